@@ -136,7 +136,7 @@ BAD = {
     "config show": (["nowhere"], "nowhere"),
     "completion": (["tcsh"], "is not one of"),
     "spel export": (["golden.json"], "is a file"),
-    "spel check": (["golden.json"], "cannot be built"),
+    "spel check": (["nowhere.prg"], "does not exist"),
     "spel run": (["nowhere.prg"], "does not exist"),
 }
 """What is a mistake in the command: exit code 2, and at most reads are sent."""

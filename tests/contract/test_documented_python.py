@@ -310,6 +310,7 @@ MAKERS = {
     "softmotion-controller.md 1": one_plc,
     "softmotion-controller.md 2": a_connected_plc,
     "spel-programs.md 1": nothing,
+    "spel-programs.md 2": nothing,
     "stopping.md 1": with_password,
     "stopping.md 2": with_password,
 }

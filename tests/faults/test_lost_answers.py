@@ -18,7 +18,7 @@ from robolink.errors import (
     TransportError,
     UnclearAnswerError,
 )
-from robolink.model import MotionProfile, Path, Verdict, WorkBox
+from robolink.model import MotionOutcome, MotionProfile, Path, Verdict, WorkBox
 from robolink.transaction import Wanted, change_tools
 
 NEW = ToolOffset(12.75, -3.25, -20)
@@ -170,6 +170,22 @@ def test_f09_a_doubled_answer_is_never_taken_for_the_next_one(serve):
             for _ in range(5):
                 assert controller.tools.read(1) == simulator.machine.tools.get(1)
                 assert controller.tools.selected() == 1
+
+
+@pytest.mark.fault("F09")
+def test_f09_a_movement_that_is_answered_twice_has_ended_and_leaves_no_doubt(serve):
+    simulator = simulator_with(FaultAction.DUPLICATE_REPLY, "Move XY")
+    with serve(simulator) as url:
+        with robolink.connect(url) as controller:
+            controller.motors(True)
+            assert lift(controller).wait(timeout_s=30.0) is MotionOutcome.ARRIVED
+            with pytest.raises((RemoteProtocolError, TransportError)):
+                for _ in range(5):
+                    controller.status()
+        with robolink.connect(url) as controller:
+            assert (
+                lift(controller, -5.0).wait(timeout_s=30.0) is MotionOutcome.ARRIVED
+            )  # nothing is blocked
 
 
 @pytest.mark.fault("F01")

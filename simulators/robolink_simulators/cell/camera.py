@@ -110,13 +110,16 @@ class CameraTruth:
 
     def picture(self, places: Iterable[XyzMm]) -> tuple[Pixel, ...]:
         """Return where the finder finds each of some places that are in the image."""
+        return tuple(pixel for pixel in self.finds(places) if pixel is not None)
+
+    def finds(self, places: Iterable[XyzMm]) -> tuple[Pixel | None, ...]:
+        """Return for each of some places where the finder finds it, ``None`` if it does not."""
         optics, rng = self.optics, self.rng
         missed = rng.random() < optics.miss_share
-        found = list[Pixel]()
+        found = list[Pixel | None]()
         for place in places:
             pixel = optics.pixel(*(a - b for a, b in zip(place, self.middle_mm, strict=True)))
-            if pixel is not None and not missed:
-                found.append(self._found(pixel))
+            found.append(None if pixel is None or missed else self._found(pixel))
         return tuple(found)
 
     def _found(self, pixel: Pixel) -> Pixel:

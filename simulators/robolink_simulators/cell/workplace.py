@@ -204,13 +204,17 @@ class Workplace(ABC):
 
         Fiducials look alike: every one in the image is found, whichever is asked for.
         """
+        return self.camera.picture(place for place, _ in self.marks(mark))
+
+    def marks(self, mark: int = TIP) -> list[tuple[XyzMm, Direction]]:
+        """Return where the tips are, or all fiducials, and how the X axis of each lies."""
         nozzle, board = self.tips.get(MOUNTED_TOOL, ToolOffset()), self.board
         if mark == TIP:
             # A held board hides the tip of its nozzle.
             shown = [tool for tool in self.tips if not (board and tool == MOUNTED_TOOL)]
-            return self.camera.picture(self.tip_mm(tool) for tool in shown)
+            return [(self.tip_mm(tool), self.axis("x", tool)) for tool in shown]
         seen = board.fiducials(nozzle) if board else ()
-        return self.camera.picture(self.robot.tip_mm(place) for place in seen)
+        return [(self.robot.tip_mm(p), self.robot.turned(axis_of(p, "x"))) for p in seen]
 
     def tip_mm(self, tool: int = MOUNTED_TOOL) -> XyzMm:
         """Return where a physical tip is now; the mounted one as its spindle wobbles."""

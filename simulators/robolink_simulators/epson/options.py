@@ -72,6 +72,12 @@ class SpelNumbers:
     port_broken: int = 2902  # docs/reference/spel.md 17
     port_timed_out: int = 2910
     port_line_too_long: int = 2915
+    vision_sequence: int = 7801
+    vision_object: int = 7802
+    vision_name: int = 7803
+    vision_uncalibrated: int = 7804
+    vision_calibration: int = 7805
+    vision_camera: int = 7806
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,6 +158,12 @@ class EpsonOptions:
         rs232_status_flags: Flags of GetStatus there [D for RC+ 5; 11 are likely since RC+ 7].
         rs232_word_port_bytes: Length of the number of a port of words there [U].
         rs232_eot_answer: What EOT is answered with [U].
+        uncalibrated_robot_result: What RobotX and its kin give without a calibration: an error, or
+            0 [open].
+        vision_not_found: What VGet does to coordinates of what was not found: it leaves the
+            variable alone, or stores 0 [U].
+        vision_acquisition_ms: Time of a picture [D: 33 to 66 ms; the value is I].
+        vision_object_ms: Time of each object of a sequence [I].
         numbers: Error numbers in use.
     """
 
@@ -210,6 +222,10 @@ class EpsonOptions:
     rs232_status_flags: Literal[10, 11] = 10
     rs232_word_port_bytes: Literal[1, 2] = 1
     rs232_eot_answer: Literal["none", "ack"] = "none"
+    uncalibrated_robot_result: Literal["error", "zero"] = "error"
+    vision_not_found: Literal["keep", "zero"] = "keep"
+    vision_acquisition_ms: int = 40
+    vision_object_ms: int = 5
     numbers: SpelNumbers = SpelNumbers()
 
 

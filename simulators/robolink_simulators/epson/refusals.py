@@ -53,6 +53,12 @@ class RefusalKind(StrEnum):
     PORT_BROKEN = "port_broken"
     PORT_TIMED_OUT = "port_timed_out"
     PORT_LINE_TOO_LONG = "port_line_too_long"
+    VISION_SEQUENCE = "vision_sequence"
+    VISION_OBJECT = "vision_object"
+    VISION_NAME = "vision_name"
+    VISION_UNCALIBRATED = "vision_uncalibrated"
+    VISION_CALIBRATION = "vision_calibration"
+    VISION_CAMERA = "vision_camera"
 
 
 class SpelRefusal(Exception):

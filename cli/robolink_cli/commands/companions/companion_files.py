@@ -10,11 +10,16 @@ from robolink.files.durable import sync_folder, write_whole
 from robolink.files.named import holds
 from robolink.messages import tr
 
-_EPSON: Final = ("epson/robolink_tools.prg", "LICENSE")
+_EPSON: Final = (
+    "epson/robolink_tools.prg",
+    "epson/calc_tool.prg",
+    "epson/calc_board_tool.prg",
+    "LICENSE",
+)
 
 
 def companion_texts() -> Mapping[str, bytes]:
-    """Return the EPSON companion's files by the name they get, with the line ends of RC+'s PC."""
+    """Return the EPSON companions' files by the name they get, with the line ends of RC+'s PC."""
     packaged = files("robolink_cli").joinpath("companions")
     # A source checkout holds them at its top; only a wheel brings them in the package.
     folder = packaged if packaged.is_dir() else Path(__file__).parents[4] / "companions"

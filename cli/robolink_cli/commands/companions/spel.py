@@ -24,10 +24,12 @@ spel.add_command(run)
 @click.option("--force", is_flag=True, help="Write over files that were changed.")
 @json_option
 def export(folder: Path, force: bool) -> None:
-    """Write the companion program, which publishes the tool table while production runs.
+    """Write the companion programs: what a controller's project can hold of ours.
 
-    Add robolink_tools.prg to the RC+ project and call RobolinkPublish; docs/monitor-only.md
-    says where. Its licence is 0BSD: it may be used in a machine without any duty.
+    robolink_tools.prg publishes the tool table while production runs: add it to the RC+ project
+    and call RobolinkPublish; docs/monitor-only.md says where. calc_tool.prg and
+    calc_board_tool.prg set tool 1 by Vision Guide; add them only where they are wanted. The
+    licence is 0BSD: they may be used in a machine without any duty.
     """
     from robolink_cli.commands.companions.companion_files import export_companions
 

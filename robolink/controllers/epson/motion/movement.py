@@ -8,6 +8,7 @@ from robolink.controllers.motion_group import not_ended_in_time
 from robolink.errors import (
     ControllerFaultError,
     RejectedError,
+    RemoteProtocolError,
     RobolinkError,
     TransportError,
     TransportTimeoutError,
@@ -94,15 +95,15 @@ class EpsonMotion:
                 return False
             try:
                 status = self._link.window.status()
-            except TransportError:
+                if status.emergency_stop or status.guard_open or status.fault:
+                    # The controller ends the statement by itself; its answer must follow soon.
+                    self._end_within(session.timeout_s)
+                    break
+                session.await_pending(wait_s=min(POLL_S, deadline.remaining_s()))
+            except (TransportError, RemoteProtocolError):
                 if self._pending.answer is None:
                     raise
-                break  # the link went after the end of the movement was announced
-            if status.emergency_stop or status.guard_open or status.fault:
-                # The controller ends the statement by itself; its answer must follow soon.
-                self._end_within(session.timeout_s)
-                break
-            session.await_pending(wait_s=min(POLL_S, deadline.remaining_s()))
+                break  # the session was over after the end of the movement was announced
         return True
 
     def _end_within(self, timeout_s: float) -> None:

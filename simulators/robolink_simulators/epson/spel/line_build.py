@@ -29,6 +29,8 @@ from robolink_simulators.epson.spel.line_tree import (
     TaskStatement,
     Trap,
     Unsimulated,
+    VisionAccess,
+    VisionRun,
 )
 from robolink_simulators.epson.spel.tree import (
     ByReference,
@@ -234,6 +236,17 @@ class ProgramBuilder(TreeBuilder):
         """Build Trap."""
         action, target = (token.lower() if token else None for token in rest[:2])
         return Trap(event, condition, action, target)
+
+    def vision_run(self, _: Token, sequence: Expression) -> VisionRun:
+        """Build VRun."""
+        return VisionRun(sequence)
+
+    def vision_access(
+        self, word: Token, path: Token, index: Expression | None, items: Items
+    ) -> VisionAccess:
+        """Build VGet or VSet."""
+        parts = tuple(part.strip().lower() for part in path.split("."))
+        return VisionAccess(word.lower(), parts, index, items)
 
     def unsimulated(self, word: Token, _: Token | None) -> Unsimulated:
         """Build a statement that is known and not carried out."""

@@ -186,6 +186,23 @@ class Trap:
 
 
 @dataclass(frozen=True, slots=True)
+class VisionRun:
+    """``VRun sequence``."""
+
+    sequence: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class VisionAccess:
+    """``VGet`` or ``VSet`` (``word``): ``sequence[.object].name[(index)], items``."""
+
+    word: str
+    path: tuple[str, ...]
+    index: Expression | None
+    items: tuple[Expression, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Unsimulated:
     """A statement of SPEL+ that the simulator does not carry out."""
 
@@ -212,6 +229,8 @@ LineNode = (
     | ChannelStatement
     | TaskStatement
     | Trap
+    | VisionRun
+    | VisionAccess
     | Unsimulated
     | Statement
 )

@@ -86,7 +86,7 @@ _UNSIMULATED_FUNCTIONS = """
 _WITH_A_FORM_OF_THEIR_OWN = """
     opencom opennet parsestr eresume error fmtstr input line read redim setcom setnet signal
     taskwait waitnet waitsig write writebin readbin close closecom closenet flush cont restart
-    tmreset resetelapsedtime randomize loadpoints savepoints
+    tmreset resetelapsedtime randomize loadpoints savepoints vrun vget vset
 """
 
 WINDOW_ONLY: Final = frozenset(

@@ -23,6 +23,7 @@ from robolink_simulators.epson.spel.tasks.task import (
 from robolink_simulators.epson.spel.tasks.traps import Traps
 from robolink_simulators.epson.spel.tasks.waits import StatementWaiting, TaskWaiting
 from robolink_simulators.epson.spel.tree import KeywordStatement, MotionStatement, Statement
+from robolink_simulators.epson.vision.system import VisionSystem
 
 BURST_NS: Final = 1_000_000
 """How long a task goes on before the others are looked at, in ns, if none of them is due."""
@@ -53,6 +54,7 @@ class ProgramRunner:
         failure: The error that ended the last task that failed.
         sharing: Locks, signals and timers.
         traps: What interrupts tasks.
+        vision: Its cameras and sequences, ``None`` for a controller without Vision Guide.
     """
 
     def __init__(
@@ -68,6 +70,7 @@ class ProgramRunner:
         self.failure: TaskFailure | None = None
         self.sharing = TaskSharing()
         self.traps = Traps(self)
+        self.vision: VisionSystem | None = None
         self._condition = condition
         self._step_ns = session.options.statement_us * 1000
         self._seen_ns = 0

@@ -10,6 +10,8 @@ from robolink_simulators.epson.spel.line_tree import (
     ChannelStatement,
     TaskStatement,
     Trap,
+    VisionAccess,
+    VisionRun,
 )
 from robolink_simulators.epson.spel.programs.emitter import Emitter
 from robolink_simulators.epson.spel.programs.families.channels import CHANNEL_STATEMENTS
@@ -17,9 +19,12 @@ from robolink_simulators.epson.spel.programs.families.control import TASK_STATEM
 from robolink_simulators.epson.spel.programs.families.interrupts import compile_trap
 from robolink_simulators.epson.spel.programs.families.texts import PROCEDURES
 from robolink_simulators.epson.spel.programs.families.timers_and_files import TIMERS_AND_FILES
+from robolink_simulators.epson.spel.programs.families.vision import compile_access, compile_run
 from robolink_simulators.epson.spel.tasks.compiled import JumpTarget, Operation
 
-FamilyStatement = TaskStatement | ChannelStatement | Trap | Call | AssignElement
+FamilyStatement = (
+    TaskStatement | ChannelStatement | Trap | Call | AssignElement | VisionRun | VisionAccess
+)
 
 PROCEDURE_TABLES: Final = (PROCEDURES, TIMERS_AND_FILES)
 """Statements written as a call; the first table that knows a name compiles it."""
@@ -38,6 +43,10 @@ def compile_family(
     match node:
         case Trap():
             return compile_trap(emitter, node, target)
+        case VisionRun():
+            return compile_run(emitter, node)
+        case VisionAccess():
+            return compile_access(emitter, node)
         case TaskStatement(word):
             return TASK_STATEMENTS[word](emitter, node)
         case ChannelStatement(word):

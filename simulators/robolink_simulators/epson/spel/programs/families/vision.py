@@ -1,0 +1,107 @@
+"""VRun, VGet and VSet (docs/reference/vision.md 1)."""
+
+from collections.abc import Callable
+
+from robolink.messages import tr
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+from robolink_simulators.epson.spel.expressions.values import as_integer, as_text
+from robolink_simulators.epson.spel.line_tree import VisionAccess, VisionRun
+from robolink_simulators.epson.spel.programs.emitter import Emitter
+from robolink_simulators.epson.spel.programs.scope import Reference
+from robolink_simulators.epson.spel.tasks.compiled import Operation
+from robolink_simulators.epson.spel.tasks.task import SpelTask, TaskKind
+from robolink_simulators.epson.spel.tasks.waits import Blocking
+from robolink_simulators.epson.spel.tree import ByReference, Expression, Name
+from robolink_simulators.epson.vision.system import RESULTS, VisionSystem
+
+_NS_PER_MS = 1_000_000
+_FORBIDDEN = frozenset({TaskKind.NO_ABORT, TaskKind.BACKGROUND})
+
+
+def _vision(t: SpelTask) -> VisionSystem:
+    if t.kind in _FORBIDDEN:
+        raise SpelRefusal(RefusalKind.NOT_IN_THIS_TASK, "No vision in this kind of task")
+    vision: VisionSystem | None = t.runner.vision
+    if vision is None:
+        raise SpelRefusal(RefusalKind.VISION_SEQUENCE, "The project has no vision sequences")
+    return vision
+
+
+def _text(emitter: Emitter, part: str) -> Callable[[SpelTask], str]:
+    """Return what gives a part of a path: a string variable's value, or the name itself."""
+    if not part.endswith("$"):
+        return lambda _: part
+    run = emitter.run(Name(part))
+    return lambda t: as_text(run(t))
+
+
+def compile_run(emitter: Emitter, node: VisionRun) -> Operation:
+    """``VRun sequence``: a bare name, or a text. It goes on when the sequence is finished.
+
+    Raises:
+        ProgramFault: It makes no sense.
+    """
+    if isinstance(node.sequence, Name) and node.sequence.arguments is None:
+        name = _text(emitter, node.sequence.name)
+    else:
+        run = emitter.run(node.sequence)
+
+        def name(t: SpelTask) -> str:
+            return as_text(run(t))
+
+    def go(t: SpelTask) -> Blocking:
+        t.session.machine.advance(t.now_ns)
+        took_ms = _vision(t).run(name(t))
+        return Blocking(lambda: False, lambda: None, end_ns=t.now_ns + took_ms * _NS_PER_MS)
+
+    return go
+
+
+def compile_access(emitter: Emitter, node: VisionAccess) -> Operation:
+    """``VGet`` into variables, or ``VSet`` from a value.
+
+    Raises:
+        ProgramFault: It makes no sense.
+    """
+    parts = [_text(emitter, part) for part in node.path]
+    if node.word == "vset":
+        return _setting(emitter, node, parts)
+    index = None if node.index is None else emitter.run(node.index)
+    count = RESULTS.get(node.path[-1], 1) if len(parts) > 2 else 1
+    if len(node.items) != count:
+        name = node.path[-1]
+        raise emitter.fault(tr("{name} fills {count} variables", name=name, count=count))
+    targets = [_target(emitter, item) for item in node.items]
+
+    def go(t: SpelTask) -> None:
+        path = tuple(part(t) for part in parts)
+        wanted = None if index is None else as_integer(index(t))
+        for value, target in zip(_vision(t).get(path, wanted), targets, strict=True):
+            if value is not None:
+                variable = target(t)
+                variable.values[0] = variable.kind.store(value)
+
+    return go
+
+
+def _setting(
+    emitter: Emitter, node: VisionAccess, parts: list[Callable[[SpelTask], str]]
+) -> Operation:
+    if len(node.items) != 1 or node.index is not None:
+        raise emitter.fault(tr("{word} takes one value", word="VSet"))
+    value = emitter.run(node.items[0])
+
+    def go(t: SpelTask) -> None:
+        given = value(t)
+        if not isinstance(given, (bool, int, float, str)):
+            raise SpelRefusal(RefusalKind.TYPE_MISMATCH, "No property is a point")
+        _vision(t).set(tuple(part(t) for part in parts), given)
+
+    return go
+
+
+def _target(emitter: Emitter, item: Expression) -> Reference:
+    given = item.target if isinstance(item, ByReference) else item
+    if not isinstance(given, Name):
+        raise emitter.fault(tr("a variable is needed"))
+    return emitter.variable(given)

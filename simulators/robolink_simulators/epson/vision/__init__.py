@@ -1,0 +1,1 @@
+"""Vision Guide in a simulated controller: sequences, calibrations, pictures of the world."""

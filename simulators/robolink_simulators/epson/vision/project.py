@@ -1,0 +1,166 @@
+"""A vision project: sequences of objects, their properties, and the calibrations of cameras.
+
+Source: docs/reference/vision.md 1, 2.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+from robolink.model import TIP
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+from robolink_simulators.epson.vision.calibration import VisionCalibration
+
+VisionValue = bool | int | float | str
+"""What properties and results are."""
+
+SEQUENCE_PROPERTIES: Final[Mapping[str, VisionValue]] = {
+    "calibration": "",
+    "camera": 1,
+    "camerabrightness": 128,
+    "cameracontrast": 128,
+    "exposuretime": 0,
+    "runtimeacquire": 1,
+}
+"""Properties of a sequence by their names in lower case, and what they are at first."""
+
+OBJECT_PROPERTIES: Final[Mapping[str, VisionValue]] = {
+    "currentresult": 1,
+    "numbertofind": 1,
+    "robotuoffset": 0.0,
+}
+"""The same of an object."""
+
+
+class PropertySet:
+    """Properties of a sequence or of an object.
+
+    Args:
+        owner: Whose they are, for messages.
+        known: Those that there are, and what they are at first.
+        given: Those that are otherwise.
+    """
+
+    def __init__(
+        self, owner: str, known: Mapping[str, VisionValue], given: Mapping[str, VisionValue]
+    ) -> None:
+        self._owner = owner
+        self._values = dict(known)
+        for name, value in given.items():
+            self.set(name.lower(), value)
+
+    def holds(self, name: str) -> bool:
+        """Tell whether there is such a property."""
+        return name in self._values
+
+    def get(self, name: str) -> VisionValue:
+        """Return what a property is.
+
+        Raises:
+            Refusal: There is none, or it is not simulated.
+        """
+        self._require(name)
+        return self._values[name]
+
+    def number(self, name: str) -> float:
+        """Return a property that is a number."""
+        return float(self.get(name))
+
+    def set(self, name: str, value: VisionValue) -> None:
+        """Change a property.
+
+        Raises:
+            Refusal: There is none, or it takes another kind of value.
+        """
+        self._require(name)
+        if isinstance(self._values[name], str) is not isinstance(value, str):
+            raise SpelRefusal(RefusalKind.TYPE_MISMATCH, f"{self._owner}.{name} is of another kind")
+        self._values[name] = value
+
+    def _require(self, name: str) -> None:
+        if name not in self._values:
+            text = f"{self._owner} has no property or result {name}, or it is not simulated"
+            raise SpelRefusal(RefusalKind.VISION_NAME, text)
+
+
+class VisionObject:
+    """Something that a sequence looks for.
+
+    Args:
+        name: Its name.
+        mark: The tip, or the number of a fiducial; all fiducials look alike to it.
+        properties: Those that are not as at first.
+    """
+
+    def __init__(
+        self, name: str, mark: int = TIP, properties: Mapping[str, VisionValue] | None = None
+    ) -> None:
+        self.name = name
+        self.mark = mark
+        self.properties = PropertySet(name, OBJECT_PROPERTIES, properties or {})
+
+
+class VisionSequence:
+    """A sequence.
+
+    Args:
+        name: Its name.
+        objects: What it looks for, in order.
+        properties: Those that are not as at first.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        objects: Iterable[VisionObject],
+        properties: Mapping[str, VisionValue] | None = None,
+    ) -> None:
+        self.name = name
+        self.objects = {one.name.lower(): one for one in objects}
+        self.properties = PropertySet(name, SEQUENCE_PROPERTIES, properties or {})
+
+    def object(self, name: str) -> VisionObject:
+        """Return one of its objects.
+
+        Raises:
+            Refusal: There is none of that name.
+        """
+        found = self.objects.get(name.lower())
+        if found is None:
+            text = f"Sequence {self.name} has no object {name}"
+            raise SpelRefusal(RefusalKind.VISION_OBJECT, text)
+        return found
+
+
+@dataclass(slots=True)
+class VisionProject:
+    """What RC+ keeps about vision beside the programs.
+
+    Attributes:
+        sequences: By their names in lower case.
+        calibrations: By their names in lower case.
+    """
+
+    sequences: dict[str, VisionSequence] = field(default_factory=dict)
+    calibrations: dict[str, VisionCalibration] = field(default_factory=dict)
+
+    @classmethod
+    def of(
+        cls, sequences: Iterable[VisionSequence], **calibrations: VisionCalibration
+    ) -> "VisionProject":
+        """Put a project together."""
+        return cls(
+            {one.name.lower(): one for one in sequences},
+            {name.lower(): one for name, one in calibrations.items()},
+        )
+
+    def sequence(self, name: str) -> VisionSequence:
+        """Return a sequence.
+
+        Raises:
+            Refusal: There is none of that name.
+        """
+        found = self.sequences.get(name.lower())
+        if found is None:
+            raise SpelRefusal(RefusalKind.VISION_SEQUENCE, f"There is no vision sequence {name}")
+        return found

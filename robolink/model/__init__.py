@@ -10,6 +10,8 @@ if TYPE_CHECKING:
     from robolink.model._controller import Controller as Controller
     from robolink.model._controller import ControllerState as ControllerState
     from robolink.model._controller import ControllerStatus as ControllerStatus
+    from robolink.model._controller_cameras import ControllerSensor as ControllerSensor
+    from robolink.model._controller_cameras import LookingController as LookingController
     from robolink.model._identity import ControllerFacts as ControllerFacts
     from robolink.model._identity import Identity as Identity
     from robolink.model._identity import Who as Who
@@ -78,6 +80,7 @@ else:
         __name__,
         {
             "_controller": "Act Capabilities Controller ControllerState ControllerStatus",
+            "_controller_cameras": "ControllerSensor LookingController",
             "record.findings": "Finding Resolver Verdict",
             "motion.geometry": "Elbow Hand Pose Posture Wrist angle_difference_deg rotate_xy",
             "_identity": "ControllerFacts Identity Who is_own_name",

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from typing import Protocol, TypeVar, runtime_checkable
 
 from robolink.calibration import CalibrationResult, VerifyResult
-from robolink.model import Controller, Pose, TipSensor, ToolOffset
+from robolink.model import Controller, ControllerSensor, Pose, TipSensor, ToolOffset
 from robolink.runner import Operator, Procedure, Runner, RunSettings, StepDone
 from robolink.stations import Found
 
@@ -81,6 +81,8 @@ class MeasurementContext:
     def runner(self, tip: ToolOffset | None = None, camera: TipSensor | None = None) -> Runner:
         """Return a runner for the flange, or for a tip at an offset from it."""
         group = self.controller.groups[0]
+        if isinstance(camera, ControllerSensor):
+            camera = camera.beside(self.controller)
         # Where nothing moves there is nothing to limit, and perhaps no pose to be read.
         start = Pose(0.0, 0.0, 0.0, 0.0) if self.start is None else self.start
         return Runner(

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from statistics import median
 
-from robolink.errors import CalibrationError
+from robolink.errors import CalibrationError, OutcomeUnknownError, StoppedError
 from robolink.messages import tr
 from robolink.model import TIP, Spot, TipSensor
 
@@ -36,8 +36,12 @@ def seen_once(sensor: TipSensor, mark: int, *, pictures: int) -> Spot:
 def _seen(sensor: TipSensor, mark: int) -> Sequence[Spot]:
     # Whatever a camera's driver raises: it must neither leave the tip down before the lens, nor be
     # taken for a failure of the controller's link.
+    # But a stop, and what nobody knows to have happened, stay what they are: a camera that is asked
+    # through the controller can meet both.
     try:
         return sensor.see(mark)
+    except (StoppedError, OutcomeUnknownError):
+        raise
     except Exception as error:
         raise CalibrationError(
             "sensor_failed",

@@ -13,6 +13,7 @@ from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import TipSensor
 from robolink.plug_ins import PlugInError, find_plug_in
+from robolink.sensing._vision_guide import VISION_GUIDE, open_vision_guide
 
 SENSORS_GROUP: Final = "robolink.sensors"
 
@@ -67,6 +68,8 @@ def sensor_name(sensor: str | TipSensor) -> str:
 
 def _opener(url: str) -> SensorOpener:
     name = _NAME.match(url)
+    if name and name[0] == VISION_GUIDE:
+        return open_vision_guide
     try:
         found = find_plug_in(SENSORS_GROUP, name[0]) if name else None
     except PlugInError as error:
@@ -82,7 +85,7 @@ def _opener(url: str) -> SensorOpener:
     if found is None:
         from importlib import metadata  # costs more than the rest of this package
 
-        known = sorted(metadata.entry_points(group=SENSORS_GROUP).names)
+        known = sorted({*metadata.entry_points(group=SENSORS_GROUP).names, VISION_GUIDE})
         raise CalibrationError(
             "sensor_not_found",
             tr("No sensor is called {url!r}.", url=sensor_name(url)),

@@ -10,6 +10,7 @@ from robolink.controllers.epson.io.bits import EpsonIo
 from robolink.controllers.epson.io.pending_values import PendingValues
 from robolink.controllers.epson.io.raw_statements import RawStatements
 from robolink.controllers.epson.io.variables import EpsonVariables
+from robolink.controllers.epson.io.vision_looks import EpsonLooks
 from robolink.controllers.epson.link.identity import FactReader
 from robolink.controllers.epson.link.line import EpsonLine, open_line
 from robolink.controllers.epson.link.link import EpsonLink
@@ -31,6 +32,7 @@ from robolink.model import (
     ControllerStatus,
     OutcomeLog,
     Secret,
+    Spot,
 )
 from robolink.protocols.epson_text import Preference
 from robolink.transport import LinkUrl
@@ -101,6 +103,10 @@ class EpsonController(ControllerCore):
         return EpsonPreserver(self._link, self.tools, self.groups[0])
 
     @cached_property
+    def _looks(self) -> EpsonLooks:
+        return EpsonLooks(self._link, self.variables)
+
+    @cached_property
     def _acts(self) -> EpsonActs:
         return EpsonActs(self._link, self.groups[0])
 
@@ -119,6 +125,30 @@ class EpsonController(ControllerCore):
             ToolError: The table was being changed, or is of another version.
         """
         return PublishedReader(self.variables).read()
+
+    def require_looks(self) -> None:
+        """Find out whether the project publishes looks of its vision system; reads only.
+
+        Raises:
+            ConfigError: It does not hold robolink_vision.prg.
+        """
+        self._looks.require_program()
+
+    def look(self, mark: int, *, program: int) -> tuple[Spot, ...]:
+        """Start the vision program and return what it saw, X and Y of the base in mm.
+
+        Args:
+            mark: The tip (0), or the number of a fiducial.
+            program: Number of the function that is started: 7 for main7.
+
+        Raises:
+            NotReadyError: The state forbids it.
+            ControllerFaultError: The look ended with an error.
+            RejectedError: The controller refused; nothing was started.
+            OutcomeUnknownError: No answer came, or the program did not end; motion is blocked
+                until a person has looked.
+        """
+        return self._looks.look(mark, program=program)
 
     def facts(self) -> ControllerFacts:
         """Read which controller and robots these are; legal while production runs."""

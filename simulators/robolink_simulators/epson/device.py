@@ -86,13 +86,11 @@ class EpsonSimulator:
         faults: What is planned to go wrong.
         exchanges: Requests answered.
         log: The last (now_ns, ">" or "<", text), with passwords hidden.
-        on_request: Called with a request before it is carried out. What it raises goes to
-            the host; the request is carried out all the same.
+        on_request: Called with a request; it is carried out all the same, whatever this raises.
         on_reply: Called with the answer before it leaves; it leaves all the same.
         watchers: Called after each act at the panel, so that a host looks for what leaves now.
         program: The program that is loaded, if any; without one Start shows a running task only.
-        present_ns: Tells the present time to such acts; a host sets it. Without one, they
-            happen at the instant that the simulator was given last.
+        present_ns: Tells such acts the time, in place of the instant given last; a host sets it.
 
     Raises:
         ConfigError: No such robot, or a state file that does not fit.
@@ -206,11 +204,11 @@ class EpsonSimulator:
         *,
         ports: Mapping[int, tuple[str, int]] | None = None,
     ) -> ProgramRunner:
-        """Load a project: Start,n runs its function mainN from now on.
+        """Load a project, in place of the one before: Start,n runs its function mainN.
 
         Args:
-            programs: Its .prg files.
-            points: Its .pts files; IOLabels.dat is taken from beside the programs.
+            programs: Its .prg files; IOLabels.dat is taken from beside them.
+            points: Its .pts files.
             ports: Where its TCP/IP ports lead whatever SetNet says.
 
         Raises:
@@ -219,11 +217,13 @@ class EpsonSimulator:
         """
         with self.acting():
             project = load_project(self._session, programs, points)
+            if self.program is not None:
+                self.program.forget()
             self.program = ProgramRunner(self._session, self.condition, project, Ports(ports))
             if "robolink_begin" in project.preserved():
                 self._companion = None  # the real one is part of the project
-            starter = self.program.starter(lambda: self._now_ns)
-            self._desk.starter = self.panel.starter = starter
+            self._desk.starter = self.program.starter(lambda: self._now_ns)
+            self.panel.starter = self._desk.starter
             return self.program
 
     def status_flags(self) -> StatusFlags:

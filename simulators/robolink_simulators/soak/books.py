@@ -36,10 +36,13 @@ class Books:
 
     Attributes:
         trusted: Whether nobody has damaged or deleted it lately.
+        lost: Whether it was deleted with what it knew of this controller, and nobody has looked
+            at the cell since.
     """
 
     def __init__(self, path: Path) -> None:
         self.trusted = True
+        self.lost = False
         self._path = path
         self._connection: sqlite3.Connection | None = None
 

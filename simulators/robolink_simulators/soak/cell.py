@@ -227,6 +227,7 @@ class VirtualCell:
             self._do(hour)
             self._settle_down()
             self._rules.left(self._plant.state())
+        self._books.lost = False  # the people are told to look, and give their word
         usable, why = self._put_right(hour)
         self._rules.at_rest(self._plant.state(), usable=usable, why=why)
         self._note(f"journal {self._books.head()}")
@@ -255,6 +256,8 @@ class VirtualCell:
             elif disturbance.what == "truncated":
                 self._computer.truncate(share)
             else:
+                self._books.lost = self._computer.known and self._books.last_number() > 0
+                self._books.close()
                 self._computer.lose()
             self._books.trusted = False
 

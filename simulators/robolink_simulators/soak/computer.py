@@ -136,6 +136,12 @@ class VirtualComputer:
         self.journal.write_bytes(data[: int(share * len(data))])
         self._beside("-wal").unlink(missing_ok=True)
 
+    @property
+    def known(self) -> bool:
+        """Whether there is a trace, beside the journal, of a controller that was changed."""
+        folder = state_folder("controllers")
+        return folder.exists() and any(folder.iterdir())
+
     def lose(self) -> None:
         """Delete the journal, as somebody may who looks for space."""
         for suffix in _SUFFIXES:

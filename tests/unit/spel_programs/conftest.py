@@ -54,14 +54,20 @@ class Cell:
 def cell(tmp_path):
     """Return a maker of cells; options are those of the controller."""
 
+    cells = []
+
     def make(text="", **options):
         files = options.pop("files", None)
         points = options.pop("points", ())
         ports = options.pop("ports", None)
         made = Cell(tmp_path, EpsonOptions(**options))
+        cells.append(made)
         return made.load(text, files=files, points=points, ports=ports) if text else made
 
-    return make
+    yield make
+    for made in cells:
+        if made.simulator.program is not None:
+            made.simulator.program.forget()
 
 
 @pytest.fixture

@@ -119,8 +119,26 @@ def test_a_controller_is_a_server_too(cell):
     thread.start()
     run_to_end(made.runner, made.simulator.advance, made.simulator.next_change, most_s=20)
     thread.join(10)
+    assert made.runner.failure is None
     assert "".join(made.runner.console).splitlines() == ["513 3"]
     assert heard == [bytes([255, 2])]
+
+
+def test_an_end_that_came_between_two_looks_is_seen_at_the_next(cell):
+    """Time that stands still for a controller passes outside."""
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    made = cell(
+        "Function main\nOpenNet #202 As Server\nWaitNet #202\nPrint 1\nFend\n",
+        ports={202: ("127.0.0.1", port)},
+    )
+    made.runner.start("main", 0)
+    made.simulator.advance(10_000_000)
+    with socket.create_connection(("127.0.0.1", port), 10):
+        change = made.simulator.next_change()
+        assert change > made.simulator.now_ns
+        made.simulator.advance(change)
+    assert list(made.runner.console) == ["1\r\n"]
 
 
 def test_a_link_that_breaks_is_dealt_with_and_opened_again(cell, partner):

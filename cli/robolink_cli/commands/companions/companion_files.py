@@ -12,6 +12,7 @@ from robolink.messages import tr
 
 _EPSON: Final = (
     "epson/robolink_tools.prg",
+    "epson/robolink_vision.prg",
     "epson/calc_tool.prg",
     "epson/calc_board_tool.prg",
     "LICENSE",

@@ -27,7 +27,8 @@ def export(folder: Path, force: bool) -> None:
     """Write the companion programs: what a controller's project can hold of ours.
 
     robolink_tools.prg publishes the tool table while production runs: add it to the RC+ project
-    and call RobolinkPublish; docs/monitor-only.md says where. calc_tool.prg and
+    and call RobolinkPublish; docs/monitor-only.md says where. robolink_vision.prg takes looks for
+    the camera vision-guide (docs/camera-and-board.md). calc_tool.prg and
     calc_board_tool.prg set tool 1 by Vision Guide; add them only where they are wanted. The
     licence is 0BSD: they may be used in a machine without any duty.
     """

@@ -155,7 +155,10 @@ def _run(
         raise click.UsageError(
             tr("There is no function {name} without arguments.", name=function)
         ) from refusal
-    return run_to_end(runner, simulator.advance, simulator.next_change, most_s=most_s)
+    try:
+        return run_to_end(runner, simulator.advance, simulator.next_change, most_s=most_s)
+    finally:
+        runner.forget()
 
 
 def _failed(failure: "TaskFailure") -> ControllerFaultError:

@@ -26,6 +26,8 @@ class WireRules:
         markers = self._on.books.markers()
         if process.stopped_ns is not None:
             self._after_stop(process, sent, markers)
+        if self._on.books.lost and sent.kind in (SentKind.MOVE, SentKind.WRITE):
+            self._on.hold("LossIsNoticed", False, f"{sent.text} leaves, the journal is gone")
         if not self._on.books.trusted:
             return
         if sent.kind is SentKind.MOVE:

@@ -20,6 +20,7 @@ NAMES: Final = (
     "KeptOnProof",
     "NoMotionInDoubt",
     "NothingWithoutRecord",
+    "LossIsNoticed",
     "NoWriteWithoutLease",
     "BooksAgree",
     "ExitCodeIsTrue",

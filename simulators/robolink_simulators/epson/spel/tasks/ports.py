@@ -99,7 +99,7 @@ class Ports:
         host, tcp_port = self._address(number, port)
         try:
             if server:
-                port.listener = socket.create_server((host, tcp_port), backlog=1)
+                port.listener = socket.create_server((host, tcp_port))
                 port.listener.setblocking(False)
             else:
                 port.link = socket.socket(socket.AF_INET, socket.SOCK_STREAM)

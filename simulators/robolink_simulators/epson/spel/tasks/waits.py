@@ -88,9 +88,13 @@ class Blocking:
         self._polled = polled
 
     def due_ns(self, seen_ns: int) -> int:
-        """Return when it is ready or its time is up, as far as is known."""
+        """Return when it is ready or its time is up, as far as is known.
+
+        What became ready outside did so after the last look: an instant that has been dealt
+        with never comes again.
+        """
         if self._ready():
-            return seen_ns
+            return seen_ns + 1
         return min(self._end_ns, seen_ns + POLL_NS) if self._polled else self._end_ns
 
     def look(self, now_ns: int) -> bool:

@@ -1,0 +1,217 @@
+"""Defects that robolink had, or that its rules speak of, each as a named replacement of functions.
+
+None is an edit of the source: :data:`DEFECTS` says what is put in the place of what for the time
+of one history. Most were found from outside, by foreign clients, proxies, a second thread in the
+worst microsecond, careless people (docs/reliability.md, "What was found from outside, and what
+holds now"); the others break one sentence of docs/reference/rules.md each.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from robolink_simulators.soak import CellKind
+
+from robolink.model import MarkerKind
+from robolink.standing import UNTOUCHED
+from tests.soak import stand_ins
+
+
+@dataclass(frozen=True, slots=True)
+class KnownDefect:
+    """One defect, put back.
+
+    Attributes:
+        name: What is wrong, in one line.
+        replacements: What is put in the place of what dotted names lead to.
+        kind: The kind of cell that can have it; ``None`` for each.
+        missed_because: Why no rule finds it in the hours that are run; empty where one does.
+    """
+
+    name: str
+    replacements: Mapping[str, object]
+    kind: CellKind | None = None
+    missed_because: str = ""
+
+
+_NOTERS: Final = (
+    "robolink.controllers.controller_core",
+    "robolink.controllers.markers",
+    "robolink.model.record.ledger",
+    "robolink.transaction._change",
+)
+_WIRE: Final = "robolink.controllers.softmotion.link.wire.MailboxWire.ended"
+_COMMANDS: Final = "robolink.controllers.softmotion.link.commands"
+_SENDER: Final = f"{_COMMANDS}.CommandSender"
+_CORE: Final = "robolink.controllers.controller_core.ControllerCore"
+_GROUP: Final = "robolink.controllers.softmotion.motion.group"
+_BEGIN: Final = "robolink.controllers.markers.MarkerStore.begin"
+_SESSION: Final = "robolink.controllers.epson.link.session.EpsonSession"
+
+DEFECTS: Final = (
+    KnownDefect(
+        "a stop holds nothing back",
+        {"robolink.stop_latch.StopLatch.admit": stand_ins.nothing},
+    ),
+    KnownDefect(
+        "a stop is looked for before the lock of the exchange, not under it",
+        {f"{_SESSION}._exchanging": stand_ins.asked_before_the_lock},
+        CellKind.EPSON,
+    ),
+    KnownDefect(
+        "a stop latches when the machine rests, not before",
+        {
+            f"{_CORE}.stop": stand_ins.latched_when_at_rest,
+            "robolink.stop_latch.StopLatch.stopping": stand_ins.open_while_stopping,
+        },
+        missed_because=(
+            "a movement would have to leave within the two points between the last "
+            "look and the end of the stop"
+        ),
+    ),
+    KnownDefect(
+        "a stop opens again by itself when the machine rests",
+        {f"{_CORE}.stop": stand_ins.released_at_once},
+    ),
+    KnownDefect(
+        "what was stopped may end well",
+        {"robolink.stop_latch.StopLatch.require_open": stand_ins.nothing},
+        missed_because=(
+            "nothing leaves under the latch, so only a stop among the last reads of a deed tells"
+        ),
+    ),
+    KnownDefect(
+        "an EPSON stop that is refused while a movement runs is acknowledged",
+        {"robolink.controllers.epson.motion.group.bring_to_rest": stand_ins.stop_not_looked_after},
+        CellKind.EPSON,
+    ),
+    KnownDefect(
+        "a PLC's stop is acknowledged when it is accepted",
+        {f"{_GROUP}.bring_group_to_rest": stand_ins.stop_sent_only},
+        CellKind.SOFTMOTION,
+    ),
+    KnownDefect(
+        "what is unsettled blocks nothing",
+        {"robolink.controllers.markers.MarkerStore.require_settled": stand_ins.nothing},
+    ),
+    KnownDefect("a movement leaves no durable mark", {_BEGIN: stand_ins.unmarked(MarkerKind.MOVE)}),
+    KnownDefect("a write leaves no durable mark", {_BEGIN: stand_ins.unmarked(MarkerKind.SET)}),
+    KnownDefect(
+        "a calibration that is killed leaves no mark of the tool of before",
+        {
+            _BEGIN: stand_ins.unmarked(MarkerKind.SELECTION),
+            "robolink.controllers.markers.MarkerStore.note_selection": stand_ins.nothing,
+        },
+    ),
+    KnownDefect(
+        "a change that is killed before its proof leaves no mark",
+        {_BEGIN: stand_ins.unmarked(MarkerKind.CHANGE)},
+    ),
+    KnownDefect(
+        "all movements of a process share one operation", {_BEGIN: stand_ins.one_marker_for_all()}
+    ),
+    KnownDefect(
+        "the tool of before is not selected again",
+        {"robolink.controllers.preserving.Preserver.restore": stand_ins.forgotten_selection},
+    ),
+    KnownDefect(
+        "what was not answered counts as not done",
+        {"robolink.controllers.markers.MarkerStore.unless_stopped": stand_ins.settled_by_silence},
+    ),
+    KnownDefect(
+        "recover believes that a write did not take, and reads nothing",
+        {"robolink.controllers.resolving.examine_write": stand_ins.unread},
+    ),
+    KnownDefect(
+        "what the journal commits is not synced",
+        {"robolink.journal.store.engines._prepare": stand_ins.not_synced},
+    ),
+    KnownDefect(
+        "an error of the journal's disk is one of SQLAlchemy's",
+        {"robolink.journal.store.store.journal_error": stand_ins.as_it_was_raised},
+    ),
+    KnownDefect(
+        "an exit code says what broke last, not what stands unproved",
+        {"robolink_cli.console.exit_codes.standing_after": lambda _error: UNTOUCHED},
+    ),
+    KnownDefect(
+        "of several tools only the last is put back",
+        {"robolink.transaction._change.put_back": stand_ins.last_only},
+        missed_because=(
+            "it ends with 6 and says which tool holds what, and a person typed the value"
+        ),
+    ),
+    KnownDefect(
+        "a deleted journal is taken for a new one",
+        {"robolink.journal._outcome_log.traces_of": stand_ins.nothing},
+    ),
+    KnownDefect(
+        "a mailbox block is written again after silence",
+        {
+            f"{_SENDER}._await_acknowledgement": stand_ins.written_again_after_silence,
+            _WIRE: stand_ins.still_usable,
+        },
+        CellKind.SOFTMOTION,
+        missed_because=(
+            "a block that comes twice under one number is carried out once, so no rule "
+            "forbids it any more"
+        ),
+    ),
+    KnownDefect(
+        "another client's acknowledgement is taken for ours",
+        {f"{_COMMANDS}.is_own": stand_ins.owner_not_compared},
+        CellKind.SOFTMOTION,
+        missed_because="the other client never has the number that is awaited",
+    ),
+    KnownDefect(
+        "an EPSON session goes on after a time-out",
+        {f"{_SESSION}._end": stand_ins.nothing},
+        CellKind.EPSON,
+        missed_because=("the late answer ends it: its name, or its place in line, is another's"),
+    ),
+    KnownDefect(
+        "the lease is looked at, and never taken",
+        {"robolink.journal._lease.Lease.secure": stand_ins.lease_not_proved},
+    ),
+    KnownDefect(
+        "what a change wrote is not taken back when it fails",
+        {"robolink.transaction._change.ToolChange._take_back": stand_ins.nothing},
+        missed_because=("its mark stays open, it ends with 6, and recover takes it back"),
+    ),
+    KnownDefect(
+        "recover keeps what nobody verified",
+        {"robolink.transaction._recovery.Settler": stand_ins.keeping},
+    ),
+    KnownDefect(
+        "the answer to a write is taken for its proof",
+        {"robolink.controllers.tool_writing.ToolWrite.read": stand_ins.requested_believed},
+        missed_because="a controller that accepts a write and ignores it is drawn too rarely",
+    ),
+    KnownDefect(
+        "an error does not say what it left on the controller",
+        {f"{module}.note_standing": stand_ins.nothing for module in _NOTERS},
+    ),
+    KnownDefect(
+        "who only presses ENTER gets a proof",
+        {
+            "robolink.procedures.pin.touch_plan.TouchPlan.__init__": stand_ins.nominal,
+            "robolink.nozzle_change._change.require_proved": stand_ins.nothing,
+        },
+    ),
+    KnownDefect(
+        "a tool change after a restart of the PLC goes on",
+        {"robolink.controllers.softmotion.link.snapshots.Snapshots._other_plc": stand_ins.nothing},
+        CellKind.SOFTMOTION,
+        missed_because="the PLC itself refuses what names its start of before",
+    ),
+    KnownDefect(
+        "an interruption strikes in the middle of an exchange",
+        {"robolink.interrupts.InterruptGate.__enter__": stand_ins.nothing},
+    ),
+    KnownDefect(
+        "a login that comes back bent is shown",
+        {f"{_SESSION}._take_aside": stand_ins.shown_whole},
+        CellKind.EPSON,
+        missed_because="a login that is bent on its way is drawn too rarely",
+    ),
+)

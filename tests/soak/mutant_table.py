@@ -1,0 +1,103 @@
+"""``python -m tests.soak.mutant_table [WORDS]``: put known defects back, print what finds each.
+
+The machine is looked at first: without a defect every rule has to hold in the same hours. Ends
+with 1 when one was broken there, or when a defect is missed of which that was not known.
+"""
+
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from robolink_simulators.soak import CellKind, run
+
+from tests.soak.known_defects import DEFECTS, KnownDefect
+
+MOST_HOURS: Final = 200
+"""Virtual robot-hours in which a defect has to be found."""
+
+HOURS_A_SEED: Final = 10
+SEEDS: Final = range(MOST_HOURS // HOURS_A_SEED)
+"""In this order, for every defect alike; none was chosen because it finds something."""
+
+
+@dataclass(frozen=True, slots=True)
+class Search:
+    """How a known defect was looked for.
+
+    Attributes:
+        defect: The defect.
+        rule: Which rule was broken first, empty where none was.
+        seed: Under which seed.
+        hours: Virtual hours until then; all of them where nothing was found.
+        cpu_s: What that took.
+    """
+
+    defect: KnownDefect
+    rule: str
+    seed: int
+    hours: int
+    cpu_s: float
+
+    def __str__(self) -> str:
+        kind = self.defect.kind.value if self.defect.kind else "both"
+        found = f"{self.rule} | {self.seed}" if self.rule else "**missed** |"
+        return f"| {self.defect.name} | {kind} | {found} | {self.hours} | {self.cpu_s:.1f} |"
+
+
+def search_for(defect: KnownDefect) -> Search:
+    """Run seed after seed with a defect put back, until a rule is broken or the hours are over."""
+    begun_s, hours = time.process_time(), 0
+    for seed in SEEDS:
+        story = run(seed, HOURS_A_SEED, kind=defect.kind, replacements=defect.replacements)
+        if story.broken:
+            first = story.broken[0]
+            hours += first.hour + 1
+            return Search(defect, first.rule, seed, hours, time.process_time() - begun_s)
+        hours += HOURS_A_SEED
+    return Search(defect, "", 0, hours, time.process_time() - begun_s)
+
+
+def broken_without_a_defect() -> list[str]:
+    """Return the rules that do not hold in the same hours as the code is, in words; none should."""
+    return [
+        f"seed {seed}, {kind}: {one}"
+        for kind in CellKind
+        for seed in SEEDS
+        for one in run(seed, HOURS_A_SEED, kind=kind).broken
+    ]
+
+
+def table(searches: Sequence[Search]) -> Iterator[str]:
+    """Yield the table of docs/reliability.md, "Known defects put back"."""
+    yield "| defect put back | cell | found by | seed | hours until then | CPU s |"
+    yield "|---|---|---|---:|---:|---:|"
+    yield from map(str, searches)
+    found = sum(bool(one.rule) for one in searches)
+    yield ""
+    yield f"{found} of {len(searches)} found within {MOST_HOURS} virtual robot-hours each. Missed:"
+    yield ""
+    for one in searches:
+        if not one.rule:
+            yield f"* {one.defect.name}: {one.defect.missed_because or 'nobody knows why'}."
+
+
+def main(words: Sequence[str]) -> int:
+    """Print it all, or of those defects only whose name holds one of some words."""
+    sound = [] if words else broken_without_a_defect()
+    if not words:
+        hours = len(CellKind) * MOST_HOURS
+        print(f"without a defect: {hours} virtual robot-hours, {len(sound)} rules broken")
+        print("\n".join(sound))
+    chosen = [one for one in DEFECTS if not words or any(word in one.name for word in words)]
+    searches = []
+    for defect in chosen:
+        print(f"... {defect.name}", file=sys.stderr, flush=True)
+        searches.append(search_for(defect))
+    print("\n".join(table(searches)))
+    return 1 if sound or not all(one.rule or one.defect.missed_because for one in searches) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,232 @@
+"""What is put in the place of functions of robolink, so that a known defect is back.
+
+Which stands for which: :mod:`tests.soak.known_defects`.
+"""
+
+import contextlib
+import sqlite3
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+from robolink.checkpoints import Checkpoint, checkpoint
+from robolink.controllers.controller_core import ControllerCore
+from robolink.controllers.epson.link.requests import command_class_of
+from robolink.controllers.epson.link.session import EpsonSession
+from robolink.controllers.markers import MarkerStore
+from robolink.controllers.softmotion.link.commands import CommandSender
+from robolink.errors import RobolinkError, TransportTimeoutError
+from robolink.journal._lease import Grip
+from robolink.journal.store import engines
+from robolink.model import EntryKind, Finding, Marker, MarkerKind, NewEntry, Verdict, new_operation
+from robolink.procedures.pin.touch_plan import TouchPlan
+from robolink.stop_latch import StopLatch
+from robolink.timing import wall_label
+from robolink.transaction import _put_back as putting_back
+from robolink.transaction._settling import Settler
+
+Function = Callable[..., Any]
+
+
+def nothing(*_given: object, **_named: object) -> None:
+    """Stand in for a look that refuses."""
+
+
+# Stopping.
+
+
+def asked_before_the_lock(session: EpsonSession, request: Any) -> Any:
+    """Ask the latch, and only then wait for the lock of the exchange."""
+
+    @contextmanager
+    def exchanging() -> Iterator[None]:
+        held: Any = session
+        session.latch.admit(command_class_of(request), request.name)
+        checkpoint(Checkpoint.LOCK, _shown(request))
+        try:
+            with held._gate, held._wire:
+                checkpoint(Checkpoint.HELD, _shown(request))
+                held._check_usable(request)
+                if held._pending is not None and request.name == "Abort":
+                    held._pending.abort_requested = True
+                yield
+        finally:
+            checkpoint(Checkpoint.EXCHANGE, _shown(request))
+
+    return exchanging()
+
+
+def _shown(request: Any) -> str:
+    return str(request.parameters[0] if request.name == "Execute" else request.name)
+
+
+def latched_when_at_rest(controller: ControllerCore) -> None:
+    """Bring the machine to rest first, and latch then."""
+    for group in controller.groups:
+        group.stop()
+    controller.latch.close()
+
+
+@contextmanager
+def open_while_stopping(_latch: StopLatch) -> Iterator[None]:
+    yield
+
+
+def stop_not_looked_after(ask: Function, _clock: object, *, controller: str) -> None:
+    """Send the Stop that ends tasks, and take a refusal of it for rest."""
+    with contextlib.suppress(RobolinkError):
+        ask("Stop")
+
+
+def stop_sent_only(
+    commands: CommandSender, _snapshots: object, _clock: object, *, controller: str
+) -> None:
+    """Take a stop that was acknowledged for rest."""
+    commands.stop()
+
+
+_stop = ControllerCore.stop
+
+
+def released_at_once(controller: ControllerCore) -> None:
+    """Open the latch when the machine rests, without anybody's word."""
+    _stop(controller)
+    controller.release_stop()
+
+
+# Markers.
+
+_begin = MarkerStore.begin
+
+
+def unmarked(*kinds: MarkerKind) -> Function:
+    """Return a beginning that stores nothing for some kinds of markers."""
+
+    def begin(
+        store: Any,
+        kind: MarkerKind,
+        request: str,
+        details: Mapping[str, object],
+        *,
+        operation: str = "",
+    ) -> Marker:
+        if kind not in kinds:
+            return _begin(store, kind, request, details, operation=operation)
+        marker = Marker(operation or new_operation(), kind, request, wall_label(), dict(details))
+        store.ledger.begin(marker)
+        if kind in (MarkerKind.SELECTION, MarkerKind.CHANGE):
+            store._procedures[kind] = marker
+        return marker
+
+    return begin
+
+
+def one_marker_for_all() -> Function:
+    """Return a beginning that gives every movement the operation of the first."""
+
+    def begin(
+        store: Any,
+        kind: MarkerKind,
+        request: str,
+        details: Mapping[str, object],
+        *,
+        operation: str = "",
+    ) -> Marker:
+        if kind is MarkerKind.MOVE:
+            operation = operation or "movement"
+        return _begin(store, kind, request, details, operation=operation)
+
+    return begin
+
+
+def forgotten_selection(preserver: Any, marker: Marker) -> None:
+    """Forget the marker of a procedure without selecting the tool of before."""
+    preserver._link.markers.clear(marker)
+
+
+def written_again_after_silence(sender: Any, command: Any, before: Any) -> Any:
+    """Take silence for a damaged block, which may be written again."""
+    try:
+        return _await_acknowledgement(sender, command, before)
+    except TransportTimeoutError:
+        return before, False
+
+
+_await_acknowledgement = CommandSender._await_acknowledgement
+
+
+def still_usable(wire: Any, error: RobolinkError) -> RobolinkError:
+    return error
+
+
+@contextmanager
+def settled_by_silence(store: MarkerStore, marker: Marker) -> Iterator[None]:
+    """Forget the marker of what was not answered."""
+    try:
+        yield
+    except RobolinkError:
+        store.clear(marker)
+        raise
+
+
+def unread(tools: Any, marker: Marker) -> Finding:
+    """Say that a write did not take without looking."""
+    tool, before = int(str(marker.details["tool"])), marker.details.get("before")
+    details = {**marker.details, "value": before, "found_later": True}
+    entry = NewEntry(EntryKind.NOT_APPLIED, operation=marker.operation, tool=tool, details=details)
+    return Finding(marker, Verdict.NOT_APPLIED, "it did not take", entries=(entry,))
+
+
+_prepare = engines._prepare
+
+
+def not_synced(connection: sqlite3.Connection) -> None:
+    """Leave it to the system when what was committed reaches the disk."""
+    _prepare(connection)
+    connection.execute("PRAGMA synchronous=OFF")
+
+
+def as_it_was_raised(error: Exception, *_given: object) -> Exception:
+    return error
+
+
+def owner_not_compared(command: Any, now: Any) -> bool:
+    return (now.ack_head, now.opcode_echo) == (command.sequence, command.opcode)
+
+
+def lease_not_proved(lease: Any, rows: Any, _purpose: str, _operator: str) -> Grip:
+    """Take the look at the lease for the lease."""
+    return Grip(1)
+
+
+_take_aside = EpsonSession._take_aside
+
+
+def shown_whole(session: EpsonSession, event: object, *, hidden: bool = False) -> None:
+    """Show what came unasked, the password of a bent login too."""
+    _take_aside(session, event)
+
+
+# The change, and what is said of it.
+
+
+def keeping(controller: Any, *, keep: bool) -> Settler:
+    """Keep what nobody verified, whatever the person said."""
+    return Settler(controller, keep=True)
+
+
+def requested_believed(write: Any) -> Any:
+    """Take the answer to a write for the proof of it."""
+    return write.requested if write.acknowledged else write.read_doubted()
+
+
+def last_only(controller: Any, steps: Any, **named: Any) -> Any:
+    return putting_back.put_back(controller, steps[-1:], **named)
+
+
+_init = TouchPlan.__init__
+
+
+def nominal(plan: TouchPlan, *given: Any, **named: Any) -> None:
+    """Bring the tip straight back over the pin, and judge nothing."""
+    _init(plan, *given, **{**named, "nominal": True})

@@ -1,0 +1,32 @@
+"""Known defects that are put back are found; all of them: ``make soak`` prints the table."""
+
+import pytest
+from robolink_simulators.soak import run
+
+from tests.soak.known_defects import DEFECTS
+from tests.soak.mutant_table import Search, table
+
+BY_NAME = {defect.name: defect for defect in DEFECTS}
+
+
+@pytest.mark.parametrize(
+    ("name", "rule"),
+    [
+        ("a movement leaves no durable mark", "MovesOnce"),
+        ("the tool of before is not selected again", "SameToolSelected"),
+    ],
+)
+def test_a_defect_that_is_put_back_is_found_by_its_rule_and_only_with_it(name, rule):
+    story = run(0, 1, replacements=BY_NAME[name].replacements)
+    assert rule in {one.rule for one in story.broken}, story.told()
+    assert run(0, 1).broken == []
+
+
+def test_each_known_defect_has_one_name_and_a_miss_is_printed_as_one():
+    assert len(BY_NAME) == len(DEFECTS) >= 20
+    found = Search(DEFECTS[0], "StillAfterStop", 2, 24, 1.0)
+    missed = Search(DEFECTS[1], "", 0, 200, 1.0)
+    lines = list(table([found, missed]))
+    assert "| StillAfterStop | 2 | 24 |" in lines[2]
+    assert "**missed**" in lines[3]
+    assert "1 of 2 found within 200 virtual robot-hours each. Missed:" in lines

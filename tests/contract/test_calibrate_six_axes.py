@@ -78,7 +78,7 @@ def mount(at):
     at.cell.mount_plate(noise_mm=SENSOR_SIGMA_MM)
 
 
-@each(*ROBOTS, chosen={"C8-C1401CR"})
+@each(*ROBOTS, chosen=())
 def test_a_pivot_recovers_the_whole_tip(at):
     document = recovered(at.calibrate("pivot", "--count", "4"), at.truth, "xyz")
     assert document["measured"] == ["x_mm", "y_mm", "z_mm"]
@@ -176,7 +176,7 @@ def test_tools_on_one_head_are_measured_one_by_one(at):
     assert at.stored == first
 
 
-@each("C8-C901S", "C8-C1401CR", "CX4-A601S", chosen={"C8-C901S"})
+@each("C8-C901S", "C8-C1401CR", "CX4-A601S", chosen=())
 def test_a_recipe_measures_writes_and_proves(at, tmp_path):
     x, y, z, u, v, w = at.world.robot.flange().coordinates()
     safe = f"{{ x_mm = {x}, y_mm = {y}, z_mm = {z + 5}, u_deg = {u}, v_deg = {v}, w_deg = {w} }}"
@@ -219,6 +219,9 @@ def look_with_a_camera(at):
     return at.calibrate("camera-affine", "--at", place, *usual), "xy"
 
 
+CELLS, LEAST_HELD = 40, 32
+
+
 @pytest.mark.soak
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize("robot", ["C8-C901S", "CX4-A601SR"])
@@ -229,13 +232,20 @@ def look_with_a_camera(at):
 def test_the_interval_of_each_method_holds_the_truth_about_as_often_as_it_says(
     measure, robot, tmp_path, monkeypatch
 ):
-    """Counted over cells with other seeds; 60 of them tell 95 % from 85 %, not from 98 %."""
-    held = []
-    for seed in range(200, 260):
+    """Counted over cells with other seeds.
+
+    An interval of 95 % holds 31 or fewer of 40 once in 7,700 times (binomial distribution); one
+    that holds 65 % holds 32 or more in 3 of 100. Each axis is counted for itself: they share their
+    touches.
+    """
+    held = dict[str, int]()
+    for seed in range(200, 200 + CELLS):
         folder = tmp_path / str(seed)
         folder.mkdir()
         with method_cell(robot, folder, monkeypatch, seed=seed) as at:
             done, axes = measure(at)
             assert done.code == 0, done.err[-1500:]
-            held += [abs(wrong) <= half for wrong, half in wrong_mm(done.document, at.truth, axes)]
-    assert sum(held) / len(held) >= 0.87
+            wrongs = wrong_mm(done.document, at.truth, axes)
+            for axis, (wrong, half) in zip(axes, wrongs, strict=True):
+                held[axis] = held.get(axis, 0) + (abs(wrong) <= half)
+    assert min(held.values()) >= LEAST_HELD, held

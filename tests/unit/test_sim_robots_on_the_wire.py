@@ -8,6 +8,12 @@ from pathlib import Path
 import pytest
 from robolink_simulators.cell.frames import zyx
 from robolink_simulators.epson import EpsonSimulator
+from robolink_simulators.epson.arm.joints import Joints
+from robolink_simulators.epson.arm.robot_settings import SingularSurroundings
+from robolink_simulators.epson.arm.robots import find_robot
+from robolink_simulators.epson.arm.six_axes import forward
+from robolink_simulators.epson.arm.tilted_legs import plan_line
+from robolink_simulators.epson.arm.trajectory import LinePace
 from robolink_simulators.epson.memory.points import frame_at
 
 from robolink.model import Elbow, Posture, Wrist
@@ -126,6 +132,10 @@ def test_tools_take_six_values_and_locals_lean(robot):
         ("C8-C901S", "Go XY(0, 1500, 500, 90, 0, 180)", 4001),
         ("C8-C901S", "AvoidSingularity 5", 4002),
         ("T6-602S", "AvoidSingularity 1", 4028),
+        ("T6-602S", "SingularityDist 10", 4028),
+        ("C8-C901S", "SingularitySpeed 101", 4002),
+        ("C8-C901S", "J1Angle P1", 4028),
+        ("T6-602S", "J4Angle P1", 4028),
         ("GX8-C453S", "Go JA(90, 146, -280, 0)", 4001),
         ("GX8-C453C", "Go JA(90, -138, -250, 0)", 4001),
         ("T6-602S", "Go JA(0, 0, 0, 0, 0, 0)", 4028),
@@ -135,6 +145,37 @@ def test_what_a_robot_cannot_do_is_refused(robot, name, statement, code):
     run = robot(name)
     assert run(statement) == "!Execute,99"
     assert run.client.code() == code
+
+
+def test_what_counts_as_near_a_singular_place_can_be_set(robot):
+    """SPEL8 p. 157, 768 to 772: AvoidSingularity sets all three back."""
+    run = robot("C8-C901S")
+    shown = "Print SingularityAngle, SingularitySpeed, SingularityDist"
+    assert run(shown).split() == ["10", "10", "30"]
+    assert run("SingularityAngle 5; SingularitySpeed 20; SingularityDist 40.5") == "0"
+    assert run(shown).split() == ["5", "20", "40.5"]
+    assert run("SingularityDist").strip() == "40.5"
+    assert run("AvoidSingularity 1") == "0"
+    assert run(shown).split() == ["10", "10", "30"]
+
+
+def test_a_line_stays_what_it_is_where_nothing_counts_as_near():
+    model = find_robot("C8-C901S")
+    start, end = Joints(0, -35, 5, 80, -2, 0), Joints(0, -35, 5, -80, -2, 160)
+    poses = (forward(model, start), forward(model, end))
+
+    def leg(around):
+        return plan_line(
+            model,
+            poses,
+            LinePace(250.0, 2500.0, 2500.0, 90.0, 400.0),
+            offset=None,
+            near=start,
+            avoiding=around,
+        )
+
+    assert leg(SingularSurroundings()).detours
+    assert not leg(SingularSurroundings(angle_deg=0.0, distance_mm=0.0)).detours
 
 
 def test_near_the_singular_wrist_a_line_is_slow_or_refused(robot):

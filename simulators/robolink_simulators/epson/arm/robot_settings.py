@@ -10,6 +10,21 @@ FINE_PULSES: Final = 10
 """Default of Fine; per model in the reference, 10 in its sample (docs/reference/spel.md 7.3)."""
 
 
+@dataclass(frozen=True, slots=True)
+class SingularSurroundings:
+    """How far the neighbourhoods of singular places reach (docs/reference/epson-robots.md).
+
+    Attributes:
+        angle_deg: SingularityAngle: of joint 5 from 0.
+        speed_percent: SingularitySpeed: from which speed of joint 4 that counts.
+        distance_mm: SingularityDist: of the wrist from the axis of joint 1.
+    """
+
+    angle_deg: float = 10.0
+    speed_percent: float = 10.0
+    distance_mm: float = 30.0
+
+
 @dataclass(slots=True)
 class RobotSettings:
     """Settings without a bearing on where the robot goes, but for the last four.
@@ -28,6 +43,7 @@ class RobotSettings:
         free_joints: Joints that SFree has released.
         home_pulses: HomeSet of each joint, ``None`` before one was given.
         avoid_singularity: AvoidSingularity, 0 to 4.
+        surroundings: Of singular places; AvoidSingularity sets them back.
     """
 
     fine_pulses: tuple[int, ...]
@@ -40,6 +56,12 @@ class RobotSettings:
     free_joints: set[int] = field(default_factory=set)
     home_pulses: tuple[int, ...] | None = None
     avoid_singularity: int = 1
+    surroundings: SingularSurroundings = SingularSurroundings()
+
+    @property
+    def avoided(self) -> SingularSurroundings | None:
+        """Return what a straight way keeps clear of, ``None`` where it does not."""
+        return self.surroundings if self.avoid_singularity else None
 
     @classmethod
     def of(cls, axes: int) -> "RobotSettings":

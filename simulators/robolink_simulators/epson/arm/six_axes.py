@@ -14,6 +14,7 @@ from typing import Final, NamedTuple
 from robolink.model import Elbow, Hand, Pose, Posture, Wrist
 from robolink_simulators.cell.frames import Frame, Matrix, Vector, printed_angles, zyx
 from robolink_simulators.epson.arm.joints import Joints, nearest_turn, within, wrapped
+from robolink_simulators.epson.arm.robot_settings import SingularSurroundings
 from robolink_simulators.epson.arm.robots import RobotModel
 from robolink_simulators.epson.refusals import OutOfReach
 
@@ -23,9 +24,6 @@ down, docs/reference/epson-robots.md, "Flags")."""
 
 FIRST_TURN_DEG: Final = 180.0
 
-SINGULARITY_ANGLE_DEG: Final = 10.0
-SINGULARITY_SPEED: Final = 0.10
-SINGULARITY_DIST_MM: Final = 30.0
 
 _J1, _J4, _J5 = 0, 3, 4
 _STRAIGHT = 1e-7
@@ -241,11 +239,11 @@ def _in_half_turn(angle_deg: float, flag: int) -> float:
 
 
 def singular_stretches(
-    model: RobotModel, knots: Sequence[Joints], rate: float
+    model: RobotModel, knots: Sequence[Joints], rate: float, around: SingularSurroundings
 ) -> tuple[tuple[int, int], ...]:
     """Return the first and the last knot of each stretch near a singular place.
 
-    The neighbourhoods are those of AvoidSingularity with its defaults (documented,
+    The neighbourhoods are those of AvoidSingularity (documented,
     docs/reference/epson-robots.md, "Singularities"): joint 5 within SingularityAngle of 0 while
     joint 4 is faster than SingularitySpeed, and the wrist within SingularityDist of the axis of
     joint 1. There joint 1 has to be as fast (assumed, or a slow line beside it would be left too).
@@ -254,9 +252,10 @@ def singular_stretches(
         model: The robot.
         knots: The joints at even shares of the way.
         rate: How much of the way a second holds.
+        around: How far the neighbourhoods reach.
     """
     per_s = rate * (len(knots) - 1)
-    near = [_is_near(model, knots[i], knots[i + 1], per_s) for i in range(len(knots) - 1)]
+    near = [_is_near(model, knots[i], knots[i + 1], per_s, around) for i in range(len(knots) - 1)]
     found = list[tuple[int, int]]()
     for inside, steps in groupby(range(len(near)), near.__getitem__):
         numbers = list(steps)
@@ -265,14 +264,16 @@ def singular_stretches(
     return tuple(found)
 
 
-def _is_near(model: RobotModel, before: Joints, after: Joints, per_s: float) -> bool:
+def _is_near(
+    model: RobotModel, before: Joints, after: Joints, per_s: float, around: SingularSurroundings
+) -> bool:
     def fast(joint: int) -> bool:
         speed = abs(after[joint] - before[joint]) * per_s
-        return speed > SINGULARITY_SPEED * model.top_speed[joint]
+        return speed > around.speed_percent / 100 * model.top_speed[joint]
 
-    if abs(before[_J5]) < SINGULARITY_ANGLE_DEG and fast(_J4):
+    if abs(before[_J5]) < around.angle_deg and fast(_J4):
         return True
-    return fast(_J1) and _from_axis_mm(model, before) < SINGULARITY_DIST_MM
+    return fast(_J1) and _from_axis_mm(model, before) < around.distance_mm
 
 
 def _from_axis_mm(model: RobotModel, joints: Joints) -> float:

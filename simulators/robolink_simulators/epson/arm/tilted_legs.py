@@ -39,12 +39,14 @@ from robolink_simulators.epson.arm.kinematics import (
     tool_frame,
 )
 from robolink_simulators.epson.arm.ramps import BrakedRamp, Ramp, TimeLaw
+from robolink_simulators.epson.arm.robot_settings import SingularSurroundings
 from robolink_simulators.epson.arm.robots import RobotModel
 from robolink_simulators.epson.arm.six_axes import singular_stretches, solve_near
 from robolink_simulators.epson.arm.trajectory import Leg, LinePace, plan_move
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
 _STILL = 1e-9
+_USUAL = SingularSurroundings()
 _CHECK_EVERY_MM = 2.0
 _CHECK_EVERY_DEG = 2.0
 _MOST_CHECKS = 2000
@@ -158,7 +160,7 @@ def plan_line(
     *,
     offset: ToolOffset | None,
     near: Joints,
-    avoiding: bool = True,
+    avoiding: SingularSurroundings | None = _USUAL,
 ) -> Leg:
     """Plan a straight leg of the tip between two tip poses, of whichever robot.
 
@@ -168,7 +170,7 @@ def plan_line(
         pace: How fast it may be.
         offset: The tool in force.
         near: The joints at the start.
-        avoiding: Whether singularities are avoided.
+        avoiding: The surroundings of singular places that are left; ``None`` for staying.
 
     Raises:
         Refusal: The line leaves the envelope, hand, elbow or wrist would have to change, or a
@@ -196,7 +198,7 @@ def plan_about_point(
     point: Frame,
     offset: ToolOffset | None,
     near: Joints,
-    avoiding: bool = True,
+    avoiding: SingularSurroundings | None = _USUAL,
 ) -> Leg:
     """Plan a leg in which an external control point runs straight over the held workpiece.
 
@@ -207,7 +209,7 @@ def plan_about_point(
         point: The external control point, in the base.
         offset: The tool in force.
         near: The joints at the start.
-        avoiding: Whether singularities are avoided.
+        avoiding: The surroundings of singular places that are left; ``None`` for staying.
 
     Raises:
         Refusal: As :func:`plan_line`.
@@ -228,7 +230,7 @@ def plan_circle(
     *,
     offset: ToolOffset | None,
     near: Joints,
-    avoiding: bool = True,
+    avoiding: SingularSurroundings | None = _USUAL,
 ) -> Leg:
     """Plan an arc of the tip in X and Y from the first pose through the second to the third.
 
@@ -275,7 +277,12 @@ def _course(
 
 
 def _leg(
-    course: _Course | _HeldCourse, length_mm: float, pace: LinePace, *, near: Joints, avoiding: bool
+    course: _Course | _HeldCourse,
+    length_mm: float,
+    pace: LinePace,
+    *,
+    near: Joints,
+    avoiding: SingularSurroundings | None,
 ) -> TiltedLeg:
     """Look at the whole way before anything moves, as for a SCARA (assumed)."""
     model, angle_deg = course.model, course.angle_deg
@@ -292,7 +299,7 @@ def _leg(
         decel = accel
     else:
         return TiltedLeg(course, (near,), None)
-    detours = singular_stretches(model, knots, rate) if avoiding else ()
+    detours = singular_stretches(model, knots, rate, avoiding) if avoiding else ()
     for first, last in detours:
         knots[first : last + 1] = _from_joint_to_joint(knots[first], knots[last], last - first)
     fastest = _fastest(model, knots)

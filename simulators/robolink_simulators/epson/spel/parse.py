@@ -26,7 +26,7 @@ PROGRAM_ONLY: Final = frozenset(_PROGRAM_WORDS.split())
 """Statements that exist in programs only (docs/reference/spel.md 13, class E)."""
 
 _WORDS_OF_OTHER_ROBOTS = """
-    brake jumptlz singularityangle singularityspeed singularitydist
+    brake jumptlz
     j1angle j4angle vsd
 """
 
@@ -79,7 +79,7 @@ _UNSIMULATED_FUNCTIONS = """
     opencom chkcom folderexists fileexists eof freefile curdir$ curdrive$ currobot ptrq atrq
     avgspeed peakspeed olrate sense till vxcalinfo vxcalpoints getrobotinsidebox
     getrobotinsideplane hand_on hand_off aio_in aio_inw aio_out aio_outw recover latchpos
-    recoverpos lookup singularityangle diffpoint difftoolorientation windowsstatus insidebox
+    recoverpos lookup diffpoint difftoolorientation windowsstatus insidebox
     insideplane loadtype projectname$ robotname hour joint restart setcom here eval
 """
 

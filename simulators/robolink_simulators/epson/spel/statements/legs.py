@@ -51,7 +51,7 @@ def line_leg(machine: Machine, start: Pose, end: Pose, *, near: Joints) -> Leg:
         line_pace(machine),
         offset=machine.offset,
         near=near,
-        avoiding=bool(machine.settings.avoid_singularity),
+        avoiding=machine.settings.avoided,
     )
 
 
@@ -74,7 +74,7 @@ def held_leg(machine: Machine, end: Pose) -> Leg:
         point=frame_at(machine.control_points.get(number)),
         offset=machine.offset,
         near=machine.arm.joints,
-        avoiding=bool(machine.settings.avoid_singularity),
+        avoiding=machine.settings.avoided,
     )
 
 
@@ -90,7 +90,7 @@ def arc_leg(machine: Machine, mid: Pose, end: Pose) -> Leg:
         line_pace(machine),
         offset=machine.offset,
         near=machine.arm.joints,
-        avoiding=bool(machine.settings.avoid_singularity),
+        avoiding=machine.settings.avoided,
     )
 
 

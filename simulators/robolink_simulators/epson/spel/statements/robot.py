@@ -4,8 +4,10 @@ Source: docs/reference/spel.md 6.2, 7.2, 7.3.
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Final
 
+from robolink_simulators.epson.arm.robot_settings import SingularSurroundings
 from robolink_simulators.epson.arm.robots import Mechanism
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
@@ -146,7 +148,25 @@ def _avoid_singularity(machine: Machine, values: Numbers) -> str:
     if not values:
         return number_text(machine.settings.avoid_singularity) + CRLF
     machine.settings.avoid_singularity = int(_within(values[0], 0, 4))
+    machine.settings.surroundings = SingularSurroundings()
     return ""
+
+
+def _surroundings(name: str, most: float) -> Setting:
+    """Return SingularityAngle, -Speed or -Dist; how large they may be is assumed."""
+
+    def choose(machine: Machine, values: Numbers) -> str:
+        if machine.model.mechanism is Mechanism.SCARA:
+            raise another_robot(machine.model)
+        _expect(values, 0, 1)
+        settings = machine.settings
+        if not values:
+            return number_text(getattr(settings.surroundings, name)) + CRLF
+        changed = {name: _within(values[0], 0, most)}
+        settings.surroundings = replace(settings.surroundings, **changed)
+        return ""
+
+    return choose
 
 
 def _range(machine: Machine, values: Numbers) -> str:
@@ -170,5 +190,8 @@ ROBOT_SETTINGS: Final[dict[str, Setting]] = {
     "homeset": _home_set,
     "range": _range,
     "avoidsingularity": _avoid_singularity,
+    "singularityangle": _surroundings("angle_deg", 180),
+    "singularityspeed": _surroundings("speed_percent", 100),
+    "singularitydist": _surroundings("distance_mm", 1000),
 }
 """Keyword to what sets or shows it; what is shown comes back as text."""

@@ -1,7 +1,8 @@
 """Lets the tasks of a program go on side by side in simulated time, statement by statement."""
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Final
 
 from robolink_simulators.epson.condition import Condition, Task
@@ -74,7 +75,7 @@ class ProgramRunner:
         self._step_ns = session.options.statement_us * 1000
         self._seen_ns = 0
         self._paused = False
-        self._mover: SpelTask | None = None
+        self._movers: dict[int, SpelTask] = {}
 
     @property
     def now_ns(self) -> int:
@@ -139,11 +140,12 @@ class ProgramRunner:
             task, due_ns, others_ns = self._next()
             if task is None or due_ns > now_ns:
                 break
-            if task.waiting is None:
-                limit_ns = min(now_ns, others_ns, task.now_ns + BURST_NS)
-                self._burst(task, max(limit_ns, task.now_ns))
-            else:
-                self._look(task, task.waiting, due_ns)
+            with self.robot_of(task):
+                if task.waiting is None:
+                    limit_ns = min(now_ns, others_ns, task.now_ns + BURST_NS)
+                    self._burst(task, max(limit_ns, task.now_ns))
+                else:
+                    self._look(task, task.waiting, due_ns)
             self._seen_ns = max(self._seen_ns, due_ns, min(task.now_ns, now_ns))
             self._tidy()
             self.traps.look(self._seen_ns)
@@ -166,12 +168,25 @@ class ProgramRunner:
             if task.halted or (self._paused and task.kind is TaskKind.NORMAL):
                 continue
             waiting = task.waiting
-            due_ns = task.now_ns if waiting is None else waiting.due_ns(self._seen_ns)
+            due_ns = task.now_ns
+            if waiting is not None:
+                with self.robot_of(task):
+                    due_ns = waiting.due_ns(self._seen_ns)
             if due_ns < first_ns:
                 first, first_ns, second_ns = task, due_ns, first_ns
             elif due_ns < second_ns:
                 second_ns = due_ns
         return first, first_ns, second_ns
+
+    @contextmanager
+    def robot_of(self, task: SpelTask) -> Iterator[None]:
+        """Put the robot in force that a task has chosen; the command window keeps its own."""
+        machine = self.session.machine
+        kept, machine.robot_number = machine.robot_number, task.robot_number
+        try:
+            yield
+        finally:
+            task.robot_number, machine.robot_number = machine.robot_number, kept
 
     def _burst(self, task: SpelTask, until_ns: int) -> None:
         """Carry operations out until an instant, or until one takes time."""
@@ -222,9 +237,10 @@ class ProgramRunner:
         if forbidden_in(task.kind, statement):
             raise SpelRefusal(RefusalKind.NOT_IN_THIS_TASK, "Not allowed in this kind of task")
         if isinstance(statement, MotionStatement):
-            if machine.arm.moving and self._mover is not task:
+            number = machine.robot_number
+            if machine.arm.moving and self._movers.get(number) is not task:
                 raise SpelRefusal(RefusalKind.ROBOT_IN_USE, "Another task moves the robot")
-            self._mover = task
+            self._movers[number] = task
         return StatementExecution(task, (statement,), task.now_ns)
 
     def _look(self, task: SpelTask, waiting: TaskWaiting, now_ns: int) -> None:
@@ -278,8 +294,9 @@ class ProgramRunner:
 
     def end(self, task: SpelTask) -> None:
         """End a task, and stop what it moves (Quit)."""
-        if self._mover is task:
-            self.session.machine.arm.halt(self._seen_ns)
+        for number, mover in self._movers.items():
+            if mover is task:
+                self.session.machine.robots[number - 1].arm.halt(self._seen_ns)
         task.ended = True
 
     def turn_to(self, state: Task) -> None:
@@ -315,13 +332,15 @@ class ProgramRunner:
             for task in self._pausing():
                 task.now_ns = max(task.now_ns, now_ns)
                 if task.waiting is not None:
-                    task.waiting.go_on(now_ns)
+                    with self.robot_of(task):
+                        task.waiting.go_on(now_ns)
 
     def _pause(self, now_ns: int) -> None:
         self._paused = True
         for task in self._pausing():
             if task.waiting is not None:
-                task.waiting.suspend(now_ns)
+                with self.robot_of(task):
+                    task.waiting.suspend(now_ns)
         self.traps.happen("sgopen" if self._condition.guard_open else "pause", now_ns)
 
     def _pausing(self) -> list[SpelTask]:

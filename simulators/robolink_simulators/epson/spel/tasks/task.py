@@ -91,6 +91,8 @@ class SpelTask(Evaluator):
 
     Attributes:
         task_number: 1 to 32, 65 to 80 in the background, 257 to 267 for traps.
+        robot_number: The robot that it has chosen with Robot n; at first that of whoever
+            started it (assumed).
         kind: How it takes stops.
         runner: What lets it go on: a ``ProgramRunner``, which makes tasks and is not known here.
         operations: Those of the function that runs.
@@ -115,6 +117,7 @@ class SpelTask(Evaluator):
         super().__init__(replace(session, memory=WindowMemory()))
         self.blends = True
         self.task_number = number
+        self.robot_number: int = session.machine.robot_number
         self.kind = kind
         self.runner = runner
         self.operations: list[Operation] = []

@@ -101,7 +101,8 @@ def _halt(emitter: Emitter, node: TaskStatement) -> Operation:
         for task in which(t):
             task.halted = True
             if task.waiting is not None:
-                task.waiting.suspend(t.now_ns)
+                with task.runner.robot_of(task):
+                    task.waiting.suspend(t.now_ns)
         return t.turn() if t.halted else None
 
     return go
@@ -116,7 +117,8 @@ def _resume(emitter: Emitter, node: TaskStatement) -> Operation:
                 task.halted = False
                 task.now_ns = max(task.now_ns, t.now_ns)
                 if task.waiting is not None:
-                    task.waiting.go_on(t.now_ns)
+                    with task.runner.robot_of(task):
+                        task.waiting.go_on(t.now_ns)
 
     return go
 

@@ -214,6 +214,10 @@ class ControllerCore(ABC):
             self._take_leave()
         except RobolinkError:
             pass  # the link is going away in any case; markers keep what is in doubt
+        except BaseException as error:
+            # Ctrl-C while taking leave: the work is done, and what it left is to be told.
+            note_standing(error, self.ledger.standing())
+            raise
         finally:
             self._close_link()
             self.outcomes.close()

@@ -82,6 +82,10 @@ def test_every_option_with_named_values_is_varied_here():
         # Of the serial line alone: tests/contract/test_epson_serial_line.py.
         *(field.name for field in fields(EpsonOptions) if field.name.startswith("rs232_")),
         # Of programs alone: tests/unit/spel_programs.
+        "vision_acquisition_ms",
+        "vision_object_ms",
+        "vision_not_found",
+        "uncalibrated_robot_result",
         "statement_us",
         "loop_passes",
         "for_test",

@@ -5,6 +5,7 @@ import sqlite3
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -72,9 +73,21 @@ class Books:
         """Return the number of the newest entry."""
         return next((row[0] for row in self._rows("SELECT max(number) FROM entries") if row[0]), 0)
 
-    def head(self) -> str:
-        """Return the newest hash of the chain."""
-        return next((str(row[0]) for row in self._rows("SELECT hash FROM head")), "")
+    def readable(self) -> bool:
+        """Return whether SQLite finds the file whole; a disk that lied may have left half of it."""
+        return [tuple(row) for row in self._rows("PRAGMA quick_check")] == [("ok",)]
+
+    def digest(self) -> str:
+        """Return a hash over all entries, the same wherever the disk lies.
+
+        A record that was begun anew names the file of the old one, so the journal's own hashes
+        are others in each folder.
+        """
+        rows = self._rows(
+            "SELECT number, at, kind, tool, verdict, details FROM entries ORDER BY number"
+        )
+        told = "\n".join(map(repr, rows))
+        return sha256(told.replace(str(self._path.resolve()), "journal").encode()).hexdigest()
 
     def value_of(self, tool: int) -> tuple[bool, ToolOffset | None]:
         """Return whether a value of a tool is on record as proved, and the newest one."""

@@ -230,7 +230,7 @@ class VirtualCell:
         self._books.lost = False  # the people are told to look, and give their word
         usable, why = self._put_right(hour)
         self._rules.at_rest(self._plant.state(), usable=usable, why=why)
-        self._note(f"journal {self._books.head()}")
+        self._note(f"journal {self._books.digest()}")
         self._surroundings.wall_jump_s = 0.0
         self._books.trusted = True
 

@@ -25,7 +25,9 @@ class RestRules:
         if state.selected != self._on.now.before.selected and not self._on.plant.moved_itself:
             self._on.hold(
                 "SameToolSelected",
-                bool(self._on.open_selection()) or state.selected == self._on.now.wish.selects,
+                bool(self._on.open_selection())
+                or state.selected == self._on.now.wish.selects
+                or not self._on.books.readable(),  # the people are told that, and asked
                 f"tool {state.selected} is selected in place of "
                 f"{self._on.now.before.selected}, and nothing on record says so",
             )

@@ -19,6 +19,7 @@ from robolink.errors import (
     UnclearAnswerError,
 )
 from robolink.model import MotionOutcome, MotionProfile, Path, Verdict, WorkBox
+from robolink.standing import standing_after
 from robolink.transaction import Wanted, change_tools
 
 NEW = ToolOffset(12.75, -3.25, -20)
@@ -337,3 +338,23 @@ def test_what_is_put_back_is_read_twice_before_it_is_trusted(serve, query, which
         with controller.preserved("a procedure"):
             controller.tools.select(0)
         assert simulator.machine.tools.selected == 1
+
+
+def test_ctrl_c_while_leave_is_taken_tells_what_the_work_before_left():
+    simulator = EpsonSimulator(seed=5)
+
+    def interrupt(_, request):
+        if "Logout" in request:
+            raise KeyboardInterrupt
+
+    register("leaving", simulator)
+    try:
+        with pytest.raises(KeyboardInterrupt) as caught:
+            with robolink.connect("epson+sim://leaving") as controller:
+                before = write(controller).before
+                simulator.on_request = interrupt
+        stands = standing_after(caught.value).tools[1]
+        assert stands.holds == simulator.machine.tools.get(1).components()
+        assert stands.before == before.components()
+    finally:
+        unregister("leaving")

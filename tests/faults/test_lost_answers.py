@@ -354,7 +354,7 @@ def test_ctrl_c_while_leave_is_taken_tells_what_the_work_before_left():
                 before = write(controller).before
                 simulator.on_request = interrupt
         stands = standing_after(caught.value).tools[1]
-        assert stands.holds == simulator.machine.tools.get(1).components()
-        assert stands.before == before.components()
+        assert (stands.before, stands.holds) == (before.components(), NEW.components())
+        assert simulator.machine.tools.get(1) == NEW
     finally:
         unregister("leaving")

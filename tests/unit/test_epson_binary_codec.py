@@ -16,13 +16,13 @@ from robolink.protocols.epson_binary import (
     Letters,
     NakCode,
     Numbers,
-    Opening,
     Role,
 )
 from robolink.protocols.epson_text import (
     BadRequest,
     ErrorCode,
     Event,
+    Opening,
     Refusal,
     Reply,
     Request,
@@ -88,8 +88,8 @@ def cut(data: bytes, places: set[int]) -> Iterator[bytes]:
     return (data[a:b] for a, b in pairwise(edges) if a < b)
 
 
-def events_of(codec: EpsonBinaryCodec, chunks: Iterator[bytes]) -> list[Event | Opening]:
-    events: list[Event | Opening] = []
+def events_of(codec: EpsonBinaryCodec, chunks: Iterator[bytes]) -> list[Event]:
+    events: list[Event] = []
     for chunk in chunks:
         codec.receive_data(chunk)
         while (event := codec.next_event()) is not NEED_DATA:

@@ -14,6 +14,7 @@ from robolink.protocols.epson_text import (
     EndOfStream,
     EpsonTextCodec,
     Event,
+    Opening,
     ParameterForm,
     Refusal,
     RemoteCommand,
@@ -155,7 +156,7 @@ def test_a_device_can_answer_whatever_it_is_sent(noise):
     device, host = EpsonTextCodec(Role.DEVICE), EpsonTextCodec(Role.HOST)
     device.receive_data(noise + b"\r\n" if noise else b"\r\n")
     for event in drain(device):
-        assert not isinstance(event, (Reply, Refusal, EndOfStream))
+        assert not isinstance(event, (Reply, Refusal, Opening, EndOfStream))
         code = getattr(event, "code", 20)
         host.receive_data(device.send(Refusal(event.name, code)))
         assert host.next_event() == Refusal(event.name, code)

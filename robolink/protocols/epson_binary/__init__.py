@@ -13,7 +13,6 @@ from robolink.protocols._role import Role as Role
 
 if TYPE_CHECKING:
     from robolink.protocols.epson_binary._codec import EpsonBinaryCodec as EpsonBinaryCodec
-    from robolink.protocols.epson_binary._codec import Opening as Opening
     from robolink.protocols.epson_binary._dialect import Dialect as Dialect
     from robolink.protocols.epson_binary._dialect import Letters as Letters
     from robolink.protocols.epson_binary._dialect import NakCode as NakCode
@@ -25,7 +24,7 @@ else:
     __getattr__ = lazy_exports(
         __name__,
         {
-            "_codec": "EpsonBinaryCodec Opening",
+            "_codec": "EpsonBinaryCodec",
             "_dialect": "Dialect Letters NakCode Numbers",
             "_letters": "LETTERS Letter letter_of",
         },

@@ -10,12 +10,11 @@ where the next one begins, and the check sum of one byte lets one in 256 broken 
 device skips what begins no request, and refuses what is broken, as a controller has to.
 """
 
-from dataclasses import dataclass
 from typing import Literal
 
-from robolink.errors import LocalProtocolError, RemoteProtocolError
+from robolink.errors import LocalProtocolError
 from robolink.messages import tr
-from robolink.protocols._role import NEED_DATA, Need, Role
+from robolink.protocols._role import Need, Role
 from robolink.protocols.epson_binary._dialect import Dialect, Letters
 from robolink.protocols.epson_binary._frames import EOT, FrameBuffer
 from robolink.protocols.epson_binary._letters import letter_of
@@ -25,15 +24,10 @@ from robolink.protocols.epson_binary._messages import (
     write_answer,
     write_request,
 )
-from robolink.protocols.epson_text import EndOfStream, Event, Refusal, Reply, Request
+from robolink.protocols.epson_text import EpsonCodec, Event, Opening, Refusal, Reply, Request
 
 
-@dataclass(frozen=True, slots=True)
-class Opening:
-    """EOT: the host turns Remote RS232 on, or begins anew (docs/reference/epson.md 2.1)."""
-
-
-class EpsonBinaryCodec:
+class EpsonBinaryCodec(EpsonCodec):
     """One end of one serial line.
 
     Args:
@@ -42,25 +36,14 @@ class EpsonBinaryCodec:
         max_frame: Most bytes of one received frame.
     """
 
-    __slots__ = ("_buffer", "_dialect", "_ended", "_failure", "_role")
+    __slots__ = ("_buffer", "_dialect")
 
     def __init__(
         self, role: Role, dialect: Dialect | None = None, *, max_frame: int = 65536
     ) -> None:
-        self._role = role
         self._dialect = dialect or Dialect()
         self._buffer = FrameBuffer(role, self._dialect, max_frame)
-        self._ended = False
-        self._failure: RemoteProtocolError | None = None
-
-    def __repr__(self) -> str:
-        # What is held may be a login, so only its length is shown.
-        return f"<EpsonBinaryCodec {self._role.name} holding {len(self._buffer.held)} bytes>"
-
-    @property
-    def bytes_held(self) -> bytes:
-        """What has arrived and is part of no event yet, for messages about half a reply."""
-        return self._buffer.held
+        super().__init__(role, self._buffer)
 
     @property
     def dialect(self) -> Dialect:
@@ -73,7 +56,7 @@ class EpsonBinaryCodec:
         guessed = self._dialect.letters is Letters.GUESSED
         return letter is not None and (letter.documented or guessed)
 
-    def send(self, event: Event | Opening) -> bytes:
+    def send(self, event: Event) -> bytes:
         """Return the bytes of one message.
 
         Raises:
@@ -87,32 +70,7 @@ class EpsonBinaryCodec:
             return write_request(event, self._dialect)
         if self._role is Role.DEVICE and isinstance(event, (Reply, Refusal)):
             return write_answer(event, self._dialect)
-        raise LocalProtocolError(
-            tr(
-                "A {role} does not send {kind}.",
-                role=self._role.name.lower(),
-                kind=type(event).__name__,
-            ),
-            remedy=tr("A host sends requests; a device sends replies and refusals."),
-        )
-
-    def receive_data(self, data: bytes) -> None:
-        """Take what was received; ``b""`` means that the line is gone.
-
-        Raises:
-            LocalProtocolError: Bytes after the end of the stream.
-            RemoteProtocolError: The codec is dead.
-        """
-        self._check_alive()
-        if not data:
-            self._ended = True
-        elif self._ended:
-            raise LocalProtocolError(
-                tr("Bytes cannot follow the end of the stream."),
-                remedy=tr("Use a new codec for a new connection."),
-            )
-        else:
-            self._buffer.append(data)
+        raise self._not_sent(event)
 
     def end_of_request(self) -> Event | None:
         """Take what is held for all that will come of a request, since the line went silent.
@@ -131,23 +89,7 @@ class EpsonBinaryCodec:
         frame = self._buffer.give_up()
         return None if frame is None else read_request(frame, self._dialect)
 
-    def next_event(self) -> Event | Opening | Literal[Need.DATA]:
-        """Return the next event, or ``NEED_DATA``.
-
-        After the line went between two messages: ``EndOfStream``, each time.
-
-        Raises:
-            RemoteProtocolError: The stream makes no sense, or ended inside a message; the codec
-                is dead from here on.
-        """
-        self._check_alive()
-        try:
-            return self._next_event()
-        except RemoteProtocolError as error:
-            self._failure = error
-            raise
-
-    def _next_event(self) -> Event | Opening | Literal[Need.DATA]:
+    def _next_event(self) -> Event | Literal[Need.DATA]:
         frame = self._buffer.take()
         if frame is not None:
             if frame.first == EOT:
@@ -155,16 +97,4 @@ class EpsonBinaryCodec:
             if self._role is Role.DEVICE:
                 return read_request(frame, self._dialect)
             return read_answer(frame, self._dialect)
-        if not self._ended:
-            return NEED_DATA
-        if held := self._buffer.held:
-            raise RemoteProtocolError(
-                tr("The connection ended inside a message."),
-                remedy=tr("Check the cable and the controller's power, then connect again."),
-                raw=b"" if self._role is Role.DEVICE else held,
-            )
-        return EndOfStream()
-
-    def _check_alive(self) -> None:
-        if (failure := self._failure) is not None:
-            raise RemoteProtocolError(failure.what, remedy=failure.remedy, raw=failure.raw)
+        return self._at_the_end()

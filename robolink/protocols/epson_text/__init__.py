@@ -7,6 +7,7 @@ from robolink.protocols._role import NEED_DATA as NEED_DATA
 from robolink.protocols._role import Role as Role
 
 if TYPE_CHECKING:
+    from robolink.protocols.epson_text._codec import EpsonCodec as EpsonCodec
     from robolink.protocols.epson_text._codec import EpsonTextCodec as EpsonTextCodec
     from robolink.protocols.epson_text._commands import COMMANDS as COMMANDS
     from robolink.protocols.epson_text._commands import ParameterForm as ParameterForm
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from robolink.protocols.epson_text._events import EndOfStream as EndOfStream
     from robolink.protocols.epson_text._events import ErrorCode as ErrorCode
     from robolink.protocols.epson_text._events import Event as Event
+    from robolink.protocols.epson_text._events import Opening as Opening
     from robolink.protocols.epson_text._events import Refusal as Refusal
     from robolink.protocols.epson_text._events import Reply as Reply
     from robolink.protocols.epson_text._events import Request as Request
@@ -31,11 +33,11 @@ else:
     __getattr__ = lazy_exports(
         __name__,
         {
-            "_codec": "EpsonTextCodec",
+            "_codec": "EpsonCodec EpsonTextCodec",
             "_commands": (
                 "COMMANDS RemoteCommand ParameterForm ReplyShape VariableType find_command"
             ),
-            "_events": "BadRequest EndOfStream ErrorCode Event Refusal Reply Request",
+            "_events": "BadRequest EndOfStream ErrorCode Event Opening Refusal Reply Request",
             "_preferences": "Preference parse_preferences preferences_field",
             "_status": "StatusFlags parse_status status_fields",
         },

@@ -11,7 +11,8 @@ every later call raises the same error again.
 """
 
 import codecs
-from typing import Final, Literal, Never
+from abc import ABC, abstractmethod
+from typing import Final, Literal, Never, Protocol
 
 from robolink.errors import ConfigError, LocalProtocolError, RemoteProtocolError
 from robolink.messages import tr
@@ -42,7 +43,128 @@ _ENCODINGS: Final = frozenset(
 """Encodings in which no longer character holds the byte of a comma, a quote or a line end."""
 
 
-class EpsonTextCodec:
+class _Held(Protocol):
+    """What has arrived, until it is an event."""
+
+    @property
+    def held(self) -> bytes:
+        """The bytes that no event has used yet."""
+
+    def __bool__(self) -> bool:
+        """Whether there are any."""
+
+    def append(self, data: bytes) -> None:
+        """Add what was received."""
+
+
+class EpsonCodec(ABC):
+    """One end of one line to a controller, whatever the frames on it are.
+
+    Args:
+        role: HOST sends requests, DEVICE answers them.
+        buffer: Keeps what has arrived.
+    """
+
+    __slots__ = ("_arrived", "_ended", "_failure", "_role")
+
+    def __init__(self, role: Role, buffer: _Held) -> None:
+        self._role = role
+        self._arrived = buffer
+        self._ended = False
+        self._failure: RemoteProtocolError | None = None
+
+    def __repr__(self) -> str:
+        # What is held may be a login, so only its length is shown.
+        return f"<{type(self).__name__} {self._role.name} holding {len(self._arrived.held)} bytes>"
+
+    @property
+    def bytes_held(self) -> bytes:
+        """What has arrived and is part of no event yet, for messages about half a reply."""
+        return self._arrived.held
+
+    def receive_data(self, data: bytes) -> None:
+        """Take what was received; ``b""`` means that the far side closed.
+
+        Raises:
+            LocalProtocolError: Bytes after the end of the stream.
+            RemoteProtocolError: The codec is dead.
+        """
+        self._check_alive()
+        if not data:
+            self._ended = True
+        elif self._ended:
+            raise LocalProtocolError(
+                tr("Bytes cannot follow the end of the stream."),
+                remedy=tr("Use a new codec for a new connection."),
+            )
+        else:
+            self._arrived.append(data)
+
+    def next_event(self) -> Event | Literal[Need.DATA]:
+        """Return the next event, or ``NEED_DATA``.
+
+        After the far side closed between two messages: ``EndOfStream``, each time.
+
+        Raises:
+            RemoteProtocolError: The stream makes no sense, or ended inside a message; the
+                codec is dead from here on.
+        """
+        self._check_alive()
+        if not self._arrived and not self._ended:
+            return NEED_DATA  # asked twice in every exchange, and mostly true
+        try:
+            return self._next_event()
+        except RemoteProtocolError as error:
+            if self._role is Role.DEVICE:
+                error.raw = b""  # it may hold a password
+            self._failure = error
+            raise
+
+    @abstractmethod
+    def carries(self, name: str) -> bool:
+        """Whether a command of this name can be sent."""
+
+    @abstractmethod
+    def send(self, event: Event) -> bytes:
+        """Return the bytes of one message.
+
+        Raises:
+            LocalProtocolError: The protocol, or this end's role, forbids it.
+            RemoteProtocolError: The codec is dead.
+        """
+
+    @abstractmethod
+    def _next_event(self) -> Event | Literal[Need.DATA]:
+        """Cut the next event out of what has arrived."""
+
+    def _at_the_end(self) -> EndOfStream | Literal[Need.DATA]:
+        """Return what it means that no whole message is left."""
+        if not self._ended:
+            return NEED_DATA
+        if held := self._arrived.held:
+            raise RemoteProtocolError(
+                tr("The connection ended inside a message."),
+                remedy=tr("Check the cable and the controller's power, then connect again."),
+                raw=held,
+            )
+        return EndOfStream()
+
+    def _not_sent(self, event: Event) -> LocalProtocolError:
+        return LocalProtocolError(
+            tr(
+                "A {role} does not send {kind}.",
+                role=self._role.name.lower(),
+                kind=type(event).__name__,
+            ),
+            remedy=tr("A host sends requests; a device sends replies and refusals."),
+        )
+
+    def _check_alive(self) -> None:
+        if (failure := self._failure) is not None:
+            raise RemoteProtocolError(failure.what, remedy=failure.remedy, raw=failure.raw)
+
+
+class EpsonTextCodec(EpsonCodec):
     r"""One end of one connection.
 
     Receiving accepts CR, LF and CRLF whatever ``terminator`` is, and any cut of the stream
@@ -70,16 +192,7 @@ class EpsonTextCodec:
         ConfigError: An argument is none of these.
     """
 
-    __slots__ = (
-        "_blank_allowed",
-        "_buffer",
-        "_encoding",
-        "_ended",
-        "_failure",
-        "_role",
-        "_terminator",
-        "_unterminated",
-    )
+    __slots__ = ("_blank_allowed", "_buffer", "_encoding", "_terminator", "_unterminated")
 
     def __init__(
         self,
@@ -94,7 +207,6 @@ class EpsonTextCodec:
             _misconfigured(tr("{value!r} is not CR, LF or CRLF.", value=terminator))
         if unterminated and role is Role.HOST:
             _misconfigured(tr("Only a device can take requests without a line end."))
-        self._role = role
         self._terminator = terminator
         self._encoding = _known_encoding(encoding)
         self._unterminated = unterminated
@@ -103,21 +215,10 @@ class EpsonTextCodec:
             quoted_replies=role is Role.HOST,
             next_message=next_request if unterminated else None,
         )
+        super().__init__(role, self._buffer)
         self._blank_allowed = False
-        self._ended = False
-        self._failure: RemoteProtocolError | None = None
 
-    def __repr__(self) -> str:
-        # What is held may be a login, so only its length is shown.
-        return f"<EpsonTextCodec {self._role.name} holding {len(self._buffer.held)} bytes>"
-
-    @property
-    def bytes_held(self) -> bytes:
-        """What has arrived and is part of no event yet, for messages about half a reply."""
-        return self._buffer.held
-
-    @staticmethod
-    def carries(name: str) -> bool:
+    def carries(self, name: str) -> bool:
         """Whether a command of this name can be sent: here all, known or not to the firmware."""
         return bool(name)
 
@@ -135,32 +236,7 @@ class EpsonTextCodec:
             return write_reply(event, self._encoding) + self._terminator
         if self._role is Role.DEVICE and isinstance(event, Refusal):
             return write_refusal(event, self._encoding) + self._terminator
-        raise LocalProtocolError(
-            tr(
-                "A {role} does not send {kind}.",
-                role=self._role.name.lower(),
-                kind=type(event).__name__,
-            ),
-            remedy=tr("A host sends requests; a device sends replies and refusals."),
-        )
-
-    def receive_data(self, data: bytes) -> None:
-        """Take what was received; ``b""`` means that the far side closed.
-
-        Raises:
-            LocalProtocolError: Bytes after the end of the stream.
-            RemoteProtocolError: The codec is dead.
-        """
-        self._check_alive()
-        if not data:
-            self._ended = True
-        elif self._ended:
-            raise LocalProtocolError(
-                tr("Bytes cannot follow the end of the stream."),
-                remedy=tr("Use a new codec for a new connection."),
-            )
-        else:
-            self._buffer.append(data)
+        raise self._not_sent(event)
 
     def end_of_request(self) -> None:
         """Take what is held for a complete request, since nothing has followed for a while.
@@ -179,26 +255,6 @@ class EpsonTextCodec:
             )
         self._buffer.end_message()
 
-    def next_event(self) -> Event | Literal[Need.DATA]:
-        """Return the next event, or ``NEED_DATA``.
-
-        After the far side closed between two messages: ``EndOfStream``, each time.
-
-        Raises:
-            RemoteProtocolError: The stream makes no sense, or ended inside a message; the
-                codec is dead from here on.
-        """
-        self._check_alive()
-        if not self._buffer and not self._ended:
-            return NEED_DATA  # asked twice in every exchange, and mostly true
-        try:
-            return self._next_event()
-        except RemoteProtocolError as error:
-            if self._role is Role.DEVICE:
-                error.raw = b""  # it may hold a password
-            self._failure = error
-            raise
-
     def _next_event(self) -> Event | Literal[Need.DATA]:
         while (line := self._buffer.take()) is not None:
             if self._role is Role.DEVICE:
@@ -212,19 +268,7 @@ class EpsonTextCodec:
                     remedy=tr("Set the terminator to CRLF in the controller's setup."),
                 )
             self._blank_allowed = False
-        if not self._ended:
-            return NEED_DATA
-        if held := self._buffer.held:
-            raise RemoteProtocolError(
-                tr("The connection ended inside a message."),
-                remedy=tr("Check the cable and the controller's power, then connect again."),
-                raw=held,
-            )
-        return EndOfStream()
-
-    def _check_alive(self) -> None:
-        if (failure := self._failure) is not None:
-            raise RemoteProtocolError(failure.what, remedy=failure.remedy, raw=failure.raw)
+        return self._at_the_end()
 
 
 def _known_encoding(name: str) -> str:

@@ -63,7 +63,15 @@ class EndOfStream:
     """The far side closed the connection between two messages."""
 
 
-Event = Request | BadRequest | Reply | Refusal | EndOfStream
+@dataclass(frozen=True, slots=True)
+class Opening:
+    """EOT on a serial line: the host turns Remote RS232 on, or begins anew.
+
+    Source: docs/reference/epson.md 2.1.
+    """
+
+
+Event = Request | BadRequest | Reply | Refusal | Opening | EndOfStream
 """Whatever a codec can hand out."""
 
 

@@ -98,7 +98,7 @@ def test_a_controller_is_a_server_too(cell):
     made = cell(
         "Function main\nUByte b(3)\nInteger n\nOpenNet #202 As Server\nWaitNet #202\n"
         "ReadBin #202, b(), 3\nn = b(0) + b(1) * 256\nPrint n, b(2)\nb(0) = 255\n"
-        "WriteBin #202, b(), 2\nWait 0.1\nFend\n",
+        "WriteBin #202, b(), 2\nWriteBin #202, b(2), 1\nWait 0.1\nFend\n",
         ports={202: ("127.0.0.1", port)},
     )
     heard = []
@@ -108,7 +108,7 @@ def test_a_controller_is_a_server_too(cell):
             try:
                 with socket.create_connection(("127.0.0.1", port), 10) as link:
                     link.sendall(bytes([1, 2, 3]))
-                    heard.append(link.recv(2))
+                    heard.append(link.makefile("rb").read(3))
                     return
             except ConnectionRefusedError:
                 continue
@@ -121,7 +121,7 @@ def test_a_controller_is_a_server_too(cell):
     thread.join(10)
     assert made.runner.failure is None
     assert "".join(made.runner.console).splitlines() == ["513 3"]
-    assert heard == [bytes([255, 2])]
+    assert heard == [bytes([255, 2, 3])]
 
 
 def test_an_end_that_came_between_two_looks_is_seen_at_the_next(cell):

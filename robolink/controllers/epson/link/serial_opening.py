@@ -18,9 +18,9 @@ from robolink.protocols.epson_binary import (
     Letters,
     NakCode,
     Numbers,
-    Opening,
     Role,
 )
+from robolink.protocols.epson_text import Opening
 from robolink.timing import Deadline
 from robolink.transport import LinkUrl, Transport, UrlOptions
 

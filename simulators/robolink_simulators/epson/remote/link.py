@@ -7,12 +7,13 @@ from collections.abc import Sequence
 from typing import Final, Protocol
 
 from robolink.errors import LocalProtocolError, RemoteProtocolError
-from robolink.protocols.epson_binary import Dialect, EpsonBinaryCodec, Opening
+from robolink.protocols.epson_binary import Dialect, EpsonBinaryCodec
 from robolink.protocols.epson_text import (
     NEED_DATA,
     BadRequest,
     EpsonTextCodec,
     ErrorCode,
+    Opening,
     Refusal,
     Reply,
     Request,

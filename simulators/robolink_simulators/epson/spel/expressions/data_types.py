@@ -3,7 +3,7 @@
 Source: docs/reference/spel.md 2.
 """
 
-from collections.abc import Callable, MutableSequence, Sequence
+from collections.abc import Callable, Sequence
 from math import prod
 from typing import Final, NamedTuple
 
@@ -104,27 +104,25 @@ def data_types(*, wraps: bool = False) -> dict[str, DataType]:
     return types
 
 
-class _Element(MutableSequence[Value]):
+class _Element:
     """One element of an array, given by reference, as if it were a scalar's only value."""
 
-    def __init__(self, values: MutableSequence[Value], index: int) -> None:
-        self._values = values
+    def __init__(self, cells: "Cells", index: int) -> None:
+        self._cells = cells
         self._index = index
 
     def __len__(self) -> int:
         return 1
 
-    def __getitem__(self, _: int | slice) -> Value:  # type: ignore[override]
-        return self._values[self._index]
+    def __getitem__(self, _: int, /) -> Value:
+        return self._cells[self._index]
 
-    def __setitem__(self, _: int | slice, value: Value) -> None:  # type: ignore[override]
-        self._values[self._index] = value
+    def __setitem__(self, _: int, value: Value, /) -> None:
+        self._cells[self._index] = value
 
-    def __delitem__(self, _: int | slice) -> None:
-        raise NotImplementedError
 
-    def insert(self, index: int, value: Value) -> None:
-        raise NotImplementedError
+Cells = list[Value] | _Element
+"""Where a variable keeps what it holds: a list, or one place in another variable's list."""
 
 
 class Variable:
@@ -133,7 +131,7 @@ class Variable:
     Attributes:
         kind: Its type.
         bounds: Highest subscripts; none for a scalar.
-        values: What it holds, the last subscript running fastest. The list stays the same.
+        values: What it holds, the last subscript running fastest. A list stays the same one.
     """
 
     __slots__ = ("bounds", "kind", "values")
@@ -141,7 +139,7 @@ class Variable:
     def __init__(self, kind: DataType, bounds: tuple[int, ...] = ()) -> None:
         self.kind = kind
         self.bounds = bounds
-        self.values: MutableSequence[Value] = [kind.start] * prod(bound + 1 for bound in bounds)
+        self.values: Cells = [kind.start] * prod(bound + 1 for bound in bounds)
 
     def at(self, subscripts: Sequence[Value]) -> int:
         """Return where an element stands.
@@ -172,7 +170,13 @@ class Variable:
 
     def clear(self) -> None:
         """Forget what it holds."""
-        self.values[:] = [self.kind.start] * len(self.values)
+        for index in range(len(self.values)):
+            self.values[index] = self.kind.start
+
+    def listed(self) -> list[Value]:
+        """Return the list of a variable that is no element of another."""
+        assert isinstance(self.values, list)  # noqa: S101 - an element has no name and no bounds
+        return self.values
 
     def resize(self, bounds: tuple[int, ...], *, keep: bool) -> None:
         """Give an array other bounds.
@@ -182,9 +186,10 @@ class Variable:
         """
         if len(bounds) != len(self.bounds):
             raise SpelRefusal(RefusalKind.SUBSCRIPT, "Redim keeps the number of subscripts")
-        kept = dict(zip(_places(self.bounds), self.values, strict=True)) if keep else {}
+        values = self.listed()
+        kept = dict(zip(_places(self.bounds), values, strict=True)) if keep else {}
         self.bounds = bounds
-        self.values[:] = [kept.get(place, self.kind.start) for place in _places(bounds)]
+        values[:] = [kept.get(place, self.kind.start) for place in _places(bounds)]
 
 
 def _places(bounds: tuple[int, ...]) -> list[tuple[int, ...]]:

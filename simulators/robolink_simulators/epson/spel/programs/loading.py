@@ -92,7 +92,7 @@ def load_project(
         machine.points.label(number, label)
     machine.io_labels = data.io_labels
     for name, variable in project.preserved().items():
-        session.variables.adopt(name, variable.kind.name, variable.bounds, variable.values)
+        session.variables.adopt(name, variable.kind.name, variable.bounds, variable.listed())
     return project
 
 

@@ -258,7 +258,7 @@ def _write_binary(emitter: Emitter, node: ChannelStatement) -> Operation:
         wanted, values = as_integer(run(t)), reference(t).values
         if not 0 <= wanted <= len(values):
             raise SpelRefusal(RefusalKind.SUBSCRIPT, f"There are no {wanted} bytes")
-        data = bytes(as_integer(value) & _BYTE for value in values[:wanted])
+        data = bytes(as_integer(value) & _BYTE for value in map(values.__getitem__, range(wanted)))
         t.runner.ports.write_bytes(number(t), data, t)
 
     return go

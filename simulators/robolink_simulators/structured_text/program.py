@@ -5,8 +5,8 @@ body becomes a tree of Python functions of one argument, the list of the instanc
 Nothing is looked up by name when it runs. Time is given with each cycle and never taken.
 """
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 from robolink.messages import tr
@@ -37,8 +37,19 @@ from robolink_simulators.structured_text.statements import (
     counted_in,
 )
 
-Foreign = Callable[[Runtime], Mapping[str, DataType]]
-"""Makes types and blocks that are not written in the language, for a running program."""
+@dataclass(frozen=True, slots=True)
+class ForeignParts:
+    """What a program names and no text declares: libraries, and objects of the project.
+
+    Attributes:
+        types: Types and blocks, by name in capital letters.
+        symbols: Names of enumerations, in the order of their numbers.
+        objects: Global objects by name, with their types.
+    """
+
+    types: Mapping[str, DataType] = field(default_factory=dict)
+    symbols: Mapping[ScalarType, Sequence[str]] = field(default_factory=dict)
+    objects: Mapping[str, tuple[DataType, Value]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +73,7 @@ class StructuredProgram:
     Args:
         sources: Its files; what is used must have been declared before.
         main: Name of the PROGRAM, or of a function block, that each cycle executes.
-        foreign: Makes what the language's own text does not declare.
+        foreign: What no text declares.
 
     Attributes:
         runtime: Time, and the turns of loops that are left.
@@ -72,11 +83,13 @@ class StructuredProgram:
     """
 
     def __init__(
-        self, sources: Iterable[SourceText], main: str, *, foreign: Foreign | None = None
+        self, sources: Iterable[SourceText], main: str, *, foreign: ForeignParts | None = None
     ) -> None:
         self.runtime = Runtime()
-        known = {**standard_blocks(self.runtime), **(foreign(self.runtime) if foreign else {})}
+        parts = foreign or ForeignParts()
+        known = {**standard_blocks(self.runtime), **parts.types}
         self._declared = Declarations(known, self.runtime)
+        self._declare(parts)
         file = ""
         for source in sources:
             file = source.name
@@ -147,6 +160,17 @@ class StructuredProgram:
                 container[variable.slot] = state[name]
             else:
                 copier(variable.type)(container[variable.slot], state[name])
+
+    def _declare(self, parts: ForeignParts) -> None:
+        for of, names in parts.symbols.items():
+            numbers: Frame = list(range(len(names)))
+            self._declared.lists[of.name.lower()] = {
+                name.lower(): (numbers, TextVariable(name.lower(), of, at, constant=True))
+                for at, name in enumerate(names)
+            }
+        for name, (of_object, value) in parts.objects.items():
+            variable = TextVariable(name.lower(), of_object, 0, first=value)
+            self._declared.globals[name.lower()] = ([value], variable)
 
     def _kept(self) -> list[tuple[str, tuple[Frame, TextVariable]]]:
         own = {name: (self._frame, one) for name, one in self._main.members.items()}

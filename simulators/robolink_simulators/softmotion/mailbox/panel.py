@@ -137,7 +137,7 @@ class PlcPanel:
     def take_ownership(self) -> None:
         """Let somebody else insist on the mailbox (F46)."""
         with self._acting() as now_ns:
-            self._plc.program.ownership.seize(now_ns)
+            self._plc.program.seize(now_ns)
 
     def restart(self) -> None:
         """Start the PLC anew; what is retained stays."""

@@ -105,13 +105,12 @@ class ExecutedMailbox:
         return (*outbox, *slots)
 
     def start(self, now_ns: int) -> None:
-        """Execute the first cycle after a start of the PLC."""
+        """Give every variable what it holds at first; the first cycle is due."""
         self.structured.restart()
         self.inbox.zero()
         self._tool = self._group.tool
         self._wire()
         self._scanned_ns = now_ns // self._cycle_ns * self._cycle_ns - self._cycle_ns
-        self.refresh(now_ns)
 
     def tell_before(self, command: Words) -> None:
         """Have a command carried out before time begins, as somebody did earlier today."""
@@ -165,6 +164,7 @@ class ExecutedMailbox:
         program.put("inbox", list(self.inbox.words))
         program.put("RL_Machine.xPermit", self._permitted)
         program.put("RL_Machine.xPowered", group.status().powered)
+        program.put("RL_Machine.xAxisMoves", any(axis.moving_alone for axis in group.axes))
         program.put("RL_Machine.xImaged", self._imaged())
         if group.tool is not self._tool:
             program.put("RL_Machine.xForeignTool", True)

@@ -74,6 +74,12 @@ class StructuredPlc(Plc):
         self.memory = ProgramMemory(self._executed.structured, mailbox.device_id)
         self.program = self._executed
 
+    def start(self, now_ns: int) -> None:
+        """Start the PLC; the program's first cycle finds the drives as the machine's has left them."""
+        super().start(now_ns)
+        self._executed.refresh(now_ns)
+        self._take_over()
+
     def make_ready(self, tool: CoordRef) -> None:
         """Enable the group; somebody takes the mailbox, selects slot 1 and gives it back."""
         if self.group.state is SmcGroupState.DISABLED:
@@ -125,7 +131,6 @@ class StructuredPlc(Plc):
 
     def _begin_program(self, now_ns: int) -> None:
         self._executed.start(now_ns)
-        self._take_over()
 
 
 def program_plc(

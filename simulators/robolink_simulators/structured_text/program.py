@@ -37,6 +37,7 @@ from robolink_simulators.structured_text.statements import (
     counted_in,
 )
 
+
 @dataclass(frozen=True, slots=True)
 class ForeignParts:
     """What a program names and no text declares: libraries, and objects of the project.

@@ -36,18 +36,24 @@ plc.add_command(check_map)
     show_default=True,
     help="First register of both blocks, counted from 0.",
 )
+@click.option(
+    "--kinematics",
+    default="",
+    metavar="NAME",
+    help="Kinematics of the axis group, such as Kin_Scara3_Z; opcode 30004 sets it again.",
+)
 @click.option("--force", is_flag=True, help="Write over files that were changed.")
 @json_option
-def export(folder: Path, profile: str, base: int, force: bool) -> None:
-    """Write the register map, the CANopen data sheet and the data types of the mailbox.
+def export(folder: Path, profile: str, base: int, kinematics: str, force: bool) -> None:
+    """Write the program of the mailbox, its register map and its CANopen data sheet.
 
-    docs/mailbox.md says what to do with them. Their licence is 0BSD: they may be used in a
+    docs/plc-program.md says what to do with them. Their licence is 0BSD: they may be used in a
     machine without any duty.
     """
     from robolink.protocols.mailbox import ExportProfile
     from robolink_cli.commands.companions.plc_export import export_texts, plc_texts
 
-    texts = plc_texts(ExportProfile(profile), base)
+    texts = plc_texts(ExportProfile(profile), base, kinematics)
     written = [str(path) for path in export_texts(folder, texts, replace=force)]
     if json_is_on():
         emit_json("robolink/plc-export/1", {"files": written, "profile": profile, "base": base})

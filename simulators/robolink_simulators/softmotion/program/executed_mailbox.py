@@ -155,7 +155,9 @@ class ExecutedMailbox:
     def next_change(self, now_ns: int) -> int | None:
         """Return when the next cycle is due that is not left out."""
         waits = 1 if self._restless else MOST_LEFT_OUT
-        return max(self._scanned_ns + waits * self._cycle_ns, now_ns // self._cycle_ns * self._cycle_ns)
+        return max(
+            self._scanned_ns + waits * self._cycle_ns, now_ns // self._cycle_ns * self._cycle_ns
+        )
 
     def _scan(self, began_ns: int) -> None:
         self._scanned_ns = began_ns

@@ -26,9 +26,7 @@ ERROR_ID: Final = ELEMENTARY["DINT"]
 COORD_SYSTEM: Final = ScalarType("SMC_COORD_SYSTEM", Family.INTEGER, 16, True)
 BUFFER_MODE: Final = ScalarType("MC_BUFFER_MODE", Family.INTEGER, 16, True)
 AXIS_GROUP: Final = OpaqueType("AXIS_GROUP_REF_SM3")
-CONTINUE_DATA: Final = StructType(
-    "SMC_AXIS_GROUP_CONTINUE_DATA", members_of([("written", BOOL)])
-)
+CONTINUE_DATA: Final = StructType("SMC_AXIS_GROUP_CONTINUE_DATA", members_of([("written", BOOL)]))
 COORD_REF: Final = StructType("MC_COORD_REF", members_of([(name, LREAL) for name in "xyzabc"]))
 POSITION: Final = StructType("SMC_POS_REF", members_of([("v", SIX)]))
 

@@ -128,7 +128,9 @@ class MotionBlocks:
 
         return BlockType(name, members, run)
 
-    def _show(self, frame: Frame, slot: Mapping[str, int], execution: BlockExecution | None) -> None:
+    def _show(
+        self, frame: Frame, slot: Mapping[str, int], execution: BlockExecution | None
+    ) -> None:
         outputs = None if execution is None else execution.outputs
         error = None if outputs is None else outputs.error
         frame[slot["done"]] = outputs is not None and outputs.done
@@ -171,7 +173,8 @@ class MotionBlocks:
 
     def _buttons(self, pins: Mapping[str, Any]) -> JogCommand:
         masks = [
-            sum(1 << at for at, on in enumerate(pins[name]) if on) for name in ("forward", "backward")
+            sum(1 << at for at, on in enumerate(pins[name]) if on)
+            for name in ("forward", "backward")
         ]
         system = CoordSystem(pins["coordsystem"])
         numbers = Dynamics(*(pins[name] for name, _, _ in _DYNAMICS))
@@ -224,4 +227,3 @@ def _press(group: AxisGroup, command: JogCommand, *, jogs: bool) -> None:
 def members_named(pins: Pins) -> dict[str, TextVariable]:
     """Return the pins of a block by name, in order."""
     return {name: TextVariable(name, of, slot, kind) for slot, (name, of, kind) in enumerate(pins)}
-

@@ -89,7 +89,7 @@ def _position(units: UserUnits) -> BlockType:
             values = units.given_axes(group.values, group.kinematics.kinds)
         else:
             values = units.given(CoordRef(*group.read_actual_position(system).values))
-        frame[slot["position"]][0][:] = [value + 0.0 for value in values]
+        frame[slot["position"]][0][:] = values
 
     pins: Pins = (("coordsystem", COORD_SYSTEM, "var_input"), ("position", POSITION, "var_output"))
     return _reading("MC_GroupReadActualPosition", pins, read)

@@ -83,8 +83,8 @@ class RaisedError(SpelRefusal):
         number: Which.
     """
 
-    def __init__(self, number: int) -> None:
-        super().__init__(RefusalKind.SYNTAX, f"Error {number}")
+    def __init__(self, number: int, text: str = "") -> None:
+        super().__init__(RefusalKind.SYNTAX, text or f"Error {number}")
         self.number = number
 
 

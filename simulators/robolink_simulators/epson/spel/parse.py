@@ -86,7 +86,8 @@ _UNSIMULATED_FUNCTIONS = """
 _WITH_A_FORM_OF_THEIR_OWN = """
     opencom opennet parsestr eresume error fmtstr input line read redim setcom setnet signal
     taskwait waitnet waitsig write writebin readbin close closecom closenet flush cont restart
-    tmreset resetelapsedtime randomize loadpoints savepoints vrun vget vset
+    tmreset resetelapsedtime randomize loadpoints savepoints vrun vget vset vload vsave vcls vcal
+    vxcalib
 """
 
 WINDOW_ONLY: Final = frozenset(

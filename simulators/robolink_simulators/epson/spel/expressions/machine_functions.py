@@ -128,6 +128,11 @@ def _point_label(session: Session, arguments: Arguments) -> Value:
     return next((name for name, at in labels.items() if at == number), "")
 
 
+def _calibration_information(session: Session, arguments: Arguments) -> Value:
+    number, which = (as_integer(argument) for argument in arguments)
+    return session.machine.image_calibrations.information(number, which)
+
+
 MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     **{f"c{axis.lower()}": (range(1, 2), _coordinate(axis)) for axis in AXES},
     **{name: (range(2), function) for name, function in FLAG_FUNCTIONS.items()},
@@ -190,6 +195,7 @@ MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     "iodef": (range(1, 2), lambda s, a: as_text(a[0]).lower() in s.machine.io_labels),
     "pnumber": (range(1, 2), _point_number),
     "plabel$": (range(1, 2), _point_label),
+    "vxcalinfo": (range(2, 3), _calibration_information),
     "ctrldev": (range(1), lambda s, _: s.machine.control_device),
 }
 """Name to the numbers of arguments allowed and the function."""
@@ -260,6 +266,13 @@ def _local_point(session: Session, arguments: Arguments) -> Point:
     return Point(astuple(local))
 
 
+def _place_of_pixel(session: Session, arguments: Arguments) -> Point:
+    if len(arguments) > 2:
+        raise SpelRefusal(RefusalKind.NOT_SIMULATED, "A camera on the robot")
+    number, pixel = as_integer(arguments[0]), as_point(arguments[1])
+    return session.machine.image_calibrations.robot_place(number, pixel)
+
+
 POINT_FUNCTIONS: Final[dict[str, tuple[range, PointFunction]]] = {
     "xy": (range(4, 7), _xy),
     "ja": (range(4, 7), of_angles),
@@ -273,6 +286,7 @@ POINT_FUNCTIONS: Final[dict[str, tuple[range, PointFunction]]] = {
     "findpos": (range(1), _found_position),
     "tlset": (range(1, 2), _tool_point),
     "local": (range(1, 2), _local_point),
+    "vxtrans": (range(2, 4), _place_of_pixel),
     "ecpset": (range(1, 2), lambda s, a: Point(s.machine.control_points.get(as_integer(a[0])))),
 }
 """Name to the numbers of arguments allowed and the function."""

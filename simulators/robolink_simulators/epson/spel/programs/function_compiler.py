@@ -26,6 +26,7 @@ from robolink_simulators.epson.spel.line_tree import (
     Unsimulated,
     VisionAccess,
     VisionRun,
+    VisionStatement,
 )
 from robolink_simulators.epson.spel.parse import WINDOW_ONLY
 from robolink_simulators.epson.spel.programs.blocks import BlockCompiler
@@ -178,7 +179,14 @@ class FunctionCompiler:
                 emitter.emit(redim(emitter.array(Name(name)), runs, keep_values=kept))
             case Trap(_, _, action, target) if action == "goto" and target is not None:
                 emitter.emit(compile_family(emitter, node, self._target(target)))
-            case TaskStatement() | ChannelStatement() | Trap() | VisionRun() | VisionAccess():
+            case (
+                TaskStatement()
+                | ChannelStatement()
+                | Trap()
+                | VisionRun()
+                | VisionAccess()
+                | VisionStatement()
+            ):
                 emitter.emit(compile_family(emitter, node))
             case Unsimulated(word):
                 emitter.emit(refuse(RefusalKind.NOT_SIMULATED, f"{word} is not simulated"))

@@ -73,9 +73,7 @@ class CameraCell:
         at = self.simulator.machine.tip()
         rows = [IN_THE_PICTURE_MM, IN_THE_PICTURE_MM[::-1], IN_THE_PICTURE_MM]
         places = zip((3.0, 0.0, -3.0), rows, strict=True)
-        return [
-            [at.x_mm + dx, at.y_mm + dy, at.z_mm, at.u_deg] for dy, row in places for dx in row
-        ]
+        return [[at.x_mm + dx, at.y_mm + dy, at.z_mm, at.u_deg] for dy, row in places for dx in row]
 
 
 @pytest.fixture
@@ -160,12 +158,12 @@ def test_an_image_calibration_turns_pixels_into_places(printed, failure):
         "Print VxCalInfo(1, 1)",
         "VxCalib 1, 3, P(0:4), P(10:14)",
         "Print VxCalInfo(1, 1)",
-        "Print FmtStr$(VxCalInfo(1, 4), \"0.0000\")",
+        'Print FmtStr$(VxCalInfo(1, 4), "0.0000")',
         "Print VxCalInfo(1, 3) < 0.0001, VxCalInfo(1, 9)",
         "P50 = XY(50, 50, 0, 0)",
         "P51 = VxTrans(1, P50)",
-        "Print FmtStr$(CX(P51), \"0.000\")",
-        "Print FmtStr$(CY(VxTrans(1, P50)), \"0.000\")",
+        'Print FmtStr$(CX(P51), "0.000")',
+        'Print FmtStr$(CY(VxTrans(1, P50)), "0.000")',
     )
     assert told == ["0", "1", "0.0200", "-1 0", "11.000", "19.000"]
     riding = failure(*points, "VxCalib 1, 5, P(0:4), P(10:14)")

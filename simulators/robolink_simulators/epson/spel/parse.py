@@ -37,9 +37,9 @@ _WORDS_NOT_SIMULATED = """
     arch armclr armset atrq autoljm box dispdev enctemper finedist hofs hordr hour jrange
     limittorque limittorquelp limittorquestop limzmargin mcordr msgbox olaccel olrate opencom
     opennet outreal parsestr performmode plane plocal ptpboost ptrq qpdecelr qpdecels shutdown
-    softcp speedrlimitation syncrobots taskstate tclim tcspeed time xylim xylimmode diffpoint
-    arc3 atclr bgo boxclr calib closecom closenet close cls copy ctreset curve cvmove
-    date del eresume error exportpoints flush fmtstr homeclr hofsjointaccuracy importpoints
+    softcp speedrlimitation syncrobots taskstate tclim tcspeed xylim xylimmode diffpoint
+    atclr boxclr calib closecom closenet close cls copy curve cvmove
+    del eresume error exportpoints flush fmtstr homeclr hofsjointaccuracy importpoints
     input inputbox latchenable line loadpoints mcal mkdir
     pdescription planeclr ptclr ptran qp randomize read redim rename resetelapsedtime savepoints
     setcom setinreal setlatch setnet signal simset taskwait tc tmreset toff ton

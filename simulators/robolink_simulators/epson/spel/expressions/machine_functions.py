@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import astuple
+from datetime import datetime, timedelta
 from typing import Final
 
 from robolink.model import ToolOffset
@@ -28,6 +29,8 @@ from robolink_simulators.epson.spel.expressions.values import (
     out_of_range,
 )
 from robolink_simulators.epson.spel.session import Session
+
+_CLOCK_AT_START: Final = datetime(2026, 1, 1, 8)  # noqa: DTZ001 - a controller has no zone
 
 Arguments = Sequence[Value]
 MachineFunction = Callable[[Session, Arguments], Value]
@@ -189,6 +192,9 @@ MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     "robottype": (range(1), lambda s, _: s.machine.model.robot_type),
     "robotmodel$": (range(1), lambda s, _: s.machine.model.name),
     "robotserial$": (range(1), lambda s, _: s.machine.serial),
+    "ctr": (range(1, 2), lambda s, a: s.machine.inputs.counted(as_integer(a[0]))),
+    "date$": (range(1), lambda s, _: clock_of(s).strftime("%Y/%m/%d")),
+    "time$": (range(1), lambda s, _: clock_of(s).strftime("%H:%M:%S")),
     "inbcd": (range(1, 2), _decimal),
     "iolabel$": (range(3, 4), _label_of),
     "ionumber": (range(1, 2), _number_of),
@@ -199,6 +205,11 @@ MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     "ctrldev": (range(1), lambda s, _: s.machine.control_device),
 }
 """Name to the numbers of arguments allowed and the function."""
+
+
+def clock_of(session: Session) -> datetime:
+    """Return what the controller's clock shows: it starts alike in every run (assumed)."""
+    return _CLOCK_AT_START + timedelta(microseconds=session.machine.arm.now_ns // 1000)
 
 
 def load_of(session: Session) -> tuple[float, float]:

@@ -254,7 +254,7 @@ SAMPLE = (
 @pytest.mark.parametrize("name", SAMPLE)
 def test_a_sample_of_the_table(name):
     line = LINES[NAMES.index(name)]
-    shares = run(line, 200)
+    shares = run(line, 100)
     assert line.least - 7 <= shares.alone <= line.most + 7, shares
 
 

@@ -96,7 +96,8 @@ def test_any_file_is_answered(capsys, cases):
 
 
 @pytest.mark.soak
-@settings(A_FEW, max_examples=1500)
+@pytest.mark.timeout(600)
+@settings(A_FEW, max_examples=1000)
 @given(FILES)
 def test_any_of_many_files_is_answered(capsys, cases):
     check_answered(capsys, cases)

@@ -4,6 +4,7 @@ Beside the method the height of the pin may stand in the cell file only.
 """
 
 import os
+import re
 from pathlib import Path
 
 import pytest
@@ -78,7 +79,8 @@ def test_a_length_is_told_refused_and_followed(cell, method, longer_mm):
     error = refused.document["error"]
     assert (refused.code, error["code"]) == (7, "length_changed"), refused.err
     assert ("longer" if longer_mm > 0 else "shorter") in error["what"]
-    assert "0.5" in error["what"]
+    (size,) = re.findall(r"is ([\d.]+) mm (?:longer|shorter)", error["what"])
+    assert float(size) == pytest.approx(0.5, abs=0.12)
     assert "--if-length-changed" in error["remedy"]
     assert cell.stored == before
     assert len(cell.recorded()) > entries

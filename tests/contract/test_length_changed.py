@@ -158,6 +158,7 @@ schema = "robolink/recipe/1"
 name = "two nozzles"
 basis = "absolute"
 z = "kept"
+verify = false
 
 [source]
 kind = "n-angle"

@@ -11,7 +11,7 @@ from enum import StrEnum
 from typing import Final, Self
 
 from robolink_simulators.faults import FaultAction, LinkKind, PlcFaultAction, links_of
-from robolink_simulators.soak.instants import drawn_instant
+from robolink_simulators.faults.instants import drawn_instant
 
 
 class CellKind(StrEnum):

@@ -85,6 +85,8 @@ def drawn_instant(rng: random.Random, cell: str, deed: str) -> tuple[Instant, in
     """Return an instant that tells in a deed, and which of those that match; mostly ``None``."""
     if rng.random() >= SHARE:
         return None
-    fitting = [one for one in INSTANTS[cell] if not one.deeds or deed in one.deeds]
+    fitting = [one for one in INSTANTS.get(cell, ()) if not one.deeds or deed in one.deeds]
+    if not fitting:
+        return None
     instant = rng.choice(fitting)
     return instant, instant.first + rng.randrange(instant.count)

@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from robolink.model import AxisKind
 from robolink_simulators.cell.frames import ORIGIN, Frame
 from robolink_simulators.softmotion.kinematics.coordinates import (
     CoordinateTransforms,
@@ -12,7 +13,6 @@ from robolink_simulators.softmotion.kinematics.coordinates import (
 )
 from robolink_simulators.softmotion.kinematics.kinematics import (
     ANY_CONFIGURATION,
-    AxisKind,
     AxisValues,
     Configuration,
     KinematicsModel,
@@ -74,7 +74,7 @@ class Planner:
             Refused: A value is not usable, or the line cannot be covered.
         """
         dynamics.require_usable()
-        tcp = self._tcp(start, target, tool)
+        tcp = self.tcp(start, target, tool)
         self._require_same_configuration(start, target)
         path = plan_line(self._kinematics, start, tcp, tool)
         return path, line_pace(path, dynamics, self._axes)
@@ -91,7 +91,7 @@ class Planner:
         if target.system is CoordSystem.ACS:
             end = self._axis_target(target)
         else:
-            tcp = self._tcp(start, target, tool)
+            tcp = self.tcp(start, target, tool)
             end = axes_for_tcp(self._kinematics, tcp, tool, target.configuration, near=start)
             end = tuple(_inside(value, axis) for value, axis in zip(end, self._axes, strict=True))
         path = JointPath(start, end)
@@ -103,7 +103,17 @@ class Planner:
             return ORIGIN
         return self._transforms.in_mcs(system, self._kinematics.flange(start) @ tool)
 
-    def _tcp(self, start: AxisValues, target: Target, tool: Frame) -> Frame:
+    def tcp(self, start: AxisValues, target: Target, tool: Frame) -> Frame:
+        """Return where a target brings the TCP, in MCS.
+
+        Args:
+            start: Axes where the movement starts: TCS stands there.
+            target: The target.
+            tool: Flange to TCP.
+
+        Raises:
+            Refused: The position is no position of its coordinate system.
+        """
         if target.system is CoordSystem.ACS:
             return self._kinematics.flange(self._axis_target(target)) @ tool
         _require_finite(target.position, 6)
@@ -119,9 +129,9 @@ class Planner:
         wanted = target.configuration
         if target.system is CoordSystem.ACS:
             wanted = self._kinematics.configuration(self._axis_target(target))
-        if wanted.elbow_right not in (None, present.elbow_right):
+        if wanted.contradicts(present):
             raise BlockRefused(
-                ErrorKind.CONFIGURATION, "A straight movement keeps the elbow's side"
+                ErrorKind.CONFIGURATION, "A straight movement keeps arm, elbow and hand"
             )
 
 

@@ -6,6 +6,7 @@ not know.
 
 import json
 from dataclasses import replace
+from typing import Any
 
 from robolink_simulators.softmotion import GroupOptions, SmcNumbers
 from robolink_simulators.softmotion.mailbox import MailboxOptions, PlcOptions, SoftMotionSimulator
@@ -34,11 +35,12 @@ OPTIONS = PlcOptions(group=GroupOptions(numbers=NUMBERS), mailbox=MailboxOptions
 SWITCHED_ON = {"boot_id": 3, "epoch": 8, "device_id": 77, "slots": {}}
 CYCLE_S = 0.004
 ABOUT_X = 0b1000
+READ_MODES = ("CURRENT", "ACTIVE", "LAST")
 
 
 def sources(kinematics="", profile=ExportProfile.FULL, change=lambda text: text):
     """Return the exported texts, changed by ``change``."""
-    texts = program_texts(profile, kinematics=kinematics)
+    texts = program_texts(profile, kinematics=kinematics, read_modes=READ_MODES)
     return [SourceText(name, change(texts[name]), kind) for name, kind in PROGRAM_SOURCES]
 
 
@@ -236,7 +238,7 @@ def b15_jog_about_x(bench):
 def without_image(model):
     """Return a machine whose kinematics does not tell its orientations."""
     kinematics = type("Untold", (type(model.kinematics),), {"orientation_image": lambda *_: None})
-    untold = object.__new__(kinematics)
+    untold: Any = object.__new__(kinematics)
     for name in getattr(model.kinematics, "__slots__", ()) or vars(model.kinematics):
         object.__setattr__(untold, name, getattr(model.kinematics, name))
     return replace(model, kinematics=untold)

@@ -1,6 +1,6 @@
 """The files that a PLC programmer puts beside the mailbox program."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from robolink.errors import ConfigError
@@ -19,13 +19,16 @@ from robolink.protocols.mailbox import (
 )
 
 
-def plc_texts(profile: ExportProfile, base: int, kinematics: str = "") -> Mapping[str, str]:
+def plc_texts(
+    profile: ExportProfile, base: int, kinematics: str = "", read_modes: Sequence[str] = ()
+) -> Mapping[str, str]:
     """Return the files by name.
 
     Args:
         profile: Which opcodes the program holds.
         base: The first register of both blocks.
         kinematics: Block name of the group's kinematics, for opcode 30004; empty for none.
+        read_modes: The three symbols of SMC_READ_TOOL_MODE, or none.
 
     Raises:
         ConfigError: There is no such kinematics.
@@ -35,7 +38,7 @@ def plc_texts(profile: ExportProfile, base: int, kinematics: str = "") -> Mappin
             tr("{name} is no kinematics of the register map.", name=kinematics),
             remedy=tr("See the table of kinematics in register_map.md."),
         )
-    program = program_texts(profile, base=base, kinematics=kinematics)
+    program = program_texts(profile, base=base, kinematics=kinematics, read_modes=read_modes)
     return {
         **program,
         "robolink_program.xml": plcopen_xml(program),

@@ -8,7 +8,7 @@ from robolink.protocols.mailbox._codes import ErrorClass
 
 _ROWS: Final = (
     ("wrongState", "SMC_AXIS_GROUP_WRONG_STATE", "201..204, 209", 11000),
-    ("nothingToReset", "", ErrorClass.NOTHING_TO_RESET.value, 120),
+    ("nothingToReset", "SMC_R_NO_ERROR_TO_RESET", ErrorClass.NOTHING_TO_RESET.value, 120),
     ("noSuchMovement", "", ErrorClass.NO_SUCH_MOVEMENT.value, ""),
     ("notAtContinue", "", ErrorClass.WRONG_STATE.value, ""),
     (
@@ -29,6 +29,13 @@ _ROWS: Final = (
         "byAxis",
         "SMC_AXIS_GROUP_INTERRUPTED_BY_SINGLE_AXIS",
         ErrorClass.INTERRUPTED_BY_AXIS.value,
+        "",
+    ),
+    ("pcsInUse", "SMC_AXIS_GROUP_PCS_STILL_IN_USE", ErrorClass.WRONG_STATE.value, ""),
+    (
+        "blending",
+        "SMC_BLENDING_NOT_SUPPORTED_BY_PREVIOUS_MOVEMENT",
+        ErrorClass.WRONG_STATE.value,
         "",
     ),
 )

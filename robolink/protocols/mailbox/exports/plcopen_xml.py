@@ -25,7 +25,9 @@ _SECTIONS: Final = {
     "VAR_IN_OUT": "inOutVars",
     "VAR": "localVars",
 }
-_ELEMENTARY: Final = frozenset("BOOL BYTE WORD DWORD INT UINT DINT UDINT LREAL TIME".split())
+_ELEMENTARY: Final = frozenset(
+    ["BOOL", "BYTE", "WORD", "DWORD", "INT", "UINT", "DINT", "UDINT", "LREAL", "TIME"]
+)
 _LISTS: Final = {"RL_Kept.st": ' retain="true"', "RL_Machine.st": ""}
 _IDS: Final = uuid.UUID("7d0cb4c5-3f4e-5cde-9a80-3a1f2b6f6f01")
 _ARRAY: Final = re.compile(r"ARRAY \[(-?\d+)\.\.(-?\d+)\] OF (.+)", re.DOTALL)
@@ -72,7 +74,7 @@ def plcopen_xml(texts: Mapping[str, str]) -> str:
     """
     types = [made for text in texts.values() for made in types_in(text)]
     blocks = [made for text in texts.values() for made in blocks_in(text)]
-    names = [unit.name for unit in (*types, *blocks)]
+    names = [made.name for made in types] + [made.name for made in blocks]
     names += [name.partition(".")[0] for name in _LISTS]
     return _FRAME.format(
         information=_data("projectinformation", "<ProjectInformation />"),
@@ -115,7 +117,8 @@ def _list(file: str, text: str) -> str:
     variables = "".join(map(_variable, list_in(text)))
     attributes = '<Attributes><Attribute Name="qualified_only" Value="" /></Attributes>'
     added = _data("attributes", attributes) + _object_id(name)
-    held = f'<globalVars name="{name}"{_LISTS[file]}>{variables}<addData>{added}</addData></globalVars>'
+    inside = f"{variables}<addData>{added}</addData>"
+    held = f'<globalVars name="{name}"{_LISTS[file]}>{inside}</globalVars>'
     return "    " + _data("globalvars", held)
 
 

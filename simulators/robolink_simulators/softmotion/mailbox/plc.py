@@ -39,6 +39,10 @@ class RunningProgram(Protocol):
     def capabilities(self) -> Capability:
         """What it can be told."""
 
+    @property
+    def holder(self) -> int:
+        """Token of the owner, 0 for nobody."""
+
     permitted: bool
     """The machine's own permit (``xPermit``)."""
 

@@ -98,6 +98,11 @@ class MailboxProgram:
             return self._tools.set_tool()
         return self._motion.latched(job) or self._answer
 
+    @property
+    def holder(self) -> int:
+        """Token of the owner, 0 for nobody."""
+        return self.ownership.holder
+
     def write(self, first: int, words: Sequence[int], now_ns: int) -> None:
         """Take what a client writes; it is looked at in the next cycle."""
         self.inbox.write(first, words)

@@ -24,6 +24,8 @@ _MEMBERS: Final[Mapping[str, ErrorKind]] = {
     "dynamics": ErrorKind.DYNAMICS,
     "nopower": ErrorKind.NO_POWER,
     "axiserror": ErrorKind.AXIS_ERROR,
+    "pcsinuse": ErrorKind.PCS_STILL_IN_USE,
+    "blending": ErrorKind.BLENDING_NOT_SUPPORTED,
     "byaxis": ErrorKind.INTERRUPTED_BY_SINGLE_AXIS,
 }
 """Members of RL_Numbers, and what they number."""

@@ -1,11 +1,11 @@
 """A mailbox program that is executed from its text, on the simulated axis group."""
 
+import re
 import struct
 from collections.abc import Mapping, Sequence
 from typing import Final
 
 from robolink.protocols.mailbox import Capability, Command, Opcode, WordOrder, Words, encode_command
-from robolink_simulators.cell.frames import NO_TURN
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
 from robolink_simulators.softmotion.group.condition import SmcGroupState
 from robolink_simulators.softmotion.mailbox.option_text import PlcOptions
@@ -14,6 +14,7 @@ from robolink_simulators.softmotion.mailbox.words.units import UserUnits
 from robolink_simulators.softmotion.program.error_numbers import ErrorNumbers
 from robolink_simulators.softmotion.program.foreign_types import (
     AXIS_GROUP,
+    READ_MODE,
     SYMBOLS,
     foreign_types,
 )
@@ -21,15 +22,17 @@ from robolink_simulators.softmotion.program.motion_blocks import MotionBlocks
 from robolink_simulators.softmotion.program.reading_blocks import reading_blocks
 from robolink_simulators.softmotion.signals import SIGNALS
 from robolink_simulators.structured_text import SourceText, StructuredProgram
-from robolink_simulators.structured_text.data_types import OpaqueType
+from robolink_simulators.structured_text.data_types import DataType, OpaqueType
 from robolink_simulators.structured_text.program import ForeignParts
 
 MAIN: Final = "RL_PRG"
-MOST_LEFT_OUT: Final = 25
-"""Cycles in a row that are left out while nothing happens."""
+FIRST_LEFT_OUT: Final = 25
+"""Cycles that are left out at first while nothing happens; then twice as many each time."""
 
+_GOING: Final = 1
+_REPLY: Final = 9
+"""Members of RL_Call: whether it is under way, and the state that the adapter replied."""
 _HEARTBEAT: Final = 9
-_STATE: Final = 7
 _TOOL_SLOT: Final = 11
 _CAPABILITIES: Final = 90
 _CRC: Final = 110
@@ -74,9 +77,10 @@ class ExecutedMailbox:
         self._cycle_ns = options.mailbox.program_cycle_us * 1000
         self._scanned_ns = -self._cycle_ns
         self._restless = True
+        self._left_out = FIRST_LEFT_OUT
         self._permitted = True
         self._tool = group.tool
-        self.structured = StructuredProgram(sources, MAIN, foreign=self._foreign())
+        self.structured = StructuredProgram(sources, MAIN, foreign=self._foreign(sources))
         self._seen: Words = ()
 
     @property
@@ -92,6 +96,11 @@ class ExecutedMailbox:
     def capabilities(self) -> Capability:
         """What the program can be told."""
         return Capability(self.words[_CAPABILITIES])
+
+    @property
+    def holder(self) -> int:
+        """Token of the owner, 0 for nobody."""
+        return int(self.structured.value("core.holder"))
 
     @property
     def selected(self) -> int:
@@ -121,6 +130,7 @@ class ExecutedMailbox:
 
     def seize(self, now_ns: int) -> None:
         """Let a client take the mailbox that nobody here knows, because a person insists."""
+        self.refresh(now_ns)
         before = self.inbox.words
         command = Command(0xFFFF, Opcode.OWNERSHIP, operands=(1, 1, 0, 0), owner=_A_STRANGER)
         self.inbox.write(0, encode_command(command))
@@ -144,17 +154,21 @@ class ExecutedMailbox:
         """Do what is due now."""
         due_ns = self.next_change(now_ns)
         if due_ns is not None and now_ns >= due_ns:
-            self.refresh(now_ns)
+            self._catch_up(now_ns)
 
     def refresh(self, now_ns: int) -> None:
-        """Execute the cycle that began last, unless it has been."""
+        """Execute the cycle that began last, unless it has been, because somebody looks."""
+        self._catch_up(now_ns)
+        self._left_out = FIRST_LEFT_OUT
+
+    def _catch_up(self, now_ns: int) -> None:
         began_ns = now_ns // self._cycle_ns * self._cycle_ns
         if began_ns > self._scanned_ns:
             self._scan(began_ns)
 
     def next_change(self, now_ns: int) -> int | None:
         """Return when the next cycle is due that is not left out."""
-        waits = 1 if self._restless else MOST_LEFT_OUT
+        waits = 1 if self._restless else self._left_out
         return max(
             self._scanned_ns + waits * self._cycle_ns, now_ns // self._cycle_ns * self._cycle_ns
         )
@@ -186,9 +200,10 @@ class ExecutedMailbox:
         """A cycle may be left out when this one was like the one before and nothing goes on."""
         words = tuple(self.structured.value("outbox"))
         still = (*words[:_HEARTBEAT], *words[_HEARTBEAT + 1 : _CRC])
-        going = any(call[1] or call[7] for call in self._calls())
+        going = any(call[_GOING] or call[_REPLY] for call in self._calls())
         moving = self._group.state in (SmcGroupState.MOVING, SmcGroupState.STOPPING)
         self._restless = still != self._seen or going or moving
+        self._left_out = FIRST_LEFT_OUT if self._restless else 2 * self._left_out
         self._seen = still
 
     def _calls(self) -> Sequence[Sequence[object]]:
@@ -199,7 +214,8 @@ class ExecutedMailbox:
         return calls
 
     def _imaged(self) -> bool:
-        return self._group.kinematics.orientation_image(NO_TURN) is not None
+        rotation = self._group.flange().rotation
+        return self._group.kinematics.orientation_image(rotation) is not None
 
     def _wire(self) -> None:
         """Give the program what an integrator writes into RL_Machine."""
@@ -219,14 +235,26 @@ class ExecutedMailbox:
         for name, number in self._numbers.members().items():
             program.put(f"RL_Machine.numbers.{name}", number)
 
-    def _foreign(self) -> ForeignParts:
+    def _foreign(self, sources: Sequence[SourceText]) -> ForeignParts:
         name = self._group.kinematics.name
-        types = dict(foreign_types())
+        types: dict[str, DataType] = dict(foreign_types())
         own = OpaqueType(f"TRAFO.{name}")
         types[own.name.upper()] = own
         blocks = MotionBlocks(self._units, self._numbers, self._group.kinematics)
-        types |= blocks.blocks(own) | reading_blocks(self._units, self._numbers)
-        return ForeignParts(types, SYMBOLS, {"AxisGroup": (AXIS_GROUP, self._group)})
+        types |= blocks.blocks(own)
+        types |= reading_blocks(self._units, self._numbers)
+        symbols = {**SYMBOLS, READ_MODE: _read_modes(sources)}
+        return ForeignParts(types, symbols, {"AxisGroup": (AXIS_GROUP, self._group)})
+
+
+def _read_modes(sources: Sequence[SourceText]) -> Sequence[str]:
+    """Return the symbols of SMC_READ_TOOL_MODE in the order of the adapter's lines.
+
+    No document names them: whatever the text calls them are the set tool, that of the active
+    movement and that of the movement commanded last, one after the other.
+    """
+    named = (re.findall(r"SMC_READ_TOOL_MODE\.(\w+)", source.text) for source in sources)
+    return [name for names in named for name in names]
 
 
 def _real_words(number: float) -> tuple[int, int]:

@@ -25,6 +25,7 @@ MASKS: Final = ArrayType(((0, 5),), BOOL)
 ERROR_ID: Final = ELEMENTARY["DINT"]
 COORD_SYSTEM: Final = ScalarType("SMC_COORD_SYSTEM", Family.INTEGER, 16, True)
 BUFFER_MODE: Final = ScalarType("MC_BUFFER_MODE", Family.INTEGER, 16, True)
+READ_MODE: Final = ScalarType("SMC_READ_TOOL_MODE", Family.INTEGER, 16, True)
 AXIS_GROUP: Final = OpaqueType("AXIS_GROUP_REF_SM3")
 CONTINUE_DATA: Final = StructType("SMC_AXIS_GROUP_CONTINUE_DATA", members_of([("written", BOOL)]))
 COORD_REF: Final = StructType("MC_COORD_REF", members_of([(name, LREAL) for name in "xyzabc"]))
@@ -46,5 +47,5 @@ SYMBOLS: Final[Mapping[ScalarType, Sequence[str]]] = {COORD_SYSTEM: _SYSTEMS, BU
 
 def foreign_types() -> Mapping[str, DataType]:
     """Return the types by name, in capital letters."""
-    named = (COORD_SYSTEM, BUFFER_MODE, AXIS_GROUP, CONTINUE_DATA, COORD_REF, POSITION)
+    named = (READ_MODE, COORD_SYSTEM, BUFFER_MODE, AXIS_GROUP, CONTINUE_DATA, COORD_REF, POSITION)
     return {of.name.upper(): of for of in named}

@@ -25,7 +25,7 @@ class ProgramMemory(RetainedMemory):
         self.device_id = device_id
 
     @property
-    def boot_id(self) -> int:  # type: ignore[override]
+    def boot_id(self) -> int:
         """Counts PLC starts."""
         return int(self._program.value(f"{_MEMORY}.bootId"))
 
@@ -34,7 +34,7 @@ class ProgramMemory(RetainedMemory):
         self._program.put(f"{_MEMORY}.bootId", number)
 
     @property
-    def epoch(self) -> int:  # type: ignore[override]
+    def epoch(self) -> int:
         """Counts owners."""
         return int(self._program.value(f"{_MEMORY}.epoch"))
 
@@ -43,7 +43,7 @@ class ProgramMemory(RetainedMemory):
         self._program.put(f"{_MEMORY}.epoch", number)
 
     @property
-    def device_id(self) -> int:  # type: ignore[override]
+    def device_id(self) -> int:
         """The PLC's own number; 0 until a program draws it with its first command."""
         return int(self._program.value(f"{_MEMORY}.deviceId"))
 

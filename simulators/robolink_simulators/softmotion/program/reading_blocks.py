@@ -7,17 +7,20 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
-from robolink_simulators.softmotion.group.condition import SmcGroupState
+from robolink_simulators.softmotion.group.condition import ReadToolMode, SmcGroupState
 from robolink_simulators.softmotion.kinematics.coordinates import CoordRef, CoordSystem
 from robolink_simulators.softmotion.mailbox.words.units import UserUnits
 from robolink_simulators.softmotion.program.error_numbers import ErrorNumbers
 from robolink_simulators.softmotion.program.foreign_types import (
     AXIS_GROUP,
+    COORD_REF,
     COORD_SYSTEM,
     ERROR_ID,
     POSITION,
+    READ_MODE,
 )
 from robolink_simulators.softmotion.program.motion_blocks import Pins, members_named
+from robolink_simulators.softmotion.smc_errors import BlockRefused
 from robolink_simulators.structured_text.data_types import BOOL, BlockType, Frame
 
 _ENABLE: Final[Pins] = (
@@ -46,7 +49,24 @@ def reading_blocks(units: UserUnits, numbers: ErrorNumbers) -> Mapping[str, Bloc
         "MC_GROUPREADSTATUS": _status(),
         "MC_GROUPREADERROR": _error(numbers),
         "MC_GROUPREADACTUALPOSITION": _position(units),
+        "SMC_GROUPREADTOOL": _tool(units),
     }
+
+
+def _tool(units: UserUnits) -> BlockType:
+    """SMC_GroupReadTool, with Enable and Valid (assumed); not valid: no such movement."""
+
+    def read(frame: Frame, slot: dict[str, int]) -> None:
+        group: AxisGroup = frame[0]
+        try:
+            tool = group.read_tool(ReadToolMode(frame[slot["readmode"]]))
+        except BlockRefused:
+            frame[slot["valid"]] = False
+            return
+        frame[slot["tooloffset"]][:] = units.given(CoordRef.of(tool.frame))
+
+    pins: Pins = (("readmode", READ_MODE, "var_input"), ("tooloffset", COORD_REF, "var_output"))
+    return _reading("SMC_GroupReadTool", pins, read)
 
 
 def _reading(name: str, outputs: Pins, read: Callable[[Frame, dict[str, int]], None]) -> BlockType:

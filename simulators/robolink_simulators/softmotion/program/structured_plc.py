@@ -2,8 +2,8 @@
 
 Theory of operation. The task runs at multiples of its period. At each, the inputs of the machine
 are put where the project wires them, the program is executed once, and its outputs are taken. A
-cycle in which nothing was written, nothing is under way and nothing has moved is left out, up to
-25 in a row: heartbeat and timers then go on in steps of 25 periods.
+cycle in which nothing was written or read, nothing is under way and nothing has moved may be left
+out: at first 25 in a row, then twice as many each time. Heartbeat and timers go on in such steps.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -75,7 +75,7 @@ class StructuredPlc(Plc):
         self.program = self._executed
 
     def start(self, now_ns: int) -> None:
-        """Start the PLC; the program's first cycle finds the drives as the machine's has left them."""
+        """Start the PLC; the first cycle of the program finds the drives switched on."""
         super().start(now_ns)
         self._executed.refresh(now_ns)
         self._take_over()
@@ -98,10 +98,12 @@ class StructuredPlc(Plc):
 
     def lay_words(self, order: WordOrder) -> None:
         """Refuse: a program lays its words as its text says."""
+        del order
         raise _not_in_a_program()
 
     def freeze_heartbeat(self, now_ns: int) -> None:
         """Refuse: the heartbeat is the program's own."""
+        del now_ns
         raise _not_in_a_program()
 
     def output(self, now_ns: int) -> Words:
@@ -150,7 +152,7 @@ def sources_in(folder: Path) -> tuple[SourceText, ...]:
     sources = []
     for name, dialect in PROGRAM_SOURCES:
         try:
-            text = read_named(folder / name)
+            text = read_named(folder / name).decode()
         except (OSError, UnicodeError) as error:
             raise ConfigError(
                 tr("{path} cannot be read: {cause}.", path=folder / name, cause=error),

@@ -29,10 +29,11 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--controller",
-    default="",
+    "controllers",
+    multiple=True,
     metavar="NAME",
-    help="Name under which the controller is on record; by default epson: and the robot's "
-    "serial number.",
+    help="Name under which a robot is on record; by default epson: and its serial number. For a "
+    "controller with several robots repeat it: each name ends in the robot's serial number.",
 )
 @click.option(
     "--tolerance-mm",
@@ -54,7 +55,7 @@ def serve(
     *,
     address: str,
     allow: tuple[str, ...],
-    controller: str,
+    controllers: tuple[str, ...],
     tolerance_mm: float,
     max_change_mm: float,
     sigma_mm: float | None,
@@ -75,7 +76,7 @@ def serve(
 
     def conversation(peer: str) -> "CallbackConversation":
         return CallbackConversation(
-            journal, limits, peer=peer, signature=signature, controller=controller
+            journal, limits, peer=peer, signature=signature, controllers=controllers
         )
 
     server = CallbackServer(host, port, conversation, allow=allow, tell=note)

@@ -163,7 +163,9 @@ class CallbackConversation:
         place = f"spel@{self._peer}"
         name = record_name(serial, _number(robot), self._controllers) or place
         log = self._journal.log(name, signature=self._signature)
-        log.ask(lambda: Identity(name, f"spel://{self._peer}", place))
+        # Robots of one controller call from one address.
+        address = f"spel://{self._peer}" if robot == "1" else f"spel://{self._peer}?robot={robot}"
+        log.ask(lambda: Identity(name, address, place))
         self._log, self._flag = log, int(flag)
         if flag == "1":
             raise CalibrationError("not_restored", tr("The program has not put its tool back."))

@@ -202,6 +202,7 @@ class CallbackCell:
     """Controller, program, relay, server and journal."""
 
     main = MAIN
+    robot = "T6-602S"
 
     def __init__(self, folder, *, seed=1, journal=None, limits=LIMITS, main="", controllers=()):
         self.controllers = controllers
@@ -211,7 +212,7 @@ class CallbackCell:
         self.server = self._serve()
         self.relay = Relay(self.server.address)
         world = WorldParameters(contact_input=CONTACT)
-        self.simulator = EpsonSimulator(serial=SERIAL, seed=seed, world=world)
+        self.simulator = EpsonSimulator(self.robot, serial=SERIAL, seed=seed, world=world)
         path = Path(folder) / "main.prg"
         path.write_text(main or self.main, encoding="ascii")
         ports = {201: self.relay.address}

@@ -64,7 +64,7 @@ def measure_named(
         ConfigError: There is no such station, or nobody knows where it is.
     """
     from robolink.serving._looks import ProgramLooks
-    from robolink.serving._touches import ProgramTouches
+    from robolink.serving._touches import touches_by
 
     method, at, place = name.partition("@")
     if method == "beams" and place:
@@ -78,10 +78,4 @@ def measure_named(
         raise CalibrationError("unknown_method", tr("There is no method {name!r}.", name=name))
     if method == "camera":
         return ProgramLooks(limits)
-    if method == "pivot":
-        from robolink.methods.pivot.source import PivotTouches
-
-        return ProgramTouches(PivotTouches(sigma_mm=limits.sigma_mm), limits)
-    from robolink.methods.n_angle.source import ManyTouches
-
-    return ProgramTouches(ManyTouches(sigma_mm=limits.sigma_mm), limits)
+    return touches_by(method, limits)

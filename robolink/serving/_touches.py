@@ -104,3 +104,14 @@ class ProgramTouches:
     def on_record(self) -> Mapping[str, object]:
         """Return what was measured; see ``ProgramMeasure``."""
         return {"flange": [list(astuple(pose)[:6]) for pose in self._measured.poses]}
+
+
+def touches_by(method: str, limits: CallbackLimits) -> ProgramTouches:
+    """Return touches of a pin, ``n-angle`` or ``pivot``, of which there is none yet."""
+    if method == "pivot":
+        from robolink.methods.pivot.source import PivotTouches
+
+        return ProgramTouches(PivotTouches(sigma_mm=limits.sigma_mm), limits)
+    from robolink.methods.n_angle.source import ManyTouches
+
+    return ProgramTouches(ManyTouches(sigma_mm=limits.sigma_mm), limits)

@@ -12,8 +12,8 @@ from robolink.model import EntryKind
 from tests.faults._callback_cell import MEASURED, PROVED, Bend, CallbackCell
 from tests.faults._callback_sensors import BEAM_INPUTS, BeamCell, CameraCell
 
-CHANGES = 500
-SHARES = {"pin": 12, "beams": 4, "camera": 4}
+CHANGES = 250
+SHARES = {"pin": 24, "beams": 8, "camera": 8}
 CELLS = {"pin": CallbackCell, "beams": BeamCell, "camera": CameraCell}
 
 
@@ -132,6 +132,7 @@ def one_change(cell, rng, own_faults):
 
 
 @pytest.mark.soak
+@pytest.mark.timeout(1200)
 @pytest.mark.parametrize(
     ("kind", "share"), [(kind, share) for kind, count in SHARES.items() for share in range(count)]
 )

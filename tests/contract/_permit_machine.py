@@ -88,8 +88,8 @@ class PermitMachine:
             world = self.simulator.world
             here = world.robot.flange().u_deg
             world.robot.turn(self.start_u + u_deg + self.rng.uniform(-2, 2) - here)
-            gap = [g + self.rng.gauss(0, self.noise_mm) for g in world.gap_mm()]
-            world.robot.carry(world.tips[1], tuple(gap))
+            x, y, z = (gap + self.rng.gauss(0, self.noise_mm) for gap in world.gap_mm())
+            world.robot.carry(world.tips[1], (x, y, z))
 
     def _waits(self):
         """The value is awaited, with the tip at its last touch."""

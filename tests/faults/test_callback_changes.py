@@ -61,6 +61,17 @@ def test_a_needle_is_measured_written_proved_kept_and_on_record(cell):
     assert max(map(len, cell.relay.questions + cell.relay.answers)) <= 255
 
 
+@pytest.mark.parametrize("device", [20, 21, 22, 26], ids=["pendant", "pc", "io", "ethernet"])
+def test_it_works_with_any_control_device(cell, device):
+    """The program calls; nothing is sent to the controller, whoever may start it."""
+    cell.simulator.machine.control_device = device
+    cell.simulator.panel.set_monitoring_only(device != 26)
+    assert cell.run() == ["kept"]
+    assert cell.error_mm < 0.01
+    assert cell.simulator.exchanges == 0
+    assert not cell.simulator.log
+
+
 def refused(cell, code, kinds):
     """The old tool stays, and the journal says why."""
     old = cell.tool

@@ -22,6 +22,12 @@ class MachineClock(ManualClock):
 
     parts = 30
 
+    def __init__(self, simulator):
+        super().__init__()
+        self.machine = PermitMachine(simulator)
+        self.calls: list[str] = []
+        self.produced = 0
+
     def sleep(self, seconds):
         super().sleep(seconds)
         self.produced += 1
@@ -39,9 +45,9 @@ class MachineClock(ManualClock):
 
 def test_calls_are_answered_one_after_the_other_until_somebody_ends_it(capsys):
     options = PlcOptions(mailbox=MailboxOptions(profile="tools"))
-    simulator, clock = SoftMotionSimulator(seed=7, options=options), MachineClock()
+    simulator = SoftMotionSimulator(seed=7, options=options)
+    clock = MachineClock(simulator)
     url = register("serve-plc", simulator, clock=clock)
-    clock.machine, clock.calls, clock.produced = PermitMachine(simulator), [], 0
     clock.machine.bump_mm = 0.15
     try:
         assert main.run(["-c", url, *SERVED, "--permit-is-contact"]) == 0

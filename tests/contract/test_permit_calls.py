@@ -15,7 +15,7 @@ from tests.contract._permit_machine import PermitMachine
 from tests.contract._softmotion_cell import BACKENDS, OWNER_SILENCE_S, served
 
 LIMITS = CallbackLimits(tolerance_mm=0.1, sigma_mm=0.01)
-PLAN = PermitPlan(1, look_s=0.02)
+PLAN = PermitPlan(1, look_s=0.02, patience_s=5.0)
 
 
 def tools_only():
@@ -64,7 +64,15 @@ def refused(cell, machine, code):
     assert entry.details["code"] == code
 
 
-@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize(
+    "backend",
+    [
+        backend
+        if backend in ("sim", "modbus-tcp")
+        else pytest.param(backend, marks=pytest.mark.soak)
+        for backend in BACKENDS
+    ],
+)
 def test_a_needle_is_measured_written_proved_and_the_machine_goes_on(backend):
     with served(backend, tools_only()) as cell:
         machine = PermitMachine(cell.simulator)
@@ -149,10 +157,11 @@ class Gone(BaseException):
     """The PC is switched off now."""
 
 
-def test_the_pc_goes_at_any_commit_and_the_machine_waits_for_a_settled_tool():
+@pytest.mark.parametrize("step", [5, pytest.param(1, marks=pytest.mark.soak)])
+def test_the_pc_goes_at_any_commit_and_the_machine_waits_for_a_settled_tool(step):
     """Old or proved, whenever the machine goes on; else it is blocked, and recover settles."""
     ends = set()
-    for commit in range(40):
+    for commit in range(0, 40, step):
         with served("sim", tools_only()) as cell:
             machine = PermitMachine(cell.simulator)
             old, at = machine.stored, -1

@@ -98,11 +98,11 @@ class BeamCell(CallbackCell):
         self.recorded_mm = (x + 4.0, y - 4.0, z - 6.0)
         self.stand_at(self.recorded_mm)
         place = self.recorded_mm
-        beams = tuple(Beam(*place[:2], heading, sigma_mm=0.002) for heading in HEADINGS)
-        self.station = BeamStation(beams, place[2], BEAM_INPUTS)
+        first, second = (Beam(*place[:2], heading, sigma_mm=0.002) for heading in HEADINGS)
+        self.station = BeamStation((first, second), place[2], BEAM_INPUTS)
         lines = [
             {"x_mm": b.x_mm, "y_mm": b.y_mm, "direction_deg": b.direction_deg, "input": number}
-            for b, number in zip(beams, BEAM_INPUTS, strict=True)
+            for b, number in zip((first, second), BEAM_INPUTS, strict=True)
         ]
         found = Found(
             id="gate",

@@ -15,8 +15,11 @@ from tests.faults._callback_sensors import BeamCell, CameraCell
 
 ANY_OF_THEM = pytest.mark.parametrize(
     "cell",
-    [CallbackCell, pytest.param(BeamCell, marks=pytest.mark.soak), CameraCell],
-    ids=["pin", "beams", "camera"],
+    [
+        pytest.param(CallbackCell, id="pin"),
+        pytest.param(BeamCell, id="beams", marks=pytest.mark.soak),
+        pytest.param(CameraCell, id="camera", marks=pytest.mark.soak),
+    ],
     indirect=True,
 )
 

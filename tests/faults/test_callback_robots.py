@@ -10,7 +10,7 @@ from robolink.model import ANY, EntryKind, ToolOffset, Verdict
 from robolink.protocols.spel_callback import CallbackLine, CallbackWord
 from robolink.serving import CallbackConversation, CallbackLimits
 from robolink.transaction import Wanted, change_tools, recover
-from tests.faults._callback_cell import SERIAL, Bend, CallbackCell
+from tests.faults._callback_cell import SERIAL, CallbackCell
 from tests.faults._callback_robots import TwoRobotCell
 
 NAMES = (f"epson:{SERIAL}", f"epson:{SERIAL}-2")
@@ -129,27 +129,4 @@ def test_a_pc_that_was_cut_off_settles_it_when_it_is_the_control_device(tmp_path
         assert cell.open_markers() == []
     finally:
         unregister("recovered")
-        cell.close()
-
-
-def test_a_link_that_robolink_cut_leaves_the_old_tool(tmp_path):
-    """The program puts its own value back, and tells when it calls again."""
-    cell = CallbackCell(tmp_path)
-    try:
-        cell.change_needle()
-        old = cell.tool
-
-        def bend(at, _line):
-            if at != 9:
-                return None
-            cell.restart_server()
-            return Bend(cut_before=True)
-
-        cell.relay.bend = bend
-        cell.run()
-        assert cell.tool.rounded(3) == old.rounded(3)
-        assert len(cell.open_markers()) == 1
-        assert cell.run() == ["kept"]
-        assert cell.open_markers() == []
-    finally:
         cell.close()

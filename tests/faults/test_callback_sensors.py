@@ -75,6 +75,7 @@ def test_a_beam_that_was_not_broken_gives_no_value(beams):
     refused(beams, "no_edge", [EntryKind.REFUSED])
 
 
+@pytest.mark.soak
 def test_a_beam_that_is_always_broken_saw_nothing(beams):
     beams.simulator.world.disconnect(4)
     beams.simulator.machine.inputs.set(4, on=True)
@@ -88,17 +89,20 @@ def test_beams_that_were_moved_since_they_were_learnt_show_in_the_proof(beams):
     refused(beams, "drift", BACK)
 
 
+@pytest.mark.soak
 def test_a_bent_needle_is_refused(beams):
     world = beams.simulator.world
     world.set_up(replace(world.parameters, lean_deg=6.0))
     refused(beams, "bent_needle", [EntryKind.REFUSED])
 
 
+@pytest.mark.soak
 def test_without_deeper_crossings_nobody_knows_where_the_tip_is(beams):
     beams.store(FIRST, beams.scans(20.0) + beams.scans(20.0)[:4])
     refused(beams, "shaft_not_crossed", [EntryKind.REFUSED])
 
 
+@pytest.mark.soak
 def test_a_proof_at_the_angle_of_the_measurement_proves_nothing(beams):
     beams.store(200, beams.scans(20.0)[:4])
     refused(beams, "insufficient_rotation", BACK)
@@ -110,6 +114,7 @@ def test_a_camera_looks_at_the_tip_and_that_is_proved_kept_and_on_record(camera)
     assert 0 < details["known_within_mm"] < 0.05
 
 
+@pytest.mark.soak
 def test_a_tip_that_is_not_seen_gives_no_value(camera):
     world = camera.simulator.world
     world.set_up(replace(world.parameters, camera_miss_share=1.0))
@@ -150,6 +155,7 @@ def test_a_camera_of_a_wrong_scale_shows_when_the_tool_turns_about_the_new_tip(c
     refused(camera, "drift", BACK)
 
 
+@pytest.mark.soak
 def test_a_proof_that_does_not_turn_about_the_new_tip_is_none(camera):
     camera.look_from(21, (40.0, -40.0, 110.0), ToolOffset(6.0, 0.0, 0.0))
     refused(camera, "not_turned_about_the_tip", BACK)

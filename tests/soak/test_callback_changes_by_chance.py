@@ -5,6 +5,7 @@ Each share of them is a controller, a PC and a journal of its own that live thro
 
 import random
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
@@ -138,7 +139,7 @@ def one_change(cell, rng, own_faults):
 )
 def test_no_unverified_value_stays(tmp_path, record_property, kind, share):
     rng = random.Random(f"changes {kind} {share}")
-    cell = CELLS[kind](tmp_path, seed=share + 1)
+    cell: Any = CELLS[kind](tmp_path, seed=share + 1)
     try:
         cell.change_needle()
         cell.length = len(cell.statements())

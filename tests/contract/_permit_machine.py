@@ -16,7 +16,7 @@ OFF_LOOKS, HELD_LOOKS = 5, 6
 class PermitMachine:
     """The machine's program, one step at each look of the client.
 
-    It touches, waits for ``xToolChanged``, proves, and waits until that falls.
+    It touches, waits for ``xToolChanged``, proves, and waits until the mailbox is given back.
 
     Attributes:
         state: What it is at: ``touches``, ``waits``, ``proves``, ``blocked``, ``produces`` or
@@ -36,6 +36,7 @@ class PermitMachine:
         self.leaves = False
         self.waited_looks = 0
         self.bump_mm = 0.0
+        self.owned = self.given_back = False
         self.begin()
 
     def begin(self, turns=TURNS, proving=PROVING):
@@ -58,6 +59,8 @@ class PermitMachine:
     def look(self):
         """Do one step."""
         self.looks += 1
+        owned = self.panel.owned
+        self.given_back, self.owned = self.owned and not owned, owned
         getattr(self, f"_{self.state.replace(' ', '_')}")()
 
     def _touches(self):
@@ -102,8 +105,14 @@ class PermitMachine:
             self.panel.withdraw_permit()
             self.state = "gave up"
 
+    def restart(self):
+        """Start the PLC, and with it this program, which then has seen nobody own the mailbox."""
+        self.panel.restart()
+        self.owned = False
+
     def _blocked(self):
-        if not self.panel.tool_changed:
+        if self.given_back:
+            self.panel.take_change_back()
             self.panel.withdraw_permit()
             self.state = "produces"
 

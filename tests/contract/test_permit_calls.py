@@ -56,9 +56,9 @@ def refused(cell, machine, code):
         call(cell, machine)
     assert caught.value.code == code
     assert machine.stored == pytest.approx(old, abs=1e-9)
+    machine.look()
     assert not machine.panel.tool_changed
     assert not machine.panel.owned
-    machine.look()
     assert cell.open_requests == []
     (entry,) = cell.journal.entries(kinds=(EntryKind.REFUSED,))
     assert entry.details["code"] == code
@@ -142,12 +142,15 @@ def test_without_the_permit_to_put_it_back_the_machine_stays_blocked_until_recov
     assert machine.stored != pytest.approx(old, abs=1e-3)
     assert machine.panel.tool_changed
     assert machine.state == "blocked"
-    cell.simulator.panel.restart()
+    machine.restart()
+    machine.look()
     assert machine.panel.tool_changed  # retained
+    assert machine.state == "blocked"
     cell.clock.advance(OWNER_SILENCE_S)
     machine.panel.give_permit()
     with cell.connect() as controller:
         recover(controller)
+        machine.look()
     assert machine.stored == pytest.approx(old, abs=1e-9)
     machine.look()
     assert machine.state == "produces"
@@ -196,6 +199,7 @@ def test_the_pc_goes_at_any_commit_and_the_machine_waits_for_a_settled_tool(step
                 recover(again)
             with cell.connect() as again:
                 free_machine(again)
+                machine.look()
             machine.look()
             assert cell.open_requests == []
             assert machine.state in ("produces", "gave up")

@@ -52,7 +52,7 @@ class PlcPanel:
 
     @property
     def tool_changed(self) -> bool:
-        """Whether a change of a tool is not settled (``xToolChanged``)."""
+        """Whether a client has changed a tool (``xToolChanged``)."""
         with self._acting():
             return self._plc.memory.tool_changed
 
@@ -62,8 +62,8 @@ class PlcPanel:
         with self._acting():
             return self._plc.program.ownership.holder != 0
 
-    def settle_tools(self) -> None:
-        """Let a person at the machine say that its tools are right (``xToolChanged`` falls)."""
+    def take_change_back(self) -> None:
+        """Let the machine's own program say that it knows of the change (``xToolChanged``)."""
         with self._acting():
             self._plc.memory.tool_changed = False
 

@@ -179,8 +179,6 @@ class MailboxProgram:
             )
             told = self._halted_for_release(command)
             self.ownership.carry_out(command, now_ns, moving=moving)
-            if not command.operands[0]:
-                self._memory.tool_changed = False
             return told
         told = self._handlers[command.opcode](command)
         if command.opcode in _CHANGING_TOOLS:

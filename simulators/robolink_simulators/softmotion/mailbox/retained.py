@@ -30,8 +30,8 @@ class RetainedMemory:
         boot_id: Counts PLC starts; 0 before the first.
         epoch: Counts owners.
         device_id: The PLC's own number, never 0.
-        tool_changed: Whether a client has changed a tool and not given the mailbox back since
-            (``xToolChanged``); the machine's program blocks its cycle meanwhile.
+        tool_changed: Whether a client has changed a tool since the machine's program took this
+            back (``xToolChanged``); it blocks its cycle meanwhile.
 
     Args:
         device_id: Its number; 0 draws one that no other has.

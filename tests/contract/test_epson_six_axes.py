@@ -158,9 +158,24 @@ def test_a_tilted_tool_is_written_whole_and_read_back(arm):
     assert controller.tools.read(3) == offset
 
 
+@pytest.mark.parametrize("arm", ["RS4-C351S"], indirect=True)
+def test_an_rs_comes_back_to_joint_1_as_it_stood_over_its_own_axis(arm):
+    simulator, controller = arm
+    machine = simulator.machine
+    there = Joints(57.0, 0.0, -20.0, 30.0)
+    machine.arm.place(there, simulator.now_ns)
+    machine.points.store(7, Point.at(machine.tip()))
+    assert controller.groups[0].pose().posture.j1_angle_deg == 57.0
+    taught = controller.points.read(7)
+    assert (taught.x_mm, taught.y_mm, taught.posture.j1_angle_deg) == (0.0, 0.0, 57.0)
+    machine.arm.place(Joints(-40.0, 60.0, -20.0, 0.0), simulator.now_ns)
+    go(controller, replace(taught, tool=0))
+    assert machine.arm.joints == pytest.approx(there, abs=1e-3)
+
+
 def test_points_and_flags_go_through_text_and_back():
     postures = [
-        Posture(elbow, wrist, j1_flag=j1, j4_flag=j4, j6_flag=j6)
+        Posture(elbow, wrist, j1_flag=j1, j4_flag=j4, j6_flag=j6, j4_angle_deg=-7.125)
         for elbow in Elbow
         for wrist in Wrist
         for j1, j4, j6 in ((0, 0, 0), (1, 0, 2), (0, 1, 127))

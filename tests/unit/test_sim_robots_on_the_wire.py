@@ -135,6 +135,9 @@ def test_tools_take_six_values_and_locals_lean(robot):
         ("T6-602S", "SingularityDist 10", 4028),
         ("C8-C901S", "SingularitySpeed 101", 4002),
         ("C8-C901S", "J1Angle P1", 4028),
+        ("RS4-C351S", "J4Angle P1", 4028),
+        ("C8-C901S", "Go Here /J1A(3)", 4028),
+        ("RS4-C351S", "Tool 0; Print PAgl(XY(0, 0, -20, 0) /J1A(361), 1)", 4001),
         ("T6-602S", "J4Angle P1", 4028),
         ("GX8-C453S", "Go JA(90, 146, -280, 0)", 4001),
         ("GX8-C453C", "Go JA(90, -138, -250, 0)", 4001),
@@ -145,6 +148,24 @@ def test_what_a_robot_cannot_do_is_refused(robot, name, statement, code):
     run = robot(name)
     assert run(statement) == "!Execute,99"
     assert run.client.code() == code
+
+
+def test_an_rs_over_its_own_axis_takes_joint_1_from_the_point(robot):
+    run = robot("RS4-C351S")
+    assert run("Motor On; Tool 0; P1 = AglToPls(57, 0, -20, 30)") == "0"
+    printed = run("Print P1")
+    assert printed.endswith("/R /J1A(57.000) /0")
+    assert parse_point(printed).posture == Posture(j1_angle_deg=57.0)
+    assert run("Print J1Angle(P1)") == "57"
+    assert run("P2 = XY(0, 0, -20, 87); Print PAgl(P2, 1)") == "0"
+    assert run("J1Angle P2, 40.5; J1Angle P2") == "40.5"
+    assert run("Print PAgl(P2, 1); Print PAgl(P2, 4)").split() == ["40.5", "46.5"]
+    assert run("Go P2 /J1A(-100); Print J1Angle") == "-100"
+    assert run("Print PAgl(XY(300, 0, -20, 87) /J1A(-100), 1)") == run(
+        "Print PAgl(XY(300, 0, -20, 87), 1)"
+    )
+    assert parse_where(run("Where")).joints == (-100, 0, -20, 187)
+    assert run("Print J1Angle") == "-100"
 
 
 def test_what_counts_as_near_a_singular_place_can_be_set(robot):

@@ -4,6 +4,7 @@ How each kind of robot is built stands in :mod:`~robolink_simulators.epson.arm.s
 :mod:`~robolink_simulators.epson.arm.six_axes`.
 """
 
+from dataclasses import replace
 from typing import Final
 
 from robolink.model import Hand, Pose, Posture, ToolOffset, rotate_xy
@@ -75,7 +76,11 @@ def continued(model: RobotModel, flange: Pose, near: Joints) -> Joints:
         joints = six_axes.solve_near(model, frame_of(flange), near)
         check_ranges(model, joints)
         return joints
-    return inverse(model, flange, hand_of(model, near), posture_of(model, near))
+    posture = posture_of(model, near)
+    if posture is not None:
+        # On the axis of joint 1 that joint stays where it is.
+        posture = replace(posture, j1_angle_deg=near[0])
+    return inverse(model, flange, hand_of(model, near), posture)
 
 
 def frame_of(pose: Pose) -> Frame:

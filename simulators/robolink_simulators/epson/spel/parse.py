@@ -26,8 +26,7 @@ PROGRAM_ONLY: Final = frozenset(_PROGRAM_WORDS.split())
 """Statements that exist in programs only (docs/reference/spel.md 13, class E)."""
 
 _WORDS_OF_OTHER_ROBOTS = """
-    brake jumptlz
-    j1angle j4angle vsd
+    brake jumptlz vsd
 """
 
 OF_OTHER_ROBOTS: Final = frozenset(_WORDS_OF_OTHER_ROBOTS.split())

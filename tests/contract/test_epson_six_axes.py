@@ -116,8 +116,12 @@ def test_a_straight_way_past_the_axis_of_joint_1_is_refused_before_it_is_sent(ar
     here = controller.groups[0].pose()
     # Past the axis, which stays on its left.
     x, y, _ = wrist_mm(here, model)
+    past = replace(here, x_mm=here.x_mm - y, y_mm=here.y_mm + x)
+    told = controller.groups[0].obstacle(past, Path.STRAIGHT, start=here)
+    assert "too near to its axis" in told
+    assert controller.groups[0].obstacle(past, Path.JOINT, start=here) == ""
     with pytest.raises(LimitError, match="too near to its axis"):
-        go(controller, replace(here, x_mm=here.x_mm - y, y_mm=here.y_mm + x), STRAIGHT)
+        go(controller, past, STRAIGHT)
     assert machine.arm.moves_started == started
     go(controller, replace(here, z_mm=here.z_mm + 5), STRAIGHT)
 
@@ -139,6 +143,21 @@ def test_what_stands_in_the_way_is_told_before_anything_moves(arm):
     singular = group.pose()
     assert "Joint 5" in group.obstacle(singular, Path.STRAIGHT)
     assert group.obstacle(singular, Path.JOINT) == ""
+    assert machine.arm.moves_started == 0
+
+
+def test_a_straight_way_past_a_singular_wrist_is_found_between_its_ends(arm):
+    """Joint 5 is -30 degrees at both ends and -1 half way."""
+    simulator, controller = arm
+    machine, group = simulator.machine, controller.groups[0]
+    machine.arm.place(Joints(0.0, -28.0, 20.0, 0.0, -30.0, 0.0), simulator.now_ns)
+    here = group.pose()
+    down_mm = 318.0 if machine.model.hangs else -318.0
+    there = replace(here, y_mm=here.y_mm - 255.0, z_mm=here.z_mm + down_mm)
+    assert group.obstacle(there, Path.STRAIGHT) == ""
+    assert "Joint 5" in group.obstacle(there, Path.STRAIGHT, start=here)
+    with pytest.raises(LimitError, match="Joint 5"):
+        go(controller, there, STRAIGHT)
     assert machine.arm.moves_started == 0
 
 

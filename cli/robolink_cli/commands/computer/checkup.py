@@ -138,7 +138,8 @@ def check_journal() -> Iterator[Remark]:
                 when=marker.begun_at,
                 request=marker.request,
             ),
-            journal.log(identity).at_work() or tr("Run: robolink -c {where} recover", where=where),
+            journal.log(identity).at_work()
+            or tr('Run: robolink -c "{where}" recover', where=where),
         )
     if not unsettled:
         yield Remark("unsettled", Level.OK, tr("nothing was left unfinished."))

@@ -113,7 +113,7 @@ def _announce(url: str, assist_url: str, robot: str, seed: int) -> None:
         tr("SIMULATED EPSON {robot} (seed {seed}). No robot moves.", robot=robot, seed=seed),
         tr("  controller  {url}", url=url),
         tr("  assist      {url}", url=assist_url),
-        tr("Try: robolink -c {url} status", url=url),
+        tr('Try: robolink -c "{url}" status', url=url),
         tr("Ctrl-C ends it."),
     )
     announce(document, lines)

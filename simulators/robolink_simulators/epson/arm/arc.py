@@ -1,11 +1,16 @@
-"""A circular motion of the tip: ``Arc mid, end`` (docs/reference/spel.md 7.1)."""
+"""Circular motions of the tip: ``Arc mid, end``, and the circle of ``Arc3``.
+
+Source: docs/reference/spel.md 7.1.
+"""
 
 import cmath
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from robolink.model import Hand, Pose, Posture, ToolOffset
 from robolink.timing import NS_PER_S
+from robolink_simulators.cell.frames import Vector, add, cross, dot, scale, subtract
 from robolink_simulators.epson.arm.joints import Joints, check_ranges
 from robolink_simulators.epson.arm.kinematics import flange_of, hand_of, posture_of, solve
 from robolink_simulators.epson.arm.ramps import BrakedRamp, Ramp, TimeLaw
@@ -97,6 +102,32 @@ def plan_arc(
     return leg
 
 
+def circle_in_space(a: Vector, b: Vector, c: Vector) -> tuple[Callable[[float], Vector], float]:
+    """Return the circle from ``a`` through ``b`` to ``c``: where it is by its share; its length.
+
+    Raises:
+        Refusal: The three stand in a line.
+    """
+    to_mid, to_end = subtract(b, a), subtract(c, a)
+    normal = cross(to_mid, to_end)
+    if math.hypot(*normal) < _STRAIGHT:
+        raise _in_a_line()
+    ahead = scale(to_mid, 1 / math.hypot(*to_mid))
+    aside = cross(scale(normal, 1 / math.hypot(*normal)), ahead)
+    mid, end = (complex(dot(to, ahead), dot(to, aside)) for to in (to_mid, to_end))
+    centre, sweep_rad = circle_through(0j, mid, end)
+
+    def way(share: float) -> Vector:
+        at = centre - centre * cmath.exp(1j * sweep_rad * share)
+        return add(a, add(scale(ahead, at.real), scale(aside, at.imag)))
+
+    return way, abs(sweep_rad) * abs(centre)
+
+
+def _in_a_line() -> SpelRefusal:
+    return SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, "The points of the arc stand in a line")
+
+
 def circle_through(a: complex, b: complex, c: complex) -> tuple[complex, float]:
     """Return the centre of the circle and the angle in radians from ``a`` through ``b`` to ``c``.
 
@@ -105,7 +136,7 @@ def circle_through(a: complex, b: complex, c: complex) -> tuple[complex, float]:
     """
     bent = ((b - a) * (c - a).conjugate()).imag
     if abs(bent) < _STRAIGHT:
-        raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, "The points of the arc stand in a line")
+        raise _in_a_line()
     centre = _centre(a, b, c)
     sweep_rad = cmath.phase((c - centre) / (a - centre))
     through = cmath.phase((b - centre) / (a - centre))

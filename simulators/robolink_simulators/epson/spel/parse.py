@@ -37,7 +37,7 @@ _WORDS_NOT_SIMULATED = """
     limittorque limittorquelp limittorquestop limzmargin mcordr msgbox olaccel olrate opencom
     opennet outreal parsestr performmode plane plocal ptpboost ptrq qpdecelr qpdecels shutdown
     softcp speedrlimitation syncrobots taskstate tclim tcspeed time xylim xylimmode diffpoint
-    arc3 atclr bgo boxclr calib closecom closenet close cls copy ctreset curve cvmove
+    atclr bgo boxclr calib closecom closenet close cls copy ctreset curve cvmove
     date del eresume error exportpoints flush fmtstr homeclr hofsjointaccuracy importpoints
     input inputbox latchenable line loadpoints mcal mkdir
     pdescription planeclr ptclr ptran qp randomize read redim rename resetelapsedtime savepoints

@@ -6,7 +6,12 @@ from dataclasses import replace
 from robolink.model import Pose
 from robolink_simulators.epson.arm.joints import Joints
 from robolink_simulators.epson.arm.motion_parameters import MotionPhase
-from robolink_simulators.epson.arm.tilted_legs import plan_about_point, plan_circle, plan_line
+from robolink_simulators.epson.arm.tilted_legs import (
+    plan_about_point,
+    plan_arc3,
+    plan_circle,
+    plan_line,
+)
 from robolink_simulators.epson.arm.trajectory import JointLeg, Leg, LinePace, plan_go
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.points import frame_at
@@ -55,15 +60,18 @@ def line_leg(machine: Machine, start: Pose, end: Pose, *, near: Joints) -> Leg:
     )
 
 
-def held_leg(machine: Machine, end: Pose) -> Leg:
+def held_leg(machine: Machine, end: Pose, mid: Pose | None = None) -> Leg:
     """Plan a leg about the external control point in force, from where the tip is.
 
+    Args:
+        machine: The robot.
+        end: Where the tip ends.
+        mid: Where it is half way, for ``Arc3 mid, end ECP``.
+
     Raises:
-        Refusal: None is in force (the number of that error is assumed), the robot has four axes
-            (not simulated), or as :func:`line_leg`.
+        Refusal: None is in force (the number of that error is assumed), or as :func:`line_leg`
+            and :func:`arc3_leg`.
     """
-    if not machine.model.six_axes:
-        raise SpelRefusal(RefusalKind.NOT_SIMULATED, "Move ... ECP on four axes is not simulated")
     number = machine.control_points.selected
     if not number:
         raise SpelRefusal(RefusalKind.ECP_UNDEFINED, "No external control point is in force")
@@ -72,6 +80,23 @@ def held_leg(machine: Machine, end: Pose) -> Leg:
         (machine.tip(), end),
         line_pace(machine),
         point=frame_at(machine.control_points.get(number)),
+        mid=mid,
+        offset=machine.offset,
+        near=machine.arm.joints,
+        avoiding=machine.settings.avoided,
+    )
+
+
+def arc3_leg(machine: Machine, mid: Pose, end: Pose) -> Leg:
+    """Plan a circle in space of the selected tip from where it is.
+
+    Raises:
+        Refusal: The three points make no circle, or it leaves the envelope.
+    """
+    return plan_arc3(
+        machine.model,
+        (machine.tip(), mid, end),
+        line_pace(machine),
         offset=machine.offset,
         near=machine.arm.joints,
         avoiding=machine.settings.avoided,

@@ -21,7 +21,13 @@ from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.joint_functions import least_motion
 from robolink_simulators.epson.spel.expressions.values import out_of_range
 from robolink_simulators.epson.spel.statements.jump import jump, jump3
-from robolink_simulators.epson.spel.statements.legs import arc_leg, go_leg, held_leg, line_leg
+from robolink_simulators.epson.spel.statements.legs import (
+    arc3_leg,
+    arc_leg,
+    go_leg,
+    held_leg,
+    line_leg,
+)
 from robolink_simulators.epson.spel.statements.passing import passing
 from robolink_simulators.epson.spel.tree import (
     MotionStatement,
@@ -47,11 +53,12 @@ _WORDS: Final = {
     "tmove": _LINE_WORDS,
     "bmove": _LINE_WORDS,
     "arc": _LINE_WORDS,
+    "arc3": _LINE_WORDS | {"ecp"},
     "jump": frozenset({"limz"}) | _GATE_WORDS,
     "jump3": frozenset({"ljm"}) | _GATE_WORDS,
     "jump3cp": frozenset({"ljm", "rot"}) | _GATE_WORDS,
 }
-_WAYPOINTS: Final = {"arc": 2, "jump3": 3, "jump3cp": 3}
+_WAYPOINTS: Final = {"arc": 2, "arc3": 2, "jump3": 3, "jump3cp": 3}
 
 
 def plan(evaluator: Evaluator, motion: MotionStatement) -> list[Leg]:
@@ -81,6 +88,11 @@ def plan(evaluator: Evaluator, motion: MotionStatement) -> list[Leg]:
             return jump3(machine, (points[0], points[1], points[2]))
         case "arc":
             return [arc_leg(machine, *(machine.pose_of(point) for point in points))]
+        case "arc3":
+            mid, end = (machine.pose_of(point) for point in points)
+            if "ecp" in motion.options.words:
+                return [held_leg(machine, end, mid)]
+            return [arc3_leg(machine, mid, end)]
         case "pass":
             return passing(evaluator, motion, points)
         case verb:
@@ -115,7 +127,7 @@ def _points(evaluator: Evaluator, motion: MotionStatement) -> list[Point]:
             case SwitchOnTheWay():
                 if motion.verb != "pass":
                     raise SpelRefusal(RefusalKind.SYNTAX, f"{motion.verb} switches nothing")
-            case _ if motion.verb == "arc":
+            case _ if motion.verb in ("arc", "arc3"):
                 raise SpelRefusal(RefusalKind.NOT_SIMULATED, "Arc by an angle or a radius")
             case _:
                 raise SpelRefusal(RefusalKind.SYNTAX, f"{motion.verb} needs a point")

@@ -1,4 +1,4 @@
-"""Straight and circular legs of a tool that can be tilted, and those of any robot that need frames.
+"""Legs of a tool that can be tilted, and those of any robot about an external control point.
 
 The tip goes its way while the tool turns evenly about one axis from the first orientation to the
 last (assumed). Hand, elbow and wrist stay, every joint turns on from where it was, and the turns
@@ -11,9 +11,7 @@ goes is assumed). One that does not avoid it stops with the error for joint spee
 anything moves (assumed).
 """
 
-import cmath
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -28,7 +26,7 @@ from robolink_simulators.cell.frames import (
     product,
     transposed,
 )
-from robolink_simulators.epson.arm.arc import circle_in_space, circle_through, plan_arc
+from robolink_simulators.epson.arm.arc import MeasuredWay, Way, plan_level_way
 from robolink_simulators.epson.arm.joints import Joints
 from robolink_simulators.epson.arm.kinematics import (
     continued_frame,
@@ -52,9 +50,6 @@ _CHECK_EVERY_MM = 2.0
 _CHECK_EVERY_DEG = 2.0
 _MOST_CHECKS = 2000
 
-Way = Callable[[float], Vector]
-"""Where the tip is after a share of its way."""
-
 
 @dataclass(frozen=True, slots=True)
 class _Course:
@@ -76,7 +71,7 @@ class _Course:
 
 @dataclass(frozen=True, slots=True)
 class _HeldCourse:
-    """The way of an external control point, straight or a circle as a held workpiece sees it.
+    """The way of an external control point, as a held workpiece sees it.
 
     The tip goes otherwise then. That the orientation of the point runs evenly is assumed.
     """
@@ -190,7 +185,7 @@ def plan_about_point(
     pace: LinePace,
     *,
     point: Frame,
-    mid: Pose | None = None,
+    way: MeasuredWay | None = None,
     offset: ToolOffset | None,
     near: Joints,
     avoiding: SingularSurroundings | None = _USUAL,
@@ -202,33 +197,25 @@ def plan_about_point(
         ends: Where the tip is and where it goes.
         pace: How fast the point may be on the workpiece.
         point: The external control point, in the base.
-        mid: Where the tip is half way, for a circle as the workpiece sees it; ``None`` for a
-            straight way. Its orientation counts for where the point is seen then (assumed).
+        way: Its way as the tip sees it, and the length; ``None`` for a straight one.
         offset: The tool in force.
         near: The joints at the start.
         avoiding: The surroundings of singular places that are left; ``None`` for staying.
 
     Raises:
-        Refusal: As :func:`plan_line`, or the three stand in a line.
+        Refusal: As :func:`plan_line`.
     """
-    for pose in filter(None, (mid, ends[1])):
-        _require_same_posture(model, near, pose)
+    _require_same_posture(model, near, ends[1])
     start, end = (frame_of(pose).inverse() @ point for pose in ends)
-    if mid is None:
-        way, length_mm = _straight(start.shift_mm, end.shift_mm)
-    else:
-        through = (frame_of(mid).inverse() @ point).shift_mm
-        way, length_mm = circle_in_space(start.shift_mm, through, end.shift_mm)
+    course, length_mm = way or _straight(start.shift_mm, end.shift_mm)
     # The workpiece turns, so the point turns against it.
     axis, angle_deg = _turn(model, ends[::-1], product(end.rotation, transposed(start.rotation)))
     to_flange = _carried_by(model, offset).inverse()
-    course = _HeldCourse(model, point, ends[0], way, start.rotation, axis, angle_deg, to_flange)
-    return _leg(course, length_mm, pace, near=near, avoiding=avoiding)
+    held = _HeldCourse(model, point, ends[0], course, start.rotation, axis, angle_deg, to_flange)
+    return _leg(held, length_mm, pace, near=near, avoiding=avoiding)
 
 
-def _straight(start: tuple[float, ...], end: tuple[float, ...]) -> tuple[Way, float]:
-    """Return a straight way, and its length in mm."""
-
+def _straight(start: Vector, end: Vector) -> MeasuredWay:
     def way(share: float) -> Vector:
         x, y, z = (a + (b - a) * share for a, b in zip(start, end, strict=True))
         return (x, y, z)
@@ -236,63 +223,45 @@ def _straight(start: tuple[float, ...], end: tuple[float, ...]) -> tuple[Way, fl
     return way, math.dist(start, end)
 
 
-def plan_arc3(
+def _turn(model: RobotModel, ends: tuple[Pose, ...], turn: Matrix) -> tuple[Vector, float]:
+    """Return the axis and angle of a turn; U of a SCARA is taken literally, whole turns too."""
+    if model.six_axes:
+        return axis_and_angle(turn)
+    by_deg = ends[1].u_deg - ends[0].u_deg
+    return (0.0, 0.0, math.copysign(1.0, by_deg)), abs(by_deg)
+
+
+def _carried_by(model: RobotModel, offset: ToolOffset | None) -> Frame:
+    """Return the frame of a tool on the flange; a SCARA takes up no V and W."""
+    if offset is None or model.six_axes:
+        return tool_frame(offset)
+    return tool_frame(replace(offset, v_deg=0.0, w_deg=0.0))
+
+
+def plan_way(
     model: RobotModel,
-    points: tuple[Pose, Pose, Pose],
+    ends: tuple[Pose, Pose],
+    way: MeasuredWay,
     pace: LinePace,
     *,
     offset: ToolOffset | None,
     near: Joints,
     avoiding: SingularSurroundings | None = _USUAL,
 ) -> Leg:
-    """Plan a circle of the tip in space from the first pose through the second to the third.
+    """Plan a way of the tip between where it is and where it comes to.
 
-    The orientation runs evenly, the mid point's does not count. Arguments as in :func:`plan_line`.
-
-    Raises:
-        Refusal: As :func:`plan_line`, or the three stand in a line.
-    """
-    first, mid, last = points
-    for pose in (mid, last):
-        _require_same_posture(model, near, pose)
-    a, b, c = ((pose.x_mm, pose.y_mm, pose.z_mm) for pose in points)
-    way, length_mm = circle_in_space(a, b, c)
-    course = _course(model, way, (first, last), offset)
-    return _leg(course, length_mm, pace, near=near, avoiding=avoiding)
-
-
-def plan_circle(
-    model: RobotModel,
-    points: tuple[Pose, Pose, Pose],
-    pace: LinePace,
-    *,
-    offset: ToolOffset | None,
-    near: Joints,
-    avoiding: SingularSurroundings | None = _USUAL,
-) -> Leg:
-    """Plan an arc of the tip in X and Y from the first pose through the second to the third.
-
-    Z and the orientation run evenly, the mid point's do not count (documented,
-    docs/reference/spel.md 7.1). Arguments as in :func:`plan_line`.
+    The orientation runs evenly, that of places between the ends does not count (documented,
+    docs/reference/spel.md 7.1). ``way`` is the way and its length in mm; the other arguments are
+    those of :func:`plan_line`.
 
     Raises:
-        Refusal: As :func:`plan_line`, or the three stand in a line.
+        Refusal: As :func:`plan_line`.
     """
     if not model.six_axes:
-        return plan_arc(model, points, pace, offset=offset, near=near)
-    a, b, c = (complex(pose.x_mm, pose.y_mm) for pose in points)
-    first, mid, last = points
-    centre, sweep_rad = circle_through(a, b, c)
-
-    def way(share: float) -> Vector:
-        at = centre + (a - centre) * cmath.exp(1j * sweep_rad * share)
-        return (at.real, at.imag, first.z_mm + (last.z_mm - first.z_mm) * share)
-
-    for pose in (mid, last):
-        _require_same_posture(model, near, pose)
-    length_mm = math.hypot(abs(sweep_rad) * abs(a - centre), last.z_mm - first.z_mm)
-    course = _course(model, way, (first, last), offset)
-    return _leg(course, length_mm, pace, near=near, avoiding=avoiding)
+        return plan_level_way(model, ends, way, pace, offset=offset, near=near)
+    _require_same_posture(model, near, ends[1])
+    course, length_mm = way
+    return _leg(_course(model, course, ends, offset), length_mm, pace, near=near, avoiding=avoiding)
 
 
 def _require_same_posture(model: RobotModel, near: Joints, end: Pose) -> None:
@@ -310,24 +279,8 @@ def _course(
     model: RobotModel, way: Way, ends: tuple[Pose, Pose], offset: ToolOffset | None
 ) -> _Course:
     start, end = (frame_of(pose).rotation for pose in ends)
-    axis, angle_deg = _turn(model, ends, product(end, transposed(start)))
-    to_flange = _carried_by(model, offset).inverse()
-    return _Course(model, way, ends[0], start, axis, angle_deg, to_flange)
-
-
-def _turn(model: RobotModel, ends: tuple[Pose, ...], turn: Matrix) -> tuple[Vector, float]:
-    """Return the axis and angle of a turn; U of a SCARA is taken literally, whole turns too."""
-    if model.six_axes:
-        return axis_and_angle(turn)
-    by_deg = ends[1].u_deg - ends[0].u_deg
-    return (0.0, 0.0, math.copysign(1.0, by_deg)), abs(by_deg)
-
-
-def _carried_by(model: RobotModel, offset: ToolOffset | None) -> Frame:
-    """Return the frame of a tool on the flange; a SCARA takes up no V and W."""
-    if offset is None or model.six_axes:
-        return tool_frame(offset)
-    return tool_frame(replace(offset, v_deg=0.0, w_deg=0.0))
+    axis, angle_deg = axis_and_angle(product(end, transposed(start)))
+    return _Course(model, way, ends[0], start, axis, angle_deg, tool_frame(offset).inverse())
 
 
 def _leg(

@@ -136,7 +136,12 @@ def _store(variable: Variable, value: str | int) -> None:
 
 
 def _input(emitter: Emitter, node: ChannelStatement) -> Operation:
-    """Input #n, variables: texts and numbers between commas or blanks."""
+    """Input #n, variables: texts and numbers between commas or blanks.
+
+    Without a port a person at a window would be asked, and there is none.
+    """
+    if node.channel is None and node.items:
+        return _refusing("Input from a window")
     number = _channel(emitter, node)
     references = [_into(emitter, item) for item in node.items]
 
@@ -161,9 +166,11 @@ def _value(text: str) -> int | float:
 
 
 def _line_input(emitter: Emitter, node: ChannelStatement) -> Operation:
-    number = _channel(emitter, node)
     if len(node.items) != 1:
         raise emitter.fault(tr("Line Input takes one variable"))
+    if node.channel is None:
+        return _refusing("Line Input from a window")
+    number = _channel(emitter, node)
     reference = _into(emitter, node.items[0])
 
     def go(t: SpelTask) -> Blocking:

@@ -229,8 +229,8 @@ def test_labels_of_points_take_shifts_and_replacements_wherever_they_stand(print
         "Print CZ(teach :Z(-7))",
     )
     assert printed(*lines) == ["-54 0", "-54 101 298", "-7"]
-    lines = ("Integer z(3), a", "a = 5", "z(2) = 3", "Print a - z(2)")
-    assert printed(*lines) == ["2"], "an array that is called as an axis"
+    array = ("Integer z(3), a", "a = 5", "z(2) = 3", "Print a - z(2)")
+    assert printed(*array) == ["2"]
 
 
 def test_the_number_of_an_arch_may_be_worked_out(printed, failure):

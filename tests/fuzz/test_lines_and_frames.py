@@ -1,19 +1,10 @@
-"""SPEL+ programs, the lines of the call-back, frames of RS232, and files of poses, nearly right.
-
-Each is read or refused by the error that its reader names; what has a check sum has it made right
-again, since random damage almost never gets past one.
-"""
+"""Lines of the call-back and frames of RS232 that are nearly right, their check sums made right."""
 
 from contextlib import suppress
-from itertools import pairwise
-from pathlib import Path
 
-import pytest
 from hypothesis import strategies as st
-from robolink_simulators.epson.spel.programs.project import build_project
-from robolink_simulators.epson.spel.source.faults import ProgramRefused
 
-from robolink.errors import ConfigError, RemoteProtocolError
+from robolink.errors import RemoteProtocolError
 from robolink.journal import memory_journal
 from robolink.model import ToolOffset
 from robolink.protocols.epson_binary import NEED_DATA, Dialect, EpsonBinaryCodec, Letters, Role
@@ -31,45 +22,9 @@ from robolink.protocols.spel_callback import (
 from robolink.serving import CallbackConversation, CallbackLimits
 from tests.fuzz._mutating import edited_bytes, fuzzed
 
-ROOT = Path(__file__).parents[2]
-PROGRAMS = tuple(path.read_bytes() for path in sorted((ROOT / "companions/epson").glob("*.prg")))
 LIMITS = CallbackLimits(tolerance_mm=0.1, max_change_mm=2.0, sigma_mm=0.01)
 OFFSET = ToolOffset(12.0, -3.5, -20.0)
 TOOL, PLACE = tool_fields(OFFSET), offset_fields(OFFSET)
-
-
-@pytest.fixture(autouse=True, scope="module")
-def folder(tmp_path_factory):
-    """Where each example is written; one file, since there are thousands of them."""
-    Folder.path = tmp_path_factory.mktemp("fuzz")
-
-
-class Folder:
-    """Set by the fixture; hypothesis hands none to what it calls."""
-
-    path: Path
-
-
-def cut_out(program: bytes, first: int) -> bytes:
-    """Return one function of a program: a whole one takes a second to be built."""
-    begins = [at for at in range(len(program)) if program.startswith(b"\nFunction ", at)]
-    spans = list(pairwise([*begins, len(program)]))
-    begin, end = spans[first % len(spans)]
-    return program[begin + 1 : end]
-
-
-@fuzzed(
-    8,
-    2000,
-    program=st.tuples(st.sampled_from(PROGRAMS), st.integers(0, 40))
-    .map(lambda chosen: cut_out(*chosen))
-    .flatmap(edited_bytes),
-)
-def test_a_program_that_is_nearly_right_is_built_or_refused(program):
-    file = Folder.path / "tried.prg"
-    file.write_bytes(program)
-    with suppress(ProgramRefused, ConfigError):
-        build_project([file])
 
 
 LINES = (

@@ -148,7 +148,11 @@ class SoftMotionSimulator:
 
     def advance(self, now_ns: int) -> None:
         """Let simulated time reach ``now_ns``, stopping wherever something changes."""
-        while (change := self.next_change()) is not None and self._now_ns < change < now_ns:
+        # Most calls come at the instant of the last one: then there is nothing in between.
+        while self._now_ns < now_ns:
+            change = self.next_change()
+            if change is None or not self._now_ns < change < now_ns:
+                break
             self._step(change)
         self._step(max(now_ns, self._now_ns))
 

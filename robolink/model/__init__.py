@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from robolink.model.motion.custom_kinematics import MCKinRefSM3 as MCKinRefSM3
     from robolink.model.motion.custom_kinematics import is_custom as is_custom
     from robolink.model.motion.custom_kinematics import kinematics_class as kinematics_class
+    from robolink.model.motion.custom_kinematics import kinematics_object as kinematics_object
     from robolink.model.motion.geometry import Elbow as Elbow
     from robolink.model.motion.geometry import Hand as Hand
     from robolink.model.motion.geometry import Pose as Pose
@@ -108,7 +109,7 @@ else:
             "motion.custom_kinematics": (
                 "AxisKind AxisPositions FlangeFrame ISMKinematicsWithOrientationImage "
                 "ISMOrientationKinematicsWithOriImage2 ISMPositionKinematics2 MCKinRefSM3 "
-                "is_custom kinematics_class"
+                "is_custom kinematics_class kinematics_object"
             ),
             "motion.geometry": "Elbow Hand Pose Posture Wrist angle_difference_deg rotate_xy",
             "_identity": "ControllerFacts Identity Who is_own_name",

@@ -10,6 +10,7 @@ A class for the PLC is written in Structured Text; this one stands for it on the
 """
 
 import importlib
+from collections.abc import Mapping
 from enum import StrEnum
 from typing import Any, Protocol, runtime_checkable
 
@@ -54,6 +55,27 @@ def kinematics_class(part: str) -> type[Any]:
     if not isinstance(found, type):
         raise ConfigError(tr("{name!r} is no class.", name=part), remedy=tr("Give module:Class."))
     return found
+
+
+def kinematics_object(part: str, numbers: Mapping[str, float] | None = None) -> object:
+    """Return an object of the class that ``module:Class`` names.
+
+    Args:
+        part: The name.
+        numbers: What its constructor is given.
+
+    Raises:
+        ConfigError: There is no such class, or its constructor refuses.
+    """
+    found = kinematics_class(part)
+    try:
+        made: object = found(**(numbers or {}))
+    except (TypeError, ValueError) as error:
+        raise ConfigError(
+            tr("{name} cannot be made: {cause}.", name=part, cause=error),
+            remedy=tr("Its constructor takes numbers by name, each with a default."),
+        ) from error
+    return made
 
 
 @runtime_checkable

@@ -24,6 +24,7 @@ from robolink.model import (
     OrientationImage,
     OrientationSpace,
     kinematics_class,
+    kinematics_object,
 )
 from robolink_simulators.cell.frames import Frame, Matrix, Vector
 from robolink_simulators.softmotion.kinematics.kinematics import (
@@ -61,7 +62,7 @@ def load_row(part: str, *, carries: bool = False, orients: bool = False) -> Kine
     }
 
     def make(*values: float) -> CustomPosition | CustomOrientation:
-        own = _constructed(part, found, dict(zip(numbers, values, strict=True)))
+        own = kinematics_object(part, dict(zip(numbers, values, strict=True)))
         _require_interfaces(part, own, orients=orients)
         return CustomOrientation(part, own) if orients else CustomPosition(part, own, carries)
 
@@ -208,16 +209,6 @@ def _asked(question: Callable[[], Answered]) -> Answered:
         return question()
     except NotReachable as unreachable:
         raise BlockRefused(ErrorKind.UNREACHABLE, str(unreachable)) from unreachable
-
-
-def _constructed(part: str, found: type[Any], numbers: dict[str, float]) -> object:
-    try:
-        return found(**numbers)
-    except (TypeError, ValueError) as error:
-        raise ConfigError(
-            tr("{name} cannot be made: {cause}.", name=part, cause=error),
-            remedy=tr("Its constructor takes numbers by name, each with a default."),
-        ) from error
 
 
 def _require_interfaces(part: str, own: object, *, orients: bool) -> None:

@@ -117,7 +117,7 @@ STANDALONE_ROWS: Final[Mapping[str, KinematicsRow]] = {
         {**_RRR, "d6": 80.0},
         ("a2", "d4"),
         # With these the flange points down at 60 % of each range.
-        {**_ARM_LIMITS, 4: _turning(-30.0, 170.0), 5: _C_LIMITS},
+        {**_ARM_LIMITS, 3: _turning(-150.0, 100.0), 4: _turning(-30.0, 170.0), 5: _C_LIMITS},
     ),
     "Kin_4AxisPalletizer": KinematicsRow(
         Palletizer4Axis,

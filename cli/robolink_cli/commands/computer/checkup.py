@@ -9,6 +9,7 @@ from robolink.errors import ConfigError
 from robolink.files.durable import state_folder
 from robolink.messages import tr
 from robolink_cli.commands.computer.doctor_finding import Level, Remark
+from robolink_cli.commands.computer.lines import devices_of_cells
 from robolink_cli.commands.computer.requirements import check_name, check_versions
 from robolink_cli.commands.computer.serial_ports import serial_ports
 
@@ -111,6 +112,14 @@ def check_serial_ports() -> Iterator[Remark]:
             )
     if not ports:
         yield Remark("serial", Level.OK, tr("there is no serial port."))
+    for device, names in devices_of_cells().items():
+        if not Path(device).exists() and device not in [port.device for port in ports]:
+            yield Remark(
+                "serial",
+                Level.WARN,
+                tr("{device} of {cells} is not there.", device=device, cells=", ".join(names)),
+                tr("Plug the adapter in; 'robolink ports' lists those that are there."),
+            )
 
 
 def check_journal() -> Iterator[Remark]:

@@ -148,11 +148,8 @@ class SoftMotionSimulator:
 
     def advance(self, now_ns: int) -> None:
         """Let simulated time reach ``now_ns``, stopping wherever something changes."""
-        # Most calls come at the instant of the last one: then there is nothing in between.
-        while self._now_ns < now_ns:
-            change = self.next_change()
-            if change is None or not self._now_ns < change < now_ns:
-                break
+        # Most calls come at the instant of the last one: then nothing lies in between.
+        while now_ns > self._now_ns < (change := self.next_change() or now_ns) < now_ns:
             self._step(change)
         self._step(max(now_ns, self._now_ns))
 

@@ -21,12 +21,12 @@ from robolink.errors import (
 )
 from robolink.model import MotionOutcome, MotionProfile, Path, WorkBox
 from robolink.protocols.mailbox import CoordinateSystem, ErrorClass
-from tests.contract._softmotion_cell import BACKENDS, QUICK, SLOW, above, served
+from tests.contract._softmotion_cell import LINKS, QUICK, SLOW, above, served
 
 ANYWHERE = WorkBox()
 
 
-@pytest.fixture(params=BACKENDS)
+@pytest.fixture(params=LINKS)
 def cell(request):
     with served(request.param) as cell:
         yield cell

@@ -43,7 +43,12 @@ _TRIES: Final = 8
 _PAST_THE_SYSTEM: Final = ("bent", "truncated", "lost")
 """What happens to the journal's file while nobody has it open."""
 
-_ON_WIRE: Final = (Hindrance.WIRE, Hindrance.MACHINE, Hindrance.PENDANT)
+_ON_WIRE: Final = (
+    Hindrance.WIRE,
+    Hindrance.MACHINE,
+    Hindrance.PENDANT,
+    Hindrance.ANOTHER_CLIENT,
+)
 
 
 class VirtualCell:
@@ -123,7 +128,7 @@ class VirtualCell:
             ]
             for disturbance in due:
                 self._happen(process, disturbance, text)
-        self._turns.pass_on()
+        self._turns.pass_on(exchanged=text.startswith("exchange"))
         if not process.alive:
             raise Killed
 

@@ -11,6 +11,7 @@ from enum import StrEnum
 from typing import Final, Self
 
 from robolink_simulators.faults import FaultAction, LinkKind, PlcFaultAction, links_of
+from robolink_simulators.faults.instants import drawn_instant
 
 
 class CellKind(StrEnum):
@@ -43,6 +44,7 @@ class Hindrance(StrEnum):
     DISK = "disk"
     CLOCK = "clock"
     INTERRUPT = "interrupt"
+    ANOTHER_CLIENT = "another client"
 
 
 @dataclass(frozen=True, slots=True)
@@ -306,6 +308,10 @@ _POINTS: Final = {
 
 
 def _disturbance(rng: random.Random, kind: CellKind, deed: Deed) -> Disturbance:
+    if found := drawn_instant(rng, kind.value, deed.value):
+        instant, at = found
+        seconds = rng.choice((0.0, 0.01, 5.0, 20.0))
+        return Disturbance(Hindrance(instant.kind), instant.what, instant.match, at, seconds)
     hindrance = rng.choices(list(_HINDRANCES), list(_HINDRANCES.values()))[0]
     short = deed is not Deed.CHANGE_NOZZLE
     places = _POINTS if hindrance in _AT_CHECKPOINTS else _PLACES

@@ -1,10 +1,12 @@
 """An EPSON controller in a virtual cell, and the link that leads to it."""
 
 import re
+from dataclasses import replace
 from typing import Final
 
 from robolink.controllers.epson import open_epson
 from robolink.controllers.epson.link.line import text_line
+from robolink.errors import TransportError
 from robolink.model import Controller, OutcomeLog, Secret, ToolOffset
 from robolink.timing import Deadline
 from robolink.transport import parse_url
@@ -174,19 +176,34 @@ class TappedTransport(InProcessTransport):
     ) -> None:
         self._process = process
         self._tap = tap
+        self._given_up = self._last = ""
         super().__init__(parse_url(address), simulator, clock, simulator.lock, durable=True)
 
     def send(self, data: bytes, *, deadline: Deadline, secret: bool = False) -> None:
         """See :meth:`robolink.transport.Transport.send`."""
         text = "$Login" if secret else data.decode("ascii", "replace").strip()
-        self._tap.leaving(self._process, _classified(text))
-        super().send(data, deadline=deadline, secret=secret)
+        self._tap.leaving(self._process, replace(_classified(text), forbidden=self._given_up))
+        self._last = text
+        try:
+            super().send(data, deadline=deadline, secret=secret)
+        except TransportError:
+            self._process.cut_off = True
+            raise
         self._tap.passed(self._process, f"wire sent {text}")
 
     def receive(self, *, deadline: Deadline) -> bytes:
         """See :meth:`robolink.transport.Transport.receive`."""
-        data = super().receive(deadline=deadline)
-        self._tap.passed(self._process, f"wire received {data!r}")
+        try:
+            data = super().receive(deadline=deadline)
+        except TransportError:
+            # Whatever answers come later stand in the place of another one's.
+            self._process.cut_off = True
+            self._given_up = f"the answer to {self._last} was given up"
+            raise
+        self._process.cut_off |= not data
+        # What a bent login brings back is the driver's to hide, not ours to write down.
+        shown = repr(data).replace(PASSWORD, "***")
+        self._tap.passed(self._process, f"wire received {shown}")
         return data
 
 

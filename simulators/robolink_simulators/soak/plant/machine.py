@@ -35,11 +35,13 @@ class SentRequest:
         kind: What it does.
         text: As it stands on the wire, or in words.
         tool: Which tool, where it is about one.
+        forbidden: Why it must not leave over this link, empty where it may.
     """
 
     kind: SentKind
     text: str
     tool: int | None = None
+    forbidden: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,9 +1,11 @@
 """A SoftMotion PLC in a virtual cell, and the mailbox link that leads to it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Final
 
 from robolink.controllers.softmotion import open_softmotion
+from robolink.errors import TransportError
 from robolink.model import Controller, OutcomeLog, ToolOffset
 from robolink.protocols.mailbox import COMMAND, COMMAND_WORDS, Opcode, Words
 from robolink.transport import MailboxHead
@@ -20,9 +22,11 @@ from robolink_simulators.soak.plant.machine import (
     SentRequest,
     WireTap,
 )
+from robolink_simulators.soak.plant.seen_session import SeenSession, another_clients
 from robolink_simulators.softmotion.mailbox.option_text import PlcOptions
 from robolink_simulators.softmotion.mailbox.options import MailboxOptions
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
+from robolink_simulators.softmotion.mailbox.words.exchange import ServedAccess
 
 _KINDS: Final = {
     Opcode.MOVE_DIRECT: SentKind.MOVE,
@@ -36,6 +40,7 @@ _KINDS: Final = {
     Opcode.STOP: SentKind.STOP,
     Opcode.HALT: SentKind.STOP,
 }
+_CHANGING: Final = (SentKind.MOVE, SentKind.WRITE)
 _NEEDS_RESTART: Final = frozenset(
     {PlcFaultAction.FREEZE_HEARTBEAT, PlcFaultAction.WORD_ORDER, PlcFaultAction.SHIFT_MAP}
 )
@@ -65,6 +70,7 @@ class SoftMotionPlant(PlantMachine):
         self._simulator.durable = True
         self._simulator.on_request = self._requested
         self._planned: list[tuple[Disturbance, int]] = []
+        self._rivals: list[tuple[Disturbance, int]] = []
         self._starts = self._simulator.plc.memory.boot_id
         self._strange = False
 
@@ -75,7 +81,7 @@ class SoftMotionPlant(PlantMachine):
 
     def connect(self, process: VirtualProcess, outcomes: OutcomeLog) -> Controller:
         """Meet the mailbox."""
-        link = TappedMailboxLink(self._simulator, self.clock, process, self.tap, self.address)
+        link = TappedMailboxLink(self, self.clock, process, self.tap, self.address)
         return open_softmotion(link, outcomes=outcomes)
 
     def hang_up(self, process: VirtualProcess) -> None:
@@ -106,6 +112,9 @@ class SoftMotionPlant(PlantMachine):
         if disturbance.kind is Hindrance.PENDANT:
             self._planned.append((disturbance, disturbance.at))
             return
+        if disturbance.kind is Hindrance.ANOTHER_CLIENT:
+            self._rivals.append((disturbance, disturbance.at))
+            return
         self._simulator.faults.add(
             PlcFault(
                 PlcFaultAction[disturbance.what],
@@ -124,7 +133,21 @@ class SoftMotionPlant(PlantMachine):
         faults.clear()
         faults.fired.clear()
         self._planned.clear()
+        self._rivals.clear()
         return met
+
+    def taken_over(self, text: str) -> bool:
+        """Tell whether another client's block takes the place of this one."""
+        due = [one for one, left in self._rivals if one.match in text and not left]
+        self._rivals = [
+            (one, left - (one.match in text)) for one, left in self._rivals if one not in due
+        ]
+        return bool(due)
+
+    @property
+    def rejected(self) -> int:
+        """How many damaged blocks the mailbox has counted."""
+        return self._simulator.plc.program.inbox.rejected
 
     def write_by_hand(self, tool: int, offset: ToolOffset) -> None:
         """Let the machine's own program write a slot."""
@@ -166,7 +189,7 @@ class TappedMailboxLink(InProcessMailboxLink):
     """A process's link to a PLC, on which the adversary sees everything.
 
     Args:
-        simulator: Where it leads.
+        plant: Where it leads.
         clock: The virtual time.
         process: Whose it is.
         tap: Told of everything.
@@ -176,7 +199,7 @@ class TappedMailboxLink(InProcessMailboxLink):
 
     def __init__(
         self,
-        simulator: SoftMotionSimulator,
+        plant: SoftMotionPlant,
         clock: ManualClock,
         process: VirtualProcess,
         tap: WireTap,
@@ -186,14 +209,20 @@ class TappedMailboxLink(InProcessMailboxLink):
         self._process = process
         self._tap = tap
         self._address = address
-        self._plc = simulator
-        super().__init__(address, simulator, clock, timeout_s)
+        self._plant = plant
+        self._plc = plant.simulator
+        self._seen = SeenSession()
+        self._last = SentKind.OTHER
+        super().__init__(address, self._plc, clock, timeout_s)
 
     def write_command(self, words: Sequence[int]) -> None:
         """See :meth:`robolink.transport.MailboxLink.write_command`."""
-        sent = _classified(words)
+        forbidden = self._seen.written(words, self._plant.rejected)
+        sent = replace(_classified(words), forbidden=forbidden)
         self._tap.leaving(self._process, sent)
-        super().write_command(words)
+        self._last = sent.kind
+        replaced = self._plant.taken_over(sent.text)
+        self._exchange(lambda now_ns: self._arriving(words, now_ns, replaced=replaced))
         self._tap.passed(self._process, f"wire sent {sent.text}")
 
     def read_head(self) -> MailboxHead:
@@ -205,6 +234,8 @@ class TappedMailboxLink(InProcessMailboxLink):
         """See :meth:`robolink.transport.MailboxLink.read_response`."""
         self._asks("read_response")
         words = super().read_response()
+        self._seen.answered(words)
+        self._process.overtaken |= self._seen.overtaken and self._last in _CHANGING
         self._tap.passed(self._process, f"wire received {words[1]} {words[2]} {words[-2]:04x}")
         return words
 
@@ -226,8 +257,21 @@ class TappedMailboxLink(InProcessMailboxLink):
     def reopened(self, *, timeout_s: float) -> "TappedMailboxLink":
         """See :meth:`robolink.transport.MailboxLink.reopened`."""
         return TappedMailboxLink(
-            self._plc, self.clock, self._process, self._tap, self._address, timeout_s
+            self._plant, self.clock, self._process, self._tap, self._address, timeout_s
         )
+
+    def _arriving(self, words: Sequence[int], now_ns: int, *, replaced: bool) -> ServedAccess:
+        served = self._plc.write(0, words, now_ns)
+        if replaced:
+            self._plc.write(0, another_clients(words), now_ns)
+        return served
+
+    def _exchange(self, serve: Callable[[int], ServedAccess]) -> Words:
+        try:
+            return super()._exchange(serve)
+        except TransportError:
+            self._process.cut_off = True
+            raise
 
     def _asks(self, text: str) -> None:
         self._tap.leaving(self._process, SentRequest(SentKind.OTHER, text))

@@ -21,6 +21,7 @@ class WireRules:
 
     def leaving(self, process: VirtualProcess, sent: SentRequest) -> None:
         """Check a request that is about to leave a process."""
+        self._on.hold("SessionEnds", not sent.forbidden, f"{sent.text} leaves: {sent.forbidden}")
         if sent.kind in (SentKind.OTHER, SentKind.STOP):
             return
         markers = self._on.books.markers()

@@ -10,7 +10,7 @@ from robolink.errors import CalibrationError
 from robolink.methods import measure_n_angle, most_informative_order
 from robolink.model import Pose, ToolOffset, rotate_xy
 from robolink.procedures import SamplingPolicy, TouchPlan
-from robolink.runner import Ask, Confirm, Move, Notify
+from robolink.runner import Ask, Confirm, Consider, Move, Notify
 
 TIP = ToolOffset(12.3, -3.9, -20.0)
 PIN = (300.0, 100.0, -60.0)
@@ -40,6 +40,8 @@ class Person:
                         here = answer = self._touch(here.u_deg)
                     case Move():
                         here = answer = step.target
+                    case Consider():
+                        answer = ("",) * len(step.moves)
                     case Notify():
                         self.told.append(step.text)
                         answer = None

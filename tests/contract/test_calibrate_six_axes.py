@@ -119,6 +119,40 @@ def test_angles_and_then_one_touch_recover_two_needles(at):
         assert abs(error) <= done.document["fit"]["half_width95"][axis], axis
 
 
+@each("C8-C901S", "C12-C1401S", "CX4-A601SR", chosen={"CX4-A601SR"})
+def test_two_poses_half_a_turn_apart_give_the_tip_by_the_makers_formula(at):
+    """U at 0 and 180 with Tool 0, as EPSON's page has it: half the difference of X and of Y.
+
+    The flange of six axes looks down on the pin, so its Y points against the base's.
+    """
+    machine, simulator = at.cell.simulator.machine, at.cell.simulator
+    *bent, wrist = machine.arm.joints
+    turned = wrist + (-90.0 if machine.model.hangs else 90.0)
+    machine.arm.place(Joints(*bent, turned), simulator.now_ns)
+    if abs(machine.arm.flange().u_deg) > 1:
+        machine.arm.place(Joints(*bent, 2 * wrist - turned), simulator.now_ns)
+    x_mm, y_mm, z_mm = at.world.tip_mm()
+    at.world.pin_mm = (x_mm + 3.0, y_mm - 3.0, z_mm - 4.0)
+    document = recovered(at.calibrate("two-pose", "--sigma", "0.02"), at.truth)
+    first, second = document["poses"]
+    assert (round(first["u_deg"]) % 360, round(second["u_deg"]) % 360) == (0, 180)
+    half = {axis: (second[f"{axis}_mm"] - first[f"{axis}_mm"]) / 2 for axis in "xy"}
+    found = document["proposed"]
+    assert (found["x_mm"], found["y_mm"]) == pytest.approx((half["x"], -half["y"]), abs=2e-3)
+    assert found["z_mm"] == document["before"]["z_mm"]
+
+
+@each("C8-C901S", "CX4-A601SR", chosen={"C8-C901S"})
+def test_two_poses_of_a_flange_that_leans_are_refused_before_it_turns(at):
+    simulator = at.cell.simulator
+    simulator.machine.arm.place(Joints(0.0, -20.0, -30.0, 0.0, -15.0, 0.0), simulator.now_ns)
+    x_mm, y_mm, z_mm = at.world.tip_mm()
+    at.world.pin_mm = (x_mm + 3.0, y_mm - 3.0, z_mm - 4.0)
+    done = at.calibrate("two-pose")
+    assert (done.code, done.document["error"]["code"]) == (7, "tilted_pose")
+    assert "turn in the air" not in done.err
+
+
 @each(*ROBOTS, *PLANAR, chosen={"C8-C901S"})
 def test_beams_recover_the_tip(at):
     mount(at)
@@ -150,15 +184,19 @@ def test_a_camera_is_found_and_then_recovers_the_tip_and_a_board(at):
 @each("C8-C901S", "CX4-A601SR", chosen={"CX4-A601SR"})
 def test_what_a_write_does_at_taught_points_is_said_in_space(at):
     machine = at.cell.simulator.machine
-    machine.points.store(3, Point.at(machine.tip()))
-    before = machine.tip()
+    upright = machine.tip()
+    taught = {3: upright, 4: replace(upright, u_deg=35.0, v_deg=20.0, w_deg=160.0)}
+    for number, pose in taught.items():
+        machine.points.store(number, Point.at(pose))
     document = recovered(at.calibrate("pivot", "--count", "4", "--impact", "1-5"), at.truth, "xyz")
-    (entry,) = document["impact"]["points"]
-    # The tip that is on the arm now stands that much beside the point with the old offset.
     change = [document["proposed"][f"{a}_mm"] - document["before"][f"{a}_mm"] for a in "xyz"]
-    moved = rotation_of(before) @ change
-    shown = [entry["dx_mm"], entry["dy_mm"], entry["dz_mm"]]
-    assert shown == pytest.approx((-moved).tolist(), abs=2e-3)
+    entries = document["impact"]["points"]
+    assert len(entries) == len(taught)
+    for entry, pose in zip(entries, taught.values(), strict=True):
+        # The tip that is on the arm now stands that much beside the point with the old offset.
+        moved = rotation_of(pose) @ change
+        shown = [entry["dx_mm"], entry["dy_mm"], entry["dz_mm"]]
+        assert shown == pytest.approx((-moved).tolist(), abs=2e-3)
 
 
 @each("C8-C901S", "CX7-A701SR", chosen={"CX7-A701SR"})
@@ -219,33 +257,58 @@ def look_with_a_camera(at):
     return at.calibrate("camera-affine", "--at", place, *usual), "xy"
 
 
-CELLS, LEAST_HELD = 40, 32
+MEASURES = (touch_at_angles, tilt_over_a_pin, cross_beams, touch_a_plate, look_with_a_camera)
+MANY, MANY_HELD = 40, 32
+FEW, FEW_HELD = 20, 14
+"""Cells and how many of them at least must hold the truth. An interval of 95 % holds 31 or fewer
+of 40 once in 7,700 times, 13 or fewer of 20 once in 29,000 times (binomial distribution)."""
+
+UPRIGHT = (
+    "GX4-C351S-L",
+    "GX4-C351SM",
+    "GX8-C652SR",
+    "RS4-C351S",
+    "RS6-C552C",
+    "T3-401S",
+    "LS6-602S",
+    "G6-651S",
+)
+TILTING = ("C8-C1401CR", "C12-C1401S", "CX4-A601SR", "CX7-A701S", "C4-A601S", "VT6L")
+"""One robot of each family and mounting: docs/calibrate.md has what was counted on them."""
+
+
+def counted(robots, cells, least, measures):
+    """Return the cases of a count: each robot with each measurement."""
+    return [
+        pytest.param(measure, robot, cells, least, id=f"{measure.__name__}-{robot}")
+        for robot in robots
+        for measure in measures
+    ]
 
 
 @pytest.mark.soak
 @pytest.mark.timeout(900)
-@pytest.mark.parametrize("robot", ["C8-C901S", "CX4-A601SR"])
 @pytest.mark.parametrize(
-    "measure",
-    [touch_at_angles, tilt_over_a_pin, cross_beams, touch_a_plate, look_with_a_camera],
+    ("measure", "robot", "cells", "least"),
+    [
+        *counted(("C8-C901S", "CX4-A601S"), MANY, MANY_HELD, MEASURES),
+        *counted(TILTING, FEW, FEW_HELD, MEASURES),
+        *counted(UPRIGHT, FEW, FEW_HELD, [m for m in MEASURES if m is not tilt_over_a_pin]),
+    ],
 )
 def test_the_interval_of_each_method_holds_the_truth_about_as_often_as_it_says(
-    measure, robot, tmp_path, monkeypatch
+    measure, robot, cells, least, tmp_path, monkeypatch, record_property
 ):
-    """Counted over cells with other seeds.
-
-    An interval of 95 % holds 31 or fewer of 40 once in 7,700 times (binomial distribution); one
-    that holds 65 % holds 32 or more in 3 of 100. Each axis is counted for itself: they share their
-    touches.
-    """
+    """Counted over cells with other seeds; each axis for itself: they share their touches."""
     held = dict[str, int]()
-    for seed in range(200, 200 + CELLS):
+    for seed in range(200, 200 + cells):
         folder = tmp_path / str(seed)
         folder.mkdir()
         with method_cell(robot, folder, monkeypatch, seed=seed) as at:
             done, axes = measure(at)
-            assert done.code == 0, done.err[-1500:]
+            assert done.code == 0, (seed, done.err[-1500:])
             wrongs = wrong_mm(done.document, at.truth, axes)
             for axis, (wrong, half) in zip(axes, wrongs, strict=True):
                 held[axis] = held.get(axis, 0) + (abs(wrong) <= half)
-    assert min(held.values()) >= LEAST_HELD, held
+    record_property("held", " ".join(f"{axis} {count}" for axis, count in held.items()))
+    assert min(held.values()) >= least, held

@@ -27,7 +27,7 @@ PROGRAM_ONLY: Final = frozenset(_PROGRAM_WORDS.split())
 
 _WORDS_OF_OTHER_ROBOTS = """
     brake jumptlz
-    j1angle j4angle vsd
+    vsd
 """
 
 OF_OTHER_ROBOTS: Final = frozenset(_WORDS_OF_OTHER_ROBOTS.split())
@@ -102,6 +102,9 @@ UNSIMULATED: Final = (
 
 UNSIMULATED_FUNCTIONS: Final = FUNCTION_ONLY | frozenset(_UNSIMULATED_FUNCTIONS.split())
 """Functions that a program may call and that are refused when it comes to them."""
+
+UNSIMULATED_FAMILIES: Final = ("workque_", "cnv_", "sf_", "aio_", "pg_", "fbusio_", "force_")
+"""What statements and functions of options of the controller begin with: none is simulated."""
 
 _REFUSED_WORDS: Final = (
     (PROGRAM_ONLY, RefusalKind.NOT_ALLOWED_HERE, "is allowed in programs only"),

@@ -11,7 +11,7 @@ from robolink_simulators.structured_text import StructuredTextError
 
 from robolink.protocols.mailbox import Opcode, program_texts
 from robolink.transport import open_mailbox_link
-from tests.unit._mailbox_client import MailboxClient
+from tests.unit._mailbox_client import MailboxClient, linked
 from tests.unit.structured_text._behaviours import of_program
 
 
@@ -56,3 +56,18 @@ def test_a_program_that_leaves_the_subset_is_told_with_its_place(tmp_path, capsy
     line = 1 + core.read_text()[: core.read_text().index("rejected := raw;")].count("\n")
     assert f"robolink_core.st, line {line}, column" in told
     assert issubclass(StructuredTextError, ValueError)
+
+
+def test_the_machine_s_program_is_told_of_a_changed_tool_and_keeps_that():
+    simulator = SoftMotionSimulator(make_plc=of_program())
+    client = linked(simulator)
+    simulator.panel.take_change_back()
+    client.take()
+    assert not simulator.panel.tool_changed
+    client.done(Opcode.WRITE_TOOL, 5, pose=(1.5, 0.0, 0.0, 0.0, 0.0, 0.0), name="needle")
+    assert simulator.panel.tool_changed
+    assert simulator.panel.owned
+    simulator.panel.restart()
+    client.wait(0.05)
+    assert simulator.panel.tool_changed
+    assert not simulator.panel.owned

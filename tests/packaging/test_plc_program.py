@@ -105,7 +105,7 @@ def test_the_xml_holds_every_unit_of_the_texts(profile):
     assert len(list(root.iter(f"{XML}dataType"))) == types
     core = pous["RL_MailboxCore"]
     kinds = {section: len(core.findall(f"{XML}interface/{XML}{section}/*")) for section in KINDS}
-    assert kinds == {"inputVars": 12, "outputVars": 1, "inOutVars": 8}
+    assert kinds == {"inputVars": 12, "outputVars": 2, "inOutVars": 8}
     (inside,) = core.findall(f"{XML}body")
     body = "".join(inside.itertext())
     assert body.strip() in texts["robolink_core.st"]

@@ -60,7 +60,7 @@ class PlcPanel:
     def owned(self) -> bool:
         """Whether a client owns the mailbox."""
         with self._acting():
-            return self._plc.program.ownership.holder != 0
+            return self._plc.program.holder != 0
 
     def take_change_back(self) -> None:
         """Let the machine's own program say that it knows of the change (``xToolChanged``)."""

@@ -8,6 +8,7 @@ from robolink_simulators.softmotion.mailbox.retained import RetainedMemory
 from robolink_simulators.structured_text import StructuredProgram
 
 _MEMORY: Final = "RL_Kept.memory"
+_TOOL_CHANGED: Final = "RL_Kept.xToolChanged"
 _NAME_WORDS: Final = 8
 
 
@@ -51,6 +52,15 @@ class ProgramMemory(RetainedMemory):
     def device_id(self, number: int) -> None:
         self._program.put(f"{_MEMORY}.deviceId", number)
 
+    @property
+    def tool_changed(self) -> bool:
+        """Whether a client has changed a tool (``xToolChanged``)."""
+        return bool(self._program.value(_TOOL_CHANGED))
+
+    @tool_changed.setter
+    def tool_changed(self, changed: bool) -> None:
+        self._program.put(_TOOL_CHANGED, changed)
+
     def slot(self, number: int) -> Slot:
         """Return what a slot holds."""
         counter, filled, tool, words = self._held(number)
@@ -86,7 +96,7 @@ class ProgramMemory(RetainedMemory):
         for number in SLOTS:
             self._put(number, plain.slot(number))
         self.boot_id, self.epoch = plain.boot_id, plain.epoch
-        self.device_id = plain.device_id
+        self.device_id, self.tool_changed = plain.device_id, plain.tool_changed
 
     def to_state(self) -> dict[str, object]:
         """Return all of it, ready for JSON."""

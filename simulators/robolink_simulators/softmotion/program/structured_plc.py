@@ -94,6 +94,7 @@ class StructuredPlc(Plc):
             )
             self._executed.tell_before(encode_command(command))
             sequence, epoch = next_number(sequence), self.memory.epoch
+        self.memory.tool_changed = False  # the machine's program has seen that
         self._take_over()
 
     def lay_words(self, order: WordOrder) -> None:

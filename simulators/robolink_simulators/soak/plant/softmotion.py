@@ -5,44 +5,32 @@ from typing import Final
 
 from robolink.controllers.softmotion import open_softmotion
 from robolink.model import Controller, OutcomeLog, ToolOffset
-from robolink.protocols.mailbox import COMMAND, COMMAND_WORDS, Opcode, Words
-from robolink.transport import MailboxHead
+from robolink.transport import MailboxLink
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.faults import PlcFault, PlcFaultAction
+from robolink_simulators.faults.fieldbus import Order
 from robolink_simulators.hosting.in_process.mailbox_link import InProcessMailboxLink
 from robolink_simulators.soak.computer import VirtualProcess
 from robolink_simulators.soak.history import Disturbance, Hindrance
-from robolink_simulators.soak.plant.machine import (
-    MachineState,
-    PlantMachine,
-    SentKind,
-    SentRequest,
-    WireTap,
-)
+from robolink_simulators.soak.plant.machine import MachineState, PlantWithWorld, WireTap
+from robolink_simulators.soak.plant.mailbox_tap import TappedMailboxLink
+from robolink_simulators.soak.plant.production import MailboxProduction
 from robolink_simulators.softmotion.mailbox.option_text import PlcOptions
 from robolink_simulators.softmotion.mailbox.options import MailboxOptions
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
-_KINDS: Final = {
-    Opcode.MOVE_DIRECT: SentKind.MOVE,
-    Opcode.MOVE_LINEAR: SentKind.MOVE,
-    Opcode.MOVE_UNTIL_INPUT: SentKind.MOVE,
-    Opcode.JOG: SentKind.MOVE,
-    Opcode.CONTINUE: SentKind.MOVE,
-    Opcode.WRITE_TOOL: SentKind.WRITE,
-    Opcode.CLEAR_TOOL: SentKind.WRITE,
-    Opcode.SELECT_TOOL: SentKind.SELECT,
-    Opcode.STOP: SentKind.STOP,
-    Opcode.HALT: SentKind.STOP,
-}
+_TIMEOUT_S: Final = 3.0
+_WATCHDOGS_MS: Final = (0, 2000, 0, 500)
+"""Of the fieldbus, by seed: silence after which it zeroes what clients write; 0 never."""
+
+_ORDERS: Final[tuple[Order, ...]] = ("high_first", "pairs_swapped", "halves_swapped")
 _NEEDS_RESTART: Final = frozenset(
     {PlcFaultAction.FREEZE_HEARTBEAT, PlcFaultAction.WORD_ORDER, PlcFaultAction.SHIFT_MAP}
 )
-_I0, _OPCODE = COMMAND["i0"].word, COMMAND["opcode"].word
 
 
-class SoftMotionPlant(PlantMachine):
+class SoftMotionPlant(PlantWithWorld):
     """A PLC with the mailbox program and a SCARA behind it.
 
     Args:
@@ -57,14 +45,15 @@ class SoftMotionPlant(PlantMachine):
 
     def __init__(self, clock: ManualClock, tap: WireTap, seed: int) -> None:
         super().__init__(clock, tap)
-        options = PlcOptions(mailbox=MailboxOptions(device_id=1000 + seed))
+        watchdog_ms = _WATCHDOGS_MS[seed // 2 % len(_WATCHDOGS_MS)]
+        options = PlcOptions(mailbox=MailboxOptions(device_id=1000 + seed, watchdog_ms=watchdog_ms))
         self._simulator = SoftMotionSimulator(
             "Kin_Scara3_Z", seed=seed, options=options, world=WorldParameters()
         )
         self._simulator.present_ns = clock.now_ns
         self._simulator.durable = True
         self._simulator.on_request = self._requested
-        self._planned: list[tuple[Disturbance, int]] = []
+        self._production = MailboxProduction(self._simulator)
         self._starts = self._simulator.plc.memory.boot_id
         self._strange = False
 
@@ -75,8 +64,15 @@ class SoftMotionPlant(PlantMachine):
 
     def connect(self, process: VirtualProcess, outcomes: OutcomeLog) -> Controller:
         """Meet the mailbox."""
-        link = TappedMailboxLink(self._simulator, self.clock, process, self.tap, self.address)
-        return open_softmotion(link, outcomes=outcomes)
+        return open_softmotion(self.tapped(self.link(), process), outcomes=outcomes)
+
+    def link(self) -> MailboxLink:
+        """Open a link to the mailbox."""
+        return InProcessMailboxLink(self.address, self._simulator, self.clock, _TIMEOUT_S)
+
+    def tapped(self, link: MailboxLink, process: VirtualProcess) -> MailboxLink:
+        """Let the adversary see what passes on a link."""
+        return TappedMailboxLink(link, process, self.tap)
 
     def hang_up(self, process: VirtualProcess) -> None:
         """A mailbox does not see that a client is gone; it hears no beat any more."""
@@ -103,8 +99,8 @@ class SoftMotionPlant(PlantMachine):
 
     def arm(self, disturbance: Disturbance) -> None:
         """Plan a fault of the fieldbus, or what happens to the PLC."""
-        if disturbance.kind is Hindrance.PENDANT:
-            self._planned.append((disturbance, disturbance.at))
+        if disturbance.kind in (Hindrance.PENDANT, Hindrance.PRODUCTION):
+            self.acts.plan(disturbance)
             return
         self._simulator.faults.add(
             PlcFault(
@@ -113,6 +109,7 @@ class SoftMotionPlant(PlantMachine):
                 disturbance.match,
                 seconds=disturbance.seconds,
                 position=disturbance.position,
+                order=_ORDERS[(disturbance.position or 0) % len(_ORDERS)],
             )
         )
 
@@ -123,8 +120,7 @@ class SoftMotionPlant(PlantMachine):
         self._strange |= any(fault.action in _NEEDS_RESTART for fault in faults.fired)
         faults.clear()
         faults.fired.clear()
-        self._planned.clear()
-        return met
+        return met + self.acts.clear()
 
     def write_by_hand(self, tool: int, offset: ToolOffset) -> None:
         """Let the machine's own program write a slot."""
@@ -133,6 +129,11 @@ class SoftMotionPlant(PlantMachine):
         values = (offset.x_mm, offset.y_mm, offset.z_mm, a, b, c)
         self._simulator.plc.memory.define(tool, values, "by hand")
         self.touched.add(tool)
+
+    def advance(self) -> None:
+        """See :meth:`PlantMachine.advance`; the machine's own program goes on, too."""
+        super().advance()
+        self._production.look(self.clock.now_ns())
 
     def repair(self) -> None:
         """Release, permit, let the program go on."""
@@ -148,105 +149,16 @@ class SoftMotionPlant(PlantMachine):
             panel.restart()
 
     def _requested(self, _number: int, text: str) -> None:
-        waiting: list[tuple[Disturbance, int]] = []
-        for disturbance, left in self._planned:
-            if disturbance.match not in text:
-                waiting.append((disturbance, left))
-            elif left:
-                waiting.append((disturbance, left - 1))
-            else:
-                slot = self._simulator.plc.memory.slot(1)
-                if slot.defined:
-                    old = _offset(slot.tool)
-                    self.write_by_hand(1, ToolOffset(old.x_mm, old.y_mm, old.z_mm + 0.5))
-        self._planned = waiting
-
-
-class TappedMailboxLink(InProcessMailboxLink):
-    """A process's link to a PLC, on which the adversary sees everything.
-
-    Args:
-        simulator: Where it leads.
-        clock: The virtual time.
-        process: Whose it is.
-        tap: Told of everything.
-        address: Its URL.
-        timeout_s: Longest wait for an answer.
-    """
-
-    def __init__(
-        self,
-        simulator: SoftMotionSimulator,
-        clock: ManualClock,
-        process: VirtualProcess,
-        tap: WireTap,
-        address: str,
-        timeout_s: float = 3.0,
-    ) -> None:
-        self._process = process
-        self._tap = tap
-        self._address = address
-        self._plc = simulator
-        super().__init__(address, simulator, clock, timeout_s)
-
-    def write_command(self, words: Sequence[int]) -> None:
-        """See :meth:`robolink.transport.MailboxLink.write_command`."""
-        sent = _classified(words)
-        self._tap.leaving(self._process, sent)
-        super().write_command(words)
-        self._tap.passed(self._process, f"wire sent {sent.text}")
-
-    def read_head(self) -> MailboxHead:
-        """See :meth:`robolink.transport.MailboxLink.read_head`."""
-        self._asks("read_head")
-        return super().read_head()
-
-    def read_response(self) -> Words:
-        """See :meth:`robolink.transport.MailboxLink.read_response`."""
-        self._asks("read_response")
-        words = super().read_response()
-        self._tap.passed(self._process, f"wire received {words[1]} {words[2]} {words[-2]:04x}")
-        return words
-
-    def read_slot(self, slot: int) -> Words:
-        """See :meth:`robolink.transport.MailboxLink.read_slot`."""
-        self._asks(f"read_slot {slot}")
-        return super().read_slot(slot)
-
-    def read_device(self) -> Words:
-        """See :meth:`robolink.transport.MailboxLink.read_device`."""
-        self._asks("read_device")
-        return super().read_device()
-
-    def beat(self, word: int) -> None:
-        """See :meth:`robolink.transport.MailboxLink.beat`."""
-        self._asks("beat")
-        super().beat(word)
-
-    def reopened(self, *, timeout_s: float) -> "TappedMailboxLink":
-        """See :meth:`robolink.transport.MailboxLink.reopened`."""
-        return TappedMailboxLink(
-            self._plc, self.clock, self._process, self._tap, self._address, timeout_s
-        )
-
-    def _asks(self, text: str) -> None:
-        self._tap.leaving(self._process, SentRequest(SentKind.OTHER, text))
-
-
-def _classified(words: Sequence[int]) -> SentRequest:
-    opcode, operand = words[_OPCODE], words[_I0]
-    try:
-        name = Opcode(opcode).name
-    except ValueError:
-        name = str(opcode)
-    kind = _KINDS.get(Opcode(opcode), SentKind.OTHER) if name != str(opcode) else SentKind.OTHER
-    if opcode == Opcode.STOP and operand:
-        kind = SentKind.OTHER  # it releases the hold
-    if opcode == Opcode.JOG and not any(words[_I0 : _I0 + 2]):
-        kind = SentKind.STOP  # it ends the jog
-    tool = operand if kind in (SentKind.WRITE, SentKind.SELECT) else None
-    carried = " ".join(f"{word:04x}" for word in words[_OPCODE : COMMAND_WORDS - 3])
-    return SentRequest(kind, f"{name} {words[0]}: {carried}", tool)
+        now_ns = self.clock.now_ns()
+        self._production.look(now_ns)
+        for disturbance in self.acts.due(text):
+            if disturbance.kind is Hindrance.PRODUCTION:
+                self._production.begin(disturbance.seconds, now_ns)
+                continue
+            slot = self._simulator.plc.memory.slot(1)
+            if slot.defined:
+                old = _offset(slot.tool)
+                self.write_by_hand(1, ToolOffset(old.x_mm, old.y_mm, old.z_mm + 0.5))
 
 
 def _offset(tool: Sequence[float]) -> ToolOffset:

@@ -1,7 +1,6 @@
 """How a deed ends: what it says, against what is so."""
 
 import math
-from typing import Final
 
 from robolink_cli.console.exit_codes import BUG, UNKNOWN, exit_code
 
@@ -11,10 +10,7 @@ from robolink.standing import Effect, standing_after
 from robolink_simulators.soak.computer import VirtualProcess
 from robolink_simulators.soak.people import OTHERS_TOOL, TOOL
 from robolink_simulators.soak.plant.machine import MachineState
-from robolink_simulators.soak.rules.so_far import Grounds
-
-_SURELY_MM: Final = 0.5
-"""A tip that was certified and lies farther off than this is a wrong certificate in any case."""
+from robolink_simulators.soak.rules.so_far import SURELY_MM, Grounds
 
 
 class EndRules:
@@ -36,7 +32,8 @@ class EndRules:
         code = 0 if error is None else exit_code(error)
         self._on.hold("NoDefectShown", code != BUG, f"{type(error).__name__}: {error}")
         self._told(error, code, state)
-        if self._on.books.trusted and code != UNKNOWN:
+        # A program that calls back tells what it left open when it calls again.
+        if self._on.books.trusted and code != UNKNOWN and not self._on.plant.calls_back:
             begun = [
                 m.request
                 for m in self._on.books.markers()
@@ -67,8 +64,8 @@ class EndRules:
 
     def _certified(self, report: ChangeReport, state: MachineState) -> None:
         (done,) = report.tools
-        truth = self._on.plant.simulator.world.tips[TOOL]
-        found = done.proposal.offset
+        truth, found = self._on.plant.tip_of(TOOL), done.proposal.offset
+        assert truth is not None  # noqa: S101 - for the type: it was measured
         error_mm = math.hypot(found.x_mm - truth.x_mm, found.y_mm - truth.y_mm)
         self._on.hold(
             "StateIsTold",
@@ -86,7 +83,7 @@ class EndRules:
             self._on.story.certified.append(error_mm <= within_mm)
             self._on.hold(
                 "TipIsWhereItSays",
-                error_mm <= _SURELY_MM,
+                error_mm <= SURELY_MM,
                 f"the tip is {error_mm:.3f} mm from where it was proved to be",
             )
 

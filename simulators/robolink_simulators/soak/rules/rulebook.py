@@ -39,6 +39,7 @@ class Rulebook(Grounds):
         for tool, offset in state.tools.items():
             self.now.wanted[tool] = [offset]
         self.plant.touched.clear()
+        self.plant.values.clear()
         self.plant.moved_itself = False
 
     def begin_again(self) -> None:

@@ -132,6 +132,7 @@ if TYPE_CHECKING:
     from robolink.calibration.pin.six_point import solve_tool_axis as solve_tool_axis
     from robolink.calibration.pin.two_pose import solve_two_pose as solve_two_pose
     from robolink.calibration.pin.two_pose import two_of as two_of
+    from robolink.calibration.quality.control_chart import LEAST_BASELINE as LEAST_BASELINE
     from robolink.calibration.quality.control_chart import USUAL_LAMBDA as USUAL_LAMBDA
     from robolink.calibration.quality.control_chart import USUAL_WIDTH as USUAL_WIDTH
     from robolink.calibration.quality.control_chart import ControlChart as ControlChart
@@ -247,7 +248,9 @@ __getattr__ = lazy_exports(
         "pin.pivot_fit": "PivotDesign PivotFit fit_pivot fit_pivot_robust pivot_design",
         "pin.six_point": "FAR_DEG SixPointResult ToolAxis solve_six_point solve_tool_axis",
         "pin.two_pose": "solve_two_pose two_of",
-        "quality.control_chart": "USUAL_LAMBDA USUAL_WIDTH ControlChart control_chart",
+        "quality.control_chart": (
+            "LEAST_BASELINE USUAL_LAMBDA USUAL_WIDTH ControlChart control_chart"
+        ),
         "quality.gauge_study": "GaugeStudy gauge_study",
         "quality.doubts": "doubt_sentence known_doubts order_in_words",
         "quality.impact": "Impact PointImpact impact_on",

@@ -101,6 +101,9 @@ class ToolTableCore(ABC):
         """Return what the controller can hold of an offset."""
         return offset
 
+    def _require_possible(self, tool: int, offset: ToolOffset) -> None:
+        """Refuse, in a preview, an offset that the machine cannot work with."""
+
     def _require_readable(self, tool: int) -> None:
         """Refuse a read that the state would not allow."""
 
@@ -184,7 +187,10 @@ class ToolTableCore(ABC):
         self._require_readable(tool)
         requested = self._storable(tool, offset)
         requests = self._requests(tool, requested)
-        return () if self.same(self._stored(tool), requested) else requests
+        if self.same(self._stored(tool), requested):
+            return ()
+        self._require_possible(tool, requested)
+        return requests
 
     def preview_clear(self, tool: int, *, then_select: int | None = None) -> tuple[str, ...]:
         """Return what :meth:`clear` would send besides its reads; raises what it would."""

@@ -37,6 +37,22 @@ if TYPE_CHECKING:
     from robolink.model._tools import plain_offset as plain_offset
     from robolink.model._tools import read_offset as read_offset
     from robolink.model._tools import tool_changed as tool_changed
+    from robolink.model.motion.custom_kinematics import AxisKind as AxisKind
+    from robolink.model.motion.custom_kinematics import AxisPositions as AxisPositions
+    from robolink.model.motion.custom_kinematics import FlangeFrame as FlangeFrame
+    from robolink.model.motion.custom_kinematics import (
+        ISMKinematicsWithOrientationImage as ISMKinematicsWithOrientationImage,
+    )
+    from robolink.model.motion.custom_kinematics import (
+        ISMOrientationKinematicsWithOriImage2 as ISMOrientationKinematicsWithOriImage2,
+    )
+    from robolink.model.motion.custom_kinematics import (
+        ISMPositionKinematics2 as ISMPositionKinematics2,
+    )
+    from robolink.model.motion.custom_kinematics import MCKinRefSM3 as MCKinRefSM3
+    from robolink.model.motion.custom_kinematics import is_custom as is_custom
+    from robolink.model.motion.custom_kinematics import kinematics_class as kinematics_class
+    from robolink.model.motion.custom_kinematics import kinematics_object as kinematics_object
     from robolink.model.motion.geometry import Elbow as Elbow
     from robolink.model.motion.geometry import Hand as Hand
     from robolink.model.motion.geometry import Pose as Pose
@@ -51,6 +67,14 @@ if TYPE_CHECKING:
     from robolink.model.motion.movement import MotionTerms as MotionTerms
     from robolink.model.motion.movement import Path as Path
     from robolink.model.motion.movement import WorkBox as WorkBox
+    from robolink.model.motion.orientation_coupling import CsTool as CsTool
+    from robolink.model.motion.orientation_coupling import OrientationImage as OrientationImage
+    from robolink.model.motion.orientation_coupling import combined_space as combined_space
+    from robolink.model.motion.orientation_space import Direction3 as Direction3
+    from robolink.model.motion.orientation_space import NotReachable as NotReachable
+    from robolink.model.motion.orientation_space import OrientationDof as OrientationDof
+    from robolink.model.motion.orientation_space import OrientationSpace as OrientationSpace
+    from robolink.model.motion.orientation_space import RotationMatrix as RotationMatrix
     from robolink.model.motion.tip_sensor import TIP as TIP
     from robolink.model.motion.tip_sensor import Spot as Spot
     from robolink.model.motion.tip_sensor import SpotUnit as SpotUnit
@@ -82,6 +106,11 @@ else:
             "_controller": "Act Capabilities Controller ControllerState ControllerStatus",
             "_controller_cameras": "ControllerSensor LookingController",
             "record.findings": "Finding Resolver Verdict",
+            "motion.custom_kinematics": (
+                "AxisKind AxisPositions FlangeFrame ISMKinematicsWithOrientationImage "
+                "ISMOrientationKinematicsWithOriImage2 ISMPositionKinematics2 MCKinRefSM3 "
+                "is_custom kinematics_class kinematics_object"
+            ),
             "motion.geometry": "Elbow Hand Pose Posture Wrist angle_difference_deg rotate_xy",
             "_identity": "ControllerFacts Identity Who is_own_name",
             "record.journal_entries": "PROOFS EntryKind NewEntry Recorded Signature",
@@ -97,6 +126,10 @@ else:
             "_people": "PersonRole require_engineer",
             "_secret": "Secret",
             "record.standing_words": "describe_standing",
+            "motion.orientation_coupling": "CsTool OrientationImage combined_space",
+            "motion.orientation_space": (
+                "Direction3 NotReachable OrientationDof OrientationSpace RotationMatrix"
+            ),
             "motion.tip_sensor": "Spot SpotUnit TIP TipSensor",
             "_tools": (
                 "ANY Expect Expected Jump ToolOffset ToolReceipt ToolTable describe_offset "

@@ -21,7 +21,7 @@ from robolink.report.sections import certainty, decisions, points, summary
 from robolink.report.sections.offsets import offsets
 from robolink.report.sections.poses import pose_tables
 
-_POLICY = "default-src 'none'; style-src 'unsafe-inline'"
+POLICY = "default-src 'none'; style-src 'unsafe-inline'"
 
 
 def render(report: Report, *others: Report) -> str:
@@ -35,11 +35,11 @@ def render(report: Report, *others: Report) -> str:
     style = files("robolink.report").joinpath("style.css").read_text(encoding="utf-8")
     numbers = ", ".join(str(one.tool) for one in reports)
     return (
-        _environment()
+        templates()
         .get_template("page.html")
         .render(
             title=tr("Tool {tool} of {controller}", tool=numbers, controller=report.controller),
-            policy=_POLICY,
+            policy=POLICY,
             # The style is the one text that is not escaped: a page takes it as it stands.
             style=Markup(style),
             heading=summary.heading(reports),
@@ -52,7 +52,7 @@ def render(report: Report, *others: Report) -> str:
 
 
 @cache
-def _environment() -> Environment:
+def templates() -> Environment:
     """Return what fills the templates: every value is escaped, a missing one is an error."""
     environment = Environment(
         loader=PackageLoader("robolink.report"),

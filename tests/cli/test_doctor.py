@@ -243,7 +243,7 @@ def test_unsettled_work_on_any_controller_is_listed(capsys):
     checks = json.loads(capsys.readouterr().out)["checks"]
     found = [check["remedy"] for check in checks if check["subject"] == "unsettled"]
     assert sorted(found) == [
-        f"Run: robolink -c epson+tcp://192.0.2.{number}:5000 recover" for number in (1, 2)
+        f'Run: robolink -c "epson+tcp://192.0.2.{number}:5000" recover' for number in (1, 2)
     ]
 
 

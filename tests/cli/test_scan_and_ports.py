@@ -1,14 +1,22 @@
 """scan and ports: what can be reached from this computer."""
 
 import json
+import os
+import select
 import socket
+import threading
 import time
+import tty
 from types import SimpleNamespace
 
 import pytest
 from robolink_cli import main
 from robolink_cli.commands.computer import scanning
 from robolink_cli.commands.computer.scanning import AddressProbe, State, parse_range
+from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.epson import EpsonOptions, EpsonSimulator
+from robolink_simulators.hosting.streams.epson_serial import serve_serial
+from robolink_simulators.hosting.streams.serial_cable import SerialCable
 
 from robolink.errors import ConfigError
 
@@ -160,3 +168,126 @@ def test_serial_ports_are_listed_by_name_and_whether_they_may_be_used(plugged_in
         f"{usable}\n{tmp_path}/ttyUSB1  adapter  USB VID:PID=0403:6001\n"
         "    you may not use it; 'robolink doctor' says what to do\n"
     )
+
+
+SENT = "04 02 53 03 50"
+
+
+def scanned(capsys, *urls):
+    """Ask at lines, with the least patience; return what was found at each."""
+    lines = [word for url in urls for word in ("--line", url)]
+    assert main.run(["scan", *lines, "--timeout", "0.05", "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert (document["probes"], document["urls"]) == ([], [])
+    return document["lines"]
+
+
+@pytest.mark.parametrize("eot", ["none", "ack"])
+def test_a_controller_at_a_serial_line_is_known_by_its_refusal(capsys, eot):
+    options = EpsonOptions(rs232_eot_answer=eot)
+    simulator = EpsonSimulator(seed=3, options=options)
+    with serve_serial(simulator, clock=ScaledClock(40.0)) as host:
+        (found,) = scanned(capsys, host.url)
+        assert (found["found"], found["sent"]) == ("controller", SENT)
+        # NAK, the letter of GetStatus, error 11: nobody is logged in.
+        assert found["received"].endswith("15 53 31 31 03 50")
+    assert [text for _, way, text in simulator.log if way == ">"] == ["$GetStatus"]
+
+
+@pytest.fixture
+def far_end():
+    """A cable, and what answers at its far end to each piece that comes."""
+    cable, over, heard = SerialCable(), threading.Event(), list[bytes]()
+    far = os.open(cable.far, os.O_RDWR | os.O_NOCTTY)
+    tty.setraw(far)
+
+    def serve(answer, unasked=b""):
+        def run():
+            while not over.is_set():
+                os.write(far, unasked)
+                if select.select([far], [], [], 0.05)[0]:
+                    heard.append(os.read(far, 256))
+                    os.write(far, answer(heard[-1]))
+
+        thread.append(threading.Thread(target=run))
+        thread[0].start()
+        return f"epson+serial://{cable.near}?baud=9600", heard
+
+    thread = list[threading.Thread]()
+    try:
+        yield serve
+    finally:
+        over.set()
+        for one in thread:
+            one.join()
+        os.close(far)
+        cable.close()
+
+
+@pytest.mark.parametrize(
+    ("answer", "found"),
+    [
+        (lambda piece: piece, "other"),
+        (lambda piece: b"OK\r\n" if piece[:1] == b"\x02" else b"", "other"),
+        (lambda piece: b"\x06" if piece == b"\x04" else b"", "other"),
+        (lambda piece: b"", "nobody"),
+    ],
+    ids=["an echo", "a modem", "an acknowledgement alone", "silence"],
+)
+def test_what_is_no_controller_gets_five_bytes_and_no_more(capsys, far_end, answer, found):
+    url, heard = far_end(answer)
+    (line,) = scanned(capsys, url)
+    assert line["found"] == found
+    assert b"".join(heard).hex(" ") == line["sent"] == SENT
+
+
+def test_into_a_conversation_of_others_nothing_is_sent(capsys, far_end):
+    url, heard = far_end(lambda piece: b"", unasked=b"12.50 g\r\n")
+    (line,) = scanned(capsys, url)
+    assert (line["found"], line["sent"]) == ("talking", "")
+    assert heard == []
+    assert main.run(["scan", "--line", url]) == 0
+    shown = capsys.readouterr().out
+    assert "somebody talks there unasked; nothing was sent" in shown
+    assert "sent: nothing; received: 31 32" in shown
+
+
+def test_a_line_that_cannot_be_opened_is_told_and_the_next_one_asked(capsys, far_end):
+    url, _ = far_end(lambda piece: b"")
+    missing = "epson+serial:///dev/ttyS77x?baud=9600"
+    first, second = scanned(capsys, missing, url)
+    assert (first["found"], second["found"]) == ("unusable", "nobody")
+    assert "ttyS77x" in first["why"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ((), "range of addresses, or a serial line"),
+        (("--line", "epson+tcp://127.0.0.1:1"), "no serial line of an EPSON controller"),
+        (("--line", "epson+serial:///dev/ttyS77x"), "baud"),
+        (("--line", "epson+serial:///dev/ttyS77x?baud=9600&numbers=roman"), "numbers"),
+    ],
+)
+def test_a_line_that_makes_no_sense_is_refused(capsys, arguments, said):
+    assert main.run(["scan", *arguments]) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_ports_and_doctor_know_the_cells_on_a_line(
+    plugged_in, capsys, tmp_path, monkeypatch, robolink_state
+):
+    del robolink_state
+    monkeypatch.chdir(tmp_path)
+    there = tmp_path / "ttyUSB0"
+    there.touch()
+    (tmp_path / "robolink.toml").write_text(
+        f'[cells.here]\nurl = "epson+serial://{there}?baud=9600"\n'
+        '[cells.gone]\nurl = "epson+serial:///dev/ttyUSB77?baud=9600"\n'
+    )
+    plugged_in(Port(device=str(there), description="n/a", hwid="n/a"))
+    assert main.run(["ports"]) == 0
+    assert f"{there}\n    cells: here\n" in capsys.readouterr().out
+    main.run(["doctor"])
+    shown = capsys.readouterr()
+    assert "/dev/ttyUSB77 of gone is not there." in shown.out + shown.err

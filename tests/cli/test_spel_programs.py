@@ -92,3 +92,28 @@ def test_a_program_with_faults_is_not_served(ended, program):
     end = ended("sim", "epson", "--tcp", "127.0.0.1:0", "--program", path)
     assert end.code == 2
     assert "main.prg:2:8" in end.err
+
+
+VISION = """
+schema = "robolink/vision/1"
+[[sequence]]
+name = "findTip"
+  [[sequence.object]]
+  name = "tip"
+"""
+
+
+def test_run_takes_a_vision_project(ended, program):
+    path = program("Function main\n  VRun findTip\n  Print 7\nFend\n")
+    end = ended("spel", "run", path, "--vision", program(VISION, "vision.toml"))
+    assert (end.code, end.out) == (0, "7\n")
+    end = ended("spel", "run", path, "--vision", program(VISION + "x = 1\n", "vision.toml"))
+    assert end.code == 2
+    assert "sequence.1.object.1.x: is not known" in end.err
+    assert ended("spel", "run", path).code == 5
+
+
+def test_a_vision_project_goes_with_a_program(ended, program):
+    end = ended("sim", "epson", "--tcp", "127.0.0.1:0", "--vision", program(VISION, "v.toml"))
+    assert end.code == 2
+    assert "--vision goes with --program" in end.err

@@ -295,6 +295,7 @@ MAKERS = {
     "beams-and-probe.md 2": nothing,
     "camera-and-board.md 1": lambda stack: {"SpotUnit": SpotUnit, "Spot": Spot, "TIP": TIP},
     "camera-and-board.md 2": nothing,
+    "custom-kinematics.md 1": nothing,
     "extending.md 1": an_acme_camera,
     "extending.md 2": a_camera_for_a_recipe,
     "extending.md 3": a_panel,

@@ -160,6 +160,11 @@ def test_pendant_points_only_and_nothing_moves(cell):
     third = cell.run("recalibrate", path, "--yes", "--json")
     assert third.code == 0, third.err
     assert cell.tool_1.x_mm == pytest.approx(OLD_TIP.x_mm + 0.1, abs=2e-3)
+    # What was measured is charted, not what was written.
+    (charted,) = json.loads(cell.run("journal", "drift", "--json").out)["controllers"]
+    tips = {c["axis"]: c["points"] for c in charted["charts"] if c["quantity"] == "tip"}
+    assert set(tips) == {"x", "y"}, "Z was kept"
+    assert [p["value_mm"] for p in tips["x"]][-2:] == pytest.approx([12.5, 12.4], abs=2e-3)
 
 
 def test_two_nozzles_on_one_head(cell):

@@ -186,7 +186,8 @@ def test_a_tool_that_the_kinematics_cannot_carry_is_refused_and_changes_nothing(
             with pytest.raises(RejectedError, match="cannot carry this tool") as refusal:
                 controller.tools.write(1, OTHER, expected=before)
             assert refusal.value.code == ErrorClass.TOOL_INCOMPATIBLE
-            assert "leave X and Y 0" in refusal.value.remedy
+            assert "X 9.000 mm, Y 9.000 mm" in str(refusal.value)
+            assert "Nothing was sent" in refusal.value.remedy
             assert controller.tools.same(controller.tools.read(1), before)
         assert cell.slot_changes(1) == changes
         assert cell.open_requests == []

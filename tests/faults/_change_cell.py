@@ -17,6 +17,7 @@ from robolink_cli import main
 from robolink_simulators.cell.clock import ManualClock, ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.options import EpsonOptions
+from robolink_simulators.hosting.streams.epson_serial import serve_serial
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
@@ -190,12 +191,17 @@ class ChangeCell(ABC):
 
 
 class EpsonChangeCell(ChangeCell):
-    """An EPSON controller."""
+    """An EPSON controller.
+
+    Attributes:
+        epson: It.
+    """
 
     matters = re.compile(r'\$(Log|Execute,"(Tool \d|TLSet ))')
 
     def __init__(self, simulator: EpsonSimulator, url: str, folder: Path) -> None:
         super().__init__(simulator, url, folder)
+        self.epson = simulator
         self._machine = simulator.machine
 
     @property
@@ -226,16 +232,21 @@ class EpsonChangeCell(ChangeCell):
 
 @contextmanager
 def change_cell(
-    folder: Path, kind: type[EpsonSimulator] = EpsonSimulator, **habits: Any
+    folder: Path,
+    kind: type[EpsonSimulator] = EpsonSimulator,
+    *,
+    serial: bool = False,
+    **habits: Any,
 ) -> Iterator[EpsonChangeCell]:
-    """Serve a cell with a journal of its own."""
+    """Serve a cell with a journal of its own, over TCP or on a pseudo terminal."""
     folder.mkdir(parents=True)
     options = EpsonOptions(**{"remote_timeout_s": 0, "login_timeout_s": 0, **habits})
     simulator = kind(seed=1, options=options)
     for tool, offset in OLD.items():
         simulator.machine.tools.set(tool, offset)
     simulator.machine.tools.flash_writes = 0
-    with serve_tcp(simulator, clock=ScaledClock(200.0)) as host:
+    serve = serve_serial if serial else serve_tcp
+    with serve(simulator, clock=ScaledClock(200.0)) as host:
         cell = EpsonChangeCell(simulator, host.url, folder)
         cell.meet()
         try:

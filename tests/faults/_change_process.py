@@ -19,7 +19,7 @@ from robolink_simulators.cell.clock import ManualClock
 
 import robolink
 from robolink.journal import open_journal
-from robolink.model import Controller, ToolOffset
+from robolink.model import TIP, Controller, LookingController, ToolOffset
 from robolink.transaction import ToolChange, Wanted, change_tools, recover
 from tests.faults import _client_process
 
@@ -54,11 +54,17 @@ def _write_verified(controller: Controller) -> None:
             change.keep("verified")
 
 
+def _look(controller: Controller) -> None:
+    assert isinstance(controller, LookingController)
+    controller.look(TIP, program=7)
+
+
 PROGRAMS: Final[dict[str, Callable[[Controller], object]]] = {
     "one tool": lambda controller: change_tools(controller, _wanted(1)),
     "two tools": lambda controller: change_tools(controller, _wanted(1, 2)),
     "two tools, verified": _write_verified,
     "recover": recover,
+    "look": _look,
 }
 
 

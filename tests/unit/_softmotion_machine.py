@@ -22,7 +22,7 @@ def standing(kinematics="Kin_Scara3_Z", at=None, options=None):
     """Return a group in Standby."""
     model = machine_named(kinematics)
     group = AxisGroup(model.kinematics, model.limits, options or GroupOptions())
-    group.place(at or (30.0, 45.0, 15.0, -20.0, 10.0)[: len(group.axes)])
+    group.place(at or (30.0, 45.0, 15.0, -20.0, 10.0, 5.0)[: len(group.axes)])
     group.power(on=True)
     assert group.enable().outputs.done
     return group
@@ -95,5 +95,19 @@ def moved(group, x_mm=0.0, y_mm=0.0, z_mm=0.0, **more):
     assert execution.outputs.busy
     return execution
 
+
+MACHINES = (
+    "Kin_Scara2_Z",
+    "Kin_Scara2_Z+Kin_CAxis",
+    "Kin_Scara3_Z",
+    "Kin_Polar_Z",
+    "Kin_Gantry3+Kin_CAxis",
+    "Kin_5Axes",
+    "Kin_Pos_RRR",
+    "Kin_ArticulatedRobot_6DOF",
+    "Kin_4AxisPalletizer",
+    "Kin_Tripod_Rotary",
+)
+"""Kinematics that differ in what a movement or a person meets."""
 
 NOZZLE = CoordRef(10.0, -5.0, 40.0, 0.0, 0.0, 20.0)

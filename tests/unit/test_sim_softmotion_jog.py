@@ -24,9 +24,9 @@ from robolink_simulators.softmotion import (
     JogCommand,
     SmcGroupState,
 )
-from robolink_simulators.softmotion.kinematics.kinematics import ANY_CONFIGURATION, AxisKind
-from robolink_simulators.softmotion.kinematics.orientation import OrientationSpace
+from robolink_simulators.softmotion.kinematics.kinematics import ANY_CONFIGURATION
 
+from robolink.model import AxisKind, OrientationSpace
 from tests.unit._softmotion_machine import (
     CYCLE_NS,
     LINE,

@@ -16,13 +16,13 @@ from robolink_simulators.softmotion import (
     Target,
     machine_named,
 )
-from robolink_simulators.softmotion.catalogue import NAMES
 from robolink_simulators.softmotion.kinematics.kinematics import Configuration
 
 from tests.unit._softmotion_machine import (
     CYCLE_NS,
     FACTORS,
     LINE,
+    MACHINES,
     NOZZLE,
     in_axes,
     kind,
@@ -36,7 +36,7 @@ from tests.unit._softmotion_machine import (
 )
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", MACHINES)
 @settings(max_examples=8, deadline=None)
 @given(data=st.data())
 def test_a_direct_movement_arrives_and_keeps_every_limit_on_the_way(name, data):

@@ -16,11 +16,11 @@ from robolink_simulators.softmotion import (
     ToolInForce,
     machine_named,
 )
-from robolink_simulators.softmotion.catalogue import NAMES
-from robolink_simulators.softmotion.kinematics.positions import Gantry3
+from robolink_simulators.softmotion.kinematics.positions import Gantry
 
 from tests.unit._softmotion_machine import (
     FACTORS,
+    MACHINES,
     NOZZLE,
     in_axes,
     kind,
@@ -32,6 +32,7 @@ from tests.unit._softmotion_machine import (
 )
 
 TOOL_SYMBOL = "SMC_AXIS_GROUP_TOOL_OFFSET_INCOMPATIBLE_WITH_KINEMATICS"
+LIMITED = ("Kin_Scara2_Z", "Kin_Polar_Z", "Kin_Pos_RRR")
 CP = "line"
 DIRECT = "direct"
 
@@ -97,7 +98,7 @@ def test_a_polar_kinematics_takes_shifts_along_z_only():
     assert set_to(group, z=1).outputs.done
 
 
-@pytest.mark.parametrize("name", [n for n in NAMES if n not in ("Kin_Scara2_Z", "Kin_Polar_Z")])
+@pytest.mark.parametrize("name", [n for n in MACHINES if n not in LIMITED])
 def test_a_kinematics_whose_orientation_is_known_takes_any_tool(name):
     """Behaviour 7, and a C axis behind an arm lifts its restriction.
 
@@ -123,7 +124,7 @@ def test_exchanging_the_kinematics_takes_the_tool_off(other):
 
 
 @dataclass(frozen=True, slots=True)
-class WithoutImage(Gantry3):
+class WithoutImage(Gantry):
     """A custom kinematics that does not implement ISMKinematicsWithOrientationImage."""
 
     def orientation_image(self, wanted):
@@ -133,7 +134,7 @@ class WithoutImage(Gantry3):
 @pytest.mark.parametrize("shift", [{"x": 1}, {"z": 1}])
 def test_a_custom_kinematics_without_an_orientation_image_takes_no_tool(shift):
     """Behaviour 9."""
-    group = AxisGroup(WithoutImage())
+    group = AxisGroup(WithoutImage("without image"))
     group.power(on=True)
     group.enable()
     refused = set_to(group, **shift)

@@ -138,11 +138,11 @@ def _unfinished(marker: "Marker", url: str, now: str) -> str:
             )
         )
     if now == before:
-        remedy = tr("'robolink -c {url} recover' settles it.", url=url)
+        remedy = tr('This settles it: robolink -c "{url}" recover', url=url)
     else:
         remedy = tr(
-            "'robolink -c {url} recover' puts tool {tool} back, with the power mode and speed of "
-            "then.",
+            "This puts tool {tool} back, with the power mode and speed of then: "
+            'robolink -c "{url}" recover',
             url=url,
             tool=before,
         )

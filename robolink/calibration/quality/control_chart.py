@@ -41,6 +41,7 @@ class ControlChart:
             the three below.
         points_out: Which later values lie outside, from 0.
         ewma: The weighted mean after each later value, in sigma from the centre.
+        ewma_limits: How far it may be from the centre after each later value, in sigma.
         ewma_first: The value at which it first left its limits, ``None`` if it did not.
         warnings: ``chart_point_out``, ``chart_drift``.
         notes: ``short_baseline``: fewer than 20 values; ``no_scatter``: all of them equal.
@@ -51,6 +52,7 @@ class ControlChart:
     limits: tuple[float, float] | None
     points_out: tuple[int, ...] | None
     ewma: tuple[float, ...] | None
+    ewma_limits: tuple[float, ...] | None
     ewma_first: int | None
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
@@ -83,32 +85,39 @@ def control_chart(
     if sigma == 0:
         notes = (*notes, "no_scatter")
     if notes:
-        return ControlChart(centre, sigma, None, None, None, None, (), notes)
+        return ControlChart(centre, sigma, None, None, None, None, None, (), notes)
     low, high = centre - _SINGLE_WIDTH * sigma, centre + _SINGLE_WIDTH * sigma
     out = tuple(i for i, value in enumerate(values_mm) if not low <= value <= high)
-    ewma, first = _weighted([(value - centre) / sigma for value in values_mm], weight, ewma_width)
+    ewma = _weighted([(value - centre) / sigma for value in values_mm], weight)
+    widths = _widths(len(ewma), weight, ewma_width)
+    left = [
+        i for i, (mean, width) in enumerate(zip(ewma, widths, strict=True)) if abs(mean) > width
+    ]
+    first = left[0] if left else None
     warnings = ("chart_point_out",) if out else ()
     if first is not None:
         warnings = (*warnings, "chart_drift")
-    return ControlChart(centre, sigma, (low, high), out, ewma, first, warnings, ())
+    return ControlChart(centre, sigma, (low, high), out, ewma, widths, first, warnings, ())
 
 
-def _weighted(
-    scaled: Sequence[float], weight: float, width: float
-) -> tuple[tuple[float, ...], int | None]:
-    """Return the weighted mean after each value, and where it first leaves its limits.
+def _weighted(scaled: Sequence[float], weight: float) -> tuple[float, ...]:
+    """Return the weighted mean after each value."""
+    means, mean = list[float](), 0.0
+    for value in scaled:
+        mean = weight * value + (1 - weight) * mean
+        means.append(mean)
+    return tuple(means)
+
+
+def _widths(count: int, weight: float, width: float) -> tuple[float, ...]:
+    """Return the limits of that mean after each value.
 
     After i values its variance is weight / (2 - weight) (1 - (1 - weight)^(2 i)).
     """
-    means, first, mean = list[float](), None, 0.0
-    for index, value in enumerate(scaled):
-        mean = weight * value + (1 - weight) * mean
-        means.append(mean)
-        settled = 1 - (1 - weight) ** (2 * (index + 1))
-        limit = width * math.sqrt(weight / (2 - weight) * settled)
-        if first is None and abs(mean) > limit:
-            first = index
-    return tuple(means), first
+    settled = width * math.sqrt(weight / (2 - weight))
+    return tuple(
+        settled * math.sqrt(1 - (1 - weight) ** (2 * (index + 1))) for index in range(count)
+    )
 
 
 def _check(

@@ -1,5 +1,6 @@
 """An axis group of a CODESYS SoftMotion PLC behind its mailbox, and meeting one."""
 
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Final
 
@@ -16,6 +17,7 @@ from robolink.controllers.softmotion.link.ownership import take_command
 from robolink.controllers.softmotion.link.snapshots import Snapshots
 from robolink.controllers.softmotion.link.wire import MailboxWire
 from robolink.controllers.softmotion.motion.group import SoftMotionGroup
+from robolink.controllers.softmotion.tools.orientation_images import OrientationImages
 from robolink.controllers.softmotion.tools.resolve import SoftMotionResolver
 from robolink.controllers.softmotion.tools.table import SoftMotionToolTable
 from robolink.errors import ConfigError, ControllerFaultError
@@ -27,6 +29,7 @@ from robolink.model import (
     ControllerFacts,
     ControllerStatus,
     OutcomeLog,
+    is_custom,
 )
 from robolink.protocols.mailbox import (
     Capability,
@@ -50,6 +53,8 @@ _RESETS: Final = (
 )
 """What brings a group out of a state; after an error a stop may still be held."""
 
+_SIMULATED: Final = "sim"
+
 _LEAVING_S: Final = 1.0
 """Longest time from the end of a reset to the state that follows it."""
 
@@ -67,12 +72,13 @@ class SoftMotionController(ControllerCore):
 
     Args:
         mailbox: The mailbox.
+        images: What is known of the machine builder's own kinematics.
     """
 
     tools: SoftMotionToolTable
     groups: tuple[SoftMotionGroup]
 
-    def __init__(self, mailbox: Mailbox) -> None:
+    def __init__(self, mailbox: Mailbox, images: OrientationImages | None = None) -> None:
         self._mailbox = mailbox
         self.groups = (SoftMotionGroup(mailbox),)
         able = mailbox.snapshots.met.capabilities
@@ -80,7 +86,8 @@ class SoftMotionController(ControllerCore):
         offered = Capabilities(
             tool_write=Capability.TOOLS in able, motion=moves, motors=moves, io=True
         )
-        super().__init__(mailbox, capabilities=offered, tools=SoftMotionToolTable(mailbox))
+        tools = SoftMotionToolTable(mailbox, images)
+        super().__init__(mailbox, capabilities=offered, tools=tools)
 
     @cached_property
     def io(self) -> SoftMotionIo:
@@ -237,12 +244,38 @@ def open_softmotion_url(url: LinkUrl, terms: ConnectionTerms, /) -> Controller:
             ),
         )
     opener = open_quick_link if terms.glance else open_mailbox_link
+    url, kinematics = _own_kinematics(url)
     link = opener(url, timeout_s=terms.timeout_s, clock=terms.clock)
-    return open_softmotion(link, outcomes=terms.record_of(link), timeout_s=terms.timeout_s)
+    return open_softmotion(
+        link,
+        outcomes=terms.record_of(link),
+        timeout_s=terms.timeout_s,
+        kinematics=kinematics,
+    )
+
+
+def _own_kinematics(url: LinkUrl) -> tuple[LinkUrl, str]:
+    """Return a URL for its link, and the class of the machine builder's own kinematics."""
+    # A plus that was not escaped has become a space.
+    named = url.options.get("kinematics", "").replace(" ", "+")
+    if url.medium == _SIMULATED:
+        return url, named if is_custom(named) else ""
+    if named and not is_custom(named):
+        raise ConfigError(
+            tr("A PLC says by itself that its kinematics is {name}.", name=named),
+            remedy=tr("Leave kinematics out, or name the class of your own as module:Class."),
+        )
+    options = {name: value for name, value in url.options.items() if name != "kinematics"}
+    return replace(url, options=options), named
 
 
 def open_softmotion(
-    link: MailboxLink, *, outcomes: OutcomeLog, timeout_s: float = 3.0, owner: int = 0
+    link: MailboxLink,
+    *,
+    outcomes: OutcomeLog,
+    timeout_s: float = 3.0,
+    owner: int = 0,
+    kinematics: str | tuple[object, ...] = (),
 ) -> SoftMotionController:
     """Meet the mailbox and return the controller; the link is closed when that fails.
 
@@ -253,6 +286,8 @@ def open_softmotion(
         outcomes: Where doubtful outcomes of this PLC are kept.
         timeout_s: Longest wait for the PLC to acknowledge a command.
         owner: This client's token; by default one that nobody else has.
+        kinematics: The machine builder's own, as ``module:Class`` or as objects, so that a tool
+            that it cannot carry is refused before it is written (docs/custom-kinematics.md).
 
     Raises:
         ConnectError: The mailbox program does not run.
@@ -263,7 +298,8 @@ def open_softmotion(
         snapshots = Snapshots(wire)
         snapshots.meet()
         device_id = read_device_id(wire)
-        return SoftMotionController(Mailbox(wire, snapshots, outcomes, device_id=device_id))
+        mailbox = Mailbox(wire, snapshots, outcomes, device_id=device_id)
+        return SoftMotionController(mailbox, OrientationImages(kinematics))
     except BaseException:
         wire.close()
         raise

@@ -49,8 +49,8 @@ class MailboxFacts:
         """Return what a snapshot says."""
         return cls(
             version=f"{now.version >> 8}.{now.version & 0xFF}",
-            kinematics=_block_name(now.position_kinematics),
-            orientation_kinematics=_block_name(now.orientation_kinematics),
+            kinematics=block_name(now.position_kinematics),
+            orientation_kinematics=block_name(now.orientation_kinematics),
             axis_count=now.axis_count,
             unit_um=now.unit_um,
             capabilities=now.capabilities,
@@ -115,7 +115,8 @@ class _Change(MarkedCommand[Response]):
         return self._mailbox.snapshots.take()
 
 
-def _block_name(code: int) -> str:
+def block_name(code: int) -> str:
+    """Return the function block of a code; empty for none."""
     try:
         kinematics = Kinematics(code)
     except ValueError:

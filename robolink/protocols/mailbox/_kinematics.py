@@ -33,6 +33,7 @@ class Kinematics(IntEnum):
     T_GANTRY2 = 14
     TRIPOD_ROTARY = 15
     TRIPOD_LINEAR = 16
+    T_GANTRY3 = 17
     C_AXIS = 32
     C_AXIS_TOOL = 33
     WRIST2 = 34
@@ -62,6 +63,7 @@ _BLOCKS: Final[Mapping[Kinematics, str]] = MappingProxyType(
         Kinematics.H_GANTRY2: "Kin_HGantry2",
         Kinematics.H_GANTRY3: "Kin_HGantry3",
         Kinematics.T_GANTRY2: "Kin_TGantry2",
+        Kinematics.T_GANTRY3: "Kin_TGantry3",
         Kinematics.TRIPOD_ROTARY: "Kin_Tripod_Rotary",
         Kinematics.TRIPOD_LINEAR: "Kin_Tripod_Linear",
         Kinematics.C_AXIS: "Kin_CAxis",

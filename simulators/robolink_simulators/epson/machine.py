@@ -13,6 +13,7 @@ from robolink_simulators.epson.arm.robots import RobotModel
 from robolink_simulators.epson.memory.bits import IO_BITS, MEMORY_BITS, BitBank
 from robolink_simulators.epson.memory.control_points import ControlPoints
 from robolink_simulators.epson.memory.driven_robot import DrivenRobot
+from robolink_simulators.epson.memory.image_calibrations import ImageCalibrations
 from robolink_simulators.epson.memory.input_bits import InputBits
 from robolink_simulators.epson.memory.io_labels import IOLabel
 from robolink_simulators.epson.memory.pallets import PalletTable
@@ -65,6 +66,7 @@ class Machine:
         memory: Memory bits.
         timed_bits: Outputs and memory bits that switch back by themselves.
         io_labels: Names of inputs, outputs and memory bits, in lower case; part of the project.
+        image_calibrations: Those of VxCalib.
         control_device: What CtrlDev gives.
     """
 
@@ -105,6 +107,7 @@ class Machine:
         self.memory = BitBank(MEMORY_BITS)
         self.timed_bits = TimedBits()
         self.io_labels: dict[str, IOLabel] = {}
+        self.image_calibrations = ImageCalibrations()
         self.control_device = REMOTE_ETHERNET
 
     @property
@@ -199,6 +202,7 @@ class Machine:
         for robot in self.robots:
             robot.forget_volatile(now_ns)
         self.robot_number = 1
+        self.image_calibrations = ImageCalibrations()
         self.outputs.clear()
         self.memory.clear()
         self.timed_bits.clear()

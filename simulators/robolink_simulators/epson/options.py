@@ -56,6 +56,7 @@ class SpelNumbers:
     no_such_file: int = 7213  # docs/reference/spel.md 10, path not found
     task_gone: int = 2261  # docs/reference/spel.md 10
     return_without_gosub: int = 2383  # docs/reference/spel.md 10
+    next_without_for: int = 2126
     input_count: int = 2505  # docs/reference/spel.md 10
     excessive_loop: int = 2556  # docs/reference/spel.md 10
     no_such_function: int = 2122

@@ -37,6 +37,7 @@ class RefusalKind(StrEnum):
     NO_SUCH_FILE = "no_such_file"
     TASK_GONE = "task_gone"
     RETURN_WITHOUT_GOSUB = "return_without_gosub"
+    NEXT_WITHOUT_FOR = "next_without_for"
     INPUT_COUNT = "input_count"
     EXCESSIVE_LOOP = "excessive_loop"
     NO_SUCH_FUNCTION = "no_such_function"
@@ -82,8 +83,8 @@ class RaisedError(SpelRefusal):
         number: Which.
     """
 
-    def __init__(self, number: int) -> None:
-        super().__init__(RefusalKind.SYNTAX, f"Error {number}")
+    def __init__(self, number: int, text: str = "") -> None:
+        super().__init__(RefusalKind.SYNTAX, text or f"Error {number}")
         self.number = number
 
 

@@ -1,26 +1,36 @@
 """Machines by the name of their kinematics, with parameters as their blocks name them."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, fields, replace
-from typing import Final
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from difflib import get_close_matches
+from itertools import product
+from typing import Any, Final, cast
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink_simulators.softmotion.kinematics.coupled import CAxis, Coupled, scara3_z
-from robolink_simulators.softmotion.kinematics.five_axes import FiveAxes
-from robolink_simulators.softmotion.kinematics.kinematics import AxisKind, KinematicsModel
-from robolink_simulators.softmotion.kinematics.positions import Gantry3, PolarZ, Scara2Z
+from robolink.model import is_custom
+from robolink_simulators.softmotion.custom import load_row, require_true
+from robolink_simulators.softmotion.kinematics.coupled import Coupled, require_solvable
+from robolink_simulators.softmotion.kinematics.kinematics import KinematicsModel
 from robolink_simulators.softmotion.motion.axes import ASSUMED_LIMITS, AxisLimits
+from robolink_simulators.softmotion.rows import (
+    ORIENTATION_ROWS,
+    POSITION_ROWS,
+    STANDALONE_ROWS,
+    KinematicsRow,
+)
+from robolink_simulators.softmotion.smc_errors import BlockRefused
 
-_COUPLED: Final = "+Kin_CAxis"
-_C_AXIS: Final = 3
-"""Place of a C axis that is coupled to a position kinematics, in the row of axes."""
+_COUPLING: Final = "+"
+_MOST_AXES: Final = 6
 
-_C_LIMITS: Final = AxisLimits(-360.0, 360.0, 720.0, 3600.0)
-# The world puts each axis at 60 % of its range: a tool that can lean stands upright there.
-_LEAN_LIMITS: Final = AxisLimits(-90.0, 60.0, 360.0, 1800.0)
-_RADIUS_LIMITS: Final = replace(ASSUMED_LIMITS[AxisKind.LINEAR], low=0.0, high=600.0)
+NAMES: Final = (
+    *STANDALONE_ROWS,
+    *POSITION_ROWS,
+    *(_COUPLING.join(parts) for parts in product(POSITION_ROWS, ORIENTATION_ROWS)),
+)
+"""Every kinematics that can be simulated, couplings behind what can stand alone."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,51 +46,12 @@ class MachineModel:
     limits: tuple[AxisLimits, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class _Entry:
-    """How a kinematics is made.
-
-    Attributes:
-        make: Makes it.
-        parameters: Their names, and the values that they have by default.
-        arms: How many of them, from the first, are lengths of arms, which are above zero.
-        limits: Of axes that are not like others of their kind.
-    """
-
-    make: Callable[..., KinematicsModel]
-    parameters: Mapping[str, float]
-    arms: int = 0
-    limits: Mapping[int, AxisLimits] = field(default_factory=dict)
-
-
-_ARMS: Final = {"dArmLength1": 300.0, "dArmLength2": 200.0}
-
-_ENTRIES: Final = {
-    "Kin_Scara2_Z": _Entry(Scara2Z, _ARMS, arms=2),
-    "Kin_Scara3_Z": _Entry(scara3_z, {**_ARMS, "dArmLength3": 0.0}, arms=2, limits={2: _C_LIMITS}),
-    "Kin_Polar_Z": _Entry(PolarZ, {}, limits={1: _RADIUS_LIMITS}),
-    "Kin_Gantry3": _Entry(Gantry3, {}),
-    "Kin_5Axes": _Entry(FiveAxes, {"dToolLength": 100.0}, limits={3: _C_LIMITS, 4: _LEAN_LIMITS}),
-}
-
-NAMES: Final = (
-    "Kin_Scara2_Z",
-    "Kin_Scara2_Z+Kin_CAxis",
-    "Kin_Scara3_Z",
-    "Kin_Polar_Z",
-    "Kin_Polar_Z+Kin_CAxis",
-    "Kin_Gantry3",
-    "Kin_Gantry3+Kin_CAxis",
-    "Kin_5Axes",
-)
-"""Every kinematics that can be simulated. Kin_Scara3_Z and Kin_5Axes are couplings already."""
-
-
 def machine_named(name: str, parameters: Mapping[str, float] | None = None) -> MachineModel:
     """Return a machine.
 
     Args:
-        name: One of :data:`NAMES`.
+        name: One of :data:`NAMES`, or ``module:Class`` in place of a part of it, for a
+            kinematics of one's own (docs/custom-kinematics.md).
         parameters: ``dArmLength1``, ``dToolLength`` and the like in mm, ``dOffsetC`` in
             degrees, and ``a0_low``, ``a0_high``, ``a0_velocity_per_s``,
             ``a0_acceleration_per_s2`` of each axis in degrees or mm.
@@ -88,16 +59,12 @@ def machine_named(name: str, parameters: Mapping[str, float] | None = None) -> M
     Raises:
         ConfigError: No such kinematics or parameter, or a value that makes no machine.
     """
-    if name not in NAMES:
-        raise ConfigError(
-            tr("The simulator has no kinematics {name!r}.", name=name),
-            remedy=tr("Known are: {names}.", names=", ".join(NAMES)),
-        )
     left = dict(parameters or {})
     _require_finite(left)
-    kinematics = _made(name, left)
+    parts = _parts(name)
+    kinematics = _made(name, parts, left)
     limits = tuple(
-        _limits(axis, assumed, left) for axis, assumed in enumerate(_assumed(name, kinematics))
+        _limits(axis, assumed, left) for axis, assumed in enumerate(_assumed(parts, kinematics))
     )
     if left:
         raise ConfigError(
@@ -108,16 +75,81 @@ def machine_named(name: str, parameters: Mapping[str, float] | None = None) -> M
             ),
             remedy=tr("Known are: {names}.", names=", ".join(parameter_names(name))),
         )
-    return MachineModel(kinematics, limits)
+    _require_standing(name, kinematics, limits)
+    model = MachineModel(kinematics, limits)
+    if any(map(is_custom, name.split(_COUPLING))):
+        require_true(name, kinematics, [(it.low, it.high) for it in limits])
+    return model
 
 
 def parameter_names(name: str) -> tuple[str, ...]:
-    """Return the parameters that a kinematics of :data:`NAMES` takes."""
-    own = [*_ENTRIES[name.removesuffix(_COUPLED)].parameters]
-    if name.endswith(_COUPLED):
-        own.append("dOffsetC")
-    axes = range(len(_made(name, {}).kinds))
+    """Return the parameters that a kinematics takes.
+
+    Raises:
+        ConfigError: There is no such kinematics.
+    """
+    parts = _parts(name)
+    own = [key for part in parts for key in part.parameters]
+    axes = range(len(_made(name, parts, {}).kinds))
     return (*own, *(f"a{axis}_{limit.name}" for axis in axes for limit in fields(AxisLimits)))
+
+
+def complete_kinematics(start: str) -> list[str]:
+    """Return the names that begin so, in any case; couplings when a + is there or nothing else."""
+    begun = start.casefold()
+    found = [name for name in NAMES if name.casefold().startswith(begun)]
+    whole = [name for name in found if _COUPLING not in name]
+    return found if _COUPLING in start or not whole else whole
+
+
+def _parts(name: str) -> list[KinematicsRow]:
+    """Return the rows of a kinematics; what is coupled comes second."""
+    first, *others = name.split(_COUPLING)
+    if len(others) > 1:
+        raise _no_machine(name)
+    if first in ORIENTATION_ROWS and not others:
+        raise ConfigError(
+            tr("{name} turns the flange of another kinematics and moves none itself.", name=first),
+            remedy=tr("Couple it, for example Kin_Gantry3+{name}.", name=first),
+        )
+    if first in STANDALONE_ROWS and others:
+        raise ConfigError(
+            tr("{name} is whole: nothing can be coupled to it.", name=first),
+            remedy=tr("Couple to one of {names}.", names=", ".join(POSITION_ROWS)),
+        )
+    rows = [_row(first, name, {**POSITION_ROWS, **STANDALONE_ROWS}, carries=bool(others))]
+    return rows + [_row(other, name, ORIENTATION_ROWS, orients=True) for other in others]
+
+
+def _row(
+    part: str,
+    name: str,
+    known: Mapping[str, KinematicsRow],
+    *,
+    carries: bool = False,
+    orients: bool = False,
+) -> KinematicsRow:
+    if is_custom(part):
+        return load_row(part, carries=carries, orients=orients)
+    if part not in known:
+        raise _no_machine(name)
+    return known[part]
+
+
+def _no_machine(name: str) -> ConfigError:
+    by_name = {known.casefold(): known for known in NAMES}
+    close = get_close_matches(name.casefold(), by_name, n=1)
+    if close:
+        remedy = tr("Is {name} meant?", name=by_name[close[0]])
+    else:
+        remedy = tr(
+            "Known are: {names}; the first {count} of them also with + and one of {others}; or "
+            "module:Class for a kinematics of your own.",
+            names=", ".join((*POSITION_ROWS, *STANDALONE_ROWS)),
+            count=len(POSITION_ROWS),
+            others=", ".join(ORIENTATION_ROWS),
+        )
+    return ConfigError(tr("The simulator has no kinematics {name!r}.", name=name), remedy=remedy)
 
 
 def _require_finite(parameters: Mapping[str, float]) -> None:
@@ -129,27 +161,38 @@ def _require_finite(parameters: Mapping[str, float]) -> None:
             )
 
 
-def _made(name: str, left: dict[str, float]) -> KinematicsModel:
-    entry = _ENTRIES[name.removesuffix(_COUPLED)]
-    lengths_mm = [left.pop(key, default) for key, default in entry.parameters.items()]
-    arms_mm = lengths_mm[: entry.arms]
-    if any(length_mm <= 0 for length_mm in arms_mm):
+def _made(name: str, parts: Sequence[KinematicsRow], left: dict[str, float]) -> KinematicsModel:
+    position, *orientations = (_made_part(part, left) for part in parts)
+    if not orientations:
+        return cast(KinematicsModel, position)
+    coupled = Coupled(position, orientations[0])
+    if len(coupled.kinds) > _MOST_AXES:
         raise ConfigError(
-            tr("An arm cannot be {length_mm} mm long.", length_mm=min(arms_mm)),
-            remedy=tr("Give the lengths of the arms in mm, above zero."),
+            tr("{name} would have {count} axes.", name=name, count=len(coupled.kinds)),
+            remedy=tr("An axis group has at most {most}.", most=_MOST_AXES),
         )
-    position = entry.make(*lengths_mm)
-    if not name.endswith(_COUPLED):
-        return position
-    c_axis = CAxis(offset_deg=left.pop("dOffsetC", 0.0))
-    return Coupled(position, c_axis, c_index=_C_AXIS)
+    require_solvable(coupled)
+    return coupled
 
 
-def _assumed(name: str, kinematics: KinematicsModel) -> Iterator[AxisLimits]:
-    entry = _ENTRIES[name.removesuffix(_COUPLED)]
-    special = {**entry.limits, **({_C_AXIS: _C_LIMITS} if name.endswith(_COUPLED) else {})}
-    for axis, kind in enumerate(kinematics.kinds):
-        yield special.get(axis, ASSUMED_LIMITS[kind])
+def _made_part(row: KinematicsRow, left: dict[str, float]) -> Any:  # noqa: ANN401 - either kind
+    values = {key: left.pop(key, default) for key, default in row.parameters.items()}
+    short = [key for key in row.positive if values[key] <= 0]
+    if short:
+        raise ConfigError(
+            tr("{name} cannot be {length_mm} mm.", name=short[0], length_mm=values[short[0]]),
+            remedy=tr("Give lengths of arms and rods in mm, above zero."),
+        )
+    return row.make(*values.values())
+
+
+def _assumed(parts: Sequence[KinematicsRow], kinematics: KinematicsModel) -> list[AxisLimits]:
+    """Return the limits of the drives, those of a coupled part behind the others."""
+    special = dict(parts[0].limits)
+    if len(parts) > 1:
+        behind = len(cast(Coupled, kinematics).position.kinds)
+        special |= {behind + axis: limits for axis, limits in parts[1].limits.items()}
+    return [special.get(n, ASSUMED_LIMITS[kind]) for n, kind in enumerate(kinematics.kinds)]
 
 
 def _limits(axis: int, assumed: AxisLimits, left: dict[str, float]) -> AxisLimits:
@@ -166,3 +209,19 @@ def _limits(axis: int, assumed: AxisLimits, left: dict[str, float]) -> AxisLimit
             remedy=tr("Give low below high, and velocity and acceleration above zero."),
         )
     return limits
+
+
+def _require_standing(name: str, kinematics: KinematicsModel, limits: Sequence[AxisLimits]) -> None:
+    """Refuse limits that let the axes come where the machine falls apart, as rods do."""
+    try:
+        for corner in product(*((it.low, it.high) for it in limits)):
+            kinematics.flange(corner)
+    except BlockRefused as refused:
+        raise ConfigError(
+            tr(
+                "{name} cannot stand at the limits of its axes: {cause}.",
+                name=name,
+                cause=refused.text,
+            ),
+            remedy=tr("Narrow the limits of the axes, or correct the lengths."),
+        ) from refused

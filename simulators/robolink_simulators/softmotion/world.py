@@ -7,9 +7,8 @@ from typing import Final
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.model import Pose, ToolOffset
+from robolink.model import AxisKind, OrientationSpace, Pose, ToolOffset
 from robolink_simulators.cell.frames import (
-    NO_TURN,
     ORIGIN,
     Z_AXIS,
     Frame,
@@ -34,15 +33,12 @@ from robolink_simulators.cell.workplace import (
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
 from robolink_simulators.softmotion.group.condition import SmcGroupState
-from robolink_simulators.softmotion.kinematics.kinematics import AxisKind, AxisValues
+from robolink_simulators.softmotion.kinematics.kinematics import AxisValues
 from robolink_simulators.softmotion.signals import SIGNALS
 from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 STORED: Final = ToolOffset(12.0, -3.5, -20.0)
 """The nozzle that was there before, on a kinematics that carries any tool."""
-
-STORED_ON_AXIS: Final = ToolOffset(0.0, 0.0, -20.0)
-"""The same, where only a shift along Z fits."""
 
 _STANCE: Final = 0.6
 _ARRIVED_MM = 1e-9
@@ -99,13 +95,12 @@ class SoftMotionWorld(Workplace):
         What is stored, and which tool is set, is up to the PLC program.
         """
         rng = random.Random(f"softmotion world {seed}")
-        image = group.kinematics.orientation_image(NO_TURN)
-        any_tool = image is not None and image.accepts((1.0, 0.0, 0.0))
-        stored = STORED if any_tool else STORED_ON_AXIS
-        tip = exchanged(stored, rng)
-        if not any_tool:
-            tip = ToolOffset(0.0, 0.0, tip.z_mm)
         group.place(tuple(_stance(axis.limits.low, axis.limits.high) for axis in group.axes))
+        image = group.kinematics.orientation_image(group.flange().rotation)
+        stored = STORED if image is None else _fitting(STORED, image)
+        tip = exchanged(stored, rng)
+        if image is not None:
+            tip = _fitting(tip, image)
         pin_mm = pin_beside(_tip_at(group, group.values, tip), rng)
         return cls(
             group, {MOUNTED_TOOL: tip}, pin_mm, seed=seed, stored=stored, parameters=parameters
@@ -199,6 +194,12 @@ class _HandledGroup:
 
 def _stance(low: float, high: float) -> float:
     return low + _STANCE * (high - low)
+
+
+def _fitting(tip: ToolOffset, image: OrientationSpace) -> ToolOffset:
+    """Return as much of a tip as the kinematics can be told."""
+    shift = (tip.x_mm, tip.y_mm, tip.z_mm)
+    return ToolOffset(*subtract(shift, image.impossible(shift)))
 
 
 def _tip_at(group: AxisGroup, axes: AxisValues, tip: ToolOffset | None) -> XyzMm:

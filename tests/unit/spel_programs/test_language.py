@@ -252,4 +252,4 @@ def test_undeclared_names_become_variables_where_an_option_says_so(printed):
 
 
 def test_an_unknown_statement_is_refused_and_never_passed_over(failure):
-    assert failure("Print 1", "VLoad", "Print 2").number == 2199
+    assert failure("Print 1", "VTeach", "Print 2").number == 2199

@@ -202,7 +202,7 @@ def test_one_joint_is_turned_and_freed(printed):
         ('LSet$("a", 3) + RSet$("b", 2) + Trim$("  c ")', "a   bc"),
         ("True And 5 > 3, 2 And 5 > 3", "-1 2"),
         ("-2 ** 2, 2 ** 3 ** 2", "-4 64"),
-        ("InBCD(0), MyTask, Ctr", None),
+        ("InBCD(0), MyTask, JT", None),
     ],
 )
 def test_functions_of_bits_and_texts(printed, failure, faults, expression, shown):

@@ -73,6 +73,12 @@ def check(files: tuple[Path, ...], points: tuple[Path, ...]) -> None:
     show_default=True,
     help="The function to start; it takes no arguments.",
 )
+@click.option(
+    "--vision",
+    type=_FILE,
+    metavar="FILE",
+    help="Vision project for VRun, as docs/spel-programs.md shows one.",
+)
 @click.option("--trace", is_flag=True, help="Show each statement before it is carried out.")
 @click.option("--robot", default="T6-602S", show_default=True, help="Model of the robot.")
 @click.option(
@@ -97,6 +103,7 @@ def run(
     files: tuple[Path, ...],
     points: tuple[Path, ...],
     function: str,
+    vision: Path | None,
     trace: bool,
     robot: str,
     options: tuple[str, ...],
@@ -113,7 +120,8 @@ def run(
 
     simulator = EpsonSimulator(robot, options=habits(options, None))
     printed = list[str]()
-    ended = _run(simulator, (files, points), function, most_s, trace=trace, printed=printed)
+    _load(simulator, (files, points), vision)
+    ended = _run(simulator, function, most_s, trace=trace, printed=printed)
     program = simulator.program
     if program is not None and program.failure is not None:
         raise _failed(program.failure)
@@ -125,9 +133,20 @@ def run(
         note(tr("It still ran after {seconds:g} s of simulated time.", seconds=most_s))
 
 
-def _run(
+def _load(
     simulator: "EpsonSimulator",
     project: tuple[Sequence[Path], Sequence[Path]],
+    vision: Path | None,
+) -> None:
+    simulator.load(*project)
+    if vision is not None:
+        from robolink_simulators.epson.vision.vision_file import install_vision
+
+        install_vision(simulator, vision)
+
+
+def _run(
+    simulator: "EpsonSimulator",
     function: str,
     most_s: float,
     *,
@@ -138,7 +157,8 @@ def _run(
     from robolink_simulators.epson.refusals import SpelRefusal
     from robolink_simulators.epson.spel.tasks.driving import run_to_end
 
-    runner = simulator.load(*project)
+    runner = simulator.program
+    assert runner is not None  # noqa: S101 - loaded before
 
     def show(text: str) -> None:
         printed.append(text)

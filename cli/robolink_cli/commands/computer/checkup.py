@@ -9,6 +9,7 @@ from robolink.errors import ConfigError
 from robolink.files.durable import state_folder
 from robolink.messages import tr
 from robolink_cli.commands.computer.doctor_finding import Level, Remark
+from robolink_cli.commands.computer.lines import devices_of_cells
 from robolink_cli.commands.computer.requirements import check_name, check_versions
 from robolink_cli.commands.computer.serial_ports import serial_ports
 
@@ -111,6 +112,14 @@ def check_serial_ports() -> Iterator[Remark]:
             )
     if not ports:
         yield Remark("serial", Level.OK, tr("there is no serial port."))
+    for device, names in devices_of_cells().items():
+        if not Path(device).exists() and device not in [port.device for port in ports]:
+            yield Remark(
+                "serial",
+                Level.WARN,
+                tr("{device} of {cells} is not there.", device=device, cells=", ".join(names)),
+                tr("Plug the adapter in; 'robolink ports' lists those that are there."),
+            )
 
 
 def check_journal() -> Iterator[Remark]:
@@ -138,7 +147,8 @@ def check_journal() -> Iterator[Remark]:
                 when=marker.begun_at,
                 request=marker.request,
             ),
-            journal.log(identity).at_work() or tr("Run: robolink -c {where} recover", where=where),
+            journal.log(identity).at_work()
+            or tr('Run: robolink -c "{where}" recover', where=where),
         )
     if not unsettled:
         yield Remark("unsettled", Level.OK, tr("nothing was left unfinished."))

@@ -15,23 +15,27 @@ if TYPE_CHECKING:
 @click.command()
 @json_option
 def ports() -> None:
-    """List the serial ports, and whether you may use them. Opens none."""
+    """List the serial ports, the cells on them, and whether you may use them. Opens none."""
     from dataclasses import asdict
 
+    from robolink_cli.commands.computer.lines import devices_of_cells
     from robolink_cli.commands.computer.serial_ports import serial_ports
 
-    found = serial_ports()
+    found, cells = serial_ports(), devices_of_cells()
     if json_is_on():
-        emit_json("robolink/ports/1", {"ports": [asdict(port) for port in found]})
+        entries = [{**asdict(port), "cells": cells.get(port.device, [])} for port in found]
+        emit_json("robolink/ports/1", {"ports": entries})
     else:
-        _show(found)
+        _show(found, cells)
 
 
-def _show(found: "list[SerialPort]") -> None:
+def _show(found: "list[SerialPort]", cells: dict[str, list[str]]) -> None:
     if not found:
         say(tr("No serial port was found."))
         return
     for port in found:
         say("  ".join(filter(None, (port.device, port.description, port.hardware))))
+        if names := cells.get(port.device):
+            say(tr("    cells: {names}", names=", ".join(names)))
         if not port.usable:
             say(tr("    you may not use it; 'robolink doctor' says what to do"))

@@ -1,4 +1,6 @@
-"""scan RANGE: where a controller might be: addresses that answer, and serial ports."""
+"""scan RANGE: where a controller might be: addresses that answer, and serial lines."""
+
+from typing import TYPE_CHECKING
 
 import click
 
@@ -6,9 +8,14 @@ from robolink.messages import tr
 from robolink_cli.console.render import emit_json, json_is_on, say
 from robolink_cli.session.context import json_option
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from robolink_cli.commands.computer.scanning import AddressProbe
+
 
 @click.command()
-@click.argument("addresses", metavar="RANGE")
+@click.argument("addresses", metavar="[RANGE]", required=False)
 @click.option("--port", type=click.IntRange(1, 65535), default=5000, show_default=True)
 @click.option(
     "--timeout",
@@ -19,20 +26,36 @@ from robolink_cli.session.context import json_option
     metavar="S",
     help="Longest wait for one address, in seconds.",
 )
+@click.option(
+    "--line",
+    "lines",
+    multiple=True,
+    metavar="URL",
+    help="Ask who is at this serial line, for example epson+serial:///dev/ttyUSB0?baud=38400. "
+    "May be repeated.",
+)
 @json_option
-def scan(addresses: str, port: int, timeout_s: float) -> None:
+def scan(addresses: str | None, port: int, timeout_s: float, lines: tuple[str, ...]) -> None:
     """Try which addresses of RANGE accept a TCP connection, at most 256 of them.
 
     RANGE is 192.168.0.7, 192.168.0.1-20 or 192.168.0.0/28. Each connection is closed at once
     and nothing is sent. A controller serves one client at a time and its maker does not say
     what a second connection does to the first: scan while nobody is connected. The serial
-    ports of this computer are listed beside; none is opened.
+    ports of this computer are listed beside; none is opened but those of --line.
+
+    A line is listened to first. If it is silent, 04 and 02 53 03 50 are sent: turn Remote RS232 on,
+    and tell the status. That changes and moves nothing on an EPSON controller; do not name a line
+    with a device on it that these five bytes could harm.
     """
+    from robolink_cli.commands.computer.lines import as_json, ask_lines, show_lines
     from robolink_cli.commands.computer.scanning import State, parse_range, probe_all
     from robolink_cli.commands.computer.serial_ports import serial_ports
 
-    wanted = parse_range(addresses)
-    probes = probe_all(wanted, port, timeout_s)
+    if addresses is None and not lines:
+        raise click.UsageError(tr("Give a range of addresses, or a serial line with --line."))
+    wanted = [] if addresses is None else parse_range(addresses)
+    asked = ask_lines(lines, timeout_s)
+    probes = probe_all(wanted, port, timeout_s) if wanted else []
     answering = [f"epson+tcp://{p.address}:{port}" for p in probes if p.state is State.OPEN]
     serial = [found.device for found in serial_ports()]
     if json_is_on():
@@ -45,9 +68,21 @@ def scan(addresses: str, port: int, timeout_s: float) -> None:
             "urls": answering,
             "probes": entries,
             "serial_ports": serial,
+            "lines": [as_json(line) for line in asked],
         }
         emit_json("robolink/scan/1", document)
         return
+    show_lines(asked)
+    if wanted:
+        _show(probes, port, timeout_s, answering)
+    say(tr("serial ports of this computer: {ports}", ports=", ".join(serial) or tr("none")))
+
+
+def _show(
+    probes: "Sequence[AddressProbe]", port: int, timeout_s: float, answering: list[str]
+) -> None:
+    from robolink_cli.commands.computer.scanning import State
+
     for url in answering:
         say(url)
     counted = {state: sum(p.state is state for p in probes) for state in State}
@@ -66,4 +101,3 @@ def scan(addresses: str, port: int, timeout_s: float) -> None:
     )
     if answering:
         say(tr("An open port is no proof of a controller: 'robolink -c URL status' asks it."))
-    say(tr("serial ports of this computer: {ports}", ports=", ".join(serial) or tr("none")))

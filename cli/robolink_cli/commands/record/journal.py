@@ -1,4 +1,4 @@
-"""journal list, show, diff, export, verify: what is on record. Reads only, no controller."""
+"""journal list, show, diff, drift, export, verify: what is on record. Reads only, no controller."""
 
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -11,6 +11,7 @@ import click
 from robolink.messages import tr
 from robolink.model import EntryKind
 from robolink_cli.access.cell import complete_cell
+from robolink_cli.commands.record.journal_drift import drift
 from robolink_cli.commands.record.journal_lookup import (
     controller_meant,
     entries_named,
@@ -97,6 +98,9 @@ class _Wanted:
 @click.group()
 def journal() -> None:
     """Look at what is on record about tools: values, proofs, people. Never changes it."""
+
+
+journal.add_command(drift)
 
 
 @journal.command("list")

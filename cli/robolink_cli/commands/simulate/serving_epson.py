@@ -11,6 +11,7 @@ from robolink_simulators.assist.port import serve_assist
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson import EpsonOptions, EpsonSimulator
 from robolink_simulators.epson.options import options_from_text, read_profile
+from robolink_simulators.epson.vision.vision_file import install_vision
 from robolink_simulators.hosting.streams.epson_serial import serve_serial
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 from robolink_simulators.serial_numbers import drawn_serial
@@ -53,19 +54,32 @@ def serve_epson(
 
 
 def load_programs(
-    simulator: EpsonSimulator, programs: Sequence[Path], points: Sequence[Path]
+    simulator: EpsonSimulator,
+    programs: Sequence[Path],
+    points: Sequence[Path],
+    vision: Path | None = None,
 ) -> None:
     """Load a project, if any; what its tasks print is shown beside the announcement.
 
+    Args:
+        simulator: Into which.
+        programs: Its programs.
+        points: Its point files.
+        vision: Its vision project.
+
     Raises:
         ConfigError: It cannot be built, or a file cannot be read.
-        click.UsageError: There are points and no programs.
+        click.UsageError: There are points or a vision project, and no programs.
     """
     if not programs:
         if points:
             raise click.UsageError(tr("--points goes with --program."))
+        if vision is not None:
+            raise click.UsageError(tr("--vision goes with --program."))
         return
     runner = simulator.load(programs, points)
+    if vision is not None:
+        install_vision(simulator, vision)
     runner.on_print = lambda text: note(text.rstrip("\r\n"))
 
 
@@ -113,7 +127,7 @@ def _announce(url: str, assist_url: str, robot: str, seed: int) -> None:
         tr("SIMULATED EPSON {robot} (seed {seed}). No robot moves.", robot=robot, seed=seed),
         tr("  controller  {url}", url=url),
         tr("  assist      {url}", url=assist_url),
-        tr("Try: robolink -c {url} status", url=url),
+        tr('Try: robolink -c "{url}" status', url=url),
         tr("Ctrl-C ends it."),
     )
     announce(document, lines)

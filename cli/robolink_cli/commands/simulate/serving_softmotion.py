@@ -131,7 +131,7 @@ def _announce(simulator: SoftMotionSimulator, urls: Mapping[str, str], assist_ur
         ),
         *(tr("  {bus}  {url}", bus=bus.ljust(10), url=url) for bus, url in urls.items()),
         tr("  assist      {url}", url=assist_url),
-        tr("Try: robolink -c '{url}' status", url=simulator.url),
+        tr('Try: robolink -c "{url}" status', url=simulator.url),
         tr("Ctrl-C ends it."),
     )
     announce(document, lines)

@@ -87,6 +87,12 @@ sim.add_command(softmotion)
     metavar="FILE",
     help="Point file (.pts) of the programs. May be repeated.",
 )
+@click.option(
+    "--vision",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Vision project of the programs, for VRun; docs/spel-programs.md shows one.",
+)
 @simulation_options
 @json_option
 def epson(
@@ -106,6 +112,7 @@ def epson(
     replay: Path | None,
     programs: tuple[Path, ...],
     points: tuple[Path, ...],
+    vision: Path | None,
     allow_remote: bool,
 ) -> None:
     """Serve a simulated EPSON controller with Remote Ethernet, or RS232, until Ctrl-C.
@@ -144,7 +151,7 @@ def epson(
         state_path=state,
         world=world_from(world),
     )
-    load_programs(simulator, programs, points)
+    load_programs(simulator, programs, points, vision)
     plan_faults(simulator, faults, {LinkKind.EPSON_SERIAL if serial else LinkKind.EPSON_TCP})
     place = None if serial else listen
     serve_epson(simulator, place, speed=speed, allow_remote=allow_remote, baud=baud)

@@ -1,11 +1,19 @@
 """sim softmotion: serve a simulated PLC with a mailbox."""
 
+import sys
 from pathlib import Path
 
 import click
 
 from robolink_cli.options.simulation import modbus_options, simulation_options
 from robolink_cli.session.context import json_option
+
+
+def _complete_kinematics(_: click.Context, __: click.Parameter, start: str) -> list[str]:
+    """Return the kinematics whose names begin so, for TAB."""
+    from robolink_simulators.softmotion.catalogue import complete_kinematics
+
+    return complete_kinematics(start)
 
 
 @click.command()
@@ -26,7 +34,9 @@ from robolink_cli.session.context import json_option
     default="Kin_Scara3_Z",
     show_default=True,
     metavar="NAME[+ORIENTATION]",
-    help="Kinematics of the axis group; a wrong name lists them all.",
+    shell_complete=_complete_kinematics,
+    help="Kinematics of the axis group; TAB completes the names. Or module:Class for one of your "
+    "own, which may stand in the present folder.",
 )
 @click.option(
     "--param",
@@ -67,6 +77,8 @@ def softmotion(
     from robolink_cli.commands.simulate.serving import named_values, world_from
     from robolink_cli.commands.simulate.serving_softmotion import Buses, serve_plc
 
+    if ":" in kinematics:
+        sys.path.append(str(Path.cwd()))
     simulator = SoftMotionSimulator(
         kinematics,
         seed=seed,

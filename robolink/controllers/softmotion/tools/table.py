@@ -15,7 +15,9 @@ from robolink.controllers.softmotion.link.condition import (
     require_still,
 )
 from robolink.controllers.softmotion.link.mailbox import Mailbox
+from robolink.controllers.softmotion.tools.compatibility import require_fit
 from robolink.controllers.softmotion.tools.group_tool import GroupTool
+from robolink.controllers.softmotion.tools.orientation_images import OrientationImages
 from robolink.controllers.softmotion.tools.slot_write import SlotWrite
 from robolink.controllers.tool_table import ToolTableCore, require_replacement
 from robolink.messages import tr
@@ -30,9 +32,10 @@ class SoftMotionToolTable(ToolTableCore):
     the axis group too.
     """
 
-    def __init__(self, mailbox: Mailbox) -> None:
+    def __init__(self, mailbox: Mailbox, images: OrientationImages | None = None) -> None:
         super().__init__(mailbox)
         self._mailbox = mailbox
+        self._images = images or OrientationImages()
         self._group_tool = GroupTool(mailbox)
 
     def indices(self) -> Sequence[int]:
@@ -72,6 +75,7 @@ class SoftMotionToolTable(ToolTableCore):
             if not self.same(stored, requested):
                 if in_force:
                     self._require_changeable(tool, requested, now, request)
+                self._require_carried(requested, now, request)
                 mailbox.prepare(draft, request, now=now)
             return SlotWrite(
                 mailbox,
@@ -113,6 +117,18 @@ class SoftMotionToolTable(ToolTableCore):
         now = mailbox.prepare(_select_draft(tool), request)
         require_still(now, controller=mailbox.identity, request=request)
         require_enabled(now, controller=mailbox.identity, request=request)
+        self._require_carried(self._stored(tool) if tool else None, now, request)
+
+    def _require_possible(self, tool: int, offset: ToolOffset) -> None:
+        now = self._mailbox.snapshots.take()
+        self._require_carried(offset, now, self._request(tool, offset))
+
+    def _require_carried(self, offset: ToolOffset | None, now: Response, request: str) -> None:
+        """Refuse a tool that the kinematics cannot carry, unless an old one is put back."""
+        mailbox = self._mailbox
+        if offset is not None and not mailbox.latch.restores:
+            identity = mailbox.identity
+            require_fit(self._images, now, offset, controller=identity, request=request)
 
     def _prove_selected(self, offset: ToolOffset, request: str) -> None:
         self._group_tool.require(offset, request)

@@ -11,9 +11,7 @@ goes is assumed). One that does not avoid it stops with the error for joint spee
 anything moves (assumed).
 """
 
-import cmath
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -28,7 +26,7 @@ from robolink_simulators.cell.frames import (
     product,
     transposed,
 )
-from robolink_simulators.epson.arm.arc import circle_through, plan_arc
+from robolink_simulators.epson.arm.arc import MeasuredWay, Way, plan_level_way
 from robolink_simulators.epson.arm.joints import Joints, check_ranges
 from robolink_simulators.epson.arm.kinematics import (
     forward,
@@ -50,9 +48,6 @@ _USUAL = SingularSurroundings()
 _CHECK_EVERY_MM = 2.0
 _CHECK_EVERY_DEG = 2.0
 _MOST_CHECKS = 2000
-
-Way = Callable[[float], Vector]
-"""Where the tip is after a share of its way."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,38 +218,30 @@ def plan_about_point(
     return _leg(course, length_mm, pace, near=near, avoiding=avoiding)
 
 
-def plan_circle(
+def plan_way(
     model: RobotModel,
-    points: tuple[Pose, Pose, Pose],
+    ends: tuple[Pose, Pose],
+    way: MeasuredWay,
     pace: LinePace,
     *,
     offset: ToolOffset | None,
     near: Joints,
     avoiding: SingularSurroundings | None = _USUAL,
 ) -> Leg:
-    """Plan an arc of the tip in X and Y from the first pose through the second to the third.
+    """Plan a way of the tip between where it is and where it comes to.
 
-    Z and the orientation run evenly, the mid point's do not count (documented,
-    docs/reference/spel.md 7.1). Arguments as in :func:`plan_line`.
+    The orientation runs evenly, that of places between the ends does not count (documented,
+    docs/reference/spel.md 7.1). ``way`` is the way and its length in mm; the other arguments are
+    those of :func:`plan_line`.
 
     Raises:
-        Refusal: As :func:`plan_line`, or the three stand in a line.
+        Refusal: As :func:`plan_line`.
     """
     if not model.six_axes:
-        return plan_arc(model, points, pace, offset=offset, near=near)
-    a, b, c = (complex(pose.x_mm, pose.y_mm) for pose in points)
-    first, mid, last = points
-    centre, sweep_rad = circle_through(a, b, c)
-
-    def way(share: float) -> Vector:
-        at = centre + (a - centre) * cmath.exp(1j * sweep_rad * share)
-        return (at.real, at.imag, first.z_mm + (last.z_mm - first.z_mm) * share)
-
-    for pose in (mid, last):
-        _require_same_posture(model, near, pose)
-    length_mm = math.hypot(abs(sweep_rad) * abs(a - centre), last.z_mm - first.z_mm)
-    course = _course(model, way, (first, last), offset)
-    return _leg(course, length_mm, pace, near=near, avoiding=avoiding)
+        return plan_level_way(model, ends, way, pace, offset=offset, near=near)
+    _require_same_posture(model, near, ends[1])
+    course, length_mm = way
+    return _leg(_course(model, course, ends, offset), length_mm, pace, near=near, avoiding=avoiding)
 
 
 def _require_same_posture(model: RobotModel, near: Joints, end: Pose) -> None:

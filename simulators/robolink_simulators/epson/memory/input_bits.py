@@ -2,8 +2,14 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Final
 
 from robolink_simulators.epson.memory.bits import BitBank
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+
+_COUNTERS: Final = 16
+_HIGHEST_COUNT: Final = 65535
+"""Where a counter stays (docs/reference/spel.md 8; what comes after it is not stated)."""
 
 Sense = Callable[[int | None], bool]
 """Tells what an input shows at an instant of the motion under way, ``None`` for the present."""
@@ -20,6 +26,7 @@ class InputBits(BitBank):
         self._senses: dict[int, Sense] = {}
         self._instant_ns: int | None = None
         self._asked: InputsAsked | None = None
+        self._counts: dict[int, int] = {}
 
     @property
     def connected(self) -> bool:
@@ -45,8 +52,37 @@ class InputBits(BitBank):
 
     def set(self, number: int, on: bool) -> None:
         """Switch one bit by hand; what it was connected to is taken off."""
+        rises = on and not super().get(number)
         super().set(number, on)
         self._senses.pop(number, None)
+        if rises and number in self._counts:
+            self._counts[number] = min(self._counts[number] + 1, _HIGHEST_COUNT)
+
+    def set_byte(self, port: int, value: int) -> None:
+        """Switch eight bits by hand."""
+        if not 0 <= value <= 0xFF:
+            raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"Not a byte: {value}")
+        for bit in range(8):
+            self.set(8 * port + bit, bool(value >> bit & 1))
+
+    def count_from_zero(self, number: int) -> None:
+        """Let an input be counted from now on (CTReset): up to 16 inputs at a time.
+
+        Raises:
+            Refusal: There is no such input, 16 others are counted, or it follows what the robot
+                meets, whose edges are not counted here.
+        """
+        self._check(number)
+        if number in self._senses:
+            raise SpelRefusal(RefusalKind.NOT_SIMULATED, "A counter of a sensor at the tip")
+        if number not in self._counts and len(self._counts) >= _COUNTERS:
+            raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"There are {_COUNTERS} counters")
+        self._counts[number] = 0
+
+    def counted(self, number: int) -> int:
+        """Return how often an input was switched on since it is counted (Ctr), 0 if it is not."""
+        self._check(number)
+        return self._counts.get(number, 0)
 
     @contextmanager
     def as_at(self, instant_ns: int) -> Iterator[None]:

@@ -4,6 +4,7 @@ from typing import Any, cast
 
 from lark import Token, Transformer, v_args
 
+from robolink_simulators.epson.spel.expressions.values import number_value
 from robolink_simulators.epson.spel.tree import (
     AssignCoordinate,
     AssignPoint,
@@ -38,23 +39,7 @@ from robolink_simulators.epson.spel.tree import (
 
 Items = tuple[Expression, ...]
 
-_RADIX = {"&h": 16, "&o": 8, "&b": 2}
-_HIGHEST_INT32 = 2**31 - 1
 _COORDINATE_FLAGS = frozenset({"R", "L", "A", "B", "F", "NF"})
-
-
-def number_value(text: str) -> int | float:
-    """Return the value of a numeric literal.
-
-    Decimal integers that no Long holds are reals (inferred from Str$(99999999999999), which
-    prints with an exponent, docs/reference/spel.md 3.2).
-    """
-    lower = text.lower()
-    if lower[:2] in _RADIX:
-        return int(lower[2:], _RADIX[lower[:2]])
-    if lower.isdigit() and int(lower) <= _HIGHEST_INT32:
-        return int(lower)
-    return float(lower)
 
 
 @v_args(inline=True)

@@ -31,12 +31,14 @@ from robolink_simulators.epson.spel.line_tree import (
     Unsimulated,
     VisionAccess,
     VisionRun,
+    VisionStatement,
 )
 from robolink_simulators.epson.spel.tree import (
     ByReference,
     Coordinates,
     Expression,
     Name,
+    PointRange,
     PrintTo,
 )
 
@@ -247,6 +249,20 @@ class ProgramBuilder(TreeBuilder):
         """Build VGet or VSet."""
         parts = tuple(part.strip().lower() for part in path.split("."))
         return VisionAccess(word.lower(), parts, index, items)
+
+    def vision_project(self, word: Token) -> VisionStatement:
+        """Build VLoad, VSave or VCls."""
+        return VisionStatement(word.lower())
+
+    def vision_calibrate(self, word: Token, name: Expression) -> VisionStatement:
+        """Build VCal."""
+        return VisionStatement(word.lower(), (name,))
+
+    def image_calibrate(
+        self, word: Token, number: Expression, mounting: Expression, *ranges: PointRange
+    ) -> VisionStatement:
+        """Build VxCalib."""
+        return VisionStatement(word.lower(), (number, mounting), ranges)
 
     def unsimulated(self, word: Token, _: Token | None) -> Unsimulated:
         """Build a statement that is known and not carried out."""

@@ -5,7 +5,13 @@ Source: docs/reference/spel.md 4, 14. Every name is lower case.
 
 from dataclasses import dataclass
 
-from robolink_simulators.epson.spel.tree import Coordinates, Expression, Name, Statement
+from robolink_simulators.epson.spel.tree import (
+    Coordinates,
+    Expression,
+    Name,
+    PointRange,
+    Statement,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,6 +199,15 @@ class VisionRun:
 
 
 @dataclass(frozen=True, slots=True)
+class VisionStatement:
+    """VLoad, VSave, VCls, ``VCal name``, ``VxCalib number, mounting, pixels, places``."""
+
+    word: str
+    items: tuple[Expression, ...] = ()
+    ranges: tuple[PointRange, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class VisionAccess:
     """``VGet`` or ``VSet`` (``word``): ``sequence[.object].name[(index)], items``."""
 
@@ -231,6 +246,7 @@ LineNode = (
     | Trap
     | VisionRun
     | VisionAccess
+    | VisionStatement
     | Unsimulated
     | Statement
 )

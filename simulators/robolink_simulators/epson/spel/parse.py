@@ -37,9 +37,9 @@ _WORDS_NOT_SIMULATED = """
     arch armclr armset atrq autoljm box dispdev enctemper finedist hofs hordr hour jrange
     limittorque limittorquelp limittorquestop limzmargin mcordr msgbox olaccel olrate opencom
     opennet outreal parsestr performmode plane plocal ptpboost ptrq qpdecelr qpdecels shutdown
-    softcp speedrlimitation syncrobots taskstate tclim tcspeed time xylim xylimmode diffpoint
-    arc3 atclr bgo boxclr calib closecom closenet close cls copy ctreset curve cvmove
-    date del eresume error exportpoints flush fmtstr homeclr hofsjointaccuracy importpoints
+    softcp speedrlimitation syncrobots taskstate tclim tcspeed xylim xylimmode diffpoint
+    atclr boxclr calib closecom closenet close cls copy curve cvmove
+    del eresume error exportpoints flush fmtstr homeclr hofsjointaccuracy importpoints
     input inputbox latchenable line loadpoints mcal mkdir
     pdescription planeclr ptclr ptran qp randomize read redim rename resetelapsedtime savepoints
     setcom setinreal setlatch setnet signal simset taskwait tc tmreset toff ton
@@ -86,7 +86,8 @@ _UNSIMULATED_FUNCTIONS = """
 _WITH_A_FORM_OF_THEIR_OWN = """
     opencom opennet parsestr eresume error fmtstr input line read redim setcom setnet signal
     taskwait waitnet waitsig write writebin readbin close closecom closenet flush cont restart
-    tmreset resetelapsedtime randomize loadpoints savepoints vrun vget vset
+    tmreset resetelapsedtime randomize loadpoints savepoints vrun vget vset vload vsave vcls vcal
+    vxcalib
 """
 
 WINDOW_ONLY: Final = frozenset(

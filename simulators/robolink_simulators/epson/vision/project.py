@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
-from robolink.model import TIP
+from robolink.model import TIP, Pose
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.vision.calibration import VisionCalibration
 
@@ -139,10 +139,12 @@ class VisionProject:
     Attributes:
         sequences: By their names in lower case.
         calibrations: By their names in lower case.
+        taught: Poses of the robot at which VCal looks, by the name of a calibration.
     """
 
     sequences: dict[str, VisionSequence] = field(default_factory=dict)
     calibrations: dict[str, VisionCalibration] = field(default_factory=dict)
+    taught: dict[str, tuple[Pose, ...]] = field(default_factory=dict)
 
     @classmethod
     def of(

@@ -5,10 +5,12 @@ Source: docs/reference/vision.md 1, 2, 4.
 
 import math
 import random
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from copy import deepcopy
+from dataclasses import dataclass, field, replace
 from typing import Final
 
+from robolink.errors import ConfigError
 from robolink.model import TIP, Pose
 from robolink_simulators.cell.camera import Pixel
 from robolink_simulators.cell.workplace import Workplace
@@ -131,6 +133,7 @@ class VisionSystem:
         seed: int = 1,
     ) -> None:
         self.project = project
+        self._saved = deepcopy(project)
         self.answers = True
         self.runs = 0
         self._world = world
@@ -161,6 +164,57 @@ class VisionSystem:
         self._outcomes[sequence.name] = SequenceOutcome(self._picture, finds, took_ms, each_ms)
         self.runs += 1
         return took_ms
+
+    def save(self) -> None:
+        """Keep the project as it is (VSave)."""
+        self._saved = deepcopy(self.project)
+
+    def load(self) -> None:
+        """Take the project as it was kept, without what was set since; results go (VLoad)."""
+        self.project = deepcopy(self._saved)
+        self._outcomes.clear()
+        self._picture = None
+
+    def taught_poses(self, calibration: str) -> tuple[Pose, ...]:
+        """Return the poses at which a calibration looks.
+
+        Raises:
+            Refusal: There is no such calibration, or none was taught.
+        """
+        poses = self.project.taught.get(calibration.lower())
+        if poses is None:
+            text = f"Calibration {calibration} has no taught points"
+            raise SpelRefusal(RefusalKind.VISION_CALIBRATION, text)
+        return poses
+
+    def target(self) -> Pixel:
+        """Return where the best tip of a new picture is, as a calibration looks for its target.
+
+        Raises:
+            Refusal: The camera does not answer, or there is none to be seen.
+        """
+        if not self.answers:
+            raise SpelRefusal(RefusalKind.VISION_CAMERA, "The camera does not answer")
+        tips = self._taken().tips
+        if not tips:
+            raise SpelRefusal(RefusalKind.VISION_CALIBRATION, "The target is not to be seen")
+        return tips[0].pixel
+
+    def calibrate(
+        self, calibration: str, pixels: Sequence[Pixel], places_mm: Sequence[tuple[float, float]]
+    ) -> None:
+        """Complete a calibration with what was seen at each place of the robot.
+
+        Raises:
+            Refusal: The places do not calibrate a camera.
+        """
+        name = calibration.lower()
+        mounting = self.project.calibrations[name].mounting
+        try:
+            found = VisionCalibration.of_points(pixels, places_mm)
+        except ConfigError as error:
+            raise SpelRefusal(RefusalKind.VISION_CALIBRATION, str(error)) from error
+        self.project.calibrations[name] = replace(found, mounting=mounting)
 
     def get(self, path: tuple[str, ...], index: int | None) -> tuple[VisionValue | None, ...]:
         """Return a property or a result; ``None`` where a variable keeps what it holds.

@@ -11,7 +11,7 @@ from robolink_simulators.faults import LinkKind, read_fault_file
 from robolink_simulators.hosting.in_process.mailbox_link import InProcessMailboxLink
 from robolink_simulators.hosting.in_process.named import NamedSimulators, seed_from_text
 from robolink_simulators.option_values import require_known
-from robolink_simulators.softmotion.catalogue import NAMES, parameter_names
+from robolink_simulators.softmotion.catalogue import parameter_names
 from robolink_simulators.softmotion.mailbox.option_text import option_names, options_from_text
 from robolink_simulators.softmotion.mailbox.parameters import parameters_from_text
 from robolink_simulators.softmotion.mailbox.simulator import (
@@ -56,7 +56,7 @@ clock_of = _named.clock
 def _made(options: Mapping[str, str]) -> SoftMotionSimulator:
     # A plus that was not escaped has become a space.
     kinematics = options.get("kinematics", DEFAULT_KINEMATICS).replace(" ", "+")
-    of_machine = parameter_names(kinematics) if kinematics in NAMES else ()
+    of_machine = parameter_names(kinematics)
     names = (*_OWN_OPTIONS, *of_machine, *option_names())
     require_known(plain(options), names, kind="PLC")
     state = options.get("state")

@@ -1,6 +1,6 @@
 """The blocks about tool, kinematics and position (docs/reference/softmotion.md 1, 2.3)."""
 
-from robolink_simulators.cell.frames import NO_TURN, Frame
+from robolink_simulators.cell.frames import Frame
 from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.group.condition import (
     ActualPosition,
@@ -100,7 +100,7 @@ class ToolBlocks(GroupCore):
             raise BlockRefused(ErrorKind.WRONG_STATE, f"No tool can be set in {self.state.name}")
 
     def _require_fit(self, tool: CoordRef) -> None:
-        image = self.kinematics.orientation_image(NO_TURN)
+        image = self.kinematics.orientation_image(self.flange().rotation)
         if image is None:
             text = f"{self.kinematics.name} has no orientation image"
             raise BlockRefused(ErrorKind.NO_ORIENTATION_IMAGE, text)

@@ -1,96 +1,87 @@
-"""A position kinematics with an axis behind it that turns the flange."""
+"""A position kinematics with an orientation kinematics on its flange."""
 
 from dataclasses import dataclass, field
 
-from robolink_simulators.cell.frames import Frame, Matrix, subtract, turned
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink.model import AxisKind, NotReachable, OrientationDof, OrientationSpace, combined_space
+from robolink_simulators.cell.frames import NO_TURN, ORIGIN, Frame, Matrix, product, transposed
 from robolink_simulators.softmotion.kinematics.kinematics import (
-    AxisKind,
     AxisValues,
     Configuration,
     KinematicsModel,
-    near_turn,
+    OrientationModel,
 )
-from robolink_simulators.softmotion.kinematics.orientation import OrientationSpace, about_z, yaw_deg
 from robolink_simulators.softmotion.kinematics.positions import Scara2Z
+from robolink_simulators.softmotion.kinematics.wrists import CAxis, Wrist2
 from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 
 @dataclass(frozen=True, slots=True)
-class CAxis:
-    """``Kin_CAxis``: one rotary axis about Z, with a fixed angle and reach.
-
-    Documented: the axis about Z, ``dOffsetC``, and that every orientation is projected to the
-    closest turn about Z, except where Z points the other way. Assumed: the flange is turned
-    by the axis value plus ``dOffsetC``.
-
-    Attributes:
-        offset_deg: ``dOffsetC``.
-        reach_mm: From the axis to the flange, along the flange's X.
-    """
-
-    offset_deg: float = 0.0
-    reach_mm: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
 class Coupled:
-    """``Kin_Coupled`` of a position kinematics and a C axis.
+    """``Kin_Coupled`` of a position kinematics and an orientation kinematics.
 
-    Source: docs/reference/softmotion.md 3.1 (documented).
-
-    The position part may turn the C axis's base about Z, as a SCARA's arms do. A shift of any
-    direction fits, because the C axis decides the orientation.
+    Source: docs/reference/softmotion.md 3.1 (documented). What is known of its flange follows
+    from what is known of the two, by :func:`robolink.model.combined_space`.
 
     Attributes:
-        position: What carries the C axis.
-        c_axis: The axis.
-        c_index: Its place in the row of axes; behind the position axes unless the kinematics
-            maps it elsewhere.
+        position: What carries the other one.
+        orientation: What turns the flange.
+        place: Where the axes of the second stand in the row of axes; behind those of the first
+            unless the kinematics maps them elsewhere.
         own_name: Name of a kinematics that is such a coupling itself.
     """
 
     position: KinematicsModel
-    c_axis: CAxis = CAxis()
-    c_index: int = 3
+    orientation: OrientationModel = field(default_factory=CAxis)
+    place: int | None = None
     own_name: str = ""
     kinds: tuple[AxisKind, ...] = field(init=False, repr=False, compare=False)
     """The axes, a0 first."""
+    _own: slice = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        carried, at = self.position.kinds, self.c_index
-        object.__setattr__(self, "kinds", (*carried[:at], AxisKind.ROTARY, *carried[at:]))
+        carried, own = self.position.kinds, self.orientation.kinds
+        at = len(carried) if self.place is None else self.place
+        object.__setattr__(self, "kinds", (*carried[:at], *own, *carried[at:]))
+        object.__setattr__(self, "_own", slice(at, at + len(own)))
 
     @property
     def name(self) -> str:
         """Name of the function block, or of both."""
-        return self.own_name or f"{self.position.name}+Kin_CAxis"
+        return self.own_name or f"{self.position.name}+{self.orientation.name}"
 
     def flange(self, axes: AxisValues) -> Frame:
         """Return where the flange is."""
-        base = self.position.flange(self._without_c(axes))
-        turn = Frame(rotation=about_z(axes[self.c_index] + self.c_axis.offset_deg))
-        return base @ turn @ Frame((self.c_axis.reach_mm, 0.0, 0.0))
+        return self.position.flange(self._carrying(axes)) @ self.orientation.flange(axes[self._own])
 
     def configuration(self, axes: AxisValues) -> Configuration:
-        """Return that of the position part."""
-        return self.position.configuration(self._without_c(axes))
+        """Return what both say."""
+        of_position = self.position.configuration(self._carrying(axes))
+        return of_position.completed(self.orientation.configuration(axes[self._own]))
 
     def axes_for(self, flange: Frame, configuration: Configuration, near: AxisValues) -> AxisValues:
-        """Return the position part's axes and the C axis that makes up its turn."""
-        reach = turned(flange.rotation, (self.c_axis.reach_mm, 0.0, 0.0))
-        wrist = Frame(subtract(flange.shift_mm, reach))
-        carried = self.position.axes_for(wrist, configuration, self._without_c(near))
-        base_deg = _yaw_deg(self.position.flange(carried).rotation)
-        c_deg = _yaw_deg(flange.rotation) - base_deg - self.c_axis.offset_deg
-        c_deg = near_turn(c_deg, near[self.c_index])
-        return (*carried[: self.c_index], c_deg, *carried[self.c_index :])
+        """Return the position part's axes, and those that make up for its turn."""
+        base = self.position.orientation_image(flange.rotation) or OrientationSpace.unknown()
+        place = Frame(self.orientation.carried_at(flange, base))
+        carried = self.position.axes_for(place, configuration, self._carrying(near))
+        seen = product(transposed(self.position.flange(carried).rotation), flange.rotation)
+        own = self.orientation.axes_for(seen, configuration, near[self._own])
+        at = self._own.start
+        return (*carried[:at], *own, *carried[at:])
 
     def orientation_image(self, wanted: Matrix) -> OrientationSpace | None:
-        """Return the closest turn about Z."""
-        return OrientationSpace.known(about_z(_yaw_deg(wanted)))
+        """Return what is known of the flange; ``None`` where nothing is of the position part."""
+        base = self.position.orientation_image(wanted)
+        if base is None:
+            return None
+        try:
+            return combined_space(base, self.orientation.image(wanted, base), wanted)
+        except NotReachable as unreachable:
+            raise BlockRefused(ErrorKind.UNREACHABLE, str(unreachable)) from unreachable
 
-    def _without_c(self, axes: AxisValues) -> AxisValues:
-        return (*axes[: self.c_index], *axes[self.c_index + 1 :])
+    def _carrying(self, axes: AxisValues) -> AxisValues:
+        return (*axes[: self._own.start], *axes[self._own.stop :])
 
 
 def scara3_z(
@@ -103,16 +94,34 @@ def scara3_z(
     """
     return Coupled(
         Scara2Z(arm_length_1_mm, arm_length_2_mm),
-        CAxis(reach_mm=arm_length_3_mm),
-        c_index=2,
+        CAxis((arm_length_3_mm, 0.0, 0.0)),
+        place=2,
         own_name="Kin_Scara3_Z",
     )
 
 
-def _yaw_deg(rotation: Matrix) -> float:
-    angle_deg = yaw_deg(rotation)
-    if angle_deg is None:
-        raise BlockRefused(
-            ErrorKind.UNREACHABLE, "The Z axis of the flange cannot point the other way"
+def require_solvable(coupled: Coupled) -> None:
+    """Refuse a coupling whose position part cannot be told where to go.
+
+    The way from the flange back to the one that carries it must not depend on a part of the
+    orientation that nobody knows: the same rule that decides about tools. The roll axis of a
+    Kin_Wrist2 may be shifted only on a flange that never turns (documented).
+
+    Raises:
+        ConfigError: Names the parts.
+    """
+    position, orientation = coupled.position, coupled.orientation
+    base = position.orientation_image(NO_TURN) or OrientationSpace.unknown()
+    space = coupled.orientation_image(base.m_ori_zero) or OrientationSpace.unknown()
+    turns = base.dof is not OrientationDof.ZERO
+    rolls = isinstance(orientation, Wrist2) and any(orientation.roll_axis_mm) and turns
+    if rolls or not space.accepts(orientation.carried_at(ORIGIN, base)):
+        raise ConfigError(
+            tr(
+                "On {position}, whose flange turns with its arms, {orientation} cannot be shifted "
+                "to the side.",
+                position=position.name,
+                orientation=orientation.name,
+            ),
+            remedy=tr("Set the shift of {orientation} to 0.", orientation=orientation.name),
         )
-    return angle_deg

@@ -1,37 +1,51 @@
 """What every kinematics offers. Lengths are millimetres, angles degrees."""
 
 import math
-from dataclasses import dataclass
-from enum import StrEnum
+from dataclasses import dataclass, fields
 from typing import Final, Protocol
 
-from robolink_simulators.cell.frames import Frame, Matrix
-from robolink_simulators.softmotion.kinematics.orientation import OrientationSpace
+from robolink.model import AxisKind, OrientationImage, OrientationSpace
+from robolink_simulators.cell.frames import Frame, Matrix, Vector
 
 AxisValues = tuple[float, ...]
 """One value an axis, a0 first: degrees of a rotary axis, mm of a linear one."""
-
-
-class AxisKind(StrEnum):
-    """How an axis moves."""
-
-    ROTARY = "rotary"
-    LINEAR = "linear"
 
 
 @dataclass(frozen=True, slots=True)
 class Configuration:
     """Which of several axis positions for one flange pose is meant.
 
+    A member is ``None`` where the kinematics has no such choice, or nothing is said about it.
+
     Attributes:
-        elbow_right: ``xElbowRight`` of the SCARA kinematics; ``None`` where there is no elbow.
+        elbow_right: ``xElbowRight`` of the SCARA kinematics.
+        arm_backwards: Whether an arm that turns about Z points away from where its wrist is
+            (``Kin_Pos_RRR_Arm_State``, ``bBackwards``).
+        elbow_low: Whether the elbow lies below the line from shoulder to wrist
+            (``Kin_Pos_RRR_Elbow_State``, ``bElbowLow``).
+        hand_down: Whether the second axis of a wrist is positive (``Kin_Wrist3_Hand_State``).
     """
 
     elbow_right: bool | None = None
+    arm_backwards: bool | None = None
+    elbow_low: bool | None = None
+    hand_down: bool | None = None
+
+    def completed(self, other: "Configuration") -> "Configuration":
+        """Return this one with what it does not say taken from another."""
+        return Configuration(*(o if m is None else m for m, o in self._pairs(other)))
+
+    def contradicts(self, other: "Configuration") -> bool:
+        """Tell whether both say something about one choice, and not the same."""
+        return any(None not in pair and pair[0] is not pair[1] for pair in self._pairs(other))
+
+    def _pairs(self, other: "Configuration") -> list[tuple[bool | None, bool | None]]:
+        names = [it.name for it in fields(self)]
+        return [(getattr(self, name), getattr(other, name)) for name in names]
 
 
 ANY_CONFIGURATION: Final = Configuration()
-"""Says nothing: the only one of a kinematics without an elbow, or the present one."""
+"""Says nothing: the only one of a kinematics without a choice, or the present one."""
 
 
 class KinematicsModel(Protocol):
@@ -46,7 +60,11 @@ class KinematicsModel(Protocol):
         """The axes, a0 first."""
 
     def flange(self, axes: AxisValues) -> Frame:
-        """Return where the flange is in the machine coordinate system."""
+        """Return where the flange is in the machine coordinate system.
+
+        Raises:
+            Refused: The axes cannot stand so, as rods that are too short.
+        """
 
     def configuration(self, axes: AxisValues) -> Configuration:
         """Return the configuration of an axis position."""
@@ -72,6 +90,43 @@ class KinematicsModel(Protocol):
         Raises:
             Refused: No orientation is closest to this one.
         """
+
+
+class OrientationModel(Protocol):
+    """Axes that turn a flange on the flange of a position kinematics."""
+
+    @property
+    def name(self) -> str:
+        """Name of the function block."""
+
+    @property
+    def kinds(self) -> tuple[AxisKind, ...]:
+        """Its axes."""
+
+    def flange(self, axes: AxisValues) -> Frame:
+        """Return where its flange is on the one that carries it."""
+
+    def configuration(self, axes: AxisValues) -> Configuration:
+        """Return the configuration of an axis position."""
+
+    def axes_for(
+        self, rotation: Matrix, configuration: Configuration, near: AxisValues
+    ) -> AxisValues:
+        """Return the axes that give an orientation, seen from the flange that carries it.
+
+        Raises:
+            Refused: It cannot be taken up.
+        """
+
+    def image(self, wanted: Matrix, base: OrientationSpace) -> OrientationImage:
+        """Return which orientations it gives (``GetOrientationImage2``).
+
+        Raises:
+            NotReachable: None is closest to this one.
+        """
+
+    def carried_at(self, flange: Frame, base: OrientationSpace) -> Vector:
+        """Return where the flange must be that carries it (``GetPositionFromOrientation``)."""
 
 
 def near_turn(angle_deg: float, near_deg: float) -> float:

@@ -1,67 +1,12 @@
-"""Which flange orientations a kinematics can take up, and which tools fit it.
-
-One rule settles every row of the vendor's table (docs/reference/softmotion.md 3.1, 3.2): a tool's
-shift must look the same whatever the part of the orientation is that nobody knows. Its rotation
-never matters.
-"""
+"""Turns about Z, and turns about Z and then Y, that come closest to an orientation."""
 
 import math
-from dataclasses import dataclass
-from enum import Enum
-from typing import Final, Self
+from typing import Final
 
-from robolink_simulators.cell.frames import (
-    NO_TURN,
-    Z_AXIS,
-    Matrix,
-    Vector,
-    about,
-    cross,
-    dot,
-)
+from robolink.model import NotReachable
+from robolink_simulators.cell.frames import Y_AXIS, Z_AXIS, Matrix, about, product
 
-PARALLEL_MM: Final = 1e-6
-"""How far a shift may stand off the known axis (the vendor's figure is unverified)."""
-
-_OPPOSITE = 1e-9
-
-
-class Freedom(Enum):
-    """What is known of the flange orientation: the member ``dof`` of OrientationSpace."""
-
-    ZERO = "zero"
-    ONE = "one"
-    THREE = "three"
-
-
-@dataclass(frozen=True, slots=True)
-class OrientationSpace:
-    """The flange orientations that can result for a programmed one.
-
-    Attributes:
-        freedom: How much of it is open.
-        rotation: One member of the space (``mOriZero``).
-        unit: With :attr:`Freedom.ONE`, the flange direction that is known (``vU``).
-    """
-
-    freedom: Freedom
-    rotation: Matrix = NO_TURN
-    unit: Vector = Z_AXIS
-
-    @classmethod
-    def known(cls, rotation: Matrix) -> Self:
-        """Return the space with a single member."""
-        return cls(Freedom.ZERO, rotation)
-
-    def accepts(self, shift_mm: Vector) -> bool:
-        """Tell whether a tool with this shift has a definite place on the flange."""
-        match self.freedom:
-            case Freedom.ZERO:
-                return True
-            case Freedom.ONE:
-                return _length(cross(shift_mm, self.unit)) <= PARALLEL_MM
-            case Freedom.THREE:
-                return _length(shift_mm) <= PARALLEL_MM
+_OPPOSITE: Final = 1e-9
 
 
 def yaw_deg(rotation: Matrix) -> float | None:
@@ -82,5 +27,27 @@ def about_z(angle_deg: float) -> Matrix:
     return about(Z_AXIS, angle_deg)
 
 
-def _length(vector: Vector) -> float:
-    return math.sqrt(dot(vector, vector))
+def about_z_then_y(turn_deg: float, lean_deg: float) -> Matrix:
+    """Return a turn about Z and then about the new Y."""
+    return product(about_z(turn_deg), about(Y_AXIS, lean_deg))
+
+
+def turn_and_lean_deg(rotation: Matrix) -> tuple[float, float]:
+    """Return the turn about Z and then about Y that come closest to a rotation R.
+
+    Closest is the Rz(c) Ry(i) with the largest trace of its transpose times R. Four of the six
+    terms of that trace depend on c + i and c - i alone, and are largest at the angles below;
+    these leave c and i open by half a turn of both, which the other two terms decide.
+
+    Raises:
+        NotReachable: Every inclination is equally far.
+    """
+    (r00, r01, r02), (r10, r11, r12), (r20, _, r22) = rotation
+    of_sum, of_difference = (r10 + r02, r00 - r12), (r10 - r02, r00 + r12)
+    if min(math.hypot(*of_sum), math.hypot(*of_difference)) < _OPPOSITE:
+        raise NotReachable("No inclination comes closest to this orientation")
+    total, rest = math.atan2(*of_sum), math.atan2(*of_difference)
+    c, i = (total + rest) / 2, (total - rest) / 2
+    if math.cos(c) * r11 - math.sin(c) * r01 + math.cos(i) * r22 - math.sin(i) * r20 < 0:
+        c, i = c + math.pi, i + math.pi
+    return math.degrees(c), math.degrees(i)

@@ -6,18 +6,19 @@ Geometry as in docs/reference/softmotion.md 3.3; the evidence of each stands at 
 import math
 from dataclasses import dataclass
 
+from robolink.model import AxisKind, OrientationDof, OrientationSpace
 from robolink_simulators.cell.frames import NO_TURN, Frame, Matrix
 from robolink_simulators.softmotion.kinematics.kinematics import (
     ANY_CONFIGURATION,
-    AxisKind,
     AxisValues,
     Configuration,
     near_turn,
 )
-from robolink_simulators.softmotion.kinematics.orientation import Freedom, OrientationSpace, about_z
+from robolink_simulators.softmotion.kinematics.orientation import about_z
 from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 _ROUNDING = 1e-9
+_IN_PLANE_MM = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,25 +69,38 @@ class Scara2Z:
 
     def orientation_image(self, wanted: Matrix) -> OrientationSpace | None:  # noqa: ARG002
         """Return that only the flange's Z is known (documented by its row of the table)."""
-        return OrientationSpace(Freedom.ONE)
+        return OrientationSpace(OrientationDof.ONE)
 
 
 @dataclass(frozen=True, slots=True)
-class PolarZ:
-    """``Kin_Polar_Z``: a turntable, a radius and a lift.
+class Polar:
+    """``Kin_Polar`` and ``Kin_Polar_Z``: a turntable and a radius, the second with a lift.
 
     Documented: a0 about Z, a1 the radius, not negative, the origin where the radius is 0.
     Inferred: the flange turns with a0.
+
+    Attributes:
+        lift: Whether it has one.
     """
 
-    name = "Kin_Polar_Z"
-    kinds = (AxisKind.ROTARY, AxisKind.LINEAR, AxisKind.LINEAR)
+    lift: bool = True
+
+    @property
+    def name(self) -> str:
+        """Name of the function block."""
+        return "Kin_Polar_Z" if self.lift else "Kin_Polar"
+
+    @property
+    def kinds(self) -> tuple[AxisKind, ...]:
+        """The axes, a0 first."""
+        return (AxisKind.ROTARY, AxisKind.LINEAR, AxisKind.LINEAR)[: 2 + self.lift]
 
     def flange(self, axes: AxisValues) -> Frame:
         """Return where the flange is."""
-        a0, radius, z = axes
+        a0, radius, *z = axes
         angle = math.radians(a0)
-        return Frame((radius * math.cos(angle), radius * math.sin(angle), z), about_z(a0))
+        shift = (radius * math.cos(angle), radius * math.sin(angle), z[0] if z else 0.0)
+        return Frame(shift, about_z(a0))
 
     def configuration(self, axes: AxisValues) -> Configuration:  # noqa: ARG002 - has none
         """Return that there is none."""
@@ -102,24 +116,44 @@ class PolarZ:
         x, y, z = flange.shift_mm
         radius = math.hypot(x, y)
         angle_deg = near[0] if radius < _ROUNDING else math.degrees(math.atan2(y, x))
-        return (near_turn(angle_deg, near[0]), radius, z)
+        return (near_turn(angle_deg, near[0]), radius, *height(z, self.lift))
 
     def orientation_image(self, wanted: Matrix) -> OrientationSpace | None:  # noqa: ARG002
         """Return that only the flange's Z is known (documented by its row of the table)."""
-        return OrientationSpace(Freedom.ONE)
+        return OrientationSpace(OrientationDof.ONE)
 
 
 @dataclass(frozen=True, slots=True)
-class Gantry3:
-    """``Kin_Gantry3``: three linear axes, the flange always parallel to MCS (documented)."""
+class Gantry:
+    """Two drives for X and Y, each by itself or through one belt, and possibly one for Z.
 
-    name = "Kin_Gantry3"
-    kinds = (AxisKind.LINEAR, AxisKind.LINEAR, AxisKind.LINEAR)
+    Documented: that the flange is always parallel to MCS; ``Kin_Gantry2`` and ``3``: an axis a
+    coordinate; ``Kin_HGantry2`` and ``3``: X+ is a0 forward and a1 as much back, Y+ both as much
+    back; ``Kin_TGantry2``: X+ is both as much forward, Y+ a0 back and a1 as much forward.
+    Inferred: half of the sum, which a belt gives; that there is a ``Kin_TGantry3``.
+
+    Attributes:
+        name: Name of the function block.
+        of_x: Share of each of the two drives in X.
+        of_y: The same for Y.
+        lift: Whether a2 is Z.
+    """
+
+    name: str
+    of_x: tuple[float, float] = (1.0, 0.0)
+    of_y: tuple[float, float] = (0.0, 1.0)
+    lift: bool = True
+
+    @property
+    def kinds(self) -> tuple[AxisKind, ...]:
+        """The axes, a0 first."""
+        return (AxisKind.LINEAR,) * (2 + self.lift)
 
     def flange(self, axes: AxisValues) -> Frame:
         """Return where the flange is."""
-        x, y, z = axes
-        return Frame((x, y, z))
+        a0, a1, *z = axes
+        x, y = (share[0] * a0 + share[1] * a1 for share in (self.of_x, self.of_y))
+        return Frame((x, y, z[0] if z else 0.0))
 
     def configuration(self, axes: AxisValues) -> Configuration:  # noqa: ARG002 - has none
         """Return that there is none."""
@@ -132,8 +166,26 @@ class Gantry3:
         near: AxisValues,  # noqa: ARG002 - nothing turns
     ) -> AxisValues:
         """Return the axes that bring the flange to the position."""
-        return flange.shift_mm
+        x, y, z = flange.shift_mm
+        (a, b), (c, d) = self.of_x, self.of_y
+        whole = a * d - b * c
+        return ((d * x - b * y) / whole, (a * y - c * x) / whole, *height(z, self.lift))
 
     def orientation_image(self, wanted: Matrix) -> OrientationSpace | None:  # noqa: ARG002
         """Return that the flange never turns."""
         return OrientationSpace.known(NO_TURN)
+
+
+def height(z_mm: float, lift: bool) -> tuple[float, ...]:
+    """Return the axis for a height: none for a machine that moves in a plane.
+
+    Raises:
+        Refused: It has no lift, and the height is not that of its plane (assumed).
+    """
+    if lift:
+        return (z_mm,)
+    if abs(z_mm) > _IN_PLANE_MM:
+        raise BlockRefused(
+            ErrorKind.UNREACHABLE, f"It moves in a plane, {abs(z_mm):.3f} from there"
+        )
+    return ()

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Final
 
+from robolink.model import AxisKind
 from robolink.timing import NS_PER_S
-from robolink_simulators.softmotion.kinematics.kinematics import AxisKind
 from robolink_simulators.softmotion.motion.profile import Pace, SpeedProfile
 from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 

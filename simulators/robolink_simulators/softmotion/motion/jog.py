@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from robolink.model import AxisKind
 from robolink.timing import NS_PER_S
 from robolink_simulators.cell.frames import (
     Frame,
@@ -18,7 +19,6 @@ from robolink_simulators.cell.frames import (
 from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.kinematics.coordinates import CoordinateTransforms, CoordSystem
 from robolink_simulators.softmotion.kinematics.kinematics import (
-    AxisKind,
     AxisValues,
     KinematicsModel,
 )

@@ -164,7 +164,7 @@ def axes_for_tcp(
     """
     wanted = product(tcp.rotation, transposed(tool.rotation))
     image = kinematics.orientation_image(wanted)
-    rotation = wanted if image is None else image.rotation
+    rotation = wanted if image is None else image.m_ori_zero
     flange = Frame(subtract(tcp.shift_mm, turned(rotation, tool.shift_mm)), rotation)
     return kinematics.axes_for(flange, configuration, near)
 

@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from robolink.model import AxisKind
 from robolink_simulators.cell.frames import ORIGIN, Frame
 from robolink_simulators.softmotion.kinematics.coordinates import (
     CoordinateTransforms,
@@ -12,7 +13,6 @@ from robolink_simulators.softmotion.kinematics.coordinates import (
 )
 from robolink_simulators.softmotion.kinematics.kinematics import (
     ANY_CONFIGURATION,
-    AxisKind,
     AxisValues,
     Configuration,
     KinematicsModel,
@@ -119,9 +119,9 @@ class Planner:
         wanted = target.configuration
         if target.system is CoordSystem.ACS:
             wanted = self._kinematics.configuration(self._axis_target(target))
-        if wanted.elbow_right not in (None, present.elbow_right):
+        if wanted.contradicts(present):
             raise BlockRefused(
-                ErrorKind.CONFIGURATION, "A straight movement keeps the elbow's side"
+                ErrorKind.CONFIGURATION, "A straight movement keeps arm, elbow and hand"
             )
 
 

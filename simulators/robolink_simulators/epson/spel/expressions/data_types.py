@@ -24,6 +24,15 @@ _REAL_DIGITS: Final = 7
 MOST_SUBSCRIPTS: Final = 3
 
 
+_MOST_ELEMENTS: Final = {
+    "local": (2000, 200),
+    "module": (100_000, 10_000),
+    "global": (100_000, 10_000),
+    "preserve": (4000, 400),
+}
+"""Elements of an array by how long it lives: of numbers, of texts (docs/reference/spel.md 2)."""
+
+
 class DataType(NamedTuple):
     """A type.
 
@@ -121,8 +130,23 @@ class _Element:
         self._cells[self._index] = value
 
 
+def most_elements(kind: DataType, life: str) -> int:
+    """Return how many elements an array of a type may have.
+
+    Args:
+        kind: Its type.
+        life: ``local``, ``module``, ``global`` or ``preserve``.
+    """
+    return _MOST_ELEMENTS[life][kind.name == "string"]
+
+
 Cells = list[Value] | _Element
 """Where a variable keeps what it holds: a list, or one place in another variable's list."""
+
+
+def elements(bounds: Sequence[int]) -> int:
+    """Return how many elements an array has, 1 for a scalar."""
+    return prod(bound + 1 for bound in bounds)
 
 
 class Variable:
@@ -131,15 +155,17 @@ class Variable:
     Attributes:
         kind: Its type.
         bounds: Highest subscripts; none for a scalar.
+        life: How long it lives, which says how large it may grow; see :func:`most_elements`.
         values: What it holds, the last subscript running fastest. A list stays the same one.
     """
 
-    __slots__ = ("bounds", "kind", "values")
+    __slots__ = ("bounds", "kind", "life", "values")
 
-    def __init__(self, kind: DataType, bounds: tuple[int, ...] = ()) -> None:
+    def __init__(self, kind: DataType, bounds: tuple[int, ...] = (), life: str = "local") -> None:
         self.kind = kind
         self.bounds = bounds
-        self.values: Cells = [kind.start] * prod(bound + 1 for bound in bounds)
+        self.life = life
+        self.values: Cells = [kind.start] * elements(bounds)
 
     def at(self, subscripts: Sequence[Value]) -> int:
         """Return where an element stands.
@@ -182,10 +208,12 @@ class Variable:
         """Give an array other bounds.
 
         Raises:
-            Refusal: Another number of subscripts.
+            Refusal: Another number of subscripts, or more elements than there may be.
         """
         if len(bounds) != len(self.bounds):
             raise SpelRefusal(RefusalKind.SUBSCRIPT, "Redim keeps the number of subscripts")
+        if min(bounds) < 0 or elements(bounds) > most_elements(self.kind, self.life):
+            raise SpelRefusal(RefusalKind.SUBSCRIPT, f"No array has the bounds {bounds}")
         values = self.listed()
         kept = dict(zip(_places(self.bounds), values, strict=True)) if keep else {}
         self.bounds = bounds

@@ -5,7 +5,6 @@ import re
 from collections.abc import Callable
 from typing import Final
 
-from robolink_simulators.epson.spel.build import number_value
 from robolink_simulators.epson.spel.expressions.printing import formatted, number_text
 from robolink_simulators.epson.spel.expressions.text_functions import TEXT_FUNCTIONS
 from robolink_simulators.epson.spel.expressions.values import (
@@ -14,6 +13,7 @@ from robolink_simulators.epson.spel.expressions.values import (
     as_number,
     as_text,
     checked,
+    number_value,
     out_of_range,
 )
 

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import astuple
+from datetime import datetime, timedelta
 from typing import Final
 
 from robolink.model import ToolOffset
@@ -28,6 +29,8 @@ from robolink_simulators.epson.spel.expressions.values import (
     out_of_range,
 )
 from robolink_simulators.epson.spel.session import Session
+
+_CLOCK_AT_START: Final = datetime(2026, 1, 1, 8)  # noqa: DTZ001 - a controller has no zone
 
 Arguments = Sequence[Value]
 MachineFunction = Callable[[Session, Arguments], Value]
@@ -128,6 +131,11 @@ def _point_label(session: Session, arguments: Arguments) -> Value:
     return next((name for name, at in labels.items() if at == number), "")
 
 
+def _calibration_information(session: Session, arguments: Arguments) -> Value:
+    number, which = (as_integer(argument) for argument in arguments)
+    return session.machine.image_calibrations.information(number, which)
+
+
 MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     **{f"c{axis.lower()}": (range(1, 2), _coordinate(axis)) for axis in AXES},
     **{name: (range(2), function) for name, function in FLAG_FUNCTIONS.items()},
@@ -184,15 +192,24 @@ MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     "robottype": (range(1), lambda s, _: s.machine.model.robot_type),
     "robotmodel$": (range(1), lambda s, _: s.machine.model.name),
     "robotserial$": (range(1), lambda s, _: s.machine.serial),
+    "ctr": (range(1, 2), lambda s, a: s.machine.inputs.counted(as_integer(a[0]))),
+    "date$": (range(1), lambda s, _: clock_of(s).strftime("%Y/%m/%d")),
+    "time$": (range(1), lambda s, _: clock_of(s).strftime("%H:%M:%S")),
     "inbcd": (range(1, 2), _decimal),
     "iolabel$": (range(3, 4), _label_of),
     "ionumber": (range(1, 2), _number_of),
     "iodef": (range(1, 2), lambda s, a: as_text(a[0]).lower() in s.machine.io_labels),
     "pnumber": (range(1, 2), _point_number),
     "plabel$": (range(1, 2), _point_label),
+    "vxcalinfo": (range(2, 3), _calibration_information),
     "ctrldev": (range(1), lambda s, _: s.machine.control_device),
 }
 """Name to the numbers of arguments allowed and the function."""
+
+
+def clock_of(session: Session) -> datetime:
+    """Return what the controller's clock shows: it starts alike in every run (assumed)."""
+    return _CLOCK_AT_START + timedelta(microseconds=session.machine.arm.now_ns // 1000)
 
 
 def load_of(session: Session) -> tuple[float, float]:
@@ -260,6 +277,13 @@ def _local_point(session: Session, arguments: Arguments) -> Point:
     return Point(astuple(local))
 
 
+def _place_of_pixel(session: Session, arguments: Arguments) -> Point:
+    if len(arguments) > 2:
+        raise SpelRefusal(RefusalKind.NOT_SIMULATED, "A camera on the robot")
+    number, pixel = as_integer(arguments[0]), as_point(arguments[1])
+    return session.machine.image_calibrations.robot_place(number, pixel)
+
+
 POINT_FUNCTIONS: Final[dict[str, tuple[range, PointFunction]]] = {
     "xy": (range(4, 7), _xy),
     "ja": (range(4, 7), of_angles),
@@ -273,6 +297,7 @@ POINT_FUNCTIONS: Final[dict[str, tuple[range, PointFunction]]] = {
     "findpos": (range(1), _found_position),
     "tlset": (range(1, 2), _tool_point),
     "local": (range(1, 2), _local_point),
+    "vxtrans": (range(2, 4), _place_of_pixel),
     "ecpset": (range(1, 2), lambda s, a: Point(s.machine.control_points.get(as_integer(a[0])))),
 }
 """Name to the numbers of arguments allowed and the function."""

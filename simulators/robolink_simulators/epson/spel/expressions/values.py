@@ -11,6 +11,8 @@ Value = bool | int | float | str | Point
 
 LONGEST_STRING = 255
 _TRUE = -1
+_RADIX = {"&h": 16, "&o": 8, "&b": 2}
+_HIGHEST_INT32 = 2**31 - 1
 LARGEST_INT = 2**63 - 1
 _LARGEST_UNSIGNED = 2**64 - 1
 
@@ -90,3 +92,21 @@ def checked(value: Value) -> Value:
     if isinstance(value, str) and len(value) > LONGEST_STRING:
         raise out_of_range("String longer than 255 characters")
     return value
+
+
+def number_value(text: str) -> int | float:
+    """Return the value of a numeric literal.
+
+    Decimal integers that no Long holds are reals (inferred from Str$(99999999999999), which
+    prints with an exponent, docs/reference/spel.md 3.2).
+
+    Raises:
+        Refusal: No type holds it.
+    """
+    lower = text.lower()
+    if lower[:2] in _RADIX:
+        return as_number(checked(int(lower[2:], _RADIX[lower[:2]])))
+    value = float(lower)
+    if lower.isdigit() and value <= _HIGHEST_INT32:
+        return int(lower)
+    return as_number(checked(value))

@@ -6,7 +6,11 @@ from typing import Any
 
 from robolink.messages import tr
 from robolink_simulators.epson.refusals import RefusalKind
-from robolink_simulators.epson.spel.expressions.data_types import DataType
+from robolink_simulators.epson.spel.expressions.data_types import (
+    DataType,
+    elements,
+    most_elements,
+)
 from robolink_simulators.epson.spel.line_tree import (
     AssignElement,
     Branching,
@@ -22,6 +26,7 @@ from robolink_simulators.epson.spel.line_tree import (
     Unsimulated,
     VisionAccess,
     VisionRun,
+    VisionStatement,
 )
 from robolink_simulators.epson.spel.parse import WINDOW_ONLY
 from robolink_simulators.epson.spel.programs.blocks import BlockCompiler
@@ -106,10 +111,9 @@ class FunctionCompiler:
         for declared in node.variables:
             if declared.name in self._emitter.scope.slots:
                 raise self._emitter.fault(tr("{name} is declared twice", name=declared.name))
-            bounds = bounds_of(declared.bounds, self._emitter)
-            slot = LocalSlot(
-                declared.name, self._types[node.type_name], bounds or (), bounds is not None
-            )
+            kind = self._types[node.type_name]
+            bounds = bounds_of(declared.bounds, self._emitter, most_elements(kind, "local"))
+            slot = LocalSlot(declared.name, kind, bounds or (), bounds is not None)
             self._emitter.scope.declare(slot)
 
     def _guarded(self, compiled: Callable[[Any], None], node: object) -> None:
@@ -117,6 +121,8 @@ class FunctionCompiler:
             compiled(node)
         except ProgramFault as fault:
             self.faults.append(fault)
+        except RecursionError:
+            self.faults.append(self._emitter.fault(tr("The line is too deeply nested.")))
 
     def _one(self, node: LineNode, place: SourcePlace) -> None:
         self._emitter.begin(place)
@@ -173,7 +179,14 @@ class FunctionCompiler:
                 emitter.emit(redim(emitter.array(Name(name)), runs, keep_values=kept))
             case Trap(_, _, action, target) if action == "goto" and target is not None:
                 emitter.emit(compile_family(emitter, node, self._target(target)))
-            case TaskStatement() | ChannelStatement() | Trap() | VisionRun() | VisionAccess():
+            case (
+                TaskStatement()
+                | ChannelStatement()
+                | Trap()
+                | VisionRun()
+                | VisionAccess()
+                | VisionStatement()
+            ):
                 emitter.emit(compile_family(emitter, node))
             case Unsimulated(word):
                 emitter.emit(refuse(RefusalKind.NOT_SIMULATED, f"{word} is not simulated"))
@@ -283,11 +296,18 @@ def without_forced(statement: KeywordStatement) -> KeywordStatement:
     return statement
 
 
-def bounds_of(bounds: tuple[Expression, ...] | None, emitter: Emitter) -> tuple[int, ...] | None:
+def bounds_of(
+    bounds: tuple[Expression, ...] | None, emitter: Emitter, most: int
+) -> tuple[int, ...] | None:
     """Return the bounds of a declared array, ``None`` for a scalar.
 
+    Args:
+        bounds: As they are written.
+        emitter: Says where.
+        most: How many elements it may have.
+
     Raises:
-        ProgramFault: They are no whole numbers.
+        ProgramFault: They are no whole numbers, or there are too many elements.
     """
     if bounds is None:
         return None
@@ -297,4 +317,6 @@ def bounds_of(bounds: tuple[Expression, ...] | None, emitter: Emitter) -> tuple[
         if not isinstance(value, int) or value < 0:
             raise emitter.fault(tr("the bound of an array is a number from 0 on"))
         values.append(value)
+    if elements(values) > most:
+        raise emitter.fault(tr("this array may have {most} elements", most=most))
     return tuple(values) or (0,)

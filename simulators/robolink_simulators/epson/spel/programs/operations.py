@@ -18,7 +18,7 @@ from robolink_simulators.epson.spel.tasks.compiled import (
     JumpTarget,
     Operation,
 )
-from robolink_simulators.epson.spel.tasks.task import SpelTask
+from robolink_simulators.epson.spel.tasks.task import DEEPEST_CALL, SpelTask
 
 SWITCHED: Final = object()
 """What an operation gives when the task goes on in another function."""
@@ -144,7 +144,10 @@ def for_next(slot: int, body: JumpTarget) -> Operation:
     """End a pass of a For: the variable ends beyond the limit (docs/reference/spel.md 4.3)."""
 
     def go(t: SpelTask) -> None:
-        counter, limit, by = t.results[slot]
+        begun = t.results[slot]
+        if begun is None:
+            raise SpelRefusal(RefusalKind.NEXT_WITHOUT_FOR, "Next without For")
+        counter, limit, by = begun
         t.count_pass()
         value = counter.values[0] = counter.kind.store(counter.values[0] + by)
         if not (value < limit if by < 0 else value > limit):
@@ -175,6 +178,8 @@ def go_sub(target: JumpTarget) -> Operation:
     """Go on elsewhere until Return."""
 
     def go(t: SpelTask) -> None:
+        if len(t.frame.returns) >= DEEPEST_CALL:
+            raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, "Subroutines call too deeply")
         t.frame.returns.append(t.pc)
         t.pc = target.pc
 

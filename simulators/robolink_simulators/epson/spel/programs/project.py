@@ -7,7 +7,12 @@ from typing import Final
 
 from robolink.messages import tr
 from robolink_simulators.epson.options import EpsonOptions
-from robolink_simulators.epson.spel.expressions.data_types import DataType, Variable, data_types
+from robolink_simulators.epson.spel.expressions.data_types import (
+    DataType,
+    Variable,
+    data_types,
+    most_elements,
+)
 from robolink_simulators.epson.spel.line_tree import (
     BlockWord,
     Declaration,
@@ -143,9 +148,11 @@ class ProjectBuilder:
         emitter = Emitter(function, {}, self._options)
         for declared in node.variables:
             _check_length(declared.name, place)
-            bounds = bounds_of(declared.bounds, emitter) or ()
-            variable = Variable(self._types[node.type_name], bounds)
-            if node.scope in ("local", "module"):
+            kind, life = self._types[node.type_name], node.scope
+            life = "module" if life == "local" else life
+            bounds = bounds_of(declared.bounds, emitter, most_elements(kind, life)) or ()
+            variable = Variable(kind, bounds, life)
+            if life == "module":
                 module[declared.name] = variable
                 continue
             known = self._project.shared.get(declared.name)

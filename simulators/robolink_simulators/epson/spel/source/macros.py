@@ -5,6 +5,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
+LONGEST_EXPANSION: Final = 8192
+"""Characters of a line after its macros (not stated; a macro may name its parameter twice, so that
+thirty of them inside each other would fill any memory)."""
+
 _TOKENS: Final = re.compile(
     r'"[^"]*(?:"|$)|&[hbo][0-9a-f]+|[a-z][a-z0-9_]*\$?|.', re.IGNORECASE | re.DOTALL
 )
@@ -29,6 +33,9 @@ def expanded(line: str, macros: Mapping[str, Macro]) -> str:
 
     The text of a macro holds no other macro (documented), so it is not looked at again; what
     stands in its parentheses is.
+
+    Raises:
+        OverflowError: It grows beyond :data:`LONGEST_EXPANSION`.
     """
     if not macros:
         return line
@@ -45,6 +52,8 @@ def expanded(line: str, macros: Mapping[str, Macro]) -> str:
             arguments, position = _arguments(tokens, position)
             replaced = [expanded(argument, macros) for argument in arguments]
             written.append(macro.applied(replaced))
+        if sum(map(len, written)) > LONGEST_EXPANSION:
+            raise OverflowError(LONGEST_EXPANSION)
     return "".join(written)
 
 

@@ -65,6 +65,7 @@ class Preprocessor:
     faults: list[ProgramFault] = field(default_factory=list)
     _macros: dict[str, Macro] = field(default_factory=dict)
     _branches: list[tuple[bool, bool]] = field(default_factory=list)
+    _open: list[Path] = field(default_factory=list)
     _size: int = 0
 
     def lines(self, path: Path) -> Iterator[SourceLine]:
@@ -85,6 +86,7 @@ class Preprocessor:
         if self._size > LARGEST_PROGRAM:
             self._blame(SourcePlace(path.name, 1), tr("The program is larger than 8 MB."))
             return
+        self._open.append(path)
         for place, text in _joined(path.name, decoded(content)):
             code = _without_comment(text)
             directive = _DIRECTIVE.match(code)
@@ -95,8 +97,15 @@ class Preprocessor:
                 continue
             if len(text) > LONGEST_LINE:
                 self._blame(place, tr("The line is longer than 512 characters."))
-            if code.strip():
-                yield SourceLine(place, expanded(code.rstrip(), self._macros))
+            if code.strip() and len(code) <= LONGEST_LINE:
+                yield from self._expanded(place, code.rstrip())
+        self._open.pop()
+
+    def _expanded(self, place: SourcePlace, code: str) -> Iterator[SourceLine]:
+        try:
+            yield SourceLine(place, expanded(code, self._macros))
+        except OverflowError:
+            self._blame(place, tr("With its macros the line is longer than 8192 characters."))
 
     def _directive(
         self, place: SourcePlace, word: str, rest: str, depth: int
@@ -148,6 +157,8 @@ class Preprocessor:
         found = [path for path in sorted(self.folder.iterdir()) if path.name.lower() == wanted]
         if not found:
             self._blame(place, tr("There is no file {name} beside it.", name=match[1]))
+        elif found[0] in self._open:
+            self._blame(place, tr("{name} includes itself.", name=match[1]))
         elif depth >= _DEEPEST_INCLUDE:
             self._blame(place, tr("Files include each other more than 8 deep."))
         else:

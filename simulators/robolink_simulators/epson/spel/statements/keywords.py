@@ -22,6 +22,7 @@ from robolink_simulators.epson.spel.expressions.joint_functions import (
     joints_at_pulses,
     pulses_of,
 )
+from robolink_simulators.epson.spel.expressions.machine_functions import clock_of
 from robolink_simulators.epson.spel.expressions.printing import CRLF, number_text
 from robolink_simulators.epson.spel.expressions.values import out_of_range
 from robolink_simulators.epson.spel.statements.legs import go_leg
@@ -244,6 +245,13 @@ def _turn_joint(evaluator: Evaluator, command: KeywordStatement) -> StatementOut
     return StatementOutcome(legs=[go_leg(machine, machine.arm.joints, Joints(*values))])
 
 
+def _clock(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
+    """Show the date, or the time of day; neither can be set (documented)."""
+    _expect(command, 0)
+    layout = "%Y/%m/%d" if command.name == "date" else "%H:%M:%S"
+    return StatementOutcome(clock_of(evaluator.session).strftime(layout) + CRLF)
+
+
 def _await_position(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
     """Wait until the robot stands (WaitPos)."""
     _expect(command, 0)
@@ -298,6 +306,8 @@ _HANDLERS: Final[dict[str, Callable[[Evaluator, KeywordStatement], StatementOutc
     "pulse": _pulse,
     "home": _home,
     "jtran": _turn_joint,
+    "date": _clock,
+    "time": _clock,
     "waitpos": _await_position,
     "on": _on,
     "off": _off,

@@ -4,9 +4,10 @@ import math
 from dataclasses import replace
 
 from robolink.model import Pose
+from robolink_simulators.epson.arm.arc import MeasuredWay
 from robolink_simulators.epson.arm.joints import Joints
 from robolink_simulators.epson.arm.motion_parameters import MotionPhase
-from robolink_simulators.epson.arm.tilted_legs import plan_about_point, plan_circle, plan_line
+from robolink_simulators.epson.arm.tilted_legs import plan_about_point, plan_line, plan_way
 from robolink_simulators.epson.arm.trajectory import JointLeg, Leg, LinePace, plan_go
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.points import frame_at
@@ -78,15 +79,16 @@ def held_leg(machine: Machine, end: Pose) -> Leg:
     )
 
 
-def arc_leg(machine: Machine, mid: Pose, end: Pose) -> Leg:
-    """Plan an arc of the selected tip from where it is.
+def way_leg(machine: Machine, end: Pose, way: MeasuredWay) -> Leg:
+    """Plan a way of the selected tip from where it is.
 
     Raises:
-        Refusal: The three points make no arc, or it leaves the envelope.
+        Refusal: It leaves the envelope, or hand, elbow or wrist would have to change.
     """
-    return plan_circle(
+    return plan_way(
         machine.model,
-        (machine.tip(), mid, end),
+        (machine.tip(), end),
+        way,
         line_pace(machine),
         offset=machine.offset,
         near=machine.arm.joints,

@@ -21,8 +21,8 @@ from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.joint_functions import least_motion
 from robolink_simulators.epson.spel.expressions.values import out_of_range
 from robolink_simulators.epson.spel.statements.jump import jump, jump3
-from robolink_simulators.epson.spel.statements.legs import arc_leg, go_leg, held_leg, line_leg
-from robolink_simulators.epson.spel.statements.passing import passing
+from robolink_simulators.epson.spel.statements.legs import go_leg, held_leg, line_leg
+from robolink_simulators.epson.spel.statements.through_points import ARC_VERBS, arc, passing
 from robolink_simulators.epson.spel.tree import (
     MotionStatement,
     PointExpression,
@@ -47,11 +47,12 @@ _WORDS: Final = {
     "tmove": _LINE_WORDS,
     "bmove": _LINE_WORDS,
     "arc": _LINE_WORDS,
+    "arc3": _LINE_WORDS,
     "jump": frozenset({"limz"}) | _GATE_WORDS,
     "jump3": frozenset({"ljm"}) | _GATE_WORDS,
     "jump3cp": frozenset({"ljm", "rot"}) | _GATE_WORDS,
 }
-_WAYPOINTS: Final = {"arc": 2, "jump3": 3, "jump3cp": 3}
+_WAYPOINTS: Final = {"jump3": 3, "jump3cp": 3}
 
 
 def plan(evaluator: Evaluator, motion: MotionStatement) -> list[Leg]:
@@ -68,6 +69,9 @@ def plan(evaluator: Evaluator, motion: MotionStatement) -> list[Leg]:
         raise SpelRefusal(RefusalKind.SYNTAX, f"{motion.verb} knows no {', '.join(sorted(wrong))}")
     if len(motion.options.words & {*_UNTIL_WORDS, "sense"}) > 1:
         raise SpelRefusal(RefusalKind.SYNTAX, "A motion takes one of Till, Find and Sense")
+    if motion.verb in ARC_VERBS:
+        require_drives(machine)
+        return [arc(evaluator, motion)]
     points = _points(evaluator, motion)
     if motion.verb != "pass" and len(points) != _WAYPOINTS.get(motion.verb, 1):
         raise SpelRefusal(RefusalKind.SYNTAX, f"{motion.verb} does not take {len(points)} points")
@@ -79,8 +83,6 @@ def plan(evaluator: Evaluator, motion: MotionStatement) -> list[Leg]:
             return jump(machine, points[0], height_mm)
         case "jump3" | "jump3cp":
             return jump3(machine, (points[0], points[1], points[2]))
-        case "arc":
-            return [arc_leg(machine, *(machine.pose_of(point) for point in points))]
         case "pass":
             return passing(evaluator, motion, points)
         case verb:
@@ -115,8 +117,6 @@ def _points(evaluator: Evaluator, motion: MotionStatement) -> list[Point]:
             case SwitchOnTheWay():
                 if motion.verb != "pass":
                     raise SpelRefusal(RefusalKind.SYNTAX, f"{motion.verb} switches nothing")
-            case _ if motion.verb == "arc":
-                raise SpelRefusal(RefusalKind.NOT_SIMULATED, "Arc by an angle or a radius")
             case _:
                 raise SpelRefusal(RefusalKind.SYNTAX, f"{motion.verb} needs a point")
     return points

@@ -61,10 +61,18 @@ def _decimal(evaluator: Evaluator, command: KeywordStatement) -> str:
     return ""
 
 
+def _reset_counter(evaluator: Evaluator, command: KeywordStatement) -> str:
+    if len(command.arguments) != 1:
+        raise SpelRefusal(RefusalKind.SYNTAX, "CTReset takes an input")
+    evaluator.session.machine.inputs.count_from_zero(evaluator.integer(command.arguments[0]))
+    return ""
+
+
 BIT_STATEMENTS: Final[dict[str, Callable[[Evaluator, KeywordStatement], str]]] = {
     "setsw": _set_switch,
     "setin": _set_byte,
     "setinw": _set_word,
     "opbcd": _decimal,
+    "ctreset": _reset_counter,
 }
 """Keyword to what carries it out."""

@@ -219,7 +219,7 @@ class ProgramRunner:
     def _take_up(self, task: SpelTask, outcome: object) -> bool:
         """Deal with what an operation gave; tell whether the task goes on at once."""
         if isinstance(outcome, Statement):
-            waiting: TaskWaiting = StatementWaiting(self._carried_out(task, outcome))
+            waiting: TaskWaiting = StatementWaiting(self.carried_out(task, outcome))
         elif hasattr(outcome, "look"):
             waiting = outcome  # type: ignore[assignment]
         else:
@@ -229,8 +229,12 @@ class ProgramRunner:
             return False  # Wait 0 gives the others a turn (documented)
         return task.waiting is None and not task.ended and not task.halted
 
-    def _carried_out(self, task: SpelTask, statement: Statement) -> StatementExecution:
-        """Begin a statement of the machine."""
+    def carried_out(self, task: SpelTask, statement: Statement) -> StatementExecution:
+        """Begin a statement of the machine for a task.
+
+        Raises:
+            Refusal: This kind of task may not, or another task moves the robot.
+        """
         machine = self.session.machine
         machine.advance(task.now_ns)
         machine.timed_bits.advance(task.now_ns)

@@ -12,7 +12,7 @@ from robolink_simulators.epson.spel.tasks.compiled import CompiledFunction, Jump
 from robolink_simulators.epson.spel.tasks.waits import Blocking, TaskWaiting
 
 DEEPEST_CALL: Final = 200
-"""Functions that may call each other (recursion is not mentioned; bounded here)."""
+"""Functions, or subroutines of one, that may call each other (no limit is mentioned; assumed)."""
 
 
 class TaskKind(StrEnum):

@@ -1,6 +1,6 @@
 """What a task waits for: a statement that takes time, a signal, a lock, a port."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Final, Protocol
 
 from robolink_simulators.epson.spel.statement_execution import StatementExecution
@@ -59,6 +59,39 @@ class StatementWaiting:
     def go_on(self, now_ns: int) -> None:
         """Go on with its motion, or begin its time anew."""
         self.execution.go_on(now_ns)
+
+
+class OneAfterAnother:
+    """Waits that follow each other; between two of them something is done.
+
+    Args:
+        steps: Gives the next wait once the one before is over. There is at least one.
+    """
+
+    def __init__(self, steps: Iterator[TaskWaiting]) -> None:
+        self._steps = steps
+        self._present = next(steps)
+
+    def due_ns(self, seen_ns: int) -> int:
+        """Return when something of the present one happens next."""
+        return self._present.due_ns(seen_ns)
+
+    def look(self, now_ns: int) -> bool:
+        """Look at the present one, and at those after it that are over at once."""
+        while self._present.look(now_ns):
+            following = next(self._steps, None)
+            if following is None:
+                return True
+            self._present = following
+        return False
+
+    def suspend(self, now_ns: int) -> None:
+        """Hold the present one."""
+        self._present.suspend(now_ns)
+
+    def go_on(self, now_ns: int) -> None:
+        """Let the present one go on."""
+        self._present.go_on(now_ns)
 
 
 class Blocking:

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
+from robolink.errors import ConfigError
 from robolink.protocols.mailbox import (
     Answer,
     Command,
@@ -22,6 +23,7 @@ from robolink_simulators.softmotion.catalogue import (
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
 from robolink_simulators.softmotion.group.condition import ReadToolMode
 from robolink_simulators.softmotion.kinematics.coordinates import CoordRef
+from robolink_simulators.softmotion.kinematics.kinematics import KinematicsModel
 from robolink_simulators.softmotion.mailbox.commands.complaints import Rejected, class_of
 from robolink_simulators.softmotion.mailbox.commands.operands import (
     require_finite,
@@ -67,6 +69,7 @@ class ToolDesk:
         self._parameters = parameters
         self._applied = group.tool
         self.selected = 0
+        self._built_in = (self.kinematics_code, group.kinematics)
         self.opcodes: Mapping[int, Handler] = MappingProxyType(
             {
                 Opcode.WRITE_TOOL: self._write,
@@ -86,8 +89,7 @@ class ToolDesk:
     def kinematics_code(self) -> int:
         """The word that names the kinematics."""
         position, _, orientation = self._group.kinematics.name.partition(_COUPLING)
-        codes = [find_kinematics(name) or 0 for name in (position, orientation)]
-        return kinematics_word(*codes)
+        return kinematics_word(_code(position), _code(orientation) if orientation else 0)
 
     def forget(self) -> None:
         """The group has no tool any more."""
@@ -147,6 +149,15 @@ class ToolDesk:
 
     def _set_kinematics(self, command: Command) -> Told:
         position, orientation, *_ = command.operands
+        execution = self._group.set_kin_transform(self._kinematics(position, orientation))
+        if execution.outputs.done:
+            self.forget()
+        return Told(execution)
+
+    def _kinematics(self, position: int, orientation: int) -> KinematicsModel:
+        """Return the kinematics of two codes; one of the machine builder's own is its own."""
+        if kinematics_word(position, orientation) == self._built_in[0]:
+            return self._built_in[1]
         name = _block_name(position)
         if orientation:
             name += _COUPLING + _block_name(orientation)
@@ -154,10 +165,10 @@ class ToolDesk:
             raise Rejected(ErrorClass.NO_KINEMATICS)
         known = parameter_names(name)
         parameters = {key: value for key, value in self._parameters.items() if key in known}
-        execution = self._group.set_kin_transform(machine_named(name, parameters).kinematics)
-        if execution.outputs.done:
-            self.forget()
-        return Told(execution)
+        try:
+            return machine_named(name, parameters).kinematics
+        except ConfigError:  # its own figures with the machine's parameters make none
+            raise Rejected(ErrorClass.NO_KINEMATICS) from None
 
     def _apply(self, number: int, tool: Six, name: str) -> Told:
         execution = self._group.set_tool(self._units.tool(tool), name)
@@ -168,6 +179,10 @@ class ToolDesk:
 
     def _answer(self, tool: ToolInForce) -> Answer:
         return Answer.of_pose(self._units.given(CoordRef.of(tool.frame)))
+
+
+def _code(block_name: str) -> Kinematics:
+    return find_kinematics(block_name) or Kinematics.CUSTOM
 
 
 def _block_name(code: int) -> str:

@@ -3,9 +3,9 @@
 import struct
 from collections.abc import Callable, Sequence
 
+from robolink.model import AxisKind
 from robolink.protocols.mailbox import Four, Six
 from robolink_simulators.softmotion.kinematics.coordinates import CoordRef
-from robolink_simulators.softmotion.kinematics.kinematics import AxisKind
 from robolink_simulators.softmotion.motion.paths import Dynamics
 
 _UM_PER_MM = 1000.0

@@ -12,6 +12,7 @@ from robolink_simulators.epson.spel.line_tree import (
     Trap,
     VisionAccess,
     VisionRun,
+    VisionStatement,
 )
 from robolink_simulators.epson.spel.programs.emitter import Emitter
 from robolink_simulators.epson.spel.programs.families.channels import CHANNEL_STATEMENTS
@@ -20,10 +21,20 @@ from robolink_simulators.epson.spel.programs.families.interrupts import compile_
 from robolink_simulators.epson.spel.programs.families.texts import PROCEDURES
 from robolink_simulators.epson.spel.programs.families.timers_and_files import TIMERS_AND_FILES
 from robolink_simulators.epson.spel.programs.families.vision import compile_access, compile_run
+from robolink_simulators.epson.spel.programs.families.vision_calibrating import (
+    VISION_STATEMENTS,
+)
 from robolink_simulators.epson.spel.tasks.compiled import JumpTarget, Operation
 
 FamilyStatement = (
-    TaskStatement | ChannelStatement | Trap | Call | AssignElement | VisionRun | VisionAccess
+    TaskStatement
+    | ChannelStatement
+    | Trap
+    | Call
+    | AssignElement
+    | VisionRun
+    | VisionAccess
+    | VisionStatement
 )
 
 PROCEDURE_TABLES: Final = (PROCEDURES, TIMERS_AND_FILES)
@@ -47,6 +58,8 @@ def compile_family(
             return compile_run(emitter, node)
         case VisionAccess():
             return compile_access(emitter, node)
+        case VisionStatement(word):
+            return VISION_STATEMENTS[word](emitter, node)
         case TaskStatement(word):
             return TASK_STATEMENTS[word](emitter, node)
         case ChannelStatement(word):

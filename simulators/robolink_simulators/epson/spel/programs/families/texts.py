@@ -1,17 +1,29 @@
-"""FmtStr and ParseStr, UBound, and what a program tells a PC (docs/reference/spel.md 11, 17)."""
+"""FmtStr and ParseStr, UBound, Eval, what a program tells a PC (docs/reference/spel.md 11, 17)."""
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from itertools import chain
 from typing import Final
 
 from robolink.messages import tr
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
-from robolink_simulators.epson.spel.expressions.printing import formatted
-from robolink_simulators.epson.spel.expressions.values import as_integer, as_number, as_text
+from robolink_simulators.epson.spel.expressions.printing import CRLF, formatted
+from robolink_simulators.epson.spel.expressions.values import (
+    LONGEST_STRING,
+    as_integer,
+    as_number,
+    as_text,
+)
 from robolink_simulators.epson.spel.line_tree import Call
+from robolink_simulators.epson.spel.parse import parse
 from robolink_simulators.epson.spel.programs.emitter import Emitter
 from robolink_simulators.epson.spel.tasks.compiled import Operation
 from robolink_simulators.epson.spel.tasks.task import SpelTask
+from robolink_simulators.epson.spel.tasks.waits import (
+    OneAfterAnother,
+    StatementWaiting,
+    TaskWaiting,
+)
 from robolink_simulators.epson.spel.tree import ByReference, Expression, Name
 
 
@@ -93,6 +105,54 @@ def upper_bound(emitter: Emitter, arguments: Sequence[Expression], slot: int) ->
     return go
 
 
+def evaluated(emitter: Emitter, arguments: Sequence[Expression], slot: int) -> Operation:
+    """Eval(command$[, reply$]): a line of the command window; its error number, 0 if it is fine.
+
+    It never raises; the reply is cut at 255 characters, and is ``!Error: number`` after an error
+    (documented, docs/reference/spel.md 4.4).
+
+    Raises:
+        ProgramFault: The arguments do not fit.
+    """
+    if not 1 <= len(arguments) <= 2:
+        raise emitter.fault(tr("Eval takes a command and a variable for its reply"))
+    command = emitter.run(arguments[0])
+    reply = emitter.variable(_named(emitter, arguments[1])) if len(arguments) > 1 else None
+
+    def finish(t: SpelTask, number: int, said: str) -> None:
+        t.results[slot] = number
+        if reply is not None:
+            text = f"!Error: {number}" if number else said.removesuffix(CRLF)
+            reply(t).values[0] = text[:LONGEST_STRING]
+
+    def carrying_out(t: SpelTask, text: str) -> Iterator[TaskWaiting]:
+        said = ""
+        try:
+            for statement in parse(text):
+                running = StatementWaiting(t.runner.carried_out(t, statement))
+                yield running
+                said += running.execution.output
+                t.now_ns = max(t.now_ns, running.execution.ended_ns)
+                if running.execution.error is not None:
+                    finish(t, running.execution.error.number, "")
+                    return
+        except SpelRefusal as refusal:
+            finish(t, getattr(t.session.options.numbers, refusal.kind), "")
+            return
+        finish(t, 0, said)
+
+    def go(t: SpelTask) -> TaskWaiting | None:
+        steps = carrying_out(t, as_text(command(t)))
+        first = next(steps, None)
+        return None if first is None else OneAfterAnother(chain((first,), steps))
+
+    return go
+
+
+def _evaluate(emitter: Emitter, node: Call) -> Operation:
+    return evaluated(emitter, node.arguments, emitter.slot())
+
+
 def _tell(emitter: Emitter, node: Call) -> Operation:
     """SPELCom_Event: what EPSON's own API would hand to a PC stands in the console instead."""
     runs = [emitter.run(argument) for argument in node.arguments]
@@ -102,12 +162,14 @@ def _tell(emitter: Emitter, node: Call) -> Operation:
 PROCEDURES: Final[dict[str, Callable[[Emitter, Call], Operation]]] = {
     "fmtstr": _format,
     "parsestr": _parse,
+    "eval": _evaluate,
     "spelcom_event": _tell,
 }
 """Statements that are written as calls."""
 
 FUNCTIONS_OF_ARRAYS: Final[dict[str, Callable[[Emitter, Sequence[Expression], int], Operation]]] = {
     "parsestr": parse_text,
+    "eval": evaluated,
     "ubound": upper_bound,
 }
-"""Functions that take an array itself, and not what it holds."""
+"""Functions that take a variable itself, and not what it holds."""

@@ -18,7 +18,12 @@ _NS_PER_MS = 1_000_000
 _FORBIDDEN = frozenset({TaskKind.NO_ABORT, TaskKind.BACKGROUND})
 
 
-def _vision(t: SpelTask) -> VisionSystem:
+def vision_of(t: SpelTask) -> VisionSystem:
+    """Return the vision system that a task may use.
+
+    Raises:
+        Refusal: This kind of task may not, or the project has none.
+    """
     if t.kind in _FORBIDDEN:
         raise SpelRefusal(RefusalKind.NOT_IN_THIS_TASK, "No vision in this kind of task")
     vision: VisionSystem | None = t.runner.vision
@@ -35,23 +40,29 @@ def _text(emitter: Emitter, part: str) -> Callable[[SpelTask], str]:
     return lambda t: as_text(run(t))
 
 
+def named(emitter: Emitter, given: Expression) -> Callable[[SpelTask], str]:
+    """Return what gives the name of something of the vision project: a bare name, or a text.
+
+    Raises:
+        ProgramFault: It makes no sense.
+    """
+    if isinstance(given, Name) and given.arguments is None:
+        return _text(emitter, given.name)
+    run = emitter.run(given)
+    return lambda t: as_text(run(t))
+
+
 def compile_run(emitter: Emitter, node: VisionRun) -> Operation:
     """``VRun sequence``: a bare name, or a text. It goes on when the sequence is finished.
 
     Raises:
         ProgramFault: It makes no sense.
     """
-    if isinstance(node.sequence, Name) and node.sequence.arguments is None:
-        name = _text(emitter, node.sequence.name)
-    else:
-        run = emitter.run(node.sequence)
-
-        def name(t: SpelTask) -> str:
-            return as_text(run(t))
+    name = named(emitter, node.sequence)
 
     def go(t: SpelTask) -> Blocking:
         t.session.machine.advance(t.now_ns)
-        took_ms = _vision(t).run(name(t))
+        took_ms = vision_of(t).run(name(t))
         return Blocking(lambda: False, lambda: None, end_ns=t.now_ns + took_ms * _NS_PER_MS)
 
     return go
@@ -76,7 +87,7 @@ def compile_access(emitter: Emitter, node: VisionAccess) -> Operation:
     def go(t: SpelTask) -> None:
         path = tuple(part(t) for part in parts)
         wanted = None if index is None else as_integer(index(t))
-        for value, target in zip(_vision(t).get(path, wanted), targets, strict=True):
+        for value, target in zip(vision_of(t).get(path, wanted), targets, strict=True):
             if value is not None:
                 variable = target(t)
                 variable.values[0] = variable.kind.store(value)
@@ -95,7 +106,7 @@ def _setting(
         given = value(t)
         if not isinstance(given, (bool, int, float, str)):
             raise SpelRefusal(RefusalKind.TYPE_MISMATCH, "No property is a point")
-        _vision(t).set(tuple(part(t) for part in parts), given)
+        vision_of(t).set(tuple(part(t) for part in parts), given)
 
     return go
 

@@ -1,0 +1,109 @@
+"""Serial lines: which cells name one, and who answers at a line that a person names."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from robolink.errors import ConfigError, ConnectError, TransportError
+from robolink.messages import tr
+from robolink_cli.console.render import say
+
+if TYPE_CHECKING:
+    from robolink.controllers.epson.verify import LineProbe
+
+_WIRED = ("serial", "modbus-rtu")
+
+
+@dataclass(frozen=True, slots=True)
+class AskedLine:
+    """A line that was asked, or could not be.
+
+    Attributes:
+        url: As it was given.
+        probe: What was found; ``None`` when it could not be opened.
+        why: Why not.
+    """
+
+    url: str
+    probe: "LineProbe | None"
+    why: str = ""
+
+
+def devices_of_cells() -> dict[str, list[str]]:
+    """Return the cells of each serial port that cell files name, by the port.
+
+    Files that are wrong name none: ``doctor`` tells what is wrong with them.
+    """
+    from robolink.config import load_cells
+    from robolink.transport import parse_url
+
+    try:
+        cells = load_cells()
+    except ConfigError:
+        return {}
+    named: dict[str, list[str]] = {}
+    for cell in cells.values():
+        link = parse_url(cell.url)
+        if link.medium in _WIRED and link.port is None:
+            named.setdefault(link.path or link.host.upper(), []).append(cell.name)
+    return named
+
+
+def ask_lines(urls: Sequence[str], timeout_s: float) -> list[AskedLine]:
+    """Ask at each line who is there.
+
+    Raises:
+        ConfigError: A URL makes no sense; then none was opened.
+    """
+    from robolink.controllers.epson.verify import probe_line, require_line
+    from robolink.transport import parse_url
+
+    for url in urls:
+        require_line(parse_url(url))
+    asked = list[AskedLine]()
+    for url in urls:
+        try:
+            asked.append(AskedLine(url, probe_line(url, timeout_s=max(timeout_s, 0.5))))
+        except (ConnectError, TransportError) as error:
+            asked.append(AskedLine(url, None, error.what))
+    return asked
+
+
+def show_lines(asked: Sequence[AskedLine]) -> None:
+    """Say what was found at each line, and every byte that was sent."""
+    from robolink.controllers.epson.verify import AtTheLine
+
+    found = {
+        AtTheLine.CONTROLLER: tr("an EPSON controller answers by Remote RS232"),
+        AtTheLine.OTHER: tr("something answers, and not as Remote RS232 at these settings"),
+        AtTheLine.TALKING: tr("somebody talks there unasked; nothing was sent"),
+        AtTheLine.NOBODY: tr("nobody answers"),
+    }
+    for line in asked:
+        if line.probe is None:
+            say(f"{line.url}: {line.why}")
+            continue
+        say(f"{line.url}: {found[line.probe.found]}")
+        say(
+            tr(
+                "    sent: {sent}; received: {received}",
+                sent=_hex(line.probe.sent),
+                received=_hex(line.probe.received),
+            )
+        )
+
+
+def as_json(line: AskedLine) -> dict[str, object]:
+    """Return a line for ``--json``."""
+    if line.probe is None:
+        return {"url": line.url, "found": "unusable", "why": line.why}
+    return {
+        "url": line.url,
+        "found": line.probe.found,
+        "sent": line.probe.sent.hex(" "),
+        "received": line.probe.received.hex(" "),
+    }
+
+
+def _hex(data: bytes) -> str:
+    return data.hex(" ") or tr("nothing")

@@ -1,0 +1,301 @@
+"""What the charts of a controller say, in words: a worn nozzle, a slipping mount, a moved pin."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from itertools import combinations
+from statistics import fmean
+from typing import Final
+
+from robolink.drift.charts import Chart
+from robolink.drift.history import MeasuredChange
+from robolink.drift.mounted import mounted_trend
+from robolink.drift.significance import shift_is_sure, value_is_unusual
+from robolink.messages import tr
+
+LEAST_SHIFTED: Final = 3
+"""So many changes in a row are asked for before a shift is believed; one may be a bad touch."""
+
+_ALIKE_SIGMA: Final = 3.0
+
+
+class DriftCode(StrEnum):
+    """What a chart shows."""
+
+    UNUSUAL_CHANGE = "unusual_change"
+    MOUNT_SHIFTED = "mount_shifted"
+    LENGTH_SHIFTED = "length_shifted"
+    TOOLS_SHIFTED_ALIKE = "tools_shifted_alike"
+    NOZZLE_WORN = "nozzle_worn"
+    NOZZLE_MOVES = "nozzle_moves"
+    PIN_MOVED = "pin_moved"
+    TURN_TEST_GROWS = "turn_test_grows"
+
+
+@dataclass(frozen=True, slots=True)
+class DriftFinding:
+    """One thing that somebody should look at.
+
+    Attributes:
+        code: What it is.
+        subject: Numbers of the tools, or name of the station.
+        since: Label of the change with which it began.
+        change: Id of that change.
+        shift_mm: By how much, by axis; a turn test has the axis "".
+        sentence: The same for a person.
+        remedy: What to do.
+    """
+
+    code: DriftCode
+    subject: tuple[int | str, ...]
+    since: str
+    change: str
+    shift_mm: Mapping[str, float]
+    sentence: str
+    remedy: str
+
+
+def findings_in(
+    charts: Sequence[Chart], changes: Sequence[MeasuredChange]
+) -> tuple[DriftFinding, ...]:
+    """Return what the charts of one controller show now; nothing for a steady cell.
+
+    Args:
+        charts: Its charts.
+        changes: The changes that they were drawn from, oldest first.
+    """
+    return (
+        *_unusual(charts, changes),
+        *_sideways(charts),
+        *_lengths(charts),
+        *_mounted(changes),
+        *_pins(charts),
+        *_turn_tests(charts),
+    )
+
+
+def _unusual(charts: Sequence[Chart], changes: Sequence[MeasuredChange]) -> Iterator[DriftFinding]:
+    """Yield tools whose last change lies outside, and does not go on with a shift."""
+    newest = {change.tool: change for change in changes}
+    for tool, change in newest.items():
+        of_tool = [c for c in charts if c.quantity == "tip" and c.subject == tool]
+        out = [c for c in of_tool if c.last.change is change and _is_unusual(c)]
+        if not out or any(_has_shifted(c) for c in out):
+            continue
+        off = {c.axis: c.last.value_mm - c.centre_mm for c in out}
+        yield DriftFinding(
+            DriftCode.UNUSUAL_CHANGE,
+            (tool,),
+            change.at,
+            change.change,
+            off,
+            tr(
+                "Tool {tool}: the last change is out of the ordinary, {off} from the mean.",
+                tool=tool,
+                off=_said(off),
+            ),
+            tr(
+                "Is the right nozzle mounted, clean and tight? Is the pin clean? Measure again to "
+                "see whether it stays."
+            ),
+        )
+
+
+def _is_unusual(chart: Chart) -> bool:
+    before = [point.value_mm for point in chart.counted[:-1]]
+    return chart.last.outside and value_is_unusual(before, chart.last.value_mm)
+
+
+def _sideways(charts: Sequence[Chart]) -> Iterator[DriftFinding]:
+    shifted: dict[int | str, list[Chart]] = {}
+    for chart in charts:
+        if chart.quantity == "tip" and chart.axis in ("x", "y") and _has_shifted(chart):
+            shifted.setdefault(chart.subject, []).append(chart)
+    alike = _alike(charts, shifted)
+    if alike:
+        together = [chart for tool in alike for chart in shifted[tool]]
+        yield _shift(
+            DriftCode.TOOLS_SHIFTED_ALIKE,
+            tuple(alike),
+            together,
+            tr(
+                "Tools {tools} have moved alike by {off} on average over the last {count} changes, "
+                "since {when}.",
+                tools=", ".join(map(str, alike)),
+                **_facts(together),
+            ),
+            tr(
+                "What they have in common has moved: the pin, the adapter at the flange, or the "
+                "zero of U."
+            ),
+        )
+    for tool, moved in shifted.items():
+        if tool not in alike:
+            yield _shift(
+                DriftCode.MOUNT_SHIFTED,
+                (tool,),
+                moved,
+                tr(
+                    "Tool {tool} has moved sideways by {off} on average over the last {count} "
+                    "changes, since {when}.",
+                    tool=tool,
+                    **_facts(moved),
+                ),
+                tr("The mount may slip: check its screws and pins, then calibrate in full."),
+            )
+
+
+def _alike(charts: Sequence[Chart], shifted: Mapping[int | str, object]) -> list[int | str]:
+    """Return the tools, two or more, that moved by the same within their scatter."""
+    plane = {
+        (chart.subject, chart.axis): chart
+        for chart in charts
+        if chart.quantity == "tip" and chart.axis in ("x", "y") and chart.subject in shifted
+    }
+    found: dict[int | str, None] = {}
+    for one, other in combinations(shifted, 2):
+        pairs = [(plane.get((one, axis)), plane.get((other, axis))) for axis in ("x", "y")]
+        if all(a is not None and b is not None and _same_shift(a, b) for a, b in pairs):
+            found |= {one: None, other: None}
+    return list(found)
+
+
+def _same_shift(a: Chart, b: Chart) -> bool:
+    shifts, variance = list[float](), 0.0
+    for chart in (a, b):
+        since = chart.shifted or chart.judged[-LEAST_SHIFTED:]
+        shifts.append(sum(p.value_mm for p in since) / len(since) - chart.centre_mm)
+        variance += chart.sigma_mm**2 * (1 / len(since) + 1 / chart.baseline)
+    return abs(shifts[0] - shifts[1]) <= _ALIKE_SIGMA * math.sqrt(variance)
+
+
+def _lengths(charts: Sequence[Chart]) -> Iterator[DriftFinding]:
+    for chart in charts:
+        if chart.quantity == "tip" and chart.axis == "z" and _has_shifted(chart):
+            yield _shift(
+                DriftCode.LENGTH_SHIFTED,
+                (chart.subject,),
+                [chart],
+                tr(
+                    "Tool {tool} has another length: {off} on average over the last {count} "
+                    "changes, since {when}.",
+                    tool=chart.subject,
+                    **_facts([chart]),
+                ),
+                tr(
+                    "Are these nozzles of another length or make, worn, or not pushed home in the "
+                    "mount?"
+                ),
+            )
+
+
+def _mounted(changes: Sequence[MeasuredChange]) -> Iterator[DriftFinding]:
+    for tool in dict.fromkeys(change.tool for change in changes):
+        trend = mounted_trend([change for change in changes if change.tool == tool])
+        if trend is None:
+            continue
+        first = trend.first
+        facts = {
+            "tool": tool,
+            "nozzle": first.nozzle,
+            "count": trend.count,
+            "when": first.at[:10],
+            "off": _said(trend.moved_mm),
+        }
+        if trend.shorter:
+            code = DriftCode.NOZZLE_WORN
+            sentence = tr(
+                "Nozzle {nozzle} of tool {tool} becomes shorter: {off} over {count} measurements "
+                "since {when}.",
+                **facts,
+            )
+            remedy = tr("It wears. Change it before the lost length matters to the process.")
+        else:
+            code = DriftCode.NOZZLE_MOVES
+            sentence = tr(
+                "Nozzle {nozzle} of tool {tool} moves: {off} over {count} measurements since "
+                "{when}.",
+                **facts,
+            )
+            remedy = tr("It sits loose in its mount, or bends: fasten or change it.")
+        yield DriftFinding(code, (tool,), first.at, first.change, trend.moved_mm, sentence, remedy)
+
+
+def _pins(charts: Sequence[Chart]) -> Iterator[DriftFinding]:
+    moved: dict[int | str, list[Chart]] = {}
+    for chart in charts:
+        if chart.quantity == "pin" and _has_shifted(chart):
+            moved.setdefault(chart.subject, []).append(chart)
+    for station, of_pin in moved.items():
+        yield _shift(
+            DriftCode.PIN_MOVED,
+            (station,),
+            of_pin,
+            tr(
+                "Station {station} has been found {off} away on average over the last {count} "
+                "changes, since {when}.",
+                station=station,
+                **_facts(of_pin),
+            ),
+            tr("The pin, or what it stands on, has moved: fasten it, then learn it anew."),
+        )
+
+
+def _turn_tests(charts: Sequence[Chart]) -> Iterator[DriftFinding]:
+    for chart in charts:
+        if chart.quantity == "turn test" and _has_shifted(chart) and chart.shift_mm > 0:
+            yield _shift(
+                DriftCode.TURN_TEST_GROWS,
+                (chart.subject,),
+                [chart],
+                tr(
+                    "The turn test of tool {tool} ends {off} farther off on average over the last "
+                    "{count} changes, since {when}.",
+                    tool=chart.subject,
+                    **_facts([chart]),
+                ),
+                tr("Something has become loose, or the touches worse: mount, pin, lens, light."),
+            )
+
+
+def _has_shifted(chart: Chart) -> bool:
+    since = [point.value_mm for point in chart.shifted]
+    if len(since) < LEAST_SHIFTED:
+        return False
+    before = [point.value_mm for point in chart.counted[: -len(since)]]
+    return shift_is_sure(before, since)
+
+
+def _shift(
+    code: DriftCode,
+    subject: tuple[int | str, ...],
+    charts: Sequence[Chart],
+    sentence: str,
+    remedy: str,
+) -> DriftFinding:
+    first = _first(charts)
+    return DriftFinding(code, subject, first.at, first.change, _off(charts), sentence, remedy)
+
+
+def _facts(charts: Sequence[Chart]) -> dict[str, object]:
+    """Return the figures of a sentence about charts that shifted together."""
+    return {
+        "off": _said(_off(charts)),
+        "count": max(len(chart.shifted) for chart in charts),
+        "when": _first(charts).at[:10],
+    }
+
+
+def _off(charts: Sequence[Chart]) -> dict[str, float]:
+    """Return the shift by axis; of several tools their mean."""
+    axes = dict.fromkeys(chart.axis for chart in charts)
+    return {axis: fmean(c.shift_mm for c in charts if c.axis == axis) for axis in axes}
+
+
+def _first(charts: Sequence[Chart]) -> MeasuredChange:
+    return min((chart.shifted[0].change for chart in charts), key=lambda change: change.number)
+
+
+def _said(off: Mapping[str, float]) -> str:
+    return ", ".join(f"{axis.upper()} {value:+.3f} mm".lstrip() for axis, value in off.items())

@@ -1,0 +1,115 @@
+"""From the journal's entries to what was measured at each tool change."""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+
+from robolink.model import EntryKind, Recorded, read_offset, with_method_name_now
+
+KINDS = (EntryKind.CALIBRATION, EntryKind.VERIFY, EntryKind.DONE, EntryKind.ROLLED_BACK)
+"""Entries that say how a change went."""
+
+_AXES = {"x_mm": "x", "y_mm": "y", "z_mm": "z"}
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredChange:
+    """A tool change that was measured, and whose value was kept.
+
+    Attributes:
+        number: Number of the entry that kept it.
+        at: When, as a label: ISO 8601, UTC.
+        change: Id of the change.
+        tool: Number of the tool.
+        nozzle: Id of the nozzle or needle, empty when nobody gave one.
+        station: Name of the pin, beams or camera, empty when nobody gave one.
+        tip_mm: What was measured of the tip, mm, by axis (``x``, ``y``, ``z``); an axis that was
+            kept is not in it.
+        pin_mm: Where the pin was found with it, base, mm, by axis ``x`` and ``y``; ``None`` where
+            the method does not find its pin.
+        turn_test_mm: Largest distance of the proof about the new tip, ``None`` without one.
+    """
+
+    number: int
+    at: str
+    change: str
+    tool: int
+    nozzle: str
+    station: str
+    tip_mm: Mapping[str, float]
+    pin_mm: Mapping[str, float] | None
+    turn_test_mm: float | None
+
+
+def measured_changes(
+    entries: Iterable[Recorded], finds_pin: Callable[[str], bool]
+) -> list[MeasuredChange]:
+    """Return the changes of one controller whose value was measured and kept, oldest first.
+
+    What was taken back, refused or only typed is none: it says nothing about the nozzle.
+
+    Args:
+        entries: Those of :data:`KINDS` of one controller, in the order in which they were stored.
+        finds_pin: Tells whether a method, by its name, finds its pin with the offset.
+    """
+    measured: dict[tuple[str, int], Recorded] = {}
+    turned: dict[tuple[str, int], float] = {}
+    kept: dict[tuple[str, int], MeasuredChange] = {}
+    for entry in entries:
+        if entry.tool is None or not entry.change:
+            continue
+        key = entry.change, entry.tool
+        match entry.kind:
+            case EntryKind.CALIBRATION:
+                measured[key] = entry
+            case EntryKind.VERIFY:
+                turned.update(_turn_test(key, entry))
+            case EntryKind.ROLLED_BACK:
+                for taken_back in [one for one in kept if one[0] == entry.change]:
+                    del kept[taken_back]
+            case EntryKind.DONE if key in measured:
+                kept[key] = _change(entry, measured[key], turned.get(key), finds_pin)
+    return list(kept.values())
+
+
+def _turn_test(key: tuple[str, int], entry: Recorded) -> Iterator[tuple[tuple[str, int], float]]:
+    largest = entry.details.get("max_drift_mm")
+    if isinstance(largest, (int, float)):
+        yield key, float(largest)
+
+
+def _change(
+    done: Recorded,
+    calibration: Recorded,
+    turn_test_mm: float | None,
+    finds_pin: Callable[[str], bool],
+) -> MeasuredChange:
+    said = with_method_name_now(calibration.details)
+    return MeasuredChange(
+        number=done.number,
+        at=done.at,
+        change=done.change,
+        tool=done.tool or 0,
+        nozzle=done.signature.nozzle,
+        station=done.signature.station,
+        tip_mm=_tip(said, done.details),
+        pin_mm=_pin(said) if finds_pin(str(said.get("method", ""))) else None,
+        turn_test_mm=turn_test_mm,
+    )
+
+
+def _tip(said: Mapping[str, object], end: Mapping[str, object]) -> dict[str, float]:
+    """Return the tip as it was measured, not as it was written: a recipe may write a difference."""
+    tip = read_offset(said.get("tip") or said.get("proposed"))
+    measured = said.get("measured")
+    if tip is None or not isinstance(measured, (list, tuple)):
+        return {}
+    axes = {axis: name in measured for name, axis in _AXES.items()}
+    axes["z"] = axes["z"] or end.get("z_from") == "measured"
+    return {axis: getattr(tip, f"{axis}_mm") for axis, known in axes.items() if known}
+
+
+def _pin(said: Mapping[str, object]) -> dict[str, float] | None:
+    place = said.get("reference_point_mm")
+    if not isinstance(place, (list, tuple)) or len(place) < 2:
+        return None
+    return {"x": float(place[0]), "y": float(place[1])}

@@ -1,0 +1,124 @@
+"""The arm of an articulated robot."""
+
+import math
+from dataclasses import dataclass
+
+from robolink.model import AxisKind, OrientationSpace
+from robolink_simulators.cell.frames import (
+    Y_AXIS,
+    Z_AXIS,
+    Frame,
+    Matrix,
+    about,
+    product,
+    turned,
+)
+from robolink_simulators.softmotion.kinematics.coupled import Coupled
+from robolink_simulators.softmotion.kinematics.kinematics import (
+    AxisValues,
+    Configuration,
+    near_turn,
+)
+from robolink_simulators.softmotion.kinematics.wrists import Wrist3
+from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
+
+_ROUNDING = 1e-12
+# The flange with all axes 0: its X along Z of MCS, its Y against Y, its Z along X (documented).
+_AT_ZERO: Matrix = ((0.0, 0.0, 1.0), (0.0, -1.0, 0.0), (1.0, 0.0, 0.0))
+
+
+@dataclass(frozen=True, slots=True)
+class PosRRR:
+    """``Kin_Pos_RRR``: a turn about Z, then two parallel axes.
+
+    Documented: the Denavit-Hartenberg rows (offset, d, a, twist) (0, d1, a1, 90), (90, 0, a2, 0),
+    (0, d3, a3, 90) and d4 to the flange; MCS at the bottom of axis 0, Z upwards, X forward; the
+    flange at (a1 + d4, -d3, d1 + a2 + a3) with all axes 0; and the ranges of the axes. Inferred:
+    arm and elbow are told apart as below.
+
+    Attributes:
+        d1_mm, a1_mm, a2_mm, d3_mm, a3_mm, d4_mm: The lengths of those rows.
+    """
+
+    d1_mm: float = 400.0
+    a1_mm: float = 25.0
+    a2_mm: float = 350.0
+    d3_mm: float = 0.0
+    a3_mm: float = 35.0
+    d4_mm: float = 350.0
+
+    name = "Kin_Pos_RRR"
+    kinds = (AxisKind.ROTARY,) * 3
+
+    def flange(self, axes: AxisValues) -> Frame:
+        """Return where the flange is."""
+        turn, lean = about(Z_AXIS, axes[0]), axes[1] + axes[2]
+        out, up = self._wrist(axes)
+        rotation = product(product(turn, about(Y_AXIS, -lean)), _AT_ZERO)
+        return Frame(turned(turn, (out, -self.d3_mm, up)), rotation)
+
+    def configuration(self, axes: AxisValues) -> Configuration:
+        """Return which way the arm reaches and where its elbow is.
+
+        The arm reaches backwards where the wrist lies behind axis 0; the elbow is low where it
+        lies below the line from the second axis to the wrist, seen along the way the arm reaches.
+        """
+        backwards = self._wrist(axes)[0] < 0
+        bent_up = math.sin(math.radians(axes[2] - self._forearm()[1])) <= 0
+        return Configuration(arm_backwards=backwards, elbow_low=bent_up is backwards)
+
+    def axes_for(self, flange: Frame, configuration: Configuration, near: AxisValues) -> AxisValues:
+        """Return the axes that bring the flange to the position; how it is turned follows."""
+        wanted = configuration.completed(self.configuration(near))
+        x, y, z = flange.shift_mm
+        square = x * x + y * y - self.d3_mm * self.d3_mm
+        if not square >= 0:
+            raise BlockRefused(ErrorKind.UNREACHABLE, "Too near to axis 0")
+        out = -math.sqrt(square) if wanted.arm_backwards else math.sqrt(square)
+        a0 = near[0]
+        if square or self.d3_mm:
+            a0 = math.degrees(math.atan2(y, x) - math.atan2(-self.d3_mm, out))
+        r, h = out - self.a1_mm, z - self.d1_mm
+        reach, lift_deg = self._forearm()
+        cosine = (r * r + h * h - self.a2_mm**2 - reach**2) / (2 * self.a2_mm * reach)
+        if not abs(cosine) <= 1 + _ROUNDING:
+            raise BlockRefused(
+                ErrorKind.UNREACHABLE, f"Out of the arm's reach: {math.hypot(r, h):.3f} from axis 1"
+            )
+        bend = math.acos(max(-1.0, min(1.0, cosine)))
+        if wanted.elbow_low is wanted.arm_backwards:
+            bend = -bend
+        across, along = reach * math.sin(bend), self.a2_mm + reach * math.cos(bend)
+        upper_deg = math.degrees(math.atan2(h, r) - math.atan2(across, along))
+        a1, a2 = upper_deg - 90.0, math.degrees(bend) + lift_deg
+        return (near_turn(a0, near[0]), near_turn(a1, near[1]), near_turn(a2, near[2]))
+
+    def orientation_image(self, wanted: Matrix) -> OrientationSpace | None:  # noqa: ARG002
+        """Return that nothing is known (documented by its row of the table)."""
+        return OrientationSpace.unknown()
+
+    def _wrist(self, axes: AxisValues) -> tuple[float, float]:
+        """Return how far the end of the forearm is out from axis 0, and how far up."""
+        upper = math.radians(90.0 + axes[1])
+        fore = math.radians(90.0 + axes[1] + axes[2])
+        out = self.a1_mm + self.a2_mm * math.cos(upper) + self.a3_mm * math.cos(fore)
+        up = self.d1_mm + self.a2_mm * math.sin(upper) + self.a3_mm * math.sin(fore)
+        return out + self.d4_mm * math.sin(fore), up - self.d4_mm * math.cos(fore)
+
+    def _forearm(self) -> tuple[float, float]:
+        """Return its length, and by how many degrees a3 leads it."""
+        return math.hypot(self.a3_mm, self.d4_mm), math.degrees(math.atan2(self.d4_mm, self.a3_mm))
+
+
+def articulated_6dof(*lengths_mm: float) -> Coupled:
+    """Return ``Kin_ArticulatedRobot_6DOF``: a Kin_Pos_RRR with a Kin_Wrist3.
+
+    Documented: that the first is its first half, the Denavit-Hartenberg rows of both, the flange
+    at (a1 + d4 + d6, -d3, d1 + a2 + a3) with all axes 0, that its Z points the way the tool does,
+    and the configuration of arm, elbow and hand.
+
+    Args:
+        lengths_mm: d1, a1, a2, d3, a3, d4, d6.
+    """
+    *arm, d6_mm = lengths_mm
+    return Coupled(PosRRR(*arm), Wrist3((0.0, 0.0, d6_mm)), own_name="Kin_ArticulatedRobot_6DOF")

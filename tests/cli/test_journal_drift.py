@@ -1,0 +1,141 @@
+"""``journal drift``: charts from a real journal, on the terminal, as JSON, as a page."""
+
+import itertools
+import json
+import re
+
+import pytest
+from robolink_cli import main
+
+from robolink.journal import open_journal
+from robolink.model import EntryKind, NewEntry, Signature
+from tests.drift._courses import course
+
+HERE, THERE = "epson+tcp://192.168.0.1:5000", "epson+tcp://192.168.0.2:5000"
+METHOD = {"method": "n_angle", "measured": ["x_mm", "y_mm"]}
+
+
+@pytest.fixture
+def run(state_folder, capsys):
+    def ran(*arguments):
+        code = main.run(("journal", "drift", *arguments))
+        shown = capsys.readouterr()
+        return code, shown.out, shown.err
+
+    return ran
+
+
+def entries(change, *, end=EntryKind.DONE, z_from="kept", method="n_angle"):
+    """Return what a nozzle change puts on record."""
+    tip = [change.tip_mm["x"], change.tip_mm["y"], change.tip_mm["z"], 0.0, 0.0, 0.0]
+    place = [change.pin_mm["x"], change.pin_mm["y"]]
+    told = {
+        EntryKind.CALIBRATION: {
+            **METHOD,
+            "method": method,
+            "proposed": tip,
+            "tip": tip,
+            "reference_point_mm": place,
+        },
+        EntryKind.VERIFY: {"max_drift_mm": change.turn_test_mm, "passed": True},
+        end: {"value": tip, "z_from": z_from},
+    }
+    return [
+        NewEntry(kind, change=change.change, operation="o", tool=change.tool, details=details)
+        for kind, details in told.items()
+    ]
+
+
+def record(changes, controller=HERE, **how):
+    journal = open_journal()
+    for change, nozzle in zip(changes, itertools.count(1), strict=False):
+        signature = Signature(os_user="cell", station="PIN-07", nozzle=f"N-{nozzle}")
+        journal.log(controller, signature=signature).append(*entries(change, **how))
+    journal.close()
+
+
+def charted(out):
+    return {
+        cell["controller"]: {
+            (c["quantity"], c["subject"], c["axis"]): [p["value_mm"] for p in c["points"]]
+            for c in cell["charts"]
+        }
+        for cell in json.loads(out)["controllers"]
+    }
+
+
+def test_without_a_journal_nothing_is_on_record(run):
+    assert run() == (0, "No measured change is on record here.\n", "")
+    assert json.loads(run("--json")[1])["controllers"] == []
+
+
+def test_the_charts_hold_what_was_measured_and_kept(run):
+    changes = course(1, 6)
+    record(changes[:4], z_from="measured")
+    record(changes[4:5], end=EntryKind.ROLLED_BACK)
+    record(changes[5:], end=EntryKind.REFUSED)
+    code, out, _ = run("--json")
+    (charts,) = charted(out).values()
+    assert code == 0
+    kept = [change.tip_mm["x"] for change in changes[:4]]
+    assert charts["tip", 1, "x"] == pytest.approx(kept)
+    assert len(charts["tip", 1, "z"]) == len(charts["turn test", 1, None]) == 4
+    pins = [change.pin_mm["y"] for change in changes[:4] if change.pin_mm]
+    assert charts["pin", "PIN-07", "y"] == pytest.approx(pins)
+
+
+def test_a_kept_z_is_not_charted_and_a_used_pin_is_not_found(run):
+    record(course(1, 3), method="one-touch")
+    (charts,) = charted(run("--json")[1]).values()
+    assert set(charts) == {("tip", 1, "x"), ("tip", 1, "y"), ("turn test", 1, None)}
+
+
+def test_a_slipping_mount_is_said_drawn_and_ends_with_1(run):
+    moved = course(1, 32, shift=lambda i, _: (0.1 * (i >= 25), 0, 0))
+    record(moved)
+    code, out, _ = run()
+    assert code == 1
+    assert "Tool 1 has moved sideways by X +0." in out
+    assert "The mount may slip" in out
+    drawn = [
+        line for line in out.splitlines() if re.fullmatch(r"[ \d.-]{10}[ .\-oX+]*[.\-oX+]", line)
+    ]
+    assert sum(line[10:].count("X") for line in drawn) >= 3
+    assert max(map(len, drawn)) <= 72
+    (cell,) = json.loads(run("--json")[1])["controllers"]
+    (finding,) = cell["findings"]
+    assert finding["code"] == "mount_shifted"
+    assert finding["subject"] == [1]
+
+
+def test_several_cells_stand_beside_each_other(run):
+    record(course(1, 22))
+    record(course(2, 32, shift=lambda i, _: (0.1 * (i >= 25), 0, 0)), THERE)
+    code, out, _ = run("--json")
+    found = {c["controller"]: len(c["findings"]) for c in json.loads(out)["controllers"]}
+    assert (code, found) == (1, {HERE: 0, THERE: 1})
+    assert run("-c", HERE)[0] == 0
+    assert set(charted(run("-c", THERE, "--json")[1])) == {THERE}
+
+
+def test_a_new_beginning_forgets_what_was_before(run):
+    record(course(1, 32, shift=lambda i, _: (0.1 * (i >= 25), 0, 0)))
+    assert run()[0] == 1
+    assert run("--since", "2100-01-01") == (0, "No measured change is on record here.\n", "")
+    code, _, err = run("--since", "yesterday")
+    assert code == 2
+    assert "yesterday" in err
+
+
+def test_the_page_has_every_chart_and_escapes_what_people_typed(run, tmp_path):
+    record(course(1, 32, shift=lambda i, _: (0.1 * (i >= 25), 0, 0)))
+    page = tmp_path / "drift.html"
+    code, out, _ = run("--page", str(page))
+    text = page.read_text(encoding="utf-8")
+    assert (code, f"Page: {page}" in out) == (1, True)
+    assert text.count("<svg") == 5
+    assert text.count('class="largest"') >= 3
+    assert "Tool 1 has moved sideways" in text
+    assert "<script" not in text
+    assert run("--page", str(page))[0] == 2, "a file that is there stays"
+    assert run("--page", str(page), "--force")[0] == 1

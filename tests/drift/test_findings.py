@@ -1,0 +1,92 @@
+"""What stands out in the course of a cell's tools, and what does not."""
+
+from collections import Counter
+
+import pytest
+
+from robolink.drift import charts_of, findings_in
+from robolink.errors import ConfigError
+from tests.drift._courses import course, found
+
+SEEDS = range(8)
+
+
+def most(seed_codes):
+    """Return the codes that most courses show."""
+    counted = Counter(code for codes in seed_codes for code in codes)
+    return {code for code, count in counted.items() if count > 4}
+
+
+def after(count, **kwargs):
+    return most([found(course(seed, count, **kwargs)) for seed in SEEDS])
+
+
+def test_a_steady_cell_shows_nothing():
+    assert after(40) == set()
+    assert after(40, tools=2) == set()
+
+
+def test_nozzles_that_are_measured_again_and_again_are_no_slipping_mount():
+    # Within a nozzle values scatter by the touch alone: limits from them would be too tight.
+    assert after(45, each_nozzle=5) == set()
+
+
+def test_one_bad_change_is_unusual_and_no_slipping_mount():
+    bad = lambda index, _: (0.5 * (index == 30), 0.0, 0.0)  # noqa: E731
+    assert after(31, shift=bad) == {"unusual_change"}
+    assert after(34, shift=bad) == set()
+
+
+def test_a_mount_that_slips_shows_sideways_in_one_tool_only():
+    moved = lambda index, tool: (0.1 * (index >= 25 and tool == 1), 0.0, 0.0)  # noqa: E731
+    assert after(32, tools=2, shift=moved) == {"mount_shifted"}
+    (finding, *_) = findings_in(charts_of(changes := course(1, 32, shift=moved)), changes)
+    assert finding.subject == (1,)
+    assert finding.shift_mm["x"] == pytest.approx(0.1, abs=0.04)
+    assert "Tool 1 has moved sideways by X +0." in finding.sentence
+    assert finding.since.startswith("2026-01-2")
+
+
+def test_tools_that_shift_alike_point_at_what_they_share():
+    moved = lambda index, _: (0.1 * (index >= 25), -0.08 * (index >= 25), 0.0)  # noqa: E731
+    assert after(33, tools=2, shift=moved) == {"tools_shifted_alike"}
+
+
+def test_opposite_shifts_are_two_mounts():
+    moved = lambda index, tool: (0.1 * (index >= 25) * (-1) ** tool, 0.0, 0.0)  # noqa: E731
+    assert after(33, tools=2, shift=moved) == {"mount_shifted"}
+
+
+def test_a_moved_pin_is_told_from_a_moved_tool():
+    assert after(30, pin=lambda index: 0.05 * (index >= 25)) == {"pin_moved"}
+
+
+def test_another_length_of_nozzles_is_told():
+    assert after(33, shift=lambda i, _: (0, 0, 0.1 * (i >= 25))) == {"length_shifted"}
+
+
+def test_a_nozzle_that_gets_shorter_wears_and_one_that_gets_longer_moves():
+    assert after(12, each_nozzle=12, wear_mm=0.005) == {"nozzle_worn"}
+    assert after(12, each_nozzle=12, wear_mm=-0.005) == {"nozzle_moves"}
+    assert after(12, each_nozzle=12, wear_mm=0.005, ids=False) == set(), "not known to be the same"
+
+
+def test_wear_ends_with_the_next_nozzle():
+    worn = course(3, 13, each_nozzle=12, wear_mm=0.01)
+    assert found(worn[:12]) == {"nozzle_worn"}
+    assert found(worn) == set()
+
+
+def test_fewer_than_twenty_changes_draw_no_limits():
+    jump = course(1, 19, shift=lambda i, _: (1.0 * (i == 18), 0, 0))
+    assert all(chart.limits_mm is None for chart in charts_of(jump))
+    assert found(jump) == set()
+    with pytest.raises(ConfigError, match="cannot rest on 1"):
+        charts_of(jump, baseline=1)
+
+
+def test_equal_values_have_no_limits_and_say_nothing():
+    changes = course(1, 25)
+    frozen = [changes[0]] * 25
+    assert {chart.sigma_mm for chart in charts_of(frozen) if chart.quantity == "pin"} == {0.0}
+    assert found(frozen) == set()

@@ -118,6 +118,11 @@ class VirtualCell:
         self._note(f"p{process.number} > {sent.text}")
         self._rules.leaving(process, sent)
 
+    def given(self, tool: int, value: ToolOffset) -> None:
+        """See a value that the machine's own program is about to be given."""
+        self._note(f"tool {tool} is to hold {value}")
+        self._rules.given(tool, value)
+
     def passed(self, process: VirtualProcess, text: str) -> None:
         """See that something has passed on the wire."""
         if not process.alive:

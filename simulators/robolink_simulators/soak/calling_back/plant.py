@@ -42,9 +42,13 @@ class ProgramPlant(EpsonPlant):
         super().__init__(clock, tap, seed)
         self._rng = random.Random(f"needles {seed}")
         self._service = ProgramService(clock, turns, tap.passed)
-        self._service.on_value = self.values.append
+        self._service.on_value = self._given
         self._production = Production(self.simulator, clock, self._service, self._rng)
         self._nominal_pin = self.simulator.world.pin_mm
+
+    def _given(self, value: ToolOffset) -> None:
+        self.values.append(value)
+        self.tap.given(1, value)
 
     def prepare(self, person: WorldParameters) -> None:
         """Put another needle on, and teach where it touches the pin."""
@@ -108,7 +112,6 @@ class ProgramPlant(EpsonPlant):
 
     def disarm(self) -> int:
         """Forget what was planned; return how much was met."""
-        self.moved_itself = self.moved_itself or self._production.lost_power
         return self._service.acts.clear() + self._production.disarm()
 
     def repair(self) -> None:

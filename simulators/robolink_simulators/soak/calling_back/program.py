@@ -85,7 +85,6 @@ class Production:
 
     Attributes:
         acts: What happens to the controller, counted by questions.
-        lost_power: Whether it lost its power since the last :meth:`disarm`.
     """
 
     def __init__(
@@ -96,7 +95,6 @@ class Production:
         rng: random.Random,
     ) -> None:
         self.acts = CountedActs()
-        self.lost_power = False
         self._simulator = simulator
         self._clock = clock
         self._service = service
@@ -150,7 +148,7 @@ class Production:
 
     def disarm(self) -> int:
         """Plan nothing any more; return how much was met."""
-        self._statements_left, self._stopping, self.lost_power = None, False, False
+        self._statements_left, self._stopping = None, False
         return self.acts.clear()
 
     def _go_on(self) -> None:
@@ -191,7 +189,7 @@ class Production:
 
     def _lose_power(self) -> None:
         self._runner.on_statement = None
-        self.lost_power = True
+        self._runner.forget()  # not one statement more, whatever the switch lets pass before it
         self._simulator.restart()
         self.switch_on()
 

@@ -71,6 +71,9 @@ class WireTap(Protocol):
             Killed: The process is dead, so nothing leaves.
         """
 
+    def given(self, tool: int, value: ToolOffset) -> None:
+        """See a value that the machine's own program is about to be given."""
+
     def passed(self, process: VirtualProcess, text: str) -> None:
         """See that a request or an answer has passed; the process may be killed here."""
 

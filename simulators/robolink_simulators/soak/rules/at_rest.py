@@ -27,7 +27,9 @@ class RestRules:
 
     def left(self, state: MachineState) -> None:
         """Check what a deed left behind, however it ended, killed or not, before anybody acts."""
-        if state.selected != self._on.now.before.selected and not self._on.plant.moved_itself:
+        # A program that is stopped leaves what it had selected; it begins with its own tool again.
+        own = self._on.plant.moved_itself or self._on.plant.calls_back
+        if state.selected != self._on.now.before.selected and not own:
             self._on.hold(
                 "SameToolSelected",
                 bool(self._on.open_selection())

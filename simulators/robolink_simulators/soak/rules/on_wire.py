@@ -88,6 +88,24 @@ class WireRules:
             wanted.append(read_offset(marker.details.get("requested")))
             wanted.append(read_offset(marker.details.get("before")))
 
+    def given(self, tool: int, value: ToolOffset) -> None:
+        """Check a value that the machine's own program is about to be given, and to write."""
+        if not self._on.books.trusted:
+            return
+        whole = [
+            marker
+            for marker in self._on.books.markers()
+            if marker.kind == "change" and str(tool) in marker.details["tools"]
+        ]
+        self._on.hold(
+            "NothingWithoutRecord",
+            any(
+                self._on.plant.same(read_offset(m.details["tools"][str(tool)]["requested"]), value)
+                for m in whole
+            ),
+            f"the program is given {value} for tool {tool} without a marker",
+        )
+
     def _after_stop(
         self, process: VirtualProcess, sent: SentRequest, markers: Sequence[BookedMarker]
     ) -> None:

@@ -58,6 +58,10 @@ class Rulebook(Grounds):
         """Check a request that is about to leave a process."""
         self._on_wire.leaving(process, sent)
 
+    def given(self, tool: int, value: ToolOffset) -> None:
+        """Check a value before the machine's own program is given it."""
+        self._on_wire.given(tool, value)
+
     def stopped(self) -> None:
         """Check the machine at the moment in which a stop is acknowledged."""
         self._on_wire.stopped()

@@ -60,7 +60,7 @@ class MotionGroupCore(ABC):
             tr("Nothing stops it when this computer falls silent."),
         )
 
-    def obstacle(self, target: Pose, path: Path) -> str:
+    def obstacle(self, target: Pose, path: Path, *, start: Pose | None = None) -> str:
         """Return why the arm could not go there so; nothing where this kind cannot tell."""
         return ""
 

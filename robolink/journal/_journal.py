@@ -182,6 +182,18 @@ class Journal:
             former, robots = tables.names.former(identity), tables.names.robots(identity)
             return (identity, *former, *robots)
 
+    def robots_of(self, controller: str) -> tuple[str, ...]:
+        """Return the names of the robots of a controller that has several, else nothing.
+
+        Args:
+            controller: Its identity, an address at which it was met, or a name of before.
+
+        Raises:
+            JournalError: It cannot be read.
+        """
+        with self._store.read() as tables:
+            return tables.names.robots(tables.names.meant(controller))
+
     def addresses_of(self, controller: str) -> tuple[str, ...]:
         """Return the URLs, without options, at which a controller was met, the latest first.
 

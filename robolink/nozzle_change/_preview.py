@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from robolink.calibration import flange_of
-from robolink.errors import CalibrationError, LimitError
+from robolink.errors import LimitError
 from robolink.messages import tr
 from robolink.model import (
     Controller,
@@ -14,25 +14,25 @@ from robolink.model import (
     MotionProfile,
     Path,
     Pose,
-    Spot,
-    SpotUnit,
     ToolOffset,
 )
 from robolink.nozzle_change._plan import ChangePlan, require_clearance, require_inputs
 from robolink.procedures import MovingSource, approach_path
 from robolink.runner import (
+    ArmAhead,
     Ask,
-    Confirm,
-    Consider,
+    ForeseenStep,
     Look,
     Move,
-    Notify,
     Procedure,
     RunSettings,
     Seek,
-    SeenAt,
     TeachPrompt,
+    foreseen_steps,
+    nothing_in_the_way,
 )
+
+Foreseen = Generator[ForeseenStep, None, tuple[Pose, bool]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +55,10 @@ class PlannedStep:
     refusal: str = ""
     shown: TeachPrompt | None = None
 
+    def target_is(self, place: Pose) -> bool:
+        """Tell whether it ends at a place."""
+        return self.target is not None and self.target.coordinates() == place.coordinates()
+
     def requests(self, group: MotionGroup) -> tuple[str, ...]:
         """Return what the step would send besides its reads, as it stands on the wire."""
         if self.target is None or self.profile is None:
@@ -69,7 +73,8 @@ def preview(controller: Controller, plan: ChangePlan) -> tuple[PlannedStep, ...]
 
     Reads only. The person's part is foreseen as no movement at all, but where the step says
     about where it leads. Where the robot stops beside a pin is drawn in the run: the limits are
-    looked at all around.
+    looked at all around. Where the places are known, the arm is asked whether it gets there, and
+    past its singular places.
 
     Raises:
         ConfigError: A clearance is below the largest change that is believed, or an input is to
@@ -83,10 +88,18 @@ def preview(controller: Controller, plan: ChangePlan) -> tuple[PlannedStep, ...]
 
 
 def foresee(
-    procedure: Procedure[object], *, here: Pose, settings: RunSettings
+    procedure: Procedure[object], *, here: Pose, settings: RunSettings, arm: ArmAhead | None = None
 ) -> tuple[PlannedStep, ...]:
-    """Return the steps of one procedure that begins with the flange at ``here``."""
-    return tuple(_follow(procedure, here, settings))
+    """Return the steps of one procedure that begins with the flange at ``here``.
+
+    Args:
+        procedure: What is foreseen; it is used up.
+        here: Where the flange is.
+        settings: The limits.
+        arm: Is asked about movements; ``None`` for asking nobody.
+    """
+    steps = foreseen_steps(procedure, here, consider=arm.considered if arm else nothing_in_the_way)
+    return tuple(_planned_steps(steps, settings, arm))
 
 
 def flange_now(controller: Controller) -> Pose:
@@ -108,7 +121,8 @@ def require_inside(controller: Controller, steps: Sequence[PlannedStep]) -> None
                 tr("{step}: {refusal}", step=step.text, refusal=step.refusal),
                 remedy=tr(
                     "Nothing was moved. The box lies about where the robot stands at the start: "
-                    "bring it nearer, or widen the box."
+                    "bring it nearer, or widen the box. Where it is the arm that cannot, put the "
+                    "station elsewhere, or turn the tool otherwise."
                 ),
                 controller=controller.identity,
             )
@@ -116,25 +130,30 @@ def require_inside(controller: Controller, steps: Sequence[PlannedStep]) -> None
 
 def _foresee(controller: Controller, plan: ChangePlan, start: Pose) -> Iterator[PlannedStep]:
     settings = plan.limits.settings(start, None)
-    here = start
-    for procedure in _procedures(controller, plan):
-        here = yield from _follow(procedure(here), here, settings)
+    here, known, arm = start, True, ArmAhead.of(controller)
+    for goal, procedure in _procedures(controller, plan):
+        steps = foreseen_steps(procedure(here), here, known=known, consider=arm.considered)
+        here, known = yield from _planned_steps(steps, settings, arm, goal)
 
 
 def _procedures(
     controller: Controller, plan: ChangePlan
-) -> Iterator[Callable[[Pose], Procedure[object]]]:
-    """Yield what runs before the write, each to be made from where the one before ended."""
-    yield partial(_journey, plan.safe, tr("go to the safe pose"))
+) -> Iterator[tuple[Pose | None, Callable[[Pose], Procedure[object]]]]:
+    """Yield what runs before the write, each to be made from where the one before ended.
+
+    The pose is where it ends, of one that does so wherever it begins.
+    """
+    yield plan.safe, partial(_journey, plan.safe, tr("go to the safe pose"))
     for one in plan.tools:
         tool, source = one.tool, one.moving
         if source is None:
             continue
         stored = controller.tools.read(tool)
-        yield partial(_journey, one.approach, tr("go to where tool {tool} is measured", tool=tool))
-        yield partial(_measurement, source, stored)
+        there = tr("go to where tool {tool} is measured", tool=tool)
+        yield one.approach, partial(_journey, one.approach, there)
+        yield None, partial(_measurement, source, stored)
         away = tr("go away from where tool {tool} is measured", tool=tool)
-        yield partial(_journey, one.retreat, away)
+        yield one.retreat, partial(_journey, one.retreat, away)
 
 
 def _journey(target: Pose | None, purpose: str, here: Pose) -> Procedure[object]:
@@ -149,43 +168,40 @@ def _measurement(source: MovingSource, stored: ToolOffset | None, here: Pose) ->
     return (yield from source.procedure(stored, here))
 
 
-def _follow(
-    procedure: Procedure[object], here: Pose, settings: RunSettings
-) -> Generator[PlannedStep, None, Pose]:
-    """Yield the steps of a procedure, and return where they lead.
+def _planned_steps(
+    steps: Foreseen, settings: RunSettings, arm: ArmAhead | None, goal: Pose | None = None
+) -> Generator[PlannedStep, None, tuple[Pose, bool]]:
+    """Yield steps with what forbids them, and return where they lead.
+
+    Args:
+        steps: As they are foreseen.
+        settings: The limits.
+        arm: Is asked about movements whose places are known.
+        goal: Where they end, wherever they begin; ``None`` where that is not so.
 
     Raises:
-        CalibrationError: It refuses before its first step.
+        CalibrationError: They are refused before the first of them.
+        LimitError: There is no way.
     """
-    try:
-        step = next(procedure)
-    except StopIteration:
-        return here
-    try:
-        while True:
-            if isinstance(step, (Notify, Confirm)):
-                # What it would say depends on poses that nobody took.
-                step = procedure.send(None)
-                continue
-            if isinstance(step, Consider):
-                # Where the poses will really be is not known yet, so neither what is in the way.
-                step = procedure.send(("",) * len(step.moves))
-                continue
-            answer = here
-            if isinstance(step, Ask):
-                answer = here = step.foreseen or here
-                refusal = _refusal(step.foreseen, settings) if step.foreseen else ""
-                yield PlannedStep(step.instruction, refusal=refusal, shown=step.shown)
-            elif isinstance(step, Look):
-                yield PlannedStep(step.purpose)
-                answer = SeenAt.of(here, Spot(*step.expected_mm), SpotUnit.BASE_MM)
-            else:
-                answer = here = step.target
-                yield _planned(step, settings)
-            step = procedure.send(answer)
-    except (StopIteration, CalibrationError):
-        # The poses are foreseen, so what they would give means nothing.
-        return here
+    while True:
+        try:
+            one = next(steps)
+        except StopIteration as ended:
+            end: tuple[Pose, bool] = ended.value
+            return end
+        step, move = one.step, one.move
+        if isinstance(step, Ask):
+            refusal = _refusal(step.foreseen, settings) if step.foreseen else ""
+            yield PlannedStep(step.instruction, refusal=refusal, shown=step.shown)
+        elif isinstance(step, Look):
+            yield PlannedStep(step.purpose)
+        else:
+            planned = _planned(step, settings)
+            arrives = goal is not None and planned.target_is(goal)
+            if arm and move and not planned.refusal and (one.known or arrives):
+                start = one.start if one.known else None
+                planned = replace(planned, refusal=arm.obstacle(move, start))
+            yield planned
 
 
 def _planned(step: Move | Seek, settings: RunSettings) -> PlannedStep:

@@ -44,9 +44,11 @@ if TYPE_CHECKING:
     from robolink.procedures.pin.source import TouchesPin as TouchesPin
     from robolink.procedures.pin.source import TouchSource as TouchSource
     from robolink.procedures.pin.touch_plan import TouchPlan as TouchPlan
+    from robolink.procedures.pin.touch_plan import plain_pose as plain_pose
     from robolink.procedures.pin.touches import PinTouches as PinTouches
     from robolink.procedures.pin.touches import lift_off as lift_off
     from robolink.procedures.pin.touches import touch_again as touch_again
+    from robolink.procedures.pin.touches import turned_touches as turned_touches
     from robolink.procedures.pose_method import PoseMethod as PoseMethod
     from robolink.procedures.sequential_sampling import TAKE_ALL as TAKE_ALL
     from robolink.procedures.sequential_sampling import Sampler as Sampler
@@ -79,8 +81,8 @@ __getattr__ = lazy_exports(
         "pin.judging": "TOUCH_CODES heights_agree jog_mm require_one_height require_touches",
         "pin.proof": "DriftProof MOST_MORE contact_pose drift_uncertainty_mm verify_by_turning",
         "pin.source": "ManualPinSource PinSource TouchSource TouchesPin",
-        "pin.touch_plan": "TouchPlan",
-        "pin.touches": "PinTouches lift_off touch_again",
+        "pin.touch_plan": "TouchPlan plain_pose",
+        "pin.touches": "PinTouches lift_off touch_again turned_touches",
         "pose_method": "PoseMethod",
         "sequential_sampling": (
             "Sampler SamplingPolicy SequentialSampler TAKE_ALL finalize_samples may_end_early "

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Generic
+from typing import Final, Generic
 
 from robolink.calibration import carrying
 from robolink.errors import CalibrationError
@@ -11,8 +11,11 @@ from robolink.messages import tr
 from robolink.model import TIP, Path, Pose, SpotUnit, ToolOffset
 from robolink.procedures.camera_plan import LookPlan
 from robolink.procedures.sequential_sampling import ResultT, finalize_samples
-from robolink.runner import Look, Move, Notify, Procedure, SeenAt
+from robolink.runner import Look, Move, Notify, Procedure, SeenAt, first_clear
 from robolink.stations import CameraStation
+
+_SHARES: Final = (1.0, -1.0, 0.5, -0.5)
+"""By which the planned turns are scaled where the arm cannot take them up."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,6 +113,30 @@ class CameraDrive:
                     "offset, and what a pixel means."
                 ),
             )
+
+    def angles_in_reach(
+        self, here: Pose, places: Callable[[Sequence[float]], Sequence[Place]]
+    ) -> Procedure[tuple[float, ...]]:
+        """Return the angles of the plan, or others where the arm cannot take them up.
+
+        They are turned to the other side then, or half as far.
+
+        Args:
+            here: Where the frame is; its U is where they count from.
+            places: What is looked at with such angles.
+
+        Raises:
+            LimitError: It can take up none of them; nothing was moved.
+        """
+        u_deg = here.u_deg
+        planned = self.plan.angles_deg(u_deg)
+        return (
+            yield from first_clear(
+                [tuple(u_deg + (angle - u_deg) * share for angle in planned) for share in _SHARES],
+                lambda angles: self.looks(places(angles), here),
+                here,
+            )
+        )
 
     def lifted(self, place: Place) -> Procedure[None]:
         """Lift off the camera from where :meth:`looks` ended."""

@@ -12,6 +12,12 @@ from typing import TYPE_CHECKING
 from robolink.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
+    from robolink.runner._arm_ahead import ArmAhead as ArmAhead
+    from robolink.runner._foreseeing import ForeseenStep as ForeseenStep
+    from robolink.runner._foreseeing import considered as considered
+    from robolink.runner._foreseeing import first_clear as first_clear
+    from robolink.runner._foreseeing import foreseen_steps as foreseen_steps
+    from robolink.runner._foreseeing import nothing_in_the_way as nothing_in_the_way
     from robolink.runner._jog_steps import jog_target as jog_target
     from robolink.runner._jog_steps import parse_decimal as parse_decimal
     from robolink.runner._jog_steps import parse_steps as parse_steps
@@ -43,6 +49,8 @@ if TYPE_CHECKING:
 __getattr__ = lazy_exports(
     __name__,
     {
+        "_arm_ahead": "ArmAhead",
+        "_foreseeing": "ForeseenStep considered first_clear foreseen_steps nothing_in_the_way",
         "_jog_steps": "jog_target parse_decimal parse_steps",
         "_operator": "Operator Question",
         "_place_question": "MOST_REFUSED inputs_of",

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import starmap
 from typing import Final, TypeVar
 
 from robolink.checkpoints import Checkpoint, checkpoint
@@ -29,6 +30,7 @@ from robolink.model import (
     Pose,
     TipSensor,
 )
+from robolink.runner._foreseeing import considered
 from robolink.runner._jog_steps import jog_target, way_in_words
 from robolink.runner._operator import Operator, Question
 from robolink.runner._place_question import MOST_REFUSED, PlaceQuestion, ended_by_operator
@@ -128,7 +130,7 @@ class Runner:
                 checkpoint(Checkpoint.STEP, type(step).__name__)
                 self._require_going()
                 if isinstance(step, Consider):
-                    step = procedure.send(tuple(map(self._obstacle, step.moves)))
+                    step = procedure.send(tuple(starmap(self._obstacle, considered(step))))
                     continue
                 try:
                     done = self._take(step)
@@ -201,12 +203,12 @@ class Runner:
             return self._seek(step)
         return self.move(step.target, step.path)
 
-    def _obstacle(self, move: Move) -> str:
+    def _obstacle(self, move: Move, start: Pose | None) -> str:
         try:
             self._settings.box.check(move.target)
         except LimitError as error:
             return error.what
-        return self._group.obstacle(move.target, move.path)
+        return self._group.obstacle(move.target, move.path, start=start)
 
     def _look(self, step: Look) -> SeenAt:
         camera = self._camera

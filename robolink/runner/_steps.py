@@ -166,9 +166,12 @@ class Consider:
 
     Attributes:
         moves: The movements, each for itself; their order does not count.
+        starts: Where each of them begins, empty where nobody knows: a straight way is then looked
+            at in its end alone.
     """
 
     moves: tuple[Move, ...]
+    starts: tuple[Pose, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ import numpy as np
 from robolink.calibration import rotation_of
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import TouchPlan
-from robolink.runner import Ask, Move, Notify, TouchedAt
+from robolink.runner import Ask, Consider, Move, Notify, TouchedAt
 
 STORED = ToolOffset(12.0, -3.5, -20.0)
 TIP = ToolOffset(12.4, -3.2, -20.5)
@@ -81,6 +81,8 @@ class SurfacePerson:
         match step:
             case Notify():
                 return None
+            case Consider():
+                return ("",) * len(step.moves)
             case Move():
                 self._here = step.target
                 self.moves.append(step)

@@ -3,9 +3,9 @@
 import math
 
 import pytest
-from scipy import stats
 
 from robolink.calibration import BudgetRow, UncertaintyBudget
+from tests.calibration._scipy_quantiles import student
 
 
 def test_rows_add_as_squares_and_degrees_of_freedom_after_welch_and_satterthwaite():
@@ -17,7 +17,7 @@ def test_rows_add_as_squares_and_degrees_of_freedom_after_welch_and_satterthwait
     nu = 0.0005**2 / (0.01**4 / 4 + 0.02**4 / 8)
     assert budget.nu_eff == pytest.approx(nu, rel=1e-9)
     assert math.floor(nu) == 11
-    assert budget.k == pytest.approx(stats.t.ppf(0.975, 11), rel=1e-9)
+    assert budget.k == pytest.approx(student(0.975, 11), rel=1e-9)
     assert (budget.type_a_mm, budget.type_b_mm) == pytest.approx((0.01, 0.02))
     document = budget.as_json()
     assert UncertaintyBudget.from_json(document) == budget

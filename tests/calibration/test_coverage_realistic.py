@@ -254,14 +254,14 @@ SAMPLE = (
 @pytest.mark.parametrize("name", SAMPLE)
 def test_a_sample_of_the_table(name):
     line = LINES[NAMES.index(name)]
-    shares = run(line, 200)
+    shares = run(line, 100)
     assert line.least - 7 <= shares.alone <= line.most + 7, shares
 
 
 def test_what_moved_is_told():
     """A bumped pin is told nearly always, and a good run in 1 or 2 of 100."""
-    assert run(LINES[NAMES.index("pin bumped by 0.1 mm, 8 touches")], 100).told > 70
-    assert run(LINES[NAMES.index("pin bumped by 0 mm, 8 touches")], 200).told < 8
+    assert run(LINES[NAMES.index("pin bumped by 0.1 mm, 8 touches")], 60).told > 70
+    assert run(LINES[NAMES.index("pin bumped by 0 mm, 8 touches")], 100).told < 8
     assert run(LINES[NAMES.index("one lonely touch, five times as rough")], 5).told == 100
 
 

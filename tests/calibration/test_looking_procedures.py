@@ -16,7 +16,7 @@ from robolink.methods import (
 )
 from robolink.model import Pose, Spot, SpotUnit, ToolOffset
 from robolink.procedures import LookPlan, verify_by_looking
-from robolink.runner import Confirm, Look, Move, Notify, SeenAt
+from robolink.runner import Confirm, Consider, Look, Move, Notify, SeenAt
 from robolink.stations import CameraStation
 from tests.calibration._simulated import refused
 
@@ -53,6 +53,9 @@ class IdealCell:
                 if isinstance(step, Notify):
                     self.told.append(step.text)
                     step = procedure.send(None)
+                    continue
+                if isinstance(step, Consider):
+                    step = procedure.send(("",) * len(step.moves))
                     continue
                 if isinstance(step, Confirm):
                     self.offers.append(step.question)

@@ -10,7 +10,7 @@ from robolink.errors import CalibrationError
 from robolink.methods import measure_n_angle, most_informative_order
 from robolink.model import Pose, ToolOffset, rotate_xy
 from robolink.procedures import SamplingPolicy, TouchPlan
-from robolink.runner import Ask, Confirm, Move, Notify
+from robolink.runner import Ask, Confirm, Consider, Move, Notify
 
 TIP = ToolOffset(12.3, -3.9, -20.0)
 PIN = (300.0, 100.0, -60.0)
@@ -40,6 +40,8 @@ class Person:
                         here = answer = self._touch(here.u_deg)
                     case Move():
                         here = answer = step.target
+                    case Consider():
+                        answer = ("",) * len(step.moves)
                     case Notify():
                         self.told.append(step.text)
                         answer = None
@@ -152,12 +154,16 @@ def test_the_first_turns_tell_the_most():
         assert planar_sigma_gain(first) < 1.1 / math.sqrt(count)
 
 
-def test_the_interval_of_an_early_end_holds_the_truth_about_as_often_as_it_says():
+@pytest.mark.parametrize(
+    ("runs", "least", "most"),
+    [(150, 0.89, 0.985), pytest.param(1000, 0.91, 0.97, marks=pytest.mark.soak)],
+)
+def test_the_interval_of_an_early_end_holds_the_truth_about_as_often_as_it_says(runs, least, most):
     """An estimated scatter stops more gladly on a lucky fit; from four touches it costs 2 %."""
     held = total = 0
-    for seed in range(400):
+    for seed in range(runs):
         result = course(Person(seed=seed), until_mm=0.012)
         errors = (result.offset.x_mm - TIP.x_mm, result.offset.y_mm - TIP.y_mm)
         held += sum(abs(e) <= h for e, h in zip(errors, result.half_width95, strict=True))
         total += 2
-    assert 0.90 < held / total < 0.98
+    assert least < held / total < most, held / total

@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from scipy import stats
 
 from robolink.calibration import TipShift, judge_shifts
 from robolink.calibration.quality.moved_station import StationShift, shift_limit
+from tests.calibration._scipy_quantiles import chi_square, fisher
 
 TOUCH = 0.02
 SEAT = (0.1, 0.1, 0.05)
@@ -29,7 +29,7 @@ def test_half_a_millimetre_common_to_new_nozzles_is_the_station():
     assert found.tools == (1, 2, 3)
     assert found.vector_mm == pytest.approx((0.50333, 0.03333, 0.01), abs=1e-4)
     assert found.sigma_mm == pytest.approx((0.06, 0.06, 0.033166), abs=1e-5)
-    assert found.chi_square_limit == pytest.approx(stats.chi2.ppf(0.999, 3))
+    assert found.chi_square_limit == pytest.approx(chi_square(0.999, 3))
 
 
 def test_a_tenth_is_how_new_nozzles_sit():
@@ -88,7 +88,7 @@ def test_the_limit_is_what_t_and_f_give():
     beyond = float(np.mean(plane + above > shift_limit([n] * 3)))
     assert beyond == pytest.approx(0.001, abs=0.0003)
     # Two axes have a closed form: 2 F(2, 2 n).
-    assert shift_limit([n, n]) == pytest.approx(2 * stats.f.ppf(0.999, 2, 2 * n), rel=1e-6)
+    assert shift_limit([n, n]) == pytest.approx(2 * fisher(0.999, 2, 2 * n), rel=1e-6)
 
 
 def test_seating_that_is_a_small_part_of_the_scatter_widens_little():

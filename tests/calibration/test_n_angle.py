@@ -6,13 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
-from scipy.stats import f as fisher
-from scipy.stats import t as student
 
 from robolink.calibration import Robust, Tolerance, solve_n_angle, solve_two_pose
 from robolink.calibration.core.statistics import student_t95
 from robolink.errors import ConfigError
 from robolink.model import ToolOffset
+from tests.calibration._scipy_quantiles import fisher, student
 from tests.calibration._simulated import PIN, refused, shaken, touching
 
 TIP = (12.3, -3.9)
@@ -82,9 +81,9 @@ def test_the_interval_is_student_s_and_a_stated_sigma_only_widens_it():
     free = solve_n_angle(poses)
     assert free.sigma_mm
     spread = free.sigma_mm * free.sigma_gain
-    assert free.half_width95 == pytest.approx([student.ppf(0.975, 4) * spread] * 2)
+    assert free.half_width95 == pytest.approx([student(0.975, 4) * spread] * 2)
     assert solve_n_angle(poses, sigma_mm=0.05).half_width95 == free.half_width95
-    assert free.region95_radius_mm == pytest.approx(math.sqrt(2 * fisher.ppf(0.95, 2, 4)) * spread)
+    assert free.region95_radius_mm == pytest.approx(math.sqrt(2 * fisher(0.95, 2, 4)) * spread)
     stated = solve_n_angle(poses, sigma_mm=0.5)
     assert stated.half_width95 == pytest.approx([1.95996 * 0.5 * 0.5] * 2, rel=1e-5)
     assert (stated.interval_from, free.interval_from) == ("stated", "residuals")
@@ -95,7 +94,7 @@ def test_the_interval_is_student_s_and_a_stated_sigma_only_widens_it():
 
 @pytest.mark.parametrize("dof", [1, 2, 3, 7, 30, 199, 201, 994, 29994])
 def test_the_quantile_is_student_s(dof):
-    assert student_t95(dof) == pytest.approx(student.ppf(0.975, dof), abs=1e-8)
+    assert student_t95(dof) == pytest.approx(student(0.975, dof), abs=1e-8)
 
 
 def test_a_quantile_needs_a_degree_of_freedom():

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import f as fisher
 
 from robolink.calibration import (
     RobotReach,
@@ -27,6 +26,7 @@ from robolink.calibration import (
 )
 from robolink.errors import CalibrationError, ConfigError
 from robolink.model import Pose, ToolOffset
+from tests.calibration._scipy_quantiles import fisher
 from tests.calibration._simulated import pivoting, refused, shaken, touching
 
 TIP = (12.3, -3.9)
@@ -119,9 +119,9 @@ def test_a_shift_too_small_to_matter_has_its_figure_and_no_name():
 
 def test_the_limits_are_shared_among_the_splits():
     found, spatial = order_of(solve_n_angle(PLAIN)), order_of(solve_pivot(SPATIAL))
-    assert found.step_f_limit == pytest.approx(fisher.ppf(1 - 0.01 / 7, 2, 10))
-    assert found.drift_f_limit == pytest.approx(fisher.ppf(0.99, 2, 10))
-    assert spatial.step_f_limit == pytest.approx(fisher.ppf(1 - 0.01 / 8, 3, 18))
+    assert found.step_f_limit == pytest.approx(fisher(1 - 0.01 / 7, 2, 10))
+    assert found.drift_f_limit == pytest.approx(fisher(0.99, 2, 10))
+    assert spatial.step_f_limit == pytest.approx(fisher(1 - 0.01 / 8, 3, 18))
 
 
 @pytest.mark.parametrize(("solve", "exact"), [(solve_n_angle, PLAIN), (solve_pivot, SPATIAL)])

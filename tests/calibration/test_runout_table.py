@@ -78,7 +78,7 @@ def test_what_was_not_looked_at_is_not_made_up():
 
 
 def test_a_wobble_does_not_spoil_the_interval_of_the_offset():
-    rng, hits, runs = np.random.default_rng(5), np.zeros(2), 800
+    rng, hits, runs = np.random.default_rng(5), np.zeros(2), 400
     for _ in range(runs):
         result = solve_runout_table(looks(rng=rng, sigma_mm=0.005))
         x, y = result.offset.components()[:2]

@@ -1,6 +1,7 @@
 """sphere-touch with a person at the sphere: what it finds, and what it is not fooled by."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -98,13 +99,19 @@ def test_a_start_beside_the_top_or_another_radius_is_told_after_four_touches(
     assert person.lowest > 0.0
 
 
+@cache
+def measured_once(axes):
+    """Return a ball and what is found on it, of which no test changes anything."""
+    ball = Ball(10.0)
+    return ball, measured(SurfacePerson(ball, start=over_top(ball), sigma_mm=0.0), axes=axes)
+
+
 @pytest.mark.parametrize(
     "aside", [(0, 0, 0), (0.3, 0, 0), (0, 0.3, 0), (0, 0, 0.3)], ids=["right", "x", "y", "z"]
 )
 @pytest.mark.parametrize("axes", [5, 6])
 def test_the_proof_on_a_sphere_shows_a_tip_that_slipped_in_any_direction(aside, axes):
-    ball = Ball(10.0)
-    result = measured(SurfacePerson(ball, start=over_top(ball), sigma_mm=0.0), axes=axes)
+    ball, result = measured_once(axes)
     frame = replace(over_top(ball, tip=ToolOffset()), tool=1)
     procedure = verify_on_sphere(
         PLAN,

@@ -108,8 +108,8 @@ def sphere_of_sixteen(rng, stated=None):
 
 @pytest.mark.parametrize("solve", [plane_of_sixteen, sphere_of_sixteen])
 def test_the_interval_holds_the_truth_in_a_sample(solve):
-    # Of 100, 95 are expected; 88 and fewer in 3 of 1,000.
-    assert all(share > 0.88 for share in covered(solve, 100))
+    # Of 60, 57 are expected; 51 and fewer in 4 of 1,000.
+    assert all(share > 0.86 for share in covered(solve, 60))
 
 
 @pytest.mark.soak

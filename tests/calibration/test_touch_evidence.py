@@ -84,14 +84,17 @@ def upright(count):
     return [(u, 0.0, 0.0) for u in ORDER[:count]]
 
 
-@pytest.mark.parametrize("count", [2, 4, 6, 8])
+LONG = pytest.mark.soak
+
+
+@pytest.mark.parametrize("count", [2, pytest.param(4, marks=LONG), 6, pytest.param(8, marks=LONG)])
 def test_touches_that_were_made_count_whatever_the_new_needle(count):
     refused = [judge_touches(touched(upright(count), honest, seed)).codes for seed in range(200)]
     # 0.3 % by chance where sigma is as stated (docs/reference/evidence.md 1).
     assert sum(map(bool, refused)) <= 5, refused
 
 
-@pytest.mark.parametrize("count", [2, 4, 8])
+@pytest.mark.parametrize("count", [2, 4, pytest.param(8, marks=LONG)])
 def test_enter_alone_is_no_touch(count):
     for seed in range(50):
         evidence = judge_touches(touched(upright(count), enter_only, seed))
@@ -103,9 +106,9 @@ def test_enter_alone_is_no_touch(count):
     ("person", "count", "code"),
     [
         (same_jog, 3, "touch_heights_differ"),
-        (same_jog, 8, "touch_heights_differ"),
+        pytest.param(same_jog, 8, "touch_heights_differ", marks=LONG),
         (height_only, 4, "touch_not_proven"),
-        (height_only, 8, "touch_not_proven"),
+        pytest.param(height_only, 8, "touch_not_proven", marks=LONG),
     ],
 )
 def test_what_only_looks_like_a_touch_is_found(person, count, code):

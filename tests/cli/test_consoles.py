@@ -7,6 +7,8 @@ import sys
 
 import pytest
 
+LONG = pytest.mark.soak
+
 CELLS = """
 [cells."三号线"]
 url = "epson+sim://console?seed=1"
@@ -66,7 +68,7 @@ def environment(tmp_path, encoding):
     }
 
 
-@pytest.mark.parametrize("encoding", ["ascii", "cp1252", "cp936"])
+@pytest.mark.parametrize("encoding", ["ascii", pytest.param("cp1252", marks=LONG), "cp936"])
 def test_no_command_and_no_error_fails_for_want_of_a_character(tmp_path, encoding):
     # The demonstration takes long, and no console has fewer characters than this one.
     commands = {
@@ -93,7 +95,7 @@ def test_no_command_and_no_error_fails_for_want_of_a_character(tmp_path, encodin
     assert r"\U0001f916" in shown
 
 
-@pytest.mark.parametrize("encoding", ["ascii", "cp936"])
+@pytest.mark.parametrize("encoding", [pytest.param("ascii", marks=LONG), "cp936"])
 def test_keys_that_the_console_does_not_know_are_a_slip_and_no_end(tmp_path, encoding):
     done = subprocess.run(
         [sys.executable, "-m", "robolink_cli", "-c", "epson+sim://console", "jog", "--yes"],

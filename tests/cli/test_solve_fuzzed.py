@@ -5,6 +5,7 @@ import math
 import tempfile
 from pathlib import Path
 
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from robolink_cli import main
@@ -80,13 +81,29 @@ def all_finite(value: object) -> bool:
     return not isinstance(value, float) or math.isfinite(value)
 
 
-@settings(
-    max_examples=150,
+FILES = st.lists(CASES, min_size=1, max_size=6)
+A_FEW = settings(
+    max_examples=40,
     deadline=None,
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
 )
-@given(st.lists(CASES, min_size=1, max_size=6))
+
+
+@A_FEW
+@given(FILES)
 def test_any_file_is_answered(capsys, cases):
+    check_answered(capsys, cases)
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(600)
+@settings(A_FEW, max_examples=1000)
+@given(FILES)
+def test_any_of_many_files_is_answered(capsys, cases):
+    check_answered(capsys, cases)
+
+
+def check_answered(capsys, cases):
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "case.json"
         path.write_text(json.dumps({"vectors": cases}))

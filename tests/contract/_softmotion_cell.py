@@ -8,6 +8,7 @@ from dataclasses import replace
 from itertools import count
 from typing import Any, Final
 
+import pytest
 from robolink_simulators.cell.clock import ManualClock, ScaledClock
 from robolink_simulators.hosting.fieldbus.canopen_node import CanPlace, serve_canopen
 from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_rtu, serve_modbus_tcp
@@ -21,6 +22,11 @@ from robolink.model import MotionProfile, Path, Pose
 from robolink.timing import NS_PER_S, SystemClock
 
 BACKENDS: Final = ("sim", "modbus-tcp", "modbus-rtu", "can-virtual", "can-multicast")
+LINKS: Final = [
+    pytest.param(name, marks=pytest.mark.soak if name == "can-virtual" else ()) for name in BACKENDS
+]
+"""What a test of every link takes: the bus of one process is left to make soak, for the one
+between processes asks more."""
 OWNER_SILENCE_S: Final = 10.1
 """After this long without a sign of its owner a mailbox is free (docs/mailbox.md, "Owners")."""
 

@@ -27,14 +27,15 @@ HOSTS = {"epson": epson, "softmotion": softmotion}
 BIAS_MM = 0.2
 
 
-@pytest.fixture(params=HOSTS)
-def named(request):
+@pytest.fixture
+def named(kind):
     """Yield a sim URL without options, and the simulator behind it once it is there."""
-    kind, name = request.param, f"assisted-habits-{request.param}"
+    name = f"assisted-habits-{kind}"
     yield f"{kind}+sim://{name}", lambda: HOSTS[kind].simulator_named(name)
     HOSTS[kind].unregister(name)
 
 
+@pytest.mark.parametrize("kind", HOSTS)
 def test_a_side_fixed_in_the_tool_is_what_the_offset_is_wrong_by(named, capsys):
     # A bias that turns with the tool looks like another tool to every touch, so nothing can tell.
     bare, simulator = named
@@ -53,6 +54,7 @@ def test_a_side_fixed_in_the_tool_is_what_the_offset_is_wrong_by(named, capsys):
     assert simulator().world.operator.touches >= 3
 
 
+@pytest.mark.parametrize("kind", ["epson", pytest.param("softmotion", marks=pytest.mark.soak)])
 @pytest.mark.parametrize("frame", ["approach", "base"])
 def test_a_side_from_which_the_tip_comes_is_told_with_its_size(named, capsys, frame):
     # One that is fixed in the base moves the pin that is found, and no tip.

@@ -9,12 +9,12 @@ from robolink_cli.commands.record.recorded_change import report_payload
 
 from robolink.journal import EntryKind
 from robolink.report import reports_of, save
-from tests.contract._method_cell import KINDS, method_cell
+from tests.contract._method_cell import method_cell, on
 
 pytestmark = pytest.mark.simulator_only
 
 
-@pytest.fixture(params=KINDS)
+@pytest.fixture(params=on("epson"))
 def cell(request, tmp_path, monkeypatch):
     with method_cell(request.param, tmp_path, monkeypatch) as cell:
         yield cell
@@ -26,7 +26,7 @@ def text_of(path):
 
 
 def test_machine_gauge_people_times_budget_touches_and_rule_stand_on_the_page(cell, tmp_path):
-    done = cell.calibrate("n-angle", "--station", "PIN-07", "--count", "8")
+    done = cell.calibrate("n-angle", "--station", "PIN-07", "--count", "6")
     assert done.code == 0, done.err
     assert "gauge G-123 at station PIN-07 ran out on 2020-01-31" in done.err
     change = cell.recorded(EntryKind.CALIBRATION)[0].change

@@ -7,7 +7,7 @@ import pytest
 from robolink.calibration import RunoutTableResult
 from robolink.methods import AllRoundPlan, CameraSource, RunoutTableSource
 from robolink.model import ToolOffset
-from tests.contract._camera_cell import KINDS, camera_station, cell_of, furnish, run_source
+from tests.contract._camera_cell import camera_station, cell_of, furnish, run_source
 from tests.contract._sensor_cell import miss_mm
 
 pytestmark = [pytest.mark.simulator_only, pytest.mark.timeout(120)]
@@ -16,7 +16,7 @@ ALL_ROUND = AllRoundPlan(turns_deg=tuple(30.0 * step for step in range(12)))
 WOBBLE_MM, TOWARD_DEG = 0.12, 40.0
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", ["epson", pytest.param("softmotion", marks=pytest.mark.soak)])
 def test_a_table_by_angle_is_found_and_the_proof_finds_the_tip_where_it_says(kind):
     with cell_of(kind) as cell:
         furnish(cell, wobble_mm=WOBBLE_MM, wobble_toward_deg=TOWARD_DEG)

@@ -97,12 +97,39 @@ def test_every_option_with_named_values_is_varied_here():
     assert {field.name for field in fields(EpsonOptions)} == varied | settled_elsewhere
 
 
+ON_THE_WIRE = {
+    *("terminator", "requests_end_with_silence", "second_client", "execute_on_disconnect"),
+    *("abort_reply_first", "flags_during_execute", "logout_while_running"),
+}
+"""Habits that show in how bytes and connections go; the others are alike on every link."""
+
+
 @pytest.fixture(params=HABITS, ids=name_of)
 def habit(request):
     return request.param
 
 
+def links(habit):
+    """Return the links on which a habit is tried, most of them in make soak."""
+    asked = {"sim", "tcp"} if not habit or ON_THE_WIRE & habit.keys() else {"sim"}
+    return [
+        pytest.param(
+            link,
+            habit,
+            marks=() if link in asked else pytest.mark.soak,
+            id=f"{link}-{name_of(habit)}",
+        )
+        for link in ("sim", "tcp", "pty")
+    ]
+
+
+ON_EVERY_LINK = pytest.mark.parametrize(
+    ("serve", "habit"), [case for habit in HABITS for case in links(habit)], indirect=True
+)
+
+
 @pytest.mark.moves
+@ON_EVERY_LINK
 def test_tools_and_motion_work_with_every_habit(serve, habit):
     simulator = EpsonSimulator(seed=11, options=EpsonOptions(**habit))
     with serve(simulator) as cell, cell.connect() as controller:
@@ -130,6 +157,7 @@ def test_tools_and_motion_work_with_every_habit(serve, habit):
 
 
 @pytest.mark.moves
+@ON_EVERY_LINK
 def test_an_abort_and_a_failed_statement_are_understood_with_every_habit(serve, habit):
     simulator = EpsonSimulator(seed=11, options=EpsonOptions(**habit))
     with serve(simulator) as cell, cell.connect() as controller:

@@ -116,8 +116,12 @@ def test_a_straight_way_past_the_axis_of_joint_1_is_refused_before_it_is_sent(ar
     here = controller.groups[0].pose()
     # Past the axis, which stays on its left.
     x, y, _ = wrist_mm(here, model)
+    past = replace(here, x_mm=here.x_mm - y, y_mm=here.y_mm + x)
+    told = controller.groups[0].obstacle(past, Path.STRAIGHT, start=here)
+    assert "too near to its axis" in told
+    assert controller.groups[0].obstacle(past, Path.JOINT, start=here) == ""
     with pytest.raises(LimitError, match="too near to its axis"):
-        go(controller, replace(here, x_mm=here.x_mm - y, y_mm=here.y_mm + x), STRAIGHT)
+        go(controller, past, STRAIGHT)
     assert machine.arm.moves_started == started
     go(controller, replace(here, z_mm=here.z_mm + 5), STRAIGHT)
 
@@ -142,6 +146,21 @@ def test_what_stands_in_the_way_is_told_before_anything_moves(arm):
     assert machine.arm.moves_started == 0
 
 
+def test_a_straight_way_past_a_singular_wrist_is_found_between_its_ends(arm):
+    """Joint 5 is -30 degrees at both ends and -1 half way."""
+    simulator, controller = arm
+    machine, group = simulator.machine, controller.groups[0]
+    machine.arm.place(Joints(0.0, -28.0, 20.0, 0.0, -30.0, 0.0), simulator.now_ns)
+    here = group.pose()
+    down_mm = 318.0 if machine.model.hangs else -318.0
+    there = replace(here, y_mm=here.y_mm - 255.0, z_mm=here.z_mm + down_mm)
+    assert group.obstacle(there, Path.STRAIGHT) == ""
+    assert "Joint 5" in group.obstacle(there, Path.STRAIGHT, start=here)
+    with pytest.raises(LimitError, match="Joint 5"):
+        go(controller, there, STRAIGHT)
+    assert machine.arm.moves_started == 0
+
+
 def test_a_place_out_of_reach_is_refused_and_the_controller_stays_ready(arm):
     simulator, controller = arm
     here = controller.groups[0].pose()
@@ -158,9 +177,24 @@ def test_a_tilted_tool_is_written_whole_and_read_back(arm):
     assert controller.tools.read(3) == offset
 
 
+@pytest.mark.parametrize("arm", ["RS4-C351S"], indirect=True)
+def test_an_rs_comes_back_to_joint_1_as_it_stood_over_its_own_axis(arm):
+    simulator, controller = arm
+    machine = simulator.machine
+    there = Joints(57.0, 0.0, -20.0, 30.0)
+    machine.arm.place(there, simulator.now_ns)
+    machine.points.store(7, Point.at(machine.tip()))
+    assert controller.groups[0].pose().posture.j1_angle_deg == 57.0
+    taught = controller.points.read(7)
+    assert (taught.x_mm, taught.y_mm, taught.posture.j1_angle_deg) == (0.0, 0.0, 57.0)
+    machine.arm.place(Joints(-40.0, 60.0, -20.0, 0.0), simulator.now_ns)
+    go(controller, replace(taught, tool=0))
+    assert machine.arm.joints == pytest.approx(there, abs=1e-3)
+
+
 def test_points_and_flags_go_through_text_and_back():
     postures = [
-        Posture(elbow, wrist, j1_flag=j1, j4_flag=j4, j6_flag=j6)
+        Posture(elbow, wrist, j1_flag=j1, j4_flag=j4, j6_flag=j6, j4_angle_deg=-7.125)
         for elbow in Elbow
         for wrist in Wrist
         for j1, j4, j6 in ((0, 0, 0), (1, 0, 2), (0, 1, 127))

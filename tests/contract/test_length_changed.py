@@ -7,12 +7,12 @@ from robolink_cli.prompts import operator as _operator
 
 from robolink.journal import EntryKind
 from robolink.model import ToolOffset
-from tests.contract._method_cell import method_cell, on
+from tests.contract._method_cell import method_cell
 
 pytestmark = pytest.mark.simulator_only
 
 AT_PIN = ("--station", "PIN-07")
-FOUR = ("--count", "4", *AT_PIN)
+THREE = ("--count", "3", *AT_PIN)
 
 
 @pytest.fixture
@@ -25,38 +25,11 @@ def station_z(arm):
     return arm.recorded(EntryKind.STATION)[0].details["z_mm"]
 
 
-@pytest.fixture
-def cell(kind, tmp_path, monkeypatch):
-    with method_cell(kind, tmp_path, monkeypatch) as cell:
-        yield cell
-
-
-@pytest.mark.parametrize("kind", on("plc"))
-def test_half_a_millimetre_shorter_is_refused_where_nobody_decides(cell):
-    method = ("two-pose", *AT_PIN)
-    first = cell.calibrate(*method)
-    assert first.code == 0, first.err
-    before = cell.stored
-    cell.lengthen(-0.5)
-    refused = cell.calibrate(*method)
-    assert refused.code == 7, refused.err
-    error = refused.document["error"]
-    assert error["code"] == "length_changed"
-    assert "0.5" in error["what"]
-    assert "shorter" in error["what"]
-    assert "--if-length-changed" in error["remedy"]
-    assert cell.stored == before
-    assert cell.recorded(EntryKind.REFUSED)[0].details["code"] == "length_changed"
-    assert cell.recorded(EntryKind.DONE)[0].details["touch"]["touches"] == len(
-        first.document["poses"]
-    )
-
-
-def test_z_follows_the_heights_where_that_was_decided(arm):
-    assert arm.calibrate("n-angle", *FOUR).code == 0
+def test_z_follows_the_heights_or_is_kept_where_that_was_decided(arm):
+    assert arm.calibrate("n-angle", *THREE).code == 0
     before = arm.stored
     arm.lengthen(-0.5)
-    followed = arm.calibrate("n-angle", *FOUR, "--if-length-changed", "difference")
+    followed = arm.calibrate("n-angle", *THREE, "--if-length-changed", "difference")
     assert followed.code == 0, followed.err
     assert arm.stored.z_mm - before.z_mm == pytest.approx(0.5, abs=0.12)
     told = followed.document["length"]
@@ -64,27 +37,14 @@ def test_z_follows_the_heights_where_that_was_decided(arm):
     assert told["written"] == "difference"
     assert "length_changed" in followed.document["warnings"]
     # Now Z is right for this tip, and there is nothing to say.
-    again = arm.calibrate("n-angle", *FOUR)
+    again = arm.calibrate("n-angle", *THREE)
     assert again.code == 0, again.err
     assert not again.document["length"]["changed"]
-    assert again.document["warnings"] == []
-
-
-def test_small_changes_do_not_add_up_unseen(arm):
-    """Each is below what touches tell; compared with the last run alone, none would ever show."""
-    codes = []
-    for _ in range(4):
-        codes.append(arm.calibrate("n-angle", *FOUR).code)
-        arm.lengthen(0.08)
-    assert codes[0] == 0
-    assert 7 in codes
-
-
-def test_z_that_is_kept_knowingly_stays_and_is_on_record(arm):
-    assert arm.calibrate("n-angle", *FOUR).code == 0
+    assert again.document["warnings"] == ["few_poses"]
+    # Kept knowingly it stays, and that is on record.
     before = arm.stored
     arm.lengthen(0.5)
-    kept = arm.calibrate("n-angle", *FOUR, "--if-length-changed", "keep")
+    kept = arm.calibrate("n-angle", *THREE, "--if-length-changed", "keep")
     assert kept.code == 0, kept.err
     assert arm.stored.z_mm == before.z_mm
     assert kept.document["length"]["written"] == "keep"
@@ -92,15 +52,23 @@ def test_z_that_is_kept_knowingly_stays_and_is_on_record(arm):
     assert "keep" in said
 
 
-@pytest.mark.parametrize("says_yes", [True, False])
-def test_a_person_is_asked_once_with_both_values(arm, monkeypatch, says_yes):
-    assert arm.calibrate("n-angle", *FOUR).code == 0
-    before = arm.stored
-    arm.lengthen(0.5)
+def test_small_changes_do_not_add_up_unseen(arm):
+    """Each is below what touches tell; compared with the last run alone, none would ever show."""
+    codes: list[int] = []
+    while len(codes) < 4 and 7 not in codes:
+        codes.append(arm.calibrate("n-angle", *THREE).code)
+        arm.lengthen(0.08)
+    assert codes[0] == 0
+    assert codes[1] == 0, "one alone is below what touches tell"
+    assert 7 in codes
+
+
+def test_a_person_is_asked_once_with_both_values(arm, monkeypatch):
+    assert arm.calibrate("n-angle", *THREE).code == 0
     monkeypatch.setattr(
         "robolink_cli.commands.measure.calibrate.live.agree_to_motion", lambda *_, **__: None
     )
-    asked, answer = [], _operator.AssistedOperator.ask
+    asked, answer, says_yes = [], _operator.AssistedOperator.ask, [True]
 
     def ask(operator, question, kind):
         asked.append(question)
@@ -108,30 +76,33 @@ def test_a_person_is_asked_once_with_both_values(arm, monkeypatch, says_yes):
 
     def confirm(runner, question):
         asked.append(question)
-        return says_yes or "instead of keeping" not in question
+        return says_yes[0] or "instead of keeping" not in question
 
     monkeypatch.setattr(_operator.AssistedOperator, "ask", ask)
     monkeypatch.setattr("robolink.runner.Runner.confirm", confirm)
-    done = arm.run(
-        "calibrate", "n-angle", "--tool", "1", *FOUR, "--no-retake", "--speed", "100",
-        "--assist", arm.cell.url, "--json",
-    )  # fmt: skip
-    assert done.code == 0, done.err
-    questions = [question for question in asked if "instead of keeping" in question]
-    assert len(questions) == 1
-    assert f"keeping {before.z_mm:.3f}" in questions[0]
-    by_mm = -0.5 if says_yes else 0.0
-    assert arm.stored.z_mm - before.z_mm == pytest.approx(by_mm, abs=0.12)
+    for says_yes[0], by_mm in ((True, -0.5), (False, 0.0)):
+        before = arm.stored
+        arm.lengthen(0.5)
+        asked.clear()
+        done = arm.run(
+            "calibrate", "n-angle", "--tool", "1", *THREE, "--no-retake", "--speed", "100",
+            "--assist", arm.cell.url, "--json",
+        )  # fmt: skip
+        assert done.code == 0, done.err
+        questions = [question for question in asked if "instead of keeping" in question]
+        assert len(questions) == 1
+        assert f"keeping {before.z_mm:.3f}" in questions[0]
+        assert arm.stored.z_mm - before.z_mm == pytest.approx(by_mm, abs=0.12)
 
 
 def test_the_height_of_a_pin_is_never_learnt_from_a_z_that_was_kept(arm):
-    assert arm.calibrate("n-angle", *FOUR).code == 0
+    assert arm.calibrate("n-angle", *THREE).code == 0
     assert station_z(arm) is None
     with arm.cell.connected() as controller:
         controller.tools.write(2, ToolOffset(12.0, -3.5, -19.0), expected=None)
     arm.world.tips[2] = ToolOffset(12.2, -3.4, -20.3)
     # Tool 2 has no touch of its own there, and nothing trustworthy says how high the pin is.
-    second = arm.calibrate("n-angle", *FOUR, tool=2)
+    second = arm.calibrate("n-angle", *THREE, tool=2)
     assert second.code == 0, second.err
     assert second.document["length"] is None
     assert any("how high the pin is" in note for note in second.document["notes"])
@@ -139,7 +110,7 @@ def test_the_height_of_a_pin_is_never_learnt_from_a_z_that_was_kept(arm):
 
 def test_a_pin_of_known_height_shows_that_another_tool_s_z_is_wrong(arm):
     learn = ("station", "learn", "PIN-07", "--tool", "1", "--assist", arm.cell.url, "--yes")
-    assert arm.calibrate("n-angle", *FOUR).code == 0
+    assert arm.calibrate("n-angle", *THREE).code == 0
     # Nobody ever showed Z of tool 1, so it shows no height either.
     assert "was never measured" in arm.run(*learn).err
     assert station_z(arm) is None
@@ -171,11 +142,11 @@ def replace_z(offset, by_mm):
 
 def test_on_a_pin_that_moved_a_length_is_not_told_and_that_is_said(arm):
     nozzle = ("--nozzle", "N-1")
-    assert arm.calibrate("n-angle", *FOUR, *nozzle).code == 0
+    assert arm.calibrate("n-angle", *THREE, *nozzle).code == 0
     before = arm.stored
     arm.bump_pin(0.4, -0.3)
     arm.lengthen(0.5)
-    done = arm.calibrate("n-angle", *FOUR, *nozzle)
+    done = arm.calibrate("n-angle", *THREE, *nozzle)
     assert done.code == 0, done.err
     assert done.document["length"] is None
     assert any("not where it was" in note for note in done.document["notes"])
@@ -187,6 +158,7 @@ schema = "robolink/recipe/1"
 name = "two nozzles"
 basis = "absolute"
 z = "kept"
+verify = false
 
 [source]
 kind = "n-angle"
@@ -195,6 +167,10 @@ count = 3
 
 [station]
 id = "PIN-07"
+
+[speeds]
+percent = 100
+mm_s = 100
 
 [[tools]]
 number = 1

@@ -1,7 +1,4 @@
-"""The behaviours of docs/reference/softmotion.md 5, seen through the wire.
-
-Numbers 6 and 9 need kinematics that are not simulated.
-"""
+"""The behaviours of docs/reference/softmotion.md 5, seen through the wire."""
 
 import math
 import re
@@ -10,7 +7,7 @@ from dataclasses import dataclass
 
 import pytest
 from robolink_simulators.cell.clock import ManualClock, ScaledClock
-from robolink_simulators.cell.frames import axis_and_angle, zyz
+from robolink_simulators.cell.frames import NO_TURN, axis_and_angle, zyz
 from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
 from robolink_simulators.softmotion.mailbox import (
     MailboxOptions,
@@ -21,6 +18,7 @@ from robolink_simulators.softmotion.mailbox import (
 import robolink
 from robolink.errors import ConfigError, RemoteProtocolError
 from robolink.journal import memory_journal
+from robolink.model import AxisKind, OrientationSpace
 from robolink.protocols.mailbox import (
     Bits,
     CommandState,
@@ -30,6 +28,7 @@ from robolink.protocols.mailbox import (
     Opcode,
     WordOrder,
     frames_match,
+    kinematics_word,
 )
 from robolink.transport import open_mailbox_link
 from tests.unit._mailbox_client import (
@@ -125,8 +124,35 @@ def test_5_a_polar_robot_carries_shifts_along_z_alone():
     assert put(client, (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)).state == CommandState.DONE
 
 
+def test_6_an_arm_of_three_axes_carries_a_rotation_and_no_shift(machine):
+    client = machine("Kin_Pos_RRR")
+    rotation = (0.0, 0.0, 0.0, 15.0, 30.0, 45.0)
+    assert put(client, rotation).state == CommandState.DONE
+    assert frames_match(set_tool(client), rotation, tolerance=1e-9)
+    shifted_too = (0.0, 0.0, 1.0, 15.0, 30.0, 45.0)
+    assert put(client, shifted_too, slot=3).error_class == ErrorClass.TOOL_INCOMPATIBLE
+    assert frames_match(set_tool(client), rotation, tolerance=1e-9)
+    assert client.now().kinematics == Kinematics.POS_RRR
+
+
+NAMED = [
+    "Kin_Gantry3",
+    "Kin_Tripod_Rotary",
+    "Kin_ArticulatedRobot_6DOF",
+    "Kin_4AxisPalletizer",
+    "Kin_5Axes",
+    "Kin_Bipod_Rotary",
+]
+"""What the behaviour names; behind them the other rows of the table that take all tools."""
+
+
 @pytest.mark.parametrize(
-    "kinematics", ["Kin_Gantry3", "Kin_5Axes", "Kin_Scara3_Z", "Kin_Scara2_Z+Kin_CAxis"]
+    "kinematics",
+    [
+        *NAMED,
+        *("Kin_Scara3_Z", "Kin_Scara2_Z+Kin_CAxis", "Kin_Gantry2", "Kin_HGantry2", "Kin_HGantry3"),
+        *("Kin_TGantry2", "Kin_TGantry3", "Kin_Tripod_Linear", "Kin_Pos_RRR+Kin_Wrist3"),
+    ],
 )
 def test_7_where_the_orientation_is_known_any_tool_fits(kinematics):
     client, _ = owning(kinematics=kinematics)
@@ -135,12 +161,52 @@ def test_7_where_the_orientation_is_known_any_tool_fits(kinematics):
     assert frames_match(set_tool(client), tool, tolerance=1e-9)
 
 
-def test_8_setting_the_kinematics_takes_the_tool_off_even_the_same_kinematics(client):
+@pytest.mark.parametrize(
+    ("kinematics", "codes"),
+    [
+        ("Kin_Scara2_Z", (Kinematics.SCARA2_Z, 0)),
+        ("Kin_Tripod_Linear+Kin_CAxis", (Kinematics.TRIPOD_LINEAR, Kinematics.C_AXIS)),
+        ("Kin_ArticulatedRobot_6DOF", (Kinematics.ARTICULATED_6DOF, 0)),
+        (f"{__name__}:RailWithImage", (Kinematics.CUSTOM, 0)),
+    ],
+)
+def test_8_setting_the_kinematics_takes_the_tool_off_even_the_same_kinematics(kinematics, codes):
+    client, _ = owning(kinematics=kinematics)
     assert set_tool(client) != NO_TOOL
-    now = client.done(Opcode.SET_KINEMATICS, Kinematics.SCARA2_Z, 0)
+    now = client.done(Opcode.SET_KINEMATICS, *codes)
+    assert now.kinematics == kinematics_word(*codes)
     assert (now.tool_slot, now.answer.pose) == (0, NO_TOOL)
     assert set_tool(client) == NO_TOOL
     assert client.slot(1).defined
+
+
+class Rail:
+    """A kinematics of one's own, of one axis, that does not implement the interface."""
+
+    kinds = (AxisKind.LINEAR,)
+
+    def axes_to_cartesian(self, axes):
+        return (axes[0], 0.0, 0.0), NO_TURN
+
+    def cartesian_to_axes(self, flange, near):
+        return (flange[0][0],)
+
+
+class RailWithImage(Rail):
+    """The same with it."""
+
+    def get_flange_orientation_image(self, r_flange):
+        return OrientationSpace.known(NO_TURN)
+
+
+@pytest.mark.parametrize("x", [1.0, 0.0])
+def test_9_a_kinematics_without_an_orientation_image_takes_no_tool(machine, x):
+    client = machine(f"{__name__}:Rail")
+    tool = (x, 0.0, 1.0 - x, 0.0, 0.0, 0.0)
+    assert put(client, tool).error_class == ErrorClass.NO_ORIENTATION_IMAGE
+    assert set_tool(client) == NO_TOOL
+    assert client.now().kinematics == Kinematics.CUSTOM
+    assert put(machine(f"{__name__}:RailWithImage"), tool).state == CommandState.DONE
 
 
 def test_10_enabling_twice_and_disabling_twice_are_errors(client):

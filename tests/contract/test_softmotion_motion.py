@@ -4,6 +4,8 @@ import threading
 from dataclasses import replace
 
 import pytest
+from robolink_simulators.softmotion import GroupOptions
+from robolink_simulators.softmotion.mailbox import PlcOptions, SoftMotionSimulator
 
 from robolink.controllers.softmotion import Jog
 from robolink.controllers.softmotion.link.wire import MailboxWire
@@ -19,12 +21,12 @@ from robolink.errors import (
 )
 from robolink.model import MotionOutcome, MotionProfile, Path, WorkBox
 from robolink.protocols.mailbox import CoordinateSystem, ErrorClass
-from tests.contract._softmotion_cell import BACKENDS, QUICK, SLOW, above, served
+from tests.contract._softmotion_cell import LINKS, QUICK, SLOW, above, served
 
 ANYWHERE = WorkBox()
 
 
-@pytest.fixture(params=BACKENDS)
+@pytest.fixture(params=LINKS)
 def cell(request):
     with served(request.param) as cell:
         yield cell
@@ -208,3 +210,14 @@ def test_a_movement_on_which_nobody_waits_is_halted_on_purpose(cell, group):
     assert end.value.code == ErrorClass.HEARTBEAT_LOST
     assert cell.movements_started == 1
     assert cell.open_requests == []
+
+
+def test_a_program_that_another_task_calls_is_told_what_to_change():
+    """ErrorID 12108: the PLC has no class for it, but what it means is known."""
+    options = PlcOptions(GroupOptions(program_task="other"))
+    with served("sim", SoftMotionSimulator(options=options)) as cell, cell.connect() as controller:
+        group = controller.groups[0]
+        with pytest.raises(RejectedError, match="ErrorID is 12108") as refused:
+            group.move_to(above(group.pose(), 1.0), QUICK, box=ANYWHERE).wait(timeout_s=5)
+        assert refused.value.code == ErrorClass.UNMAPPED
+        assert "motion task" in refused.value.remedy

@@ -23,7 +23,7 @@ from robolink.errors import (
 from robolink.model import ANY, ControllerState, EntryKind, ToolOffset, Verdict, WorkBox
 from robolink.nozzle_change import ChangePlan, Limits, NozzleChange, ToolPlan
 from robolink.transaction import Wanted, change_tools, plan_undo, recover, undo
-from tests.contract._softmotion_cell import BACKENDS, OWNER_SILENCE_S, QUICK, above, served
+from tests.contract._softmotion_cell import LINKS, OWNER_SILENCE_S, QUICK, above, served
 
 SCRATCH = 15
 NEW = ToolOffset(11.25, -3.125, -20.5, 12.0)
@@ -31,16 +31,7 @@ OTHER = ToolOffset(1.0, 2.0, 3.0, 0.0, 20.0)
 TIMEOUT_S = 0.4
 
 
-# The bus of one process is left to make soak: the one between processes asks more.
-IN_PROCESS = "can-virtual"
-
-
-@pytest.fixture(
-    params=[
-        pytest.param(name, marks=pytest.mark.soak if name == IN_PROCESS else ())
-        for name in BACKENDS
-    ]
-)
+@pytest.fixture(params=LINKS)
 def cell(request):
     with served(request.param) as cell:
         yield cell

@@ -21,7 +21,7 @@ from robolink.errors import (
 )
 from robolink.model import ANY, ToolOffset, WorkBox
 from robolink.protocols.mailbox import ErrorClass, ReadMode, frames_match
-from tests.contract._softmotion_cell import BACKENDS, QUICK, above, served
+from tests.contract._softmotion_cell import LINKS, QUICK, above, served
 
 SCRATCH = 15
 NEW = ToolOffset(11.25, -3.125, -20.5, 12.0, 30.0, -40.0)
@@ -32,7 +32,7 @@ OTHER = ToolOffset(9.0, 9.0, 9.0)
 ANYWHERE = WorkBox()
 
 
-@pytest.fixture(params=BACKENDS)
+@pytest.fixture(params=LINKS)
 def backend(request):
     return request.param
 

@@ -57,7 +57,7 @@ def told(log, *looks: str) -> list[str]:
     return [text for text in sent if not text.startswith(looks)]
 
 
-BACKENDS = ("epson-sim", "epson-tcp", *plcs.BACKENDS)
+BACKENDS = ("epson-sim", "epson-tcp", *plcs.LINKS)
 
 
 @pytest.fixture(params=BACKENDS)

@@ -19,7 +19,7 @@ from robolink.errors import (
     RejectedError,
 )
 from robolink.model import ControllerState, MotionProfile, Path, WorkBox
-from tests.contract._softmotion_cell import BACKENDS, SLOW, above
+from tests.contract._softmotion_cell import BACKENDS, LINKS, SLOW, above
 from tests.contract._softmotion_cell import served as served_plc
 
 CREEPING = MotionProfile(Path.STRAIGHT, 5, 1.0)
@@ -123,7 +123,7 @@ ONE_CLIENT_EACH = ("modbus-rtu", "can-virtual", "can-multicast")
 """A serial line is opened once; a CANopen node answers one SDO client at a time."""
 
 
-@pytest.fixture(params=BACKENDS)
+@pytest.fixture(params=LINKS)
 def plc(request):
     with served_plc(request.param) as cell:
         yield cell

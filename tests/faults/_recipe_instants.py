@@ -26,8 +26,8 @@ from robolink.runner import Question
 Kind = Literal["request", "answer", "wait", "question", "commit"]
 _EVERY: Final = 97
 """Every 97th instant belongs to the sample,"""
-_TURNS: Final = 9
-"""of which each test takes every ninth."""
+_TURNS: Final = 12
+"""of which each test takes every twelfth."""
 
 
 @dataclass(frozen=True)

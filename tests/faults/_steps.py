@@ -23,8 +23,12 @@ SHARES: Final = 8
 _EVERY = 48
 """Of all other exchanges, every 48th makes the sample."""
 
-_MATTERS = re.compile(r'\$(Log|Execute,"(Tool \d|Move |Go ))')
-"""Logs in or out, selects or moves."""
+_MATTERS = re.compile(r'\$(Log|Execute,"Tool \d)')
+"""Logs in or out, or selects."""
+
+_MOVES = re.compile(r'\$Execute,"(Move |Go )')
+_EVERY_MOVE = 3
+"""Of the movements, most of which are the jogs of one touch, every third one makes the sample."""
 
 _WRITES = re.compile(r'\$Execute,"TLSet \d')
 
@@ -48,10 +52,13 @@ def steps_of(requests: list[str], share: int) -> list[Step]:
     """
     all_of_them = os.environ.get("ROBOLINK_ALL_KILL_POINTS") == "1"
     chosen: list[Step] = []
+    moves = 0
     for number, request in enumerate(requests, start=1):
+        moves += bool(_MOVES.match(request))
+        due = moves % _EVERY_MOVE == 1 if _MOVES.match(request) else _MATTERS.match(request)
         if all_of_them or _WRITES.match(request):
             chosen += [Step(number, moment, request) for moment in MOMENTS]
-        elif number % _EVERY == 1 or _MATTERS.match(request):
+        elif number % _EVERY == 1 or due:
             moment = MOMENTS[len(chosen) % 2]
             chosen.append(Step(number, moment, request))
     return chosen[share::SHARES]

@@ -189,14 +189,15 @@ class Change:
             NozzleChange(robot, plan, operator=operator).run()
 
 
-def test_ctrl_c_while_a_marker_is_written_or_cleared_leaves_none_open_and_nothing_moves():
+@pytest.mark.parametrize("every", [3, pytest.param(1, marks=pytest.mark.soak)])
+def test_ctrl_c_while_a_marker_is_written_or_cleared_leaves_none_open_and_nothing_moves(every):
     whole = Change()
     undisturbed = InterruptingLog(math.inf, whole.simulator)
     try:
         whole.run(undisturbed)
     finally:
         unregister("interrupted")
-    for at in range(1, undisturbed.changes + 1):
+    for at in range(1, undisturbed.changes + 1, every):
         change = Change()
         outcomes = InterruptingLog(at, change.simulator)
         with pytest.raises(KeyboardInterrupt):

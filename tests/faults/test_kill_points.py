@@ -3,8 +3,9 @@ command says that Tool 0 is still selected and names the old tool, and resolve p
 
 A whole `robolink calibrate two-pose` runs as a process of its own against a served simulator.
 Its process is killed at an exchange: before the controller carries it out, or after that and
-before the answer leaves. By default a fixed sample is taken: every login, selection, write
-and move, and every 48th of the other exchanges. ``ROBOLINK_ALL_KILL_POINTS=1`` takes all.
+before the answer leaves. By default a fixed sample is taken: every login, selection and write,
+every third movement, and every 48th of the other exchanges. ``ROBOLINK_ALL_KILL_POINTS=1`` takes
+all.
 """
 
 import pytest

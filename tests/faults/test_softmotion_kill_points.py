@@ -30,7 +30,7 @@ def written_by(step: Step) -> bool:
     )
 
 
-@pytest.mark.parametrize("program", ["one tool", "two tools"])
+@pytest.mark.parametrize("program", [pytest.param("one tool", marks=pytest.mark.soak), "two tools"])
 @pytest.mark.fault("F57", "F58")
 def test_f57_f58_a_change_on_a_plc_killed_at_each_step_is_recovered_as_a_whole(tmp_path, program):
     with plc_change_cell(tmp_path / "whole") as cell:
@@ -60,7 +60,7 @@ def test_f80_a_recovery_on_a_plc_killed_at_each_step_may_be_run_again(tmp_path):
         all_steps = cell.steps_of("recover")
         check_recovered(cell, program, written)
         assert cell.tools == OLD
-    steps = chosen(cell, all_steps, every=2)
+    steps = chosen(cell, all_steps, every=4)
     for number, step in enumerate(steps):
         with plc_change_cell(tmp_path / str(number)) as cell:
             cell.kill(program, half)

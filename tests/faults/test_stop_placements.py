@@ -24,7 +24,7 @@ from tests.faults._stop_placements import Placement, Placements
 
 pytestmark = pytest.mark.timeout(7200)
 
-_SAMPLE = 8
+_SAMPLE = 5
 
 
 @dataclass

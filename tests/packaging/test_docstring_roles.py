@@ -7,6 +7,7 @@ what these import, and among what the packages around the module hand out.
 import ast
 import re
 from collections.abc import Iterator
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -114,19 +115,22 @@ def leads_somewhere(role: Role, trees: dict[str, ast.Module]) -> bool:
     return any(followed(import_module(package), names) for package in around) or absolute(names)
 
 
-TREES = dict(modules())
+@cache
+def trees() -> dict[str, ast.Module]:
+    """Return every module; not at import, where each process of the suite would read them all."""
+    return dict(modules())
 
 
 @pytest.mark.parametrize("package", [package.rpartition("/")[2] for package in PACKAGES])
 def test_what_a_docstring_names_is_there(package):
     found = [
         role
-        for name, tree in TREES.items()
+        for name, tree in trees().items()
         if name.split(".")[0] == package
         for role in roles(name, tree)
     ]
     assert len(found) > 20
-    assert [role for role in found if not leads_somewhere(role, TREES)] == []
+    assert [role for role in found if not leads_somewhere(role, trees())] == []
 
 
 @pytest.mark.parametrize(
@@ -141,4 +145,4 @@ def test_what_a_docstring_names_is_there(package):
     ],
 )
 def test_a_wrong_name_is_found(module, owners, target, there):
-    assert leads_somewhere(Role(module, owners, target), TREES) is there
+    assert leads_somewhere(Role(module, owners, target), trees()) is there

@@ -1,9 +1,10 @@
 """Defects that robolink had, or that its rules speak of, each as a named replacement of functions.
 
 None is an edit of the source: :data:`DEFECTS` says what is put in the place of what for the time
-of one history. Most were found from outside, by foreign clients, proxies, a second thread in the
-worst microsecond, careless people (docs/reliability.md, "What was found from outside, and what
-holds now"); the others break one sentence of docs/reference/rules.md each.
+of one history. Most were found from outside: in robolink, by foreign clients, proxies, a second
+thread in the worst microsecond, careless people (docs/reliability.md, "What was found from outside,
+and what holds now"), or in the systems that others trust, by their users; ``found_by`` says so. The
+others break one sentence of docs/reference/rules.md each.
 """
 
 from collections.abc import Mapping
@@ -25,12 +26,14 @@ class KnownDefect:
         name: What is wrong, in one line.
         replacements: What is put in the place of what dotted names lead to.
         kind: The kind of cell that can have it; ``None`` for each.
+        found_by: Who found it from outside, in a few words; empty where nobody has.
         missed_because: Why no rule finds it in the hours that are run; empty where one does.
     """
 
     name: str
     replacements: Mapping[str, object]
     kind: CellKind | None = None
+    found_by: str = ""
     missed_because: str = ""
 
 
@@ -48,15 +51,21 @@ _GROUP: Final = "robolink.controllers.softmotion.motion.group"
 _BEGIN: Final = "robolink.controllers.markers.MarkerStore.begin"
 _SESSION: Final = "robolink.controllers.epson.link.session.EpsonSession"
 
+_THREAD: Final = "stops from a second thread"
+_RECALIBRATION: Final = "stops in a whole recalibration"
+_PROXY: Final = "disturbed runs"
+
 DEFECTS: Final = (
     KnownDefect(
         "a stop holds nothing back",
         {"robolink.stop_latch.StopLatch.admit": stand_ins.nothing},
+        found_by=_THREAD,
     ),
     KnownDefect(
         "a stop is looked for before the lock of the exchange, not under it",
         {f"{_SESSION}._exchanging": stand_ins.asked_before_the_lock},
         CellKind.EPSON,
+        found_by=_THREAD,
     ),
     KnownDefect(
         "a stop latches when the machine rests, not before",
@@ -64,26 +73,23 @@ DEFECTS: Final = (
             f"{_CORE}.stop": stand_ins.latched_when_at_rest,
             "robolink.stop_latch.StopLatch.stopping": stand_ins.open_while_stopping,
         },
-        missed_because=(
-            "a movement would have to leave within the two points between the last "
-            "look and the end of the stop"
-        ),
+        found_by=_THREAD,
     ),
     KnownDefect(
         "a stop opens again by itself when the machine rests",
         {f"{_CORE}.stop": stand_ins.released_at_once},
+        found_by=_RECALIBRATION,
     ),
     KnownDefect(
         "what was stopped may end well",
         {"robolink.stop_latch.StopLatch.require_open": stand_ins.nothing},
-        missed_because=(
-            "nothing leaves under the latch, so only a stop among the last reads of a deed tells"
-        ),
+        found_by=_RECALIBRATION,
     ),
     KnownDefect(
         "an EPSON stop that is refused while a movement runs is acknowledged",
         {"robolink.controllers.epson.motion.group.bring_to_rest": stand_ins.stop_not_looked_after},
         CellKind.EPSON,
+        found_by="a jog that was killed",
     ),
     KnownDefect(
         "a PLC's stop is acknowledged when it is accepted",
@@ -93,6 +99,7 @@ DEFECTS: Final = (
     KnownDefect(
         "what is unsettled blocks nothing",
         {"robolink.controllers.markers.MarkerStore.require_settled": stand_ins.nothing},
+        found_by="a jog after a killed calibration",
     ),
     KnownDefect("a movement leaves no durable mark", {_BEGIN: stand_ins.unmarked(MarkerKind.MOVE)}),
     KnownDefect("a write leaves no durable mark", {_BEGIN: stand_ins.unmarked(MarkerKind.SET)}),
@@ -102,10 +109,12 @@ DEFECTS: Final = (
             _BEGIN: stand_ins.unmarked(MarkerKind.SELECTION),
             "robolink.controllers.markers.MarkerStore.note_selection": stand_ins.nothing,
         },
+        found_by="two state folders",
     ),
     KnownDefect(
         "a change that is killed before its proof leaves no mark",
         {_BEGIN: stand_ins.unmarked(MarkerKind.CHANGE)},
+        found_by="a journal that fails midway",
     ),
     KnownDefect(
         "all movements of a process share one operation", {_BEGIN: stand_ins.one_marker_for_all()}
@@ -113,10 +122,12 @@ DEFECTS: Final = (
     KnownDefect(
         "the tool of before is not selected again",
         {"robolink.controllers.preserving.Preserver.restore": stand_ins.forgotten_selection},
+        found_by="a journal that fails midway",
     ),
     KnownDefect(
         "what was not answered counts as not done",
         {"robolink.controllers.markers.MarkerStore.unless_stopped": stand_ins.settled_by_silence},
+        found_by="a proxy that bends answers",
     ),
     KnownDefect(
         "recover believes that a write did not take, and reads nothing",
@@ -129,21 +140,21 @@ DEFECTS: Final = (
     KnownDefect(
         "an error of the journal's disk is one of SQLAlchemy's",
         {"robolink.journal.store.store.journal_error": stand_ins.as_it_was_raised},
+        found_by="an unwritable journal",
     ),
     KnownDefect(
         "an exit code says what broke last, not what stands unproved",
         {"robolink_cli.console.exit_codes.standing_after": lambda _error: UNTOUCHED},
+        found_by=_PROXY,
     ),
     KnownDefect(
         "of several tools only the last is put back",
         {"robolink.transaction._change.put_back": stand_ins.last_only},
-        missed_because=(
-            "it ends with 6 and says which tool holds what, and a person typed the value"
-        ),
     ),
     KnownDefect(
         "a deleted journal is taken for a new one",
         {"robolink.journal._outcome_log.traces_of": stand_ins.nothing},
+        found_by="people who look for space",
     ),
     KnownDefect(
         "a mailbox block is written again after silence",
@@ -152,22 +163,19 @@ DEFECTS: Final = (
             _WIRE: stand_ins.still_usable,
         },
         CellKind.SOFTMOTION,
-        missed_because=(
-            "a block that comes twice under one number is carried out once, so no rule "
-            "forbids it any more"
-        ),
+        found_by="users of pymodbus",
     ),
     KnownDefect(
         "another client's acknowledgement is taken for ours",
         {f"{_COMMANDS}.is_own": stand_ins.owner_not_compared},
         CellKind.SOFTMOTION,
-        missed_because="the other client never has the number that is awaited",
+        found_by="users of EPICS asyn",
     ),
     KnownDefect(
         "an EPSON session goes on after a time-out",
         {f"{_SESSION}._end": stand_ins.nothing},
         CellKind.EPSON,
-        missed_because=("the late answer ends it: its name, or its place in line, is another's"),
+        found_by="users of EPICS asyn",
     ),
     KnownDefect(
         "the lease is looked at, and never taken",
@@ -176,7 +184,7 @@ DEFECTS: Final = (
     KnownDefect(
         "what a change wrote is not taken back when it fails",
         {"robolink.transaction._change.ToolChange._take_back": stand_ins.nothing},
-        missed_because=("its mark stays open, it ends with 6, and recover takes it back"),
+        found_by="a journal that fails midway",
     ),
     KnownDefect(
         "recover keeps what nobody verified",
@@ -185,11 +193,12 @@ DEFECTS: Final = (
     KnownDefect(
         "the answer to a write is taken for its proof",
         {"robolink.controllers.tool_writing.ToolWrite.read": stand_ins.requested_believed},
-        missed_because="a controller that accepts a write and ignores it is drawn too rarely",
+        found_by="users of flexiv_rdk",
     ),
     KnownDefect(
         "an error does not say what it left on the controller",
         {f"{module}.note_standing": stand_ins.nothing for module in _NOTERS},
+        found_by=_PROXY,
     ),
     KnownDefect(
         "who only presses ENTER gets a proof",
@@ -197,21 +206,23 @@ DEFECTS: Final = (
             "robolink.procedures.pin.touch_plan.TouchPlan.__init__": stand_ins.nominal,
             "robolink.nozzle_change._change.require_proved": stand_ins.nothing,
         },
+        found_by="careless people",
     ),
     KnownDefect(
         "a tool change after a restart of the PLC goes on",
         {"robolink.controllers.softmotion.link.snapshots.Snapshots._other_plc": stand_ins.nothing},
         CellKind.SOFTMOTION,
-        missed_because="the PLC itself refuses what names its start of before",
+        found_by="users of pyads",
     ),
     KnownDefect(
         "an interruption strikes in the middle of an exchange",
         {"robolink.interrupts.InterruptGate.__enter__": stand_ins.nothing},
+        found_by="a closed window",
     ),
     KnownDefect(
         "a login that comes back bent is shown",
         {f"{_SESSION}._take_aside": stand_ins.shown_whole},
         CellKind.EPSON,
-        missed_because="a login that is bent on its way is drawn too rarely",
+        found_by="users of smtpd",
     ),
 )

@@ -7,7 +7,7 @@ from robolink_simulators.soak.drawing.faults import LINE_KINDS, MAILBOX_KINDS
 from robolink_simulators.soak.drawing.hours import deeds_of
 from robolink_simulators.soak.drawing.lengths import length_of
 from robolink_simulators.soak.history import Hindrance
-from robolink_simulators.soak.plant.bent_line import LineBend
+from robolink_simulators.soak.plant.lines.bent_line import LineBend
 
 LINKS = {
     CellKind.EPSON: LinkKind.EPSON_SIM,

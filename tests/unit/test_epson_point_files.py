@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robolink.errors import ConfigError
-from robolink.model import Hand, Pose
+from robolink.model import Hand, Pose, Posture
 from robolink.pose_tables import parse_pts, read_poses, read_pts
 
 
@@ -51,6 +51,17 @@ def test_a_point_file_is_a_file_of_poses_too(tmp_path):
     assert (entry.name, entry.number, entry.line, found.how.skipped) == ("caf\xe9 } {", 7, 5, 1)
     assert entry.pose == Pose(88.952, 0.0, 0.0, -101.024, hand=Hand.LEFT, local=3)
     assert "local" in entry.stated
+
+
+def test_the_angle_of_a_singular_place_is_read_from_a_point_file():
+    angles = "\trJ1Angle=57.5\n\trJ4Angle=0\n}"
+    there, away = block(1, 1, U=87), block(2, 2, U=87)
+    poses = parse_pts(pts(there[:-1] + angles, away[:-1] + angles.replace("57.5", "0")))
+    told, untold = poses[1], poses[2]
+    assert told is not None
+    assert told.posture == Posture(j1_angle_deg=57.5)
+    assert untold is not None
+    assert untold.posture is None
 
 
 def test_an_empty_point_file_has_no_points():

@@ -50,8 +50,8 @@ def test_a_serial_line_is_proved_in_step_before_its_first_answer_is_taken():
 def test_on_a_serial_line_a_late_answer_is_never_taken_for_the_next():
     late = rtu(words(41))
     line, client = over_rtu(
-        lambda frame: [(1.5, late)],
-        lambda frame: [(0.9, piece) for piece in honest(frame)],
+        lambda frame: [(1.3, late)],
+        lambda frame: [(0.6, piece) for piece in honest(frame)],
         lambda frame: [rtu(words(42))],
     )
     with pytest.raises(TransportTimeoutError):
@@ -59,6 +59,20 @@ def test_on_a_serial_line_a_late_answer_is_never_taken_for_the_next():
     assert client.read_input(1, 1) == (42,)
     questions = [frame[1:6].hex() for frame in line.sent]
     assert questions == ["0400000003", "0400000001", "0300000003", "0400010001"]
+
+
+def test_on_a_dead_line_repeats_share_one_short_deadline_and_no_later_question_does():
+    line, client = over_rtu()
+    ends_s = []
+    for _ in range(2):
+        with pytest.raises(TransportTimeoutError):
+            client.read_input(0, 1)
+        ends_s.append(line.clock.now_ns() / 1e9)
+    assert ends_s[0] < 1.03
+    assert ends_s[1] < 1.03 + 0.8
+    line.clock.sleep(60.0)
+    line.steps = [lambda frame: [(0.95, piece) for piece in honest(frame)], honest]
+    assert client.read_input(0, 1) == (0,)
 
 
 @pytest.mark.fault("F02")

@@ -24,7 +24,9 @@ SCARAS = [model for model in robots() if model.mechanism is Mechanism.SCARA]
 def placements(draw):
     model = draw(st.sampled_from(SCARAS))
     # J2 = 0 is the singular stretched arm, where both hands are one.
-    bend = st.floats(0.5, model.ranges[1].high)
+    below = model.narrow_below
+    widest_deg = model.ranges[1].high if below is None else below[1]
+    bend = st.floats(0.5, widest_deg)
     j2 = draw(bend) * draw(st.sampled_from((-1, 1)))
     j1, j3, j4 = (draw(st.floats(*model.ranges[joint])) for joint in (0, 2, 3))
     return model, Joints(j1, j2, j3, j4)

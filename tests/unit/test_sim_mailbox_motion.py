@@ -138,6 +138,22 @@ def test_an_axis_error_ends_everything_with_its_class():
     assert client.now().group_state == GroupState.STANDBY
 
 
+def test_the_error_of_the_group_is_not_that_of_a_block_that_it_refuses():
+    """Two channels: a block in error whose number nobody knows shows none, not the group's."""
+    client, simulator = owning()
+    simulator.panel.fail_axis(1, 16)
+    now = client.now()
+    assert (now.error_class, now.raw_error) == (ErrorClass.NONE, 16)
+    assert client.refused(Opcode.CLEAR_TOOL, 1) == ErrorClass.WRONG_STATE
+    assert client.now().raw_error == 0
+    assert client.refused(Opcode.ENABLE) == ErrorClass.ERRORSTOP
+    assert client.now().raw_error == 11000
+    client.done(Opcode.READ_TOOL, 0)
+    assert client.now().raw_error == 16
+    client.done(Opcode.RESET)
+    assert client.now().raw_error == 0
+
+
 def test_the_emergency_stop_takes_the_power_and_a_reset_does_not_give_it_back():
     client, simulator = owning()
     sequence = client.move(z=-20.0).ack_head

@@ -5,6 +5,7 @@ import math
 from collections import defaultdict
 from pathlib import Path
 
+import numpy as np
 import pytest
 from robolink_simulators.cell.frames import zyx
 from robolink_simulators.epson import EpsonSimulator
@@ -135,6 +136,9 @@ def test_tools_take_six_values_and_locals_lean(robot):
         ("T6-602S", "SingularityDist 10", 4028),
         ("C8-C901S", "SingularitySpeed 101", 4002),
         ("C8-C901S", "J1Angle P1", 4028),
+        ("RS4-C351S", "J4Angle P1", 4028),
+        ("C8-C901S", "Go Here /J1A(3)", 4028),
+        ("RS4-C351S", "Tool 0; Print PAgl(XY(0, 0, -20, 0) /J1A(361), 1)", 4001),
         ("T6-602S", "J4Angle P1", 4028),
         ("GX8-C453S", "Go JA(90, 146, -280, 0)", 4001),
         ("GX8-C453C", "Go JA(90, -138, -250, 0)", 4001),
@@ -145,6 +149,24 @@ def test_what_a_robot_cannot_do_is_refused(robot, name, statement, code):
     run = robot(name)
     assert run(statement) == "!Execute,99"
     assert run.client.code() == code
+
+
+def test_an_rs_over_its_own_axis_takes_joint_1_from_the_point(robot):
+    run = robot("RS4-C351S")
+    assert run("Motor On; Tool 0; P1 = AglToPls(57, 0, -20, 30)") == "0"
+    printed = run("Print P1")
+    assert printed.endswith("/R /J1A(57.000) /0")
+    assert parse_point(printed).posture == Posture(j1_angle_deg=57.0)
+    assert run("Print J1Angle(P1)") == "57"
+    assert run("P2 = XY(0, 0, -20, 87); Print PAgl(P2, 1)") == "0"
+    assert run("J1Angle P2, 40.5; J1Angle P2") == "40.5"
+    assert run("Print PAgl(P2, 1); Print PAgl(P2, 4)").split() == ["40.5", "46.5"]
+    assert run("Go P2 /J1A(-100); Print J1Angle") == "-100"
+    assert run("Print PAgl(XY(300, 0, -20, 87) /J1A(-100), 1)") == run(
+        "Print PAgl(XY(300, 0, -20, 87), 1)"
+    )
+    assert parse_where(run("Where")).joints == (-100, 0, -20, 187)
+    assert run("Print J1Angle") == "-100"
 
 
 def test_what_counts_as_near_a_singular_place_can_be_set(robot):
@@ -279,18 +301,60 @@ def test_a_line_past_the_singular_wrist_is_left_and_come_back_to(robot):
     assert off_line_mm(middle, start, end) < 1e-3
 
 
-def test_a_held_workpiece_is_led_past_an_external_control_point(robot):
-    """The point runs straight over the workpiece; the tip does not."""
-    run = robot("C8-C901S")
-    run("Tool 1; P1 = Here; P2 = Here +X(30) +Y(20) +TLU(40) +TLV(10)")
+HELD = [
+    ("C8-C901S", "Here +X(30) +Y(20) +TLU(40) +TLV(10)", "Here +X(-10) +Z(25)"),
+    ("T6-602S", "Here +X(-30) +Y(20) +U(-200)", "Here +X(-20) +Y(5) +U(-100)"),
+    ("RS4-C351S", "Here +X(30) +Y(20) +U(40)", "Here +X(10) +Y(15) +U(20)"),
+]
+
+
+@pytest.mark.parametrize(("name", "end", "mid"), HELD, ids=[case[0] for case in HELD])
+def test_a_held_workpiece_is_led_past_an_external_control_point(robot, name, end, mid):
+    """The point runs straight over the workpiece, or round it; the tip does not."""
+    run = robot(name)
+    assert run("Motor On; Tool 0; TLSet 1, XY(12, 5, 0, 20); Tool 1") == "0"
+    assert run(f"P1 = Here; P2 = {end}; P3 = {mid}") == "0"
     assert run("Move P2 ECP") == "!Execute,99"
     assert run.client.code() == 4013
     run.client.ask("$Reset")
-    run("ECPSet 1, Here +X(60) +Z(-40); ECP 1; SpeedS 50")
-    start, end = (parse_point(run(f"Print {name}")).coordinates for name in ("P1", "P2"))
+    run("Motor On; ECPSet 1, Here +X(60) +Z(-40); ECP 1; SpeedS 50")
+    start, last, half = (parse_point(run(f"Print P{n}")).coordinates for n in (1, 2, 3))
     point = frame_of_six(parse_point(run("Print ECPSet(1)")).coordinates)
+
+    def seen(*places):
+        return [(frame_of_six(at).inverse() @ point).shift_mm for at in places]
+
     middle = tip_along(run, "Move P2 ECP", 0.5)
-    seen = [(frame_of_six(at).inverse() @ point).shift_mm for at in (middle, start, end)]
-    assert off_line_mm(*seen) < 1e-2
-    assert off_line_mm(middle, start, end) > 1.0
-    assert parse_point(run("Print Here")).coordinates == pytest.approx(end, abs=2e-3)
+    assert off_line_mm(*seen(middle, start, last)) < 1e-2
+    assert off_line_mm(middle, start, last) > 1.0
+    assert parse_point(run("Print Here")).coordinates == pytest.approx(last, abs=2e-3)
+    run("Go P1")
+    some = [tip_along(run, "Arc3 P3, P2 ECP", share) for share in (0.4, 0.7) if run("Go P1")]
+    assert parse_point(run("Print Here")).coordinates == pytest.approx(last, abs=2e-3)
+    for place in some:
+        assert off_circle_mm(*seen(place, start, half, last)) < 1e-2
+
+
+@pytest.mark.parametrize(("name", "end", "mid"), HELD[:2], ids=[case[0] for case in HELD[:2]])
+def test_arc3_is_a_circle_in_space_through_its_middle_point(robot, name, end, mid):
+    run = robot(name)
+    run(f"Motor On; P1 = Here; P2 = {end}; P3 = {mid} +Z(-12); SpeedS 50")
+    start, last, half = (parse_point(run(f"Print P{n}")).coordinates for n in (1, 2, 3))
+    places = [tip_along(run, "Arc3 P3, P2", share) for share in (0.3, 0.6) if run("Go P1")]
+    assert parse_point(run("Print Here")).coordinates == pytest.approx(last, abs=2e-3)
+    for place in places:
+        assert off_circle_mm(place, start, half, last) < 1e-2
+        assert off_line_mm(place, start, last) > 1.0
+    assert run("Arc3 P2, P2") == "!Execute,99"
+    assert run.client.code() == 4002
+
+
+def off_circle_mm(place, *three):
+    """Return how far a place is from the circle through three others."""
+    at, a, b, c = (np.array(one[:3]) for one in (place, *three))
+    normal = np.cross(b - a, c - a)
+    rows = np.array([b - a, c - a, normal])
+    heights = [(b @ b - a @ a) / 2, (c @ c - a @ a) / 2, normal @ a]
+    centre = np.linalg.solve(rows, heights)
+    aside = (at - a) @ normal / np.linalg.norm(normal)
+    return math.hypot(np.linalg.norm(at - centre) - np.linalg.norm(a - centre), aside)

@@ -46,7 +46,7 @@ def test_the_real_capture_is_read_and_written_again():
                 Hand.RIGHT,
                 ("R", "A", "NF", "J4F0", "J1A(-12.5)", "0"),
                 0,
-                Posture(),
+                Posture(j1_angle_deg=-12.5),
             ),
         ),
         ("X:1 Y:2 Z:3 U:4/L/15", PrintedPoint((1.0, 2.0, 3.0, 4.0), Hand.LEFT, ("L", "15"), 15)),

@@ -1,8 +1,10 @@
 """The stations of a cell, as commands show them."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
+from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import EntryKind, Recorded
 from robolink.stations import Station, find_station, find_stations
@@ -11,29 +13,76 @@ from robolink_cli.session.context import CliContext
 from robolink_cli.views.documents import number
 
 
-def known_stations(context: CliContext) -> dict[str, Station]:
+@dataclass(frozen=True, slots=True)
+class StationOfRobot:
+    """A station, and whose it is.
+
+    Attributes:
+        station: What is known of it.
+        robot: Name of the robot in whose record it stands, or that of the controller where an entry
+            does not tell which of its robots it is about; empty where there is one robot.
+    """
+
+    station: Station
+    robot: str = ""
+
+
+def known_stations(context: CliContext, *, robot: str | None = None) -> list[StationOfRobot]:
     """Return the stations that cell file and journal know, without asking the controller.
 
+    Each robot of a controller has places of its own; what the cell file declares is each one's.
+
+    Args:
+        context: The command.
+        robot: The robot that is meant, by its name or the part behind its controller's; ``None``
+            for all.
+
     Raises:
-        ConfigError: No controller is named, or the journal cannot be read.
+        ConfigError: No controller is named, there is no such robot, or the journal cannot be read.
     """
-    return find_stations(context.cell, _entries(context))
+    return [
+        StationOfRobot(station, name)
+        for name, entries in _records(context, robot, nobodys=True)
+        for station in find_stations(context.cell, entries).values()
+    ]
 
 
-def known_station(context: CliContext, name: str) -> Station:
+def known_station(context: CliContext, name: str, *, robot: str | None = None) -> StationOfRobot:
     """Return one of them.
 
     Raises:
-        ConfigError: There is none of that name, or the journal cannot be read.
+        ConfigError: There is none of that name, or the journal cannot be read; or several robots
+            of the controller have one, and none is named.
     """
-    return find_station(context.cell, _entries(context), name)
+    records = _records(context, robot, nobodys=False)
+    learnt = [
+        (whose, entries)
+        for whose, entries in records
+        if any(station.learnt for station in _named(context, entries, name))
+    ]
+    if len(learnt) > 1:
+        raise ConfigError(
+            tr(
+                "Several robots of this controller have a place of station {name}: {robots}.",
+                name=name,
+                robots=", ".join(whose for whose, _ in learnt),
+            ),
+            remedy=tr("Name one of them with --robot."),
+        )
+    whose, entries = (learnt or records)[0]
+    return StationOfRobot(find_station(context.cell, entries, name), whose if learnt else "")
 
 
-def station_payload(station: Station) -> dict[str, Any]:
-    """Return one station for a document."""
+def _named(context: CliContext, entries: Sequence[Recorded], name: str) -> list[Station]:
+    return [one for one in find_stations(context.cell, entries).values() if one.id == name]
+
+
+def station_payload(station: Station, *, robot: str = "") -> dict[str, Any]:
+    """Return one station for a document; ``robot`` where a controller has several."""
     due = station.check_due
     return {
         "id": station.id,
+        "robot": robot or None,
         "kind": station.kind.value,
         "x_mm": station.x_mm,
         "y_mm": station.y_mm,
@@ -51,8 +100,9 @@ def station_payload(station: Station) -> dict[str, Any]:
     }
 
 
-def show_stations(stations: Sequence[Station]) -> None:
-    """Print one station a line."""
+def show_stations(known: Sequence[StationOfRobot]) -> None:
+    """Print one station a line, with its robot where there are several."""
+    stations = [one.station for one in known]
     if not stations:
         say(
             tr(
@@ -61,15 +111,18 @@ def show_stations(stations: Sequence[Station]) -> None:
             )
         )
         return
-    columns = (tr("station"), tr("kind"), "X mm", "Y mm", "Z mm", "sigma mm", tr("found"))
+    several = any(one.robot for one in known)
+    whose = [tr("robot")] if several else []
+    columns = (*whose, tr("station"), tr("kind"), "X mm", "Y mm", "Z mm", "sigma mm", tr("found"))
     rows = [
         [
+            *([one.robot.rpartition("/")[2]] if several else []),
             station.id,
             station.kind.value,
             *(number(v) for v in (station.x_mm, station.y_mm, station.z_mm, station.sigma_mm)),
             _found(station),
         ]
-        for station in stations
+        for one, station in zip(known, stations, strict=True)
     ]
     table(tr("stations"), columns, rows)
     for station in stations:
@@ -77,9 +130,10 @@ def show_stations(stations: Sequence[Station]) -> None:
             say(f"  ! {station.remark()}")
 
 
-def show_station(station: Station) -> None:
+def show_station(one: StationOfRobot) -> None:
     """Print one station."""
-    show_stations([station])
+    station = one.station
+    show_stations([one])
     if station.gauge:
         say(tr("  gauge: {gauge}", gauge=station.gauge))
     if station.check_due:
@@ -96,12 +150,44 @@ def _found(station: Station) -> str:
     )
 
 
-def _entries(context: CliContext) -> Iterable[Recorded]:
+def _records(
+    context: CliContext, robot: str | None, *, nobodys: bool
+) -> list[tuple[str, list[Recorded]]]:
+    """Return what is on record about stations for each robot, newest first, by its name.
+
+    What stands under a controller of several robots tells none of them, and is one more record
+    where ``nobodys``.
+
+    Raises:
+        ConfigError: The robot that is meant is none of them.
+    """
     from robolink.journal import default_location, may_exist, open_journal
     from robolink.transport import parse_url
 
     address = parse_url(context.require_url()).address
-    if not may_exist(default_location()):
-        return ()
-    journal = open_journal(read_only=True)
-    return journal.entries(controller=address, kinds=(EntryKind.STATION,))
+    robots, entries = tuple[str, ...](), list[Recorded]()
+    if may_exist(default_location()):
+        journal = open_journal(read_only=True)
+        robots = journal.robots_of(address)
+        entries = list(journal.entries(controller=address, kinds=(EntryKind.STATION,)))
+    if robot is not None:
+        robots = (_meant(robot, robots),)
+    elif not robots:
+        return [("", entries)]
+    records = [
+        (name, [one for one in entries if one.controller == name]) for name in sorted(robots)
+    ]
+    untold = [one for one in entries if one.controller not in robots]
+    if robot is None and nobodys and untold:
+        records.append((untold[0].controller, untold))
+    return records
+
+
+def _meant(robot: str, robots: Sequence[str]) -> str:
+    for name in robots:
+        if robot in (name, name.rpartition("/")[2]):
+            return name
+    raise ConfigError(
+        tr("No robot {robot!r} is on record here.", robot=robot),
+        remedy=tr("These are: {robots}.", robots=", ".join(robots) or tr("none")),
+    )

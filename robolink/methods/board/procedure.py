@@ -58,11 +58,15 @@ def measure_board(
             ``several_fiducials_seen``, ``far_off``, ``camera_not_calibrated``,
             ``coincident_fiducials``, ``spacing_mismatch``, and the others of :func:`solve_board`
             and :func:`solve_board_round`.
+        LimitError: The arm cannot bring the board before the camera so; nothing was moved.
     """
     board.require_apart()
     solvable_planes([here], height_of(stored))
     tool, centred = stored or NO_OFFSET, False
-    drive, angles_deg = CameraDrive(station, plan, here), plan.angles_deg(here.u_deg)
+    drive = CameraDrive(station, plan, here)
+    angles_deg = yield from drive.angles_in_reach(
+        here, lambda angles: _places(board, stored or NO_OFFSET, angles)
+    )
     if plan.centre_first:
         found = _places(board, tool, angles_deg[:1])[:2]
         pair = BoardDrawing(board.fiducials_mm[:2])

@@ -73,10 +73,14 @@ def look_round(
     Raises:
         CalibrationError: ``tilted_pose`` before anything moves; ``tip_not_seen``,
             ``several_tips_seen``, ``camera_not_calibrated``, and those of the solver.
+        LimitError: The arm cannot bring the tip before the camera so; nothing was moved.
     """
     solvable_planes([here], height_of(stored))
     tip, centred = stored or NO_OFFSET, False
-    drive, angles_deg = CameraDrive(station, plan, here), plan.angles_deg(here.u_deg)
+    drive = CameraDrive(station, plan, here)
+    angles_deg = yield from drive.angles_in_reach(
+        here, lambda angles: [Place(u_deg, stored or NO_OFFSET) for u_deg in angles]
+    )
     if plan.centre_first:
         found = Place(angles_deg[0], tip)
 

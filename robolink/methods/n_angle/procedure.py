@@ -1,10 +1,15 @@
 """A tip touched onto a pin at several angles of U."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
-from robolink.calibration import CalibrationResult, planar_sigma_gain
+from robolink.calibration import (
+    CalibrationResult,
+    height_of,
+    planar_sigma_gain,
+    solvable_planes,
+)
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset, angle_difference_deg
 from robolink.procedures import (
@@ -12,10 +17,17 @@ from robolink.procedures import (
     PinTouches,
     SamplingPolicy,
     TouchPlan,
+    offset_z,
+    plain_pose,
     sample_sequentially,
     touch_again,
+    turned_touches,
 )
-from robolink.runner import Procedure, TouchedAt
+from robolink.runner import Procedure, TouchedAt, first_clear
+
+_SHARES: Final = (1.0, -1.0, 0.5, -0.5)
+"""By which the planned turns are scaled where the arm cannot take them up: to the other side, and
+half as far."""
 
 FALSE_ALARM: Final = 0.001
 """How often a bias along the approach is told where there is none."""
@@ -41,11 +53,25 @@ def measure_n_angle(
     Raises:
         CalibrationError: ``not_touched``, ``typed_ahead``, ``touch_heights_differ``,
             ``touch_not_proven``, ``large_residual``, and as :func:`solve_n_angle`.
+        LimitError: The arm cannot turn so over this pin, nor to the other side, nor half as far.
     """
     touches = PinTouches(plan, comes_down=stored is not None)
     first = yield from touches.first()
+    # Refused before anything turns, not when all touches are made.
+    solvable_planes([first], height_of(stored))
     # Within half a turn of zero: adding up from touch to touch leaves the joint's range.
-    angles = [angle_difference_deg(first.u_deg + turn_deg, 0.0) for turn_deg in turns_deg]
+    choice = [
+        [angle_difference_deg(first.u_deg + turn_deg * share, 0.0) for turn_deg in turns_deg]
+        for share in _SHARES
+    ]
+    nominal = replace(plan, nominal=True)
+    angles = yield from first_clear(
+        choice,
+        lambda angles_deg: turned_touches(
+            nominal, first, angles_deg, stored or ToolOffset(), comes_down=stored is not None
+        ),
+        offset_z(plain_pose(first), plan.lift_mm),
+    )
     turning = _NAngleSampler(touches, stored, sigma_mm, first)
     result = yield from sample_sequentially(turning, first, [first.u_deg, *angles], sampling)
     touches.require_made()

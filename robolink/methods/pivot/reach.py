@@ -62,6 +62,36 @@ def tilts_in_reach(
     return chosen
 
 
+def free_tilts(
+    over: OverPin, choice: Sequence[Tilt], lift_mm: float
+) -> Procedure[tuple[Tilt, ...]]:
+    """Return which of many orientations the arm can take up over a place, in their order.
+
+    Args:
+        over: The place as the first touch showed it.
+        choice: What there is to choose from.
+        lift_mm: How far above it the tool tilts.
+
+    Raises:
+        CalibrationError: ``not_tilted``: fewer than three are left; nothing was tilted.
+    """
+    refusals = yield from _refusals(over, choice, lift_mm)
+    free = tuple(tilt for tilt, refusal in zip(choice, refusals, strict=True) if not refusal)
+    if len(free) < LEAST_TILTS:
+        raise _not_tilted(next(filter(None, refusals)))
+    if len(free) < len(choice):
+        yield Notify(
+            tr(
+                "{missed} of {count} tilts cannot be taken up here: {why} The touches are chosen "
+                "among the others.",
+                missed=len(choice) - len(free),
+                count=len(choice),
+                why=next(filter(None, refusals)),
+            )
+        )
+    return free
+
+
 def proving_in_reach(
     over: OverPin, wanted: Sequence[Tilt], lift_mm: float
 ) -> Procedure[tuple[Tilt, ...]]:

@@ -13,6 +13,7 @@ from robolink.calibration import (
     solve_plane_touch,
 )
 from robolink.messages import tr
+from robolink.methods.pivot.reach import free_tilts
 from robolink.methods.pivot.tilts import UPRIGHT, OverPin
 from robolink.methods.plane_touch.design import (
     candidates,
@@ -61,7 +62,7 @@ def measure_plane_touch(
     drive = SurfaceDrive(plan, over, touches)
     normal = yield from _upright(plan, drive, touches, over.pin_mm, survey, stored)
     uprights = [SurfaceSpot(UPRIGHT, place, normal) for place in places_of(touches.taken, stored)]
-    choice = candidates(survey.tilt_deg, axes)
+    choice = yield from free_tilts(over, candidates(survey.tilt_deg, axes), plan.lift_mm)
     spots, columns = informative_spots(drive, uprights, survey, choice, stored)
     if not plan.nominal:
         require_observable(columns)

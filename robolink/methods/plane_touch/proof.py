@@ -3,6 +3,7 @@
 import numpy as np
 
 from robolink.calibration import CalibrationResult, PlaneTouchResult, VerifyResult, rotation_of
+from robolink.methods.pivot.reach import free_tilts
 from robolink.methods.pivot.tilts import OverPin
 from robolink.methods.plane_touch.design import candidates
 from robolink.methods.surface_drive import (
@@ -50,7 +51,8 @@ def verify_on_plane(
         raise TypeError("the plane that was touched is a part of the result")
     normal, foot = _under(here, tip, result)
     over = OverPin(here, foot, tip=tip, frame=result.offset)
-    tilts = candidates(tilt_deg, axes, turned_deg=TURNED_DEG)
+    choice = candidates(tilt_deg, axes, turned_deg=TURNED_DEG)
+    tilts = yield from free_tilts(over, choice, plan.lift_mm)
     spots = proving_spots(over, [SurfaceSpot(tilt, foot, normal) for tilt in tilts])
     return (
         yield from verify_on_surface(

@@ -8,6 +8,7 @@ import numpy as np
 
 from robolink.calibration import SphereTouchResult, solve_sphere_touch, sphere_columns
 from robolink.messages import tr
+from robolink.methods.pivot.reach import free_tilts
 from robolink.methods.pivot.tilts import UPRIGHT, OverPin
 from robolink.methods.plane_touch.design import candidates
 from robolink.methods.sphere_touch.design import (
@@ -61,7 +62,7 @@ def measure_sphere_touch(
     uprights = [
         SurfaceSpot(UPRIGHT, place, survey.upright_side(i)) for i, place in enumerate(places)
     ]
-    tilts = candidates(survey.tilt_deg, axes)
+    tilts = yield from free_tilts(over, candidates(survey.tilt_deg, axes), plan.lift_mm)
     possible = reachable(drive, centre, radius_mm, tilts, survey)
     spots, columns = informative_spots(drive, uprights, possible, survey, stored, centre)
     for number in range(UPRIGHTS, survey.count):

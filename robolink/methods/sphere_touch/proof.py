@@ -1,6 +1,7 @@
 """The proof of a tip on the sphere on which it was measured."""
 
 from robolink.calibration import CalibrationResult, SphereTouchResult, VerifyResult
+from robolink.methods.pivot.reach import free_tilts
 from robolink.methods.pivot.tilts import OverPin
 from robolink.methods.plane_touch.design import candidates
 from robolink.methods.plane_touch.proof import TURNED_DEG
@@ -45,7 +46,8 @@ def verify_on_sphere(
     radius_mm = result.radius_mm
     over = OverPin(here, (x_mm, y_mm, z_mm + radius_mm), tip=tip, frame=result.offset)
     drive = SurfaceDrive(plan, over, SurfaceTouches(plan))
-    tilts = candidates(survey.tilt_deg, axes, turned_deg=TURNED_DEG)
+    choice = candidates(survey.tilt_deg, axes, turned_deg=TURNED_DEG)
+    tilts = yield from free_tilts(over, choice, plan.lift_mm)
     possible = reachable(drive, (x_mm, y_mm, z_mm), radius_mm, tilts, survey)
     return (
         yield from verify_on_surface(

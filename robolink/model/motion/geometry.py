@@ -49,6 +49,9 @@ class Posture:
         j2_flag: The same of joint 2, of an arm that folds under itself.
         j4_flag: 1 where joint 4 stands beyond half a turn.
         j6_flag: How many half turns joint 6 stands beyond the first.
+        j1_angle_deg: Where joint 1 stands in a singular place that leaves it free: an RS arm with
+            its flange on the axis of joint 1. ``None`` where none was told.
+        j4_angle_deg: The same of joint 4, of an N robot.
     """
 
     elbow: Elbow = Elbow.ABOVE
@@ -57,6 +60,8 @@ class Posture:
     j2_flag: int = 0
     j4_flag: int = 0
     j6_flag: int = 0
+    j1_angle_deg: float | None = None
+    j4_angle_deg: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

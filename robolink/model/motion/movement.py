@@ -190,11 +190,17 @@ class MotionGroup(Protocol):
     def requests_for(self, target: Pose, profile: MotionProfile) -> tuple[str, ...]:
         """Return what :meth:`move_to` would send besides its reads, as it stands on the wire."""
 
-    def obstacle(self, target: Pose, path: Path) -> str:
+    def obstacle(self, target: Pose, path: Path, *, start: Pose | None = None) -> str:
         """Return why the arm could not go there so, a sentence; empty where nothing is known.
 
-        Reads only, and is no promise: it is for whoever has other places to choose from. The
-        target is meant for the tool in force.
+        Reads only, and is no promise: it is for whoever has other places to choose from, or would
+        rather not begin. The places are meant for the tool in force.
+
+        Args:
+            target: Where to.
+            path: How.
+            start: Where from, ``None`` where nobody knows; of a straight way only the end is looked
+                at then.
         """
 
     def deceleration_mm_s2(self) -> float | None:

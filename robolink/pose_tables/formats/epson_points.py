@@ -36,7 +36,8 @@ from robolink.pose_tables.values import LengthUnit, RawPose, RawTable
 
 _FIELDS: Final = ("nNumber", "nUndefined", "rX", "rY", "rZ", "rU", "rV", "rW", "nLocal", "nHand")
 _FLAGS: Final = ("nElbow", "nWrist", "nJ1Flag", "nJ2Flag", "nJ4Flag", "nJ6Flag")
-_NAMES: Final = "|".join((*_FIELDS, *_FLAGS))
+_ANGLES: Final = ("rJ1Angle", "rJ4Angle")
+_NAMES: Final = "|".join((*_FIELDS, *_FLAGS, *_ANGLES))
 _BLOCK: Final = re.compile(r"^Point[0-9]+ *\{\s*?\n(.*?)^\s*\}", re.MULTILINE | re.DOTALL)
 _FIELD: Final = re.compile(
     rf"^\s*({_NAMES})=(-?[0-9]{{1,9}}(?:\.[0-9]{{1,9}})?(?:E[+-][0-9]{{1,3}})?)\s*$",
@@ -148,7 +149,10 @@ def _pose(fields: Mapping[str, float]) -> Pose | None:
 
 
 def _posture(fields: Mapping[str, float]) -> Posture | None:
-    """Return the flags of a point, ``None`` where they are those of any point of a SCARA."""
+    """Return the flags of a point, ``None`` where they are those of any point of a SCARA.
+
+    An angle of a singular place is 0 in every point that has none.
+    """
     numbers = {name: int(fields.get(name, 0)) for name in _FLAGS}
     posture = Posture(
         elbow=_ELBOWS.get(numbers["nElbow"], Elbow.ABOVE),
@@ -157,6 +161,8 @@ def _posture(fields: Mapping[str, float]) -> Posture | None:
         j2_flag=numbers["nJ2Flag"],
         j4_flag=numbers["nJ4Flag"],
         j6_flag=numbers["nJ6Flag"],
+        j1_angle_deg=fields.get("rJ1Angle") or None,
+        j4_angle_deg=fields.get("rJ4Angle") or None,
     )
     tilted = fields["rV"] != 0 or fields["rW"] != 0
     return posture if tilted or posture != Posture() else None

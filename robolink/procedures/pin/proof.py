@@ -17,11 +17,11 @@ from robolink.calibration import (
 )
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
-from robolink.procedures.approach import NO_OFFSET
+from robolink.procedures.approach import NO_OFFSET, offset_z
 from robolink.procedures.pin.judging import heights_agree
 from robolink.procedures.pin.touch_plan import TouchPlan, plain_pose
 from robolink.procedures.pin.touches import PinTouches
-from robolink.runner import Notify, Procedure, TouchedAt
+from robolink.runner import Notify, Procedure, TouchedAt, first_clear
 
 MOST_MORE: Final = 2
 """Touches that a drift may take which is neither surely inside nor surely outside."""
@@ -56,30 +56,68 @@ def verify_by_turning(
 
     Raises:
         CalibrationError: ``not_touched`` or ``typed_ahead``, with the tip drawn back.
+        LimitError: The arm cannot turn so over this pin, nor two thirds as far.
     """
-    touches = PinTouches(plan)
+    turning = _Turning(plan, contact, written, tip)
+    angles_deg = yield from first_clear(
+        [tuple(angles_deg), tuple(_nearer(contact.u_deg, angle) for angle in angles_deg)],
+        turning.on_paper,
+        offset_z(plain_pose(contact), plan.lift_mm),
+    )
     proof = DriftProof(tolerance_mm, plan.u_drift_mm if u_mm is None else u_mm)
-
-    def shown(angle_deg: float) -> Procedure[None]:
-        place = _place(contact, angle_deg, written, tip)
-        found = yield from touches.again(
-            place,
-            key=len(proof.touches),
-            turning=tr("turn about the new tip"),
-            instruction=tr("Bring the tip back onto the pin; what you jog shows the drift."),
-        )
-        proof.add(place, found)
-
     for angle_deg in angles_deg:
-        yield from shown(angle_deg)
+        proof.add(*(yield from turning.shown(angle_deg)))
     for _ in range(MOST_MORE):
         doubted = proof.undecided()
         if doubted is None:
             break
         yield Notify(proof.told(doubted))
-        yield from shown(doubted.u_deg)
+        proof.add(*(yield from turning.shown(doubted.u_deg)))
     heights_mm = [contact.z_mm, *(touch.z_mm for touch in proof.touches)]
     return proof.result(heights_agree(heights_mm, plan.sigma_in_height_mm))
+
+
+def _nearer(u_deg: float, angle_deg: float) -> float:
+    """Return an angle two thirds of the way from where the tool was measured."""
+    return u_deg + (angle_deg - u_deg) * 2 / 3
+
+
+class _Turning:
+    """Brings the new tip back onto the pin at angles of U.
+
+    Args:
+        plan: Lift, clearance, contact input.
+        contact: Pose of the new tool's tip on the pin.
+        written: The offset in force.
+        tip: Where the tip was found.
+    """
+
+    def __init__(
+        self, plan: TouchPlan, contact: Pose, written: ToolOffset, tip: ToolOffset
+    ) -> None:
+        self._plan, self._contact = plan, contact
+        self._written, self._tip = written, tip
+        self._touches = PinTouches(plan)
+        self._count = 0
+
+    def shown(self, angle_deg: float) -> Procedure[tuple[Pose, TouchedAt]]:
+        """Have the pin touched; returns where the tip should have been, and where it was."""
+        place = _place(self._contact, angle_deg, self._written, self._tip)
+        found = yield from self._touches.again(
+            place,
+            key=self._count,
+            turning=tr("turn about the new tip"),
+            instruction=tr("Bring the tip back onto the pin; what you jog shows the drift."),
+        )
+        self._count += 1
+        return place, found
+
+    def on_paper(self, angles_deg: Sequence[float]) -> Procedure[None]:
+        """Take all, as it is foreseen."""
+        nominal = replace(self._plan, nominal=True)
+        paper = _Turning(nominal, self._contact, self._written, self._tip)
+        for angle_deg in angles_deg:
+            yield from paper.shown(angle_deg)
 
 
 def contact_pose(result: CalibrationResult, *, tool: int) -> Pose:

@@ -5,7 +5,7 @@ the pin, and the last bit is done by the person, who sees it. How far beside and
 that a touch that was not made shows (docs/reference/evidence.md 1).
 """
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -161,6 +161,31 @@ def touch_again(
             instruction=tr("Bring the tip onto the pin again, with the tool turned."),
         )
     )
+
+
+def turned_touches(
+    plan: TouchPlan,
+    first: Pose,
+    angles_deg: Sequence[float],
+    guess: ToolOffset,
+    *,
+    comes_down: bool = True,
+) -> Procedure[None]:
+    """Touch at one angle after the other; nothing is made of it.
+
+    To be looked at before the first of them is taken: the plan is a nominal one then.
+
+    Args:
+        plan: How.
+        first: The touch from which the tip was lifted off.
+        angles_deg: U of each.
+        guess: About where the tip is.
+        comes_down: As for :class:`PinTouches`.
+    """
+    touches = PinTouches(plan, comes_down=comes_down)
+    last: Pose = first
+    for angle_deg in angles_deg:
+        last = yield from touch_again(touches, last, angle_deg, guess)
 
 
 def _turned(contact: Pose, u_deg: float, guess: ToolOffset) -> Pose:

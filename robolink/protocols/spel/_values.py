@@ -39,6 +39,7 @@ _MARKS: Final = {hand: mark for mark, hand in _HANDS.items()}
 _ELBOWS: Final = {"A": Elbow.ABOVE, "B": Elbow.BELOW}
 _WRISTS: Final = {"NF": Wrist.NO_FLIP, "F": Wrist.FLIP}
 _JOINT_FLAG: Final = re.compile(r"J([1246])F([0-9]{1,3})", re.ASCII)
+_JOINT_ANGLE: Final = re.compile(rf"J([14])A\(({NUMBER})\)", re.ASCII)
 _HIGHEST_LOCAL: Final = 15
 
 _LINE: Final = re.compile(
@@ -160,15 +161,22 @@ class PrintedPoint:
 def posture_marks(posture: Posture, *, six_axes: bool) -> tuple[str, ...]:
     """Return the flags of a posture without their slashes, ``A NF J4F0 J6F0`` for instance.
 
-    Source: docs/reference/spel.md 5.1; J1F is written where it is not 0, and J2F on an arm without
-    elbow and wrist only.
+    Source: docs/reference/spel.md 5.1; J1F is written where it is not 0, J2F on an arm without
+    elbow and wrist only, and the angles of singular places where they are told.
     """
     first = (f"J1F{posture.j1_flag}",) if posture.j1_flag else ()
     if not six_axes:
-        return (*first, f"J2F{posture.j2_flag}") if posture.j2_flag else first
+        folded = (f"J2F{posture.j2_flag}",) if posture.j2_flag else ()
+        return (*first, *folded, *_angle_marks(posture))
     elbow = "A" if posture.elbow is Elbow.ABOVE else "B"
     wrist = "NF" if posture.wrist is Wrist.NO_FLIP else "F"
-    return (elbow, wrist, *first, f"J4F{posture.j4_flag}", f"J6F{posture.j6_flag}")
+    turns = (*first, f"J4F{posture.j4_flag}", f"J6F{posture.j6_flag}")
+    return (elbow, wrist, *turns, *_angle_marks(posture))
+
+
+def _angle_marks(posture: Posture) -> tuple[str, ...]:
+    angles = {1: posture.j1_angle_deg, 4: posture.j4_angle_deg}
+    return tuple(f"J{joint}A({decimal(a)})" for joint, a in angles.items() if a is not None)
 
 
 def _posture(flags: tuple[str, ...]) -> Posture | None:
@@ -177,12 +185,14 @@ def _posture(flags: tuple[str, ...]) -> Posture | None:
     Raises:
         ValueError: They contradict each other.
     """
-    named: dict[str, Elbow | Wrist | int] = {}
+    named: dict[str, Elbow | Wrist | int | float] = {}
     for flag in flags:
-        entry: tuple[str, Elbow | Wrist | int]
-        joint = _JOINT_FLAG.fullmatch(flag)
+        entry: tuple[str, Elbow | Wrist | int | float]
+        joint, angle = _JOINT_FLAG.fullmatch(flag), _JOINT_ANGLE.fullmatch(flag)
         if joint is not None:
             entry = f"j{joint[1]}_flag", int(joint[2])
+        elif angle is not None:
+            entry = f"j{angle[1]}_angle_deg", float(angle[2])
         elif flag in _ELBOWS:
             entry = "elbow", _ELBOWS[flag]
         elif flag in _WRISTS:

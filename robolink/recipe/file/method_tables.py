@@ -4,7 +4,7 @@ import dataclasses
 import functools
 from typing import Annotated, Any, ClassVar, Literal, Union, get_args, get_origin
 
-from pydantic import BaseModel, Field, GetCoreSchemaHandler, create_model
+from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, create_model
 from pydantic_core import CoreSchema
 
 from robolink.methods import AnyMethod, Help, MethodParameters, Unit, all_methods, fields_of
@@ -12,9 +12,14 @@ from robolink.methods.declaration.fields import ParameterField as Parameter
 from robolink.methods.declaration.fields import bare
 from robolink.recipe.file.tables import Table
 
+_DESCRIBED = ConfigDict(use_attribute_docstrings=False)
+"""Their keys bring their sentences: pydantic need not look through every module for a source."""
+
 
 class MethodTable(Table):
     """What the tables of all methods have in common."""
+
+    model_config = _DESCRIBED
 
     of_method: ClassVar[AnyMethod]
 
@@ -36,6 +41,8 @@ class MethodTable(Table):
 
 class _Line(Table):
     """A table inside of one, such as a light beam."""
+
+    model_config = _DESCRIBED
 
     of_class: ClassVar[type[Any]]
 

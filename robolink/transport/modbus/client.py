@@ -5,7 +5,7 @@ Nothing is sent twice and no connection is renewed by itself
 """
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Final, Protocol
 
 from robolink import ambient
 from robolink.errors import (
@@ -28,6 +28,12 @@ from robolink.transport.modbus.messages import (
     ModbusRequest,
 )
 from robolink.transport.stream.contract import Transport
+
+_RETRY_S: Final = 0.75
+"""How long all repeats of a question that was not answered may take together."""
+
+_REACTION_S: Final = 0.2
+"""What a server takes to answer, on a line so slow that its time counts."""
 
 
 class Exchange(Protocol):
@@ -89,6 +95,7 @@ class ModbusClient:
         self._unit = unit
         self._timeout_s = timeout_s
         self._lock = ambient.lock()
+        self._repeats_until: Deadline | None = None
 
     @property
     def identity(self) -> str:
@@ -193,16 +200,36 @@ class ModbusClient:
 
     def _ask(self, request: ModbusRequest) -> ModbusReply:
         with self._lock:
-            deadline = Deadline.after(self.clock, self._timeout_s)
+            deadline = self._deadline()
             try:
                 reply = self._exchange.ask(request, deadline)
                 if reply.refusal is not None:
                     raise refused(self.identity, request, reply.refusal)
-            except (TransportTimeoutError, RemoteProtocolError):
+            except (TransportTimeoutError, RemoteProtocolError) as error:
                 if not self._exchange.recovers:
                     self._transport.close()
+                elif isinstance(error, TransportTimeoutError) and self._repeats_until is None:
+                    self._repeats_until = Deadline.after(self.clock, self._retry_s)
                 raise
             except TransportError:
                 self._transport.close()
                 raise
+            self._repeats_until = None
             return reply
+
+    def _deadline(self) -> Deadline:
+        """Return when the next question is given up.
+
+        On a line that answered nothing, repeats share one short deadline: a PLC that lost its
+        power is noticed soon after the first, and one lost answer ends nothing.
+        """
+        whole, repeats = Deadline.after(self.clock, self._timeout_s), self._repeats_until
+        if repeats is not None and not repeats.expired:
+            return min(whole, repeats, key=lambda one: one.at_ns)
+        self._repeats_until = None
+        return whole
+
+    @property
+    def _retry_s(self) -> float:
+        """Time for the question that finds the place on a line again, and for the repeat."""
+        return max(_RETRY_S, 2 * self.read_takes_s(MOST_REGISTERS_READ) + _REACTION_S)

@@ -7,21 +7,9 @@ from robolink.errors import ConfigError, ConnectError
 from robolink.messages import tr
 from robolink.timing import Deadline
 from robolink.transport._url import LinkUrl
+from robolink.transport.stream.keepalive import set_keepalive
 
 _UNREACHABLE = (errno.EHOSTUNREACH, errno.ENETUNREACH, errno.ENETDOWN)
-
-# A peer that lost its power answers nothing, and bytes sent to it "succeed" for minutes
-# unless the kernel is told otherwise (docs/reference/faults.md F11). Probing after 1 s
-# of silence, twice, 1 s apart, ends an idle link after 3 s; unacknowledged data end it
-# after 2.5 s. Each constant is missing on some platform.
-_OPTIONS = (
-    ("SOL_SOCKET", "SO_KEEPALIVE", 1),
-    ("IPPROTO_TCP", "TCP_NODELAY", 1),
-    ("IPPROTO_TCP", "TCP_KEEPIDLE", 1),
-    ("IPPROTO_TCP", "TCP_KEEPINTVL", 1),
-    ("IPPROTO_TCP", "TCP_KEEPCNT", 2),
-    ("IPPROTO_TCP", "TCP_USER_TIMEOUT", 2500),
-)
 
 
 def require_tcp_url(url: LinkUrl) -> tuple[str, int]:
@@ -77,9 +65,7 @@ def dial(url: LinkUrl, *, timeout_s: float, deadline: Deadline) -> socket.socket
 
 def _connect(connection: socket.socket, address: object, deadline: Deadline) -> socket.socket:
     try:
-        for level, name, value in _OPTIONS:
-            if hasattr(socket, name):
-                connection.setsockopt(getattr(socket, level), getattr(socket, name), value)
+        set_keepalive(connection)
         connection.settimeout(max(deadline.remaining_s(), 1e-3))  # 0 would mean non-blocking
         connection.connect(address)  # type: ignore[arg-type]
     except BaseException:

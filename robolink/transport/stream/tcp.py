@@ -29,6 +29,7 @@ from robolink.messages import tr
 from robolink.timing import Clock, Deadline, SystemClock
 from robolink.transport._url import LinkUrl
 from robolink.transport.stream.dial import dial
+from robolink.transport.stream.keepalive import unheard
 
 _SLICE_S = 0.05
 _CHUNK_BYTES = 4096
@@ -60,6 +61,7 @@ class TcpTransport:
         self._place = url.place
         self._clock = clock
         self._closed = False
+        self._unheard: OSError | None = None
         self._look = looker(connection)
         # Without MSG_DONTWAIT (Windows) nothing may wait in the kernel: poll first, always.
         self._no_wait: int = getattr(socket, "MSG_DONTWAIT", 0)
@@ -121,6 +123,7 @@ class TcpTransport:
             try:
                 data = self._socket.recv(_CHUNK_BYTES)
             except BlockingIOError:
+                self._require_heard()
                 continue
             except OSError as error:
                 raise self._ended(error) from error
@@ -129,6 +132,8 @@ class TcpTransport:
     def receive_waiting(self) -> bytes | None:
         """See :meth:`robolink.transport.Transport.receive_waiting`."""
         if not self._closed and not self._look():
+            if self._unheard is not None:
+                raise self._ended(self._unheard)
             return None
         try:
             data = self._socket.recv(_CHUNK_BYTES, self._no_wait)
@@ -144,6 +149,9 @@ class TcpTransport:
             remaining_s = deadline.remaining_s()
             if wait_ready(self._socket, min(remaining_s, _SLICE_S)):
                 return True
+            self._unheard = unheard(self._socket)
+            if self._unheard is not None:
+                return True  # the next look at it says so
             if remaining_s == 0:
                 return False
         return True
@@ -154,6 +162,11 @@ class TcpTransport:
         with contextlib.suppress(OSError):  # not connected any more: nobody to wake
             self._socket.shutdown(socket.SHUT_RDWR)
         self._socket.close()
+
+    def _require_heard(self) -> None:
+        self._unheard = unheard(self._socket)
+        if self._unheard is not None:
+            raise self._ended(self._unheard) from self._unheard
 
     def _end_of_stream(self) -> bytes:
         """Tell our own close, which wakes a waiting read with nothing, from the far side's."""

@@ -60,6 +60,7 @@ _ON_WIRE: Final = (
     Hindrance.MACHINE,
     Hindrance.PENDANT,
     Hindrance.PRODUCTION,
+    Hindrance.ANOTHER_CLIENT,
 )
 
 
@@ -149,7 +150,7 @@ class VirtualCell:
             ]
             for disturbance in due:
                 self._happen(process, disturbance, text)
-        self._turns.pass_on()
+        self._turns.pass_on(exchanged=text.startswith("exchange"))
         if not process.alive:
             raise Killed
 

@@ -28,6 +28,8 @@ class VirtualProcess:
         controller: The controller that it is connected to, ``None`` before and after.
         stopped_ns: When a stop was acknowledged in it, ``None`` while none was.
         put_back: Tools whose old value it has written since.
+        cut_off: Whether a link of it has failed.
+        overtaken: Whether another client was acknowledged in the place of a movement or write.
     """
 
     def __init__(self, number: int, person: str, holder: LeaseHolder, path: Path) -> None:
@@ -37,6 +39,8 @@ class VirtualProcess:
         self.controller: Controller | None = None
         self.stopped_ns: int | None = None
         self.put_back: set[int] = set()
+        self.cut_off = False
+        self.overtaken = False
         self._holder = holder
         self._path = path
         self._journal: Journal | None = None

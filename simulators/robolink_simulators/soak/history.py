@@ -49,6 +49,7 @@ class Hindrance(StrEnum):
     DISK = "disk"
     CLOCK = "clock"
     INTERRUPT = "interrupt"
+    ANOTHER_CLIENT = "another client"
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,6 +19,18 @@ _REAL_PATIENCE_S: Final = 300.0
 
 _LONGEST_FAVOUR: Final = 100_000
 
+_CHANGES_SHARE: Final = 0.75
+"""How often the favour changes once, of the times in which the new thread has it."""
+
+_CHANGES: Final = (2, 3, 3, 3, 8, 11)
+"""At the end of which exchange it changes: an EPSON stop has three, one of a PLC eleven."""
+
+_CATCHING_UP: Final = 12
+"""For how many points at most whoever stood still until then is favoured."""
+
+_SHORT_FAVOUR: Final = 40
+"""For how many points at most whoever began a thread is favoured."""
+
 
 class Killed(BaseException):
     """The process to which this thread belongs is dead; raised again at each further point."""
@@ -88,6 +100,8 @@ class TurnTaking:
         self._threads = [self._main]
         self._favoured: SteppedThread | None = None
         self._favour_left = 0
+        self._then: SteppedThread | None = None
+        self._exchanges_left = 0
         self._by_ident = {threading.get_ident(): self._main}
 
     @property
@@ -103,8 +117,11 @@ class TurnTaking:
     def start(self, name: str, owner: Mortal | None, work: Callable[[], None]) -> SteppedThread:
         """Begin another thread; it runs when its turn comes.
 
-        Half of the time it is favoured, or whoever began it: then the other one stands still at
-        one point for as long as that can go on, which a fair draw at each point never shows.
+        Mostly it is favoured, or whoever began it: then the other one stands still at one point
+        for as long as that can go on, which a fair draw at each point never shows. At times the
+        favour changes once, at the end of one of the first exchanges: who stood still goes on
+        while the other one is nearly done (a priority change point, as in Burckhardt et al., "A
+        randomized scheduler with probabilistic guarantees of finding bugs", ASPLOS 2010).
         """
         thread = SteppedThread(name, owner)
 
@@ -120,15 +137,31 @@ class TurnTaking:
                 self._end(thread)
 
         self._threads.append(thread)
-        self._favoured = self.rng.choice((thread, thread, self.current, None))
-        self._favour_left = _LONGEST_FAVOUR if self._favoured is thread else self.rng.randint(1, 40)
+        me = self.current
+        self._favoured = self.rng.choice((thread, thread, thread, thread, me, None))
+        self._favour_left = (
+            _LONGEST_FAVOUR if self._favoured is thread else self.rng.randint(1, _SHORT_FAVOUR)
+        )
+        changes = self._favoured is thread and self.rng.random() < _CHANGES_SHARE
+        self._then = me if changes else None
+        self._exchanges_left = self.rng.choice(_CHANGES)
         threading.Thread(target=run, name=f"soak {name}", daemon=True).start()
         return thread
 
-    def pass_on(self) -> None:
-        """Let the seed say who goes on: this thread, or another one."""
-        if not self.alone:
-            self._hand_over(self._drawn())
+    def pass_on(self, *, exchanged: bool = False) -> None:
+        """Let the seed say who goes on: this thread, or another one.
+
+        Args:
+            exchanged: Whether the thread has ended an exchange, and holds no lock of one.
+        """
+        if self.alone:
+            return
+        if exchanged and self._then is not None and self.current is self._favoured:
+            self._exchanges_left -= 1
+            if not self._exchanges_left:
+                self._favoured, self._then = self._then, None
+                self._favour_left = self.rng.randint(1, _CATCHING_UP)
+        self._hand_over(self._drawn())
 
     def wait_until(self, ready: Callable[[], bool], timeout_s: float | None = None) -> bool:
         """Let others run until ``ready`` holds, or the time is over; return whether it holds.
@@ -154,7 +187,7 @@ class TurnTaking:
         """Let every other thread run to its end."""
         me = self.current
         self.wait_until(lambda: all(other.over for other in self._threads if other is not me))
-        self._threads, self._favoured = [me], None
+        self._threads, self._favoured, self._then = [me], None, None
 
     def _drawn(self) -> SteppedThread:
         while True:

@@ -33,6 +33,9 @@ class SmcNumbers:
     no_power: int = 14  # [D] drive has no power
     axis_error: int = 2  # [D]
     interrupted_by_single_axis: int = 0
+    pcs_still_in_use: int = 0
+    blending_not_supported: int = 0
+    outside_motion_task: int = 12108  # [F]
 
     def error(self, kind: ErrorKind, text: str = "") -> SmcError:
         """Return the complaint with its number."""
@@ -57,6 +60,11 @@ class GroupOptions:
         set_tool_while_stopping: Whether SMC_GroupSetTool is accepted while a stop is held [U].
         last_commanded_tool: Whether the tool of the last commanded movement can still be read
             when no movement is unfinished [U].
+        program_task: Where the program runs that calls the movement blocks [project]: outside of
+            the motion task they end in error 12108 [F].
+        coordinate_transform_in_use: What MC_SetCoordinateTransform does to a PCS in which an
+            unfinished movement or a jog counts [U]: SMC_AXIS_GROUP_PCS_STILL_IN_USE stands on
+            the pages of jogging and of dynamic coordinate systems.
         latch: Where a touch-probe latch takes the position [ours]: at the ``cycle`` in which
             the input was seen, as a program does, or at the ``edge``, as a drive does.
         numbers: Error numbers in use.
@@ -69,5 +77,7 @@ class GroupOptions:
     disable_from: Literal["standby", "any"] = "standby"
     set_tool_while_stopping: bool = True
     last_commanded_tool: Literal["kept", "unfinished"] = "kept"
+    program_task: Literal["motion", "other"] = "motion"
+    coordinate_transform_in_use: Literal["refused", "accepted"] = "refused"
     latch: Literal["cycle", "edge"] = "cycle"
     numbers: SmcNumbers = SmcNumbers()

@@ -29,6 +29,9 @@ class ErrorKind(StrEnum):
     NO_POWER = "no_power"
     AXIS_ERROR = "axis_error"
     INTERRUPTED_BY_SINGLE_AXIS = "interrupted_by_single_axis"
+    PCS_STILL_IN_USE = "pcs_still_in_use"
+    BLENDING_NOT_SUPPORTED = "blending_not_supported"
+    OUTSIDE_MOTION_TASK = "outside_motion_task"
 
 
 SYMBOLS: Final = {
@@ -36,6 +39,10 @@ SYMBOLS: Final = {
     ErrorKind.TOOL_INCOMPATIBLE: "SMC_AXIS_GROUP_TOOL_OFFSET_INCOMPATIBLE_WITH_KINEMATICS",
     ErrorKind.NO_ORIENTATION_IMAGE: "SMC_AXIS_GROUP_TOOL_OFFSET_INCOMPATIBLE_WITH_KINEMATICS",
     ErrorKind.INTERRUPTED_BY_SINGLE_AXIS: "SMC_AXIS_GROUP_INTERRUPTED_BY_SINGLE_AXIS",
+    ErrorKind.PCS_STILL_IN_USE: "SMC_AXIS_GROUP_PCS_STILL_IN_USE",
+    ErrorKind.BLENDING_NOT_SUPPORTED: "SMC_BLENDING_NOT_SUPPORTED_BY_PREVIOUS_MOVEMENT",
+    # Its number was seen with that meaning; that this is its symbol is unverified.
+    ErrorKind.NOTHING_TO_RESET: "SMC_R_NO_ERROR_TO_RESET",
 }
 """The vendor's symbols, where a document names them (docs/reference/softmotion.md 1.4)."""
 

@@ -120,6 +120,25 @@ def test_a_line_that_recovers_is_asked_again(cell):
     assert controller.status().ready
 
 
+@pytest.mark.fault("F11")
+def test_a_line_that_stays_silent_is_asked_once_more_when_the_deadline_has_passed(cell):
+    cell.link.recovers = True
+    controller = cell.met()
+    asked = []
+
+    def silence(_deliver):
+        asked.append(cell.link.clock.now_ns())
+        cell.link.clock.advance(10.0)
+        raise cell.link.silence()
+
+    for _ in range(3):
+        cell.link.plan("read_response", silence)
+    with pytest.raises(TransportTimeoutError):
+        controller.status()
+    assert len(asked) == 2
+    assert cell.link.closed
+
+
 def test_a_link_that_does_not_recover_is_not_asked_again(cell):
     controller = cell.met()
     cell.link.lose_answer("read_response")

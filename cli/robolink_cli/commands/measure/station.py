@@ -12,26 +12,36 @@ def station() -> None:
     """Pins, beams, surfaces and cameras of a cell: where they are, and how sure."""
 
 
+_robot_option = click.option(
+    "--robot",
+    metavar="NAME",
+    help=tr("A controller with several robots: which one, as 'station list' names it."),
+)
+
+
 @station.command("list")
+@_robot_option
 @controller_options
-def list_stations(context: CliContext) -> None:
+def list_stations(context: CliContext, robot: str | None) -> None:
     """List the stations of a cell. Reads cell file and journal only; no controller is asked."""
     from robolink_cli.views.stations import known_stations, show_stations, station_payload
 
-    stations = known_stations(context)
-    payload = {"stations": [station_payload(one) for one in stations.values()]}
-    context.emit("stations", payload, lambda: show_stations(tuple(stations.values())))
+    known = known_stations(context, robot=robot)
+    payload = {"stations": [station_payload(one.station, robot=one.robot) for one in known]}
+    context.emit("stations", payload, lambda: show_stations(known))
 
 
 @station.command("show")
 @click.argument("name", metavar="ID")
+@_robot_option
 @controller_options
-def show(context: CliContext, name: str) -> None:
+def show(context: CliContext, name: str, robot: str | None) -> None:
     """Show one station. Reads cell file and journal only; no controller is asked."""
     from robolink_cli.views.stations import known_station, show_station, station_payload
 
-    found = known_station(context, name)
-    context.emit("station", station_payload(found), lambda: show_station(found))
+    found = known_station(context, name, robot=robot)
+    payload = station_payload(found.station, robot=found.robot)
+    context.emit("station", payload, lambda: show_station(found))
 
 
 @station.command("learn")

@@ -17,7 +17,7 @@ from robolink.nozzle_change import (
     touching_as_recorded,
 )
 from robolink.procedures import MeasurementContext, TouchPlan
-from robolink.runner import inputs_of
+from robolink.runner import ArmAhead, inputs_of
 from robolink.stations import Found, Station, StationKind, find_stations, station_entry
 from robolink_cli.console.render import note, table
 from robolink_cli.prompts.operator import operator_at
@@ -60,7 +60,8 @@ def learn(
         course = learn_station(
             known, here=here, tool=tool, tip=tip, plan=replace(touch, nominal=True)
         )
-        steps = foresee(course, here=here, settings=limits.settings(here, None))
+        ahead = ArmAhead.of(controller)
+        steps = foresee(course, here=here, settings=limits.settings(here, None), arm=ahead)
         if dry_run:
             payload = {"dry_run": True, "tool": tool, "steps": steps_payload(controller, steps)}
             context.emit("dry-run", payload, lambda: show_plan(payload))

@@ -37,6 +37,11 @@ class Robot:
         """Whether V and W exist."""
         return spel.tilts_tool(self.type_code)
 
+    @property
+    def folds(self) -> bool:
+        """Whether it is an RS, whose arm folds under itself onto the axis of joint 1."""
+        return self.type_code == spel.RobotType.RS
+
 
 class RobotFacts:
     """Reads which robot is in force, when that is needed first.

@@ -9,7 +9,7 @@ from robolink.controllers.epson.link.stopping import bring_to_rest
 from robolink.controllers.epson.motion.movement import EpsonMotion
 from robolink.controllers.epson.motion.positions import read_position
 from robolink.controllers.epson.motion.power_and_speed import Settings
-from robolink.controllers.epson.motion.singularities import obstacle_of, require_clear
+from robolink.controllers.epson.motion.singularities import SingularPlaces
 from robolink.controllers.epson.motion.until_input import (
     EpsonMotionUntilInput,
     read_input,
@@ -94,11 +94,13 @@ class EpsonGroup(MotionGroupCore):
         """Return what :meth:`move_to` would send besides its reads, as it stands on the wire."""
         return executes((*self.settings.statements(profile), self._statement_for(target, profile)))
 
-    def obstacle(self, target: Pose, path: Path) -> str:
-        """Return why six axes could not go there so; four are not asked."""
-        if not self._six_axes:
+    def obstacle(self, target: Pose, path: Path, *, start: Pose | None = None) -> str:
+        """Return why six axes, or an RS, could not go there so; other arms are not asked."""
+        singular = self._singular
+        if singular is None:
             return ""
-        return obstacle_of(self._link.window, self._flagged(target), path)
+        begin = None if start is None else self._flagged(start)
+        return singular.obstacle(self._flagged(target), path, begin)
 
     def deceleration_mm_s2(self) -> float:
         """Read AccelS: ``Till`` brakes with it (docs/reference/spel.md 7.1)."""
@@ -160,8 +162,9 @@ class EpsonGroup(MotionGroupCore):
                 self._require_motors(statement)
                 found = spel.parse_integer(window.printed(spel.print_selected_tool()))
                 self._require_tool(target, found, statement)
-                if self._six_axes:
-                    require_clear(window, self._flagged(target), profile.path)
+                singular = self._singular
+                if singular is not None:
+                    singular.require_clear(self._flagged(target), profile.path)
                 self.settings.slow_down(profile)
                 last_look()
                 with link.uninterrupted():
@@ -193,6 +196,14 @@ class EpsonGroup(MotionGroupCore):
     @property
     def _six_axes(self) -> bool:
         return self._link.robot.read().six_axes
+
+    @property
+    def _singular(self) -> SingularPlaces | None:
+        """What the arm has to keep clear of, ``None`` for one without singular places."""
+        robot = self._link.robot.read()
+        if not robot.six_axes and not robot.folds:
+            return None
+        return SingularPlaces(self._link.window, robot.six_axes)
 
     def _flagged(self, target: Pose) -> Pose:
         """Return a target of six axes with the present hand, elbow and wrist where it has none.

@@ -1,12 +1,14 @@
-"""What a six-axis arm is held back from: places it cannot reach, and singular ones.
+"""What an arm with singular places is held back from: places it cannot reach, and those.
 
 Close to where joint 5 is at 0 a straight movement of the tip asks joints 4 and 6 for speeds that
 they do not have, and close to the axis of joint 1 it asks them of joint 1: the controller leaves
-the way there, or ends with an error (docs/reference/epson-robots.md, "Singularities"). The third
-one, the stretched elbow, is the end of the reach, which is asked for.
+the way there, or ends with an error (docs/reference/epson-robots.md, "Singularities"). An RS has
+the second of them. The third one, the stretched elbow, is the end of the reach, which is asked for.
 """
 
 import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import Final
 
 from robolink.controllers.epson.link.window import CommandWindow
@@ -30,82 +32,131 @@ _WRIST: Final = 5
 _FREE_DEG: Final = 5.0
 """Joint 1 may turn by this in any straight movement: a jog of 2.6 mm so near the axis would."""
 
+_FOLLOWING: Final = 1.5
+
 _TURNED_DEG: Final = 0.01
 
+_LOOKED_AT_EVERY_MM: Final = 25.0
+"""Joint 5 is asked for along a straight way so often: on the smallest arm it turns by 6 degrees
+meanwhile at most, less than it is kept clear by."""
 
-def obstacle_of(window: CommandWindow, target: Pose, path: Path) -> str:
-    """Return why six axes cannot go to a target, or not straight; empty where they can.
+_AHEAD_DEG: Final = 1.0
+"""So much more in a look ahead: where a tip stops beside its place is drawn later."""
 
-    Asked with functions that move nothing and raise no error in the controller.
+
+@dataclass(frozen=True, slots=True)
+class SingularPlaces:
+    """Asks a controller what a movement of its arm would meet.
+
+    All questions are functions that move nothing and raise no error in the controller. Targets
+    are meant for the tool in force.
+
+    Attributes:
+        window: The controller.
+        six_axes: Whether the arm has a wrist of three joints; else it is an RS.
     """
-    if not spel.parse_boolean(window.printed(spel.print_reachable(target, six_axes=True))):
-        return tr("The robot cannot reach that place with its tool turned so.")
-    if path is not Path.STRAIGHT:
-        return ""
-    bend_deg = _joint_at(window, target, _WRIST)
-    if abs(bend_deg) < KEPT_CLEAR_DEG:
-        return tr(
-            "Joint 5 would stand at {angle:.1f} degrees there, too near to its singular place "
-            "at 0 for a straight movement.",
-            angle=bend_deg,
+
+    window: CommandWindow
+    six_axes: bool
+
+    def obstacle(self, target: Pose, path: Path, start: Pose | None = None) -> str:
+        """Return why the arm cannot go to a target, or not straight; empty where it can.
+
+        Args:
+            target: Where to, with its flags.
+            path: How.
+            start: Where from; ``None`` where nobody knows yet, and then of a straight way only its
+                end is looked at.
+        """
+        told = self._in_the_way(target, path, start, _AHEAD_DEG)
+        if told or path is not Path.STRAIGHT or start is None or not self._reaches(start):
+            return told
+        return self._swing(start, target, self._joint_at(start, _SWING))
+
+    def require_clear(self, target: Pose, path: Path) -> None:
+        """Hold a movement back that would end out of reach, or meet a singular place.
+
+        Raises:
+            LimitError: Says which of the two, and what to do.
+        """
+        straight = path is Path.STRAIGHT
+        here = read_position(self.window, spel.print_real_position()) if straight else None
+        found = self._in_the_way(target, path, here, 0.0)
+        remedy = tr(
+            "Tilt or turn the tool otherwise, or put the reference point elsewhere: in reach, "
+            "and so that joint 5 stays more than {limit:g} degrees from 0.",
+            limit=KEPT_CLEAR_DEG,
         )
-    return ""
-
-
-def require_clear(window: CommandWindow, target: Pose, path: Path) -> None:
-    """Hold a movement of six axes back that would end out of reach, or meet a singular place.
-
-    Raises:
-        LimitError: Says which of the two, and what to do.
-    """
-    found = obstacle_of(window, target, path)
-    if found:
-        raise LimitError(
-            tr("{obstacle} Nothing was sent.", obstacle=found),
-            remedy=tr(
-                "Tilt or turn the tool otherwise, or put the reference point elsewhere: in reach, "
-                "and so that joint 5 stays more than {limit:g} degrees from 0.",
-                limit=KEPT_CLEAR_DEG,
-            ),
-        )
-    if path is Path.STRAIGHT:
-        _require_clear_of_base(window, target)
-
-
-def _require_clear_of_base(window: CommandWindow, target: Pose) -> None:
-    """Hold a straight movement back that swings joint 1 as only one close to its axis does.
-
-    Along a chord that stays 30 mm from the axis, joint 1 turns by at most 2 asin(d / 60 mm). How
-    long the wrist's way is, is known where the tool does not turn.
-
-    Raises:
-        LimitError: The wrist would come nearer.
-    """
-    there_deg = _joint_at(window, target, _SWING)
-    now_deg = spel.parse_number(window.printed(spel.print_joint_angle(_SWING)))
-    swing_deg = abs(there_deg - now_deg)
-    if swing_deg < _FREE_DEG:
-        return
-    here = read_position(window, spel.print_real_position())
-    turned = zip(here.coordinates()[3:], target.coordinates()[3:], strict=True)
-    if any(abs(angle_difference_deg(a, b)) > _TURNED_DEG for a, b in turned):
-        return
-    way_mm = math.dist(here.coordinates()[:3], target.coordinates()[:3])
-    if swing_deg > 2 * math.degrees(math.asin(min(1.0, way_mm / (2 * KEPT_CLEAR_MM)))):
-        raise LimitError(
-            tr(
-                "Joint 1 would turn by {angle:.0f} degrees in a straight movement of {way:.1f} mm: "
-                "the wrist is too near to its axis. Nothing was sent.",
-                angle=swing_deg,
-                way=way_mm,
-            ),
-            remedy=tr(
+        if here is not None and not found:
+            now_deg = spel.parse_number(self.window.printed(spel.print_joint_angle(_SWING)))
+            found = self._swing(here, target, now_deg)
+            remedy = tr(
                 "Put the reference point where the wrist stays more than {limit:g} mm from the "
                 "axis of joint 1.",
                 limit=KEPT_CLEAR_MM,
-            ),
+            )
+        if found:
+            raise LimitError(tr("{obstacle} Nothing was sent.", obstacle=found), remedy=remedy)
+
+    def _in_the_way(self, target: Pose, path: Path, start: Pose | None, further_deg: float) -> str:
+        straight = path is Path.STRAIGHT
+        for place in _places(start if straight else None, target):
+            if not self._reaches(place):
+                return tr("The robot cannot reach that place with its tool turned so.")
+            if not straight or not self.six_axes:
+                continue
+            bend_deg = self._joint_at(place, _WRIST)
+            if abs(bend_deg) < KEPT_CLEAR_DEG + further_deg:
+                return tr(
+                    "Joint 5 would stand at {angle:.1f} degrees there, too near to its singular "
+                    "place at 0 for a straight movement.",
+                    angle=bend_deg,
+                )
+        return ""
+
+    def _swing(self, start: Pose, target: Pose, start_deg: float) -> str:
+        """Return why a straight movement swings joint 1 as only one close to its axis does.
+
+        Along a chord that stays 30 mm from the axis, joint 1 turns by at most 2 asin(d / 60 mm).
+        How long the wrist's way is, is known where the tool does not turn. On an RS the way of the
+        flange is that of the wrist, and joint 1 follows its distance from the axis, too, by no more
+        than half as much again.
+        """
+        there_deg = self._joint_at(target, _SWING)
+        swing_deg = abs(there_deg - start_deg)
+        if swing_deg < _FREE_DEG or _turns(start, target):
+            return ""
+        way_mm = math.dist(start.coordinates()[:3], target.coordinates()[:3])
+        usual_deg = 2 * math.degrees(math.asin(min(1.0, way_mm / (2 * KEPT_CLEAR_MM))))
+        if swing_deg <= usual_deg * (1.0 if self.six_axes else _FOLLOWING):
+            return ""
+        return tr(
+            "Joint 1 would turn by {angle:.0f} degrees in a straight movement of {way:.1f} mm: "
+            "the wrist is too near to its axis.",
+            angle=swing_deg,
+            way=way_mm,
         )
 
+    def _reaches(self, place: Pose) -> bool:
+        asked = spel.print_reachable(place, six_axes=self.six_axes)
+        return spel.parse_boolean(self.window.printed(asked))
 
-def _joint_at(window: CommandWindow, target: Pose, joint: int) -> float:
-    return spel.parse_number(window.printed(spel.print_joint_of(target, joint, six_axes=True)))
+    def _joint_at(self, target: Pose, joint: int) -> float:
+        asked = spel.print_joint_of(target, joint, six_axes=self.six_axes)
+        return spel.parse_number(self.window.printed(asked))
+
+
+def _turns(start: Pose, target: Pose) -> bool:
+    angles = zip(start.coordinates()[3:], target.coordinates()[3:], strict=True)
+    return any(abs(angle_difference_deg(a, b)) > _TURNED_DEG for a, b in angles)
+
+
+def _places(start: Pose | None, target: Pose) -> Iterator[Pose]:
+    """Yield the end of a straight way, and what lies between where the tool does not turn."""
+    if start is not None and not _turns(start, target):
+        begin, end = start.coordinates()[:3], target.coordinates()[:3]
+        count = math.ceil(math.dist(begin, end) / _LOOKED_AT_EVERY_MM)
+        for step in range(1, count):
+            x, y, z = (a + (b - a) * step / count for a, b in zip(begin, end, strict=True))
+            yield replace(target, x_mm=x, y_mm=y, z_mm=z)
+    yield target

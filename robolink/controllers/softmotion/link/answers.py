@@ -25,6 +25,9 @@ _POSED: Final = frozenset(
     {Opcode.MOVE_DIRECT, Opcode.MOVE_LINEAR, Opcode.MOVE_UNTIL_INPUT, Opcode.WRITE_TOOL}
 )
 
+_OUTSIDE_MOTION_TASK: Final = 12108
+"""ErrorID of a movement block that another task calls (docs/reference/softmotion.md 1.4)."""
+
 
 class Ended(NamedTuple):
     """How a command ended, and the snapshot that says so."""
@@ -59,7 +62,7 @@ def refused(command: Command, now: Response, error_class: int) -> RejectedError:
             meaning=_meaning(error_class, now),
         ),
         code=error_class,
-        remedy=_remedy(error_class),
+        remedy=_remedy(error_class, now.raw_error),
         request=describe(command),
     )
 
@@ -105,7 +108,11 @@ def _meaning(error_class: int, now: Response) -> str:
     return tr("{meaning} ({number})", meaning=meaning, number=error_class)
 
 
-def _remedy(error_class: int) -> str:
+def _remedy(error_class: int, raw_error: int = 0) -> str:
+    if error_class == ErrorClass.UNMAPPED and raw_error == _OUTSIDE_MOTION_TASK:
+        return tr(
+            "Let the motion task of the PLC call the mailbox program, then download it again."
+        )
     remedies: dict[int, str] = {
         ErrorClass.VERSION: tr("Export the PLC program of this robolink and load it."),
         ErrorClass.UNKNOWN_OPCODE: tr("Load the profile 'full' of the PLC program."),

@@ -20,14 +20,16 @@ from robolink.errors import (
     RobolinkError,
     TransportClosedError,
     TransportError,
+    TransportTimeoutError,
 )
 from robolink.interrupts import InterruptGate
 from robolink.messages import tr
 from robolink.stop_latch import StopLatch
+from robolink.timing import Deadline
 from robolink.transport import MailboxHead, MailboxLink
 
 _READS: Final = 3
-_LOOK_BACK_S: Final = 0.8
+_LOOK_BACK_S: Final = 0.7
 """Longest time for a look at what ended the session: a request to a PLC that is gone ends within
 1 s of its deadline, this look included (docs/reference/faults.md F11)."""
 
@@ -224,8 +226,11 @@ class MailboxWire:
             self._asked(lambda: self._link.beat(self.next_beat()))
 
     def _asked(self, exchange: Callable[[], T]) -> T:
+        """Do an exchange up to three times; only once more when its whole deadline has passed."""
         lost: list[RobolinkError] = []
+        deadline = Deadline.after(self.clock, self.timeout_s)
         while len(lost) < _READS:
+            last = bool(lost) and deadline.expired
             try:
                 with self._gate:
                     self.exchanges += 1
@@ -234,8 +239,9 @@ class MailboxWire:
                 return found
             except (TransportError, RemoteProtocolError) as error:
                 lost.append(error)
-                if isinstance(error, TransportClosedError):
-                    break  # the link cannot be used any more
+                silent = last and isinstance(error, TransportTimeoutError)
+                if silent or isinstance(error, TransportClosedError):
+                    break  # nobody is there, or the link cannot be used any more
         raise self._over(lost[0])
 
     def _over(self, error: RobolinkError) -> RobolinkError:
@@ -249,6 +255,8 @@ class MailboxWire:
         """Return why the link ended, if another look tells more; it only reads."""
         if self.look_back is None or isinstance(error, RemoteProtocolError):
             return error
+        if self.whole_look_s and isinstance(error, TransportTimeoutError):
+            return error  # a start cuts no serial line: who is silent there has nothing to tell
         self._link.close()
         try:
             link = self._link.reopened(timeout_s=_LOOK_BACK_S)

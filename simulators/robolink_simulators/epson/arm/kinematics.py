@@ -4,12 +4,14 @@ How each kind of robot is built stands in :mod:`~robolink_simulators.epson.arm.s
 :mod:`~robolink_simulators.epson.arm.six_axes`.
 """
 
+import math
+from dataclasses import replace
 from typing import Final
 
 from robolink.model import Hand, Pose, Posture, ToolOffset, rotate_xy
 from robolink_simulators.cell.frames import ORIGIN, Frame, printed_angles, zyx
 from robolink_simulators.epson.arm import scara, six_axes
-from robolink_simulators.epson.arm.joints import Joints, check_depth, check_ranges
+from robolink_simulators.epson.arm.joints import Joints, check_depth, check_ranges, nearest_turn
 from robolink_simulators.epson.arm.robots import RobotModel
 
 PLAIN: Final = Posture()
@@ -73,9 +75,36 @@ def continued(model: RobotModel, flange: Pose, near: Joints) -> Joints:
     """
     if model.six_axes:
         joints = six_axes.solve_near(model, frame_of(flange), near)
+    else:
+        joints = scara.solve(model, flange, hand_of(model, near), _kept(model, near))
+    check_ranges(model, joints)
+    check_depth(model, joints)
+    return joints
+
+
+def continued_frame(model: RobotModel, flange: Frame, near: Joints) -> Joints:
+    """Return the joints of :func:`continued` for a frame, which tells no turns of U.
+
+    Those of a SCARA are the nearest.
+
+    Raises:
+        OutOfReach: The arms or a joint's range do not allow it.
+    """
+    if model.six_axes:
+        joints = six_axes.solve_near(model, flange, near)
         check_ranges(model, joints)
         return joints
-    return inverse(model, flange, hand_of(model, near), posture_of(model, near))
+    (along, *_), (across, *_), _ = flange.rotation
+    u_deg = math.degrees(math.atan2(across, along))
+    stands_deg = forward(model, near).u_deg
+    pose = Pose(*flange.shift_mm, nearest_turn(u_deg, stands_deg), hand=hand_of(model, near))
+    return continued(model, pose, near)
+
+
+def _kept(model: RobotModel, near: Joints) -> Posture:
+    """Return the posture of joints; on the axis of joint 1 that joint stays where it is."""
+    posture = posture_of(model, near)
+    return PLAIN if posture is None else replace(posture, j1_angle_deg=near[0])
 
 
 def frame_of(pose: Pose) -> Frame:

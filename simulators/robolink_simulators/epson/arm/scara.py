@@ -17,6 +17,9 @@ from robolink_simulators.epson.arm.robots import Mechanism, RobotModel
 from robolink_simulators.epson.refusals import OutOfReach
 
 _ROUNDING = 1e-9
+_ON_THE_AXIS_MM = 1e-6
+"""Nearer to the axis of joint 1 the flange of an RS leaves joint 1 free; a point that prints 0.000
+for X and Y is there."""
 _FIRST_TURN_MIDDLE_DEG = 90.0
 _HALF = 180.0
 
@@ -38,7 +41,12 @@ def posture_of(model: RobotModel, joints: Joints) -> Posture | None:
     if model.mechanism is not Mechanism.FOLDED_SCARA:
         return None
     first = -_HALF <= joints[0] - _FIRST_TURN_MIDDLE_DEG <= _HALF
-    return Posture(j1_flag=int(not first), j2_flag=int(abs(joints[1]) > _HALF))
+    away_mm = 2 * model.lengths_mm[0] * abs(math.sin(math.radians(joints[1]) / 2))
+    return Posture(
+        j1_flag=int(not first),
+        j2_flag=int(abs(joints[1]) > _HALF),
+        j1_angle_deg=joints[0] if away_mm < _ON_THE_AXIS_MM else None,
+    )
 
 
 def forward(model: RobotModel, joints: Joints) -> Pose:
@@ -62,7 +70,9 @@ def forward(model: RobotModel, joints: Joints) -> Pose:
 def solve(model: RobotModel, flange: Pose, hand: Hand, posture: Posture) -> Joints:
     """Return the joints that put the flange at ``flange``, whatever their ranges.
 
-    Joint 1 is taken within half a turn of the middle of its range, or in the turn of its flag.
+    Joint 1 is taken within half a turn of the middle of its range, or in the turn of its flag. An
+    RS whose flange is on the axis of joint 1 takes J1Angle, 0 where the point has none (documented
+    that it counts there; docs/reference/epson-robots.md, "Singularities").
 
     Raises:
         OutOfReach: The position is too far out or too far in for the two arms.
@@ -82,9 +92,12 @@ def solve(model: RobotModel, flange: Pose, hand: Hand, posture: Posture) -> Join
     j2_deg = math.degrees(bend)
     low, high = model.ranges[0]
     if model.mechanism is Mechanism.FOLDED_SCARA:
-        j1_deg = within(-90.0, 270.0, j1_deg)
-        if posture.j1_flag:
-            j1_deg += -360.0 if j1_deg - 360.0 >= low - _ROUNDING else 360.0
+        if distance_sq < _ON_THE_AXIS_MM**2:
+            j1_deg, j2_deg = posture.j1_angle_deg or 0.0, _HALF
+        else:
+            j1_deg = within(-90.0, 270.0, j1_deg)
+            if posture.j1_flag:
+                j1_deg += -360.0 if j1_deg - 360.0 >= low - _ROUNDING else 360.0
         j2_deg = wrapped(j2_deg - _HALF)
         if posture.j2_flag:
             j2_deg += 360.0 if j2_deg < 0 else -360.0

@@ -1,4 +1,4 @@
-"""Straight and circular legs of a tool that can be tilted, and of any robot's tool.
+"""Legs of a tool that can be tilted, and those of any robot about an external control point.
 
 The tip goes its way while the tool turns evenly about one axis from the first orientation to the
 last (assumed). Hand, elbow and wrist stay, every joint turns on from where it was, and the turns
@@ -27,8 +27,9 @@ from robolink_simulators.cell.frames import (
     transposed,
 )
 from robolink_simulators.epson.arm.arc import MeasuredWay, Way, plan_level_way
-from robolink_simulators.epson.arm.joints import Joints, check_ranges
+from robolink_simulators.epson.arm.joints import Joints
 from robolink_simulators.epson.arm.kinematics import (
+    continued_frame,
     forward,
     frame_of,
     hand_of,
@@ -39,7 +40,7 @@ from robolink_simulators.epson.arm.kinematics import (
 from robolink_simulators.epson.arm.ramps import BrakedRamp, Ramp, TimeLaw
 from robolink_simulators.epson.arm.robot_settings import SingularSurroundings
 from robolink_simulators.epson.arm.robots import RobotModel
-from robolink_simulators.epson.arm.six_axes import singular_stretches, solve_near
+from robolink_simulators.epson.arm.six_axes import singular_stretches
 from robolink_simulators.epson.arm.trajectory import Leg, LinePace, plan_move
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
@@ -70,32 +71,30 @@ class _Course:
 
 @dataclass(frozen=True, slots=True)
 class _HeldCourse:
-    """The way of an external control point, straight as a held workpiece sees it.
+    """The way of an external control point, as a held workpiece sees it.
 
-    The tip is no straight line then. That the orientation of the point runs evenly is assumed.
+    The tip goes otherwise then. That the orientation of the point runs evenly is assumed.
     """
 
     model: RobotModel
     point: Frame
     first: Pose
-    seen: tuple[Frame, Frame]
+    way: Way
+    start: Matrix
     axis: Vector
     angle_deg: float
     to_flange: Frame
 
     def flange(self, share: float) -> Frame:
         """Return the frame of the flange after a share of the way."""
-        start, end = self.seen
-        pairs = zip(start.shift_mm, end.shift_mm, strict=True)
-        x, y, z = (a + (b - a) * share for a, b in pairs)
         turn = about(self.axis, self.angle_deg * share)
-        seen = Frame((x, y, z), product(turn, start.rotation))
+        seen = Frame(self.way(share), product(turn, self.start))
         return self.point @ seen.inverse() @ self.to_flange
 
 
 @dataclass(frozen=True, slots=True)
 class TiltedLeg:
-    """A leg of six axes along a course.
+    """A leg along a course.
 
     Attributes:
         course: Where the flange goes.
@@ -124,12 +123,12 @@ class TiltedLeg:
         if self._off_course(at):
             following = zip(near, self.knots[int(at) + 1], strict=True)
             return Joints(*(a + (b - a) * (at - int(at)) for a, b in following))
-        return solve_near(self.course.model, self.course.flange(share), near)
+        return continued_frame(self.course.model, self.course.flange(share), near)
 
     def flange_at(self, elapsed_ns: int) -> Pose:
         """Return the pose of the flange that long after the start."""
         course, share = self.course, self._share_at(elapsed_ns)
-        if self._off_course(share * (len(self.knots) - 1)):
+        if not course.model.six_axes or self._off_course(share * (len(self.knots) - 1)):
             return forward(course.model, self.joints_at(elapsed_ns))
         return pose_of_frame(course.flange(share), course.first, tool=0)
 
@@ -174,12 +173,7 @@ def plan_line(
     if not model.six_axes:
         return plan_move(model, ends, pace, offset=offset, near=near)
     start, end = (pose.coordinates()[:3] for pose in ends)
-    length_mm = math.dist(start, end)
-
-    def way(share: float) -> Vector:
-        x, y, z = (a + (b - a) * share for a, b in zip(start, end, strict=True))
-        return (x, y, z)
-
+    way, length_mm = _straight(start, end)
     _require_same_posture(model, near, ends[1])
     course = _course(model, way, ends, offset)
     return _leg(course, length_mm, pace, near=near, avoiding=avoiding)
@@ -191,17 +185,19 @@ def plan_about_point(
     pace: LinePace,
     *,
     point: Frame,
+    way: MeasuredWay | None = None,
     offset: ToolOffset | None,
     near: Joints,
     avoiding: SingularSurroundings | None = _USUAL,
 ) -> Leg:
-    """Plan a leg in which an external control point runs straight over the held workpiece.
+    """Plan a leg in which an external control point runs over the held workpiece.
 
     Args:
-        model: The robot, of six axes.
+        model: The robot.
         ends: Where the tip is and where it goes.
         pace: How fast the point may be on the workpiece.
         point: The external control point, in the base.
+        way: Its way as the tip sees it, and the length; ``None`` for a straight one.
         offset: The tool in force.
         near: The joints at the start.
         avoiding: The surroundings of singular places that are left; ``None`` for staying.
@@ -211,11 +207,35 @@ def plan_about_point(
     """
     _require_same_posture(model, near, ends[1])
     start, end = (frame_of(pose).inverse() @ point for pose in ends)
-    axis, angle_deg = axis_and_angle(product(end.rotation, transposed(start.rotation)))
-    to_flange = tool_frame(offset).inverse()
-    course = _HeldCourse(model, point, ends[0], (start, end), axis, angle_deg, to_flange)
-    length_mm = math.dist(start.shift_mm, end.shift_mm)
-    return _leg(course, length_mm, pace, near=near, avoiding=avoiding)
+    course, length_mm = way or _straight(start.shift_mm, end.shift_mm)
+    # The workpiece turns, so the point turns against it.
+    axis, angle_deg = _turn(model, ends[::-1], product(end.rotation, transposed(start.rotation)))
+    to_flange = _carried_by(model, offset).inverse()
+    held = _HeldCourse(model, point, ends[0], course, start.rotation, axis, angle_deg, to_flange)
+    return _leg(held, length_mm, pace, near=near, avoiding=avoiding)
+
+
+def _straight(start: Vector, end: Vector) -> MeasuredWay:
+    def way(share: float) -> Vector:
+        x, y, z = (a + (b - a) * share for a, b in zip(start, end, strict=True))
+        return (x, y, z)
+
+    return way, math.dist(start, end)
+
+
+def _turn(model: RobotModel, ends: tuple[Pose, ...], turn: Matrix) -> tuple[Vector, float]:
+    """Return the axis and angle of a turn; U of a SCARA is taken literally, whole turns too."""
+    if model.six_axes:
+        return axis_and_angle(turn)
+    by_deg = ends[1].u_deg - ends[0].u_deg
+    return (0.0, 0.0, math.copysign(1.0, by_deg)), abs(by_deg)
+
+
+def _carried_by(model: RobotModel, offset: ToolOffset | None) -> Frame:
+    """Return the frame of a tool on the flange; a SCARA takes up no V and W."""
+    if offset is None or model.six_axes:
+        return tool_frame(offset)
+    return tool_frame(replace(offset, v_deg=0.0, w_deg=0.0))
 
 
 def plan_way(
@@ -276,8 +296,7 @@ def _leg(
     steps = math.ceil(min(length_mm / _CHECK_EVERY_MM + angle_deg / _CHECK_EVERY_DEG, _MOST_CHECKS))
     knots = [near]
     for step in range(1, steps + 1):
-        knots.append(solve_near(model, course.flange(step / steps), knots[-1]))
-        check_ranges(model, knots[-1])
+        knots.append(continued_frame(model, course.flange(step / steps), knots[-1]))
     if length_mm > _STILL:
         rate, accel = pace.speed_mm_s / length_mm, pace.accel_mm_s2 / length_mm
         decel = pace.decel_mm_s2 / length_mm
@@ -286,11 +305,13 @@ def _leg(
         decel = accel
     else:
         return TiltedLeg(course, (near,), None)
-    detours = singular_stretches(model, knots, rate, avoiding) if avoiding else ()
+    detours = (
+        singular_stretches(model, knots, rate, avoiding) if avoiding and model.six_axes else ()
+    )
     for first, last in detours:
         knots[first : last + 1] = _from_joint_to_joint(knots[first], knots[last], last - first)
     fastest = _fastest(model, knots)
-    if rate > fastest and not avoiding:
+    if rate > fastest and model.six_axes and not avoiding:
         raise SpelRefusal(
             RefusalKind.JOINT_TOO_FAST, "A joint would be too fast near a singularity"
         )

@@ -206,6 +206,10 @@ class TreeBuilder(Transformer[Token, tuple[Statement, ...]]):
         """Build ``/R`` or ``/1``."""
         return Modifier(ModifierKind.FLAG, word[1:].strip().upper())
 
+    def angle_flag(self, word: Token, value: Expression) -> Modifier:
+        """Build ``/J1A(30)``."""
+        return Modifier(ModifierKind.ANGLE, word[1:].strip().upper(), value)
+
     def at_local(self, word: Token) -> Modifier:
         """Build ``@1``."""
         return Modifier(ModifierKind.CONVERT, word[1:].strip())

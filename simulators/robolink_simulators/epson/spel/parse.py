@@ -27,7 +27,7 @@ PROGRAM_ONLY: Final = frozenset(_PROGRAM_WORDS.split())
 
 _WORDS_OF_OTHER_ROBOTS = """
     brake jumptlz
-    j1angle j4angle vsd
+    vsd
 """
 
 OF_OTHER_ROBOTS: Final = frozenset(_WORDS_OF_OTHER_ROBOTS.split())

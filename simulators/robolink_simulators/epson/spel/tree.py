@@ -62,6 +62,7 @@ class ModifierKind(Enum):
     """What a modifier behind a point does (docs/reference/spel.md 5.2)."""
 
     FLAG = "/"
+    ANGLE = "/J1A"
     CONVERT = "@"
     SHIFT = "+"
     REPLACE = ":"

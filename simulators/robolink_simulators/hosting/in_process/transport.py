@@ -48,6 +48,8 @@ class InProcessTransport:
         self._closed = False
         with lock:
             self._link: DeviceLink = device.connect(clock.now_ns())
+        # Told once: to ask a protocol costs more than an exchange.
+        self._resettable = self._link if isinstance(self._link, ResettableLink) else None
 
     @property
     def url(self) -> str:
@@ -141,7 +143,7 @@ class InProcessTransport:
     def _taken(self) -> bytes | None:
         self._pump()
         if not self._arrived:
-            if isinstance(self._link, ResettableLink) and self._link.reset:
+            if self._resettable is not None and self._resettable.reset:
                 raise self._broken()
             return b"" if self._link.closed else None
         most = min(len(self._arrived), _CHUNK_BYTES)

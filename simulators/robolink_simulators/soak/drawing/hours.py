@@ -5,13 +5,14 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
+from robolink_simulators.faults.instants import drawn_instant
 from robolink_simulators.soak.drawing.faults import (
     LINE_KINDS,
     MACHINE_FAULTS,
     MAILBOX_KINDS,
     WIRE_FAULTS,
 )
-from robolink_simulators.soak.drawing.lengths import DeedLength, length_of
+from robolink_simulators.soak.drawing.lengths import length_of
 from robolink_simulators.soak.history import (
     CellKind,
     Deed,
@@ -21,7 +22,7 @@ from robolink_simulators.soak.history import (
     History,
     Hour,
 )
-from robolink_simulators.soak.plant.bent_line import LineBend
+from robolink_simulators.soak.plant.lines.bent_line import LineBend
 
 _TURNS: Final = (
     *(CellKind.EPSON, CellKind.SOFTMOTION) * 2,
@@ -44,7 +45,7 @@ _TURNS: Final = (
 )
 """What stands in the cells of seeds 0, 1, 2 .. 19, and so on."""
 
-_ANOTHER_SHARE: Final = 0.5
+_ANOTHER_SHARE: Final = 0.6
 _MOST: Final = 4
 _SHARES: Final = {
     Deed.CHANGE_NOZZLE: 0.6,
@@ -66,6 +67,13 @@ _HINDRANCES: Final = {
     Hindrance.CLOCK: 0.03,
     Hindrance.INTERRUPT: 0.06,
 }
+_FAMILIES: Final[Mapping[CellKind, str]] = {
+    CellKind.EPSON: CellKind.EPSON.value,
+    CellKind.EPSON_SERIAL: CellKind.EPSON.value,
+    **dict.fromkeys(MAILBOX_KINDS, CellKind.SOFTMOTION.value),
+}
+"""Under which name the instants that tell are known, for kinds that have any."""
+
 _LINE_SHARE: Final = 0.2
 _PRODUCTION_SHARE: Final = 0.1
 _NO_ROBOLINK: Final = frozenset(
@@ -102,10 +110,9 @@ def _hour(seed: int, number: int, kind: CellKind) -> Hour:
     rng = random.Random(f"hour {number} of {seed}")
     deeds = deeds_of(kind)
     deed = rng.choices(list(deeds), list(deeds.values()))[0]
-    length = length_of(kind, deed)
-    drawn = [_disturbance(rng, kind, length)]
+    drawn = [_disturbance(rng, kind, deed)]
     while rng.random() < _ANOTHER_SHARE and len(drawn) < _MOST:
-        drawn.append(_disturbance(rng, kind, length))
+        drawn.append(_disturbance(rng, kind, deed))
     return Hour(number, deed, _habit(rng), tuple(drawn))
 
 
@@ -152,7 +159,22 @@ def _habit(rng: random.Random) -> Habit:
     )
 
 
-def _disturbance(rng: random.Random, kind: CellKind, length: DeedLength) -> Disturbance:
+def _told_instant(rng: random.Random, kind: CellKind, deed: Deed) -> Disturbance | None:
+    """Return a fault at an instant that tells, mostly ``None``; only what the link can have."""
+    found = drawn_instant(rng, _FAMILIES.get(kind, ""), deed.value)
+    if found is None:
+        return None
+    instant, at = found
+    if instant.kind == Hindrance.WIRE and instant.what not in WIRE_FAULTS[kind]:
+        return None
+    seconds = rng.choice((0.0, 0.01, 5.0, 20.0))
+    return Disturbance(Hindrance(instant.kind), instant.what, instant.match, at, seconds)
+
+
+def _disturbance(rng: random.Random, kind: CellKind, deed: Deed) -> Disturbance:
+    if (told := _told_instant(rng, kind, deed)) is not None:
+        return told
+    length = length_of(kind, deed)
     shares = _hindrances(kind)
     hindrance = rng.choices(list(shares), list(shares.values()))[0]
     places = length.requests if hindrance in _BY_REQUESTS else length.points

@@ -9,7 +9,6 @@ from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.hosting.in_process.canopen_bus import SteppedCan
 from robolink_simulators.soak.computer import VirtualProcess
 from robolink_simulators.soak.plant.machine import WireTap
-from robolink_simulators.soak.plant.mailbox_tap import TappedMailboxLink
 from robolink_simulators.soak.plant.softmotion import SoftMotionPlant
 
 _NODE: Final = 5
@@ -31,7 +30,7 @@ class CanopenPlant(SoftMotionPlant):
     def tapped(self, link: MailboxLink, process: VirtualProcess) -> MailboxLink:
         """See :meth:`SoftMotionPlant.tapped`."""
         self._open[process.number] = link
-        return TappedMailboxLink(link, process, self.tap)
+        return super().tapped(link, process)
 
     def hang_up(self, process: VirtualProcess) -> None:
         """The system closes the adapter of a process that died."""

@@ -1,10 +1,12 @@
 """An EPSON controller in a virtual cell, and the link that leads to it."""
 
 import re
+from dataclasses import replace
 from typing import Final
 
 from robolink.controllers.epson import open_epson
 from robolink.controllers.epson.link.line import text_line
+from robolink.errors import TransportError
 from robolink.model import Controller, OutcomeLog, Secret, ToolOffset
 from robolink.timing import Deadline
 from robolink.transport import parse_url
@@ -15,7 +17,7 @@ from robolink_simulators.faults import Fault, FaultAction
 from robolink_simulators.hosting.seam import WireDevice
 from robolink_simulators.soak.computer import VirtualProcess
 from robolink_simulators.soak.history import Disturbance, Hindrance
-from robolink_simulators.soak.plant.bent_line import BentTransport
+from robolink_simulators.soak.plant.lines.bent_line import BentTransport
 from robolink_simulators.soak.plant.machine import (
     MachineState,
     PlantWithWorld,
@@ -122,7 +124,7 @@ class EpsonPlant(PlantWithWorld):
     def write_by_hand(self, tool: int, offset: ToolOffset) -> None:
         """Write a tool at the pendant."""
         self._simulator.machine.tools.set(tool, offset)
-        self.touched.add(tool)
+        self.note_hand(tool, offset)
 
     def repair(self) -> None:
         """Release, close, switch back to automatic; restart after a serious error."""
@@ -152,7 +154,12 @@ class TappedTransport(BentTransport):
         process: Whose it is.
         tap: Told of everything.
         address: Its URL.
+
+    Attributes:
+        ends_with_silence: Whether nothing may leave any more once an answer was given up.
     """
+
+    ends_with_silence = True
 
     def __init__(
         self,
@@ -165,6 +172,7 @@ class TappedTransport(BentTransport):
     ) -> None:
         self._process = process
         self._tap = tap
+        self._given_up = self._last = ""
         super().__init__(parse_url(address), device, clock, simulator.lock, durable=True)
 
     def told(self, data: bytes, *, secret: bool) -> str:
@@ -176,14 +184,29 @@ class TappedTransport(BentTransport):
         text = self.told(data, secret=secret)
         if self.line is not None:
             self.line.announce(text)
-        self._tap.leaving(self._process, _classified(text))
-        super().send(data, deadline=deadline, secret=secret)
+        forbidden = self._given_up if self.ends_with_silence else ""
+        self._tap.leaving(self._process, replace(_classified(text), forbidden=forbidden))
+        self._last = text
+        try:
+            super().send(data, deadline=deadline, secret=secret)
+        except TransportError:
+            self._process.cut_off = True
+            raise
         self._tap.passed(self._process, f"wire sent {text}")
 
     def receive(self, *, deadline: Deadline) -> bytes:
         """See :meth:`robolink.transport.Transport.receive`."""
-        data = super().receive(deadline=deadline)
-        self._tap.passed(self._process, f"wire received {data!r}")
+        try:
+            data = super().receive(deadline=deadline)
+        except TransportError:
+            # Whatever answers come later stand in the place of another one's.
+            self._process.cut_off = True
+            self._given_up = f"the answer to {self._last} was given up"
+            raise
+        self._process.cut_off |= not data
+        # What a bent login brings back is the driver's to hide, not ours to write down.
+        shown = repr(data).replace(PASSWORD, "***")
+        self._tap.passed(self._process, f"wire received {shown}")
         return data
 
 

@@ -13,8 +13,8 @@ from robolink_simulators.hosting.in_process.line_port import LinePort
 from robolink_simulators.hosting.streams.epson_serial import SerialFace
 from robolink_simulators.soak.computer import VirtualProcess
 from robolink_simulators.soak.history import Disturbance, Hindrance
-from robolink_simulators.soak.plant.bent_line import BentLine
 from robolink_simulators.soak.plant.epson import PASSWORD, EpsonPlant, TappedTransport
+from robolink_simulators.soak.plant.lines.bent_line import BentLine
 from robolink_simulators.soak.plant.machine import WireTap
 
 
@@ -55,6 +55,9 @@ class EpsonSerialPlant(EpsonPlant):
 
 class TappedLine(TappedTransport):
     """A process's time at the line, on which the adversary reads the frames."""
+
+    ends_with_silence = False
+    """A line outlives every session: it is silenced and turned on anew, in the same process."""
 
     def told(self, data: bytes, *, secret: bool) -> str:
         """Return a request in words, as the same one is written on a network."""

@@ -41,11 +41,13 @@ class SentRequest:
         kind: What it does.
         text: As it stands on the wire, or in words.
         tool: Which tool, where it is about one.
+        forbidden: Why it must not leave over this link, empty where it may.
     """
 
     kind: SentKind
     text: str
     tool: int | None = None
+    forbidden: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +92,7 @@ class PlantMachine(ABC):
         calls_back: Whether its own program changes the tool, and calls robolink back.
         numbered: Whether its commands have numbers, so that one that comes twice counts once.
         touched: Tools that somebody past this computer has written since the last look.
+        by_hand: What they wrote last, by tool.
         moved_itself: Whether the tool in force was changed past this computer since then.
         acts: What is planned to happen past the wire, counted by requests.
         values: Values that its own program was given since the last look.
@@ -105,6 +108,7 @@ class PlantMachine(ABC):
         self.clock = clock
         self.tap = tap
         self.touched: set[int] = set()
+        self.by_hand: dict[int, ToolOffset] = {}
         self.moved_itself = False
         self.acts = CountedActs()
         self.values: list[ToolOffset] = []
@@ -180,6 +184,11 @@ class PlantMachine(ABC):
     @abstractmethod
     def disarm(self) -> int:
         """Forget what was planned and was not met; return how much was met."""
+
+    def note_hand(self, tool: int, offset: ToolOffset) -> None:
+        """Note that somebody past this computer has written a tool."""
+        self.touched.add(tool)
+        self.by_hand[tool] = offset
 
     @abstractmethod
     def write_by_hand(self, tool: int, offset: ToolOffset) -> None:

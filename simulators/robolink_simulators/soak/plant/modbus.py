@@ -1,5 +1,6 @@
 """A SoftMotion PLC in a virtual cell behind Modbus frames: on a network, or on a serial line."""
 
+from collections.abc import Sequence
 from typing import Final
 
 from robolink.timing import Deadline
@@ -14,10 +15,9 @@ from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.hosting.in_process.line_port import LinePort
 from robolink_simulators.soak.computer import VirtualProcess
 from robolink_simulators.soak.history import Disturbance, Hindrance
-from robolink_simulators.soak.plant.bent_line import BentLine, BentTransport
+from robolink_simulators.soak.plant.lines.bent_line import BentLine, BentTransport
+from robolink_simulators.soak.plant.lines.mailbox_frames import MailboxFrames
 from robolink_simulators.soak.plant.machine import WireTap
-from robolink_simulators.soak.plant.mailbox_frames import MailboxFrames
-from robolink_simulators.soak.plant.mailbox_tap import TappedMailboxLink
 from robolink_simulators.soak.plant.softmotion import SoftMotionPlant
 
 BAUD: Final = 38_400
@@ -90,9 +90,14 @@ class ModbusRtuPlant(ModbusTcpPlant):
         return self._mailbox(transport, exchange)
 
     def tapped(self, link: MailboxLink, process: VirtualProcess) -> MailboxLink:
-        """See :meth:`SoftMotionPlant.tapped`; the line is told what is asked."""
+        """See :meth:`SoftMotionPlant.tapped`."""
         self._open[process.number] = link
-        return TappedMailboxLink(link, process, self.tap, self._line.announce)
+        return super().tapped(link, process)
+
+    def announce(self, text: str, words: Sequence[int] = ()) -> None:
+        """See :meth:`SoftMotionPlant.announce`; the line is told what is asked, too."""
+        super().announce(text, words)
+        self._line.announce(text)
 
     def hang_up(self, process: VirtualProcess) -> None:
         """The system closes the port of a process that died."""

@@ -22,7 +22,7 @@ from robolink_simulators.plc.device import PlcSimulator
 from robolink_simulators.plc.serving import PlcOnLine
 from robolink_simulators.soak.computer import VirtualProcess
 from robolink_simulators.soak.history import Disturbance, Hindrance
-from robolink_simulators.soak.plant.bent_line import BentLine, BentTransport
+from robolink_simulators.soak.plant.lines.bent_line import BentLine, BentTransport
 from robolink_simulators.soak.plant.machine import (
     MachineState,
     PlantMachine,
@@ -194,7 +194,7 @@ class RegisterMapPlant(PlantMachine):
         """Let a person at the HMI give a tool other values."""
         x, y, z, u, *_ = offset.components()
         self._simulator.program.set_tool(tool, {"x": x, "y": y, "z": z, "u": u})
-        self.touched.add(tool)
+        self.note_hand(tool, offset)
 
     def repair(self) -> None:
         """Permit, let the program answer again, show at the HMI what the machine works with."""

@@ -5,6 +5,7 @@ from typing import Final
 
 from robolink.controllers.softmotion import open_softmotion
 from robolink.model import Controller, OutcomeLog, ToolOffset
+from robolink.protocols.mailbox import Words
 from robolink.transport import MailboxLink
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.cell.world_parameters import WorldParameters
@@ -13,9 +14,11 @@ from robolink_simulators.faults.fieldbus import Order
 from robolink_simulators.hosting.in_process.mailbox_link import InProcessMailboxLink
 from robolink_simulators.soak.computer import VirtualProcess
 from robolink_simulators.soak.history import Disturbance, Hindrance
+from robolink_simulators.soak.plant.counted_acts import CountedActs
 from robolink_simulators.soak.plant.machine import MachineState, PlantWithWorld, WireTap
 from robolink_simulators.soak.plant.mailbox_tap import TappedMailboxLink
 from robolink_simulators.soak.plant.production import MailboxProduction
+from robolink_simulators.soak.plant.seen_session import another_clients
 from robolink_simulators.softmotion.mailbox.option_text import PlcOptions
 from robolink_simulators.softmotion.mailbox.options import MailboxOptions
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
@@ -53,7 +56,10 @@ class SoftMotionPlant(PlantWithWorld):
         self._simulator.present_ns = clock.now_ns
         self._simulator.durable = True
         self._simulator.on_request = self._requested
+        self._simulator.on_reply = self._replied
         self._production = MailboxProduction(self._simulator)
+        self._rivals = CountedActs()
+        self._taken_over: Words = ()
         self._starts = self._simulator.plc.memory.boot_id
         self._strange = False
 
@@ -72,7 +78,11 @@ class SoftMotionPlant(PlantWithWorld):
 
     def tapped(self, link: MailboxLink, process: VirtualProcess) -> MailboxLink:
         """Let the adversary see what passes on a link."""
-        return TappedMailboxLink(link, process, self.tap)
+        return TappedMailboxLink(link, process, self.tap, self)
+
+    def announce(self, text: str, words: Sequence[int] = ()) -> None:
+        """Count a request before it leaves; a rival's block may take the place of this one."""
+        self._taken_over = another_clients(words) if self._rivals.due(text) and words else ()
 
     def hang_up(self, process: VirtualProcess) -> None:
         """A mailbox does not see that a client is gone; it hears no beat any more."""
@@ -102,6 +112,9 @@ class SoftMotionPlant(PlantWithWorld):
         if disturbance.kind in (Hindrance.PENDANT, Hindrance.PRODUCTION):
             self.acts.plan(disturbance)
             return
+        if disturbance.kind is Hindrance.ANOTHER_CLIENT:
+            self._rivals.plan(disturbance)
+            return
         self._simulator.faults.add(
             PlcFault(
                 PlcFaultAction[disturbance.what],
@@ -120,7 +133,12 @@ class SoftMotionPlant(PlantWithWorld):
         self._strange |= any(fault.action in _NEEDS_RESTART for fault in faults.fired)
         faults.clear()
         faults.fired.clear()
-        return met + self.acts.clear()
+        return met + self.acts.clear() + self._rivals.clear()
+
+    @property
+    def rejected(self) -> int:
+        """How many damaged blocks the mailbox has counted."""
+        return self._simulator.plc.program.inbox.rejected
 
     def write_by_hand(self, tool: int, offset: ToolOffset) -> None:
         """Let the machine's own program write a slot."""
@@ -128,7 +146,7 @@ class SoftMotionPlant(PlantWithWorld):
         del x, y, z
         values = (offset.x_mm, offset.y_mm, offset.z_mm, a, b, c)
         self._simulator.plc.memory.define(tool, values, "by hand")
-        self.touched.add(tool)
+        self.note_hand(tool, offset)
 
     def advance(self) -> None:
         """See :meth:`PlantMachine.advance`; the machine's own program goes on, too."""
@@ -147,6 +165,11 @@ class SoftMotionPlant(PlantWithWorld):
             panel.lay_words("low_first")
             panel.shift_map(0)
             panel.restart()
+
+    def _replied(self, _number: int, text: str) -> None:
+        if self._taken_over and text.startswith("write_command"):
+            words, self._taken_over = self._taken_over, ()
+            self._simulator.plc.write(0, words, self.clock.now_ns())
 
     def _requested(self, _number: int, text: str) -> None:
         now_ns = self.clock.now_ns()

@@ -1,16 +1,39 @@
 """How a deed ends: what it says, against what is so."""
 
 import math
+from collections.abc import Iterator
+from typing import Final
 
 from robolink_cli.console.exit_codes import BUG, UNKNOWN, exit_code
 
+from robolink.errors import (
+    ConfigError,
+    LeaseLostError,
+    OutcomeUnknownError,
+    RemoteProtocolError,
+    TransportError,
+)
 from robolink.model import ToolOffset
 from robolink.nozzle_change import ChangeReport
 from robolink.standing import Effect, standing_after
 from robolink_simulators.soak.computer import VirtualProcess
+from robolink_simulators.soak.history import Hindrance
 from robolink_simulators.soak.people import OTHERS_TOOL, TOOL
 from robolink_simulators.soak.plant.machine import MachineState
 from robolink_simulators.soak.rules.so_far import SURELY_MM, Grounds
+
+_HARM_THE_JOURNAL: Final = (Hindrance.DISK, Hindrance.POWER_CUT)
+_OUT_OF_REACH: Final = (
+    OutcomeUnknownError,
+    TransportError,
+    RemoteProtocolError,
+    LeaseLostError,
+    ConfigError,
+)
+"""After these nothing can be put back: the link is gone, or the right to write, or the record."""
+
+_TRIED: Final = {"rolled back", "not applied", "conflict", "unknown"}
+"""What the journal says of a tool that was, or could not be, put back."""
 
 
 class EndRules:
@@ -32,6 +55,12 @@ class EndRules:
         code = 0 if error is None else exit_code(error)
         self._on.hold("NoDefectShown", code != BUG, f"{type(error).__name__}: {error}")
         self._told(error, code, state)
+        self._taken_back(process, error, state)
+        self._on.hold(
+            "ExitCodeIsTrue",
+            code == UNKNOWN or not process.overtaken,
+            f"it ends with {code}, and another client was answered in place of it",
+        )
         # A program that calls back tells what it left open when it calls again.
         if self._on.books.trusted and code != UNKNOWN and not self._on.plant.calls_back:
             begun = [
@@ -44,6 +73,29 @@ class EndRules:
                 not begun or self._on.now.crowded,
                 f"it ends with {code}, and {begun} is open",
             )
+
+    def _taken_back(
+        self, process: VirtualProcess, error: BaseException | None, state: MachineState
+    ) -> None:
+        """Check that a change that failed tried to put the old values back, where it could."""
+        hour = self._on.now.hour
+        harmed = any(one.kind in _HARM_THE_JOURNAL for one in hour.disturbances)
+        gone = process.cut_off or any(isinstance(one, _OUT_OF_REACH) for one in _chain(error))
+        if error is None or gone or harmed or self._on.now.crowded or not self._on.books.trusted:
+            return
+        for marker in self._on.books.markers():
+            if marker.kind != "change" or marker.operation in self._on.now.old_markers:
+                continue
+            for tool in map(int, marker.details["tools"]):
+                before, holds = self._on.now.before.tools.get(tool), state.tools.get(tool)
+                if tool in self._on.plant.touched or self._on.plant.same(before, holds):
+                    continue
+                entries = {kind for kind, _ in self._on.books.verdicts(self._on.now.entries, tool)}
+                self._on.hold(
+                    "TakenBack",
+                    bool(entries & _TRIED),
+                    f"tool {tool} keeps {holds}, and nobody tried to put {before} back",
+                )
 
     def _succeeded(self, process: VirtualProcess, state: MachineState) -> None:
         self._on.hold(
@@ -126,3 +178,10 @@ class EndRules:
                 state.selected == self._on.now.before.selected or bool(self._on.open_selection()),
                 f"unchanged is told, but tool {state.selected} is selected",
             )
+
+
+def _chain(error: BaseException | None) -> Iterator[BaseException]:
+    """Yield an error and what led to it."""
+    while error is not None:
+        yield error
+        error = error.__cause__ or error.__context__

@@ -42,6 +42,7 @@ class RestRules:
         if not self._on.books.trusted:
             return
         markers = self._on.books.markers()
+        self._all_or_none(state, markers)
         for tool in {*self._on.now.before.tools, *state.tools}:
             holds = state.tools.get(tool)
             named = [
@@ -50,6 +51,15 @@ class RestRules:
                 if m.details.get("tool") == tool or str(tool) in m.details.get("tools", {})
             ]
             self._agrees(tool, holds, named)
+
+    def _all_or_none(self, state: MachineState, markers: Sequence[BookedMarker]) -> None:
+        """Check that of several tools all hold what was typed, or none: or something is open."""
+        typed = self._on.now.wish.typed
+        if len(typed) < 2 or markers or any(tool in self._on.plant.touched for tool, _ in typed):
+            return
+        new = [self._on.plant.same(state.tools.get(tool), offset) for tool, offset in typed]
+        held = {tool: state.tools.get(tool) for tool, _ in typed}
+        self._on.hold("AllOrNone", all(new) or not any(new), f"half of {typed} stands: {held}")
 
     def _note_what_others_changed(self, state: MachineState) -> None:
         """Note values that no journal can be right about, until they are written again.

@@ -21,6 +21,7 @@ class WireRules:
 
     def leaving(self, process: VirtualProcess, sent: SentRequest) -> None:
         """Check a request that is about to leave a process."""
+        self._on.hold("SessionEnds", not sent.forbidden, f"{sent.text} leaves: {sent.forbidden}")
         if sent.kind in (SentKind.OTHER, SentKind.STOP):
             return
         markers = self._on.books.markers()
@@ -133,6 +134,7 @@ class WireRules:
         before: list[ToolOffset | None] = [
             self._on.now.first.tools.get(tool),
             self._on.now.before.tools.get(tool),
+            self._on.plant.by_hand.get(tool),  # it was there before the change, if not at first
         ]
         # A marker that could not be stored any more: the change around it says what it was.
         return not ours or any(self._on.plant.same(one, wanted) for one in before)

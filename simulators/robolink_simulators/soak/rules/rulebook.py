@@ -39,6 +39,7 @@ class Rulebook(Grounds):
         for tool, offset in state.tools.items():
             self.now.wanted[tool] = [offset]
         self.plant.touched.clear()
+        self.plant.by_hand.clear()
         self.plant.values.clear()
         self.plant.moved_itself = False
 

@@ -4,6 +4,7 @@ from robolink_simulators.cell.frames import ORIGIN, Frame
 from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.group.condition import SmcGroupState
 from robolink_simulators.softmotion.group.core import GroupCore, block
+from robolink_simulators.softmotion.kinematics.coordinates import CoordSystem
 from robolink_simulators.softmotion.kinematics.kinematics import AxisValues
 from robolink_simulators.softmotion.motion.jog import JogCommand, JogMotion
 from robolink_simulators.softmotion.motion.movement import EdgeWatch, Movement, SmcBufferMode
@@ -40,7 +41,8 @@ class MoveBlocks(GroupCore):
         planner = self._planner()
         path, pace = planner.line(start, target, self.tool.frame, dynamics)
         base = planner.base(start, target.system, self.tool.frame)
-        self._begin(path, pace, mode, execution, base=base, watch=watch)
+        system = target.system
+        self._begin(path, pace, mode, execution, base=base, watch=watch, system=system)
 
     @block
     def move_direct_absolute(
@@ -56,7 +58,7 @@ class MoveBlocks(GroupCore):
         mode = self._effective(mode, continuous=False)
         start = self._start(mode)
         path, pace = self._planner().direct(start, target, self.tool.frame, factors)
-        self._begin(path, pace, mode, execution)
+        self._begin(path, pace, mode, execution, system=target.system)
 
     @block
     def jog(self, execution: BlockExecution, command: JogCommand) -> None:
@@ -103,11 +105,16 @@ class MoveBlocks(GroupCore):
         return Planner(self.kinematics, self.axes, self.transforms)
 
     def _effective(self, mode: SmcBufferMode, *, continuous: bool) -> SmcBufferMode:
-        """Return Buffered where the tool changes between two CP movements (documented)."""
+        """Return Buffered where a change of tool does not let a movement join the one before.
+
+        Between two CP movements neither Blending nor Aborting joins them (documented); between
+        others Blending does not (documented on the page of SMC_GroupSetTool).
+        """
         last = self.motion.queue.last
-        if last is None or last.execution.ended or not last.continuous or not continuous:
+        if last is None or last.execution.ended or last.tool == self.tool:
             return mode
-        return mode if last.tool == self.tool else SmcBufferMode.BUFFERED
+        both_continuous = last.continuous and continuous
+        return SmcBufferMode.BUFFERED if both_continuous or mode.blends else mode
 
     def _start(self, mode: SmcBufferMode) -> AxisValues:
         """Return where a movement will begin."""
@@ -116,7 +123,8 @@ class MoveBlocks(GroupCore):
             return queue.axes_if_braked(self.now_ns) or self.values
         if any(movement.watch and movement.watch.stops for movement in queue.unfinished):
             text = "Where a movement until an input ends is not known before"
-            raise BlockRefused(ErrorKind.WRONG_STATE, text)
+            kind = ErrorKind.BLENDING_NOT_SUPPORTED if mode.blends else ErrorKind.WRONG_STATE
+            raise BlockRefused(kind, text)
         return queue.last_axes() or self.values
 
     def _begin(
@@ -128,6 +136,7 @@ class MoveBlocks(GroupCore):
         *,
         base: Frame = ORIGIN,
         watch: EdgeWatch | None = None,
+        system: CoordSystem,
     ) -> None:
         self.machine.begin_motion()
         self.motion.end_jog()
@@ -146,5 +155,6 @@ class MoveBlocks(GroupCore):
                 base=base,
                 execution=execution,
                 watch=watch,
+                system=system,
             )
         )

@@ -51,6 +51,9 @@ class StateMachine:
             Refused: The state, the power or an axis does not allow it.
             Overruled: A stop is held, and the options say so.
         """
+        if self._options.program_task != "motion":
+            text = "A movement block was called outside of the motion task"
+            raise BlockRefused(ErrorKind.OUTSIDE_MOTION_TASK, text)
         if self.stop_held and self._options.movement_while_stopping == "aborted":
             raise Overruled
         if self.state not in (SmcGroupState.STANDBY, SmcGroupState.MOVING):

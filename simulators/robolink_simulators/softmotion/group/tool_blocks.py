@@ -9,8 +9,15 @@ from robolink_simulators.softmotion.group.condition import (
 )
 from robolink_simulators.softmotion.group.core import GroupCore, block
 from robolink_simulators.softmotion.kinematics.coordinates import CoordRef, CoordSystem
-from robolink_simulators.softmotion.kinematics.kinematics import KinematicsModel
+from robolink_simulators.softmotion.kinematics.kinematics import (
+    ANY_CONFIGURATION,
+    AxisValues,
+    Configuration,
+    KinematicsModel,
+)
 from robolink_simulators.softmotion.motion.movement import ToolInForce
+from robolink_simulators.softmotion.motion.paths import axes_for_tcp
+from robolink_simulators.softmotion.motion.planner import Planner, Position, Target
 from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 
@@ -74,6 +81,8 @@ class ToolBlocks(GroupCore):
         self, execution: BlockExecution, system: CoordSystem, in_wcs: CoordRef
     ) -> None:
         """``MC_SetCoordinateTransform``: where MCS, PCS_1 or PCS_2 stands in WCS."""
+        if self.options.coordinate_transform_in_use == "refused":
+            self._require_unused(system)
         self.transforms.place(system, in_wcs.frame())
         execution.finish()
 
@@ -89,6 +98,56 @@ class ToolBlocks(GroupCore):
         configuration = self.kinematics.configuration(self.values)
         return ActualPosition(CoordRef.of(seen).components(), configuration)
 
+    def convert_position(
+        self,
+        position: Position,
+        system_in: CoordSystem,
+        system_out: CoordSystem,
+        *,
+        tool: CoordRef | None = None,
+        near: AxisValues | None = None,
+        configuration: Configuration = ANY_CONFIGURATION,
+    ) -> Position:
+        """``SMC_GroupConvertPosition``: the same place of the TCP in another coordinate system.
+
+        Documented: by the tool that is set, not by that of the active movement, unless another
+        is given (``UseToolOffsetParameter``, ``ToolOffset``). So a tool can be tried without
+        being set; one that the kinematics cannot carry is refused as SMC_GroupSetTool does
+        (assumed).
+
+        Args:
+            position: Axis values in ACS, else X, Y, Z in mm and A, B, C in degrees.
+            system_in: What it counts in.
+            system_out: What the answer counts in.
+            tool: The tool to convert with.
+            near: ``aRef``; where the axes are by default. Counts for ACS only.
+            configuration: ``config``. Counts for ACS only.
+
+        Raises:
+            Refused: The position is none, or out of reach, or the tool does not fit.
+        """
+        if tool is not None:
+            self._require_fit(tool)
+        frame = self.tool.frame if tool is None else tool.frame()
+        tcp_now = self.flange() @ frame
+        planner = Planner(self.kinematics, self.axes, self.transforms)
+        tcp = planner.tcp(self.values, Target(position, system_in), frame)
+        if system_out is CoordSystem.ACS:
+            reference = self.values if near is None else near
+            return axes_for_tcp(self.kinematics, tcp, frame, configuration, near=reference)
+        seen = self.transforms.in_mcs(system_out, tcp_now).inverse() @ tcp
+        return CoordRef.of(seen).components()
+
+    def continue_tool_offset(self) -> ToolInForce:
+        """``SMC_GroupGetContinueToolOffset``: the tool that interrupted movements go on with.
+
+        Raises:
+            Refused: Nothing was interrupted.
+        """
+        if not self.motion.interrupted:
+            raise BlockRefused(ErrorKind.NO_SUCH_MOVEMENT, "Nothing was interrupted")
+        return self.motion.interrupted[0].tool
+
     def tcp(self) -> Frame:
         """Return where the TCP of the tool that is set is, in MCS."""
         return self.flange() @ self.tool.frame
@@ -98,6 +157,14 @@ class ToolBlocks(GroupCore):
         stopping = self.state is SmcGroupState.STOPPING and not self.options.set_tool_while_stopping
         if self.state in locked or stopping:
             raise BlockRefused(ErrorKind.WRONG_STATE, f"No tool can be set in {self.state.name}")
+
+    def _require_unused(self, system: CoordSystem) -> None:
+        """Refuse to move a PCS in which something under way counts (unverified where)."""
+        jog = self.motion.jog
+        under_way = [*self.motion.queue.unfinished, *self.motion.interrupted]
+        systems = [*(it.system for it in under_way), *([jog.system] if jog else ())]
+        if system in (CoordSystem.PCS_1, CoordSystem.PCS_2) and system in systems:
+            raise BlockRefused(ErrorKind.PCS_STILL_IN_USE, f"{system.name} is still in use")
 
     def _require_fit(self, tool: CoordRef) -> None:
         image = self.kinematics.orientation_image(self.flange().rotation)

@@ -24,6 +24,7 @@ from robolink.protocols.mailbox import (
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
 from robolink_simulators.softmotion.group.condition import GroupStatus
 from robolink_simulators.softmotion.kinematics.coordinates import CoordRef, CoordSystem
+from robolink_simulators.softmotion.mailbox.commands.jobs import Job
 from robolink_simulators.softmotion.mailbox.commands.tools import ToolDesk
 from robolink_simulators.softmotion.mailbox.program import MailboxProgram
 from robolink_simulators.softmotion.mailbox.retained import RetainedMemory
@@ -142,7 +143,7 @@ class Outbox:
             "ack_head": job.command.sequence if job else 0,
             "state": job.state if job else CommandState.EMPTY,
             "error_class": job.error_class if job else ErrorClass.NONE,
-            "raw_error": (job.raw if job else 0) or (status.error.number if status.error else 0),
+            "raw_error": _raw_error(job, status),
             "opcode_echo": job.command.opcode if job else 0,
             "group_state": GroupState(self._group.state.value),
             "bits": self._bits(program, status),
@@ -161,3 +162,14 @@ class Outbox:
             program.permitted,
         )
         return Bits(sum(bit for bit, on in zip(_BITS, shown, strict=True) if on))
+
+
+def _raw_error(job: Job | None, status: GroupStatus) -> int:
+    """Return the ErrorID of the block, or of the group where the block shows no error.
+
+    The two are never mixed (docs/mailbox.md, "Errors"): a block in error whose number nobody
+    knows shows 0, whatever the group shows beside it.
+    """
+    if job is not None and job.error_class:
+        return job.raw
+    return status.error.number if status.error else 0

@@ -95,6 +95,11 @@ class JogMotion:
         execution.activate()
 
     @property
+    def system(self) -> CoordSystem:
+        """The coordinate system that the buttons count in."""
+        return self._command.system
+
+    @property
     def resting(self) -> bool:
         """Whether no button moves anything and nothing moves any more."""
         return not any(self._command.directions) and not any(self._velocities)

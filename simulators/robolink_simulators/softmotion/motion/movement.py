@@ -6,7 +6,7 @@ from enum import IntEnum
 from robolink.timing import NS_PER_S
 from robolink_simulators.cell.frames import ORIGIN, Frame
 from robolink_simulators.softmotion.function_blocks import BlockExecution
-from robolink_simulators.softmotion.kinematics.coordinates import CoordRef
+from robolink_simulators.softmotion.kinematics.coordinates import CoordRef, CoordSystem
 from robolink_simulators.softmotion.kinematics.kinematics import AxisValues
 from robolink_simulators.softmotion.motion.paths import JointPath, LinePath, Path
 from robolink_simulators.softmotion.motion.profile import Pace, SpeedProfile
@@ -63,6 +63,7 @@ class Movement:
         base: Where the coordinate system of its command stands in MCS.
         execution: What its block shows.
         watch: The input it ends at, if any.
+        system: The coordinate system that its target counts in.
 
     Attributes:
         armed: Whether the input has shown what it shows before the edge.
@@ -79,8 +80,10 @@ class Movement:
         base: Frame,
         execution: BlockExecution,
         watch: EdgeWatch | None = None,
+        system: CoordSystem = CoordSystem.MCS,
     ) -> None:
         self.number = number
+        self.system = system
         self.path = path
         self.tool = tool
         self.mode = mode

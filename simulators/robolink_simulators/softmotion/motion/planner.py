@@ -74,7 +74,7 @@ class Planner:
             Refused: A value is not usable, or the line cannot be covered.
         """
         dynamics.require_usable()
-        tcp = self._tcp(start, target, tool)
+        tcp = self.tcp(start, target, tool)
         self._require_same_configuration(start, target)
         path = plan_line(self._kinematics, start, tcp, tool)
         return path, line_pace(path, dynamics, self._axes)
@@ -91,7 +91,7 @@ class Planner:
         if target.system is CoordSystem.ACS:
             end = self._axis_target(target)
         else:
-            tcp = self._tcp(start, target, tool)
+            tcp = self.tcp(start, target, tool)
             end = axes_for_tcp(self._kinematics, tcp, tool, target.configuration, near=start)
             end = tuple(_inside(value, axis) for value, axis in zip(end, self._axes, strict=True))
         path = JointPath(start, end)
@@ -103,7 +103,17 @@ class Planner:
             return ORIGIN
         return self._transforms.in_mcs(system, self._kinematics.flange(start) @ tool)
 
-    def _tcp(self, start: AxisValues, target: Target, tool: Frame) -> Frame:
+    def tcp(self, start: AxisValues, target: Target, tool: Frame) -> Frame:
+        """Return where a target brings the TCP, in MCS.
+
+        Args:
+            start: Axes where the movement starts: TCS stands there.
+            target: The target.
+            tool: Flange to TCP.
+
+        Raises:
+            Refused: The position is no position of its coordinate system.
+        """
         if target.system is CoordSystem.ACS:
             return self._kinematics.flange(self._axis_target(target)) @ tool
         _require_finite(target.position, 6)

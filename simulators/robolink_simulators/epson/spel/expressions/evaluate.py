@@ -18,7 +18,11 @@ from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.request_refusals import RequestRefused
 from robolink_simulators.epson.spel.expressions.closures import Run, Scope, check_count, closure
 from robolink_simulators.epson.spel.expressions.data_types import Variable
-from robolink_simulators.epson.spel.expressions.joint_functions import printed_pulses
+from robolink_simulators.epson.spel.expressions.joint_functions import (
+    printed_pulses,
+    require_singular_angle,
+    with_singular_angle,
+)
 from robolink_simulators.epson.spel.expressions.machine_functions import (
     POINT_FUNCTIONS,
     coordinates_of,
@@ -218,12 +222,20 @@ class Evaluator:
             match modifier.kind:
                 case ModifierKind.FLAG:
                     point = _flagged(point, modifier.word)
+                case ModifierKind.ANGLE:
+                    point = self._angled(point, modifier)
                 case ModifierKind.CONVERT:
                     number = _local_number(modifier.word)
                     point = self.session.machine.locals.convert(point, number)
                 case _:
                     point = self._changed(point, modifier)
         return point
+
+    def _angled(self, point: Point, modifier: Modifier) -> Point:
+        joint = int(modifier.word[1])
+        require_singular_angle(self.session.machine.model, joint)
+        angle_deg = 0.0 if modifier.value is None else float(self.number(modifier.value))
+        return with_singular_angle(point, joint, angle_deg)
 
     def _changed(self, point: Point, modifier: Modifier) -> Point:
         amount = 0.0 if modifier.value is None else float(self.number(modifier.value))

@@ -11,7 +11,7 @@ from typing import Any, Final
 from robolink.model import Elbow, Hand, Posture, Wrist
 from robolink_simulators.epson.arm.joints import Joints, check_ranges
 from robolink_simulators.epson.arm.kinematics import PLAIN, flange_of, frame_of
-from robolink_simulators.epson.arm.robots import RobotModel
+from robolink_simulators.epson.arm.robots import Mechanism, RobotModel
 from robolink_simulators.epson.arm.six_axes import solve_near, wrist_of
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.points import Point
@@ -204,6 +204,32 @@ def _of_posture(read: Callable[[Posture], int]) -> Callable[[Session, Arguments]
     return tell
 
 
+def _of_singular_place(joint: int) -> Callable[[Session, Arguments], Value]:
+    """Return J1Angle or J4Angle: of a point, or of where the arm stands.
+
+    RS robots have J1Angle alone, N robots both (documented, docs/reference/epson-robots.md,
+    "Flags"). A point that has none tells 0, as point files do.
+    """
+
+    def tell(session: Session, arguments: Arguments) -> Value:
+        require_singular_angle(session.machine.model, joint)
+        posture = as_point(arguments[0]).posture if arguments else session.machine.arm.posture
+        told = posture or PLAIN
+        return (told.j1_angle_deg if joint == 1 else told.j4_angle_deg) or 0.0
+
+    return tell
+
+
+def require_singular_angle(model: RobotModel, joint: int) -> None:
+    """Refuse the angle of a singular place on a robot that has none.
+
+    Raises:
+        Refusal: No N robot is simulated, and only RS robots have J1Angle beside them.
+    """
+    if joint != 1 or model.mechanism is not Mechanism.FOLDED_SCARA:
+        raise SpelRefusal(RefusalKind.OTHER_ROBOT, f"J{joint}Angle is for another kind of robot")
+
+
 FLAG_FUNCTIONS: Final[dict[str, Callable[[Session, Arguments], Value]]] = {
     "hand": _hand,
     "elbow": _of_posture(lambda posture: _ELBOWS[posture.elbow]),
@@ -212,6 +238,8 @@ FLAG_FUNCTIONS: Final[dict[str, Callable[[Session, Arguments], Value]]] = {
     "j2flag": _of_posture(lambda posture: posture.j2_flag),
     "j4flag": _of_posture(lambda posture: posture.j4_flag),
     "j6flag": _of_posture(lambda posture: posture.j6_flag),
+    "j1angle": _of_singular_place(1),
+    "j4angle": _of_singular_place(4),
 }
 """Name to the function of a point, or without one of the arm."""
 
@@ -220,6 +248,12 @@ _NAMED: Final[dict[str, dict[int, Elbow | Wrist]]] = {
     "wrist": {number: wrist for wrist, number in _WRISTS.items()},
 }
 _HIGHEST_FLAG: Final = {"j1flag": 1, "j2flag": 1, "j4flag": 1, "j6flag": 127}
+
+
+def with_singular_angle(point: Point, joint: int, angle_deg: float) -> Point:
+    """Return a point with J1Angle or J4Angle set, in degrees."""
+    changed: dict[str, Any] = {f"j{joint}_angle_deg": angle_deg}
+    return replace(point, posture=replace(point.posture or PLAIN, **changed))
 
 
 def with_flag(point: Point, flag: str, value: int) -> Point:

@@ -100,6 +100,8 @@ def _point(pairs: Pairs) -> Point:
         Elbow.BELOW if pairs.get("nElbow") == "2" else Elbow.ABOVE,
         Wrist.FLIP if pairs.get("nWrist") == "2" else Wrist.NO_FLIP,
         **flags,
+        j1_angle_deg=float(pairs.get("rJ1Angle", "0")) or None,
+        j4_angle_deg=float(pairs.get("rJ4Angle", "0")) or None,
     )
     hand = Hand.LEFT if pairs.get("nHand") == "2" else Hand.RIGHT
     return Point((x, y, z, u, v, w), hand, int(pairs.get("nLocal", "0")), posture=posture)

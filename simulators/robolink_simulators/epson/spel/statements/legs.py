@@ -4,8 +4,10 @@ import math
 from dataclasses import replace
 
 from robolink.model import Pose
+from robolink_simulators.cell.frames import Frame
 from robolink_simulators.epson.arm.arc import MeasuredWay
 from robolink_simulators.epson.arm.joints import Joints
+from robolink_simulators.epson.arm.kinematics import frame_of
 from robolink_simulators.epson.arm.motion_parameters import MotionPhase
 from robolink_simulators.epson.arm.tilted_legs import plan_about_point, plan_line, plan_way
 from robolink_simulators.epson.arm.trajectory import JointLeg, Leg, LinePace, plan_go
@@ -56,27 +58,44 @@ def line_leg(machine: Machine, start: Pose, end: Pose, *, near: Joints) -> Leg:
     )
 
 
-def held_leg(machine: Machine, end: Pose) -> Leg:
+def held_leg(machine: Machine, end: Pose, way: MeasuredWay | None = None) -> Leg:
     """Plan a leg about the external control point in force, from where the tip is.
 
+    Args:
+        machine: The robot.
+        end: Where the tip comes to.
+        way: The way of the point over the workpiece, of :func:`seen_from` at its places; ``None``
+            for a straight one.
+
     Raises:
-        Refusal: None is in force (the number of that error is assumed), the robot has four axes
-            (not simulated), or as :func:`line_leg`.
+        Refusal: None is in force (the number of that error is assumed), or as :func:`line_leg`.
     """
-    if not machine.model.six_axes:
-        raise SpelRefusal(RefusalKind.NOT_SIMULATED, "Move ... ECP on four axes is not simulated")
-    number = machine.control_points.selected
-    if not number:
-        raise SpelRefusal(RefusalKind.ECP_UNDEFINED, "No external control point is in force")
     return plan_about_point(
         machine.model,
         (machine.tip(), end),
         line_pace(machine),
-        point=frame_at(machine.control_points.get(number)),
+        point=_point_in_force(machine),
+        way=way,
         offset=machine.offset,
         near=machine.arm.joints,
         avoiding=machine.settings.avoided,
     )
+
+
+def seen_from(machine: Machine, tip: Pose) -> Pose:
+    """Return where a workpiece that the tip holds sees the external control point in force.
+
+    Raises:
+        Refusal: None is in force.
+    """
+    return Pose(*(frame_of(tip).inverse() @ _point_in_force(machine)).shift_mm, 0.0)
+
+
+def _point_in_force(machine: Machine) -> Frame:
+    number = machine.control_points.selected
+    if not number:
+        raise SpelRefusal(RefusalKind.ECP_UNDEFINED, "No external control point is in force")
+    return frame_at(machine.control_points.get(number))
 
 
 def way_leg(machine: Machine, end: Pose, way: MeasuredWay) -> Leg:

@@ -47,7 +47,7 @@ _WORDS: Final = {
     "tmove": _LINE_WORDS,
     "bmove": _LINE_WORDS,
     "arc": _LINE_WORDS,
-    "arc3": _LINE_WORDS,
+    "arc3": _LINE_WORDS | {"ecp"},
     "jump": frozenset({"limz"}) | _GATE_WORDS,
     "jump3": frozenset({"ljm"}) | _GATE_WORDS,
     "jump3cp": frozenset({"ljm", "rot"}) | _GATE_WORDS,

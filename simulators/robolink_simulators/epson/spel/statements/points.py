@@ -10,7 +10,12 @@ from typing import Final
 from robolink_simulators.epson.memory.points import HIGHEST_POINT, Local, Point
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
-from robolink_simulators.epson.spel.expressions.joint_functions import FLAG_FUNCTIONS, with_flag
+from robolink_simulators.epson.spel.expressions.joint_functions import (
+    FLAG_FUNCTIONS,
+    require_singular_angle,
+    with_flag,
+    with_singular_angle,
+)
 from robolink_simulators.epson.spel.expressions.machine_functions import coordinates_of
 from robolink_simulators.epson.spel.expressions.printing import CRLF, number_text, point_line
 from robolink_simulators.epson.spel.expressions.values import as_number, as_text, out_of_range
@@ -102,13 +107,23 @@ def _flag(evaluator: Evaluator, command: KeywordStatement) -> str:
     That a number alone is shown is assumed; a sample is missing (docs/reference/spel.md 5.1).
     """
     arguments, session = _expect(command, 0, 1, 2), evaluator.session
+    singular = _SINGULAR_ANGLES.get(command.name)
+    if singular is not None:
+        require_singular_angle(session.machine.model, singular)
     if len(arguments) < 2:
         values = [evaluator.point_of(argument) for argument in arguments]
         return number_text(as_number(FLAG_FUNCTIONS[command.name](session, values))) + CRLF
-    number, value = evaluator.stored_number(arguments[0]), evaluator.integer(arguments[1])
-    points = session.machine.points
+    number, points = evaluator.stored_number(arguments[0]), session.machine.points
+    if singular is not None:
+        angle_deg = float(evaluator.number(arguments[1]))
+        points.store(number, with_singular_angle(points.get(number), singular, angle_deg))
+        return ""
+    value = evaluator.integer(arguments[1])
     points.store(number, with_flag(points.get(number), command.name, value))
     return ""
+
+
+_SINGULAR_ANGLES: Final = {"j1angle": 1, "j4angle": 4}
 
 
 def _control_point(evaluator: Evaluator, command: KeywordStatement) -> str:

@@ -19,11 +19,12 @@ from robolink_simulators.epson.arm.arc import (
     space_through,
 )
 from robolink_simulators.epson.arm.trajectory import Leg
+from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.values import Number
-from robolink_simulators.epson.spel.statements.legs import go_leg, way_leg
+from robolink_simulators.epson.spel.statements.legs import go_leg, held_leg, seen_from, way_leg
 from robolink_simulators.epson.spel.tree import (
     LabelledPoint,
     Literal,
@@ -53,22 +54,38 @@ def arc(evaluator: Evaluator, motion: MotionStatement) -> Leg:
     numbers = [one for one in given if not isinstance(one, Point)]
     in_order = all(isinstance(one, Point) for one in given[: len(points)])
     start, space = machine.tip(), motion.verb == "arc3"
+    held = "ecp" in motion.options.words
     match (len(points), len(numbers), space):
         case (2, 0, _) if in_order:
             mid, end = points
             _require_the_hand(mid, end)
+            if held:
+                return held_leg(machine, end, space_through(*_seen(machine, start, mid, end)))
             through = space_through if space else level_through
             return way_leg(machine, end, through(start, mid, end))
         case (2, 1, _) if in_order:
             end, centre = points
+            long = numbers[0] == _LONG
+            if held:
+                way = space_about(*_seen(machine, start, end, centre), long=long)
+                return held_leg(machine, end, way)
             about = space_about if space else level_about
-            return way_leg(machine, end, about(start, end, centre, long=numbers[0] == _LONG))
+            return way_leg(machine, end, about(start, end, centre, long=long))
         case (1, 1, False) if in_order:
             (end,) = points
             return way_leg(machine, end, level_by_angle(start, end, float(numbers[0])))
         case (1, 3, False) if in_order:
             return _of_radius(evaluator, points[0], numbers)
     raise SpelRefusal(RefusalKind.SYNTAX, f"{motion.verb} does not take these")
+
+
+def _seen(machine: Machine, *tips: Pose) -> tuple[Pose, Pose, Pose]:
+    """Return where a held workpiece sees the external control point from three places.
+
+    That how it is turned at the mid point or the centre counts for that is assumed.
+    """
+    first, second, third = (seen_from(machine, tip) for tip in tips)
+    return first, second, third
 
 
 def _of_radius(evaluator: Evaluator, end: Pose, numbers: Sequence[Number]) -> Leg:

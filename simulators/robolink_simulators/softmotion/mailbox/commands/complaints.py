@@ -25,6 +25,9 @@ _CLASSES: Final = {
     ErrorKind.NO_POWER: ErrorClass.AXIS,
     ErrorKind.AXIS_ERROR: ErrorClass.AXIS,
     ErrorKind.INTERRUPTED_BY_SINGLE_AXIS: ErrorClass.INTERRUPTED_BY_AXIS,
+    ErrorKind.PCS_STILL_IN_USE: ErrorClass.WRONG_STATE,
+    ErrorKind.BLENDING_NOT_SUPPORTED: ErrorClass.WRONG_STATE,
+    ErrorKind.OUTSIDE_MOTION_TASK: ErrorClass.UNMAPPED,
 }
 
 _STATES: Final = {

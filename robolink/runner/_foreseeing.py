@@ -1,0 +1,141 @@
+"""Procedures followed on paper: each step and where it leads, while nothing moves."""
+
+from collections.abc import Callable, Generator, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import repeat
+from typing import TypeVar
+
+from robolink.errors import CalibrationError, LimitError
+from robolink.messages import tr
+from robolink.model import Path, Pose, Spot, SpotUnit
+from robolink.runner._steps import (
+    Ask,
+    Confirm,
+    Consider,
+    Look,
+    Move,
+    Notify,
+    Procedure,
+    Seek,
+    SeenAt,
+)
+
+OptionT = TypeVar("OptionT")
+
+
+@dataclass(frozen=True, slots=True)
+class ForeseenStep:
+    """A step of a procedure that nobody has taken.
+
+    Attributes:
+        step: Which.
+        start: Where the frame is before it.
+        known: Whether that is so; else a person brings the tip somewhere before, and it is taken
+            to stay where it is.
+    """
+
+    step: Ask | Move | Seek | Look
+    start: Pose
+    known: bool
+
+    @property
+    def move(self) -> Move | None:
+        """The movement, of a search too; ``None`` for a step that moves nothing by itself."""
+        step = self.step
+        if isinstance(step, Seek):
+            return Move(step.target, Path.STRAIGHT, step.purpose)
+        return step if isinstance(step, Move) else None
+
+
+def nothing_in_the_way(step: Consider, *, known: bool) -> tuple[str, ...]:  # noqa: ARG001 - the form of an answer
+    """Answer that nothing is known against any of the movements."""
+    return ("",) * len(step.moves)
+
+
+def foreseen_steps(
+    procedure: Procedure[object],
+    here: Pose,
+    *,
+    known: bool = True,
+    consider: Callable[..., tuple[str, ...]] = nothing_in_the_way,
+) -> Generator[ForeseenStep, None, tuple[Pose, bool]]:
+    """Yield the steps of a procedure, and return where they lead, and whether that is known.
+
+    Args:
+        procedure: What is followed; it is used up.
+        here: Where the frame is.
+        known: Whether that is so.
+        consider: Answers what the procedure wants to know about movements.
+
+    Raises:
+        CalibrationError: It refuses before its first step.
+        LimitError: It finds no way.
+    """
+    try:
+        step = next(procedure)
+    except StopIteration:
+        return here, known
+    try:
+        while True:
+            if isinstance(step, (Notify, Confirm)):
+                # What it would say depends on poses that nobody took.
+                step = procedure.send(None)
+                continue
+            if isinstance(step, Consider):
+                step = procedure.send(consider(step, known=known))
+                continue
+            yield ForeseenStep(step, here, known)
+            answer = here
+            if isinstance(step, Ask):
+                known = known and step.foreseen is not None
+                answer = here = step.foreseen or here
+            elif isinstance(step, Look):
+                answer = SeenAt.of(here, Spot(*step.expected_mm), SpotUnit.BASE_MM)
+            else:
+                answer = here = step.target
+            step = procedure.send(answer)
+    except (StopIteration, CalibrationError):
+        # The poses are foreseen, so what they would give means nothing.
+        return here, known
+
+
+def considered(step: Consider) -> Iterator[tuple[Move, Pose | None]]:
+    """Yield each movement with where it begins."""
+    yield from zip(step.moves, step.starts or repeat(None), strict=False)
+
+
+def first_clear(
+    options: Sequence[OptionT],
+    steps: Callable[[OptionT], Procedure[object]],
+    here: Pose,
+) -> Procedure[OptionT]:
+    """Return the first option whose movements can all be made. Nothing moves.
+
+    Args:
+        options: What there is to choose from, the best first.
+        steps: Makes the steps of an option, to be followed on paper.
+        here: Where the frame is.
+
+    Raises:
+        LimitError: None can; says why of the first.
+    """
+    refusals = list[tuple[Move, str]]()
+    for option in options:
+        foreseen = [one for one in foreseen_steps(steps(option), here) if one.move is not None]
+        moves = tuple(one.move for one in foreseen if one.move is not None)
+        told: tuple[str, ...] = yield Consider(moves, tuple(one.start for one in foreseen))
+        in_the_way = zip(moves, told, strict=True)
+        refusal = next(((move, why) for move, why in in_the_way if why), None)
+        if refusal is None:
+            if refusals:
+                yield Notify(tr("Another way is taken than planned: {why}", why=refusals[0][1]))
+            return option
+        refusals.append(refusal)
+    move, why = refusals[0]
+    raise LimitError(
+        tr("{step}: {refusal} Nothing was moved for it.", step=move.purpose, refusal=why),
+        remedy=tr(
+            "Tilt or turn the tool otherwise at the first place, or put the reference point where "
+            "the arm has room and stays away from its singular places."
+        ),
+    )

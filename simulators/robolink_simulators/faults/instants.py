@@ -1,0 +1,92 @@
+"""The instants at which a fault tells most: where those that were found from outside had struck.
+
+A fault that is drawn evenly over a deed of 2,700 points meets one of these once in a thousand
+hours. So a part of all faults is drawn from here (docs/reliability.md, "Known defects put back").
+Nothing here knows a defect: it is where a careful person would pull the plug.
+"""
+
+import random
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+
+@dataclass(frozen=True, slots=True)
+class Instant:
+    """A fault, and where it comes.
+
+    Attributes:
+        kind: Which kind of hindrance, by its value.
+        what: Which of its kind.
+        match: Text that the request, or the checkpoint, contains.
+        count: How many of those there are to choose from.
+        deeds: The deeds in which it tells, by value; empty for each.
+        first: How many are passed over.
+    """
+
+    kind: str
+    what: str
+    match: str
+    count: int = 1
+    deeds: tuple[str, ...] = ()
+    first: int = 0
+
+
+SHARE: Final = 0.4
+"""Share of all faults that are drawn from here."""
+
+_NOZZLE: Final = ("change the nozzle",)
+_TYPED: Final = ("type a tool offset", "type two tool offsets")
+_TWO: Final = ("type two tool offsets",)
+
+INSTANTS: Final[Mapping[str, Sequence[Instant]]] = {
+    "epson": (
+        # A login that is bent on its way, and comes back in its refusal.
+        Instant("wire", "GARBLE_REQUEST", "Login"),
+        # A write that is acknowledged, and not carried out.
+        Instant("wire", "IGNORE_WRITE", "TLSet ", 2),
+        Instant("wire", "IGNORE_WRITE", "TLSet 3, XY", 1, _TWO),
+        # An answer that comes when nobody waits for it any more.
+        Instant("wire", "DELAY", "Print", 40),
+        # Just before a movement leaves, and at its answer.
+        *(Instant("stop", "", "lock Move ", 15, _NOZZLE),) * 5,
+        Instant("stop", "", "lock Go ", 3, _NOZZLE),
+        # Behind the last write, before it is on record.
+        Instant("stop", "", "exchange Print TLSet", 3, _TYPED),
+        *(Instant("stop", "", "commit ", 8, _TYPED),) * 2,
+        Instant("stop", "", "commit after", 8, _NOZZLE, first=68),
+        # Between the first and the second of two tools.
+        *(Instant("stop", "", "procedure TLSet 3", 1, _TWO),) * 3,
+        *(Instant("interrupt", "", "lock TLSet 3", 1, _TWO),) * 3,
+    ),
+    "softmotion": (
+        # A block that is lost: nothing acknowledges it.
+        Instant("wire", "DROP_REQUEST", "write_command", 12),
+        # A start of the PLC just before it is told something.
+        Instant("machine", "RESTART", "write_command", 30),
+        Instant("machine", "RESTART", "WRITE_TOOL", 2),
+        # Another client's block in the same cycle, under the same number.
+        Instant("another client", "", "MOVE_LINEAR", 18, _NOZZLE),
+        Instant("another client", "", "SELECT_TOOL", 2, _NOZZLE),
+        Instant("another client", "", "WRITE_TOOL", 2),
+        # Just before a movement leaves; behind the last write; between two tools.
+        *(Instant("stop", "", "lock 2103", 15, _NOZZLE),) * 5,
+        Instant("stop", "", "exchange 5205", 2, _TYPED),
+        *(Instant("stop", "", "commit ", 6, _TYPED),) * 2,
+        Instant("stop", "", "commit after", 8, _NOZZLE, first=68),
+        *(Instant("stop", "", "procedure 5205 WRITE_TOOL 3", 1, _TWO),) * 3,
+        *(Instant("interrupt", "", "lock 5205 WRITE_TOOL 3", 1, _TWO),) * 3,
+    ),
+}
+"""By kind of cell."""
+
+
+def drawn_instant(rng: random.Random, cell: str, deed: str) -> tuple[Instant, int] | None:
+    """Return an instant that tells in a deed, and which of those that match; mostly ``None``."""
+    if rng.random() >= SHARE:
+        return None
+    fitting = [one for one in INSTANTS.get(cell, ()) if not one.deeds or deed in one.deeds]
+    if not fitting:
+        return None
+    instant = rng.choice(fitting)
+    return instant, instant.first + rng.randrange(instant.count)

@@ -10,6 +10,11 @@
 '     RobolinkTouch(8)                     at the touch: input 8 is on
 '     RobolinkWrite                        asks for the value, keeps the old one, writes
 '     RobolinkApproach, RobolinkTouch      again, at other angles: the proof
+'
+' In place of touches, with RobolinkBegin(1, "beams@NAME") or RobolinkBegin(1, "camera"):
+'
+'     RobolinkApproach(8), then twice RobolinkEdge(1, 8)   beam 1 on input 8: broken, free again
+'     RobolinkSeen(n, x, y)                robot at rest: n candidates, and where the one is, RobotXYU
 '     RobolinkFinish                       keeps the new value, or puts the old one back
 '     RobolinkClose                        in any case
 '
@@ -21,8 +26,10 @@
 #define RL_WAIT_S 10
 
 Global Preserve Integer rl_flag    ' 0 none, 1 old value must come back, 2 kept, 3 put back
-Global Preserve Integer rl_tool    ' the tool of the last change
+Global Preserve Integer rl_robot   ' the robot of the last change
+Global Preserve Integer rl_tool    ' its tool
 Global Preserve Double rl_old(5)   ' what it held before
+Global Preserve Double rl_new(5)   ' what was written
 Global Preserve String rl_op$      ' the name of the last change
 
 Global Integer rl_stop             ' 1: RobolinkClose ends the program if nothing was kept
@@ -32,39 +39,46 @@ Global String rl_code$             ' why the last one was not
 Global Integer rl_open
 Global Integer rl_number
 Global Integer rl_clear
+Global Integer rl_level
 Global Integer rl_proof
 Global String rl_word$
 Global String rl_field$(15)
 
-' Puts the old value back where a cut came before the new one was proved.
+' Puts the old value back where a cut came before the new one was proved. A tool that holds neither
+' was set by somebody else since: it is left.
 Function RobolinkRestore
+  Integer r
   If rl_flag = 1 Then
-    RlSetTool rl_tool, rl_old(0), rl_old(1), rl_old(2), rl_old(3), rl_old(4), rl_old(5)
+    r = Robot
+    RlChoose rl_robot
+    If RlOurs() Then
+      RlPutBack
+    EndIf
     rl_flag = 3
+    RlChoose r
   EndIf
 Fend
 
 Function RobolinkOpen(host$ As String, port As Integer) As Boolean
-  String op$
+  Integer r
   RobolinkOpen = False
   RobolinkRestore
   rl_kept = 0
   rl_code$ = "no_answer"
-  rl_number = 0
   rl_proof = 0
   rl_clear = 0
-  op$ = rl_op$
-  If op$ = "" Then
-    op$ = "-"
-  EndIf
-  If RlConnect(host$, port) Then
-    If RlAsk("HELLO," + RobotSerial$ + "," + Str$(Robot) + "," + Str$(rl_flag) + "," + op$ + "," + Str$(rl_tool) + "," + RlTool$(rl_tool)) Then
-      If rl_word$ = "WELCOME" Then
-        rl_flag = 0
-        RobolinkOpen = True
-      EndIf
+  r = Robot
+  If rl_flag <> 0 And rl_robot <> r Then
+    ' What another robot has to tell is told under that robot's name.
+    RlChoose rl_robot
+    RlHello host$, port
+    RlBye
+    RlChoose r
+    If rl_flag <> 0 Then
+      Exit Function
     EndIf
   EndIf
+  RobolinkOpen = RlHello(host$, port)
 Fend
 
 Function RobolinkBegin(n As Integer, method$ As String) As Boolean
@@ -73,14 +87,16 @@ Function RobolinkBegin(n As Integer, method$ As String) As Boolean
     If RlAsk("BEGIN," + Str$(n) + "," + method$ + "," + RlTool$(n)) Then
       If rl_word$ = "GO" Then
         rl_tool = n
+        rl_robot = Robot
         RobolinkBegin = True
       EndIf
     EndIf
   EndIf
 Fend
 
-' Notes that the contact is off while the tip is clear of the pin.
+' Notes what the input shows while the tip is clear of the pin, or of the beam.
 Function RobolinkApproach(bit As Integer)
+  rl_level = Sw(bit)
   rl_clear = 0
   If Sw(bit) = Off Then
     rl_clear = 1
@@ -89,50 +105,46 @@ Fend
 
 ' Sends where the robot stands, in the tool that is in force, and what the contact shows.
 Function RobolinkTouch(bit As Integer) As Boolean
-  String text$
-  Integer touched
-  RobolinkTouch = False
+  Integer touched, clear
   touched = 0
   If Sw(bit) = On Then
     touched = 1
   EndIf
-  text$ = "POSE,"
-  If rl_proof = 1 Then
-    text$ = "PROOF,"
-  EndIf
-  text$ = text$ + Str$(Tool) + "," + RlNumber$(CX(Here)) + "," + RlNumber$(CY(Here)) + "," + RlNumber$(CZ(Here)) + "," + RlNumber$(CU(Here))
-  If RlSixAxes() Then
-    text$ = text$ + "," + RlNumber$(CV(Here)) + "," + RlNumber$(CW(Here))
-  Else
-    text$ = text$ + ",0,0"
-  EndIf
-  text$ = text$ + "," + Str$(rl_clear) + "," + Str$(touched)
+  clear = rl_clear
   rl_clear = 0
-  If RlAsk(text$) Then
-    If rl_word$ = "OK" Then
-      RobolinkTouch = True
-    EndIf
-  EndIf
+  RobolinkTouch = RlSend(Str$(clear) + "," + Str$(touched))
+Fend
+
+' Sends where the robot stands at an edge of a beam, and what its input showed before and shows now.
+Function RobolinkEdge(beam As Integer, bit As Integer) As Boolean
+  Integer before
+  before = rl_level
+  rl_level = Sw(bit)
+  RobolinkEdge = RlSend(Str$(beam) + "," + Str$(before) + "," + Str$(rl_level))
+Fend
+
+' Sends where the robot stands, how many candidates its camera saw, and where the one is.
+Function RobolinkSeen(n As Integer, x As Double, y As Double) As Boolean
+  RobolinkSeen = RlSend(Str$(n) + "," + RlNumber$(x) + "," + RlNumber$(y))
 Fend
 
 ' Asks for the value and writes it. From here on the old value comes back unless it is proved.
 Function RobolinkWrite As Boolean
+  Integer i
   RobolinkWrite = False
+  If Robot <> rl_robot Then
+    Exit Function
+  EndIf
   If RlAsk("SOLVE") Then
     If rl_word$ = "VALUE" Then
-      rl_old(0) = CX(TLSet(rl_tool))
-      rl_old(1) = CY(TLSet(rl_tool))
-      rl_old(2) = CZ(TLSet(rl_tool))
-      rl_old(3) = CU(TLSet(rl_tool))
-      rl_old(4) = 0
-      rl_old(5) = 0
-      If RlSixAxes() Then
-        rl_old(4) = CV(TLSet(rl_tool))
-        rl_old(5) = CW(TLSet(rl_tool))
-      EndIf
+      RlRead ByRef rl_old()
+      For i = 0 To 5
+        rl_new(i) = Val(rl_field$(i + 1)) / 1000
+      Next i
       rl_op$ = rl_field$(0)
       rl_flag = 1
-      RlSetTool rl_tool, Val(rl_field$(1)) / 1000, Val(rl_field$(2)) / 1000, Val(rl_field$(3)) / 1000, Val(rl_field$(4)) / 1000, Val(rl_field$(5)) / 1000, Val(rl_field$(6)) / 1000
+      RlSetTool rl_tool, rl_new(0), rl_new(1), rl_new(2), rl_new(3), rl_new(4), rl_new(5)
+      RlRead ByRef rl_new()
       If RlAsk("WROTE," + rl_op$ + "," + RlTool$(rl_tool)) Then
         If rl_word$ = "PROVE" Then
           rl_proof = 1
@@ -147,7 +159,7 @@ Fend
 
 Function RobolinkFinish As Boolean
   RobolinkFinish = False
-  If rl_flag = 1 Then
+  If rl_flag = 1 And Robot = rl_robot Then
     If RlAsk("JUDGE," + rl_op$) Then
       If rl_word$ = "KEEP" And rl_field$(0) = rl_op$ Then
         rl_flag = 2
@@ -170,11 +182,7 @@ Function RobolinkClose
   If rl_flag = 1 Then
     RlGiveUp
   EndIf
-  If rl_open = 1 Then
-    RlAsk("BYE")
-    CloseNet #RL_PORT
-    rl_open = 0
-  EndIf
+  RlBye
   If rl_stop = 1 And rl_kept = 0 Then
     Error 8101
   EndIf
@@ -184,14 +192,110 @@ Fend
 
 Function RlGiveUp
   String code$
+  Integer r
   code$ = rl_code$
-  RobolinkRestore
+  r = Robot
+  RlChoose rl_robot
+  RlPutBack
+  rl_flag = 3
   If RlAsk("RESTORED," + rl_op$ + "," + RlTool$(rl_tool)) Then
     If rl_word$ = "DONE" Then
       rl_flag = 0
     EndIf
   EndIf
+  RlChoose r
   rl_code$ = code$
+Fend
+
+Function RlPutBack
+  RlSetTool rl_tool, rl_old(0), rl_old(1), rl_old(2), rl_old(3), rl_old(4), rl_old(5)
+Fend
+
+' True while the tool holds what was written here.
+Function RlOurs As Boolean
+  Integer i
+  Double now(5)
+  RlOurs = False
+  If TLDef(rl_tool) = 0 Then
+    Exit Function
+  EndIf
+  RlRead ByRef now()
+  For i = 0 To 5
+    If Abs(now(i) - rl_new(i)) > 0.0015 Then
+      Exit Function
+    EndIf
+  Next i
+  RlOurs = True
+Fend
+
+Function RlRead(ByRef v() As Double)
+  v(0) = CX(TLSet(rl_tool))
+  v(1) = CY(TLSet(rl_tool))
+  v(2) = CZ(TLSet(rl_tool))
+  v(3) = CU(TLSet(rl_tool))
+  v(4) = 0
+  v(5) = 0
+  If RlSixAxes() Then
+    v(4) = CV(TLSet(rl_tool))
+    v(5) = CW(TLSet(rl_tool))
+  EndIf
+Fend
+
+Function RlChoose(n As Integer)
+  If Robot <> n Then
+    Robot n
+  EndIf
+Fend
+
+' Says who the robot in force is, and what it had to tell.
+Function RlHello(host$ As String, port As Integer) As Boolean
+  String op$
+  RlHello = False
+  rl_number = 0
+  op$ = rl_op$
+  If op$ = "" Then
+    op$ = "-"
+  EndIf
+  If RlConnect(host$, port) Then
+    If RlAsk("HELLO," + RobotSerial$ + "," + Str$(Robot) + "," + Str$(rl_flag) + "," + op$ + "," + Str$(rl_tool) + "," + RlTool$(rl_tool)) Then
+      If rl_word$ = "WELCOME" Then
+        rl_flag = 0
+        RlHello = True
+      EndIf
+    EndIf
+  EndIf
+Fend
+
+Function RlBye
+  If rl_open = 1 Then
+    RlAsk("BYE")
+    CloseNet #RL_PORT
+    rl_open = 0
+  EndIf
+Fend
+
+' Sends where the robot stands, and what was seen there.
+Function RlSend(seen$ As String) As Boolean
+  String text$
+  RlSend = False
+  If Robot <> rl_robot Then
+    Exit Function
+  EndIf
+  text$ = "POSE,"
+  If rl_proof = 1 Then
+    text$ = "PROOF,"
+  EndIf
+  text$ = text$ + Str$(Tool) + "," + RlNumber$(CX(Here)) + "," + RlNumber$(CY(Here)) + "," + RlNumber$(CZ(Here)) + "," + RlNumber$(CU(Here))
+  If RlSixAxes() Then
+    text$ = text$ + "," + RlNumber$(CV(Here)) + "," + RlNumber$(CW(Here))
+  Else
+    text$ = text$ + ",0,0"
+  EndIf
+  If RlAsk(text$ + "," + seen$) Then
+    If rl_word$ = "OK" Then
+      RlSend = True
+    EndIf
+  EndIf
 Fend
 
 Function RlConnect(host$ As String, port As Integer) As Boolean

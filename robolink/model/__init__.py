@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from robolink.model._tools import Expect as Expect
     from robolink.model._tools import Expected as Expected
     from robolink.model._tools import Jump as Jump
+    from robolink.model._tools import KinematicToolTable as KinematicToolTable
     from robolink.model._tools import ToolOffset as ToolOffset
     from robolink.model._tools import ToolReceipt as ToolReceipt
     from robolink.model._tools import ToolTable as ToolTable
@@ -132,8 +133,8 @@ else:
             ),
             "motion.tip_sensor": "Spot SpotUnit TIP TipSensor",
             "_tools": (
-                "ANY Expect Expected Jump ToolOffset ToolReceipt ToolTable describe_offset "
-                "plain_offset read_offset tool_changed"
+                "ANY Expect Expected Jump KinematicToolTable ToolOffset ToolReceipt ToolTable "
+                "describe_offset plain_offset read_offset tool_changed"
             ),
             "motion.until_input": "InputEdge MotionUntilInput",
         },

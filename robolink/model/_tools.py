@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import Final, Literal, Protocol
+from typing import Final, Literal, Protocol, runtime_checkable
 
 from robolink.errors import ConfigError, ToolChangedError
 from robolink.messages import tr
@@ -269,3 +269,18 @@ def _quaternion(offset: ToolOffset) -> tuple[float, float, float, float]:
         cu * sv * cw + su * cv * sw,
         su * cv * cw - cu * sv * sw,
     )
+
+
+@runtime_checkable
+class KinematicToolTable(Protocol):
+    """A tool table of a machine whose kinematics does not carry every tool."""
+
+    def require_measurable(self, components: Sequence[str]) -> None:
+        """Refuse to measure what the machine could not be told afterwards; only reads.
+
+        Args:
+            components: ``x_mm``, ``y_mm``, ``z_mm`` and other parts of a tool.
+
+        Raises:
+            RejectedError: Names the kinematics, the impossible components, and why.
+        """

@@ -24,6 +24,7 @@ from robolink.nozzle_change._plan import (
     require_clearance,
     require_contacts,
     require_inputs,
+    require_measurable,
 )
 from robolink.nozzle_change._proposal import ChangeReport, Proposal, ToolReport
 from robolink.nozzle_change._records import decision_entry, refusal_entry, verification_entry
@@ -108,6 +109,7 @@ class NozzleChange:
             # What the write would be refused for is said before a person has measured anything.
             for one in self._plan.tools:
                 self._controller.tools.require_writable(one.tool)
+            require_measurable(self._controller, self._plan)
         require_contacts(self._controller, self._plan)
         plan, listener, context = self._plan, self._listener, self._context()
         measuring = Measuring(context, listener)

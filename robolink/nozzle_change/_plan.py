@@ -6,8 +6,8 @@ from dataclasses import asdict, dataclass, field, replace
 from robolink.calibration import CalibrationResult
 from robolink.errors import ConfigError, RejectedError
 from robolink.messages import tr
-from robolink.methods import LengthRule, TwoPoseSource
-from robolink.model import Controller, Pose, ToolOffset, WorkBox, plain_offset
+from robolink.methods import LengthRule, TwoPoseSource, find_method
+from robolink.model import Controller, KinematicToolTable, Pose, ToolOffset, WorkBox, plain_offset
 from robolink.nozzle_change._acceptance import AcceptanceCriteria
 from robolink.nozzle_change._pin_record import require_pin_in_base, touch_details
 from robolink.nozzle_change._proposal import Proposal
@@ -207,6 +207,20 @@ def require_inputs(controller: Controller, plan: ChangePlan) -> None:
     for one in plan.tools:
         if isinstance(one.source, TouchesPin) and one.source.touch.contact is not None:
             inputs_of(controller)
+
+
+def require_measurable(controller: Controller, plan: ChangePlan) -> None:
+    """Refuse a plan that measures what the machine's kinematics could not be told; only reads.
+
+    Raises:
+        RejectedError: Names the components, and why.
+    """
+    tools = controller.tools
+    if not isinstance(tools, KinematicToolTable):
+        return
+    for one in plan.tools:
+        if one.method:
+            tools.require_measurable(find_method(one.method).measures)
 
 
 def require_contact_input(controller: Controller, touch: TouchPlan) -> None:

@@ -16,7 +16,12 @@ from robolink.model import (
     Pose,
     ToolOffset,
 )
-from robolink.nozzle_change._plan import ChangePlan, require_clearance, require_inputs
+from robolink.nozzle_change._plan import (
+    ChangePlan,
+    require_clearance,
+    require_inputs,
+    require_measurable,
+)
 from robolink.procedures import MovingSource, approach_path
 from robolink.runner import (
     ArmAhead,
@@ -79,9 +84,11 @@ def preview(controller: Controller, plan: ChangePlan) -> tuple[PlannedStep, ...]
     Raises:
         ConfigError: A clearance is below the largest change that is believed, or an input is to
             show contact where there are none.
+        RejectedError: The machine's kinematics could not be told what would be measured.
     """
     require_clearance(plan)
     require_inputs(controller, plan)
+    require_measurable(controller, plan)
     if not plan.moves:
         return ()
     return tuple(_foresee(controller, plan, flange_now(controller)))

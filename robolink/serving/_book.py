@@ -4,10 +4,11 @@ Source: docs/reference/rules.md 6, with the program in the place of the driver. 
 one of any tool change, so ``robolink recover`` settles it where the controller can be read.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
+from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import (
     EntryKind,
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
 CALLED_BACK: Final = "called_back"
 _PROVED: Final = "proved"
+_UNSET: Final = frozenset({"-", "0"})
 
 
 class ProgramChange:
@@ -112,6 +114,30 @@ class ProgramChange:
                 **details,
             },
         )
+
+
+def record_name(serial: str, robot: int, controllers: Collection[str]) -> str:
+    """Return the name under which a robot is on record; empty where it has no number of its own.
+
+    Args:
+        serial: What RobotSerial$ gives.
+        robot: Which robot of its controller it is, from 1.
+        controllers: Names that a person gave. Of several robots each has its own, which ends in its
+            serial number (docs/decisions/0025-each-robot-of-a-controller-has-its-record.md).
+
+    Raises:
+        CalibrationError: ``unknown_robot``: one name was given, for another robot.
+    """
+    for name in controllers:
+        if serial not in _UNSET and name.endswith((f":{serial}", f"/{serial}")):
+            return name
+    if len(controllers) == 1 and robot == 1:
+        return next(iter(controllers))
+    if controllers:
+        raise CalibrationError(
+            "unknown_robot", tr("Robot {serial} was not named when this began.", serial=serial)
+        )
+    return "" if serial in _UNSET else f"epson:{serial}"
 
 
 def begin_change(

@@ -4,8 +4,8 @@ Each question is answered by one line. What cannot be understood ends the conver
 answer, and the program, left without one, puts the old value back.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import astuple, dataclass, field
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from robolink.errors import (
@@ -34,19 +34,16 @@ from robolink.protocols.spel_callback import (
     read_tool,
     same_thousandths,
 )
-from robolink.serving._book import ProgramChange, begin_change, open_changes
-from robolink.serving._judging import (
-    CallbackLimits,
-    Touches,
-    measured,
-    method_named,
-    proved,
-)
+from robolink.serving._book import ProgramChange, begin_change, open_changes, record_name
+from robolink.serving._judging import CallbackLimits, require_believed
+from robolink.serving._measures import measure_named
+from robolink.stations import Station, StationKind, find_station
 
 if TYPE_CHECKING:
     from robolink.calibration import CalibrationResult
+    from robolink.config import Cell
     from robolink.journal import Journal, JournalOutcomeLog
-    from robolink.procedures import PoseMethod
+    from robolink.serving._measures import ProgramMeasure
 
 Answer = tuple[CallbackWord, tuple[str, ...]]
 
@@ -54,8 +51,6 @@ _TOOLS: Final = range(1, 16)
 _LENGTHS: Final = {
     CallbackWord.HELLO: 12,
     CallbackWord.BEGIN: 9,
-    CallbackWord.POSE: 9,
-    CallbackWord.PROOF: 9,
     CallbackWord.SOLVE: 0,
     CallbackWord.WROTE: 8,
     CallbackWord.JUDGE: 1,
@@ -63,9 +58,10 @@ _LENGTHS: Final = {
     CallbackWord.RESTORED: 8,
     CallbackWord.BYE: 0,
 }
-"""Questions, and how many fields each has."""
+"""Questions, and how many fields each has; of a pose the method decides how many."""
 
-_UNSET: Final = frozenset({"-", "0"})
+_POSE_FIELDS: Final = 7
+"""The tool in force, and six lengths and angles; what was seen there follows."""
 
 
 @dataclass(slots=True)
@@ -74,9 +70,7 @@ class _Run:
 
     tool: int
     before: ToolOffset
-    method: "PoseMethod"
-    touches: Touches = field(default_factory=Touches)
-    proofs: Touches = field(default_factory=Touches)
+    measure: "ProgramMeasure"
     result: "CalibrationResult | None" = None
     change: ProgramChange | None = None
     written: bool = False
@@ -90,8 +84,9 @@ class CallbackConversation:
         limits: What its measurements are held to.
         peer: From where it calls, as a person may read it.
         signature: Who watches over it, and with what software.
-        controller: The name under which its controller is on record; without one, that of the
-            robot's serial number.
+        controllers: Names under which its robots are on record, see ``record_name``; without one,
+            that of the robot's serial number.
+        cell: The cell, whose stations a program may measure at; those on record count without.
 
     Attributes:
         over: Whether the program has said that it is done.
@@ -104,14 +99,15 @@ class CallbackConversation:
         *,
         peer: str,
         signature: Signature | None = None,
-        controller: str = "",
+        controllers: Collection[str] = (),
+        cell: "Cell | None" = None,
     ) -> None:
         self.over = False
         self._journal = journal
         self._limits = limits
         self._peer = peer
         self._signature = signature or Signature()
-        self._controller = controller
+        self._controllers, self._cell = tuple(controllers), cell
         self._log: JournalOutcomeLog | None = None
         self._number = 0
         self._flag = 0
@@ -137,7 +133,7 @@ class CallbackConversation:
             RemoteProtocolError: It makes no sense here; nothing is to be answered.
         """
         deed = self._deeds.get(line.word)
-        if deed is None or len(line.fields) != _LENGTHS[line.word]:
+        if deed is None or len(line.fields) != _LENGTHS.get(line.word, len(line.fields)):
             raise _senseless(line)
         if line.number != self._number + 1 or (self._log is None) != (line.word == "HELLO"):
             raise _senseless(line)
@@ -161,13 +157,15 @@ class CallbackConversation:
     # What the program says of itself.
 
     def _hello(self, fields: Sequence[str]) -> Answer:
-        serial, _robot, flag, operation, tool, *value = fields
+        serial, robot, flag, operation, tool, *value = fields
         if flag not in ("0", "1", "2", "3"):
             raise RemoteProtocolError(tr("{field!r} is no state of a program.", field=flag))
         place = f"spel@{self._peer}"
-        name = self._controller or (place if serial in _UNSET else f"epson:{serial}")
+        name = record_name(serial, _number(robot), self._controllers) or place
         log = self._journal.log(name, signature=self._signature)
-        log.ask(lambda: Identity(name, f"spel://{self._peer}", place))
+        # Robots of one controller call from one address.
+        address = f"spel://{self._peer}" if robot == "1" else f"spel://{self._peer}?robot={robot}"
+        log.ask(lambda: Identity(name, address, place))
         self._log, self._flag = log, int(flag)
         if flag == "1":
             raise CalibrationError("not_restored", tr("The program has not put its tool back."))
@@ -205,8 +203,16 @@ class CallbackConversation:
         if before is None:
             raise CalibrationError("tool_undefined", tr("Tool {tool} is not defined.", tool=tool))
         self._require_settled(tool, before)
-        self._run = _Run(tool, before, method_named(fields[1], self._limits))
+        try:
+            measure = measure_named(fields[1], self._limits, self._station)
+        except ConfigError as error:
+            raise CalibrationError("station_unknown", error.what) from error
+        self._run = _Run(tool, before, measure)
         return CallbackWord.GO, ()
+
+    def _station(self, name: str, kind: StationKind) -> Station:
+        recorded = self._require_log().recorded(kinds=(EntryKind.STATION,))
+        return find_station(self._cell, recorded, name, kind=kind)
 
     def _require_settled(self, tool: int, value: ToolOffset | None) -> None:
         """Close what the program never wrote; refuse while anything else is open.
@@ -232,35 +238,37 @@ class CallbackConversation:
         run = self._require_run()
         if run.change is not None:
             raise RemoteProtocolError(tr("The touches of the measurement were over."))
-        self._add(run.touches, fields, {run.tool: run.before})
-        return CallbackWord.OK, (str(len(run.touches.poses)),)
+        return self._add(run, fields, {run.tool: run.before}, proof=False)
 
     def _pose_of_proof(self, fields: Sequence[str]) -> Answer:
         run = self._require_run()
         if not run.written or run.change is None or run.change.requested is None:
             raise RemoteProtocolError(tr("Nothing was written that could be proved."))
-        self._add(run.proofs, fields, {run.tool: run.change.requested})
-        return CallbackWord.OK, (str(len(run.proofs.poses)),)
+        return self._add(run, fields, {run.tool: run.change.requested}, proof=True)
 
-    def _add(self, touches: Touches, fields: Sequence[str], known: dict[int, ToolOffset]) -> None:
+    def _add(
+        self, run: _Run, fields: Sequence[str], known: dict[int, ToolOffset], *, proof: bool
+    ) -> Answer:
         from robolink.calibration import flange_poses
 
-        tool, *values, seen_off, seen_on = fields
-        x, y, z, u, v, w = read_components(values)
-        taken_in = _number(tool)
+        pose_fields, seen = fields[:_POSE_FIELDS], fields[_POSE_FIELDS:]
+        if len(seen) != run.measure.length:
+            raise RemoteProtocolError(tr("A pose has another number of fields."))
+        taken_in, (x, y, z, u, v, w) = _number(pose_fields[0]), read_components(pose_fields[1:])
         if taken_in and taken_in not in known:
             raise CalibrationError(
                 "tool_pose", tr("A pose was taken in tool {tool}.", tool=taken_in)
             )
         pose = Pose(x_mm=x, y_mm=y, z_mm=z, u_deg=u, v_deg=v, w_deg=w, tool=taken_in)
         (flange,) = flange_poses([pose], tools=known)
-        touches.add(flange, seen_off=seen_off == "1", seen_on=seen_on == "1")
+        return CallbackWord.OK, (str(run.measure.add(flange, seen, proof=proof)),)
 
     def _solve(self, _fields: Sequence[str]) -> Answer:
         run = self._require_run()
         if run.change is not None:
             raise RemoteProtocolError(tr("A value was given already."))
-        result = measured(run.method, run.touches, run.before, self._limits)
+        result = run.measure.solve(run.before)
+        require_believed(result, run.before, self._limits)
         rounded = ToolOffset(*(round(value, 3) for value in result.offset.components()))
         run.result = result
         run.change = begin_change(self._require_log(), run.tool, run.before, rounded)
@@ -269,8 +277,8 @@ class CallbackConversation:
             result.method,
             known_within_mm=result.known_within_mm,
             warnings=list(result.warnings),
-            flange=[list(astuple(pose)[:6]) for pose in run.touches.poses],
             peer=self._peer,
+            **run.measure.on_record(),
         )
         return CallbackWord.VALUE, (run.change.operation, *offset_fields(rounded))
 
@@ -289,13 +297,13 @@ class CallbackConversation:
         run, change = self._of_change(fields[0])
         if run.result is None or change.requested is None or not run.written:
             raise RemoteProtocolError(tr("Nothing was written that could be proved."))
-        proof = proved(run.proofs, run.result, change.requested, self._limits)
+        proof = run.measure.prove(run.result, change.requested)
         if not proof.passed:
             raise CalibrationError(
                 "drift", tr("The tip drifts by {drift:.3f} mm.", drift=proof.max_drift_mm)
             )
         change.allow_keeping(
-            tr("proved by the program's own touches"),
+            tr("proved by what the program saw after it wrote"),
             max_drift_mm=proof.max_drift_mm,
             tolerance_mm=self._limits.tolerance_mm,
             warnings=list(proof.warnings),
@@ -321,7 +329,9 @@ class CallbackConversation:
     def _refused(self, error: RobolinkError) -> Answer:
         """Put a refusal on record; a program that has written puts the old value back."""
         code = error.code if isinstance(error, CalibrationError) else _code(error)
-        run, log = self._run, self._require_log()
+        run, log = self._run, self._log
+        if log is None:
+            return CallbackWord.REFUSE, (code,)
         entry = NewEntry(
             EntryKind.REFUSED,
             tool=None if run is None else run.tool,

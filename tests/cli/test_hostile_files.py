@@ -55,7 +55,10 @@ def refused(words, capsys):
     return document["error"]["what"]
 
 
-@pytest.mark.parametrize("content", CONTENTS)
+@pytest.mark.parametrize(
+    "content",
+    [pytest.param(name, marks=pytest.mark.soak if name == "too long" else ()) for name in CONTENTS],
+)
 def test_whatever_a_file_holds_it_is_refused_by_name(content, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     file = tmp_path / "hostile"

@@ -1,6 +1,8 @@
 """spel check, spel run, and a program in a served controller, as a person types them."""
 
 import json
+import os
+import tty
 from types import SimpleNamespace
 
 import pytest
@@ -117,3 +119,19 @@ def test_a_vision_project_goes_with_a_program(ended, program):
     end = ended("sim", "epson", "--tcp", "127.0.0.1:0", "--vision", program(VISION, "v.toml"))
     assert end.code == 2
     assert "--vision goes with --program" in end.err
+
+
+def test_run_reaches_the_serial_line_that_it_is_told(ended, program):
+    path = program('Function main\n  OpenCom #1\n  Print #1, "to the line"\nFend\n')
+    far, near = os.openpty()
+    try:
+        tty.setraw(near)
+        end = ended("spel", "run", path, "--com", f"1={os.ttyname(near)}")
+        assert (end.code, os.read(far, 100)) == (0, b"to the line\r\n")
+    finally:
+        os.close(far)
+        os.close(near)
+    assert ended("spel", "run", path).code == 5
+    end = ended("spel", "run", path, "--com", "9=/dev/pts/3")
+    assert end.code == 2
+    assert "1 to 4 or 1001 to 1008" in end.err

@@ -119,6 +119,40 @@ def test_angles_and_then_one_touch_recover_two_needles(at):
         assert abs(error) <= done.document["fit"]["half_width95"][axis], axis
 
 
+@each("C8-C901S", "C12-C1401S", "CX4-A601SR", chosen={"CX4-A601SR"})
+def test_two_poses_half_a_turn_apart_give_the_tip_by_the_makers_formula(at):
+    """U at 0 and 180 with Tool 0, as EPSON's page has it: half the difference of X and of Y.
+
+    The flange of six axes looks down on the pin, so its Y points against the base's.
+    """
+    machine, simulator = at.cell.simulator.machine, at.cell.simulator
+    *bent, wrist = machine.arm.joints
+    turned = wrist + (-90.0 if machine.model.hangs else 90.0)
+    machine.arm.place(Joints(*bent, turned), simulator.now_ns)
+    if abs(machine.arm.flange().u_deg) > 1:
+        machine.arm.place(Joints(*bent, 2 * wrist - turned), simulator.now_ns)
+    x_mm, y_mm, z_mm = at.world.tip_mm()
+    at.world.pin_mm = (x_mm + 3.0, y_mm - 3.0, z_mm - 4.0)
+    document = recovered(at.calibrate("two-pose", "--sigma", "0.02"), at.truth)
+    first, second = document["poses"]
+    assert (round(first["u_deg"]) % 360, round(second["u_deg"]) % 360) == (0, 180)
+    half = {axis: (second[f"{axis}_mm"] - first[f"{axis}_mm"]) / 2 for axis in "xy"}
+    found = document["proposed"]
+    assert (found["x_mm"], found["y_mm"]) == pytest.approx((half["x"], -half["y"]), abs=2e-3)
+    assert found["z_mm"] == document["before"]["z_mm"]
+
+
+@each("C8-C901S", "CX4-A601SR", chosen={"C8-C901S"})
+def test_two_poses_of_a_flange_that_leans_are_refused_before_it_turns(at):
+    simulator = at.cell.simulator
+    simulator.machine.arm.place(Joints(0.0, -20.0, -30.0, 0.0, -15.0, 0.0), simulator.now_ns)
+    x_mm, y_mm, z_mm = at.world.tip_mm()
+    at.world.pin_mm = (x_mm + 3.0, y_mm - 3.0, z_mm - 4.0)
+    done = at.calibrate("two-pose")
+    assert (done.code, done.document["error"]["code"]) == (7, "tilted_pose")
+    assert "turn in the air" not in done.err
+
+
 @each(*ROBOTS, *PLANAR, chosen={"C8-C901S"})
 def test_beams_recover_the_tip(at):
     mount(at)
@@ -150,15 +184,19 @@ def test_a_camera_is_found_and_then_recovers_the_tip_and_a_board(at):
 @each("C8-C901S", "CX4-A601SR", chosen={"CX4-A601SR"})
 def test_what_a_write_does_at_taught_points_is_said_in_space(at):
     machine = at.cell.simulator.machine
-    machine.points.store(3, Point.at(machine.tip()))
-    before = machine.tip()
+    upright = machine.tip()
+    taught = {3: upright, 4: replace(upright, u_deg=35.0, v_deg=20.0, w_deg=160.0)}
+    for number, pose in taught.items():
+        machine.points.store(number, Point.at(pose))
     document = recovered(at.calibrate("pivot", "--count", "4", "--impact", "1-5"), at.truth, "xyz")
-    (entry,) = document["impact"]["points"]
-    # The tip that is on the arm now stands that much beside the point with the old offset.
     change = [document["proposed"][f"{a}_mm"] - document["before"][f"{a}_mm"] for a in "xyz"]
-    moved = rotation_of(before) @ change
-    shown = [entry["dx_mm"], entry["dy_mm"], entry["dz_mm"]]
-    assert shown == pytest.approx((-moved).tolist(), abs=2e-3)
+    entries = document["impact"]["points"]
+    assert len(entries) == len(taught)
+    for entry, pose in zip(entries, taught.values(), strict=True):
+        # The tip that is on the arm now stands that much beside the point with the old offset.
+        moved = rotation_of(pose) @ change
+        shown = [entry["dx_mm"], entry["dy_mm"], entry["dz_mm"]]
+        assert shown == pytest.approx((-moved).tolist(), abs=2e-3)
 
 
 @each("C8-C901S", "CX7-A701SR", chosen={"CX7-A701SR"})

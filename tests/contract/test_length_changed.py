@@ -13,6 +13,7 @@ pytestmark = pytest.mark.simulator_only
 
 AT_PIN = ("--station", "PIN-07")
 THREE = ("--count", "3", *AT_PIN)
+TWO = ("two-pose", *AT_PIN)
 
 
 @pytest.fixture
@@ -96,13 +97,13 @@ def test_a_person_is_asked_once_with_both_values(arm, monkeypatch):
 
 
 def test_the_height_of_a_pin_is_never_learnt_from_a_z_that_was_kept(arm):
-    assert arm.calibrate("n-angle", *THREE).code == 0
+    assert arm.calibrate(*TWO).code == 0
     assert station_z(arm) is None
     with arm.cell.connected() as controller:
         controller.tools.write(2, ToolOffset(12.0, -3.5, -19.0), expected=None)
     arm.world.tips[2] = ToolOffset(12.2, -3.4, -20.3)
     # Tool 2 has no touch of its own there, and nothing trustworthy says how high the pin is.
-    second = arm.calibrate("n-angle", *THREE, tool=2)
+    second = arm.calibrate(*TWO, tool=2)
     assert second.code == 0, second.err
     assert second.document["length"] is None
     assert any("how high the pin is" in note for note in second.document["notes"])
@@ -110,7 +111,7 @@ def test_the_height_of_a_pin_is_never_learnt_from_a_z_that_was_kept(arm):
 
 def test_a_pin_of_known_height_shows_that_another_tool_s_z_is_wrong(arm):
     learn = ("station", "learn", "PIN-07", "--tool", "1", "--assist", arm.cell.url, "--yes")
-    assert arm.calibrate("n-angle", *THREE).code == 0
+    assert arm.calibrate(*TWO).code == 0
     # Nobody ever showed Z of tool 1, so it shows no height either.
     assert "was never measured" in arm.run(*learn).err
     assert station_z(arm) is None
@@ -124,9 +125,9 @@ def test_a_pin_of_known_height_shows_that_another_tool_s_z_is_wrong(arm):
     with arm.cell.connected() as controller:
         controller.tools.write(2, wrong, expected=None)
     arm.world.tips[2] = arm.truth
-    refused = arm.calibrate("two-pose", *AT_PIN, tool=2)
+    refused = arm.calibrate(*TWO, tool=2)
     assert refused.document["error"]["code"] == "length_changed"
-    followed = arm.calibrate("two-pose", *AT_PIN, "--if-length-changed", "difference", tool=2)
+    followed = arm.calibrate(*TWO, "--if-length-changed", "difference", tool=2)
     assert followed.code == 0, followed.err
     followed_z = arm.held(2)
     assert followed_z is not None
@@ -142,11 +143,11 @@ def replace_z(offset, by_mm):
 
 def test_on_a_pin_that_moved_a_length_is_not_told_and_that_is_said(arm):
     nozzle = ("--nozzle", "N-1")
-    assert arm.calibrate("n-angle", *THREE, *nozzle).code == 0
+    assert arm.calibrate(*TWO, *nozzle).code == 0
     before = arm.stored
     arm.bump_pin(0.4, -0.3)
     arm.lengthen(0.5)
-    done = arm.calibrate("n-angle", *THREE, *nozzle)
+    done = arm.calibrate(*TWO, *nozzle)
     assert done.code == 0, done.err
     assert done.document["length"] is None
     assert any("not where it was" in note for note in done.document["notes"])
@@ -161,8 +162,7 @@ z = "kept"
 verify = false
 
 [source]
-kind = "n-angle"
-count = 3
+kind = "two-pose"
 {more}
 
 [station]

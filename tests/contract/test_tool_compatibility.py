@@ -184,3 +184,50 @@ def test_a_command_says_it_and_sends_nothing(machine, tmp_path, monkeypatch, cap
         assert main.run([*command, *more]) == 5
         assert "X 12.000 mm of its shift is impossible" in capsys.readouterr().err
     assert not written(simulator)
+
+
+@pytest.fixture
+def run(machine, tmp_path, monkeypatch, capsys):
+    """Run a command on a PLC whose flange turns with its arms; gives code and messages."""
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path))
+    simulator, plc = machine("Kin_Scara2_Z")
+    plc.close()
+
+    def run(*words):
+        code = main.run(["-c", "softmotion+sim://fits", *words])
+        shown = capsys.readouterr()
+        assert simulator.plc.group.movements_started == 0
+        assert not written(simulator)
+        return code, shown.out + shown.err
+
+    return run
+
+
+SCARA_PIN = str(EXAMPLES / "recipes" / "scara-pin.toml")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("recalibrate", SCARA_PIN, "--yes"),
+        ("recalibrate", SCARA_PIN, "--dry-run"),
+        ("calibrate", "two-pose", "--tool", "1", "--yes"),
+    ],
+)
+def test_what_a_recipe_would_measure_in_vain_is_said_before_anything_moves(run, words):
+    code, told = run(*words, "--assist", "softmotion+sim://fits")
+    assert code == 5
+    assert "Kin_Scara2_Z could not be told what would be measured: X, Y." in told
+
+
+@pytest.mark.parametrize(
+    ("kinematics", "components"),
+    [
+        ("Kin_Scara2_Z", ("z_mm", "u_deg")),
+        ("Kin_Gantry3+Kin_CAxis", ("x_mm", "y_mm", "z_mm")),
+        ("Kin_Pos_RRR", ("u_deg",)),
+    ],
+)
+def test_what_can_be_told_may_be_measured(machine, kinematics, components):
+    _, plc = machine(kinematics)
+    plc.tools.require_measurable(components)

@@ -30,18 +30,17 @@ NS = 1_000_000_000
 LIMITS = CallbackLimits(tolerance_mm=0.1, max_change_mm=2.0, sigma_mm=0.01)
 MEASURED = (-60, -20, 20, 60, 90)
 PROVED = (75, -75)
-MAIN = f"""
+_MAIN = """
 Global Integer ended
 Function main
-  Integer i
   ended = 0
   RobolinkRestore
   Tool 1
   If RobolinkOpen("127.0.0.1", 5001) Then
-    If RobolinkBegin(1, "n-angle") Then
-      If TouchAll(11, {10 + len(MEASURED)}) Then
+    If RobolinkBegin(1, "{method}") Then
+      If {measure} Then
         If RobolinkWrite() Then
-          If TouchAll(21, {20 + len(PROVED)}) Then
+          If {prove} Then
             If RobolinkFinish() Then
               Print "kept"
             EndIf
@@ -57,6 +56,8 @@ Fend
 Function main2
   RobolinkRestore
 Fend
+"""
+_TOUCHING = f"""
 Function TouchAll(first As Integer, last As Integer) As Boolean
   Integer i
   TouchAll = True
@@ -75,6 +76,18 @@ Fend
 """
 
 
+def main_of(method, measure, prove, functions):
+    """Return a program that calibrates by a method, with functions that measure and prove."""
+    return _MAIN.format(method=method, measure=measure, prove=prove) + functions
+
+
+def touching(method="n-angle", measured=MEASURED, proved=PROVED):
+    """Return a program that touches a pin in so many orientations."""
+    ends = f"TouchAll(11, {10 + len(measured)})", f"TouchAll(21, {20 + len(proved)})"
+    return main_of(method, *ends, _TOUCHING)
+
+
+MAIN = touching()
 NOMINAL = ToolOffset(12, -3.5, -20)
 
 
@@ -188,22 +201,32 @@ def bent(line):
 class CallbackCell:
     """Controller, program, relay, server and journal."""
 
-    def __init__(self, folder, *, seed=1, journal=None, limits=LIMITS, main=MAIN):
+    main = MAIN
+    robot = "T6-602S"
+
+    def __init__(self, folder, *, seed=1, journal=None, limits=LIMITS, main="", controllers=()):
+        self.controllers = controllers
         self.rng = random.Random(f"callback {seed}")
         self.journal = journal or memory_journal(new_operation())
         self.limits = limits
         self.server = self._serve()
         self.relay = Relay(self.server.address)
         world = WorldParameters(contact_input=CONTACT)
-        self.simulator = EpsonSimulator(serial=SERIAL, seed=seed, world=world)
+        self.simulator = EpsonSimulator(self.robot, serial=SERIAL, seed=seed, world=world)
         path = Path(folder) / "main.prg"
-        path.write_text(main, encoding="ascii")
+        path.write_text(main or self.main, encoding="ascii")
         ports = {201: self.relay.address}
         self.runner = self.simulator.load([COMPANION, path], ports=ports)
+        self.furnish()
+
+    def furnish(self):
+        """Put into the cell what the program measures with besides the pin."""
 
     def _serve(self):
         def conversation(peer):
-            return CallbackConversation(self.journal, self.limits, peer=peer)
+            return CallbackConversation(
+                self.journal, self.limits, peer=peer, controllers=self.controllers
+            )
 
         server = CallbackServer("127.0.0.1", 0, conversation)
         server.start()
@@ -246,6 +269,10 @@ class CallbackCell:
     def change_needle(self):
         """Put another needle on: its tip is some tenths of a mm from the nominal one."""
         self.simulator.world.tips[1] = exchanged(NOMINAL, self.rng)
+        self.bring()
+
+    def bring(self):
+        """Put the points of the program where the needle that is mounted needs them."""
         self.teach(11, MEASURED)
         self.teach(21, PROVED)
 

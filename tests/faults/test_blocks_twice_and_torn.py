@@ -101,7 +101,9 @@ def test_f27_a_block_that_reaches_the_plc_twice_is_carried_out_once(cell):
 
 
 @pytest.mark.fault("F28", "F32")
-@pytest.mark.parametrize("at", [1, 8, 32, 61, 63])
+@pytest.mark.parametrize(
+    "at", [1, *(pytest.param(at, marks=pytest.mark.soak) for at in (8, 32, 61)), 63]
+)
 def test_f28_f32_a_block_whose_rest_comes_late_is_carried_out_whole_and_once(at):
     with served("modbus-tcp", SoftMotionSimulator(seed=7)) as cell:
         with cell.connect() as controller:

@@ -11,6 +11,17 @@ import pytest
 from robolink import checkpoints
 from robolink.checkpoints import Checkpoint
 from tests.faults._callback_cell import IDENTITY, CallbackCell
+from tests.faults._callback_sensors import BeamCell, CameraCell
+
+ANY_OF_THEM = pytest.mark.parametrize(
+    "cell",
+    [
+        pytest.param(CallbackCell, id="pin"),
+        pytest.param(BeamCell, id="beams", marks=pytest.mark.soak),
+        pytest.param(CameraCell, id="camera", marks=pytest.mark.soak),
+    ],
+    indirect=True,
+)
 
 
 class PcGone(BaseException):
@@ -18,8 +29,8 @@ class PcGone(BaseException):
 
 
 @pytest.fixture
-def cell(tmp_path):
-    made = CallbackCell(tmp_path)
+def cell(tmp_path, request):
+    made = getattr(request, "param", CallbackCell)(tmp_path)
     made.change_needle()
     yield made
     made.close()
@@ -51,6 +62,7 @@ def cut_at_each(cell, chosen, *, least):
     return ends
 
 
+@ANY_OF_THEM
 def test_the_power_goes_before_a_statement_that_matters(cell):
     """Both ends must come up, or nothing was tried."""
     critical = ("rl_flag =", "TLSet n", "JUDGE", "KEPT,", "WROTE")
@@ -59,6 +71,7 @@ def test_the_power_goes_before_a_statement_that_matters(cell):
 
 
 @pytest.mark.soak
+@ANY_OF_THEM
 def test_the_power_goes_before_any_statement_of_the_companion(cell):
     assert cut_at_each(cell, lambda text: bool(text.strip()), least=80) == {True, False}
 
@@ -95,6 +108,7 @@ def in_server():
     return threading.current_thread() is not threading.main_thread()
 
 
+@ANY_OF_THEM
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
 def test_the_pc_goes_before_and_after_everything_that_it_stores(cell):
     total = commits_of(cell)

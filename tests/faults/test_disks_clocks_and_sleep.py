@@ -12,7 +12,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 import pytest
@@ -26,10 +26,10 @@ from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
 from robolink import ambient
-from robolink.errors import LeaseHeldError, TransportTimeoutError
+from robolink.errors import LeaseHeldError, LeaseLostError, TransportTimeoutError
 from robolink.journal import open_journal
 from robolink.journal.store import engines
-from robolink.model import MarkerKind
+from robolink.model import Marker, MarkerKind
 from tests.faults._client_process import ClientProcess
 from tests.faults._nozzle_cell import OLD_TIP, NozzleCell, served_cell
 from tests.faults._requests import changes
@@ -242,3 +242,52 @@ def test_f65_a_plc_halts_when_the_computer_sleeps_and_nothing_goes_on_when_it_wa
         assert group.movements_started == 1
         assert at_rest(simulator)
         assert began_mm - group.tcp().shift_mm[0] < 3
+
+
+ASLEEP_S = 3600
+SOMEBODY_ELSE = """
+import sys
+from robolink.errors import LeaseHeldError
+from robolink.journal import open_journal
+from robolink.model import Marker, MarkerKind
+log = open_journal(sys.argv[1]).log(sys.argv[2])
+try:
+    log.begin(Marker("theirs", MarkerKind.SET, "TLSet 3", "now", {"tool": 3}))
+    log.clear("theirs")
+except LeaseHeldError:
+    print("held")
+else:
+    print("taken")
+"""
+
+
+def said_after_sleep(location: Path, identity: str, asleep_s: int) -> str:
+    """Let another process ask for a lease on this computer, which slept meanwhile.
+
+    Only the clock that counts the time asleep is shifted, as a suspend does (time_namespaces(7)).
+    """
+    if shutil.which("unshare") is None:
+        pytest.skip("there is no unshare here, to shift the clock that counts the time asleep")
+    asleep = ["unshare", "--time", "--boottime", str(asleep_s)]
+    command = [sys.executable, "-c", SOMEBODY_ELSE, str(location), identity]
+    ended = subprocess.run(
+        [*asleep, *command], capture_output=True, text=True, timeout=50, check=False
+    )
+    if "unshare:" in ended.stderr:
+        pytest.skip(f"no time namespace can be made here: {ended.stderr.strip()}")
+    assert not ended.returncode, ended.stderr
+    return ended.stdout.strip()
+
+
+@pytest.mark.soak
+@pytest.mark.fault("F65")
+def test_f65_who_slept_has_lost_the_lease_and_begins_nothing_more(tmp_path):
+    """The lease is of a process that lives, and is lost by the time asleep alone."""
+    location, identity = tmp_path / "journal.db", "epson+tcp://192.168.0.1:5000"
+    with closing(open_journal(str(location))) as journal:
+        log = journal.log(identity)
+        log.begin(Marker("ours", MarkerKind.SET, "TLSet 2", "now", {"tool": 2}))
+        assert said_after_sleep(location, identity, 0) == "held"
+        assert said_after_sleep(location, identity, ASLEEP_S) == "taken"
+        with pytest.raises(LeaseLostError):
+            log.begin(Marker("more", MarkerKind.SET, "TLSet 2", "now", {"tool": 2}))

@@ -105,7 +105,7 @@ POSSIBLE = [action for action in FaultAction if LinkKind.EPSON_SERIAL in links_o
 LATE_ANSWERS = 2
 """An answer that was held back costs the session to which it comes, and never more."""
 
-USUAL = (FaultAction.DROP_REPLY, FaultAction.GARBLE_REPLY, FaultAction.DUPLICATE_REQUEST)
+USUAL = (FaultAction.DROP_REPLY, FaultAction.GARBLE_REPLY)
 
 
 @pytest.mark.parametrize(

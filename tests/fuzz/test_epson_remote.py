@@ -81,7 +81,7 @@ def events_of(codec, data):
     return found
 
 
-@fuzzed(60, 20_000, data=st.sampled_from(REQUESTS).flatmap(edited_bytes), cut=st.integers(0, 60))
+@fuzzed(25, 20_000, data=st.sampled_from(REQUESTS).flatmap(edited_bytes), cut=st.integers(0, 60))
 def test_a_device_reads_a_request_or_refuses_it(data, cut):
     whole = events_of(EpsonTextCodec(Role.DEVICE), data)
     codec = EpsonTextCodec(Role.DEVICE)
@@ -90,13 +90,13 @@ def test_a_device_reads_a_request_or_refuses_it(data, cut):
     assert whole is not None
 
 
-@fuzzed(60, 20_000, data=st.sampled_from(ANSWERS).flatmap(edited_bytes))
+@fuzzed(25, 20_000, data=st.sampled_from(ANSWERS).flatmap(edited_bytes))
 def test_a_host_reads_an_answer_or_refuses_it(data):
     events_of(EpsonTextCodec(Role.HOST), data)
 
 
 @fuzzed(
-    60,
+    25,
     20_000,
     data=st.sampled_from(PRINTED).map(str.encode).flatmap(edited_bytes),
     parse=st.sampled_from(PARSERS),
@@ -118,7 +118,7 @@ class Listener(Client):
 STATEMENTS = tuple(statement.encode() for statement, _ in rows())
 
 
-@fuzzed(45, 5000, data=st.sampled_from(STATEMENTS).flatmap(edited_bytes))
+@fuzzed(20, 5000, data=st.sampled_from(STATEMENTS).flatmap(edited_bytes))
 def test_a_controller_survives_every_statement(data):
     simulator = EpsonSimulator(seed=3)
     client = Listener(simulator)
@@ -136,7 +136,7 @@ def test_a_controller_survives_every_statement(data):
         assert client.ask("$GetStatus").startswith("#GetStatus,") or client.link.closed
 
 
-@fuzzed(40, 5000, data=st.sampled_from(REQUESTS).flatmap(edited_bytes))
+@fuzzed(20, 5000, data=st.sampled_from(REQUESTS).flatmap(edited_bytes))
 def test_a_controller_answers_or_hangs_up_whatever_it_is_asked(data):
     simulator = EpsonSimulator(seed=3)
     client = Listener(simulator)

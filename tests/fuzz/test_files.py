@@ -9,13 +9,16 @@ from hypothesis import strategies as st
 from robolink_cli.commands.measure.solve.solving import load as load_case
 from robolink_cli.commands.measure.solve.solving import solve_document
 from robolink_simulators.epson.options import PROFILE_SCHEMA, options_from_text, read_profile
+from robolink_simulators.epson.spel.programs.project_files import read_io_labels, read_points
+from robolink_simulators.faults import read_fault_file
 from robolink_simulators.hosting.replay import read_recording
 
 from robolink.backup import Backup, ToolState, backup_to_text
 from robolink.backup import load as load_backup
 from robolink.config import check_file
-from robolink.errors import ConfigError
+from robolink.errors import CalibrationError, ConfigError
 from robolink.model import ControllerFacts, ToolOffset
+from robolink.pose_tables import read_poses, read_pts
 from robolink.recipe import load_recipe
 from robolink.register_maps import draft_from_csv, load_map
 from tests.fuzz._mutating import edited_bytes, fuzzed
@@ -61,6 +64,40 @@ def profiled(path):
     return options_from_text(dict(read_profile(path)))
 
 
+PLAN = """
+schema = "robolink/faults/1"
+link = "epson+tcp"
+seed = 3
+
+[[fault]]
+action = "drop_reply"
+match = "TLSet 2, XY"
+on_exchange = 1
+"""
+POINTS = """ENVT0100,LM:,DS:,CS:,MA:,EI:
+sVersion="2.0.0"
+nNumberOfPoints=1
+Point1 {
+\tnNumber=7
+\tsLabel="pin"
+\tnUndefined=0
+\trX=88.952
+\trY=233.345
+\trZ=-20.062
+\trU=-101.024
+\trV=0
+\trW=0
+\tnLocal=0
+\tnHand=1
+}
+"""
+LABELS = 'LAB {\nInputBit1 {\n\tnBit=3\n\tsLabel="contact"\n}\n}\n'
+KUKA = "DECL E6POS XPIN={X 405.8,Y -62.9,Z 251.6,A 40.0,B 12.0,C -172.0,S 2,T 35}\n"
+TABLE = "x_mm,y_mm,z_mm,u_deg\n287.500,103.250,-100.0,0\n312.500,96.750,-100.0,180\n"
+GERMAN = "X [mm];Y [mm];Z [mm];U [deg]\n287,500;103,250;-100,0;0\n312,500;96,750;-100,0;180\n"
+POSES = {"schema": "robolink/poses/1", "poses": [{"x_mm": 1.5, "y_mm": 2.0, "u_deg": 90.0}]}
+
+
 READERS = {
     "recipe": (load_recipe, (EXAMPLES / "recipes/scara-pin.toml").read_bytes()),
     "two recipes": (load_recipe, (EXAMPLES / "recipes/nozzle-and-camera.toml").read_bytes()),
@@ -70,6 +107,14 @@ READERS = {
     "case": (solved, json.dumps(CASE).encode()),
     "register list": (draft_from_csv, CSV.encode()),
     "dialogue": (read_recording, DIALOGUE.encode()),
+    "fault plan": (read_fault_file, PLAN.encode()),
+    "points": (read_pts, POINTS.encode()),
+    "points of a project": (read_points, POINTS.encode()),
+    "labels of a project": (read_io_labels, LABELS.encode()),
+    "poses": (read_poses, TABLE.encode()),
+    "poses with commas": (read_poses, GERMAN.encode()),
+    "poses of another robot": (read_poses, KUKA.encode()),
+    "poses as JSON": (read_poses, json.dumps(POSES).encode()),
     "profile": (profiled, json.dumps(PROFILE).encode()),
 }
 
@@ -95,7 +140,7 @@ def test_the_seed_of_each_kind_is_right(kind):
 
 
 @fuzzed(
-    100,
+    60,
     20_000,
     tried=st.sampled_from(sorted(READERS)).flatmap(
         lambda kind: st.tuples(st.just(kind), edited_bytes(READERS[kind][1]))
@@ -106,5 +151,6 @@ def test_a_file_that_is_nearly_right_is_read_or_refused(tried):
     file = Folder.path / "tried"
     file.write_bytes(content)
     # Its words may stand in the error as they are: what is shown is escaped at the console's door.
-    with suppress(ConfigError):
+    # A pose that is not finite is refused as the solvers refuse it.
+    with suppress(ConfigError, CalibrationError):
         READERS[kind][0](file)

@@ -147,6 +147,7 @@ def test_a_wheel_with_another_hash_ends_the_installation(index):
 
 
 @linux
+@pytest.mark.soak
 @pytest.mark.parametrize("variables", [{}, {"LOCKED": "only"}], ids=["yes", "only"])
 def test_an_index_that_lacks_a_package_is_told_and_the_ranges_are_taken(index, variables):
     done = installed(index, f"robolink-absent==1.0 --hash=sha256:{'0' * 64}", **variables)
@@ -155,6 +156,7 @@ def test_an_index_that_lacks_a_package_is_told_and_the_ranges_are_taken(index, v
     assert ("by the ranges" in done.stderr) == (not variables)
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize("pythons", [f"{HERE}1", "2.7, 3.0"])
 def test_a_lock_for_other_pythons_is_told_and_the_ranges_are_taken(index, pythons):
     pin = f"robolink-tiny==1.0 --hash=sha256:{'0' * 64}"

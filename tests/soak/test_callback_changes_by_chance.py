@@ -4,16 +4,18 @@ Each share of them is a controller, a PC and a journal of its own that live thro
 """
 
 import random
+from dataclasses import replace
+from typing import Any
 
 import pytest
 
 from robolink.model import EntryKind
 from tests.faults._callback_cell import MEASURED, PROVED, Bend, CallbackCell
+from tests.faults._callback_sensors import BEAM_INPUTS, BeamCell, CameraCell
 
-SHARES, CHANGES = 20, 500
-QUESTIONS = 14
-STATEMENTS = 3_600
-"""About as many as a whole change has."""
+CHANGES = 250
+SHARES = {"pin": 24, "beams": 8, "camera": 8}
+CELLS = {"pin": CallbackCell, "beams": BeamCell, "camera": CameraCell}
 
 
 def no_fault(_cell, _rng):
@@ -25,13 +27,13 @@ def bent_exchange(cell, rng):
     names = tuple(Bend.__dataclass_fields__)
     first = len(cell.relay.questions)
     struck = {
-        first + rng.randrange(QUESTIONS): rng.choice(names) for _ in range(rng.choice((1, 2)))
+        first + rng.randrange(cell.exchanges): rng.choice(names) for _ in range(rng.choice((1, 2)))
     }
     cell.relay.bend = lambda at, _line: Bend(**{struck[at]: True}) if at in struck else None
 
 
 def pc_restarts(cell, rng):
-    at = len(cell.relay.questions) + rng.randrange(QUESTIONS)
+    at = len(cell.relay.questions) + rng.randrange(cell.exchanges)
 
     def bend(number, _line):
         if number != at:
@@ -48,40 +50,102 @@ def touch_beside(cell, rng):
     cell.teach(first + at, angles[at : at + 1], off_mm=rng.choice((-1, 1)) * rng.uniform(0.3, 2))
 
 
+def aside(rng):
+    """Return by how much something is bumped: so far that it counts."""
+    return rng.choice((-1, 1)) * rng.uniform(0.12, 0.2)
+
+
 def pin_bumped(cell, rng):
-    x, y, z = cell.simulator.world.pin_mm
-    cell.simulator.world.pin_mm = (x + rng.choice((-1, 1)) * rng.uniform(0.12, 0.2), y, z)
+    world, (x, y, z) = cell.simulator.world, cell.simulator.world.pin_mm
+    world.pin_mm = (x + aside(rng), y, z)
     cell.teach(21, PROVED)
-    cell.pin_back = (x, y, z)
+    cell.undo = lambda: setattr(world, "pin_mm", (x, y, z))
 
 
-FAULTS = (no_fault, bent_exchange, bent_exchange, pc_restarts, touch_beside, pin_bumped, None)
+def beam_dark(cell, rng):
+    """One of the beams never switches."""
+    cell.simulator.world.disconnect(rng.choice(BEAM_INPUTS))
+    cell.undo = lambda: cell.stand_at(cell.recorded_mm)
+
+
+def beams_moved(cell, rng):
+    x, y, z = cell.recorded_mm
+    cell.stand_at((x + aside(rng), y, z) if rng.random() < 0.5 else (x, y + aside(rng), z))
+    cell.undo = lambda: cell.stand_at(cell.recorded_mm)
+
+
+def furnished(cell, **parameters):
+    world = cell.simulator.world
+    before = world.parameters
+    world.set_up(replace(before, **parameters))
+    cell.undo = lambda: world.set_up(before)
+
+
+def needle_bent(cell, rng):
+    furnished(cell, lean_deg=rng.uniform(3, 8), lean_toward_deg=rng.uniform(-180, 180))
+
+
+def tip_unseen(cell, _rng):
+    furnished(cell, camera_miss_share=0.15)
+
+
+def false_finds(cell, _rng):
+    furnished(cell, camera_outlier_share=0.15)
+
+
+def camera_bumped(cell, rng):
+    """Once, at some exchange, between two looks or before the proof."""
+    camera, at = cell.simulator.world.camera, len(cell.relay.questions)
+    x, y, z = camera.middle_mm
+    at += rng.randrange(cell.exchanges)
+
+    def bend(number, _line):
+        if number == at:
+            camera.middle_mm = (x + aside(rng), y, z)
+
+    cell.relay.bend = bend
+    cell.undo = lambda: setattr(camera, "middle_mm", (x, y, z))
+
+
+FAULTS = (no_fault, bent_exchange, bent_exchange, pc_restarts, None)
 """``None``: the power goes at some statement."""
 
+OWN_FAULTS = {
+    "pin": (touch_beside, pin_bumped),
+    "beams": (beam_dark, beams_moved, needle_bent),
+    "camera": (tip_unseen, false_finds, camera_bumped),
+}
 
-def one_change(cell, rng):
+
+def one_change(cell, rng, own_faults):
     """Let one change go as chance has it; tell whether a new value stays."""
-    cell.relay.bend, cell.pin_back = lambda _number, _line: None, cell.simulator.world.pin_mm
+    cell.relay.bend, cell.undo = lambda _number, _line: None, lambda: None
     cell.change_needle()
-    old, fault = cell.tool, rng.choice(FAULTS)
+    old, fault = cell.tool, rng.choice((*FAULTS, *own_faults))
     if fault is None:
-        cell.run_until(rng.randrange(STATEMENTS))
+        cell.run_until(rng.randrange(cell.length))
     else:
         fault(cell, rng)
         cell.run()
     cell.restore()
-    cell.simulator.world.pin_mm = cell.pin_back
+    cell.undo()
     return cell.require_whole(old)
 
 
 @pytest.mark.soak
-@pytest.mark.parametrize("share", range(SHARES))
-def test_no_unverified_value_stays(tmp_path, share):
-    rng = random.Random(f"changes {share}")
-    cell = CallbackCell(tmp_path, seed=share + 1)
+@pytest.mark.timeout(1200)
+@pytest.mark.parametrize(
+    ("kind", "share"), [(kind, share) for kind, count in SHARES.items() for share in range(count)]
+)
+def test_no_unverified_value_stays(tmp_path, record_property, kind, share):
+    rng = random.Random(f"changes {kind} {share}")
+    cell: Any = CELLS[kind](tmp_path, seed=share + 1)
     try:
-        kept = sum(one_change(cell, rng) for _ in range(CHANGES))
-        assert CHANGES / 10 < kept < CHANGES * 9 / 10  # both ends came up
+        cell.change_needle()
+        cell.length = len(cell.statements())
+        cell.exchanges = len(cell.relay.questions)
+        kept = sum(one_change(cell, rng, OWN_FAULTS[kind]) for _ in range(CHANGES))
+        assert CHANGES / 20 < kept < CHANGES * 19 / 20  # both ends came up
         cell.relay.bend = lambda _number, _line: None
         cell.change_needle()
         assert cell.run() == ["kept"]
@@ -90,5 +154,6 @@ def test_no_unverified_value_stays(tmp_path, share):
         # What is on record as last is what the tool holds.
         (last,) = cell.entries(EntryKind.DONE, limit=1)
         assert list(last.details["value"]) == list(cell.tool.rounded(3).components())
+        record_property("kept", kept)
     finally:
         cell.close()

@@ -19,7 +19,7 @@ def test_every_rule_holds_in_forty_disturbed_hours(seed):
 
 
 def test_one_seed_is_one_history_in_every_process():
-    program = "from robolink_simulators.soak import run; print(run(5, 2).hash, run(6, 2).hash)"
+    program = "from robolink_simulators.soak import run; print(run(5, 1).hash, run(6, 1).hash)"
     told = subprocess.run(
         [sys.executable, "-c", program],
         env={**os.environ, "PYTHONHASHSEED": "12345"},
@@ -27,9 +27,9 @@ def test_one_seed_is_one_history_in_every_process():
         capture_output=True,
         text=True,
     ).stdout
-    here = run(5, 2).hash, run(6, 2).hash
+    here = run(5, 1).hash, run(6, 1).hash
     assert told.split() == [*here]
-    assert len({*here, run(7, 2).hash}) == 3
+    assert len(set(here)) == 2
 
 
 @pytest.mark.soak

@@ -1,11 +1,16 @@
 """Every kind of cell: its deeds come off undisturbed, and what is broken in it is found."""
 
+import os
+import subprocess
+import sys
+
 import pytest
 from robolink_simulators.soak import CellKind, live_through, run
 from robolink_simulators.soak.drawing.hours import deeds_of
 from robolink_simulators.soak.history import Habit, History, Hour
 
-from robolink.model import EntryKind
+from robolink.model import Marker, MarkerKind, plain_offset
+from robolink.serving._book import ProgramChange
 from tests.soak.known_defects import DEFECTS
 
 pytestmark = pytest.mark.soak
@@ -16,9 +21,13 @@ UNMARKED_WRITE = BY_NAME["a write leaves no durable mark"]
 UNMARKED_MOVE = BY_NAME["a movement leaves no durable mark"]
 
 
-def takes_any_value_for_the_old_one(change, value):
-    change._close(EntryKind.ROLLED_BACK, "put back by the program", value)
-    return True
+def handed_out_without_a_marker(log, tool, before, requested):
+    values = {"before": plain_offset(before), "requested": plain_offset(requested)}
+    marker = Marker("none", MarkerKind.CHANGE, "none", "", {"tools": {str(tool): values}})
+    return ProgramChange(log, marker)
+
+
+UNMARKED_VALUE = {"robolink.serving._conversation.begin_change": handed_out_without_a_marker}
 
 
 @pytest.mark.parametrize("kind", CellKind)
@@ -31,8 +40,19 @@ def test_undisturbed_deeds_come_off(kind):
 
 
 @pytest.mark.parametrize("kind", CellKind)
-def test_one_seed_is_one_history_of_every_kind(kind):
-    assert run(11, 3, kind=kind).hash == run(11, 3, kind=kind).hash
+def test_one_seed_is_one_history_in_every_process_and_kind(kind):
+    program = (
+        "from robolink_simulators.soak import CellKind, run; "
+        f"print(run(11, 3, kind=CellKind.{kind.name}).hash)"
+    )
+    told = subprocess.run(
+        [sys.executable, "-c", program],
+        env={**os.environ, "PYTHONHASHSEED": "12345"},
+        check=True,
+        capture_output=True,
+        text=True,
+    ).stdout
+    assert told.strip() == run(11, 3, kind=kind).hash
 
 
 @pytest.mark.parametrize(
@@ -43,6 +63,7 @@ def test_one_seed_is_one_history_of_every_kind(kind):
         (CellKind.MODBUS_RTU, UNMARKED_MOVE, "MovesOnce"),
         (CellKind.CANOPEN, UNMARKED_MOVE, "MovesOnce"),
         (CellKind.REGISTER_MAP, UNMARKED_WRITE, "OnlyWantedValues"),
+        (CellKind.PROGRAM, UNMARKED_VALUE, "NothingWithoutRecord"),
     ],
 )
 def test_a_defect_is_found_in_every_kind_of_cell(kind, replacements, rule):

@@ -40,7 +40,7 @@ def events(chunks):
     return found
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(st.lists(LINES, min_size=1, max_size=4), st.data())
 def test_any_split_gives_the_same_lines(lines, data):
     stream = b"".join(map(encode_line, lines))
@@ -50,7 +50,7 @@ def test_any_split_gives_the_same_lines(lines, data):
     assert events(chunks) == lines
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(LINES, st.data())
 def test_a_line_with_one_other_byte_or_two_that_changed_places_is_refused(line, data):
     good = encode_line(line)[:-2]
@@ -65,7 +65,7 @@ def test_a_line_with_one_other_byte_or_two_that_changed_places_is_refused(line, 
                 decode_line(bad)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(st.lists(st.binary(max_size=400), max_size=4))
 def test_whatever_comes_is_refused_for_good_and_little_of_it_is_kept(chunks):
     codec, failed = CallbackCodec(), False

@@ -5,6 +5,20 @@ from pathlib import Path
 
 import pytest
 from robolink_simulators.epson import EpsonOptions, EpsonSimulator
+from robolink_simulators.epson.spel.expressions.functions import PLAIN_FUNCTIONS
+from robolink_simulators.epson.spel.expressions.machine_functions import (
+    MACHINE_FUNCTIONS,
+    POINT_FUNCTIONS,
+)
+from robolink_simulators.epson.spel.expressions.state_functions import STATE_FUNCTIONS
+from robolink_simulators.epson.spel.parse import (
+    UNSIMULATED,
+    UNSIMULATED_FAMILIES,
+    UNSIMULATED_FUNCTIONS,
+    WINDOW_ONLY,
+)
+from robolink_simulators.epson.spel.programs.families.texts import FUNCTIONS_OF_ARRAYS
+from robolink_simulators.epson.spel.tasks.functions import TASK_FUNCTIONS
 
 PAGE = Path(__file__).parents[2] / "docs" / "spel-statements.md"
 _ROW = re.compile(r"^\| `(?P<statement>[^|]+)` \| (?P<who>[^|]+) \| (?P<answer>[^|]+) \|$")
@@ -69,3 +83,19 @@ def test_an_assigned_variable_is_read_over_the_wire_and_back(login):
     assert answer(client, "Print g_Long + 1") == "`7`"
     refusing = login(EpsonSimulator(options=EpsonOptions(variable_assignment="refused")))
     assert answer(refusing, "g_Long = 1") == "2119"
+
+
+def refused_words():
+    """Return the statements and the functions that a program may hold and that are refused."""
+    known = {"pdef", *PLAIN_FUNCTIONS, *MACHINE_FUNCTIONS, *POINT_FUNCTIONS, *STATE_FUNCTIONS}
+    known |= {*TASK_FUNCTIONS, *FUNCTIONS_OF_ARRAYS}
+    return UNSIMULATED - WINDOW_ONLY, UNSIMULATED_FUNCTIONS - known
+
+
+def test_what_is_refused_is_listed_by_name():
+    section = PAGE.read_text(encoding="utf-8").partition("## Not carried out")[2]
+    _, statements, functions = re.split(r"^Statements:$|^Functions:$", section, flags=re.MULTILINE)
+    functions, families = functions.split("begin so")
+    listed = [set(re.findall(r"`([^`]+)`", part)) for part in (statements, functions, families)]
+    families = {f"{word}..." for word in UNSIMULATED_FAMILIES}
+    assert listed == [*refused_words(), families]

@@ -28,6 +28,7 @@ from robolink.model import (
     Controller,
     ControllerFacts,
     ControllerStatus,
+    MarkerKind,
     OutcomeLog,
     is_custom,
 )
@@ -209,10 +210,18 @@ class SoftMotionController(ControllerCore):
         set_kinematics(self._mailbox, position, orientation)
 
     def _take_leave(self) -> None:
-        """Halt what nobody waited on, and give the mailbox back."""
+        """Halt what nobody waited on, and give the mailbox back.
+
+        A machine takes that for the word that all its tools are settled (docs/plc-callback.md), so
+        after a change that is not, it stays taken until ``recover``, or for 10 s of silence.
+        """
         if self._mailbox.wire.alive:
             self.groups[0].abort_unfinished()
-            self._mailbox.commands.ownership.release()
+            if not self._mailbox.wire.epoch or not self._change_is_open():
+                self._mailbox.commands.ownership.release()
+
+    def _change_is_open(self) -> bool:
+        return any(marker.kind is MarkerKind.CHANGE for marker in self.outcomes.open_markers())
 
     def _close_link(self) -> None:
         self._mailbox.wire.close()

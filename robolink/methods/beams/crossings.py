@@ -1,27 +1,14 @@
 """Crossings of two beams, each told about as it is made, and the worst of them made again."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Final
 
-from robolink.calibration import (
-    BeamsResult,
-    Crossing,
-    FlangePlane,
-    TipHeight,
-    crossing_sigma_gain,
-    solve_crossed_beams,
-)
-from robolink.errors import CalibrationError
+from robolink.calibration import BeamsResult, Crossing, crossing_sigma_gain
 from robolink.messages import tr
 from robolink.methods.beams.drive import BeamDrive, BeamScan, BeamTravel
+from robolink.methods.beams.solving import CrossingSolver
 from robolink.model import ToolOffset
-from robolink.procedures import NO_OFFSET
 from robolink.runner import Procedure
-
-_PASSES: Final = 4
-_STILL_MM: Final = 1e-7
 
 
 @dataclass(slots=True)
@@ -79,12 +66,15 @@ class CrossingSampler:
     def solve(self, crossings: Sequence[Crossing]) -> BeamsResult:
         """Solve what was taken."""
         at_first = crossings[: len(self.first.rounds())]
+        plan, solver = self.first.plan, self._solver
         if self.shaft:
-            self._require_straight(at_first)
+            solver.require_straight(
+                at_first, self.shaft, shaft_mm=plan.shaft_mm, max_lean_deg=plan.max_lean_deg
+            )
         if self.turned is None or len(crossings) > len(at_first):
-            return self._solved(crossings, moved=self.turned is not None)
+            return solver.solved(crossings, moved=self.turned is not None)
         # Where the beams are is not relied on, so nothing tells yet how sure the tip is.
-        return replace(self._solved(crossings), half_width95=(), region95_radius_mm=None)
+        return replace(solver.solved(crossings), half_width95=(), region95_radius_mm=None)
 
     def foreseen(self, place: BeamScan) -> Crossing:
         """Return what would be taken there."""
@@ -106,57 +96,9 @@ class CrossingSampler:
         """Say which one it is."""
         return tr("Crossing {number}, at {where}", number=number, where=self.named(crossing))
 
-    def _solved(
-        self, crossings: Sequence[Crossing], *, deeper_mm: float = 0.0, moved: bool = False
-    ) -> BeamsResult:
-        """Solve crossings, at the height of the tip that is found.
-
-        A flange that leans carries a tip that is d beside the expected one by d sin(lean) higher or
-        lower, so the beams see another place of its shaft: X and Y would be wrong by d sin(lean)^2,
-        which no residual shows; 4 um at 0.5 mm and 5 degrees. Each pass leaves sin(lean)^2 of it.
-        """
-        tip = expected = self.stored or NO_OFFSET
-        for _ in range(_PASSES):
-            before = tip
-            found = solve_crossed_beams(
-                crossings,
-                self.first.station.beams,
-                stored=self.stored,
-                height=self._height(tip, deeper_mm),
-                sigma_mm=self.sigma_mm,
-                beams_may_have_moved=moved,
-            )
-            tip = replace(expected, x_mm=found.offset.x_mm, y_mm=found.offset.y_mm)
-            if math.dist((tip.x_mm, tip.y_mm), (before.x_mm, before.y_mm)) < _STILL_MM:
-                break
-        return found
-
-    def _height(self, tip: ToolOffset, deeper_mm: float) -> TipHeight:
-        """Return the height at which the beams see the needle, in the flange's axes.
-
-        The tip dips below the beams, so they see the shaft above it, along the flange's axis.
-        """
-        first, expected = self.first, self.stored or NO_OFFSET
-        plane = FlangePlane.of(first.frame)
-        above_mm = first.plan.dip_mm + deeper_mm + plane.rise_mm(expected) - plane.rise_mm(tip)
-        return TipHeight(tip.z_mm + above_mm / plane.r33)
-
-    def _require_straight(self, crossings: Sequence[Crossing]) -> None:
-        """Refuse a needle whose shaft is not above its tip."""
-        plan = self.first.plan
-        tip, shaft = (
-            self._solved(seen, deeper_mm=deeper_mm).offset
-            for seen, deeper_mm in ((crossings, 0.0), (self.shaft, plan.shaft_mm))
+    @property
+    def _solver(self) -> CrossingSolver:
+        first = self.first
+        return CrossingSolver(
+            first.station.beams, first.frame, first.plan.dip_mm, self.stored, self.sigma_mm
         )
-        beside_mm = math.hypot(shaft.x_mm - tip.x_mm, shaft.y_mm - tip.y_mm)
-        lean_deg = math.degrees(math.atan2(beside_mm, plan.shaft_mm))
-        if lean_deg > plan.max_lean_deg:
-            raise CalibrationError(
-                "bent_needle",
-                tr(
-                    "The needle leans by {lean:.1f} degrees; {limit:.1f} are allowed.",
-                    lean=lean_deg,
-                    limit=plan.max_lean_deg,
-                ),
-                remedy=tr("Change it, and look whether it is seated straight."),
-            )

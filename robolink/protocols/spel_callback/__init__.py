@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from robolink.protocols.spel_callback._lines import encode_line as encode_line
     from robolink.protocols.spel_callback._values import offset_fields as offset_fields
     from robolink.protocols.spel_callback._values import read_components as read_components
+    from robolink.protocols.spel_callback._values import read_place as read_place
     from robolink.protocols.spel_callback._values import read_tool as read_tool
     from robolink.protocols.spel_callback._values import same_thousandths as same_thousandths
     from robolink.protocols.spel_callback._values import tool_fields as tool_fields
@@ -27,6 +28,7 @@ else:
         {
             "_codec": "CallbackCodec",
             "_lines": "LONGEST_LINE CallbackLine CallbackWord check_sum decode_line encode_line",
-            "_values": "offset_fields read_components read_tool same_thousandths tool_fields",
+            "_values": "offset_fields read_components read_place read_tool same_thousandths "
+            "tool_fields",
         },
     )

@@ -37,9 +37,22 @@ def read_components(fields: Sequence[str]) -> tuple[float, ...]:
     Raises:
         RemoteProtocolError: They are none.
     """
-    if len(fields) != COMPONENTS or not all(map(_WHOLE.fullmatch, fields)):
+    return _read(fields, COMPONENTS)
+
+
+def read_place(fields: Sequence[str]) -> tuple[float, ...]:
+    """Return X and Y of a place, mm.
+
+    Raises:
+        RemoteProtocolError: They are none.
+    """
+    return _read(fields, 2)
+
+
+def _read(fields: Sequence[str], count: int) -> tuple[float, ...]:
+    if len(fields) != count or not all(map(_WHOLE.fullmatch, fields)):
         raise RemoteProtocolError(
-            tr("{fields} are no pose in thousandths.", fields=",".join(fields))
+            tr("{fields} are no {count} whole thousandths.", fields=",".join(fields), count=count)
         )
     return tuple(int(field) / 1000 for field in fields)
 

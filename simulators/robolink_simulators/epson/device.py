@@ -264,7 +264,7 @@ class EpsonSimulator:
         """Let simulated time reach ``now_ns``, stopping wherever something changes."""
         if now_ns == self._settled_ns:
             return
-        while (change := self.next_change()) is not None and self._now_ns < change < now_ns:
+        while now_ns > self._now_ns < (change := self.next_change() or now_ns) < now_ns:
             self._step(change)
         self._step(max(now_ns, self._now_ns))
 

@@ -64,12 +64,12 @@ class Flash:
         Raises:
             ConfigError: It cannot be written.
         """
+        if self._path is None:
+            return
         mark = self._mark()
         if mark == self._written:
             return
         self._written = mark
-        if self._path is None:
-            return
         first, *others = self._machine.robots
         document: dict[str, object] = {
             "schema": SCHEMA,

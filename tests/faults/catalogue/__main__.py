@@ -32,6 +32,8 @@ def main(wanted: list[str]) -> int:
     count = Counter(verdict.word for verdict in verdicts)
     words = ("passed", "in part", "FAILED", "not run")
     print(f"{len(verdicts)} faults: " + ", ".join(f"{count[word]} {word}" for word in words))
+    hardware = sum(end.on_hardware for of_row in listener.ends.values() for end in of_row.values())
+    print(f"Not run, for want of a real controller: {hardware} tests, of rows shown on simulators.")
     return 1 if count["FAILED"] or ended else 0
 
 

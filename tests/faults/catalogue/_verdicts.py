@@ -3,9 +3,14 @@
 from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import Final
 
 from tests.faults.catalogue._rows import Row
 from tests.faults.catalogue._shown_by import Showing
+
+NO_HARDWARE: Final = ("no hardware", "no motion on hardware")
+"""How tests begin that skip for want of a real controller. The catalogue is about the simulators,
+so such a column takes nothing from a row; how many there were is printed apart."""
 
 
 @dataclass(slots=True)
@@ -15,6 +20,7 @@ class Ends:
     passed: int = 0
     failed: int = 0
     why_skipped: list[str] = field(default_factory=list)
+    on_hardware: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +80,10 @@ class Listener:
             if report.failed:
                 end.failed += 1
             elif report.skipped:
-                end.why_skipped.append(str(report.longrepr[2]).removeprefix("Skipped: "))
+                why = str(report.longrepr[2]).removeprefix("Skipped: ")
+                if why.startswith(NO_HARDWARE):
+                    end.on_hardware += 1
+                else:
+                    end.why_skipped.append(why)
             elif report.when == "call":
                 end.passed += 1

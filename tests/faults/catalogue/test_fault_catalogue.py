@@ -132,6 +132,15 @@ def report(outcome, when="call", longrepr=None):
     )
 
 
+def test_a_column_for_real_hardware_takes_nothing_from_a_row_and_is_counted():
+    listener = Listener()
+    listener.pytest_runtest_logreport(report("passed"))
+    reason = ("file", 1, "Skipped: no hardware: set ROBOLINK_EPSON_URL to a real controller")
+    listener.pytest_runtest_logreport(report("skipped", "setup", reason))
+    assert judged(ROW, [SHOWING], listener.ends).word == "passed"
+    assert listener.ends["F01"][SHOWING.node].on_hardware == 1
+
+
 def test_a_test_that_breaks_while_it_is_set_up_or_torn_down_has_failed():
     for when in ("setup", "teardown"):
         listener = Listener()

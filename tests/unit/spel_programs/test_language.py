@@ -213,6 +213,74 @@ def test_forms_of_public_programs_are_taken(printed):
     assert printed(*lines, "Print n, CX(P0)") == ["1 1"]
 
 
+def test_labels_of_points_take_shifts_and_replacements_wherever_they_stand(printed):
+    """Seen in two public programs."""
+    lines = (
+        "P1 = XY(100, 300, -50, 20)",
+        'PLabel 1, "teach"',
+        'PLabel 2, "place"',
+        "Real h",
+        "h = 4",
+        "place = teach -Z(h) :U(0)",
+        "Print CZ(P2), CU(P2)",
+        "P3 = teach -Z(h)",
+        "P4 = teach +X(1) -Y(2)",
+        "Print CZ(P3), CX(P4), CY(P4)",
+        "Print CZ(teach :Z(-7))",
+    )
+    assert printed(*lines) == ["-54 0", "-54 101 298", "-7"]
+    array = ("Integer z(3), a", "a = 5", "z(2) = 3", "Print a - z(2)")
+    assert printed(*array) == ["2"]
+
+
+def test_the_number_of_an_arch_may_be_worked_out(printed, failure):
+    lines = (
+        "Integer n",
+        "n = 3",
+        "P1 = Here -X(10)",
+        "Jump P1 C(n) LimZ 0",
+        "Print Dist(P1, Here) < 0.001",
+    )
+    assert printed(*lines) == ["-1"]
+    assert failure("P1 = Here", "Jump P1 C(8)").number == 4002
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "WorkQue_Remove 1, All",
+        "Print WorkQue_Len(1)",
+        "Go WorkQue_Get(1, (0)) :Z(5)",
+        "Cnv_Mode 1, 2",
+        "Input a$",
+        "Line Input a$",
+    ],
+)
+def test_options_of_the_controller_build_and_are_refused_when_they_are_come_to(failure, line):
+    told = failure("String a$", "Print 1", line)
+    assert (told.number, told.line) == (2199, 4)
+
+
+def test_one_project_is_read_in_one_code_page(cell):
+    """GBK bytes that are also code page 932: in both files the same label, or it is not found."""
+    label = "\u5de5\u4f4d"
+    told = "\u8bf7\u68c0\u67e5".encode("gbk")
+    label.encode("gbk").decode("cp932")
+    with pytest.raises(UnicodeDecodeError):
+        told.decode("cp932")
+    made = cell(
+        "Function main\nother\nFend\n",
+        files={
+            "o.prg": b"' " + told + f"\nFunction other\nPrint CX({label})\nFend\n".encode("gbk"),
+            "robot1.pts": (
+                'Point1 {\nnNumber=4\nsLabel="' + label + '"\nrX=7\nrY=0\nrZ=0\nrU=0\n}\n'
+            ).encode("gbk"),
+        },
+        points=["robot1.pts"],
+    )
+    assert made.run() == ["7"]
+
+
 @pytest.mark.parametrize(
     ("text", "told"),
     [

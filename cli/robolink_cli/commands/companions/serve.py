@@ -6,76 +6,148 @@ import click
 
 from robolink.messages import tr
 from robolink_cli.console.render import note
-from robolink_cli.session.context import json_option
+from robolink_cli.session.context import CliContext, controller_options
 
 if TYPE_CHECKING:
-    from robolink.serving import CallbackConversation, CallbackServer
+    from robolink.serving import CallbackLimits, CallbackServer
 
 
 @click.command("serve")
 @click.option(
     "--spel",
     "address",
-    required=True,
     metavar="HOST:PORT",
-    help="Where SPEL+ programs call, for example 127.0.0.1:5001.",
+    help=tr(
+        "Where SPEL+ programs call, for example 127.0.0.1:5001. A cell that is named besides says "
+        "where its stations are."
+    ),
+)
+@click.option(
+    "--plc",
+    "method",
+    type=click.Choice(["n-angle", "pivot"]),
+    help=tr(
+        "Answer the program of the PLC that is named: it touches a pin, by this method. "
+        "docs/plc-callback.md"
+    ),
 )
 @click.option(
     "--allow",
     multiple=True,
     metavar="ADDRESS",
-    help="Address of a controller that may call; needed for any HOST but this computer's own. "
-    "May be repeated.",
+    help=tr(
+        "Address of a controller that may call; needed for any HOST but this computer's own. "
+        "May be repeated."
+    ),
 )
 @click.option(
-    "--controller",
-    default="",
+    "--on-record",
+    "controllers",
+    multiple=True,
     metavar="NAME",
-    help="Name under which the controller is on record; by default epson: and the robot's "
-    "serial number.",
+    help=tr(
+        "Name under which a robot is on record; by default epson: and its serial number. For a "
+        "controller with several robots repeat it: each name ends in the robot's serial number."
+    ),
 )
 @click.option(
     "--tolerance-mm",
     type=float,
     default=0.1,
     show_default=True,
-    help="Largest drift about the new tip, and widest interval.",
+    help=tr("Largest drift about the new tip, and widest interval."),
 )
 @click.option(
     "--max-change-mm",
     type=float,
     default=2.0,
     show_default=True,
-    help="Largest change of the offset that is believed.",
+    help=tr("Largest change of the offset that is believed."),
 )
-@click.option("--sigma-mm", type=float, help="How far one touch scatters, where it is known.")
-@json_option
+@click.option("--sigma-mm", type=float, help=tr("How far one touch scatters, where it is known."))
+@click.option(
+    "--tool", type=click.IntRange(1, 15), help=tr("With a PLC: the slot that its program measures.")
+)
+@click.option(
+    "--touches",
+    type=int,
+    default=5,
+    show_default=True,
+    help=tr("With a PLC: touches before the write."),
+)
+@click.option(
+    "--proofs", type=int, default=2, show_default=True, help=tr("With a PLC: touches afterwards.")
+)
+@click.option(
+    "--permit-is-contact",
+    is_flag=True,
+    help=tr("With a PLC: its permit comes only by the contact of tip and pin while it calibrates."),
+)
+@controller_options
 def serve(
+    context: CliContext,
     *,
-    address: str,
+    address: str | None,
+    method: str | None,
     allow: tuple[str, ...],
-    controller: str,
+    controllers: tuple[str, ...],
     tolerance_mm: float,
     max_change_mm: float,
     sigma_mm: float | None,
+    tool: int | None,
+    touches: int,
+    proofs: int,
+    permit_is_contact: bool,
 ) -> None:
     """Answer running programs that calibrate a tool at their own safe point.
 
-    The program moves and writes; here it is decided whether the value is proved, and all is
-    put on record. Nothing is sent to a controller. docs/spel-callback.md shows both sides.
+    The program moves; here it is decided whether the value is proved, and all is put on record. A
+    SPEL+ program writes by itself, and nothing is sent to its controller (docs/spel-callback.md).
+    Into the slot of a PLC the value is written from here (docs/plc-callback.md).
     """
+    from robolink.serving import CallbackLimits
+
+    limits = CallbackLimits(tolerance_mm, max_change_mm, sigma_mm)
+    if (address is None) is (method is None):
+        raise click.UsageError(tr("Give one of --spel and --plc."))
+    if address is not None:
+        _serve_programs(context, address, limits, allow=allow, controllers=controllers)
+        return
+    if tool is None or not permit_is_contact:
+        raise click.UsageError(
+            tr("--plc needs --tool, and --permit-is-contact: else nothing shows a touch.")
+        )
+    from robolink.serving import PermitPlan
+    from robolink_cli.commands.companions.serve_plc import serve_plc
+
+    plan = PermitPlan(tool, str(method), touches, proofs)
+    serve_plc(context, plan, limits)
+
+
+def _serve_programs(
+    context: CliContext,
+    address: str,
+    limits: "CallbackLimits",
+    *,
+    allow: tuple[str, ...],
+    controllers: tuple[str, ...],
+) -> None:
     from robolink import __version__
     from robolink.journal import open_journal, signature_here
-    from robolink.serving import CallbackConversation, CallbackLimits, CallbackServer
+    from robolink.serving import CallbackConversation, CallbackServer
     from robolink_cli.commands.simulate.serving import Termination, host_and_port
 
     host, port = host_and_port(address, "--spel")
-    limits = CallbackLimits(tolerance_mm, max_change_mm, sigma_mm)
     journal, signature = open_journal(), signature_here(__version__)
 
-    def conversation(peer: str) -> "CallbackConversation":
+    def conversation(peer: str) -> CallbackConversation:
         return CallbackConversation(
-            journal, limits, peer=peer, signature=signature, controller=controller
+            journal,
+            limits,
+            peer=peer,
+            signature=signature,
+            controllers=controllers,
+            cell=context.cell,
         )
 
     server = CallbackServer(host, port, conversation, allow=allow, tell=note)

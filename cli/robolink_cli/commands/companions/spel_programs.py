@@ -79,6 +79,13 @@ def check(files: tuple[Path, ...], points: tuple[Path, ...]) -> None:
     metavar="FILE",
     help="Vision project for VRun, as docs/spel-programs.md shows one.",
 )
+@click.option(
+    "--com",
+    "lines",
+    multiple=True,
+    metavar="NUMBER=DEVICE",
+    help="Serial line of a port of OpenCom, as 1=/dev/pts/3; no other is reached. May be repeated.",
+)
 @click.option("--trace", is_flag=True, help="Show each statement before it is carried out.")
 @click.option("--robot", default="T6-602S", show_default=True, help="Model of the robot.")
 @click.option(
@@ -104,6 +111,7 @@ def run(
     points: tuple[Path, ...],
     function: str,
     vision: Path | None,
+    lines: tuple[str, ...],
     trace: bool,
     robot: str,
     options: tuple[str, ...],
@@ -120,7 +128,7 @@ def run(
 
     simulator = EpsonSimulator(robot, options=habits(options, None))
     printed = list[str]()
-    _load(simulator, (files, points), vision)
+    _load(simulator, (files, points), vision, lines)
     ended = _run(simulator, function, most_s, trace=trace, printed=printed)
     program = simulator.program
     if program is not None and program.failure is not None:
@@ -133,12 +141,29 @@ def run(
         note(tr("It still ran after {seconds:g} s of simulated time.", seconds=most_s))
 
 
+def _lines(texts: Sequence[str]) -> dict[int, str]:
+    """Return the serial line of each port that ``--com`` names."""
+    from robolink_simulators.epson.spel.tasks.serial_link import COM_NUMBERS
+
+    named = dict[int, str]()
+    for text in texts:
+        number, _, device = text.partition("=")
+        if not device or number not in map(str, COM_NUMBERS):
+            raise click.UsageError(
+                tr("--com takes 1 to 4 or 1001 to 1008, and a device: 1=/dev/pts/3.")
+            )
+        named[int(number)] = device
+    return named
+
+
 def _load(
     simulator: "EpsonSimulator",
     project: tuple[Sequence[Path], Sequence[Path]],
     vision: Path | None,
+    lines: Sequence[str],
 ) -> None:
-    simulator.load(*project)
+    runner = simulator.load(*project)
+    runner.ports.devices |= _lines(lines)
     if vision is not None:
         from robolink_simulators.epson.vision.vision_file import install_vision
 

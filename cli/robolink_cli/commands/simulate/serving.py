@@ -29,6 +29,11 @@ class Termination:
         while not self._stopped.wait(0.5):
             pass
 
+    @property
+    def came(self) -> bool:
+        """Whether it came."""
+        return self._stopped.is_set()
+
     def __enter__(self) -> "Termination":
         self._before = signal.signal(signal.SIGTERM, lambda _number, _frame: self._stopped.set())
         return self

@@ -42,6 +42,7 @@ def condition_of(now: Response) -> dict[str, object]:
     return {
         "text": error_meaning(now.error_class) if status_of(now).code else "",
         "selected_tool": now.tool_slot,
+        "tool_known": is_tool_known(now),
         "motors_on": now.group_state != GroupState.DISABLED,
         "powered": bool(bits & Bits.POWERED),
         "owned": bool(bits & Bits.OWNED),

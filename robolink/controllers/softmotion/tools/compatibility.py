@@ -5,6 +5,7 @@ The PLC refuses such a tool by itself, in one word for all of it
 shift is impossible and why. A slot that is not in force would even be written without a word.
 """
 
+from collections.abc import Sequence
 from typing import Final
 
 from robolink.controllers.softmotion.facts import block_name
@@ -36,9 +37,63 @@ def require_fit(
     Raises:
         RejectedError: Names the kinematics, each impossible component, and why.
     """
-    position, orientation = now.position_kinematics, now.orientation_kinematics
+    space = _space(images, now, controller=controller, request=request)
+    shift = (offset.x_mm, offset.y_mm, offset.z_mm)
+    if space is None or space.accepts(shift):
+        return
+    raise _incompatible(
+        tr(
+            "{kinematics} cannot carry this tool: {parts} of its shift is impossible. {why}",
+            kinematics=_name(now),
+            parts=_parts(space, shift),
+            why=_why(space),
+        ),
+        controller=controller,
+        request=request,
+    )
+
+
+def require_measurable(
+    images: OrientationImages, now: Response, components: Sequence[str], *, controller: str
+) -> None:
+    """Refuse to measure components of a shift that the kinematics in force cannot carry.
+
+    A measured one is never exactly zero, so it would be refused when it is written, with the
+    work of a measurement behind it.
+
+    Args:
+        images: What is known of the kinematics.
+        now: A snapshot that was taken just now.
+        components: ``x_mm``, ``y_mm``, ``z_mm`` and other parts of a tool.
+        controller: Its name in the error.
+
+    Raises:
+        RejectedError: Names the kinematics, each impossible component, and why.
+    """
+    space = _space(images, now, controller=controller, request="")
+    if space is None:
+        return
+    directions = {"x_mm": (1.0, 0.0, 0.0), "y_mm": (0.0, 1.0, 0.0), "z_mm": (0.0, 0.0, 1.0)}
+    measured = [name for name in directions if name in components]
+    impossible = [name for name in measured if not space.accepts(directions[name])]
+    if impossible:
+        raise _incompatible(
+            tr(
+                "{kinematics} could not be told what would be measured: {parts}. {why}",
+                kinematics=_name(now),
+                parts=", ".join(name[0].upper() for name in impossible),
+                why=_why(space),
+            ),
+            controller=controller,
+            request="",
+        )
+
+
+def _space(
+    images: OrientationImages, now: Response, *, controller: str, request: str
+) -> OrientationSpace | None:
     try:
-        space = images.space(position, orientation)
+        return images.space(now.position_kinematics, now.orientation_kinematics)
     except NoOrientationImageError:
         raise RejectedError(
             tr("{kinematics} cannot carry tool offsets at all.", kinematics=_name(now)),
@@ -50,16 +105,11 @@ def require_fit(
             controller=controller,
             request=request,
         ) from None
-    shift = (offset.x_mm, offset.y_mm, offset.z_mm)
-    if space is None or space.accepts(shift):
-        return
-    raise RejectedError(
-        tr(
-            "{kinematics} cannot carry this tool: {parts} of its shift is impossible. {why}",
-            kinematics=_name(now),
-            parts=_parts(space, shift),
-            why=_why(space),
-        ),
+
+
+def _incompatible(what: str, *, controller: str, request: str) -> RejectedError:
+    return RejectedError(
+        what,
         code=ErrorClass.TOOL_INCOMPATIBLE,
         remedy=tr(
             "Couple an orientation kinematics in the PLC, or mount the tip on that line. Nothing "

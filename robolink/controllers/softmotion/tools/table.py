@@ -15,7 +15,7 @@ from robolink.controllers.softmotion.link.condition import (
     require_still,
 )
 from robolink.controllers.softmotion.link.mailbox import Mailbox
-from robolink.controllers.softmotion.tools.compatibility import require_fit
+from robolink.controllers.softmotion.tools.compatibility import require_fit, require_measurable
 from robolink.controllers.softmotion.tools.group_tool import GroupTool
 from robolink.controllers.softmotion.tools.orientation_images import OrientationImages
 from robolink.controllers.softmotion.tools.slot_write import SlotWrite
@@ -122,6 +122,11 @@ class SoftMotionToolTable(ToolTableCore):
     def _require_possible(self, tool: int, offset: ToolOffset) -> None:
         now = self._mailbox.snapshots.take()
         self._require_carried(offset, now, self._request(tool, offset))
+
+    def require_measurable(self, components: Sequence[str]) -> None:
+        """Refuse to measure what this kinematics could not be told; see the model."""
+        mailbox, now = self._mailbox, self._mailbox.snapshots.take()
+        require_measurable(self._images, now, components, controller=mailbox.identity)
 
     def _require_carried(self, offset: ToolOffset | None, now: Response, request: str) -> None:
         """Refuse a tool that the kinematics cannot carry, unless an old one is put back."""

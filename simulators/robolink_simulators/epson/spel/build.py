@@ -11,6 +11,7 @@ from robolink_simulators.epson.spel.tree import (
     AssignVariable,
     Base,
     Binary,
+    ComputedPoint,
     Coordinates,
     Distance,
     Expression,
@@ -35,6 +36,7 @@ from robolink_simulators.epson.spel.tree import (
     Target,
     Unary,
     Until,
+    shifted,
 )
 
 Items = tuple[Expression, ...]
@@ -73,7 +75,8 @@ class TreeBuilder(Transformer[Token, tuple[Statement, ...]]):
         until = untils[0] if untils else None
         ljm = next((option.ljm for option in options if option.ljm is not None), None)
         meanwhile = tuple(part for option in options for part in option.meanwhile)
-        joined = MotionOptions(words, limz, ljm, until, meanwhile)
+        arch = next((option.arch for option in options if option.arch is not None), None)
+        joined = MotionOptions(words, limz, ljm, arch, until, meanwhile)
         return MotionStatement(verb.lower(), targets, joined)
 
     def plain_option(self, word: Token) -> MotionOptions:
@@ -83,6 +86,10 @@ class TreeBuilder(Transformer[Token, tuple[Statement, ...]]):
     def ljm_option(self, word: Token, flag: Expression | None) -> MotionOptions:
         """Build LJM with or without its flag."""
         return MotionOptions(frozenset({word.lower()}), ljm=flag)
+
+    def arch_option(self, _: Token, number: Expression) -> MotionOptions:
+        """Build ``C(n)``."""
+        return MotionOptions(frozenset({"c7"}), arch=number)
 
     def limz_option(self, word: Token, value: Expression | None) -> MotionOptions:
         """Build LimZ with or without a height."""
@@ -160,6 +167,14 @@ class TreeBuilder(Transformer[Token, tuple[Statement, ...]]):
     def labelled(self, word: Token, *modifiers: Modifier) -> PointExpression:
         """Build a point that is named in a motion."""
         return PointExpression(LabelledPoint(word.lower()), modifiers=modifiers)
+
+    def called_point(self, word: Token, arguments: Items, *modifiers: Modifier) -> PointExpression:
+        """Build a point that a function gives in a motion."""
+        return PointExpression(ComputedPoint(Name(word.lower(), arguments)), modifiers=modifiers)
+
+    def replaced(self, value: Expression, *modifiers: Modifier) -> PointExpression:
+        """Build ``label :U(0)`` or ``label -Z(10) :U(0)``, whose shift was read as a difference."""
+        return shifted(value, modifiers)
 
     def error_on(self, _: Token) -> Name:
         """Build ``Error On``, which a client writes for ErrorOn."""

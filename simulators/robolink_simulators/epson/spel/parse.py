@@ -103,6 +103,9 @@ UNSIMULATED: Final = (
 UNSIMULATED_FUNCTIONS: Final = FUNCTION_ONLY | frozenset(_UNSIMULATED_FUNCTIONS.split())
 """Functions that a program may call and that are refused when it comes to them."""
 
+UNSIMULATED_FAMILIES: Final = ("workque_", "cnv_", "sf_", "aio_", "pg_", "fbusio_", "force_")
+"""What statements and functions of options of the controller begin with: none is simulated."""
+
 _REFUSED_WORDS: Final = (
     (PROGRAM_ONLY, RefusalKind.NOT_ALLOWED_HERE, "is allowed in programs only"),
     (FUNCTION_ONLY, RefusalKind.FUNCTION_ONLY, "is a function and no statement"),

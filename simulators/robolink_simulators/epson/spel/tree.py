@@ -1,5 +1,6 @@
 """Statements and expressions after parsing: plain values, nothing evaluated yet."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
@@ -117,7 +118,14 @@ class ByReference:
     target: Name
 
 
-Base = StoredPoint | LabelledPoint | PointFunction
+@dataclass(frozen=True, slots=True)
+class ComputedPoint:
+    """What an expression is worth, as a point."""
+
+    value: "Expression"
+
+
+Base = StoredPoint | LabelledPoint | PointFunction | ComputedPoint
 """What a point expression begins with."""
 
 Expression = (
@@ -177,6 +185,7 @@ class MotionOptions:
     words: frozenset[str] = frozenset()
     limz: Expression | None = None
     ljm: Expression | None = None
+    arch: Expression | None = None
     until: Until | None = None
     meanwhile: tuple[Meanwhile, ...] = ()
 
@@ -255,3 +264,48 @@ Statement = (
     | AssignCoordinate
     | If
 )
+
+
+SHIFTING = frozenset(
+    {*"XYZUVW", *(f"TL{axis}" for axis in "XYZUVW"), *(f"R{axis}" for axis in "XYZ")}
+)
+"""Axes of the shifts behind a point."""
+
+
+def shifted(value: "Expression", modifiers: tuple[Modifier, ...] = ()) -> PointExpression:
+    """Return what looks like a difference as a point and its shifts: ``label -Z(10)``.
+
+    Args:
+        value: It.
+        modifiers: Those that stand behind it.
+    """
+    while isinstance(value, Binary) and value.operator in ("+", "-"):
+        match value.right:
+            case Name(axis, (amount,)) if axis.upper() in SHIFTING:
+                by = Unary("-", amount) if value.operator == "-" else amount
+                modifiers = (Modifier(ModifierKind.SHIFT, axis.upper(), by), *modifiers)
+                value = value.left
+            case _:
+                break
+    return PointExpression(ComputedPoint(value), modifiers=modifiers)
+
+
+def shifts_a_label(value: "Expression", known: Callable[[str], bool]) -> bool:
+    """Tell whether what looks like a difference is the label of a point and its shifts.
+
+    Args:
+        value: It.
+        known: Tells whether a name is a variable's.
+    """
+    axes = list[str]()
+    while isinstance(value, Binary) and value.operator in ("+", "-"):
+        match value.right:
+            case Name(axis, (_,)) if axis.upper() in SHIFTING:
+                axes.append(axis)
+                value = value.left
+            case _:
+                return False
+    match value:
+        case Name(label, None):
+            return bool(axes) and not any(map(known, (label, *axes)))
+    return False

@@ -182,6 +182,8 @@ class EndRules:
 
 def _chain(error: BaseException | None) -> Iterator[BaseException]:
     """Yield an error and what led to it."""
-    while error is not None:
-        yield error
+    seen: list[BaseException] = []
+    while error is not None and not any(error is one for one in seen):  # it may be its own cause
+        seen.append(error)
         error = error.__cause__ or error.__context__
+    yield from seen

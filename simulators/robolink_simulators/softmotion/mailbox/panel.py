@@ -50,6 +50,23 @@ class PlcPanel:
         with self._acting():
             self._plc.program.permitted = False
 
+    @property
+    def tool_changed(self) -> bool:
+        """Whether a client has changed a tool (``xToolChanged``)."""
+        with self._acting():
+            return self._plc.memory.tool_changed
+
+    @property
+    def owned(self) -> bool:
+        """Whether a client owns the mailbox."""
+        with self._acting():
+            return self._plc.program.ownership.holder != 0
+
+    def take_change_back(self) -> None:
+        """Let the machine's own program say that it knows of the change (``xToolChanged``)."""
+        with self._acting():
+            self._plc.memory.tool_changed = False
+
     def fail_axis(self, number: int = 0, error_number: int = _LAG_ERROR) -> None:
         """Let a drive fail.
 

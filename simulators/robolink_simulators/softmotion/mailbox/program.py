@@ -36,6 +36,9 @@ from robolink_simulators.softmotion.mailbox.words.inbox import Inbox
 from robolink_simulators.softmotion.mailbox.words.units import UserUnits
 
 _ANYTIME: Final = frozenset({Opcode.STOP, Opcode.HALT})
+_CHANGING_TOOLS: Final = frozenset(
+    {Opcode.WRITE_TOOL, Opcode.SELECT_TOOL, Opcode.CLEAR_TOOL, Opcode.SET_KINEMATICS}
+)
 _ANSWERED: Final = frozenset(
     {
         Opcode.SELECT_TOOL,
@@ -178,7 +181,10 @@ class MailboxProgram:
             told = self._halted_for_release(command)
             self.ownership.carry_out(command, now_ns, moving=moving)
             return told
-        return self._handlers[command.opcode](command)
+        told = self._handlers[command.opcode](command)
+        if command.opcode in _CHANGING_TOOLS:
+            self._memory.tool_changed = True
+        return told
 
     def _note_beat(self, now_ns: int) -> None:
         heard = self._watch.note(self.inbox.heartbeat, self._memory.epoch, now_ns)

@@ -30,6 +30,8 @@ class RetainedMemory:
         boot_id: Counts PLC starts; 0 before the first.
         epoch: Counts owners.
         device_id: The PLC's own number, never 0.
+        tool_changed: Whether a client has changed a tool since the machine's program took this
+            back (``xToolChanged``); it blocks its cycle meanwhile.
 
     Args:
         device_id: Its number; 0 draws one that no other has.
@@ -39,6 +41,7 @@ class RetainedMemory:
         self.device_id = device_id or ambient.random_number(32)
         self.boot_id = 0
         self.epoch = 0
+        self.tool_changed = False
         self._slots = dict.fromkeys(SLOTS, Slot())
 
     def slot(self, number: int) -> Slot:
@@ -72,6 +75,7 @@ class RetainedMemory:
             "boot_id": self.boot_id,
             "epoch": self.epoch,
             "device_id": self.device_id,
+            "tool_changed": self.tool_changed,
             "slots": slots,
         }
 
@@ -86,6 +90,7 @@ class RetainedMemory:
             raise ValueError(sorted(slots))
         self._slots.update(slots)
         self.boot_id, self.epoch = int(state["boot_id"]), int(state["epoch"])
+        self.tool_changed = bool(state.get("tool_changed", False))
         # A file of an earlier simulator has none; the one that was drawn stays and is kept.
         device_id = int(state.get("device_id", self.device_id))
         encode_device_id(device_id)

@@ -28,6 +28,8 @@ from robolink_simulators.epson.spel.tree import (
     PointPair,
     ResultSlot,
     Unary,
+    shifted,
+    shifts_a_label,
 )
 
 
@@ -110,6 +112,11 @@ def closure(expression: Expression, scope: Scope) -> Run:
         case Unary(sign, operand):
             inner = closure(operand, scope)
             return lambda t: unary(sign, inner(t))
+        case Binary() if shifts_a_label(
+            expression, lambda name: scope.named(name, None) is not None
+        ):
+            point = shifted(expression)
+            return lambda t: t.point(point)
         case Binary(sign, left, right):
             return _binary(sign, closure(left, scope), closure(right, scope))
         case PointExpression():

@@ -38,6 +38,7 @@ from robolink_simulators.epson.spel.expressions.values import (
 from robolink_simulators.epson.spel.session import Session
 from robolink_simulators.epson.spel.tree import (
     Base,
+    ComputedPoint,
     Coordinates,
     Expression,
     LabelledPoint,
@@ -211,6 +212,8 @@ class Evaluator:
     def _base(self, base: Base) -> Point:
         if isinstance(base, StoredPoint):
             return self.session.machine.points.get(self.integer(base.number))
+        if isinstance(base, ComputedPoint):
+            return as_point(self.value(base.value))
         if isinstance(base, LabelledPoint):
             return as_point(self.value(Name(base.name)))
         counts, function = POINT_FUNCTIONS[base.name]

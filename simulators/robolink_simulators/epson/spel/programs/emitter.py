@@ -19,7 +19,15 @@ from robolink_simulators.epson.spel.tasks.compiled import (
     Operation,
 )
 from robolink_simulators.epson.spel.tasks.task import SpelTask
-from robolink_simulators.epson.spel.tree import ByReference, Expression, Name, ResultSlot
+from robolink_simulators.epson.spel.tree import (
+    Binary,
+    ByReference,
+    Expression,
+    Name,
+    ResultSlot,
+    shifted,
+    shifts_a_label,
+)
 
 _NAMES_A_TASK: Final = frozenset({"taskstate", "taskdone", "taskinfo", "taskinfo$"})
 """Functions whose argument may name a function that is not called by that."""
@@ -126,6 +134,8 @@ class Emitter:
                 return node
         if not is_dataclass(node) or isinstance(node, type):
             return node
+        if isinstance(node, Binary) and shifts_a_label(node, self.scope.holds):
+            return self.hoisted(shifted(node))  # type: ignore[return-value]
         parts = {part.name: getattr(node, part.name) for part in fields(node)}
         new = {name: self.hoisted(part) for name, part in parts.items()}
         if all(new[name] is parts[name] for name in parts):

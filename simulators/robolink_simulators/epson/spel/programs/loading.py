@@ -11,6 +11,7 @@ from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.epson.spel.programs.project import build_project
 from robolink_simulators.epson.spel.programs.project_files import read_io_labels, read_points
 from robolink_simulators.epson.spel.session import Session
+from robolink_simulators.epson.spel.source.source_text import encoding_of
 from robolink_simulators.epson.spel.tasks.compiled import SpelProject
 
 IO_LABELS: Final = "IOLabels.dat"
@@ -26,6 +27,7 @@ class ProjectData:
         io_labels: Labels of inputs, outputs and memory bits.
         files: What each point file holds.
         known: Whether any file said so; if none did, a build cannot tell labels from mistakes.
+        encoding: The code page of all its files, ``None`` where no one fits them all.
     """
 
     points: dict[int, Point] = field(default_factory=dict)
@@ -33,6 +35,7 @@ class ProjectData:
     io_labels: dict[str, IOLabel] = field(default_factory=dict)
     files: dict[str, tuple[dict[int, Point], dict[str, int]]] = field(default_factory=dict)
     known: bool = False
+    encoding: str | None = None
 
     @property
     def labels(self) -> frozenset[str] | None:
@@ -48,17 +51,18 @@ def project_data(programs: Sequence[Path], points: Sequence[Path] = ()) -> Proje
     Raises:
         ConfigError: A file cannot be read.
     """
-    data = ProjectData(known=bool(points))
+    folders = sorted({path.parent for path in programs})
+    beside = [path for folder in folders for path in sorted(folder.glob("*.inc"))]
+    listed = [path for folder in folders if (path := folder / IO_LABELS).is_file()]
+    encoding = encoding_of((*programs, *points, *beside, *listed))
+    data = ProjectData(known=bool(points or listed), encoding=encoding)
     for path in points:
-        read, labels = read_points(path)
+        read, labels = read_points(path, encoding)
         data.points |= read
         data.point_labels |= labels
         data.files[path.name.lower()] = (read, labels)
-    for folder in {path.parent for path in programs}:
-        path = folder / IO_LABELS
-        if path.is_file():
-            data.io_labels |= read_io_labels(path)
-            data.known = True
+    for path in listed:
+        data.io_labels |= read_io_labels(path, encoding)
     return data
 
 
@@ -83,7 +87,7 @@ def load_project(
         ConfigError: A file cannot be read.
     """
     data = project_data(programs, points)
-    project = build_project(programs, session.options, labels=data.labels)
+    project = build_project(programs, session.options, labels=data.labels, encoding=data.encoding)
     project.point_files |= data.files
     machine = session.machine
     for number, point in data.points.items():
@@ -106,4 +110,4 @@ def check_project(
         ConfigError: A file cannot be read.
     """
     data = project_data(programs, points or points_beside(programs))
-    return build_project(programs, options, labels=data.labels), data.known
+    return build_project(programs, options, labels=data.labels, encoding=data.encoding), data.known

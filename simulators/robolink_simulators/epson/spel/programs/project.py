@@ -61,10 +61,17 @@ class ProjectBuilder:
     Args:
         options: The controller's habits.
         labels: Names of points, inputs and outputs, ``None`` where they are not known.
+        encoding: The code page of its files, ``None`` where each is looked at for itself.
     """
 
-    def __init__(self, options: EpsonOptions, labels: frozenset[str] | None = None) -> None:
+    def __init__(
+        self,
+        options: EpsonOptions,
+        labels: frozenset[str] | None = None,
+        encoding: str | None = None,
+    ) -> None:
         self._options = options
+        self._encoding = encoding
         self._labels = labels
         self._types = data_types(wraps=options.integer_overflow == "wrap")
         self._project = SpelProject()
@@ -89,7 +96,7 @@ class ProjectBuilder:
         return self._project
 
     def _read(self, path: Path) -> None:
-        preprocessor = Preprocessor(path.parent)
+        preprocessor = Preprocessor(path.parent, self._encoding)
         module: dict[str, Variable] = {}
         self._project.modules[path.name] = module
         current: _Outline | None = None
@@ -215,6 +222,7 @@ def build_project(
     options: EpsonOptions | None = None,
     *,
     labels: frozenset[str] | None = None,
+    encoding: str | None = None,
 ) -> SpelProject:
     """Return the project in some program files; see :class:`ProjectBuilder`.
 
@@ -222,4 +230,4 @@ def build_project(
         ProgramRefused: Something is wrong with it.
         ConfigError: A file cannot be read.
     """
-    return ProjectBuilder(options or EpsonOptions(), labels).build(files)
+    return ProjectBuilder(options or EpsonOptions(), labels, encoding).build(files)

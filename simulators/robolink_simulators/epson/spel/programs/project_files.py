@@ -32,9 +32,9 @@ _LABELS: Final = re.compile(r"(Input|Output|Memory)(Bit|Byte|Word)Labels$")
 Pairs = dict[str, str]
 
 
-def _text(path: Path) -> str:
+def _text(path: Path, encoding: str | None) -> str:
     try:
-        return decoded(read_named(path))
+        return decoded(read_named(path), encoding)
     except OSError as error:
         raise ConfigError(
             tr("{path} cannot be read: {why}.", path=path, why=error.strerror or error),
@@ -59,7 +59,7 @@ def _blocks(text: str) -> Iterator[tuple[tuple[str, ...], Pairs]]:
             pairs[pair[1]] = pair[2].strip().strip('"')
 
 
-def read_points(path: Path) -> tuple[dict[int, Point], dict[str, int]]:
+def read_points(path: Path, encoding: str | None = None) -> tuple[dict[int, Point], dict[str, int]]:
     """Return the points of a file by their numbers, and the numbers of their labels.
 
     A point is left out where one of its first six coordinates is marked undefined.
@@ -68,7 +68,7 @@ def read_points(path: Path) -> tuple[dict[int, Point], dict[str, int]]:
         ConfigError: It cannot be read, or a point makes no sense.
     """
     points, labels = dict[int, Point](), dict[str, int]()
-    for names, pairs in _blocks(_text(path)):
+    for names, pairs in _blocks(_text(path, encoding)):
         if names[-1] != "Point":
             continue
         try:
@@ -115,14 +115,14 @@ _FLAGS: Final = {
 }
 
 
-def read_io_labels(path: Path) -> dict[str, IOLabel]:
+def read_io_labels(path: Path, encoding: str | None = None) -> dict[str, IOLabel]:
     """Return the labels of inputs, outputs and memory bits, by their names in lower case.
 
     Raises:
         ConfigError: It cannot be read.
     """
     labels = dict[str, IOLabel]()
-    for names, pairs in _blocks(_text(path)):
+    for names, pairs in _blocks(_text(path, encoding)):
         kind = _LABELS.match(names[-2]) if len(names) > 1 else None
         number = next((v for k, v in pairs.items() if k in ("nBit", "nByte", "nWord", "nPort")), "")
         name = pairs.get("sLabel", "")

@@ -11,7 +11,7 @@ from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.closures import Run, Surroundings, closure
 from robolink_simulators.epson.spel.expressions.data_types import DataType, Variable
 from robolink_simulators.epson.spel.expressions.values import Value
-from robolink_simulators.epson.spel.parse import UNSIMULATED_FUNCTIONS
+from robolink_simulators.epson.spel.parse import UNSIMULATED_FAMILIES, UNSIMULATED_FUNCTIONS
 from robolink_simulators.epson.spel.tasks.compiled import LocalSlot, SpelProject
 from robolink_simulators.epson.spel.tasks.functions import task_function
 from robolink_simulators.epson.spel.tree import Expression
@@ -100,7 +100,7 @@ class FunctionScope:
         Raises:
             Refusal: Nothing is called so.
         """
-        if name in UNSIMULATED_FUNCTIONS:
+        if name in UNSIMULATED_FUNCTIONS or name.startswith(UNSIMULATED_FAMILIES):
             return _unsimulated(name)
         if arguments is not None:
             raise SpelRefusal(RefusalKind.NAME_UNDEFINED, f"Nothing is called {name}")

@@ -4,7 +4,7 @@ Source: docs/reference/spel.md 1, 1.1; docs/reference/spel.md 16.
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
@@ -38,15 +38,38 @@ class SourceLine:
     text: str
 
 
-def decoded(content: bytes) -> str:
-    """Return the text of a project file, whatever code page its PC used.
+def encoding_of(paths: Iterable[Path]) -> str | None:
+    """Return the first code page in which every file of a project can be read, if there is one.
 
-    UTF-8, code page 932 and GBK are tried, in this order; what is none of them is read byte by
-    byte, since its other letters stand in comments, texts and labels.
+    One PC has written them all, and a label is to be the same text in each: what is no UTF-8 may
+    be read in two code pages, file by file, as different letters.
+
+    Raises:
+        ConfigError: A file cannot be read.
     """
+    contents = [_content(path) for path in paths]
     for encoding in _ENCODINGS:
         try:
-            return content.decode(encoding)
+            for content in contents:
+                content.decode(encoding)
+        except UnicodeDecodeError:
+            continue
+        return encoding
+    return None
+
+
+def decoded(content: bytes, encoding: str | None = None) -> str:
+    """Return the text of a project file.
+
+    Args:
+        content: What is in it.
+        encoding: The code page of its project; without one UTF-8, code page 932 and GBK are tried,
+            in this order. What is none of them is read byte by byte, since its other letters
+            stand in comments, texts and labels.
+    """
+    for candidate in _ENCODINGS if encoding is None else (encoding,):
+        try:
+            return content.decode(candidate)
         except UnicodeDecodeError:
             continue
     return content.decode("latin-1")
@@ -58,10 +81,12 @@ class Preprocessor:
 
     Attributes:
         folder: Where included files are looked for.
+        encoding: The code page of the project, if one is known.
         faults: What was wrong with directives.
     """
 
     folder: Path
+    encoding: str | None = None
     faults: list[ProgramFault] = field(default_factory=list)
     _macros: dict[str, Macro] = field(default_factory=dict)
     _branches: list[tuple[bool, bool]] = field(default_factory=list)
@@ -87,7 +112,7 @@ class Preprocessor:
             self._blame(SourcePlace(path.name, 1), tr("The program is larger than 8 MB."))
             return
         self._open.append(path)
-        for place, text in _joined(path.name, decoded(content)):
+        for place, text in _joined(path.name, decoded(content, self.encoding)):
             code = _without_comment(text)
             directive = _DIRECTIVE.match(code)
             if directive is not None:

@@ -30,6 +30,8 @@ from robolink_simulators.epson.spel.tree import (
     SwitchOnTheWay,
 )
 
+HIGHEST_ARCH: Final = 7
+
 _SAME_MM = 0.001
 _SAME_DEG = 0.001
 
@@ -69,6 +71,9 @@ def plan(evaluator: Evaluator, motion: MotionStatement) -> list[Leg]:
         raise SpelRefusal(RefusalKind.SYNTAX, f"{motion.verb} knows no {', '.join(sorted(wrong))}")
     if len(motion.options.words & {*_UNTIL_WORDS, "sense"}) > 1:
         raise SpelRefusal(RefusalKind.SYNTAX, "A motion takes one of Till, Find and Sense")
+    arch = motion.options.arch
+    if arch is not None and not 0 <= evaluator.integer(arch) <= HIGHEST_ARCH:
+        raise out_of_range(f"There is no arch {evaluator.integer(arch)}")
     if motion.verb in ARC_VERBS:
         require_drives(machine)
         return [arc(evaluator, motion)]

@@ -122,6 +122,8 @@ TASK_FUNCTIONS: Final[dict[str, tuple[range, TaskFunction]]] = {
     "elapsedtime": (range(1), _elapsed),
     "rnd": (range(1, 2), _random),
     "chknet": (range(1, 2), lambda t, a: _runner(t).ports.waiting_bytes(as_integer(a[0]), t)),
+    "chkcom": (range(1, 2), lambda t, a: _runner(t).ports.waiting_bytes(as_integer(a[0]), t)),
+    "opencom": (range(1, 2), lambda t, a: _runner(t).ports.owner_number(as_integer(a[0]))),
     "lof": (range(1, 2), lambda t, a: _runner(t).ports.lines(as_integer(a[0]), t)),
     "opennet": (range(1, 2), lambda t, a: _runner(t).ports.owner_number(as_integer(a[0]))),
 }

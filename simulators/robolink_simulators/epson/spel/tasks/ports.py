@@ -1,6 +1,7 @@
-"""TCP/IP ports 201 to 216 on sockets of this machine (docs/reference/spel.md 17).
+"""TCP/IP ports 201 to 216 on sockets of this machine, and serial ports (docs/reference/spel.md 17).
 
-Only this machine is reached: a program under test must not find its way to a real cell.
+Only this machine is reached, and of its serial lines those alone that were named for the program:
+a program under test must not find its way to a real cell.
 """
 
 import ipaddress
@@ -11,6 +12,11 @@ from typing import TYPE_CHECKING, Final, Protocol
 
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.values import LONGEST_STRING, out_of_range
+from robolink_simulators.epson.spel.tasks.serial_link import (
+    COM_NUMBERS,
+    SerialFormat,
+    SerialLink,
+)
 
 if TYPE_CHECKING:
     from robolink_simulators.epson.spel.tasks.task import SpelTask
@@ -64,11 +70,13 @@ class PortSettings:
         address: Host and TCP port.
         terminator: What ends a line.
         timeout_s: How long a read waits, 0 for ever.
+        form: How the characters of a serial line are.
     """
 
     address: Address
     terminator: bytes = b"\r\n"
     timeout_s: float = 0.0
+    form: SerialFormat = field(default_factory=SerialFormat)
 
 
 @dataclass(slots=True)
@@ -76,7 +84,7 @@ class _Port:
     settings: PortSettings | None = None
     owner: "SpelTask | None" = None
     listener: socket.socket | None = None
-    link: PortLink | None = None
+    link: PortLink | SerialLink | None = None
     connected: bool = False
     received: bytearray = field(default_factory=bytearray)
 
@@ -101,13 +109,15 @@ class Ports:
 
     Attributes:
         addresses: See above.
+        devices: The serial line of each serial port that has one.
         dial: Connects a port that is a client; what stands in for a network is put here.
     """
 
     def __init__(self, addresses: Mapping[int, Address] | None = None) -> None:
         self.addresses = dict(addresses or {})
         self.dial: Callable[[Address], PortLink] = dialled
-        self._ports = {number: _Port() for number in NUMBERS}
+        self._ports = {number: _Port() for number in (*NUMBERS, *COM_NUMBERS)}
+        self.devices: dict[int, str] = {}
 
     def configure(self, number: int, settings: PortSettings) -> None:
         """Carry SetNet out.
@@ -146,8 +156,23 @@ class Ports:
             raise SpelRefusal(RefusalKind.PORT_IN_USE, f"Port {number}: {error}") from error
         port.owner = task
 
+    def open_line(self, number: int, task: "SpelTask") -> None:
+        """Carry OpenCom out.
+
+        Raises:
+            Refusal: It is open already, no line was named for it, or it cannot be opened.
+        """
+        port = self._port(number)
+        if port.is_open:
+            raise SpelRefusal(RefusalKind.PORT_OPEN_ALREADY, f"Port {number} is open")
+        if number not in self.devices:
+            raise SpelRefusal(RefusalKind.PORT_UNSET, f"Port {number} has no serial line")
+        form = SerialFormat() if port.settings is None else port.settings.form
+        port.link = SerialLink(number, self.devices[number], form)
+        port.owner, port.connected = task, True
+
     def close(self, number: int) -> None:
-        """Carry CloseNet out; a port that is not open may be closed (seen)."""
+        """Carry CloseNet or CloseCom out; a port that is not open may be closed (seen)."""
         self._port(number).close()
 
     def close_of(self, task: "SpelTask") -> None:
@@ -315,7 +340,7 @@ class Ports:
 
     def _connect(self, number: int, port: _Port) -> None:
         """See whether the other end has answered; try again if it was not there."""
-        if port.link is None:
+        if port.link is None or isinstance(port.link, SerialLink):
             return
         error = port.link.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
         try:

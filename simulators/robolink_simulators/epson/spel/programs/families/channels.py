@@ -1,8 +1,8 @@
-"""Network statements (docs/reference/spel.md 17); serial ports and files are not simulated."""
+"""Network and serial statements (docs/reference/spel.md 17); files are not simulated."""
 
 import re
 from collections.abc import Callable
-from typing import Final
+from typing import Final, Literal
 
 from robolink.messages import tr
 from robolink.timing import NS_PER_S
@@ -10,17 +10,26 @@ from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.closures import Run
 from robolink_simulators.epson.spel.expressions.data_types import Variable
 from robolink_simulators.epson.spel.expressions.functions import PLAIN_FUNCTIONS
-from robolink_simulators.epson.spel.expressions.values import as_integer, as_number, as_text
+from robolink_simulators.epson.spel.expressions.values import (
+    as_integer,
+    as_number,
+    as_text,
+    out_of_range,
+)
 from robolink_simulators.epson.spel.line_tree import ChannelStatement
 from robolink_simulators.epson.spel.programs.emitter import Emitter
 from robolink_simulators.epson.spel.programs.scope import Reference
 from robolink_simulators.epson.spel.tasks.compiled import Operation
 from robolink_simulators.epson.spel.tasks.ports import PortSettings
+from robolink_simulators.epson.spel.tasks.serial_link import SerialFormat
 from robolink_simulators.epson.spel.tasks.task import SpelTask
 from robolink_simulators.epson.spel.tasks.waits import Blocking
 from robolink_simulators.epson.spel.tree import ByReference, Expression, Name
 
 _TERMINATORS: Final = {"cr": b"\r", "lf": b"\n", "crlf": b"\r\n"}
+_PARITIES: Final[dict[str, Literal["N", "O", "E"]]] = {"n": "N", "o": "O", "e": "E"}
+_SLOWEST_BAUD: Final = 110
+_FASTEST_BAUD: Final = 115_200
 _SEPARATORS: Final = re.compile(r"\s*,\s*|\s+")
 _BYTE: Final = 0xFF
 
@@ -53,6 +62,43 @@ def _set(emitter: Emitter, node: ChannelStatement) -> Operation:
         t.runner.ports.configure(number(t), PortSettings(address, ending, seconds))
 
     return go
+
+
+def _set_line(emitter: Emitter, node: ChannelStatement) -> Operation:
+    """SetCom #n, baud, data bits, stop bits, parity, end, RTS or NONE, XON or NONE, time."""
+    number = _channel(emitter, node)
+    runs = [None if isinstance(item, Name) else emitter.run(item) for item in node.items[:8]]
+    words = [item.name if isinstance(item, Name) else "" for item in node.items[:8]]
+    words += [""] * (8 - len(words))
+    runs += [None] * (8 - len(runs))
+    ending = _TERMINATORS.get(words[4] or "crlf")
+    if ending is None:
+        raise emitter.fault(tr("a line ends with one of these"), expected=("CR", "LF", "CRLF"))
+    parity = _PARITIES.get(words[3] or "n")
+    if parity is None:
+        raise emitter.fault(tr("parity is one of these"), expected=("O", "E", "N"))
+    if {words[5], words[6]} - {"", "none"}:
+        return _refusing("Flow control of a serial port")
+
+    def go(t: SpelTask) -> None:
+        numbers = [None if run is None else as_number(run(t)) for run in runs]
+        baud, data_bits, stop_bits = (
+            usual if value is None else int(value)
+            for value, usual in zip(numbers[:3], (9600, 8, 1), strict=True)
+        )
+        known = _SLOWEST_BAUD <= baud <= _FASTEST_BAUD
+        if not known or data_bits not in (7, 8) or stop_bits not in (1, 2):
+            raise out_of_range(f"SetCom {baud}, {data_bits}, {stop_bits}")
+        form = SerialFormat(baud, data_bits, stop_bits, parity)
+        seconds = float(numbers[7] or 0)
+        t.runner.ports.configure(number(t), PortSettings(("", 0), ending, seconds, form))
+
+    return go
+
+
+def _open_line(emitter: Emitter, node: ChannelStatement) -> Operation:
+    number = _channel(emitter, node)
+    return lambda t: t.runner.ports.open_line(number(t), t)
 
 
 def _open(emitter: Emitter, node: ChannelStatement) -> Operation:
@@ -136,7 +182,12 @@ def _store(variable: Variable, value: str | int) -> None:
 
 
 def _input(emitter: Emitter, node: ChannelStatement) -> Operation:
-    """Input #n, variables: texts and numbers between commas or blanks."""
+    """Input #n, variables: texts and numbers between commas or blanks.
+
+    Without a port a person at a window would be asked, and there is none.
+    """
+    if node.channel is None and node.items:
+        return _refusing("Input from a window")
     number = _channel(emitter, node)
     references = [_into(emitter, item) for item in node.items]
 
@@ -161,9 +212,11 @@ def _value(text: str) -> int | float:
 
 
 def _line_input(emitter: Emitter, node: ChannelStatement) -> Operation:
-    number = _channel(emitter, node)
     if len(node.items) != 1:
         raise emitter.fault(tr("Line Input takes one variable"))
+    if node.channel is None:
+        return _refusing("Line Input from a window")
+    number = _channel(emitter, node)
     reference = _into(emitter, node.items[0])
 
     def go(t: SpelTask) -> Blocking:
@@ -279,6 +332,9 @@ CHANNEL_STATEMENTS: Final[dict[str, Callable[[Emitter, ChannelStatement], Operat
     "setnet": _set,
     "opennet": _open,
     "closenet": _close,
+    "setcom": _set_line,
+    "opencom": _open_line,
+    "closecom": _close,
     "waitnet": _await,
     "input": _input,
     "line input": _line_input,

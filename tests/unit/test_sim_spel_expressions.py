@@ -208,7 +208,7 @@ WORDS = """
 """
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(st.lists(st.sampled_from(WORDS.split()), max_size=12).map(" ".join) | st.text(max_size=40))
 def test_whatever_is_sent_ends_in_an_answer(text):
     execution = interpreter().start(text, 0)

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
-from robolink_simulators.faults.instants import drawn_instant
+from robolink_simulators.faults.instants import drawn_instant, drawn_rarity
 from robolink_simulators.soak.drawing.faults import (
     LINE_KINDS,
     MACHINE_FAULTS,
@@ -113,6 +113,10 @@ def _hour(seed: int, number: int, kind: CellKind) -> Hour:
     drawn = [_disturbance(rng, kind, deed)]
     while rng.random() < _ANOTHER_SHARE and len(drawn) < _MOST:
         drawn.append(_disturbance(rng, kind, deed))
+    rarely = random.Random(f"rare {number} of {seed}")
+    rare = drawn_rarity(rarely, _FAMILIES.get(kind, ""), deed.value)
+    if rare is not None:
+        drawn.append(Disturbance(Hindrance(rare.kind), rare.what, rare.match))
     return Hour(number, deed, _habit(rng), tuple(drawn))
 
 

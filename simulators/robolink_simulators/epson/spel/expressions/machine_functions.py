@@ -10,6 +10,7 @@ from robolink.model import ToolOffset
 from robolink_simulators.epson.memory.bits import BitBank
 from robolink_simulators.epson.memory.points import AXES, Point
 from robolink_simulators.epson.refusals import OutOfReach, RefusalKind, SpelRefusal
+from robolink_simulators.epson.spel.expressions.defined.arches import ARCH_FUNCTIONS
 from robolink_simulators.epson.spel.expressions.joint_functions import (
     FLAG_FUNCTIONS,
     angles_to_pulses,
@@ -139,6 +140,7 @@ def _calibration_information(session: Session, arguments: Arguments) -> Value:
 MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     **{f"c{axis.lower()}": (range(1, 2), _coordinate(axis)) for axis in AXES},
     **{name: (range(2), function) for name, function in FLAG_FUNCTIONS.items()},
+    **ARCH_FUNCTIONS,
     "pagl": (range(2, 3), joint_of_point),
     "ppls": (range(2, 3), pulses_of_point),
     "avoidsingularity": (range(1), lambda s, _: s.machine.settings.avoid_singularity),

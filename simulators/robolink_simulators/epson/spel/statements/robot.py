@@ -14,6 +14,7 @@ from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.joint_functions import JOINT_COUNTS, another_robot
 from robolink_simulators.epson.spel.expressions.printing import CRLF, number_text
 from robolink_simulators.epson.spel.expressions.values import Number, out_of_range
+from robolink_simulators.epson.spel.statements.defined.arches import ARCH_SETTINGS
 
 Numbers = Sequence[Number]
 Setting = Callable[[Machine, Numbers], str]
@@ -178,6 +179,7 @@ def _range(machine: Machine, values: Numbers) -> str:
 
 
 ROBOT_SETTINGS: Final[dict[str, Setting]] = {
+    **ARCH_SETTINGS,
     "weight": _weight,
     "inertia": _inertia,
     "fine": _fine,

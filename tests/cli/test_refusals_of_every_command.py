@@ -118,6 +118,7 @@ BAD = {
     "journal list": (["--limit", "0"], "--limit"),
     "journal show": (["abcd"], "'abcd'"),
     "journal diff": (["1"], "Missing argument"),
+    "journal drift": (["--baseline", "5"], "--baseline"),
     "journal export": (["golden.json"], "exists already"),
     "journal verify": (["all"], "unexpected extra argument"),
     "tool list": (["--timeout", "soon"], "soon"),

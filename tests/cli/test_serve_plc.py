@@ -20,7 +20,7 @@ SERVED = ("serve", "--plc", "n-angle", "--tool", "1", "--sigma-mm", "0.01", "--j
 class MachineClock(ManualClock):
     """Time in which the machine goes on whenever somebody waits; it produces before each call."""
 
-    parts = 30
+    parts = 12
 
     def __init__(self, simulator):
         super().__init__()
@@ -39,7 +39,7 @@ class MachineClock(ManualClock):
             self.machine.bump_mm = 0.0
             self.machine.begin()
             self.produced = 0
-            if len(self.calls) == 3:
+            if len(self.calls) == 2:
                 os.kill(os.getpid(), signal.SIGTERM)
 
 
@@ -54,10 +54,10 @@ def test_calls_are_answered_one_after_the_other_until_somebody_ends_it(capsys):
     finally:
         unregister("serve-plc")
     told = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
-    assert [one["event"] for one in told] == ["listening", "refused", "kept", "kept"]
-    assert clock.calls == ["produces"] * 3
+    assert [one["event"] for one in told] == ["listening", "refused", "kept"]
+    assert clock.calls == ["produces"] * 2
     assert told[1]["code"] == "point_moved"
-    assert told[3]["tool"] == 1
+    assert told[2]["tool"] == 1
     assert clock.machine.error_mm < 0.02
     assert not clock.machine.panel.tool_changed
 

@@ -93,6 +93,7 @@ def test_a_needle_is_measured_written_proved_and_the_machine_goes_on(backend):
         assert done.details["called_back"] is True
 
 
+@pytest.mark.soak
 def test_a_touch_that_the_contact_did_not_see_never_comes(cell):
     """Nobody counts it for another one: the machine gives up, and so does robolink."""
     machine = PermitMachine(cell.simulator)
@@ -102,6 +103,7 @@ def test_a_touch_that_the_contact_did_not_see_never_comes(cell):
     assert EntryKind.INTENT not in kinds(cell)
 
 
+@pytest.mark.soak
 def test_touches_that_scatter_give_no_value(cell):
     machine = PermitMachine(cell.simulator, noise_mm=0.2)
     with pytest.raises(CalibrationError):

@@ -128,7 +128,7 @@ def test_a_kinematics_of_one_s_own_that_is_named_is_judged_before_the_plc_is_ask
     machine, example
 ):
     simulator, plc = machine(example, named=True)
-    with pytest.raises(RejectedError, match=r"X 12\.000 mm, Y -3\.500 mm"):
+    with pytest.raises(RejectedError, match=r"own kinematics .* X 12\.000 mm, Y -3\.500 mm"):
         plc.tools.write(3, BESIDE, expected=None)
     assert not written(simulator)
     plc.tools.write(3, ALONG, expected=None)

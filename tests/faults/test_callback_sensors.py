@@ -70,6 +70,7 @@ def test_beams_are_crossed_solved_proved_kept_and_on_record(beams):
     assert 0 < details["known_within_mm"] < 0.03
 
 
+@pytest.mark.soak
 def test_a_beam_that_was_not_broken_gives_no_value(beams):
     beams.simulator.world.disconnect(4)
     refused(beams, "no_edge", [EntryKind.REFUSED])
@@ -148,6 +149,7 @@ def scaled(truth, factor):
     return replace(right, mm_per_px=longer, origin_mm=origin)
 
 
+@pytest.mark.soak
 def test_a_camera_of_a_wrong_scale_shows_when_the_tool_turns_about_the_new_tip(camera):
     """Turned 4 mm beside the tip, its circle is too large by as much, and no residual tells."""
     camera.see(scaled(camera.simulator.world.camera, 1.05))

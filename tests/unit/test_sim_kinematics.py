@@ -23,11 +23,12 @@ SCARAS = [model for model in robots() if model.mechanism is Mechanism.SCARA]
 @st.composite
 def placements(draw):
     model = draw(st.sampled_from(SCARAS))
-    # J2 = 0 is the singular stretched arm, where both hands are one.
-    below = model.narrow_below
-    widest_deg = model.ranges[1].high if below is None else below[1]
-    bend = st.floats(0.5, widest_deg)
-    j2 = draw(bend) * draw(st.sampled_from((-1, 1)))
+    # J2 = 0 is the singular stretched arm, where both hands are one. Curved arms bend farther to
+    # one side, and some bend less far deep down.
+    most_deg = 180.0 if model.narrow_below is None else model.narrow_below[1]
+    side = draw(st.sampled_from((-1, 1)))
+    widest_deg = -model.ranges[1].low if side < 0 else model.ranges[1].high
+    j2 = side * draw(st.floats(0.5, min(most_deg, widest_deg)))
     j1, j3, j4 = (draw(st.floats(*model.ranges[joint])) for joint in (0, 2, 3))
     return model, Joints(j1, j2, j3, j4)
 

@@ -90,3 +90,27 @@ def drawn_instant(rng: random.Random, cell: str, deed: str) -> tuple[Instant, in
         return None
     instant = rng.choice(fitting)
     return instant, instant.first + rng.randrange(instant.count)
+
+
+RARE_SHARE: Final = 0.06
+"""Share of hours in which one of these comes besides."""
+
+RARE: Final[Mapping[str, Sequence[Instant]]] = {
+    "epson": (
+        # Somebody who looks for space deletes the journal.
+        Instant("disk", "lost", ""),
+        # A write that takes, and whose answer is lost.
+        Instant("wire", "DROP_REPLY", "TLSet 2, XY", 1, _TYPED),
+    ),
+    "softmotion": (
+        Instant("disk", "lost", ""),
+        Instant("wire", "DROP_REPLY", "WRITE_TOOL", 1, _TYPED),
+    ),
+}
+"""What the shares of the others leave out too often; drawn by itself, so that it moves no other."""
+
+
+def drawn_rarity(rng: random.Random, cell: str, deed: str) -> Instant | None:
+    """Return something rare that tells in a deed; mostly ``None``."""
+    fitting = [one for one in RARE.get(cell, ()) if not one.deeds or deed in one.deeds]
+    return rng.choice(fitting) if fitting and rng.random() < RARE_SHARE else None

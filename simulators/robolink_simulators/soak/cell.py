@@ -346,6 +346,9 @@ class VirtualCell:
                 self._books.trusted = False
             except RobolinkError as error:
                 why = describe(error)
+            except Exception as error:
+                why = f"{type(error).__name__}: {error}"
+                self._rules.hold("NoDefectShown", False, why)
             finally:
                 self._turns.current.owner = None
                 process.end()

@@ -11,7 +11,7 @@ from enum import StrEnum
 from typing import Final, Self
 
 from robolink_simulators.faults import FaultAction, LinkKind, PlcFaultAction, links_of
-from robolink_simulators.faults.instants import drawn_instant
+from robolink_simulators.faults.instants import drawn_instant, drawn_rarity
 
 
 class CellKind(StrEnum):
@@ -162,6 +162,9 @@ def _hour(seed: int, number: int, kind: CellKind) -> Hour:
     drawn = [_disturbance(rng, kind, deed)]
     while rng.random() < _ANOTHER_SHARE and len(drawn) < _MOST:
         drawn.append(_disturbance(rng, kind, deed))
+    rarely = random.Random(f"rare {number} of {seed}")
+    if rare := drawn_rarity(rarely, kind.value, deed.value):
+        drawn.append(Disturbance(Hindrance(rare.kind), rare.what, rare.match))
     return Hour(number, deed, _habit(rng), tuple(drawn))
 
 

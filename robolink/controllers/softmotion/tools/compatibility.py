@@ -16,7 +16,7 @@ from robolink.controllers.softmotion.tools.orientation_images import (
 from robolink.errors import RejectedError
 from robolink.messages import tr
 from robolink.model import OrientationDof, OrientationSpace, ToolOffset
-from robolink.protocols.mailbox import ErrorClass, Response
+from robolink.protocols.mailbox import ErrorClass, Kinematics, Response
 
 _SHOWN_MM: Final = 0.0005
 _AXES: Final = {(1.0, 0.0, 0.0): "X", (0.0, 1.0, 0.0): "Y", (0.0, 0.0, 1.0): "Z"}
@@ -121,8 +121,10 @@ def _incompatible(what: str, *, controller: str, request: str) -> RejectedError:
 
 
 def _name(now: Response) -> str:
-    names = [block_name(now.position_kinematics), block_name(now.orientation_kinematics)]
-    return "+".join(name for name in names if name)
+    codes = (now.position_kinematics, now.orientation_kinematics)
+    if Kinematics.CUSTOM in codes:
+        return tr("The machine builder's own kinematics")
+    return "+".join(name for name in map(block_name, codes) if name)
 
 
 def _parts(space: OrientationSpace, shift: tuple[float, float, float]) -> str:

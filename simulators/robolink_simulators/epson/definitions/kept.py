@@ -1,28 +1,34 @@
 """What one robot keeps over a power cycle besides its tools."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
+from robolink_simulators.epson.definitions.added_arms import AddedArms
 from robolink_simulators.epson.definitions.arches import ArchTable
 
 
 class KeptDefinitions:
     """What one robot is told once and keeps over a power cycle, but for its tools.
 
+    Args:
+        own_arm: The values of arm 0, as ArmSet lists them.
+
     Attributes:
         arches: Those of Jump.
+        arms: Added arms; that they are kept as tools are is assumed.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, own_arm: Sequence[float]) -> None:
         self.arches = ArchTable()
+        self.arms = AddedArms(own_arm)
 
     @property
     def changes(self) -> int:
         """How often something of it was changed."""
-        return self.arches.changes
+        return self.arches.changes + self.arms.changes
 
     def to_state(self) -> dict[str, object]:
         """Return what survives power-off, ready for JSON."""
-        return {"arches": self.arches.to_state()}
+        return {"arches": self.arches.to_state(), "arms": self.arms.to_state()}
 
     def restore(self, state: Mapping[str, object]) -> None:
         """Take over what :meth:`to_state` returned.
@@ -31,3 +37,4 @@ class KeptDefinitions:
             KeyError, TypeError, ValueError: It is something else.
         """
         self.arches.restore(state["arches"])
+        self.arms.restore(state["arms"])

@@ -68,7 +68,7 @@ class DrivenRobot:
         self.settings = RobotSettings.of(model.axes)
         self.pallets = PalletTable()
         self.control_points = ControlPoints()
-        self.kept = KeptDefinitions()
+        self.kept = KeptDefinitions(model.arm_values)
         self.sensed = False
         self.till_met = False
         self.found: Point | None = None

@@ -34,7 +34,7 @@ OF_OTHER_ROBOTS: Final = frozenset(_WORDS_OF_OTHER_ROBOTS.split())
 """Statements that the reference allows, for arms that this simulator has none of."""
 
 _WORDS_NOT_SIMULATED = """
-    armclr armset atrq autoljm box dispdev enctemper finedist hofs hordr hour jrange
+    atrq autoljm box dispdev enctemper finedist hofs hordr hour jrange
     limittorque limittorquelp limittorquestop limzmargin mcordr msgbox olaccel olrate opencom
     opennet outreal parsestr performmode plane plocal ptpboost ptrq qpdecelr qpdecels shutdown
     softcp speedrlimitation syncrobots taskstate tclim tcspeed xylim xylimmode diffpoint

@@ -10,6 +10,7 @@ from robolink.model import ToolOffset
 from robolink_simulators.epson.memory.bits import BitBank
 from robolink_simulators.epson.memory.points import AXES, Point
 from robolink_simulators.epson.refusals import OutOfReach, RefusalKind, SpelRefusal
+from robolink_simulators.epson.spel.expressions.defined.added_arms import ARM_FUNCTIONS
 from robolink_simulators.epson.spel.expressions.defined.arches import ARCH_FUNCTIONS
 from robolink_simulators.epson.spel.expressions.joint_functions import (
     FLAG_FUNCTIONS,
@@ -141,6 +142,7 @@ MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     **{f"c{axis.lower()}": (range(1, 2), _coordinate(axis)) for axis in AXES},
     **{name: (range(2), function) for name, function in FLAG_FUNCTIONS.items()},
     **ARCH_FUNCTIONS,
+    **ARM_FUNCTIONS,
     "pagl": (range(2, 3), joint_of_point),
     "ppls": (range(2, 3), pulses_of_point),
     "avoidsingularity": (range(1), lambda s, _: s.machine.settings.avoid_singularity),
@@ -173,8 +175,6 @@ MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     "weight": (range(1, 2), lambda s, a: _item(load_of(s), a)),
     "inertia": (range(2), lambda s, a: _item(inertia_of(s), [as_number(x) + 1 for x in a])),
     "sfree": (range(1, 2), lambda s, a: int(as_integer(a[0]) in s.machine.settings.free_joints)),
-    "arm": (range(1), lambda *_: 0),
-    "armdef": (range(1, 2), lambda _, a: as_integer(a[0]) == 0),
     "ecp": (range(1), lambda s, _: s.machine.control_points.selected),
     "ecpdef": (range(1, 2), lambda s, a: s.machine.control_points.defined(as_integer(a[0]))),
     "agl": (range(1, 2), lambda s, a: _item(s.machine.arm.joints, a)),

@@ -159,6 +159,7 @@ class DrivenRobot:
         self.points = PointTable()
         self.locals = LocalTable(tilting=self.model.six_axes)
         self.control_points.selected = 0
+        self.kept.limits.strict = False
 
     def _tip_of(self, flange: Pose) -> Pose:
         return tip_of(self.model, flange, self.offset, tool=self.tools.selected)

@@ -21,6 +21,7 @@ from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.joint_functions import least_motion
 from robolink_simulators.epson.spel.expressions.values import out_of_range
+from robolink_simulators.epson.spel.statements.defined.xy_limits import require_within_limits
 from robolink_simulators.epson.spel.statements.jump import jump, jump3
 from robolink_simulators.epson.spel.statements.legs import go_leg, held_leg, line_leg
 from robolink_simulators.epson.spel.statements.through_points import ARC_VERBS, arc, passing
@@ -65,6 +66,14 @@ def plan(evaluator: Evaluator, motion: MotionStatement) -> list[Leg]:
     Raises:
         Refusal: Motors off, a free joint, a target out of reach, a wrong option ...
     """
+    legs = _planned(evaluator, motion)
+    # Only the last leg of a Jump ends at a target.
+    targets = legs[-1:] if motion.verb == "jump" else legs
+    require_within_limits(evaluator.session, legs, targets)
+    return legs
+
+
+def _planned(evaluator: Evaluator, motion: MotionStatement) -> list[Leg]:
     machine = evaluator.session.machine
     wrong = motion.options.words - _WORDS[motion.verb]
     if wrong:

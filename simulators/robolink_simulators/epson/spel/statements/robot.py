@@ -16,6 +16,7 @@ from robolink_simulators.epson.spel.expressions.printing import CRLF, number_tex
 from robolink_simulators.epson.spel.expressions.values import Number, out_of_range
 from robolink_simulators.epson.spel.statements.defined.added_arms import ARM_SETTINGS
 from robolink_simulators.epson.spel.statements.defined.arches import ARCH_SETTINGS
+from robolink_simulators.epson.spel.statements.defined.xy_limits import LIMIT_SETTINGS
 
 Numbers = Sequence[Number]
 Setting = Callable[[Machine, Numbers], str]
@@ -166,6 +167,7 @@ def _range(machine: Machine, values: Numbers) -> str:
 ROBOT_SETTINGS: Final[dict[str, Setting]] = {
     **ARCH_SETTINGS,
     **ARM_SETTINGS,
+    **LIMIT_SETTINGS,
     "weight": _weight,
     "inertia": _inertia,
     "fine": _fine,

@@ -140,12 +140,13 @@ class MailboxProgram:
         self.jobs.follow()
 
     def _accept(self, command: Command, now_ns: int) -> None:
-        if self.ownership.owns(command):
+        owned = self.ownership.owns(command)
+        if owned:
             self.ownership.heard(now_ns)
         try:
             self._require_admitted(command)
             if self.jobs.in_work and command.opcode not in _ANYTIME:
-                self.inbox.hold_back(command)
+                self.inbox.hold_back(command, owned=owned)
                 self.jobs.note(Finished(command.sequence, CommandState.ERROR, ErrorClass.BUSY))
                 return
             told = self._carried_out(command, now_ns)
@@ -156,7 +157,7 @@ class MailboxProgram:
             job.reject(rejected.error_class, rejected.raw)
         named = self.ownership.answer() if command.opcode == Opcode.OWNERSHIP else Answer()
         self._answer = told.answer or named
-        self.inbox.accept(command)
+        self.inbox.accept(command, owned=owned)
         self.jobs.add(job)
 
     def _require_admitted(self, command: Command) -> None:

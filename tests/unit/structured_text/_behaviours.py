@@ -235,6 +235,20 @@ def b15_jog_about_x(bench):
     assert bench.client.now().tcp == after
 
 
+def block_of_before(bench):
+    """Not one of the sixteen: docs/mailbox.md, "When a command counts"."""
+    client = bench.client
+    first = client.command(Opcode.WRITE_TOOL, 3, pose=(1.0, 2.0, 3.0, 0.0, 0.0, 0.0))
+    for command in (first, client.command(Opcode.CLEAR_TOOL, 3), first):
+        client.write(command)
+        bench.note()
+    assert client.slot(3).counter == 2
+    for jump in (0x7FFF, 0x7FFF, 1):  # past 65535
+        client.sequence = (client.sequence + jump - 1) % 0xFFFF
+        bench.read_tool()
+    assert client.now().ack_head < 10
+
+
 def without_image(model):
     """Return a machine whose kinematics does not tell its orientations."""
     kinematics = type("Untold", (type(model.kinematics),), {"orientation_image": lambda *_: None})

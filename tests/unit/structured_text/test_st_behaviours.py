@@ -29,8 +29,14 @@ RUNS = [
     (b.b13_a_stop_is_held, "Kin_Scara3_Z"),
     (b.b14_an_axis_alone, "Kin_Scara3_Z"),
     (b.b15_jog_about_x, "Kin_ArticulatedRobot_6DOF"),
+    (b.block_of_before, "Kin_Scara3_Z"),
 ]
-SAMPLE = {b.b03_scara2_keeps_its_tool, b.b13_a_stop_is_held, b.b15_jog_about_x}
+SAMPLE = {
+    b.b03_scara2_keeps_its_tool,
+    b.b13_a_stop_is_held,
+    b.b15_jog_about_x,
+    b.block_of_before,
+}
 
 
 def cases():

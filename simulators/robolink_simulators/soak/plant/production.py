@@ -46,7 +46,7 @@ class MailboxProduction:
         """Do what is due."""
         if self._stage is _Stage.IDLE or now_ns < self._due_ns:
             return
-        if self._plc.program.ownership.holder != _TOKEN:
+        if self._plc.program.holder != _TOKEN:
             self._stage = _Stage.IDLE  # refused, or another one insisted
         elif self._stage is _Stage.TAKING:
             self._send(Opcode.READ_TOOL, 0, now_ns)

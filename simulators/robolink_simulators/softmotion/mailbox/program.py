@@ -101,6 +101,11 @@ class MailboxProgram:
             return self._tools.set_tool()
         return self._motion.latched(job) or self._answer
 
+    @property
+    def holder(self) -> int:
+        """Token of the owner, 0 for nobody."""
+        return self.ownership.holder
+
     def write(self, first: int, words: Sequence[int], now_ns: int) -> None:
         """Take what a client writes; it is looked at in the next cycle."""
         self.inbox.write(first, words)
@@ -124,6 +129,10 @@ class MailboxProgram:
         """Take the zeros that a fieldbus leaves when its watchdog expires."""
         self.inbox.zero()
         self._plan_look(now_ns)
+
+    def seize(self, now_ns: int) -> None:
+        """Let a client take the mailbox that nobody here knows, because a person insists."""
+        self.ownership.seize(now_ns)
 
     def next_change(self, now_ns: int) -> int | None:
         """Return when :meth:`run` will next do something by itself, if ever."""

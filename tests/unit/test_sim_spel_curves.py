@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import pytest
 from robolink_simulators.epson import EpsonSimulator
+from robolink_simulators.epson.arm.ways.curve import through
 from robolink_simulators.epson.definitions.curves import CurveSwitch, FreeCurve
 
 from tests.unit.test_sim_spel_motion import Cell
@@ -57,6 +58,13 @@ def test_a_curve_goes_smoothly_through_its_points_at_speed_s(cell):
 def _bend_deg(a, b, c):
     before, after = (math.atan2(q[1] - p[1], q[0] - p[0]) for p, q in ((a, b), (b, c)))
     return abs(math.degrees((after - before + math.pi) % (2 * math.pi) - math.pi))
+
+
+def test_a_curve_is_the_same_backwards():
+    places = [(float(x), float(y), float(z), float(u)) for x, y, z, u in POINTS]
+    there, back = through(places, closed=False), through(places[::-1], closed=False)
+    for share in (0.1, 0.3, 0.5, 0.8):
+        assert there.at(share) == pytest.approx(back.at(1 - share), abs=1e-6)
 
 
 def test_a_closed_curve_ends_where_it_began(cell):

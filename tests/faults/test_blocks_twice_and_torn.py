@@ -38,9 +38,22 @@ def cell(request):
 
 @pytest.mark.fault("F25")
 @pytest.mark.parametrize(
-    "how",
-    [PlcFaultAction.DROP_REPLY, PlcFaultAction.GARBLE_REPLY],
-    ids=lambda how: how.name.lower(),
+    ("cell", "how"),
+    [
+        ("modbus-tcp", PlcFaultAction.DROP_REPLY),
+        ("modbus-rtu", PlcFaultAction.GARBLE_REPLY),
+        ("can-virtual", PlcFaultAction.DROP_REPLY),
+        *(
+            pytest.param(link, how, marks=pytest.mark.soak)
+            for link, how in (
+                ("modbus-tcp", PlcFaultAction.GARBLE_REPLY),
+                ("modbus-rtu", PlcFaultAction.DROP_REPLY),
+                ("can-virtual", PlcFaultAction.GARBLE_REPLY),
+            )
+        ),
+    ],
+    indirect=["cell"],
+    ids=lambda value: value if isinstance(value, str) else value.name.lower(),
 )
 def test_f25_a_movement_whose_answer_is_lost_is_unproved_and_begun_once(cell, how):
     cell.simulator.faults.add(PlcFault(how, match="write_command MOVE_LINEAR"))
@@ -67,9 +80,12 @@ def test_f25_a_movement_whose_answer_is_lost_is_unproved_and_begun_once(cell, ho
 
 
 @pytest.mark.fault("F26")
-def test_f26_whichever_answer_of_a_movement_is_lost_it_is_begun_once():
-    """In process and in simulated time: one run for each answer, until none was lost."""
-    for lost in range(200):
+@pytest.mark.parametrize(
+    "first", [0, *(pytest.param(n, marks=pytest.mark.soak) for n in range(1, 4))]
+)
+def test_f26_whichever_answer_of_a_movement_is_lost_it_is_begun_once(first):
+    """In process and in simulated time: one run for every fourth answer, until none was lost."""
+    for lost in range(first, 200, 4):
         with served("sim", SoftMotionSimulator(seed=7)) as cell:
             cell.simulator.faults.add(PlcFault(PlcFaultAction.DROP_REPLY, on_exchange=lost))
             try:
@@ -137,6 +153,11 @@ def test_f28_f32_a_block_whose_rest_never_comes_triggers_nothing(cell):
 
 
 @pytest.mark.fault("F29")
+@pytest.mark.parametrize(
+    "cell",
+    ["modbus-tcp", *(pytest.param(link, marks=pytest.mark.soak) for link in LINKS[1:])],
+    indirect=True,
+)
 def test_f29_behind_the_highest_number_comes_1_and_0_is_never_sent(cell):
     with closing(open_mailbox_link(cell.url)) as link:
         client = MailboxClient(link)

@@ -124,7 +124,7 @@ NAMES = st.text(max_size=300) | st.sampled_from(
 )
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=30, deadline=None, derandomize=True)
 @given(NAMES)
 def test_no_identity_leads_out_of_its_folder(identity):
     try:

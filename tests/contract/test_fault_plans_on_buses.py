@@ -91,7 +91,9 @@ def test_frames_in_pieces_or_twice_give_no_other_values(bus, action):
             assert len(faults.fired) == 1
 
 
-@pytest.mark.parametrize("segment", [0, 3, -1])
+@pytest.mark.parametrize(
+    "segment", [3, *(pytest.param(segment, marks=pytest.mark.soak) for segment in (0, -1))]
+)
 def test_the_segment_that_is_lost_is_the_one_that_the_plan_says(segment, tmp_path):
     """A slot of 36 words travels in 11 segments; what is lost shows in what was asked after."""
     asked: list[bytes] = []

@@ -62,7 +62,7 @@ def asked(controller, tools):
     ("link", "late_s"),
     [
         pytest.param("modbus-tcp", 0.9, marks=pytest.mark.fault("F01")),
-        pytest.param("can-virtual", 0.9, marks=pytest.mark.fault("F01")),
+        pytest.param("can-virtual", 0.9, marks=[pytest.mark.fault("F01"), pytest.mark.soak]),
         pytest.param("modbus-rtu", 0.82, marks=[pytest.mark.fault("F02"), pytest.mark.soak]),
         pytest.param("modbus-rtu", 0.95, marks=pytest.mark.fault("F02")),
     ],

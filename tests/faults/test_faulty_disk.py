@@ -102,7 +102,7 @@ def test_a_sync_that_lies_loses_what_was_acknowledged_at_a_power_cut_and_not_at_
 
 
 @pytest.mark.parametrize(
-    "seeds", [range(2), pytest.param(range(2, 100), marks=pytest.mark.soak)], ids=["two", "many"]
+    "seeds", [range(1), pytest.param(range(1, 100), marks=pytest.mark.soak)], ids=["one", "many"]
 )
 @pytest.mark.parametrize("page", range(4))
 def test_a_bent_page_is_never_read_as_another_record(folder, page, seeds):

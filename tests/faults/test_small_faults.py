@@ -16,7 +16,7 @@ from tests.faults.small.faults_of_a_run import Pair, Planned, drawn, planned, re
 from tests.faults.small.outcomes import outcome
 from tests.faults.small.wire import Act, SmallFault
 
-_SAMPLE = {"EPSON": 6, "PLC": 2}
+_SAMPLE = {"EPSON": 6, "PLC": 1}
 _SHARES = 24
 
 DECISIVE = {

@@ -200,7 +200,7 @@ def test_the_other_laptop_may_always_stop_a_plc(plc):
     assert simulator.plc.group.movements_started == 0
 
 
-@in_both_ways
+@pytest.mark.soak
 def test_a_person_at_the_other_laptop_may_take_a_plc_and_the_first_is_refused(plc):
     simulator, url, other = plc
     with robolink.connect(url) as mine:

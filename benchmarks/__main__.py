@@ -5,6 +5,7 @@ from benchmarks.journal import measure_journal
 from benchmarks.kinematics import measure_kinematics
 from benchmarks.mailbox import measure_mailbox
 from benchmarks.nozzle_change import measure_nozzle_change
+from benchmarks.plc_program import measure_plc_program
 from benchmarks.solvers import measure_solvers
 from benchmarks.spel_programs import measure_spel_programs
 from benchmarks.start_up import measure_start_up
@@ -27,6 +28,7 @@ def main() -> None:
             *measure_solvers(),
             *measure_kinematics(),
             *measure_spel_programs(),
+            *measure_plc_program(),
         ]
     )
 

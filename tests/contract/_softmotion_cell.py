@@ -101,7 +101,7 @@ class PlcCell:
     @property
     def owner(self) -> int:
         """Token of the client that owns the mailbox, 0 for nobody."""
-        return self.simulator.plc.program.ownership.holder
+        return self.simulator.plc.program.holder
 
     @property
     def open_requests(self) -> list[str]:

@@ -82,6 +82,7 @@ def recalibrate(simulator, example, folder):
     return run(simulator, *words)
 
 
+@pytest.mark.soak
 def test_the_example_finds_the_whole_tip_on_a_leaning_plate_and_proves_it(plc, tmp_path):
     simulator = plc()
     code, document, said = recalibrate(simulator, PLATE, tmp_path)

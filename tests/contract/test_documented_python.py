@@ -24,8 +24,10 @@ from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 import robolink
 from robolink import ToolOffset
+from robolink.errors import RobolinkError
 from robolink.model import TIP, Hand, Pose, Secret, Spot, SpotUnit, WorkBox, rotate_xy
 from robolink.protocols.epson_text import VariableType
+from robolink.protocols.mailbox import program_texts
 from robolink.runner import RunSettings, ask_yes_no
 from robolink.sensing import open_sensor, seen_once
 from robolink.testing import MemoryMachine
@@ -314,6 +316,7 @@ MAKERS = {
     "spel-programs.md 2": nothing,
     "stopping.md 1": with_password,
     "stopping.md 2": with_password,
+    "structured-text.md 1": nothing,
 }
 
 TESTS = {name for name, block in BLOCKS.items() if "\ndef test_" in f"\n{block}"}
@@ -322,7 +325,12 @@ TESTS = {name for name, block in BLOCKS.items() if "\ndef test_" in f"\n{block}"
 def test_every_block_is_run_and_no_python_stands_outside_of_a_fence():
     assert MAKERS.keys() | TESTS == BLOCKS.keys()
     assert not MAKERS.keys() & TESTS
-    assert {"README.md 3", "README.md 4", "verify-controller.md 1"} == TESTS
+    assert {
+        "README.md 3",
+        "README.md 4",
+        "structured-text.md 2",
+        "verify-controller.md 1",
+    } == TESTS
     for page in PAGES:
         rest = FENCED.sub("", page.read_text(encoding="utf-8"))
         assert not re.search(r"^    (with robolink|from robolink|import robolink)", rest, re.M), (
@@ -338,6 +346,18 @@ def test_a_block_runs(name, tmp_path, monkeypatch):
         then = given.pop("then", lambda: True)
         exec(compile(BLOCKS[name], name, "exec"), given)  # what it is to do: run what is shown
         assert then()
+
+
+def test_the_test_of_an_integrator_s_program_passes(tmp_path):
+    for name, text in program_texts().items():
+        (tmp_path / name).write_text(text)
+    given: dict[str, Any] = {}
+    exec(compile(BLOCKS["structured-text.md 2"], "structured-text.md 2", "exec"), given)
+    given["test_our_program_takes_a_tool"](tmp_path)
+    core = tmp_path / "robolink_core.st"
+    core.write_text(core.read_text().replace("kept.slots[o0].tool := pose;", "raw := 0;"))
+    with pytest.raises(RobolinkError):
+        given["test_our_program_takes_a_tool"](tmp_path)
 
 
 def test_the_tests_of_readme_pass_in_somebody_else_s_run(pytester):

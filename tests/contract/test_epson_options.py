@@ -52,6 +52,7 @@ HABITS: list[dict[str, Any]] = [
     {"error_state_after_failed_execute": False, "clear_selected_tool": "keeps"},
     {
         "clear_selected_tool": "error",
+        "xylim_counts": "flange",
         "login_without_parameter": "error_12",
         "missing_robot_number": "current",
         "robot_zero": "error_12",

@@ -63,7 +63,7 @@ class PlcChangeCell(ChangeCell):
     @property
     def owner(self) -> int:
         """Token of the client that owns the mailbox, 0 for nobody."""
-        return self._now().program.ownership.holder
+        return self._now().program.holder
 
     def writes(self) -> list[int]:
         """Return the slots that were written so far, in order."""

@@ -15,7 +15,7 @@ def test_every_rule_holds_in_forty_disturbed_hours(seed):
     story = run(seed, HOURS)
     assert story.broken == [], story.told()
     assert story.hours == HOURS
-    assert sum(story.met.values()) >= HOURS // 3  # they came to pass, and were not only drawn
+    assert sum(story.met.values()) >= HOURS // 2  # they came to pass, and were not only drawn
 
 
 def test_one_seed_is_one_history():

@@ -62,11 +62,36 @@ def test_the_same_command_again_is_acknowledged_and_not_carried_out():
         client.wait(0.05)
     assert client.acknowledged(command).state == CommandState.DONE
     assert client.slot(3).counter == 1
-    client.write(client.command(Opcode.CLEAR_TOOL, 3))
-    client.wait(0.05)
+
+
+@pytest.mark.fault("F27")
+@pytest.mark.parametrize("between", ["the owner's next", "another client's"])
+def test_a_command_of_before_is_not_carried_out_again_behind_another(between):
+    client, _ = owning()
+    command = client.command(Opcode.WRITE_TOOL, 3, pose=(1.0, 2.0, 3.0, 0.0, 0.0, 0.0))
     client.write(command)
     client.wait(0.05)
-    assert client.slot(3).counter == 3
+    if between == "another client's":
+        other = another(client)
+        other.write(other.command(Opcode.OWNERSHIP, 1))  # refused, and acknowledged
+    else:
+        client.write(client.command(Opcode.CLEAR_TOOL, 3))
+    client.wait(0.05)
+    changes = client.slot(3).counter
+    client.write(command)
+    client.wait(0.05)
+    assert client.slot(3).counter == changes
+    # What is new after that counts as ever.
+    assert client.done(Opcode.WRITE_TOOL, 4, name="next").state == CommandState.DONE
+
+
+def test_the_numbers_of_an_owner_go_on_behind_the_highest():
+    client, _ = owning()
+    client.sequence = 0xFFFE - 0x7FFF
+    for jump in (0x7FFF, 1, 1, 1):
+        client.sequence += jump - 1
+        assert client.done(Opcode.READ_TOOL).state == CommandState.DONE
+    assert client.now().ack_head == 2
 
 
 @pytest.mark.fault("F28")

@@ -14,7 +14,7 @@ SCHEMA: Final = "robolink/sim-state/1"
 
 
 class Flash:
-    """Keeps the tools and the selected tool (docs/reference/spel.md 6.1), and which robot it is.
+    """Keeps tools, what else a robot is told once, and which it is (docs/reference/spel.md 6.3).
 
     Args:
         path: Where; ``None`` keeps nothing.
@@ -25,12 +25,12 @@ class Flash:
         self._path = path
         self._machine = machine
         # Nothing is written yet: a serial number that was drawn is kept at the first occasion.
-        self._written: list[tuple[int, int]] | None = None
+        self._written: list[object] | None = None
 
     def restore(self) -> None:
-        """Give the machine the tools and the serial number of the file, if there is one.
+        """Give the machine what the file holds, if there is one.
 
-        A file of before serial numbers were drawn has none; the machine keeps its own then.
+        An older file lacks the serial number, or all but tools; the machine keeps its own then.
 
         Raises:
             ConfigError: The file cannot be read or is not of this robot.
@@ -46,6 +46,8 @@ class Flash:
             first.tools.restore(state["tools"])
             for other, tools in zip(others, state.get("other_tools", ()), strict=True):
                 other.tools.restore(tools)
+            for one, kept in zip(self._machine.robots, state.get("kept", ()), strict=False):
+                one.kept.restore(kept)
             serial = state.get("serial")
         except (OSError, KeyError, RecursionError, TypeError, ValueError) as error:
             raise ConfigError(
@@ -59,7 +61,7 @@ class Flash:
             self._written = self._mark()
 
     def save_changes(self) -> None:
-        """Write the file if a tool or the selection changed since it was written last.
+        """Write the file if something of that changed since it was written last.
 
         Raises:
             ConfigError: It cannot be written.
@@ -76,11 +78,12 @@ class Flash:
             "robot": first.model.name,
             "serial": first.serial,
             "tools": first.tools.to_state(),
+            "kept": [robot.kept.to_state() for robot in self._machine.robots],
         }
         if others:
             document["other_tools"] = [other.tools.to_state() for other in others]
         save_state(self._path, document)
 
-    def _mark(self) -> list[tuple[int, int]]:
-        tables = [robot.tools for robot in self._machine.robots]
-        return [(tools.flash_writes, tools.selected) for tools in tables]
+    def _mark(self) -> list[object]:
+        robots = self._machine.robots
+        return [(one.tools.flash_writes, one.tools.selected, one.kept.changes) for one in robots]

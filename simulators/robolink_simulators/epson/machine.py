@@ -10,6 +10,7 @@ from robolink_simulators.epson.arm.joints import Joints
 from robolink_simulators.epson.arm.motion_parameters import MotionParameters
 from robolink_simulators.epson.arm.robot_settings import RobotSettings
 from robolink_simulators.epson.arm.robots import RobotModel
+from robolink_simulators.epson.definitions.kept import KeptDefinitions
 from robolink_simulators.epson.memory.bits import IO_BITS, MEMORY_BITS, BitBank
 from robolink_simulators.epson.memory.control_points import ControlPoints
 from robolink_simulators.epson.memory.driven_robot import DrivenRobot
@@ -80,6 +81,7 @@ class Machine:
     settings = _OfTheRobotInForce[RobotSettings]()
     pallets = _OfTheRobotInForce[PalletTable]()
     control_points = _OfTheRobotInForce[ControlPoints]()
+    kept = _OfTheRobotInForce[KeptDefinitions]()
     sensed = _OfTheRobotInForce[bool]()
     till_met = _OfTheRobotInForce[bool]()
     found = _OfTheRobotInForce["Point | None"]()

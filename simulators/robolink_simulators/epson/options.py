@@ -122,6 +122,8 @@ class EpsonOptions:
         accel_max: Highest Accel in percent; AccelMax gives it [D: usually 100, R: 120].
         clear_selected_tool: What TLClr does to the tool in force: Tool 0 is selected, the
             number stays selected without a definition, or it is an error [U].
+        xylim_counts: What XYLim holds inside its limits: the tip of the selected tool, or the
+            flange [U].
         reset_outputs_off: Preference "Reset turns off outputs" [D].
         outputs_off_at_estop: Preference "Outputs off at emergency stop" [D; that it is on as
             delivered is assumed].
@@ -197,6 +199,7 @@ class EpsonOptions:
     number_lead_blank: bool = False
     accel_max: int = 120
     clear_selected_tool: Literal["selects_zero", "keeps", "error"] = "selects_zero"
+    xylim_counts: Literal["tip", "flange"] = "tip"
     reset_outputs_off: bool = True
     outputs_off_at_estop: bool = True
     dry_run: bool = False

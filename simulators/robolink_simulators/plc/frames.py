@@ -98,6 +98,10 @@ class Frames(ABC):
         """Add what a client sent."""
         self._buffer += data
 
+    def forget(self) -> None:
+        """Drop what is no whole request yet: on a serial line silence ends a frame."""
+        self._buffer = b""
+
     @abstractmethod
     def take(self) -> PlcRequest | None:
         """Return the next request, ``None`` while there is no whole one.

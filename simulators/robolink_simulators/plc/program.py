@@ -104,6 +104,14 @@ class PlcProgram:
         answered = self.memory.is_on(commit.answer) or self.memory.is_on(commit.error)
         return self._answer_at_ns is None and not answered
 
+    def start_anew(self) -> None:
+        """Switch the PLC off and on: its tools are retained, its signals are as at first."""
+        self._answer_at_ns = None
+        self.memory.switch(self._map.commit.request, False)
+        for slot in self._map.slots.values():
+            self._show(slot.components, self.in_force[slot.tool])
+        self._power_up()
+
     def _power_up(self) -> None:
         if self._map.probe is not None:
             number = self._map.probe.number

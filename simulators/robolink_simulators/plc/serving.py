@@ -54,7 +54,7 @@ class PlcLineHost(LineHost):
     """
 
     def __init__(self, simulator: PlcSimulator, map_file: Path, clock: ScaledClock) -> None:
-        super().__init__(_OnLine(simulator), clock=clock, lock=simulator.lock)
+        super().__init__(PlcOnLine(simulator), clock=clock, lock=simulator.lock)
         options = dict(PTY_LINE)
         if simulator.unit != _DEFAULT_UNIT:
             options["unit"] = str(simulator.unit)
@@ -63,7 +63,7 @@ class PlcLineHost(LineHost):
         )
 
 
-class _OnLine:
+class PlcOnLine:
     """The PLC as a line sees it: a :class:`~robolink_simulators.hosting.seam.WireDevice`."""
 
     def __init__(self, simulator: PlcSimulator) -> None:
@@ -72,6 +72,7 @@ class _OnLine:
         self.next_change = simulator.next_change
 
     def connect(self, now_ns: int) -> PlcLink:
+        """Listen at the line."""
         return self._simulator.connect(now_ns, LineFrames())
 
 

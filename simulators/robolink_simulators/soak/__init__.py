@@ -28,6 +28,7 @@ Where things stand: :mod:`.history` draws what happens, :mod:`.running` and :mod
 
 from collections.abc import Mapping
 
+from robolink_simulators.soak.drawing.hours import drawn_history as drawn_history
 from robolink_simulators.soak.history import CellKind as CellKind
 from robolink_simulators.soak.history import History as History
 from robolink_simulators.soak.running import live_through as live_through
@@ -50,4 +51,4 @@ def run(
         replacements: Objects to put in place of what dotted names lead to, meanwhile: defects
             that the rules have to find.
     """
-    return live_through(History.drawn(seed, hours, kind), replacements)
+    return live_through(drawn_history(seed, hours, kind), replacements)

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from robolink.timing import wall_label
+from robolink_simulators.soak.drawing.hours import drawn_history
 from robolink_simulators.soak.history import CellKind, History
 from robolink_simulators.soak.results import ResultsFile, SeedResult, summed_up
 from robolink_simulators.soak.running import live_through
@@ -56,7 +57,7 @@ def main(
     """Run whole simulated cells against seeded disturbances, and check the rules all the time."""
     own = None if kind is None else CellKind(kind)
     if seed is not None:
-        sys.exit(_one(History.drawn(seed, hours, own), replay, shrinks, write_test))
+        sys.exit(_one(drawn_history(seed, hours, own), replay, shrinks, write_test))
     if seeds is None:
         click.echo("\n".join(summed_up(ResultsFile(results).results())) or "nothing was run yet")
         return
@@ -83,7 +84,7 @@ def _range(seeds: range, hours: int, kind: CellKind | None, results: ResultsFile
         if seed in done:
             continue
         begun_s = time.process_time()
-        story = live_through(History.drawn(seed, hours, kind))
+        story = live_through(drawn_history(seed, hours, kind))
         result = SeedResult.of(story, ended_at=wall_label(), cpu_s=time.process_time() - begun_s)
         results.add(result)
         failed |= bool(story.broken)

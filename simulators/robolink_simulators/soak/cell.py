@@ -2,7 +2,7 @@
 
 import os
 import random
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final
@@ -18,25 +18,36 @@ from robolink.transaction import Wanted, change_tools
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.faults import DiskFault, FaultyDisk
 from robolink_simulators.soak.books import Books
+from robolink_simulators.soak.calling_back.plant import ProgramPlant
 from robolink_simulators.soak.computer import VirtualComputer, VirtualProcess
 from robolink_simulators.soak.history import CellKind, Disturbance, Hindrance, History, Hour
 from robolink_simulators.soak.people import (
     OTHERS_TOOL,
-    carry_out,
     describe,
     habits_in,
-    put_right,
     wish_of,
 )
+from robolink_simulators.soak.plant.canopen import CanopenPlant
 from robolink_simulators.soak.plant.epson import PASSWORD, EpsonPlant
-from robolink_simulators.soak.plant.machine import PlantMachine, SentRequest
+from robolink_simulators.soak.plant.epson_serial import EpsonSerialPlant
+from robolink_simulators.soak.plant.machine import PlantMachine, SentRequest, WireTap
+from robolink_simulators.soak.plant.modbus import ModbusRtuPlant, ModbusTcpPlant
+from robolink_simulators.soak.plant.register_map import RegisterMapPlant
 from robolink_simulators.soak.plant.softmotion import SoftMotionPlant
 from robolink_simulators.soak.rules import Rulebook
 from robolink_simulators.soak.story import Story
 from robolink_simulators.soak.surroundings import SeededSurroundings
 from robolink_simulators.soak.threads import Killed, TurnTaking
 
-_PLANTS: Final = {CellKind.EPSON: EpsonPlant, CellKind.SOFTMOTION: SoftMotionPlant}
+_PLANTS: Final[Mapping[CellKind, Callable[[ManualClock, WireTap, int], PlantMachine]]] = {
+    CellKind.EPSON: EpsonPlant,
+    CellKind.SOFTMOTION: SoftMotionPlant,
+    CellKind.EPSON_SERIAL: EpsonSerialPlant,
+    CellKind.MODBUS_TCP: ModbusTcpPlant,
+    CellKind.MODBUS_RTU: ModbusRtuPlant,
+    CellKind.CANOPEN: CanopenPlant,
+    CellKind.REGISTER_MAP: RegisterMapPlant,
+}
 _TRIES: Final = 8
 """How often people try to get a cell going again; each time they look longer."""
 
@@ -45,8 +56,10 @@ _PAST_THE_SYSTEM: Final = ("bent", "truncated", "lost")
 
 _ON_WIRE: Final = (
     Hindrance.WIRE,
+    Hindrance.LINE,
     Hindrance.MACHINE,
     Hindrance.PENDANT,
+    Hindrance.PRODUCTION,
     Hindrance.ANOTHER_CLIENT,
 )
 
@@ -84,14 +97,18 @@ class VirtualCell:
             self._computer = VirtualComputer(self._folder, self._surroundings)
             self._books = Books(self._computer.journal)
             stack.callback(self._books.close)
-            self._plant: PlantMachine = _PLANTS[self._history.kind](
-                self._clock, self, self._history.seed
-            )
+            self._plant = self._built()
             self._rules = Rulebook(self.story, self._plant, self._books)
             for hour in self._history.hours:
                 self._live_through(hour)
             self._look_for_the_password()
         return self.story
+
+    def _built(self) -> PlantMachine:
+        seed = self._history.seed
+        if self._history.kind is CellKind.PROGRAM:
+            return ProgramPlant(self._clock, self, seed, self._turns)
+        return _PLANTS[self._history.kind](self._clock, self, seed)
 
     # What the machine's wire, and the checkpoints, tell.
 
@@ -101,6 +118,11 @@ class VirtualCell:
             raise Killed
         self._note(f"p{process.number} > {sent.text}")
         self._rules.leaving(process, sent)
+
+    def given(self, tool: int, value: ToolOffset) -> None:
+        """See a value that the machine's own program is about to be given."""
+        self._note(f"tool {tool} is to hold {value}")
+        self._rules.given(tool, value)
 
     def passed(self, process: VirtualProcess, text: str) -> None:
         """See that something has passed on the wire."""
@@ -212,9 +234,7 @@ class VirtualCell:
         self.story.begin_hour(hour.number)
         self._clock.advance_to(hour.number * 3600 * NS_PER_S)
         self._note(f"hour {hour.number}: {hour.habit.person} sets out to {hour.deed}")
-        world = self._plant.simulator.world
-        world.set_up(habits_in(hour.habit))
-        world.change_nozzle()
+        self._plant.prepare(habits_in(hour.habit))
         self._harm_the_journal(hour)
         self._rules.begin(hour, wish_of(hour))
         self._arm(hour)
@@ -274,8 +294,8 @@ class VirtualCell:
         try:
             with one_ending(), self._connected(process) as controller:
                 try:
-                    self._rules.now.report = carry_out(
-                        controller, hour, self._plant.simulator, self._note_said
+                    self._rules.now.report = self._plant.carry_out(
+                        controller, hour, self._note_said
                     )
                 except BaseException as raised:
                     error = raised
@@ -323,7 +343,7 @@ class VirtualCell:
         self._others = []
         self._at_work = None
         self._clock.advance(90.0)
-        self._plant.simulator.advance(self._clock.now_ns())
+        self._plant.advance()
 
     def _put_right(self, hour: Hour) -> tuple[bool, str]:
         """Let the people get the cell going again; return whether that came off, and why not."""
@@ -334,7 +354,7 @@ class VirtualCell:
             self._turns.current.owner = process
             try:
                 with self._connected(process) as controller:
-                    if put_right(controller, hour.habit, self._note_said):
+                    if self._plant.put_right(controller, hour.habit, self._note_said):
                         return True, ""
                 why = "something stays open"
             except JournalError as error:
@@ -354,7 +374,7 @@ class VirtualCell:
                 process.end()
             self._note(f"try {attempt + 1}: {why}")
             self._clock.advance(30.0 * 2**attempt)
-            self._plant.simulator.advance(self._clock.now_ns())
+            self._plant.advance()
         return False, why
 
     def _look_for_the_password(self) -> None:

@@ -55,10 +55,15 @@ class VirtualProcess:
         store = Store(place, read_only=False)
         self._journal = Journal(store, place.location, read_only=False)
         store.open()
+        return self.log_of(address, clock)
+
+    def log_of(self, controller: str, clock: Clock) -> JournalOutcomeLog:
+        """Return the record of another controller in the journal that is open."""
+        assert self._journal is not None  # noqa: S101 - for the type: it was opened
         signature = Signature(
             os_user=self.person, host="cell-pc", version="soak", operator=self.person
         )
-        return self._journal.log(address, signature=signature, holder=self._holder, clock=clock)
+        return self._journal.log(controller, signature=signature, holder=self._holder, clock=clock)
 
     def end(self) -> None:
         """End, by itself or not: the system closes what was open."""

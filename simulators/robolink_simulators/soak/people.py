@@ -15,9 +15,10 @@ from robolink.timing import Clock
 from robolink.transaction import Wanted, change_tools, plan_undo, recover, undo
 from robolink_simulators.assist.port import InProcessEyes
 from robolink_simulators.cell.world_parameters import WorldParameters
-from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.soak.history import Deed, Habit, Hour
-from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
+
+Tell = Callable[[str], None]
+"""Told what a person is shown, and does."""
 
 TOOL: Final = 1
 """Whose nozzle is changed; the cell's own tool."""
@@ -57,6 +58,8 @@ def wish_of(hour: Hour) -> Wish:
             return Wish(selects=TOOL)
         case Deed.UNDO:
             return Wish(undoes=True)
+        case Deed.PRODUCE:
+            return Wish()
 
 
 def habits_in(habit: Habit) -> WorldParameters:
@@ -72,18 +75,24 @@ def habits_in(habit: Habit) -> WorldParameters:
 def carry_out(
     controller: Controller,
     hour: Hour,
-    simulator: EpsonSimulator | SoftMotionSimulator,
-    tell: Callable[[str], None],
+    eyes: InProcessEyes | None,
+    tell: Tell,
 ) -> ChangeReport | None:
     """Do what the person of an hour set out to do; a report where a tip was measured.
+
+    Args:
+        controller: The controller.
+        hour: The hour.
+        eyes: What the person sees with; ``None`` where nothing is measured.
+        tell: Told what is shown.
 
     Raises:
         RobolinkError: It did not succeed.
     """
     wish = wish_of(hour)
-    if wish.measures:
+    if wish.measures and eyes is not None:
         controller.motors(True)
-        person = _PersonWithHabits.at(simulator, tell, controller.clock, hour.habit)
+        person = _PersonWithHabits.at(eyes, tell, controller.clock, hour.habit)
         return NozzleChange(controller, ChangePlan((ToolPlan(TOOL),)), operator=person).run()
     if wish.typed:
         wanted = [Wanted(n, offset, controller.tools.read(n)) for n, offset in wish.typed]
@@ -95,15 +104,28 @@ def carry_out(
     return None
 
 
-def put_right(controller: Controller, habit: Habit, tell: Callable[[str], None]) -> bool:
+def put_right(
+    controller: Controller,
+    habit: Habit,
+    tell: Tell,
+    *,
+    moved_by_robolink: bool = True,
+) -> bool:
     """Do what a person does after an accident; return whether nothing is left.
+
+    Args:
+        controller: The controller.
+        habit: Whose hour it is.
+        tell: Told what is shown.
+        moved_by_robolink: Whether robolink resets it and selects its tools.
 
     Raises:
         RobolinkError: It does not work yet.
     """
-    with suppress(NotReadyError):
-        controller.reset_fault()
-    controller.motors(True)
+    if moved_by_robolink:
+        with suppress(NotReadyError):
+            controller.reset_fault()
+        controller.motors(True)
 
     def looked(finding: Finding) -> bool:
         tell(f"gives their word: {finding.sentence}")
@@ -112,7 +134,7 @@ def put_right(controller: Controller, habit: Habit, tell: Callable[[str], None])
     done = recover(controller, keep=habit.keeps, confirm=looked)
     for finding in done.settled:
         tell(f"settled: {finding.verdict} {finding.marker.request}")
-    if controller.tools.selected() != TOOL:
+    if moved_by_robolink and controller.tools.selected() != TOOL:
         controller.tools.select(TOOL)
     return not done.left and not controller.outcomes.open_markers()
 
@@ -125,12 +147,12 @@ class _PersonWithHabits(AssistedOperator):
     @classmethod
     def at(
         cls,
-        simulator: EpsonSimulator | SoftMotionSimulator,
-        tell: Callable[[str], None],
+        eyes: InProcessEyes,
+        tell: Tell,
         clock: Clock,
         habit: Habit,
     ) -> "_PersonWithHabits":
-        person = cls.with_eyes(InProcessEyes(simulator), tell, clock=clock)
+        person = cls.with_eyes(eyes, tell, clock=clock)
         assert isinstance(person, cls)  # noqa: S101 - for the type: with_eyes makes the class it is called on
         person.declines = habit.declines
         return person

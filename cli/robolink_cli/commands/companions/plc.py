@@ -20,6 +20,13 @@ def plc() -> None:
 plc.add_command(check_map)
 
 
+def _symbols(given: tuple[str, str, str] | None) -> tuple[str, ...]:
+    names = given or ()
+    if not all(name.isascii() and name.isidentifier() for name in names):
+        raise click.BadParameter(tr("a symbol is one name without a dot"))
+    return names
+
+
 @plc.command("export")
 @click.argument("folder", metavar="DIR", type=click.Path(file_okay=False, path_type=Path))
 @click.option(
@@ -36,18 +43,34 @@ plc.add_command(check_map)
     show_default=True,
     help="First register of both blocks, counted from 0.",
 )
+@click.option(
+    "--kinematics",
+    default="",
+    metavar="NAME",
+    help="Kinematics of the axis group, such as Kin_Scara3_Z; opcode 30004 sets it again.",
+)
+@click.option(
+    "--read-modes",
+    nargs=3,
+    default=None,
+    metavar="SET ACTIVE LAST",
+    callback=lambda _, __, given: _symbols(given),
+    help="Symbols of SMC_READ_TOOL_MODE in your Library Manager, to read tools by the block.",
+)
 @click.option("--force", is_flag=True, help="Write over files that were changed.")
 @json_option
-def export(folder: Path, profile: str, base: int, force: bool) -> None:
-    """Write the register map, the CANopen data sheet and the data types of the mailbox.
+def export(
+    folder: Path, profile: str, base: int, kinematics: str, read_modes: tuple[str, ...], force: bool
+) -> None:
+    """Write the program of the mailbox, its register map and its CANopen data sheet.
 
-    docs/mailbox.md says what to do with them. Their licence is 0BSD: they may be used in a
+    docs/plc-program.md says what to do with them. Their licence is 0BSD: they may be used in a
     machine without any duty.
     """
     from robolink.protocols.mailbox import ExportProfile
     from robolink_cli.commands.companions.plc_export import export_texts, plc_texts
 
-    texts = plc_texts(ExportProfile(profile), base)
+    texts = plc_texts(ExportProfile(profile), base, kinematics, read_modes)
     written = [str(path) for path in export_texts(folder, texts, replace=force)]
     if json_is_on():
         emit_json("robolink/plc-export/1", {"files": written, "profile": profile, "base": base})

@@ -1,6 +1,6 @@
 """The files that a PLC programmer puts beside the mailbox program."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from robolink.errors import ConfigError
@@ -9,15 +9,40 @@ from robolink.messages import tr
 from robolink.protocols.mailbox import (
     ExportProfile,
     electronic_data_sheet,
+    error_table_csv,
+    find_kinematics,
+    plcopen_xml,
+    program_texts,
     register_map_csv,
     register_map_markdown,
     structured_text_types,
 )
 
 
-def plc_texts(profile: ExportProfile, base: int) -> Mapping[str, str]:
-    """Return the files by name; ``base`` is the first register of both blocks."""
+def plc_texts(
+    profile: ExportProfile, base: int, kinematics: str = "", read_modes: Sequence[str] = ()
+) -> Mapping[str, str]:
+    """Return the files by name.
+
+    Args:
+        profile: Which opcodes the program holds.
+        base: The first register of both blocks.
+        kinematics: Block name of the group's kinematics, for opcode 30004; empty for none.
+        read_modes: The three symbols of SMC_READ_TOOL_MODE, or none.
+
+    Raises:
+        ConfigError: There is no such kinematics.
+    """
+    if kinematics and find_kinematics(kinematics) is None:
+        raise ConfigError(
+            tr("{name} is no kinematics of the register map.", name=kinematics),
+            remedy=tr("See the table of kinematics in register_map.md."),
+        )
+    program = program_texts(profile, base=base, kinematics=kinematics, read_modes=read_modes)
     return {
+        **program,
+        "robolink_program.xml": plcopen_xml(program),
+        "errors.csv": error_table_csv(),
         "register_map.csv": register_map_csv(base),
         "register_map.md": register_map_markdown(profile, base),
         "robolink_mailbox.eds": electronic_data_sheet(),

@@ -2,11 +2,15 @@
 
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from robolink_cli.options.simulation import modbus_options, simulation_options
 from robolink_cli.session.context import json_option
+
+if TYPE_CHECKING:
+    from robolink_simulators.softmotion.mailbox.simulator import PlcMaker
 
 
 def _complete_kinematics(_: click.Context, __: click.Parameter, start: str) -> list[str]:
@@ -45,6 +49,12 @@ def _complete_kinematics(_: click.Context, __: click.Parameter, start: str) -> l
     metavar="NAME=VALUE",
     help="A parameter of the kinematics or a drive, for example dArmLength1=250. May be repeated.",
 )
+@click.option(
+    "--program",
+    metavar="DIR",
+    type=click.Path(exists=True, file_okay=False, path_type=Path),
+    help="Execute the program in this folder, as 'plc export' writes it, changed or not.",
+)
 @simulation_options
 @json_option
 def softmotion(
@@ -56,6 +66,7 @@ def softmotion(
     node: int,
     kinematics: str,
     parameters: tuple[str, ...],
+    program: Path | None,
     seed: int,
     state: Path | None,
     speed: float,
@@ -86,7 +97,18 @@ def softmotion(
         options=options_from_text(named_values(options, "--option profile=tools")),
         state_path=state,
         world=world_from(world),
+        make_plc=_plc_with(program),
     )
     buses = Buses(modbus_tcp, modbus_rtu, can, unit=unit, node=node, allow_remote=allow_remote)
     plan_faults(simulator, faults, buses.kinds)
     serve_plc(simulator, buses, speed=speed)
+
+
+def _plc_with(program: Path | None) -> "PlcMaker":
+    from robolink_simulators.softmotion.mailbox.plc import Plc
+
+    if program is None:
+        return Plc
+    from robolink_simulators.softmotion.program.structured_plc import program_plc, sources_in
+
+    return program_plc(sources_in(program))

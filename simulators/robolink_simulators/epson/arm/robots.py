@@ -124,6 +124,18 @@ class RobotModel:
         return _ROBOT_TYPES[self.mechanism]
 
     @property
+    def arm_values(self) -> tuple[float, ...]:
+        """What ArmSet lists of arm 0, mm and degrees (docs/reference/spel.md 6.2).
+
+        Of a SCARA the length of arm 2, two offsets, the length of arm 1, an offset: each offset
+        is 0. Of six axes the six lengths; that the other six are 0 is assumed.
+        """
+        if self.six_axes:
+            return (*self.lengths_mm, *(0.0,) * 6)
+        a1_mm, a2_mm = self.lengths_mm
+        return (a2_mm, 0.0, 0.0, a1_mm, 0.0)
+
+    @property
     def reach_mm(self) -> float:
         """No flange comes farther from the axis of joint 2, or of joint 1 of a SCARA."""
         return sum(self.lengths_mm[2:] if self.six_axes else self.lengths_mm)

@@ -17,6 +17,7 @@ from robolink_simulators.epson.arm.kinematics import (
 from robolink_simulators.epson.arm.motion_parameters import MotionParameters
 from robolink_simulators.epson.arm.robot_settings import RobotSettings
 from robolink_simulators.epson.arm.robots import RobotModel
+from robolink_simulators.epson.definitions.kept import KeptDefinitions
 from robolink_simulators.epson.memory.control_points import ControlPoints
 from robolink_simulators.epson.memory.pallets import PalletTable
 from robolink_simulators.epson.memory.points import LocalTable, Point, PointTable
@@ -41,6 +42,7 @@ class DrivenRobot:
         settings: What it is told about its load, its arm and its joints.
         pallets: Pallets 0 to 15.
         control_points: External control points 1 to 15.
+        kept: What it was told once and keeps, but for tools.
         sensed: Whether the last Jump was stopped by its Sense.
         till_met: Whether the last motion was stopped by its Till.
         found: Where the last Find met its condition, the selected tool's tip.
@@ -66,6 +68,7 @@ class DrivenRobot:
         self.settings = RobotSettings.of(model.axes)
         self.pallets = PalletTable()
         self.control_points = ControlPoints()
+        self.kept = KeptDefinitions(model.arm_values)
         self.sensed = False
         self.till_met = False
         self.found: Point | None = None
@@ -156,6 +159,7 @@ class DrivenRobot:
         self.points = PointTable()
         self.locals = LocalTable(tilting=self.model.six_axes)
         self.control_points.selected = 0
+        self.kept.limits.strict = False
 
     def _tip_of(self, flange: Pose) -> Pose:
         return tip_of(self.model, flange, self.offset, tool=self.tools.selected)

@@ -89,7 +89,7 @@ class TreeBuilder(Transformer[Token, tuple[Statement, ...]]):
 
     def arch_option(self, _: Token, number: Expression) -> MotionOptions:
         """Build ``C(n)``."""
-        return MotionOptions(frozenset({"c7"}), arch=number)
+        return MotionOptions(frozenset({"c"}), arch=number)
 
     def limz_option(self, word: Token, value: Expression | None) -> MotionOptions:
         """Build LimZ with or without a height."""

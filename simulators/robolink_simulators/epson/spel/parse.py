@@ -34,16 +34,16 @@ OF_OTHER_ROBOTS: Final = frozenset(_WORDS_OF_OTHER_ROBOTS.split())
 """Statements that the reference allows, for arms that this simulator has none of."""
 
 _WORDS_NOT_SIMULATED = """
-    arch armclr armset atrq autoljm box dispdev enctemper finedist hofs hordr hour jrange
+    atrq autoljm box dispdev enctemper finedist hofs hordr hour jrange
     limittorque limittorquelp limittorquestop limzmargin mcordr msgbox olaccel olrate opencom
     opennet outreal parsestr performmode plane plocal ptpboost ptrq qpdecelr qpdecels shutdown
-    softcp speedrlimitation syncrobots taskstate tclim tcspeed xylim xylimmode diffpoint
+    softcp speedrlimitation syncrobots taskstate tclim tcspeed diffpoint
     atclr boxclr calib closecom closenet close cls copy curve cvmove
     del eresume error exportpoints flush fmtstr homeclr hofsjointaccuracy importpoints
     input inputbox latchenable line loadpoints mcal mkdir
     pdescription planeclr ptclr ptran qp randomize read redim rename resetelapsedtime savepoints
     setcom setinreal setlatch setnet signal simset taskwait tc tmreset toff ton
-    vcal vcalpoints waitnet waitsig write writebin xylimclr abortmotion
+    vcal vcalpoints waitnet waitsig write writebin abortmotion
     cont restart recover vdefgetmotionrange vdefsetmotionrange vshowmodel vtrain
     sysconfig workque_list cnv_quelist history clearhistory
 """

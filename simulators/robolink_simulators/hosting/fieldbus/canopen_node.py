@@ -1,7 +1,6 @@
 """Serves a simulated PLC as a CANopen node."""
 
 import logging
-import struct
 import threading
 from dataclasses import dataclass
 from typing import Any, Final
@@ -12,30 +11,14 @@ import canopen
 from robolink.closing import ClosedAtExit
 from robolink.errors import ConfigError, ConnectError
 from robolink.messages import tr
-from robolink.protocols.mailbox import COMMAND
 from robolink.timing import NS_PER_S
 from robolink_simulators.cell.clock import ScaledClock
-from robolink_simulators.faults import LinkKind
-from robolink_simulators.hosting.fieldbus.canopen_objects import (
-    MailboxObjects,
-    object_dictionary,
-)
-from robolink_simulators.hosting.fieldbus.canopen_sdo import PlcSdoServer
+from robolink_simulators.hosting.fieldbus.canopen_face import LOOK_S, PERIOD_S, CanopenFace
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 for _name in ("can", "canopen"):  # they write to standard error when nobody listens
     logging.getLogger(_name).addHandler(logging.NullHandler())
 
-_BOOT_UP: Final = 0
-_OPERATIONAL: Final = 5
-_PRE_OPERATIONAL: Final = 127
-_ENTER_PRE_OPERATIONAL: Final = 128
-_TPDO1, _RPDO1, _HEARTBEAT = 0x180, 0x200, 0x700
-_HEAD: Final = struct.Struct("<HBBHH")
-_BEAT: Final = COMMAND["client_heartbeat"].word
-_LOOK_S: Final = 0.01
-_PERIOD_S: Final = 0.1
-"""Of the NMT heartbeat and of TPDO1's event timer, as the data sheet says."""
 _NOTIFIER_CYCLE_S: Final = 0.02
 MULTICAST_PORT: Final = 43113
 """python-can's own."""
@@ -92,24 +75,13 @@ class CanopenHost(ClosedAtExit):
         self.url = place.url
         self._simulator = simulator
         self._clock = clock
-        self._id = place.node
         self._network = network
-        self._starts = simulator.plc.starts
-        self._sent: tuple[int, ...] = ()
-        # canopen declares no types for what is used of it here.
-        node: Any = canopen.LocalNode(place.node, object_dictionary(place.node))
-        node.sdo = server = PlcSdoServer(node, real_seconds=self._real_seconds)
-        objects = MailboxObjects(simulator, clock.now_ns, server)
-        if not simulator.options.mailbox.snapshot_latched:
-            server.refresh_from(objects.fresh)
-        node.add_read_callback(objects.read)
-        node.add_write_callback(objects.write)
-        network.add_node(node)
-        self._node = node
-        network.subscribe(_RPDO1 + self._id, self._beaten)
+        self._face = CanopenFace(
+            simulator, place.node, clock, network, real_seconds=self._real_seconds
+        )
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._live, name="canopen host", daemon=True)
-        self._boot()
+        self._face.boot()
         self._thread.start()
 
     def close(self) -> None:
@@ -124,47 +96,13 @@ class CanopenHost(ClosedAtExit):
     def _real_seconds(self, simulated: float) -> float:
         return self._clock.real_seconds(self._clock.now_ns() + round(simulated * NS_PER_S))
 
-    def _boot(self) -> None:
-        """Announce a start; the client then has to start the node."""
-        self._node.nmt.on_command(0, bytes([_ENTER_PRE_OPERATIONAL, self._id]), 0.0)
-        self._network.send_message(_HEARTBEAT + self._id, bytes([_BOOT_UP]))
-
     def _live(self) -> None:
         """Send heads and heartbeats until the end."""
-        rounds = round(_PERIOD_S / _LOOK_S)
+        rounds = round(PERIOD_S / LOOK_S)
         count = 0
-        while not self._ending.wait(_LOOK_S):
+        while not self._ending.wait(LOOK_S):
             count += 1
-            due = count % rounds == 0
-            self._look_for_a_start()
-            operational = self._node.nmt.state == "OPERATIONAL"
-            if operational:
-                self._send_head(due=due)
-            if due:
-                state = _OPERATIONAL if operational else _PRE_OPERATIONAL
-                self._network.send_message(_HEARTBEAT + self._id, bytes([state]))
-
-    def _look_for_a_start(self) -> None:
-        if self._starts != self._simulator.plc.starts:
-            self._starts = self._simulator.plc.starts
-            self._boot()
-
-    def _send_head(self, *, due: bool) -> None:
-        """Send TPDO1 when something in it but the heartbeat changed, and when it is due."""
-        with self._simulator.lock:
-            now_ns = self._clock.now_ns()
-            self._simulator.advance(now_ns)
-            words = self._simulator.plc.response(now_ns)
-        head = (words[1], words[2], words[7], words[3])
-        if due or head != self._sent:
-            self._sent = head
-            self._network.send_message(_TPDO1 + self._id, _HEAD.pack(*head, words[9]))
-
-    def _beaten(self, _identifier: int, data: bytearray, _timestamp: float) -> None:
-        if len(data) == 2 and self._node.nmt.state == "OPERATIONAL":
-            with self._simulator.lock:
-                word = int.from_bytes(data, "little")
-                self._simulator.write(_BEAT, (word,), self._clock.now_ns(), LinkKind.CAN)
+            self._face.look(due=count % rounds == 0)
 
 
 def serve_canopen(

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Final
 
-from robolink_simulators.cell.clock import ScaledClock
+from robolink.timing import Clock
 from robolink_simulators.faults import LinkKind
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 from robolink_simulators.softmotion.mailbox.words.exchange import ServedAccess
@@ -33,7 +33,7 @@ class PlcRegisters:
     def __init__(
         self,
         simulator: SoftMotionSimulator,
-        clock: ScaledClock,
+        clock: Clock,
         link: LinkKind = LinkKind.MODBUS_TCP,
     ) -> None:
         self._link = link

@@ -36,7 +36,7 @@ def serve_serial(
         raise no_pseudo_terminal(error) from error
 
 
-class _SerialFace:
+class SerialFace:
     """A controller as its serial port shows it; see ``hosting.seam.WireDevice``."""
 
     def __init__(self, simulator: EpsonSimulator) -> None:
@@ -57,7 +57,7 @@ class EpsonLineHost(LineHost):
     """
 
     def __init__(self, simulator: EpsonSimulator, *, clock: ScaledClock, baud: int) -> None:
-        face = _SerialFace(simulator)
+        face = SerialFace(simulator)
         super().__init__(face, clock=clock, lock=simulator.lock, baud=baud)
         self._simulator = simulator
         options = {"baud": str(baud or _SHOWN_BAUD), **_told(serial_dialect(simulator.options))}

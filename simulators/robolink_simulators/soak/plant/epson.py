@@ -14,12 +14,13 @@ from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.faults import Fault, FaultAction
-from robolink_simulators.hosting.in_process.transport import InProcessTransport
+from robolink_simulators.hosting.seam import WireDevice
 from robolink_simulators.soak.computer import VirtualProcess
 from robolink_simulators.soak.history import Disturbance, Hindrance
+from robolink_simulators.soak.plant.lines.bent_line import BentTransport
 from robolink_simulators.soak.plant.machine import (
     MachineState,
-    PlantMachine,
+    PlantWithWorld,
     SentKind,
     SentRequest,
     WireTap,
@@ -33,13 +34,9 @@ _WRITES: Final = re.compile(r'\$Execute,"(?:TLSet (\d+), |TLClr (\d+))')
 _SELECTS: Final = re.compile(r'\$Execute,"Tool (\d+)"')
 _STOPS: Final = re.compile(r"\$(?:Abort|Stop)")
 _SOME_ERROR: Final = 2000
-_UNSEEN: Final = frozenset(
-    {FaultAction.GARBLE_REQUEST, FaultAction.GARBLE_REPLY, FaultAction.SWAP_BYTES}
-)
-"""Text has no checksum: a digit that is another digit cannot be told from the right one."""
 
 
-class EpsonPlant(PlantMachine):
+class EpsonPlant(PlantWithWorld):
     """An EPSON SCARA on Remote Ethernet.
 
     Args:
@@ -50,6 +47,7 @@ class EpsonPlant(PlantMachine):
 
     kind = "epson"
     address = "epson+sim://cell"
+    world = WorldParameters()
 
     def __init__(self, clock: ManualClock, tap: WireTap, seed: int) -> None:
         super().__init__(clock, tap)
@@ -58,13 +56,12 @@ class EpsonPlant(PlantMachine):
             seed=seed,
             password=Secret(PASSWORD),
             serial=f"SOAK{seed:06d}",
-            world=WorldParameters(),
+            world=self.world,
         )
         self._simulator.present_ns = clock.now_ns
         self._simulator.on_request = self._requested
-        self._links: dict[int, InProcessTransport] = {}
+        self._links: dict[int, TappedTransport] = {}
         self._moves = 0
-        self._planned: list[tuple[Disturbance, int]] = []
 
     @property
     def simulator(self) -> EpsonSimulator:
@@ -73,7 +70,9 @@ class EpsonPlant(PlantMachine):
 
     def connect(self, process: VirtualProcess, outcomes: OutcomeLog) -> Controller:
         """Log in."""
-        link = TappedTransport(self._simulator, self.clock, process, self.tap, self.address)
+        link = TappedTransport(
+            self._simulator, self._simulator, self.clock, process, self.tap, self.address
+        )
         self._links[process.number] = link
         return open_epson(text_line(link), outcomes=outcomes, password=Secret(PASSWORD))
 
@@ -101,13 +100,11 @@ class EpsonPlant(PlantMachine):
     def arm(self, disturbance: Disturbance) -> None:
         """Plan a fault of the wire, or what somebody does at the controller."""
         if disturbance.kind is Hindrance.PENDANT:
-            self._planned.append((disturbance, disturbance.at))
+            self.acts.plan(disturbance)
             return
-        action = FaultAction[disturbance.what]
-        self.undecided |= action in _UNSEEN
         self._simulator.faults.add(
             Fault(
-                action,
+                FaultAction[disturbance.what],
                 disturbance.at,
                 disturbance.match,
                 seconds=disturbance.seconds,
@@ -122,13 +119,12 @@ class EpsonPlant(PlantMachine):
         met = len(faults.fired)
         faults.clear()
         faults.fired.clear()
-        self._planned.clear()
-        return met
+        return met + self.acts.clear()
 
     def write_by_hand(self, tool: int, offset: ToolOffset) -> None:
         """Write a tool at the pendant."""
         self._simulator.machine.tools.set(tool, offset)
-        self.touched.add(tool)
+        self.note_hand(tool, offset)
 
     def repair(self) -> None:
         """Release, close, switch back to automatic; restart after a serious error."""
@@ -143,32 +139,32 @@ class EpsonPlant(PlantMachine):
         repeated = FaultAction.DUPLICATE_REQUEST in {f.action for f in self._simulator.faults.fired}
         if _MOVES.match(text) and not repeated:
             self._moves += 1
-        waiting: list[tuple[Disturbance, int]] = []
-        for disturbance, left in self._planned:
-            if disturbance.match not in text:
-                waiting.append((disturbance, left))
-            elif left:
-                waiting.append((disturbance, left - 1))
-            else:
-                old = self.state().tools.get(1, ToolOffset(12.0, -3.5, -20.0))
-                self.write_by_hand(1, ToolOffset(old.x_mm + 0.5, old.y_mm - 0.25, old.z_mm))
-        self._planned = waiting
+        for _ in self.acts.due(text):
+            old = self.state().tools.get(1, ToolOffset(12.0, -3.5, -20.0))
+            self.write_by_hand(1, ToolOffset(old.x_mm + 0.5, old.y_mm - 0.25, old.z_mm))
 
 
-class TappedTransport(InProcessTransport):
+class TappedTransport(BentTransport):
     """A process's connection, on which the adversary sees everything.
 
     Args:
-        simulator: Where it leads.
+        simulator: The controller.
+        device: Where it leads: the controller's network, or its serial line.
         clock: The virtual time.
         process: Whose it is.
         tap: Told of everything.
         address: Its URL.
+
+    Attributes:
+        ends_with_silence: Whether nothing may leave any more once an answer was given up.
     """
+
+    ends_with_silence = True
 
     def __init__(
         self,
         simulator: EpsonSimulator,
+        device: WireDevice,
         clock: ManualClock,
         process: VirtualProcess,
         tap: WireTap,
@@ -177,12 +173,19 @@ class TappedTransport(InProcessTransport):
         self._process = process
         self._tap = tap
         self._given_up = self._last = ""
-        super().__init__(parse_url(address), simulator, clock, simulator.lock, durable=True)
+        super().__init__(parse_url(address), device, clock, simulator.lock, durable=True)
+
+    def told(self, data: bytes, *, secret: bool) -> str:
+        """Return a request in words."""
+        return "$Login" if secret else data.decode("ascii", "replace").strip()
 
     def send(self, data: bytes, *, deadline: Deadline, secret: bool = False) -> None:
         """See :meth:`robolink.transport.Transport.send`."""
-        text = "$Login" if secret else data.decode("ascii", "replace").strip()
-        self._tap.leaving(self._process, replace(_classified(text), forbidden=self._given_up))
+        text = self.told(data, secret=secret)
+        if self.line is not None:
+            self.line.announce(text)
+        forbidden = self._given_up if self.ends_with_silence else ""
+        self._tap.leaving(self._process, replace(_classified(text), forbidden=forbidden))
         self._last = text
         try:
             super().send(data, deadline=deadline, secret=secret)

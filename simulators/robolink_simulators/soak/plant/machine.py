@@ -7,10 +7,16 @@ from enum import StrEnum
 from typing import Final, Protocol
 
 from robolink.model import Controller, OutcomeLog, ToolOffset
+from robolink.nozzle_change import ChangeReport
+from robolink_simulators.assist.port import InProcessEyes
 from robolink_simulators.cell.clock import ManualClock
+from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.plc.device import PlcSimulator
 from robolink_simulators.soak.computer import VirtualProcess
-from robolink_simulators.soak.history import Disturbance
+from robolink_simulators.soak.history import Disturbance, Habit, Hour
+from robolink_simulators.soak.people import Tell, carry_out, put_right
+from robolink_simulators.soak.plant.counted_acts import CountedActs
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 _ALIKE: Final = 0.0006
@@ -67,6 +73,9 @@ class WireTap(Protocol):
             Killed: The process is dead, so nothing leaves.
         """
 
+    def given(self, tool: int, value: ToolOffset) -> None:
+        """See a value that the machine's own program is about to be given."""
+
     def passed(self, process: VirtualProcess, text: str) -> None:
         """See that a request or an answer has passed; the process may be killed here."""
 
@@ -79,28 +88,68 @@ class PlantMachine(ABC):
         tap: Told of everything on the wire.
 
     Attributes:
+        moved_by_robolink: Whether robolink moves it, resets it and selects its tools.
+        calls_back: Whether its own program changes the tool, and calls robolink back.
         numbered: Whether its commands have numbers, so that one that comes twice counts once.
         touched: Tools that somebody past this computer has written since the last look.
+        by_hand: What they wrote last, by tool.
         moved_itself: Whether the tool in force was changed past this computer since then.
-        undecided: Whether what was written may have arrived bent, so that for a while the machine
-            may hold what nobody wanted.
+        acts: What is planned to happen past the wire, counted by requests.
+        values: Values that its own program was given since the last look.
     """
 
     kind: str
     address: str
+    moved_by_robolink: bool = True
+    calls_back: bool = False
     numbered: bool = False
 
     def __init__(self, clock: ManualClock, tap: WireTap) -> None:
         self.clock = clock
         self.tap = tap
         self.touched: set[int] = set()
+        self.by_hand: dict[int, ToolOffset] = {}
         self.moved_itself = False
-        self.undecided = False
+        self.acts = CountedActs()
+        self.values: list[ToolOffset] = []
 
     @property
     @abstractmethod
-    def simulator(self) -> EpsonSimulator | SoftMotionSimulator:
+    def simulator(self) -> EpsonSimulator | SoftMotionSimulator | PlcSimulator:
         """The simulated controller."""
+
+    @property
+    def eyes(self) -> InProcessEyes | None:
+        """What the person at the machine sees with; ``None`` where robolink moves nothing."""
+        return None
+
+    def tip_of(self, tool: int) -> ToolOffset | None:  # noqa: ARG002 - the form of those that know
+        """Return where a tool's tip really is, as far as the machine has a world."""
+        return None
+
+    @abstractmethod
+    def prepare(self, person: WorldParameters) -> None:
+        """Let a person begin an hour, with another nozzle where the machine has a world."""
+
+    def carry_out(self, controller: Controller, hour: Hour, tell: Tell) -> ChangeReport | None:
+        """Do what the person of an hour set out to do; a report where a tip was measured.
+
+        Raises:
+            RobolinkError: It did not succeed.
+        """
+        return carry_out(controller, hour, self.eyes, tell)
+
+    def put_right(self, controller: Controller, habit: Habit, tell: Tell) -> bool:
+        """Do what a person does after an accident; return whether nothing is left.
+
+        Raises:
+            RobolinkError: It does not work yet.
+        """
+        return put_right(controller, habit, tell, moved_by_robolink=self.moved_by_robolink)
+
+    def advance(self) -> None:
+        """Let the machine follow the time."""
+        self.simulator.advance(self.clock.now_ns())
 
     @abstractmethod
     def connect(self, process: VirtualProcess, outcomes: OutcomeLog) -> Controller:
@@ -136,6 +185,11 @@ class PlantMachine(ABC):
     def disarm(self) -> int:
         """Forget what was planned and was not met; return how much was met."""
 
+    def note_hand(self, tool: int, offset: ToolOffset) -> None:
+        """Note that somebody past this computer has written a tool."""
+        self.touched.add(tool)
+        self.by_hand[tool] = offset
+
     @abstractmethod
     def write_by_hand(self, tool: int, offset: ToolOffset) -> None:
         """Let somebody write a tool at the machine's own panel."""
@@ -150,3 +204,26 @@ class PlantMachine(ABC):
             return one is other
         pairs = zip(one.components(), other.components(), strict=True)
         return all(abs(a - b) <= _ALIKE for a, b in pairs)
+
+
+class PlantWithWorld(PlantMachine):
+    """A machine that robolink moves in a world with a pin, and a person at it."""
+
+    @property
+    @abstractmethod
+    def simulator(self) -> EpsonSimulator | SoftMotionSimulator:
+        """The simulated controller."""
+
+    @property
+    def eyes(self) -> InProcessEyes:
+        """See :attr:`PlantMachine.eyes`."""
+        return InProcessEyes(self.simulator)
+
+    def tip_of(self, tool: int) -> ToolOffset:
+        """See :meth:`PlantMachine.tip_of`."""
+        return self.simulator.world.tips[tool]
+
+    def prepare(self, person: WorldParameters) -> None:
+        """See :meth:`PlantMachine.prepare`."""
+        self.simulator.world.set_up(person)
+        self.simulator.world.change_nozzle()

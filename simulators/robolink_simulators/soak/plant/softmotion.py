@@ -1,53 +1,39 @@
 """A SoftMotion PLC in a virtual cell, and the mailbox link that leads to it."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from typing import Final
 
 from robolink.controllers.softmotion import open_softmotion
-from robolink.errors import TransportError
 from robolink.model import Controller, OutcomeLog, ToolOffset
-from robolink.protocols.mailbox import COMMAND, COMMAND_WORDS, Opcode, Words
-from robolink.transport import MailboxHead
+from robolink.protocols.mailbox import Words
+from robolink.transport import MailboxLink
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.faults import PlcFault, PlcFaultAction
+from robolink_simulators.faults.fieldbus import Order
 from robolink_simulators.hosting.in_process.mailbox_link import InProcessMailboxLink
 from robolink_simulators.soak.computer import VirtualProcess
 from robolink_simulators.soak.history import Disturbance, Hindrance
-from robolink_simulators.soak.plant.machine import (
-    MachineState,
-    PlantMachine,
-    SentKind,
-    SentRequest,
-    WireTap,
-)
-from robolink_simulators.soak.plant.seen_session import SeenSession, another_clients
+from robolink_simulators.soak.plant.counted_acts import CountedActs
+from robolink_simulators.soak.plant.machine import MachineState, PlantWithWorld, WireTap
+from robolink_simulators.soak.plant.mailbox_tap import TappedMailboxLink
+from robolink_simulators.soak.plant.production import MailboxProduction
+from robolink_simulators.soak.plant.seen_session import another_clients
 from robolink_simulators.softmotion.mailbox.option_text import PlcOptions
 from robolink_simulators.softmotion.mailbox.options import MailboxOptions
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
-from robolink_simulators.softmotion.mailbox.words.exchange import ServedAccess
 
-_KINDS: Final = {
-    Opcode.MOVE_DIRECT: SentKind.MOVE,
-    Opcode.MOVE_LINEAR: SentKind.MOVE,
-    Opcode.MOVE_UNTIL_INPUT: SentKind.MOVE,
-    Opcode.JOG: SentKind.MOVE,
-    Opcode.CONTINUE: SentKind.MOVE,
-    Opcode.WRITE_TOOL: SentKind.WRITE,
-    Opcode.CLEAR_TOOL: SentKind.WRITE,
-    Opcode.SELECT_TOOL: SentKind.SELECT,
-    Opcode.STOP: SentKind.STOP,
-    Opcode.HALT: SentKind.STOP,
-}
-_CHANGING: Final = (SentKind.MOVE, SentKind.WRITE)
+_TIMEOUT_S: Final = 3.0
+_WATCHDOGS_MS: Final = (0, 2000, 0, 500)
+"""Of the fieldbus, by seed: silence after which it zeroes what clients write; 0 never."""
+
+_ORDERS: Final[tuple[Order, ...]] = ("high_first", "pairs_swapped", "halves_swapped")
 _NEEDS_RESTART: Final = frozenset(
     {PlcFaultAction.FREEZE_HEARTBEAT, PlcFaultAction.WORD_ORDER, PlcFaultAction.SHIFT_MAP}
 )
-_I0, _OPCODE = COMMAND["i0"].word, COMMAND["opcode"].word
 
 
-class SoftMotionPlant(PlantMachine):
+class SoftMotionPlant(PlantWithWorld):
     """A PLC with the mailbox program and a SCARA behind it.
 
     Args:
@@ -62,15 +48,18 @@ class SoftMotionPlant(PlantMachine):
 
     def __init__(self, clock: ManualClock, tap: WireTap, seed: int) -> None:
         super().__init__(clock, tap)
-        options = PlcOptions(mailbox=MailboxOptions(device_id=1000 + seed))
+        watchdog_ms = _WATCHDOGS_MS[seed // 2 % len(_WATCHDOGS_MS)]
+        options = PlcOptions(mailbox=MailboxOptions(device_id=1000 + seed, watchdog_ms=watchdog_ms))
         self._simulator = SoftMotionSimulator(
             "Kin_Scara3_Z", seed=seed, options=options, world=WorldParameters()
         )
         self._simulator.present_ns = clock.now_ns
         self._simulator.durable = True
         self._simulator.on_request = self._requested
-        self._planned: list[tuple[Disturbance, int]] = []
-        self._rivals: list[tuple[Disturbance, int]] = []
+        self._simulator.on_reply = self._replied
+        self._production = MailboxProduction(self._simulator)
+        self._rivals = CountedActs()
+        self._taken_over: Words = ()
         self._starts = self._simulator.plc.memory.boot_id
         self._strange = False
 
@@ -81,8 +70,19 @@ class SoftMotionPlant(PlantMachine):
 
     def connect(self, process: VirtualProcess, outcomes: OutcomeLog) -> Controller:
         """Meet the mailbox."""
-        link = TappedMailboxLink(self, self.clock, process, self.tap, self.address)
-        return open_softmotion(link, outcomes=outcomes)
+        return open_softmotion(self.tapped(self.link(), process), outcomes=outcomes)
+
+    def link(self) -> MailboxLink:
+        """Open a link to the mailbox."""
+        return InProcessMailboxLink(self.address, self._simulator, self.clock, _TIMEOUT_S)
+
+    def tapped(self, link: MailboxLink, process: VirtualProcess) -> MailboxLink:
+        """Let the adversary see what passes on a link."""
+        return TappedMailboxLink(link, process, self.tap, self)
+
+    def announce(self, text: str, words: Sequence[int] = ()) -> None:
+        """Count a request before it leaves; a rival's block may take the place of this one."""
+        self._taken_over = another_clients(words) if self._rivals.due(text) and words else ()
 
     def hang_up(self, process: VirtualProcess) -> None:
         """A mailbox does not see that a client is gone; it hears no beat any more."""
@@ -109,11 +109,11 @@ class SoftMotionPlant(PlantMachine):
 
     def arm(self, disturbance: Disturbance) -> None:
         """Plan a fault of the fieldbus, or what happens to the PLC."""
-        if disturbance.kind is Hindrance.PENDANT:
-            self._planned.append((disturbance, disturbance.at))
+        if disturbance.kind in (Hindrance.PENDANT, Hindrance.PRODUCTION):
+            self.acts.plan(disturbance)
             return
         if disturbance.kind is Hindrance.ANOTHER_CLIENT:
-            self._rivals.append((disturbance, disturbance.at))
+            self._rivals.plan(disturbance)
             return
         self._simulator.faults.add(
             PlcFault(
@@ -122,6 +122,7 @@ class SoftMotionPlant(PlantMachine):
                 disturbance.match,
                 seconds=disturbance.seconds,
                 position=disturbance.position,
+                order=_ORDERS[(disturbance.position or 0) % len(_ORDERS)],
             )
         )
 
@@ -132,17 +133,7 @@ class SoftMotionPlant(PlantMachine):
         self._strange |= any(fault.action in _NEEDS_RESTART for fault in faults.fired)
         faults.clear()
         faults.fired.clear()
-        self._planned.clear()
-        self._rivals.clear()
-        return met
-
-    def taken_over(self, text: str) -> bool:
-        """Tell whether another client's block takes the place of this one."""
-        due = [one for one, left in self._rivals if one.match in text and not left]
-        self._rivals = [
-            (one, left - (one.match in text)) for one, left in self._rivals if one not in due
-        ]
-        return bool(due)
+        return met + self.acts.clear() + self._rivals.clear()
 
     @property
     def rejected(self) -> int:
@@ -155,7 +146,12 @@ class SoftMotionPlant(PlantMachine):
         del x, y, z
         values = (offset.x_mm, offset.y_mm, offset.z_mm, a, b, c)
         self._simulator.plc.memory.define(tool, values, "by hand")
-        self.touched.add(tool)
+        self.note_hand(tool, offset)
+
+    def advance(self) -> None:
+        """See :meth:`PlantMachine.advance`; the machine's own program goes on, too."""
+        super().advance()
+        self._production.look(self.clock.now_ns())
 
     def repair(self) -> None:
         """Release, permit, let the program go on."""
@@ -170,127 +166,22 @@ class SoftMotionPlant(PlantMachine):
             panel.shift_map(0)
             panel.restart()
 
+    def _replied(self, _number: int, text: str) -> None:
+        if self._taken_over and text.startswith("write_command"):
+            words, self._taken_over = self._taken_over, ()
+            self._simulator.plc.write(0, words, self.clock.now_ns())
+
     def _requested(self, _number: int, text: str) -> None:
-        waiting: list[tuple[Disturbance, int]] = []
-        for disturbance, left in self._planned:
-            if disturbance.match not in text:
-                waiting.append((disturbance, left))
-            elif left:
-                waiting.append((disturbance, left - 1))
-            else:
-                slot = self._simulator.plc.memory.slot(1)
-                if slot.defined:
-                    old = _offset(slot.tool)
-                    self.write_by_hand(1, ToolOffset(old.x_mm, old.y_mm, old.z_mm + 0.5))
-        self._planned = waiting
-
-
-class TappedMailboxLink(InProcessMailboxLink):
-    """A process's link to a PLC, on which the adversary sees everything.
-
-    Args:
-        plant: Where it leads.
-        clock: The virtual time.
-        process: Whose it is.
-        tap: Told of everything.
-        address: Its URL.
-        timeout_s: Longest wait for an answer.
-    """
-
-    def __init__(
-        self,
-        plant: SoftMotionPlant,
-        clock: ManualClock,
-        process: VirtualProcess,
-        tap: WireTap,
-        address: str,
-        timeout_s: float = 3.0,
-    ) -> None:
-        self._process = process
-        self._tap = tap
-        self._address = address
-        self._plant = plant
-        self._plc = plant.simulator
-        self._seen = SeenSession()
-        self._last = SentKind.OTHER
-        super().__init__(address, self._plc, clock, timeout_s)
-
-    def write_command(self, words: Sequence[int]) -> None:
-        """See :meth:`robolink.transport.MailboxLink.write_command`."""
-        forbidden = self._seen.written(words, self._plant.rejected)
-        sent = replace(_classified(words), forbidden=forbidden)
-        self._tap.leaving(self._process, sent)
-        self._last = sent.kind
-        replaced = self._plant.taken_over(sent.text)
-        self._exchange(lambda now_ns: self._arriving(words, now_ns, replaced=replaced))
-        self._tap.passed(self._process, f"wire sent {sent.text}")
-
-    def read_head(self) -> MailboxHead:
-        """See :meth:`robolink.transport.MailboxLink.read_head`."""
-        self._asks("read_head")
-        return super().read_head()
-
-    def read_response(self) -> Words:
-        """See :meth:`robolink.transport.MailboxLink.read_response`."""
-        self._asks("read_response")
-        words = super().read_response()
-        self._seen.answered(words)
-        self._process.overtaken |= self._seen.overtaken and self._last in _CHANGING
-        self._tap.passed(self._process, f"wire received {words[1]} {words[2]} {words[-2]:04x}")
-        return words
-
-    def read_slot(self, slot: int) -> Words:
-        """See :meth:`robolink.transport.MailboxLink.read_slot`."""
-        self._asks(f"read_slot {slot}")
-        return super().read_slot(slot)
-
-    def read_device(self) -> Words:
-        """See :meth:`robolink.transport.MailboxLink.read_device`."""
-        self._asks("read_device")
-        return super().read_device()
-
-    def beat(self, word: int) -> None:
-        """See :meth:`robolink.transport.MailboxLink.beat`."""
-        self._asks("beat")
-        super().beat(word)
-
-    def reopened(self, *, timeout_s: float) -> "TappedMailboxLink":
-        """See :meth:`robolink.transport.MailboxLink.reopened`."""
-        return TappedMailboxLink(
-            self._plant, self.clock, self._process, self._tap, self._address, timeout_s
-        )
-
-    def _arriving(self, words: Sequence[int], now_ns: int, *, replaced: bool) -> ServedAccess:
-        served = self._plc.write(0, words, now_ns)
-        if replaced:
-            self._plc.write(0, another_clients(words), now_ns)
-        return served
-
-    def _exchange(self, serve: Callable[[int], ServedAccess]) -> Words:
-        try:
-            return super()._exchange(serve)
-        except TransportError:
-            self._process.cut_off = True
-            raise
-
-    def _asks(self, text: str) -> None:
-        self._tap.leaving(self._process, SentRequest(SentKind.OTHER, text))
-
-
-def _classified(words: Sequence[int]) -> SentRequest:
-    opcode, operand = words[_OPCODE], words[_I0]
-    try:
-        name = Opcode(opcode).name
-    except ValueError:
-        name = str(opcode)
-    kind = _KINDS.get(Opcode(opcode), SentKind.OTHER) if name != str(opcode) else SentKind.OTHER
-    if opcode == Opcode.STOP and operand:
-        kind = SentKind.OTHER  # it releases the hold
-    if opcode == Opcode.JOG and not any(words[_I0 : _I0 + 2]):
-        kind = SentKind.STOP  # it ends the jog
-    tool = operand if kind in (SentKind.WRITE, SentKind.SELECT) else None
-    carried = " ".join(f"{word:04x}" for word in words[_OPCODE : COMMAND_WORDS - 3])
-    return SentRequest(kind, f"{name} {words[0]}: {carried}", tool)
+        now_ns = self.clock.now_ns()
+        self._production.look(now_ns)
+        for disturbance in self.acts.due(text):
+            if disturbance.kind is Hindrance.PRODUCTION:
+                self._production.begin(disturbance.seconds, now_ns)
+                continue
+            slot = self._simulator.plc.memory.slot(1)
+            if slot.defined:
+                old = _offset(slot.tool)
+                self.write_by_hand(1, ToolOffset(old.x_mm, old.y_mm, old.z_mm + 0.5))
 
 
 def _offset(tool: Sequence[float]) -> ToolOffset:

@@ -20,7 +20,7 @@ from robolink_simulators.soak.computer import VirtualProcess
 from robolink_simulators.soak.history import Hindrance
 from robolink_simulators.soak.people import OTHERS_TOOL, TOOL
 from robolink_simulators.soak.plant.machine import MachineState
-from robolink_simulators.soak.rules.so_far import Grounds
+from robolink_simulators.soak.rules.so_far import SURELY_MM, Grounds
 
 _HARM_THE_JOURNAL: Final = (Hindrance.DISK, Hindrance.POWER_CUT)
 _OUT_OF_REACH: Final = (
@@ -34,9 +34,6 @@ _OUT_OF_REACH: Final = (
 
 _TRIED: Final = {"rolled back", "not applied", "conflict", "unknown"}
 """What the journal says of a tool that was, or could not be, put back."""
-
-_SURELY_MM: Final = 0.5
-"""A tip that was certified and lies farther off than this is a wrong certificate in any case."""
 
 
 class EndRules:
@@ -64,7 +61,8 @@ class EndRules:
             code == UNKNOWN or not process.overtaken,
             f"it ends with {code}, and another client was answered in place of it",
         )
-        if self._on.books.trusted and code != UNKNOWN:
+        # A program that calls back tells what it left open when it calls again.
+        if self._on.books.trusted and code != UNKNOWN and not self._on.plant.calls_back:
             begun = [
                 m.request
                 for m in self._on.books.markers()
@@ -118,8 +116,8 @@ class EndRules:
 
     def _certified(self, report: ChangeReport, state: MachineState) -> None:
         (done,) = report.tools
-        truth = self._on.plant.simulator.world.tips[TOOL]
-        found = done.proposal.offset
+        truth, found = self._on.plant.tip_of(TOOL), done.proposal.offset
+        assert truth is not None  # noqa: S101 - for the type: it was measured
         error_mm = math.hypot(found.x_mm - truth.x_mm, found.y_mm - truth.y_mm)
         self._on.hold(
             "StateIsTold",
@@ -137,7 +135,7 @@ class EndRules:
             self._on.story.certified.append(error_mm <= within_mm)
             self._on.hold(
                 "TipIsWhereItSays",
-                error_mm <= _SURELY_MM,
+                error_mm <= SURELY_MM,
                 f"the tip is {error_mm:.3f} mm from where it was proved to be",
             )
 

@@ -1,12 +1,17 @@
 """What is left behind: before anybody acts, and when the people have put it right."""
 
+import math
 from collections.abc import Sequence
+from typing import Final
 
 from robolink.model import ToolOffset
 from robolink_simulators.soak.books import BookedMarker
 from robolink_simulators.soak.people import TOOL
 from robolink_simulators.soak.plant.machine import MachineState
-from robolink_simulators.soak.rules.so_far import Grounds
+from robolink_simulators.soak.rules.so_far import SURELY_MM, TOLERANCE_MM, Grounds
+
+_PROOFS: Final = ("verified", "proved, and kept by the program")
+"""What the record says of a value that was proved: by robolink, and by a program's touches."""
 
 
 class RestRules:
@@ -22,7 +27,9 @@ class RestRules:
 
     def left(self, state: MachineState) -> None:
         """Check what a deed left behind, however it ended, killed or not, before anybody acts."""
-        if state.selected != self._on.now.before.selected and not self._on.plant.moved_itself:
+        # A program that is stopped leaves what it had selected; it begins with its own tool again.
+        own = self._on.plant.moved_itself or self._on.plant.calls_back
+        if state.selected != self._on.now.before.selected and not own:
             self._on.hold(
                 "SameToolSelected",
                 bool(self._on.open_selection())
@@ -74,7 +81,7 @@ class RestRules:
             not known or self._on.plant.same(value, holds),
             f"tool {tool} is on record as {value}, it holds {holds}, and nothing is open",
         )
-        wanted = self._on.now.wanted.get(tool, [None])
+        wanted = [*self._on.now.wanted.get(tool, [None]), *self._on.plant.values]
         self._on.hold(
             "OnlyWantedValues",
             any(self._on.plant.same(one, holds) for one in wanted),
@@ -104,6 +111,21 @@ class RestRules:
             if tool in self._on.plant.touched or self._on.plant.same(holds, before):
                 continue
             self._on.hold("KeptOnProof", self._proved(tool, holds), f"tool {tool} keeps {holds}")
+            if self._on.plant.calls_back and holds is not None:
+                self._certified_by_program(holds)
+
+    def _certified_by_program(self, kept: ToolOffset) -> None:
+        """Compare a value that the machine's own program keeps with where the tip is."""
+        truth = self._on.plant.tip_of(TOOL)
+        if truth is None:
+            return
+        error_mm = math.hypot(kept.x_mm - truth.x_mm, kept.y_mm - truth.y_mm)
+        self._on.story.certified.append(error_mm <= TOLERANCE_MM)
+        self._on.hold(
+            "TipIsWhereItSays",
+            error_mm <= SURELY_MM,
+            f"the tip is {error_mm:.3f} mm from where the program was told that it is",
+        )
 
     def _proved(self, tool: int, holds: ToolOffset | None) -> bool:
         """Tell whether a new value rests on a proof, or on a person's word."""
@@ -113,4 +135,4 @@ class RestRules:
         if self._on.now.wish.undoes or self._on.now.hour.habit.keeps:
             return True
         verdicts = self._on.books.verdicts(self._on.now.entries, tool)
-        return any(kind == "done" and verdict == "verified" for kind, verdict in verdicts)
+        return any(kind == "done" and verdict in _PROOFS for kind, verdict in verdicts)

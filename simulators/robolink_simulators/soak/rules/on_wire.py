@@ -89,6 +89,24 @@ class WireRules:
             wanted.append(read_offset(marker.details.get("requested")))
             wanted.append(read_offset(marker.details.get("before")))
 
+    def given(self, tool: int, value: ToolOffset) -> None:
+        """Check a value that the machine's own program is about to be given, and to write."""
+        if not self._on.books.trusted:
+            return
+        whole = [
+            marker
+            for marker in self._on.books.markers()
+            if marker.kind == "change" and str(tool) in marker.details["tools"]
+        ]
+        self._on.hold(
+            "NothingWithoutRecord",
+            any(
+                self._on.plant.same(read_offset(m.details["tools"][str(tool)]["requested"]), value)
+                for m in whole
+            ),
+            f"the program is given {value} for tool {tool} without a marker",
+        )
+
     def _after_stop(
         self, process: VirtualProcess, sent: SentRequest, markers: Sequence[BookedMarker]
     ) -> None:
@@ -116,6 +134,7 @@ class WireRules:
         before: list[ToolOffset | None] = [
             self._on.now.first.tools.get(tool),
             self._on.now.before.tools.get(tool),
+            self._on.plant.by_hand.get(tool),  # it was there before the change, if not at first
         ]
         # A marker that could not be stored any more: the change around it says what it was.
         return not ours or any(self._on.plant.same(one, wanted) for one in before)

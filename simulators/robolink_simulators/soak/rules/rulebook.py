@@ -39,6 +39,8 @@ class Rulebook(Grounds):
         for tool, offset in state.tools.items():
             self.now.wanted[tool] = [offset]
         self.plant.touched.clear()
+        self.plant.by_hand.clear()
+        self.plant.values.clear()
         self.plant.moved_itself = False
 
     def begin_again(self) -> None:
@@ -56,6 +58,10 @@ class Rulebook(Grounds):
     def leaving(self, process: VirtualProcess, sent: SentRequest) -> None:
         """Check a request that is about to leave a process."""
         self._on_wire.leaving(process, sent)
+
+    def given(self, tool: int, value: ToolOffset) -> None:
+        """Check a value before the machine's own program is given it."""
+        self._on_wire.given(tool, value)
 
     def stopped(self) -> None:
         """Check the machine at the moment in which a stop is acknowledged."""

@@ -38,6 +38,12 @@ NAMES: Final = (
 )
 """Every rule, in the order in which they are listed."""
 
+SURELY_MM: Final = 0.5
+"""A tip that was certified and lies farther off than this is a wrong certificate in any case."""
+
+TOLERANCE_MM: Final = 0.1
+"""What the touches of a program's proof are held to."""
+
 
 @dataclass(slots=True)
 class HourSoFar:

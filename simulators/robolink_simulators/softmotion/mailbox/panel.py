@@ -60,7 +60,7 @@ class PlcPanel:
     def owned(self) -> bool:
         """Whether a client owns the mailbox."""
         with self._acting():
-            return self._plc.program.ownership.holder != 0
+            return self._plc.program.holder != 0
 
     def take_change_back(self) -> None:
         """Let the machine's own program say that it knows of the change (``xToolChanged``)."""
@@ -154,7 +154,7 @@ class PlcPanel:
     def take_ownership(self) -> None:
         """Let somebody else insist on the mailbox (F46)."""
         with self._acting() as now_ns:
-            self._plc.program.ownership.seize(now_ns)
+            self._plc.program.seize(now_ns)
 
     def restart(self) -> None:
         """Start the PLC anew; what is retained stays."""

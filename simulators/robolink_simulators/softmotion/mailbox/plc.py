@@ -1,13 +1,14 @@
 """A PLC: the axis group, its retained memory, and the mailbox program from start to start."""
 
 from collections.abc import Mapping
-from typing import Final
+from typing import Final, Protocol
 
 from robolink.protocols.mailbox import (
     COMMAND_WORDS,
     DEVICE_START,
     RESPONSE_WORDS,
     SLOT_WORDS,
+    Capability,
     WordOrder,
     Words,
     next_number,
@@ -21,9 +22,44 @@ from robolink_simulators.softmotion.mailbox.option_text import PlcOptions
 from robolink_simulators.softmotion.mailbox.outbox import HEAD, Outbox
 from robolink_simulators.softmotion.mailbox.program import MailboxProgram
 from robolink_simulators.softmotion.mailbox.retained import RetainedMemory
+from robolink_simulators.softmotion.mailbox.words.inbox import Inbox
 from robolink_simulators.softmotion.mailbox.words.units import UserUnits
 
 _PRESET_SLOT: Final = 1
+
+
+class RunningProgram(Protocol):
+    """A mailbox program from one PLC start to the next, as the rest of the PLC sees it."""
+
+    @property
+    def inbox(self) -> Inbox:
+        """What clients have written."""
+
+    @property
+    def capabilities(self) -> Capability:
+        """What it can be told."""
+
+    @property
+    def holder(self) -> int:
+        """Token of the owner, 0 for nobody."""
+
+    permitted: bool
+    """The machine's own permit (``xPermit``)."""
+
+    def write(self, first: int, words: Words, now_ns: int) -> None:
+        """Take what a client writes."""
+
+    def run(self, now_ns: int) -> None:
+        """Do what is due now."""
+
+    def zero_inputs(self, now_ns: int) -> None:
+        """Take the zeros that a fieldbus leaves when its watchdog expires."""
+
+    def next_change(self, now_ns: int) -> int | None:
+        """Return when ``run`` will next do something by itself, if ever."""
+
+    def seize(self, now_ns: int) -> None:
+        """Let a client take the mailbox that nobody here knows, because a person insists."""
 
 
 class Plc:
@@ -68,7 +104,8 @@ class Plc:
         self.estop_pressed = False
         self._start_ns = 0
         self._frozen: Words | None = None
-        self.program = self._new_program()
+        self._modelled = self._new_program()
+        self.program: RunningProgram = self._modelled
 
     @property
     def frozen(self) -> bool:
@@ -82,12 +119,11 @@ class Plc:
         enables the group, because no client can (assumed).
         """
         self.group.restart(self._kinematics)
-        self.memory.boot_id = next_number(self.memory.boot_id)
         self.starts += 1
         self._start_ns, self._frozen, self._beating_until_ns = now_ns, None, None
         self.tools.forget()
         permitted = self.program.permitted
-        self.program = self._new_program()
+        self._begin_program(now_ns)
         self.program.permitted = permitted
         self.group.power(on=not self.estop_pressed)
         if self._options.mailbox.profile == "tools":
@@ -111,7 +147,7 @@ class Plc:
         """Lay values of several words in another order from now on."""
         self._order = order
         self._outbox.lay_words(order)
-        self.program.inbox.lay_words(order)
+        self._modelled.inbox.lay_words(order)
 
     def thaw(self) -> None:
         """Let the mailbox program go on."""
@@ -135,13 +171,13 @@ class Plc:
 
     def output(self, now_ns: int) -> Words:
         """Return response, slots and device block, one behind the other."""
-        return self._frozen or self._outbox.words(self.program, self._heartbeat(now_ns))
+        return self._frozen or self._outbox.words(self._modelled, self._heartbeat(now_ns))
 
     def response(self, now_ns: int) -> Words:
         """Return the response block."""
         if self._frozen is not None:
             return self._frozen[:RESPONSE_WORDS]
-        return self._outbox.response(self.program, self._heartbeat(now_ns))
+        return self._outbox.response(self._modelled, self._heartbeat(now_ns))
 
     def read(self, first: int, count: int, now_ns: int) -> Words:
         """Return words of response, slots and device block."""
@@ -150,7 +186,7 @@ class Plc:
             return shifted + (0,) * (count - len(shifted))
         slot, offset = divmod(first - RESPONSE_WORDS, SLOT_WORDS)
         if self._frozen is None and first + count <= HEAD.words:
-            told = self._outbox.head(self.program, self._heartbeat(now_ns))
+            told = self._outbox.head(self._modelled, self._heartbeat(now_ns))
             return told[first : first + count]
         if first + count <= RESPONSE_WORDS:
             return self.response(now_ns)[first : first + count]
@@ -170,6 +206,13 @@ class Plc:
         cycle_ns = self._options.group.cycle_us * 1000
         until_ns = now_ns if self._beating_until_ns is None else self._beating_until_ns
         return (until_ns - self._start_ns) // cycle_ns & 0xFFFF
+
+    def _begin_program(self, now_ns: int) -> None:
+        """Start the mailbox program anew; it counts the start."""
+        del now_ns  # a program that counts time has use for it
+        self.memory.boot_id = next_number(self.memory.boot_id)
+        self._modelled = self._new_program()
+        self.program = self._modelled
 
     def _new_program(self) -> MailboxProgram:
         program = MailboxProgram(

@@ -101,6 +101,11 @@ class MailboxProgram:
             return self._tools.set_tool()
         return self._motion.latched(job) or self._answer
 
+    @property
+    def holder(self) -> int:
+        """Token of the owner, 0 for nobody."""
+        return self.ownership.holder
+
     def write(self, first: int, words: Sequence[int], now_ns: int) -> None:
         """Take what a client writes; it is looked at in the next cycle."""
         self.inbox.write(first, words)
@@ -125,6 +130,10 @@ class MailboxProgram:
         self.inbox.zero()
         self._plan_look(now_ns)
 
+    def seize(self, now_ns: int) -> None:
+        """Let a client take the mailbox that nobody here knows, because a person insists."""
+        self.ownership.seize(now_ns)
+
     def next_change(self, now_ns: int) -> int | None:
         """Return when :meth:`run` will next do something by itself, if ever."""
         deadline_ns = self._watch.deadline_ns
@@ -140,12 +149,13 @@ class MailboxProgram:
         self.jobs.follow()
 
     def _accept(self, command: Command, now_ns: int) -> None:
-        if self.ownership.owns(command):
+        owned = self.ownership.owns(command)
+        if owned:
             self.ownership.heard(now_ns)
         try:
             self._require_admitted(command)
             if self.jobs.in_work and command.opcode not in _ANYTIME:
-                self.inbox.hold_back(command)
+                self.inbox.hold_back(command, owned=owned)
                 self.jobs.note(Finished(command.sequence, CommandState.ERROR, ErrorClass.BUSY))
                 return
             told = self._carried_out(command, now_ns)
@@ -156,7 +166,7 @@ class MailboxProgram:
             job.reject(rejected.error_class, rejected.raw)
         named = self.ownership.answer() if command.opcode == Opcode.OWNERSHIP else Answer()
         self._answer = told.answer or named
-        self.inbox.accept(command)
+        self.inbox.accept(command, owned=owned)
         self.jobs.add(job)
 
     def _require_admitted(self, command: Command) -> None:

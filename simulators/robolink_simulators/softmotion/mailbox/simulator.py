@@ -16,7 +16,7 @@ from typing import Any, Final
 from robolink.protocols.mailbox import COMMAND, Opcode, Words
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.faults import LinkKind, PlcFault, PlcFaultAction
-from robolink_simulators.softmotion.catalogue import machine_named
+from robolink_simulators.softmotion.catalogue import MachineModel, machine_named
 from robolink_simulators.softmotion.kinematics.coordinates import CoordRef
 from robolink_simulators.softmotion.mailbox.mishaps import PlcMishaps
 from robolink_simulators.softmotion.mailbox.option_text import PlcOptions
@@ -38,6 +38,8 @@ _LOG_LINES: Final = 2000
 _TORN_S: Final = 0.02
 """Between the halves of a torn write for which no other time is given."""
 
+PlcMaker = Callable[[MachineModel, Mapping[str, float], PlcOptions], Plc]
+
 RequestHook = Callable[[int, str], None]
 """Called with the running number of a request and a text."""
 
@@ -53,6 +55,7 @@ class SoftMotionSimulator:
         state_path: File that keeps what retained memory keeps.
         faults: What is planned to go wrong.
         world: What goes wrong around the robot.
+        make_plc: Makes the controller, from machine, parameters and options.
 
     At first the machine stands ready: enabled, slot 1 defined and selected. With a state file
     of an earlier run it has just been switched on: without a tool and, in the profile
@@ -90,6 +93,7 @@ class SoftMotionSimulator:
         state_path: Path | None = None,
         faults: Iterable[PlcFault] = (),
         world: WorldParameters | None = None,
+        make_plc: PlcMaker = Plc,
     ) -> None:
         self.lock = threading.RLock()
         self.url = ""
@@ -109,7 +113,7 @@ class SoftMotionSimulator:
         self._overtaken: list[tuple[int, Words]] = []
         self.faults = WireFaults(faults, seed)
         given = dict(parameters or {})
-        self.plc = Plc(machine_named(kinematics, given), given, self.options)
+        self.plc = make_plc(machine_named(kinematics, given), given, self.options)
         self.world = SoftMotionWorld.seeded(self.plc.group, seed, world)
         self.panel = PlcPanel(self.plc, self.acting)
         self._mishaps = PlcMishaps(self.panel)

@@ -7,9 +7,17 @@ from datetime import datetime, timedelta
 from typing import Final
 
 from robolink.model import ToolOffset
+from robolink_simulators.epson.arm.kinematics import forward
 from robolink_simulators.epson.memory.bits import BitBank
 from robolink_simulators.epson.memory.points import AXES, Point
 from robolink_simulators.epson.refusals import OutOfReach, RefusalKind, SpelRefusal
+from robolink_simulators.epson.spel.expressions.defined.added_arms import ARM_FUNCTIONS
+from robolink_simulators.epson.spel.expressions.defined.arches import ARCH_FUNCTIONS
+from robolink_simulators.epson.spel.expressions.defined.xy_limits import (
+    LIMIT_FUNCTIONS,
+    corner_of_limits,
+    outside_limits_mm,
+)
 from robolink_simulators.epson.spel.expressions.joint_functions import (
     FLAG_FUNCTIONS,
     angles_to_pulses,
@@ -64,10 +72,10 @@ def _word(bank: BitBank, arguments: Arguments) -> int:
 
 def _reachable(session: Session, arguments: Arguments) -> Value:
     try:
-        session.machine.joints_for(as_point(arguments[0]))
+        joints = session.machine.joints_for(as_point(arguments[0]))
     except OutOfReach:
         return False
-    return True
+    return not outside_limits_mm(session, forward(session.machine.model, joints))
 
 
 def _distance(_: Session, arguments: Arguments) -> Value:
@@ -139,6 +147,9 @@ def _calibration_information(session: Session, arguments: Arguments) -> Value:
 MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     **{f"c{axis.lower()}": (range(1, 2), _coordinate(axis)) for axis in AXES},
     **{name: (range(2), function) for name, function in FLAG_FUNCTIONS.items()},
+    **ARCH_FUNCTIONS,
+    **ARM_FUNCTIONS,
+    **LIMIT_FUNCTIONS,
     "pagl": (range(2, 3), joint_of_point),
     "ppls": (range(2, 3), pulses_of_point),
     "avoidsingularity": (range(1), lambda s, _: s.machine.settings.avoid_singularity),
@@ -171,8 +182,6 @@ MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     "weight": (range(1, 2), lambda s, a: _item(load_of(s), a)),
     "inertia": (range(2), lambda s, a: _item(inertia_of(s), [as_number(x) + 1 for x in a])),
     "sfree": (range(1, 2), lambda s, a: int(as_integer(a[0]) in s.machine.settings.free_joints)),
-    "arm": (range(1), lambda *_: 0),
-    "armdef": (range(1, 2), lambda _, a: as_integer(a[0]) == 0),
     "ecp": (range(1), lambda s, _: s.machine.control_points.selected),
     "ecpdef": (range(1, 2), lambda s, a: s.machine.control_points.defined(as_integer(a[0]))),
     "agl": (range(1, 2), lambda s, a: _item(s.machine.arm.joints, a)),
@@ -297,6 +306,7 @@ POINT_FUNCTIONS: Final[dict[str, tuple[range, PointFunction]]] = {
     "findpos": (range(1), _found_position),
     "tlset": (range(1, 2), _tool_point),
     "local": (range(1, 2), _local_point),
+    "xylim": (range(1, 2), corner_of_limits),
     "vxtrans": (range(2, 4), _place_of_pixel),
     "ecpset": (range(1, 2), lambda s, a: Point(s.machine.control_points.get(as_integer(a[0])))),
 }

@@ -5,6 +5,7 @@ this one has ended (assumed simplification), what stands between them does not w
 """
 
 from robolink_simulators.epson.arm.trajectory import JointLeg, Leg
+from robolink_simulators.epson.arm.ways.arch import ArchedLeg
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.spel.statements.legs import go_leg, line_leg
 from robolink_simulators.epson.spel.tree import MotionStatement
@@ -38,6 +39,6 @@ def fall_ns(leg: Leg) -> int:
 def rest_of_way(machine: Machine, leg: Leg) -> Leg:
     """Return the way from where the arm stands to where a leg was to end."""
     end = leg.joints_at(leg.duration_ns)
-    if isinstance(leg, JointLeg):
+    if isinstance(leg, JointLeg | ArchedLeg):
         return go_leg(machine, machine.arm.joints, end)
     return line_leg(machine, machine.tip(), machine.tip_at(end), near=machine.arm.joints)

@@ -5,6 +5,8 @@ from robolink_simulators.epson.arm.joints import Joints
 from robolink_simulators.epson.arm.kinematics import flange_of, solve
 from robolink_simulators.epson.arm.motion_parameters import LIMZ_MARGIN_MM, MotionPhase
 from robolink_simulators.epson.arm.trajectory import Leg
+from robolink_simulators.epson.arm.ways.arch import arched
+from robolink_simulators.epson.definitions.arches import Arch
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
@@ -14,12 +16,19 @@ DESCENT = 2
 """Which leg of a Jump is the descent; Sense is looked at just before it (documented)."""
 
 
-def jump(machine: Machine, point: Point, limz_mm: float | None) -> list[Leg]:
-    """Plan a gate motion: up to LimZ, across, down (documented as C7, the default).
+def jump(
+    machine: Machine,
+    point: Point,
+    limz_mm: float | None,
+    *,
+    arch: Arch | None = None,
+    looks: bool = False,
+) -> list[Leg]:
+    """Plan a motion up to LimZ, across, down; ``arch`` rounds it, without one it is a gate (C7).
 
     LimZ is compared with joint 3, not with the tip (assumed: its default of 0 would else be
     out of reach under every tool that hangs down). The modifier's height counts in the
-    target's local (documented).
+    target's local (documented). ``looks`` is whether Sense is looked at before the descent.
 
     Raises:
         Refusal: Start or target lie above LimZ; the start's number is documented (4005).
@@ -35,11 +44,13 @@ def jump(machine: Machine, point: Point, limz_mm: float | None) -> list[Leg]:
             raise SpelRefusal(RefusalKind.ABOVE_LIMZ, f"{what} above LimZ")
     up = start.at_height(max(start.j3_mm, height_mm))
     across = end.at_height(max(end.j3_mm, height_mm))
-    return [
+    gate = [
         go_leg(machine, start, up, phase=MotionPhase.DEPART),
         go_leg(machine, up, across),
         go_leg(machine, across, end, phase=MotionPhase.APPROACH),
     ]
+    rounded = None if arch is None else arched(gate, arch, looks=looks)
+    return [*(rounded or gate)]
 
 
 def jump3(machine: Machine, points: tuple[Point, Point, Point]) -> list[Leg]:

@@ -11,7 +11,6 @@ from robolink.protocols.spel import PrintedWhere, format_tool_listing, format_wh
 from robolink.timing import NS_PER_S
 from robolink_simulators.epson.arm.joints import Joints
 from robolink_simulators.epson.arm.trajectory import Leg
-from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.bits import BitBank
 from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
@@ -25,6 +24,7 @@ from robolink_simulators.epson.spel.expressions.joint_functions import (
 from robolink_simulators.epson.spel.expressions.machine_functions import clock_of
 from robolink_simulators.epson.spel.expressions.printing import CRLF, number_text
 from robolink_simulators.epson.spel.expressions.values import out_of_range
+from robolink_simulators.epson.spel.statements.defined.xy_limits import require_within_limits
 from robolink_simulators.epson.spel.statements.legs import go_leg
 from robolink_simulators.epson.spel.statements.motion import require_drives
 from robolink_simulators.epson.spel.statements.points import POINT_STATEMENTS, point_argument
@@ -219,7 +219,7 @@ def _pulse(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
     machine = evaluator.session.machine
     require_drives(machine)
     counts = [evaluator.integer(argument) for argument in arguments]
-    return StatementOutcome(legs=[_leg_to_pulses(machine, counts)])
+    return StatementOutcome(legs=[_leg_to_pulses(evaluator, counts)])
 
 
 def _home(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
@@ -230,7 +230,7 @@ def _home(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
     if home is None:
         raise SpelRefusal(RefusalKind.HOME_UNDEFINED, "No home position is set")
     require_drives(machine)
-    return StatementOutcome(legs=[_leg_to_pulses(machine, home)])
+    return StatementOutcome(legs=[_leg_to_pulses(evaluator, home)])
 
 
 def _turn_joint(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
@@ -242,7 +242,7 @@ def _turn_joint(evaluator: Evaluator, command: KeywordStatement) -> StatementOut
     require_drives(machine)
     values = list(machine.arm.joints)
     values[number - 1] += float(evaluator.number(by))
-    return StatementOutcome(legs=[go_leg(machine, machine.arm.joints, Joints(*values))])
+    return StatementOutcome(legs=[_leg_of_joints(evaluator, Joints(*values))])
 
 
 def _clock(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
@@ -259,8 +259,15 @@ def _await_position(evaluator: Evaluator, command: KeywordStatement) -> Statemen
     return StatementOutcome(duration_ns=max(0, (arm.next_change() or arm.now_ns) - arm.now_ns))
 
 
-def _leg_to_pulses(machine: Machine, counts: Sequence[int]) -> Leg:
-    return go_leg(machine, machine.arm.joints, joints_at_pulses(machine, counts))
+def _leg_to_pulses(evaluator: Evaluator, counts: Sequence[int]) -> Leg:
+    return _leg_of_joints(evaluator, joints_at_pulses(evaluator.session.machine, counts))
+
+
+def _leg_of_joints(evaluator: Evaluator, joints: Joints) -> Leg:
+    machine = evaluator.session.machine
+    leg = go_leg(machine, machine.arm.joints, joints)
+    require_within_limits(evaluator.session, [leg], targets=())
+    return leg
 
 
 def _joint(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:

@@ -9,6 +9,7 @@ from robolink.model import Pose, rotate_xy
 from robolink_simulators.cell.frames import Frame, add, axis_and_angle, product, transposed
 from robolink_simulators.epson.arm.kinematics import frame_of
 from robolink_simulators.epson.arm.trajectory import Leg
+from robolink_simulators.epson.definitions.arches import GATE, Arch
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.points import (
     Coordinates,
@@ -20,6 +21,7 @@ from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.joint_functions import least_motion
 from robolink_simulators.epson.spel.expressions.values import out_of_range
+from robolink_simulators.epson.spel.statements.defined.xy_limits import require_within_limits
 from robolink_simulators.epson.spel.statements.jump import jump, jump3
 from robolink_simulators.epson.spel.statements.legs import go_leg, held_leg, line_leg
 from robolink_simulators.epson.spel.statements.through_points import ARC_VERBS, arc, passing
@@ -30,16 +32,15 @@ from robolink_simulators.epson.spel.tree import (
     SwitchOnTheWay,
 )
 
-HIGHEST_ARCH: Final = 7
-
 _SAME_MM = 0.001
 _SAME_DEG = 0.001
 
 # LJM leaves a SCARA's point unchanged (documented); TGo and BGo move six axes
-# the least. C0 to C7 all rise to LimZ, as C7 does.
+# the least. An arch rounds Jump; Jump3 comes to rest at its corners under each (assumed).
 _UNTIL_WORDS: Final = frozenset({"till", "find"})
 _LINE_WORDS: Final = frozenset({"cp", "rot"}) | _UNTIL_WORDS
-_GATE_WORDS: Final = frozenset({"cp", "sense", *(f"c{n}" for n in range(8))}) | _UNTIL_WORDS
+_ARCH_WORDS: Final = frozenset(f"c{n}" for n in range(GATE + 1))
+_GATE_WORDS: Final = frozenset({"cp", "sense", "c"}) | _ARCH_WORDS | _UNTIL_WORDS
 _WORDS: Final = {
     "go": frozenset({"cp", "ljm"}) | _UNTIL_WORDS,
     "tgo": frozenset({"cp"}) | _UNTIL_WORDS,
@@ -65,15 +66,21 @@ def plan(evaluator: Evaluator, motion: MotionStatement) -> list[Leg]:
     Raises:
         Refusal: Motors off, a free joint, a target out of reach, a wrong option ...
     """
+    legs = _planned(evaluator, motion)
+    # Only the last leg of a Jump ends at a target.
+    targets = legs[-1:] if motion.verb == "jump" else legs
+    require_within_limits(evaluator.session, legs, targets)
+    return legs
+
+
+def _planned(evaluator: Evaluator, motion: MotionStatement) -> list[Leg]:
     machine = evaluator.session.machine
     wrong = motion.options.words - _WORDS[motion.verb]
     if wrong:
         raise SpelRefusal(RefusalKind.SYNTAX, f"{motion.verb} knows no {', '.join(sorted(wrong))}")
     if len(motion.options.words & {*_UNTIL_WORDS, "sense"}) > 1:
         raise SpelRefusal(RefusalKind.SYNTAX, "A motion takes one of Till, Find and Sense")
-    arch = motion.options.arch
-    if arch is not None and not 0 <= evaluator.integer(arch) <= HIGHEST_ARCH:
-        raise out_of_range(f"There is no arch {evaluator.integer(arch)}")
+    arch = _arch(evaluator, motion)
     if motion.verb in ARC_VERBS:
         require_drives(machine)
         return [arc(evaluator, motion)]
@@ -85,7 +92,8 @@ def plan(evaluator: Evaluator, motion: MotionStatement) -> list[Leg]:
     match motion.verb:
         case "jump":
             height_mm = None if limz is None else float(evaluator.number(limz))
-            return jump(machine, points[0], height_mm)
+            looks = "sense" in motion.options.words
+            return jump(machine, points[0], height_mm, arch=arch, looks=looks)
         case "jump3" | "jump3cp":
             return jump3(machine, (points[0], points[1], points[2]))
         case "pass":
@@ -102,6 +110,20 @@ def plan(evaluator: Evaluator, motion: MotionStatement) -> list[Leg]:
             ljm = motion.options.ljm
             flag = 1 if ljm is None else evaluator.integer(ljm)
             return [go_leg(machine, machine.arm.joints, least_motion(machine, target, flag))]
+
+
+def _arch(evaluator: Evaluator, motion: MotionStatement) -> Arch | None:
+    """Return the arch that a motion names, ``None`` for a gate.
+
+    Raises:
+        Refusal: There is no such arch, or it names two.
+    """
+    numbers = [int(word[1]) for word in motion.options.words if word in _ARCH_WORDS]
+    if motion.options.arch is not None:
+        numbers.append(evaluator.integer(motion.options.arch))
+    if len(numbers) > 1:
+        raise SpelRefusal(RefusalKind.SYNTAX, "A motion takes one arch")
+    return evaluator.session.machine.kept.arches.get(numbers[0] if numbers else GATE)
 
 
 def _points(evaluator: Evaluator, motion: MotionStatement) -> list[Point]:

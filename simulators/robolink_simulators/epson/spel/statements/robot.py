@@ -1,4 +1,4 @@
-"""Keyword statements about load, arm, free joints and the home position.
+"""Keyword statements about load, free joints and the home position.
 
 Source: docs/reference/spel.md 6.2, 7.2, 7.3.
 """
@@ -14,6 +14,9 @@ from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.joint_functions import JOINT_COUNTS, another_robot
 from robolink_simulators.epson.spel.expressions.printing import CRLF, number_text
 from robolink_simulators.epson.spel.expressions.values import Number, out_of_range
+from robolink_simulators.epson.spel.statements.defined.added_arms import ARM_SETTINGS
+from robolink_simulators.epson.spel.statements.defined.arches import ARCH_SETTINGS
+from robolink_simulators.epson.spel.statements.defined.xy_limits import LIMIT_SETTINGS
 
 Numbers = Sequence[Number]
 Setting = Callable[[Machine, Numbers], str]
@@ -78,22 +81,6 @@ def _continuous_path(machine: Machine, values: Numbers) -> str:
         return number_text(int(machine.settings.continuous_path)) + CRLF
     machine.settings.continuous_path = bool(values[0])
     return ""
-
-
-def _numbered(kind: RefusalKind) -> Setting:
-    """Return Arm: number 0 is there, no other was ever defined."""
-
-    def choose(_: Machine, values: Numbers) -> str:
-        _expect(values, 0, 1)
-        if not values:
-            return "0" + CRLF
-        if not 0 <= values[0] <= 15:
-            raise out_of_range(f"There is no number {values[0]}")
-        if values[0]:
-            raise SpelRefusal(kind, f"Number {values[0]} is not defined")
-        return ""
-
-    return choose
 
 
 def _joints(machine: Machine, values: Numbers) -> set[int]:
@@ -178,12 +165,14 @@ def _range(machine: Machine, values: Numbers) -> str:
 
 
 ROBOT_SETTINGS: Final[dict[str, Setting]] = {
+    **ARCH_SETTINGS,
+    **ARM_SETTINGS,
+    **LIMIT_SETTINGS,
     "weight": _weight,
     "inertia": _inertia,
     "fine": _fine,
     "speedfactor": _speed_factor,
     "cp": _continuous_path,
-    "arm": _numbered(RefusalKind.ARM_UNDEFINED),
     "ecp": _control_point,
     "sfree": _free,
     "slock": _lock,

@@ -6,9 +6,9 @@ a program under test must not find its way to a real cell.
 
 import ipaddress
 import socket
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Protocol
 
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.values import LONGEST_STRING, out_of_range
@@ -27,6 +27,39 @@ _MOST_BYTES: Final = 65536
 _ENCODING: Final = "latin-1"
 
 Address = tuple[str, int]
+
+
+class PortLink(Protocol):
+    """What a port asks of a connection: what a socket has."""
+
+    def setblocking(self, flag: bool, /) -> None:
+        """See ``socket.socket.setblocking``."""
+
+    def settimeout(self, value: float | None, /) -> None:
+        """See ``socket.socket.settimeout``."""
+
+    def getsockopt(self, level: int, name: int, /) -> int:
+        """See ``socket.socket.getsockopt``."""
+
+    def getpeername(self) -> object:
+        """See ``socket.socket.getpeername``; raises OSError while there is no other end."""
+
+    def sendall(self, data: bytes, /) -> None:
+        """See ``socket.socket.sendall``."""
+
+    def recv(self, most: int, /) -> bytes:
+        """See ``socket.socket.recv``; raises BlockingIOError while nothing has come."""
+
+    def close(self) -> None:
+        """See ``socket.socket.close``."""
+
+
+def dialled(address: Address) -> PortLink:
+    """Return a socket that is being connected."""
+    link = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    link.setblocking(False)
+    link.connect_ex(address)
+    return link
 
 
 @dataclass(slots=True)
@@ -51,7 +84,7 @@ class _Port:
     settings: PortSettings | None = None
     owner: "SpelTask | None" = None
     listener: socket.socket | None = None
-    link: socket.socket | SerialLink | None = None
+    link: PortLink | SerialLink | None = None
     connected: bool = False
     received: bytearray = field(default_factory=bytearray)
 
@@ -75,11 +108,14 @@ class Ports:
         addresses: Where ports lead whatever SetNet says: a test puts free ports here.
 
     Attributes:
+        addresses: See above.
         devices: The serial line of each serial port that has one.
+        dial: Connects a port that is a client; what stands in for a network is put here.
     """
 
     def __init__(self, addresses: Mapping[int, Address] | None = None) -> None:
         self.addresses = dict(addresses or {})
+        self.dial: Callable[[Address], PortLink] = dialled
         self._ports = {number: _Port() for number in (*NUMBERS, *COM_NUMBERS)}
         self.devices: dict[int, str] = {}
 
@@ -114,9 +150,7 @@ class Ports:
                 port.listener = socket.create_server((host, tcp_port))
                 port.listener.setblocking(False)
             else:
-                port.link = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-                port.link.setblocking(False)
-                port.link.connect_ex((host, tcp_port))
+                port.link = self.dial((host, tcp_port))
         except OSError as error:
             port.close()
             raise SpelRefusal(RefusalKind.PORT_IN_USE, f"Port {number}: {error}") from error
@@ -306,7 +340,7 @@ class Ports:
 
     def _connect(self, number: int, port: _Port) -> None:
         """See whether the other end has answered; try again if it was not there."""
-        if not isinstance(port.link, socket.socket):
+        if port.link is None or isinstance(port.link, SerialLink):
             return
         error = port.link.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
         try:
@@ -314,9 +348,7 @@ class Ports:
         except OSError:
             if error:
                 port.link.close()
-                port.link = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-                port.link.setblocking(False)
-                port.link.connect_ex(self._address(number, port))
+                port.link = self.dial(self._address(number, port))
             return
         port.connected = True
 

@@ -17,6 +17,11 @@ from robolink_simulators.softmotion.mailbox.words.image import arranged
 
 _CRC: Final = COMMAND["crc"].word
 _HEARTBEAT: Final = COMMAND["client_heartbeat"].word
+_SEQUENCES: Final = 0xFFFF
+"""1 to 65535, and 1 again."""
+
+_MOST_AHEAD: Final = _SEQUENCES // 2
+"""What is farther ahead than this is behind (docs/mailbox.md, "When a command counts")."""
 
 
 class Inbox:
@@ -34,6 +39,7 @@ class Inbox:
         self._image = [0] * COMMAND_WORDS
         self._damaged: set[tuple[int, int]] = set()
         self._settled: list[tuple[int, int, int]] = []
+        self._newest: tuple[int, int, int] | None = None
         self.rejected = 0
 
     @property
@@ -70,15 +76,34 @@ class Inbox:
                 self._damaged.add((error.head, error.crc))
                 self.rejected = self.rejected + 1 & 0xFFFF
             return None
-        return None if self._fingerprint(command) in self._settled else command
+        if self._fingerprint(command) in self._settled or self._is_of_before(command):
+            return None
+        return command
 
-    def accept(self, command: Command) -> None:
-        """Remember a command: when it stands there again it is the same one."""
+    def accept(self, command: Command, *, owned: bool) -> None:
+        """Remember a command: when it stands there again it is the same one.
+
+        Args:
+            command: The command.
+            owned: Whether it came from the owner, who numbers its commands upwards.
+        """
         self._settled = [self._fingerprint(command)]
+        self._note_number(command, owned=owned)
 
-    def hold_back(self, command: Command) -> None:
+    def hold_back(self, command: Command, *, owned: bool) -> None:
         """Remember a command that came too early: it is not carried out later either."""
         self._settled.append(self._fingerprint(command))
+        self._note_number(command, owned=owned)
+
+    def _note_number(self, command: Command, *, owned: bool) -> None:
+        if owned:
+            self._newest = (command.owner, command.epoch, command.sequence)
+
+    def _is_of_before(self, command: Command) -> bool:
+        """Tell whether its owner has sent a newer one in this epoch: it comes late, or twice."""
+        if self._newest is None or (command.owner, command.epoch) != self._newest[:2]:
+            return False
+        return not 0 < (command.sequence - self._newest[2]) % _SEQUENCES <= _MOST_AHEAD
 
     def _fingerprint(self, command: Command) -> tuple[int, int, int]:
         return (command.owner, command.sequence, self._image[_CRC])

@@ -35,8 +35,11 @@ class UserUnits:
         return self.tool(frame).components()
 
     def given(self, frame: CoordRef) -> Six:
-        """Return a tool offset or pose in user units."""
-        x, y, z, a, b, c = frame.components()
+        """Return a tool offset or pose in user units.
+
+        There is no minus zero in it: a program that takes numbers apart has none.
+        """
+        x, y, z, a, b, c = (value + 0.0 for value in frame.components())
         return (x / self._mm, y / self._mm, z / self._mm, a, b, c)
 
     def axes(self, values: Six, kinds: Sequence[AxisKind]) -> Six:
@@ -45,7 +48,7 @@ class UserUnits:
 
     def given_axes(self, values: Sequence[float], kinds: Sequence[AxisKind]) -> Six:
         """Return axis values in user units and degrees; axes that are not there are 0."""
-        return _six(values, kinds, lambda value: value / self._mm)
+        return _six([value + 0.0 for value in values], kinds, lambda value: value / self._mm)
 
     def dynamics(self, numbers: Four, *, factors: bool = False) -> Dynamics:
         """Return velocity and the rest in mm, or unchanged when they are factors."""

@@ -1,0 +1,1 @@
+"""Ways of the arm that are more than one plain leg."""

@@ -1,0 +1,48 @@
+"""What one robot keeps over a power cycle besides its tools."""
+
+from collections.abc import Mapping, Sequence
+
+from robolink_simulators.epson.definitions.added_arms import AddedArms
+from robolink_simulators.epson.definitions.arches import ArchTable
+from robolink_simulators.epson.definitions.xy_limits import XYLimits
+
+
+class KeptDefinitions:
+    """What one robot is told once and keeps over a power cycle, but for its tools.
+
+    Args:
+        own_arm: The values of arm 0, as ArmSet lists them.
+
+    Attributes:
+        arches: Those of Jump.
+        arms: Added arms; that they are kept as tools are is assumed.
+        limits: Those of XYLim; that they are kept is assumed, their mode is not (documented).
+    """
+
+    def __init__(self, own_arm: Sequence[float]) -> None:
+        self.arches = ArchTable()
+        self.arms = AddedArms(own_arm)
+        self.limits = XYLimits()
+
+    @property
+    def changes(self) -> int:
+        """How often something of it was changed."""
+        return self.arches.changes + self.arms.changes + self.limits.changes
+
+    def to_state(self) -> dict[str, object]:
+        """Return what survives power-off, ready for JSON."""
+        return {
+            "arches": self.arches.to_state(),
+            "arms": self.arms.to_state(),
+            "limits": self.limits.to_state(),
+        }
+
+    def restore(self, state: Mapping[str, object]) -> None:
+        """Take over what :meth:`to_state` returned.
+
+        Raises:
+            KeyError, TypeError, ValueError: It is something else.
+        """
+        self.arches.restore(state["arches"])
+        self.arms.restore(state["arms"])
+        self.limits.restore(state["limits"])

@@ -1,0 +1,1 @@
+"""Functions about what a robot is told once and keeps."""

@@ -1,0 +1,1 @@
+"""Statements about what a robot is told once and keeps."""

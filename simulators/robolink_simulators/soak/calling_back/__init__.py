@@ -1,0 +1,1 @@
+"""Cells in which the production program measures, and calls robolink back for a verdict."""

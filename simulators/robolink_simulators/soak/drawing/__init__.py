@@ -1,0 +1,1 @@
+"""How a seed draws what happens to a cell: which hours, which faults, and when."""

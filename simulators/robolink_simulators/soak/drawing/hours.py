@@ -1,0 +1,209 @@
+"""The hours of a seed: which cell, which deeds, whose habits, and what gets in the way when."""
+
+import random
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Final
+
+from robolink_simulators.faults.instants import drawn_instant, drawn_rarity
+from robolink_simulators.soak.drawing.faults import (
+    LINE_KINDS,
+    MACHINE_FAULTS,
+    MAILBOX_KINDS,
+    WIRE_FAULTS,
+)
+from robolink_simulators.soak.drawing.lengths import length_of
+from robolink_simulators.soak.history import (
+    CellKind,
+    Deed,
+    Disturbance,
+    Habit,
+    Hindrance,
+    History,
+    Hour,
+)
+from robolink_simulators.soak.plant.lines.bent_line import LineBend
+
+_TURNS: Final = (
+    *(CellKind.EPSON, CellKind.SOFTMOTION) * 2,
+    CellKind.EPSON_SERIAL,
+    CellKind.MODBUS_RTU,
+    CellKind.EPSON,
+    CellKind.CANOPEN,
+    CellKind.REGISTER_MAP,
+    CellKind.PROGRAM,
+    CellKind.EPSON,
+    CellKind.SOFTMOTION,
+    CellKind.MODBUS_TCP,
+    CellKind.EPSON_SERIAL,
+    CellKind.MODBUS_RTU,
+    CellKind.SOFTMOTION,
+    CellKind.REGISTER_MAP,
+    CellKind.PROGRAM,
+    CellKind.EPSON,
+    CellKind.MODBUS_TCP,
+)
+"""What stands in the cells of seeds 0, 1, 2 .. 19, and so on."""
+
+_ANOTHER_SHARE: Final = 0.6
+_MOST: Final = 4
+_SHARES: Final = {
+    Deed.CHANGE_NOZZLE: 0.6,
+    Deed.SET_TOOL: 0.14,
+    Deed.SET_TWO: 0.1,
+    Deed.SELECT_TOOL: 0.06,
+    Deed.UNDO: 0.1,
+}
+_OF_REGISTERS: Final = (Deed.SET_TOOL, Deed.SET_TWO, Deed.UNDO)
+_HINDRANCES: Final = {
+    Hindrance.WIRE: 0.3,
+    Hindrance.MACHINE: 0.14,
+    Hindrance.STOP: 0.24,
+    Hindrance.KILL: 0.16,
+    Hindrance.POWER_CUT: 0.05,
+    Hindrance.PENDANT: 0.05,
+    Hindrance.SECOND_PERSON: 0.05,
+    Hindrance.DISK: 0.06,
+    Hindrance.CLOCK: 0.03,
+    Hindrance.INTERRUPT: 0.06,
+}
+_FAMILIES: Final[Mapping[CellKind, str]] = {
+    CellKind.EPSON: CellKind.EPSON.value,
+    CellKind.EPSON_SERIAL: CellKind.EPSON.value,
+    **dict.fromkeys(MAILBOX_KINDS, CellKind.SOFTMOTION.value),
+}
+"""Under which name the instants that tell are known, for kinds that have any."""
+
+_LINE_SHARE: Final = 0.2
+_PRODUCTION_SHARE: Final = 0.1
+_NO_ROBOLINK: Final = frozenset(
+    {Hindrance.STOP, Hindrance.PENDANT, Hindrance.SECOND_PERSON, Hindrance.INTERRUPT}
+)
+"""What a program that calls back does not have: nobody is at robolink's keyboard."""
+
+_DISK_FAULTS: Final = ("FULL", "UNWRITABLE", "SYNC_FAILS", "bent", "truncated", "lost")
+_BY_REQUESTS: Final = frozenset(
+    {
+        Hindrance.WIRE,
+        Hindrance.LINE,
+        Hindrance.MACHINE,
+        Hindrance.PENDANT,
+        Hindrance.PRODUCTION,
+    }
+)
+"""What is placed at a request that the machine receives; the rest at a point that is passed."""
+
+
+def drawn_history(seed: int, hours: int, kind: CellKind | None = None) -> History:
+    """Return the history of a seed.
+
+    Args:
+        seed: Decides everything.
+        hours: How many hours; each has one change and one disturbance at least.
+        kind: What stands in the cell; by default the seed decides.
+    """
+    own = kind or _TURNS[seed % len(_TURNS)]
+    return History(seed, own, tuple(_hour(seed, number, own) for number in range(hours)))
+
+
+def _hour(seed: int, number: int, kind: CellKind) -> Hour:
+    rng = random.Random(f"hour {number} of {seed}")
+    deeds = deeds_of(kind)
+    deed = rng.choices(list(deeds), list(deeds.values()))[0]
+    drawn = [_disturbance(rng, kind, deed)]
+    while rng.random() < _ANOTHER_SHARE and len(drawn) < _MOST:
+        drawn.append(_disturbance(rng, kind, deed))
+    rarely = random.Random(f"rare {number} of {seed}")
+    rare = drawn_rarity(rarely, _FAMILIES.get(kind, ""), deed.value)
+    if rare is not None:
+        drawn.append(Disturbance(Hindrance(rare.kind), rare.what, rare.match))
+    return Hour(number, deed, _habit(rng), tuple(drawn))
+
+
+def deeds_of(kind: CellKind) -> Mapping[Deed, float]:
+    """Return what is set out to do in a kind of cell, and how often."""
+    if kind is CellKind.PROGRAM:
+        return {Deed.PRODUCE: 1.0}
+    if kind is CellKind.REGISTER_MAP:
+        return {deed: _SHARES[deed] for deed in _OF_REGISTERS}
+    return _SHARES
+
+
+def _hindrances(kind: CellKind) -> Mapping[Hindrance, float]:
+    shares = dict(_HINDRANCES)
+    if kind in LINE_KINDS:
+        shares[Hindrance.LINE] = _LINE_SHARE
+    if kind in MAILBOX_KINDS:
+        shares[Hindrance.PRODUCTION] = _PRODUCTION_SHARE
+    if kind is CellKind.PROGRAM:
+        shares = {one: share for one, share in shares.items() if one not in _NO_ROBOLINK}
+    return shares
+
+
+def _habit(rng: random.Random) -> Habit:
+    habit = Habit(
+        person=rng.choice(("anna", "ben")),
+        keeps=rng.random() < 0.15,
+        impatient=rng.random() < 0.35,
+    )
+    if rng.random() < 0.75:
+        return habit
+    return replace(
+        habit,
+        **rng.choice(
+            (
+                {"stays_share": 1.0},
+                {"stays_share": 0.5},
+                {"types_ahead": True},
+                {"bias_mm": 0.3},
+                {"tires_mm": 0.1},
+                {"declines": True},
+            )
+        ),
+    )
+
+
+def _told_instant(rng: random.Random, kind: CellKind, deed: Deed) -> Disturbance | None:
+    """Return a fault at an instant that tells, mostly ``None``; only what the link can have."""
+    found = drawn_instant(rng, _FAMILIES.get(kind, ""), deed.value)
+    if found is None:
+        return None
+    instant, at = found
+    if instant.kind == Hindrance.WIRE and instant.what not in WIRE_FAULTS[kind]:
+        return None
+    seconds = rng.choice((0.0, 0.01, 5.0, 20.0))
+    return Disturbance(Hindrance(instant.kind), instant.what, instant.match, at, seconds)
+
+
+def _disturbance(rng: random.Random, kind: CellKind, deed: Deed) -> Disturbance:
+    if (told := _told_instant(rng, kind, deed)) is not None:
+        return told
+    length = length_of(kind, deed)
+    shares = _hindrances(kind)
+    hindrance = rng.choices(list(shares), list(shares.values()))[0]
+    places = length.requests if hindrance in _BY_REQUESTS else length.points
+    match, count = rng.choice(places)
+    at = rng.randrange(count)
+    what, seconds, position = "", 0.0, None
+    match hindrance:
+        case Hindrance.WIRE:
+            what = rng.choice(WIRE_FAULTS[kind])
+            seconds = rng.choice((0.05, 0.5, 2.0, 5.0, 20.0))
+            position = rng.choice((None, None, *range(12)))
+        case Hindrance.LINE:
+            what = rng.choice(list(LineBend)).name
+            position = rng.choice((None, *range(40)))
+        case Hindrance.MACHINE:
+            what = rng.choice(MACHINE_FAULTS[kind])
+            seconds = rng.choice((0.0, 0.0, 0.01, 0.3))
+            position = rng.randrange(3)
+        case Hindrance.PRODUCTION:
+            seconds = rng.choice((0.5, 3.0, 20.0))
+        case Hindrance.DISK:
+            what = rng.choice(_DISK_FAULTS)
+            match, at = "commit before", rng.randrange(max(1, length.commits))
+        case Hindrance.POWER_CUT:
+            what = rng.choice(("", "SYNC_LIES"))
+        case Hindrance.CLOCK:
+            seconds = rng.choice((-86400.0, -5.0, 3600.0, 40 * 86400.0))
+    return Disturbance(hindrance, what, match, at, seconds, position)

@@ -1,0 +1,1 @@
+"""What carries bytes to the machines of virtual cells, and bends them."""

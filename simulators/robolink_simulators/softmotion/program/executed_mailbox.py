@@ -1,0 +1,262 @@
+"""A mailbox program that is executed from its text, on the simulated axis group."""
+
+import re
+import struct
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+from robolink.protocols.mailbox import Capability, Command, Opcode, WordOrder, Words, encode_command
+from robolink_simulators.softmotion.group.axis_group import AxisGroup
+from robolink_simulators.softmotion.group.condition import SmcGroupState
+from robolink_simulators.softmotion.mailbox.option_text import PlcOptions
+from robolink_simulators.softmotion.mailbox.words.inbox import Inbox
+from robolink_simulators.softmotion.mailbox.words.units import UserUnits
+from robolink_simulators.softmotion.program.error_numbers import ErrorNumbers
+from robolink_simulators.softmotion.program.foreign_types import (
+    AXIS_GROUP,
+    READ_MODE,
+    SYMBOLS,
+    foreign_types,
+)
+from robolink_simulators.softmotion.program.motion_blocks import MotionBlocks
+from robolink_simulators.softmotion.program.reading_blocks import reading_blocks
+from robolink_simulators.softmotion.signals import SIGNALS
+from robolink_simulators.structured_text import SourceText, StructuredProgram
+from robolink_simulators.structured_text.data_types import DataType, OpaqueType
+from robolink_simulators.structured_text.program import ForeignParts
+
+MAIN: Final = "RL_PRG"
+FIRST_LEFT_OUT: Final = 25
+"""Cycles that are left out at first while nothing happens; then twice as many each time."""
+
+_GOING: Final = 1
+_REPLY: Final = 9
+"""Members of RL_Call: whether it is under way, and the state that the adapter replied."""
+_HEARTBEAT: Final = 9
+_TOOL_SLOT: Final = 11
+_CAPABILITIES: Final = 90
+_CRC: Final = 110
+_A_STRANGER: Final = 0x5EE7_0001
+_US: Final = 1000
+_SETTLE_CYCLES: Final = 6
+
+
+class ExecutedMailbox:
+    """One mailbox program, executed in the cycles of its task.
+
+    Args:
+        group: The axis group.
+        units: Of the mailbox.
+        kinematics: The word that names the kinematics.
+        sources: The program.
+        options: The PLC's habits.
+
+    Attributes:
+        structured: The program.
+        inbox: What clients have written.
+        cycles: Cycles executed since the program was loaded.
+
+    Raises:
+        StructuredTextError: A text is not in the subset.
+    """
+
+    def __init__(
+        self,
+        group: AxisGroup,
+        units: UserUnits,
+        kinematics: int,
+        sources: Sequence[SourceText],
+        options: PlcOptions,
+    ) -> None:
+        self.inbox = Inbox(WordOrder.LOW_FIRST)
+        self.cycles = 0
+        self._group = group
+        self._units = units
+        self._kinematics = kinematics
+        self._numbers = ErrorNumbers(options.group.numbers)
+        self._cycle_ns = options.mailbox.program_cycle_us * 1000
+        self._scanned_ns = -self._cycle_ns
+        self._restless = True
+        self._left_out = FIRST_LEFT_OUT
+        self._permitted = True
+        self._tool = group.tool
+        self.structured = StructuredProgram(sources, MAIN, foreign=self._foreign(sources))
+        self._seen: Words = ()
+
+    @property
+    def permitted(self) -> bool:
+        """The machine's own permit (``xPermit``)."""
+        return self._permitted
+
+    @permitted.setter
+    def permitted(self, on: bool) -> None:
+        self._permitted, self._restless = on, True
+
+    @property
+    def capabilities(self) -> Capability:
+        """What the program can be told."""
+        return Capability(self.words[_CAPABILITIES])
+
+    @property
+    def holder(self) -> int:
+        """Token of the owner, 0 for nobody."""
+        return int(self.structured.value("core.holder"))
+
+    @property
+    def selected(self) -> int:
+        """The slot that was selected last, 0 for none."""
+        return self.words[_TOOL_SLOT]
+
+    @property
+    def words(self) -> Words:
+        """Response, slots and device block, one behind the other."""
+        outbox, slots = self.structured.value("outbox"), self.structured.value("slotWords")
+        return (*outbox, *slots)
+
+    def start(self, now_ns: int) -> None:
+        """Give every variable what it holds at first; the first cycle is due."""
+        self.structured.restart()
+        self.inbox.zero()
+        self._tool = self._group.tool
+        self._wire()
+        self._scanned_ns = now_ns // self._cycle_ns * self._cycle_ns - self._cycle_ns
+
+    def tell_before(self, command: Words) -> None:
+        """Have a command carried out before time begins, as somebody did earlier today."""
+        self.inbox.write(0, command)
+        for _ in range(_SETTLE_CYCLES):
+            self._scan(self._scanned_ns)
+        self.inbox.zero()
+
+    def seize(self, now_ns: int) -> None:
+        """Let a client take the mailbox that nobody here knows, because a person insists."""
+        self.refresh(now_ns)
+        before = self.inbox.words
+        command = Command(0xFFFF, Opcode.OWNERSHIP, operands=(1, 1, 0, 0), owner=_A_STRANGER)
+        self.inbox.write(0, encode_command(command))
+        self._scan(self._scanned_ns)
+        self.inbox.write(0, before)
+        self._restless = True
+
+    def write(self, first: int, words: Words, now_ns: int) -> None:
+        """Take what a client writes; the program sees it in the next cycle."""
+        self.refresh(now_ns)
+        self.inbox.write(first, words)
+        self._restless = True
+
+    def zero_inputs(self, now_ns: int) -> None:
+        """Take the zeros that a fieldbus leaves when its watchdog expires."""
+        self.refresh(now_ns)
+        self.inbox.zero()
+        self._restless = True
+
+    def run(self, now_ns: int) -> None:
+        """Do what is due now."""
+        due_ns = self.next_change(now_ns)
+        if due_ns is not None and now_ns >= due_ns:
+            self._catch_up(now_ns)
+
+    def refresh(self, now_ns: int) -> None:
+        """Execute the cycle that began last, unless it has been, because somebody looks."""
+        self._catch_up(now_ns)
+        self._left_out = FIRST_LEFT_OUT
+
+    def _catch_up(self, now_ns: int) -> None:
+        began_ns = now_ns // self._cycle_ns * self._cycle_ns
+        if began_ns > self._scanned_ns:
+            self._scan(began_ns)
+
+    def next_change(self, now_ns: int) -> int | None:
+        """Return when the next cycle is due that is not left out."""
+        waits = 1 if self._restless else self._left_out
+        return max(
+            self._scanned_ns + waits * self._cycle_ns, now_ns // self._cycle_ns * self._cycle_ns
+        )
+
+    def _scan(self, began_ns: int) -> None:
+        self._scanned_ns = began_ns
+        self.cycles += 1
+        program, group = self.structured, self._group
+        program.put("inbox", list(self.inbox.words))
+        program.put("RL_Machine.xPermit", self._permitted)
+        program.put("RL_Machine.xPowered", group.status().powered)
+        program.put("RL_Machine.xAxisMoves", any(axis.moving_alone for axis in group.axes))
+        program.put("RL_Machine.xImaged", self._imaged())
+        if group.tool is not self._tool:
+            program.put("RL_Machine.xForeignTool", True)
+        inputs = [group.inputs.read(number, group.values) for number in range(SIGNALS)]
+        program.put("RL_Machine.inputs", inputs)
+        program.cycle(began_ns // _US)
+        self._tool = group.tool
+        self._switch_outputs()
+        self._judge_rest()
+
+    def _switch_outputs(self) -> None:
+        for number, on in enumerate(self.structured.value("RL_Machine.outputs")):
+            if self._group.outputs.read(number) is not on:
+                self._group.outputs.switch(number, on)
+
+    def _judge_rest(self) -> None:
+        """A cycle may be left out when this one was like the one before and nothing goes on."""
+        words = tuple(self.structured.value("outbox"))
+        still = (*words[:_HEARTBEAT], *words[_HEARTBEAT + 1 : _CRC])
+        going = any(call[_GOING] or call[_REPLY] for call in self._calls())
+        moving = self._group.state in (SmcGroupState.MOVING, SmcGroupState.STOPPING)
+        self._restless = still != self._seen or going or moving
+        self._left_out = FIRST_LEFT_OUT if self._restless else 2 * self._left_out
+        self._seen = still
+
+    def _calls(self) -> Sequence[Sequence[object]]:
+        try:
+            calls: Sequence[Sequence[object]] = self.structured.value("calls")
+        except KeyError:  # a program of another make
+            return ()
+        return calls
+
+    def _imaged(self) -> bool:
+        rotation = self._group.flange().rotation
+        return self._group.kinematics.orientation_image(rotation) is not None
+
+    def _wire(self) -> None:
+        """Give the program what an integrator writes into RL_Machine."""
+        program, kinds = self.structured, self._group.kinematics.kinds
+        unit = self._units.unit_um
+        low, high = _real_words(unit)
+        given: Mapping[str, object] = {
+            "xSimulated": True,
+            "kinematics": self._kinematics,
+            "axisCount": len(kinds),
+            "unitMm": unit / 1000.0,
+            "unitLow": low,
+            "unitHigh": high,
+        }
+        for name, value in given.items():
+            program.put(f"RL_Machine.{name}", value)
+        for name, number in self._numbers.members().items():
+            program.put(f"RL_Machine.numbers.{name}", number)
+
+    def _foreign(self, sources: Sequence[SourceText]) -> ForeignParts:
+        name = self._group.kinematics.name
+        types: dict[str, DataType] = dict(foreign_types())
+        own = OpaqueType(f"TRAFO.{name}")
+        types[own.name.upper()] = own
+        blocks = MotionBlocks(self._units, self._numbers, self._group.kinematics)
+        types |= blocks.blocks(own)
+        types |= reading_blocks(self._units, self._numbers)
+        symbols = {**SYMBOLS, READ_MODE: _read_modes(sources)}
+        return ForeignParts(types, symbols, {"AxisGroup": (AXIS_GROUP, self._group)})
+
+
+def _read_modes(sources: Sequence[SourceText]) -> Sequence[str]:
+    """Return the symbols of SMC_READ_TOOL_MODE in the order of the adapter's lines.
+
+    No document names them: whatever the text calls them are the set tool, that of the active
+    movement and that of the movement commanded last, one after the other.
+    """
+    named = (re.findall(r"SMC_READ_TOOL_MODE\.(\w+)", source.text) for source in sources)
+    return [name for names in named for name in names]
+
+
+def _real_words(number: float) -> tuple[int, int]:
+    low, high = struct.unpack("<HH", struct.pack("<f", number))
+    return low, high

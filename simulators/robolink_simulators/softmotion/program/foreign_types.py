@@ -1,0 +1,51 @@
+"""The data types of SoftMotion that a program names, as far as documents show them.
+
+Source: docs/reference/softmotion.md 1.3, 2.4, 2.6. That the union of positions calls its array
+``v`` is assumed, here and on one marked line of the exported adapter.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+from robolink_simulators.structured_text.data_types import (
+    BOOL,
+    ELEMENTARY,
+    LREAL,
+    ArrayType,
+    DataType,
+    Family,
+    OpaqueType,
+    ScalarType,
+    StructType,
+    members_of,
+)
+
+SIX: Final = ArrayType(((0, 5),), LREAL)
+MASKS: Final = ArrayType(((0, 5),), BOOL)
+ERROR_ID: Final = ELEMENTARY["DINT"]
+COORD_SYSTEM: Final = ScalarType("SMC_COORD_SYSTEM", Family.INTEGER, 16, True)
+BUFFER_MODE: Final = ScalarType("MC_BUFFER_MODE", Family.INTEGER, 16, True)
+READ_MODE: Final = ScalarType("SMC_READ_TOOL_MODE", Family.INTEGER, 16, True)
+AXIS_GROUP: Final = OpaqueType("AXIS_GROUP_REF_SM3")
+CONTINUE_DATA: Final = StructType("SMC_AXIS_GROUP_CONTINUE_DATA", members_of([("written", BOOL)]))
+COORD_REF: Final = StructType("MC_COORD_REF", members_of([(name, LREAL) for name in "xyzabc"]))
+POSITION: Final = StructType("SMC_POS_REF", members_of([("v", SIX)]))
+
+_SYSTEMS: Final = ("ACS", "MCS", "WCS", "PCS_1", "PCS_2", "TCS")
+_MODES: Final = (
+    "Aborting",
+    "Buffered",
+    "BlendingLow",
+    "BlendingPrevious",
+    "BlendingNext",
+    "BlendingHigh",
+)
+
+SYMBOLS: Final[Mapping[ScalarType, Sequence[str]]] = {COORD_SYSTEM: _SYSTEMS, BUFFER_MODE: _MODES}
+"""The names of enumerations, in the order of their numbers."""
+
+
+def foreign_types() -> Mapping[str, DataType]:
+    """Return the types by name, in capital letters."""
+    named = (READ_MODE, COORD_SYSTEM, BUFFER_MODE, AXIS_GROUP, CONTINUE_DATA, COORD_REF, POSITION)
+    return {of.name.upper(): of for of in named}

@@ -1,0 +1,170 @@
+"""A PLC whose mailbox program is executed from its own text.
+
+Theory of operation. The task runs at multiples of its period. At each, the inputs of the machine
+are put where the project wires them, the program is executed once, and its outputs are taken. A
+cycle in which nothing was written or read, nothing is under way and nothing has moved may be left
+out: at first 25 in a row, then twice as many each time. Heartbeat and timers go on in such steps.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Final
+
+from robolink.errors import ConfigError
+from robolink.files.named import read_named
+from robolink.messages import tr
+from robolink.protocols.mailbox import (
+    RESPONSE_WORDS,
+    Command,
+    Opcode,
+    WordOrder,
+    Words,
+    encode_command,
+    next_number,
+)
+from robolink_simulators.softmotion.catalogue import MachineModel
+from robolink_simulators.softmotion.group.condition import SmcGroupState
+from robolink_simulators.softmotion.kinematics.coordinates import CoordRef
+from robolink_simulators.softmotion.mailbox.option_text import PlcOptions
+from robolink_simulators.softmotion.mailbox.plc import Plc
+from robolink_simulators.softmotion.program.executed_mailbox import ExecutedMailbox
+from robolink_simulators.softmotion.program.program_memory import ProgramMemory
+from robolink_simulators.structured_text import SourceText, TextDialect
+
+PROGRAM_SOURCES: Final = (
+    ("robolink_core.st", TextDialect.COMMON),
+    ("RL_Kept.st", TextDialect.CODESYS),
+    ("RL_Machine.st", TextDialect.CODESYS),
+    ("robolink_softmotion.st", TextDialect.CODESYS),
+    ("robolink_program.st", TextDialect.CODESYS),
+)
+"""The files that are executed, and what each may hold."""
+
+_SOMEBODY: Final = 0x5EE7_0002
+_FIRST_SLOT: Final = 1
+
+
+class StructuredPlc(Plc):
+    """A controller, without its fieldbus, that executes Structured Text.
+
+    Args:
+        model: Kinematics and drives.
+        parameters: Those of the kinematics.
+        options: The PLC's habits; what only a modelled program has is refused.
+        sources: The program.
+
+    Raises:
+        ConfigError: The program cannot be read, or an option does not go with one.
+    """
+
+    def __init__(
+        self,
+        model: MachineModel,
+        parameters: Mapping[str, float],
+        options: PlcOptions,
+        sources: Iterable[SourceText],
+    ) -> None:
+        super().__init__(model, parameters, options)
+        mailbox = options.mailbox
+        if mailbox.word_order != "low_first" or not mailbox.identified:
+            raise _not_in_a_program()
+        self._executed = ExecutedMailbox(
+            self.group, self._units, self.tools.kinematics_code, tuple(sources), options
+        )
+        self.memory = ProgramMemory(self._executed.structured, mailbox.device_id)
+        self.program = self._executed
+
+    def start(self, now_ns: int) -> None:
+        """Start the PLC; the first cycle of the program finds the drives switched on."""
+        super().start(now_ns)
+        self._executed.refresh(now_ns)
+        self._take_over()
+
+    def make_ready(self, tool: CoordRef) -> None:
+        """Enable the group; somebody takes the mailbox, selects slot 1 and gives it back."""
+        if self.group.state is SmcGroupState.DISABLED:
+            self.group.enable()
+        x, y, z, a, b, c = self._units.given(tool)
+        self.memory.define(_FIRST_SLOT, (x, y, z, a, b, c), "nozzle")
+        sequence, epoch = 1, 0
+        wanted = ((Opcode.OWNERSHIP, 1), (Opcode.SELECT_TOOL, _FIRST_SLOT), (Opcode.OWNERSHIP, 0))
+        for opcode, operand in wanted:
+            command = Command(
+                sequence, opcode, operands=(operand, 0, 0, 0), owner=_SOMEBODY, epoch=epoch
+            )
+            self._executed.tell_before(encode_command(command))
+            sequence, epoch = next_number(sequence), self.memory.epoch
+        self.memory.tool_changed = False  # the machine's program has seen that
+        self._take_over()
+
+    def lay_words(self, order: WordOrder) -> None:
+        """Refuse: a program lays its words as its text says."""
+        del order
+        raise _not_in_a_program()
+
+    def freeze_heartbeat(self, now_ns: int) -> None:
+        """Refuse: the heartbeat is the program's own."""
+        del now_ns
+        raise _not_in_a_program()
+
+    def output(self, now_ns: int) -> Words:
+        """Return response, slots and device block, one behind the other."""
+        if self._frozen is not None:
+            return self._frozen
+        self._executed.refresh(now_ns)
+        self._take_over()
+        return self._executed.words
+
+    def response(self, now_ns: int) -> Words:
+        """Return the response block."""
+        return self.output(now_ns)[:RESPONSE_WORDS]
+
+    def read(self, first: int, count: int, now_ns: int) -> Words:
+        """Return words of response, slots and device block."""
+        shown = self.output(now_ns)[first + self.shift :][:count]
+        return shown + (0,) * (count - len(shown)) if self.shift else shown
+
+    def advance(self, now_ns: int) -> None:
+        """Let simulated time reach ``now_ns``, which is at most :meth:`next_change`."""
+        super().advance(now_ns)
+        self._take_over()
+
+    def _take_over(self) -> None:
+        self.tools.selected = self._executed.selected
+
+    def _begin_program(self, now_ns: int) -> None:
+        self._executed.start(now_ns)
+
+
+def program_plc(
+    sources: Iterable[SourceText],
+) -> Callable[[MachineModel, Mapping[str, float], PlcOptions], Plc]:
+    """Return what makes a PLC that executes these texts, for ``SoftMotionSimulator``."""
+    texts = tuple(sources)
+    return lambda model, parameters, options: StructuredPlc(model, parameters, options, texts)
+
+
+def sources_in(folder: Path) -> tuple[SourceText, ...]:
+    """Return the texts of a program that ``plc export`` wrote, changed or not.
+
+    Raises:
+        ConfigError: A file is missing, or cannot be read.
+    """
+    sources = []
+    for name, dialect in PROGRAM_SOURCES:
+        try:
+            text = read_named(folder / name).decode()
+        except (OSError, UnicodeError) as error:
+            raise ConfigError(
+                tr("{path} cannot be read: {cause}.", path=folder / name, cause=error),
+                remedy=tr("Name a folder that 'robolink plc export' has written."),
+            ) from error
+        sources.append(SourceText(name, text, dialect))
+    return tuple(sources)
+
+
+def _not_in_a_program() -> ConfigError:
+    return ConfigError(
+        tr("A program that is executed from its text cannot be bent like that."),
+        remedy=tr("Change its text, or simulate without one."),
+    )

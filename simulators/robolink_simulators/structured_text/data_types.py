@@ -1,0 +1,259 @@
+"""The data types of the subset, what variables of them hold, and how values are kept in range.
+
+A scalar is an ``int``, ``bool`` or ``float``; a duration is an ``int`` of microseconds. An array,
+a structure and the instance of a function block are Python lists: the same list wherever the
+same thing is meant, so that VAR_IN_OUT is a reference.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+from functools import partial
+from itertools import starmap
+from typing import Any, Final, TypeAlias
+
+Value: TypeAlias = Any
+"""What a variable holds."""
+
+Frame = list[Any]
+"""The variables of one instance, or the members of one structure or array."""
+
+Getter = Callable[[Frame], Any]
+
+
+class Family(Enum):
+    """What may be done with a scalar."""
+
+    INTEGER = "integer"
+    BITS = "bits"
+    BOOL = "bool"
+    REAL = "real"
+    TIME = "time"
+
+
+@dataclass(frozen=True, slots=True)
+class ScalarType:
+    """An elementary type.
+
+    Attributes:
+        name: As it is written.
+        family: What may be done with it.
+        bits: How many it has.
+        signed: Whether it has negative values.
+    """
+
+    name: str
+    family: Family
+    bits: int = 0
+    signed: bool = False
+
+    @property
+    def lowest(self) -> int:
+        """The smallest value of an integer."""
+        return -(1 << self.bits - 1) if self.signed else 0
+
+    @property
+    def highest(self) -> int:
+        """The greatest value of an integer."""
+        return (1 << (self.bits - 1 if self.signed else self.bits)) - 1
+
+    def initial(self) -> Value:
+        """Return what a variable holds that is given nothing."""
+        return {Family.BOOL: False, Family.REAL: 0.0}.get(self.family, 0)
+
+    def wrapping(self, get: Getter) -> Getter:
+        """Return a getter that keeps what another gives in range, as assignment does."""
+        if self.family not in (Family.INTEGER, Family.BITS):
+            return get
+        mask, half = (1 << self.bits) - 1, 1 << self.bits - 1
+        if self.signed:
+            return lambda frame: ((get(frame) + half) & mask) - half
+        return lambda frame: get(frame) & mask
+
+
+@dataclass(frozen=True, slots=True)
+class ArrayType:
+    """An array.
+
+    Attributes:
+        bounds: First and last index of each dimension.
+        element: Type of an element.
+    """
+
+    bounds: tuple[tuple[int, int], ...]
+    element: "DataType"
+
+    @property
+    def size(self) -> int:
+        """Its number of elements."""
+        count = 1
+        for low, high in self.bounds:
+            count *= high - low + 1
+        return count
+
+    def initial(self) -> Frame:
+        """Return an array as it is at first."""
+        return [self.element.initial() for _ in range(self.size)]
+
+
+@dataclass(slots=True, eq=False)
+class TextVariable:
+    """A variable, or a member of a structure.
+
+    Attributes:
+        name: In small letters.
+        type: Its type.
+        slot: Its place in the frame.
+        kind: ``var``, ``var_input``, ``var_output`` or ``var_in_out``.
+        retained: Whether a restart keeps it.
+        constant: Whether it can only be read.
+        first: What it holds at first, ``None`` for what its type says.
+    """
+
+    name: str
+    type: "DataType"
+    slot: int
+    kind: str = "var"
+    retained: bool = False
+    constant: bool = False
+    first: Value = None
+
+    def initial(self) -> Value:
+        """Return what it holds at first."""
+        if isinstance(self.first, list):
+            return list(self.first)
+        return self.type.initial() if self.first is None else self.first
+
+
+@dataclass(slots=True, eq=False)
+class StructType:
+    """A structure.
+
+    Attributes:
+        name: As it is written.
+        members: By name, in order.
+    """
+
+    name: str
+    members: dict[str, TextVariable] = field(default_factory=dict)
+
+    def initial(self) -> Frame:
+        """Return a structure as it is at first."""
+        return [member.initial() for member in self.members.values()]
+
+
+@dataclass(slots=True, eq=False)
+class BlockType:
+    """A function block, or a program.
+
+    Attributes:
+        name: As it is written.
+        members: Its variables by name, in order.
+        run: Executes an instance once.
+        made: Called with each new instance, for a block that is not written in the language.
+    """
+
+    name: str
+    members: dict[str, TextVariable] = field(default_factory=dict)
+    run: Callable[[Frame], object] = lambda _: None
+    made: Callable[[Frame], None] | None = None
+
+    def initial(self) -> Frame:
+        """Return a new instance."""
+        instance = [
+            None if member.kind == "var_in_out" else member.initial()
+            for member in self.members.values()
+        ]
+        if self.made is not None:
+            self.made(instance)
+        return instance
+
+
+@dataclass(frozen=True, slots=True)
+class OpaqueType:
+    """A type whose inside no program sees; its one value is whatever the host puts there."""
+
+    name: str
+
+    def initial(self) -> None:
+        """Return nothing: the host gives it."""
+        return
+
+
+DataType = ScalarType | ArrayType | StructType | BlockType | OpaqueType
+
+_INTEGERS: Final = (
+    ("SINT", 8, True),
+    ("USINT", 8, False),
+    ("INT", 16, True),
+    ("UINT", 16, False),
+    ("DINT", 32, True),
+    ("UDINT", 32, False),
+)
+
+ELEMENTARY: Final[Mapping[str, ScalarType]] = {
+    **{n: ScalarType(n, Family.INTEGER, bits, signed) for n, bits, signed in _INTEGERS},
+    **{n: ScalarType(n, Family.BITS, b) for n, b in (("BYTE", 8), ("WORD", 16), ("DWORD", 32))},
+    "BOOL": ScalarType("BOOL", Family.BOOL, 1),
+    "LREAL": ScalarType("LREAL", Family.REAL),
+    "TIME": ScalarType("TIME", Family.TIME),
+}
+"""The elementary types of the subset, by name."""
+
+BOOL: Final = ELEMENTARY["BOOL"]
+LREAL: Final = ELEMENTARY["LREAL"]
+TIME: Final = ELEMENTARY["TIME"]
+DINT: Final = ELEMENTARY["DINT"]
+
+
+def same(one: DataType, other: DataType) -> bool:
+    """Tell whether values of one type can be given to variables of another."""
+    if isinstance(one, StructType | BlockType) or isinstance(other, StructType | BlockType):
+        return one is other
+    return one == other
+
+
+def copier(of: DataType) -> Callable[[Frame, Frame], None]:
+    """Return what copies an array or structure into another one, member by member."""
+    if isinstance(of, ArrayType) and isinstance(of.element, ScalarType):
+        return _copy_flat
+    if isinstance(of, ArrayType):
+        each = copier(of.element)
+        return partial(_copy_each, [each] * of.size)
+    if isinstance(of, StructType):
+        members = of.members.values()
+        return partial(_copy_members, [_member_copier(member.type) for member in members])
+    raise TypeError(of)
+
+
+def _member_copier(of: DataType) -> Callable[[Frame, Frame], None] | None:
+    return None if isinstance(of, ScalarType | OpaqueType) else copier(of)
+
+
+def _copy_flat(target: Frame, source: Frame) -> None:
+    target[:] = source
+
+
+def _copy_each(
+    copiers: Sequence[Callable[[Frame, Frame], None]], target: Frame, source: Frame
+) -> None:
+    for copy, one, other in zip(copiers, target, source, strict=True):
+        copy(one, other)
+
+
+def _copy_members(
+    copiers: Sequence[Callable[[Frame, Frame], None] | None], target: Frame, source: Frame
+) -> None:
+    for slot, copy in enumerate(copiers):
+        if copy is None:
+            target[slot] = source[slot]
+        else:
+            copy(target[slot], source[slot])
+
+
+def members_of(pairs: Sequence[tuple[str, DataType]], kind: str = "var") -> dict[str, TextVariable]:
+    """Return members by name, in order, for a type that is not written in the language."""
+    made = starmap(
+        lambda slot, pair: TextVariable(pair[0].lower(), pair[1], slot, kind), enumerate(pairs)
+    )
+    return {member.name: member for member in made}

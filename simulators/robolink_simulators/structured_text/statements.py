@@ -1,0 +1,316 @@
+"""Statements of the text, translated into functions of the frame."""
+
+from collections.abc import Callable
+from typing import Final
+
+from lark import Token
+
+from robolink.messages import tr
+from robolink_simulators.structured_text.data_types import Family, Frame, Getter, ScalarType, copier
+from robolink_simulators.structured_text.expressions import ExpressionTranslator
+from robolink_simulators.structured_text.invocations import call
+from robolink_simulators.structured_text.parse import (
+    Node,
+    TextPlace,
+    refused,
+)
+from robolink_simulators.structured_text.references import (
+    SPENT,
+    Runtime,
+    TextScope,
+    VariableReference,
+)
+from robolink_simulators.structured_text.typed import Typed, as_number, fitted, kept, settled
+
+Action = Callable[[Frame], int]
+"""Executes a statement; returns how it ended."""
+
+_ON, _EXIT, _RETURN = range(3)
+
+TURNS_A_CYCLE: Final = 200_000
+"""Turns of loops in one cycle; a real PLC's watchdog would have stepped in long before."""
+
+
+class StatementTranslator(ExpressionTranslator):
+    """Translates the statements of one block."""
+
+    def __init__(self, scope: TextScope) -> None:
+        super().__init__(scope)
+        self._all: dict[str, Callable[[Node], Action]] = {
+            "assignment": self._assignment,
+            "call": self._call,
+            "if_statement": self._if,
+            "case_statement": self._case,
+            "for_statement": self._for,
+            "while_statement": self._while,
+            "repeat_statement": self._repeat,
+            "exit_statement": self._exit,
+            "return_statement": lambda _: lambda _: _RETURN,
+        }
+        self._depth = 0
+
+    def block(self, tree: Node) -> Action:
+        """Translate statements that follow each other."""
+        actions = [self._all[child.data](child) for child in tree.children]
+        if len(actions) == 1:
+            return actions[0]
+        steps = tuple(actions)
+
+        def run(frame: Frame) -> int:
+            for step in steps:
+                end = step(frame)
+                if end:
+                    return end
+            return _ON
+
+        return run
+
+    def _assignment(self, tree: Node) -> Action:
+        target_tree, value_tree = tree.children
+        place = self.place(tree)
+        target = self.reference(target_tree)
+        self._require_writable(target, place)
+        value = self.expression(value_tree)
+        if isinstance(target.type, ScalarType):
+            return _storing(target, kept(value, target.type, place))
+        source, get = fitted(value, target.type, place).get, target.get
+        copy = copier(target.type)
+
+        def assign(frame: Frame) -> int:
+            copy(get(frame), source(frame))
+            return _ON
+
+        return assign
+
+    def _require_writable(self, target: VariableReference, place: TextPlace) -> None:
+        if not target.writable:
+            raise refused(place, tr("{name} can only be read here", name=target.name))
+        if target.simple and target.name in self._scope.turning:
+            raise refused(place, tr("the loop alone changes {name}", name=target.name))
+
+    def _call(self, tree: Node) -> Action:
+        return call(tree, self, self._scope)
+
+    def _if(self, tree: Node) -> Action:
+        condition, then, *rest = tree.children
+        arms = [(self.condition(condition).get, self.block(then))]
+        otherwise: Action | None = None
+        for part in rest:
+            if part is None or isinstance(part, Token):
+                continue
+            if part.data == "else_if":
+                test, block = part.children
+                arms.append((self.condition(test).get, self.block(block)))
+            else:
+                otherwise = self.block(part)
+        if len(arms) == 1:
+            return _one_armed(*arms[0], otherwise)
+
+        def decide(frame: Frame) -> int:
+            for test, action in arms:
+                if test(frame):
+                    return action(frame)
+            return otherwise(frame) if otherwise else _ON
+
+        return decide
+
+    def _case(self, tree: Node) -> Action:
+        selector_tree, *parts = tree.children
+        place = self.place(tree)
+        selector = as_number(self.expression(selector_tree))
+        if selector.scalar is None or selector.scalar.family is not Family.INTEGER:
+            raise refused(place, tr("CASE chooses by a whole number"))
+        get = settled(selector, place, "CASE").get
+        singles: dict[int, Action] = {}
+        ranges: list[tuple[range, Action]] = []
+        otherwise: Action = _nothing
+        for part in parts:
+            if part is None:
+                continue
+            if part.data == "block":
+                otherwise = self.block(part)
+                continue
+            *labels, block = part.children
+            action = self.block(block)
+            for label in labels:
+                self._label(label, action, singles, ranges)
+
+        def choose(frame: Frame) -> int:
+            value = get(frame)
+            action = singles.get(value)
+            if action is None:
+                action = next((act for span, act in ranges if value in span), otherwise)
+            return action(frame)
+
+        return choose
+
+    def _label(
+        self,
+        label: Node,
+        action: Action,
+        singles: dict[int, Action],
+        ranges: list[tuple[range, Action]],
+    ) -> None:
+        first, last = label.children
+        low, high = bound_value(first), None if last is None else bound_value(last)
+        span = range(low, (low if high is None else high) + 1)
+        taken = any(number in span for number in singles) or any(
+            other.start < span.stop and span.start < other.stop for other, _ in ranges
+        )
+        if taken:
+            raise refused(self.place(label), tr("the label stands there twice"))
+        if high is None:
+            singles[low] = action
+        else:
+            ranges.append((span, action))
+
+    def _for(self, tree: Node) -> Action:
+        name, first_tree, last_tree, step_tree, body_tree = tree.children
+        place = self.place(tree)
+        low = str(name).lower()
+        variable = self._scope.members.get(low)
+        of = variable.type if variable else None
+        if not isinstance(of, ScalarType) or of.family is not Family.INTEGER or not variable:
+            raise refused(place, tr("{name} is no whole number of this block", name=str(name)))
+        if variable.kind == "var_in_out" or low in self._scope.turning:
+            raise refused(place, tr("{name} cannot count this loop", name=str(name)))
+        first = kept(self._bound(first_tree), of, place)
+        last = kept(self._bound(last_tree), of, place)
+        step = 1 if step_tree is None else bound_value(step_tree)
+        if step == 0:
+            raise refused(place, tr("a loop that counts by 0 never ends"))
+        self._scope.turning.append(low)
+        body = self._loop_body(body_tree)
+        self._scope.turning.pop()
+        return _counting(variable.slot, first, last, step, body, self._scope.runtime, place)
+
+    def _bound(self, tree: Node) -> Typed:
+        return settled(self.expression(tree), self.place(tree), "FOR")
+
+    def _while(self, tree: Node) -> Action:
+        condition_tree, body_tree = tree.children
+        test = self.condition(condition_tree).get
+        body = self._loop_body(body_tree)
+        runtime, place = self._scope.runtime, self.place(tree)
+
+        def turn(frame: Frame) -> int:
+            while test(frame):
+                count_turn(runtime, place)
+                end = body(frame)
+                if end:
+                    return _ON if end == _EXIT else end
+            return _ON
+
+        return turn
+
+    def _repeat(self, tree: Node) -> Action:
+        body_tree, condition_tree = tree.children
+        body = self._loop_body(body_tree)
+        test = self.condition(condition_tree).get
+        runtime, place = self._scope.runtime, self.place(tree)
+
+        def turn(frame: Frame) -> int:
+            while True:
+                count_turn(runtime, place)
+                end = body(frame)
+                if end:
+                    return _ON if end == _EXIT else end
+                if test(frame):
+                    return _ON
+
+        return turn
+
+    def _loop_body(self, tree: Node) -> Action:
+        self._depth += 1
+        body = self.block(tree)
+        self._depth -= 1
+        return body
+
+    def _exit(self, tree: Node) -> Action:
+        if not self._depth:
+            raise refused(self.place(tree), tr("EXIT stands in no loop"))
+        return lambda _: _EXIT
+
+
+def _nothing(_: Frame) -> int:
+    return _ON
+
+
+def _storing(target: VariableReference, get: Getter) -> Action:
+    slot = target.slot
+    if slot >= 0:
+
+        def assign(frame: Frame) -> int:
+            frame[slot] = get(frame)
+            return _ON
+
+        return assign
+    locate = target.locate
+
+    def assign_there(frame: Frame) -> int:
+        value = get(frame)
+        container, key = locate(frame)
+        container[key] = value
+        return _ON
+
+    return assign_there
+
+
+def _one_armed(test: Getter, then: Action, otherwise: Action | None) -> Action:
+    if otherwise is None:
+        return lambda frame: then(frame) if test(frame) else _ON
+    return lambda frame: then(frame) if test(frame) else otherwise(frame)
+
+
+def _counting(
+    slot: int,
+    first: Getter,
+    last: Getter,
+    step: int,
+    body: Action,
+    runtime: Runtime,
+    place: TextPlace,
+) -> Action:
+    """A FOR loop; its end is worked out anew at each turn, as both compilers do."""
+
+    def count(frame: Frame) -> int:
+        value = frame[slot] = first(frame)
+        turned = False
+        while (value <= last(frame)) if step > 0 else (value >= last(frame)):
+            count_turn(runtime, place)
+            end = body(frame)
+            if end:
+                return _ON if end == _EXIT else end
+            turned = True
+            value += step
+            frame[slot] = value
+        if turned:
+            frame[slot] = SPENT
+        return _ON
+
+    return count
+
+
+def count_turn(runtime: Runtime, place: TextPlace) -> None:
+    """Count a turn of a loop.
+
+    Raises:
+        StructuredTextError: The loops of this cycle have turned too often.
+    """
+    runtime.turns_left -= 1
+    if runtime.turns_left < 0:
+        raise refused(
+            place, tr("the loops of one cycle turned more than {count} times", count=TURNS_A_CYCLE)
+        )
+
+
+def bound_value(tree: Node) -> int:
+    """Return a whole number of a label, a step or a bound."""
+    *sign, digits = (str(part) for part in tree.children if part is not None)
+    number = int(digits.replace("_", ""))
+    return -number if sign else number
+
+
+def counted_in(tree: Node) -> set[str]:
+    """Return the variables that count loops, in small letters."""
+    return {str(loop.children[0]).lower() for loop in tree.find_data("for_statement")}

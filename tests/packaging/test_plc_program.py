@@ -1,0 +1,149 @@
+"""The exported program of the mailbox: read by others, in two profiles, as text and as XML."""
+
+import csv
+import io
+import re
+import xml.etree.ElementTree as ElementTree
+
+import pytest
+from blark.parse import parse_source_code
+from robolink_cli import main
+from robolink_cli.commands.companions.plc_export import plc_texts
+from robolink_simulators.softmotion.program.structured_plc import PROGRAM_SOURCES
+from robolink_simulators.structured_text import SourceText, StructuredProgram, TextDialect
+from robolink_simulators.structured_text.parse import parse
+
+from robolink.protocols.mailbox import (
+    COMMAND,
+    DEVICE_WORDS,
+    PROGRAM_FILES,
+    RESPONSE,
+    SLOT,
+    ErrorClass,
+    ExportProfile,
+    program_texts,
+)
+
+FULL, TOOLS = ExportProfile.FULL, ExportProfile.TOOLS
+CORE, ADAPTER = "robolink_core.st", "robolink_softmotion.st"
+MODES = ("CURRENT", "ACTIVE", "LAST")
+MOVING = re.compile(r"MC_Move|Jog|MC_GroupHalt|MC_GroupStop|\b(2102|2103|30004|30007|30008)\b")
+COMMENT = re.compile(r"\(\*.*?\*\)|//[^\n]*", re.DOTALL)
+XML = "{http://www.plcopen.org/xml/tc6_0200}"
+
+
+def every_text():
+    for profile in ExportProfile:
+        for modes in ((), MODES):
+            texts = program_texts(profile, kinematics="Kin_Scara3_Z", read_modes=modes)
+            for name, text in texts.items():
+                yield pytest.param(name, text, id=f"{profile}-{len(modes)}-{name}")
+
+
+@pytest.mark.parametrize(("name", "text"), list(every_text()))
+def test_every_text_is_complete_and_under_0bsd(name, text):
+    assert "SPDX-License-Identifier: 0BSD" in text
+    assert text.isascii()
+    left = ("full:", "kinematics:", "read tool:", "from memory:", "_SYMBOL", "_TYPE;")
+    assert [mark for mark in left if mark in text] == []
+    parse(name, text, dict(PROGRAM_SOURCES)[name])
+
+
+@pytest.mark.parametrize("profile", list(ExportProfile))
+def test_the_core_stays_in_the_common_subset(profile):
+    core = SourceText("robolink_core.st", program_texts(profile)["robolink_core.st"])
+    assert core.dialect is TextDialect.COMMON
+    made = StructuredProgram([core], "RL_SlotTable")
+    assert made.value("begun") is False
+
+
+def test_the_tools_profile_moves_nothing():
+    for text in program_texts(TOOLS).values():
+        assert MOVING.search(COMMENT.sub("", text)) is None
+    full = program_texts(FULL)
+    assert all(MOVING.search(COMMENT.sub("", full[name])) for name in (CORE, ADAPTER))
+
+
+def test_the_blocks_are_as_long_as_the_register_map_says():
+    core, glue = (program_texts(FULL, base=100)[n] for n in ("robolink_core.st", PROGRAM_FILES[-1]))
+    slots = 15 * SLOT.words + DEVICE_WORDS
+    assert f"RL_Inbox : ARRAY [0..{COMMAND.words - 1}] OF WORD" in core
+    assert f"RL_Outbox : ARRAY [0..{RESPONSE.words - 1}] OF WORD" in core
+    assert f"RL_SlotWords : ARRAY [0..{slots - 1}] OF WORD" in core
+    for address in ("%IW100", "%QW100", f"%QW{100 + RESPONSE.words}"):
+        assert f"AT {address} :" in glue
+
+
+def test_only_the_adapter_names_the_vendors_blocks():
+    for name, text in program_texts(FULL, kinematics="Kin_Scara3_Z").items():
+        names = [word for word in ("SMC_Group", "MC_Group", "MC_Move", "MC_Set") if word in text]
+        told = "RL_Machine.st", "robolink_softmotion.st"
+        assert not names or name in told, (name, names)
+
+
+def test_the_errors_have_the_members_and_classes_of_the_program():
+    rows = list(csv.DictReader(io.StringIO(plc_texts(FULL, 0)["errors.csv"])))
+    core = program_texts(FULL)["robolink_core.st"]
+    body = core.partition("TYPE RL_Numbers : STRUCT\n")[2].partition("END_STRUCT")[0]
+    members = [line.split()[0] for line in body.splitlines() if ":" in line]
+    assert sorted(row["member"] for row in rows) == sorted(members)
+    known = {str(code.value) for code in ErrorClass}
+    for row in rows:
+        for code in row["error_class"].replace("..", ", ").split(", "):
+            assert code in known
+
+
+@pytest.mark.parametrize("profile", list(ExportProfile))
+def test_the_xml_holds_every_unit_of_the_texts(profile):
+    texts = plc_texts(profile, 0, "Kin_Scara3_Z")
+    root = ElementTree.fromstring(texts["robolink_program.xml"].encode())
+    pous = {pou.get("name"): pou for pou in root.iter(f"{XML}pou")}
+    assert {"RL_MailboxCore", "RL_SlotTable", "RL_SoftMotion", "RL_PRG"} <= pous.keys()
+    blocks = sum(texts[name].count("\nEND_FUNCTION_BLOCK") for name in PROGRAM_FILES)
+    assert len(pous) == blocks + 1
+    types = sum(texts[name].count("\nTYPE ") for name in PROGRAM_FILES)
+    assert len(list(root.iter(f"{XML}dataType"))) == types
+    core = pous["RL_MailboxCore"]
+    kinds = {section: len(core.findall(f"{XML}interface/{XML}{section}/*")) for section in KINDS}
+    assert kinds == {"inputVars": 12, "outputVars": 2, "inOutVars": 8}
+    (inside,) = core.findall(f"{XML}body")
+    body = "".join(inside.itertext())
+    assert body.strip() in texts["robolink_core.st"]
+    lists = {one.get("name"): one for one in root.iter(f"{XML}globalVars")}
+    assert lists["RL_Kept"].get("retain") == "true"
+    addresses = [
+        v.get("address") for v in pous["RL_PRG"].iter(f"{XML}variable") if v.get("address")
+    ]
+    assert addresses == ["%IW0", "%QW0", "%QW112"]
+
+
+KINDS = ("inputVars", "outputVars", "inOutVars")
+
+
+@pytest.mark.parametrize("name", ["RL_Kept.st", "RL_Machine.st"])
+def test_a_foreign_parser_reads_the_lists(name):
+    assert parse_source_code(program_texts(FULL)[name]).exception is None
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(200)
+@pytest.mark.parametrize("profile", list(ExportProfile))
+@pytest.mark.parametrize("name", PROGRAM_FILES)
+def test_a_foreign_parser_reads_every_file(profile, name):
+    text = program_texts(profile, kinematics="Kin_Scara3_Z")[name]
+    assert parse_source_code(text).exception is None
+    broken = text.replace(":=", "=:", 1)
+    assert broken == text or parse_source_code(broken).exception is not None
+
+
+def test_what_cannot_be_exported_is_told(tmp_path, capsys):
+    folder = str(tmp_path / "plc")
+    assert main.run(["plc", "export", folder, "--kinematics", "Kin_Nothing"]) == 2
+    assert "Kin_Nothing" in capsys.readouterr().err
+    assert main.run(["plc", "export", folder, "--read-modes", "A.B", "C", "D"]) == 2
+    assert not (tmp_path / "plc").exists()
+    arguments = ["--profile", "full", "--kinematics", "Kin_Scara3_Z", "--read-modes", *MODES]
+    assert main.run(["plc", "export", folder, *arguments]) == 0
+    adapter = (tmp_path / "plc" / "robolink_softmotion.st").read_text()
+    assert "SMC_READ_TOOL_MODE.CURRENT" in adapter
+    assert "kinematics : UINT := 2;" in (tmp_path / "plc" / "RL_Machine.st").read_text()

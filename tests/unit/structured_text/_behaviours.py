@@ -1,0 +1,258 @@
+"""The sixteen conformance behaviours over the wire (docs/reference/softmotion.md 5).
+
+Each talks to a mailbox and takes down its words; who serves it, the model or the program, it does
+not know.
+"""
+
+import json
+from dataclasses import replace
+from typing import Any
+
+from robolink_simulators.softmotion import GroupOptions, SmcNumbers
+from robolink_simulators.softmotion.mailbox import MailboxOptions, PlcOptions, SoftMotionSimulator
+from robolink_simulators.softmotion.mailbox.plc import Plc
+from robolink_simulators.softmotion.program.structured_plc import PROGRAM_SOURCES, StructuredPlc
+from robolink_simulators.structured_text import SourceText
+
+from robolink.protocols.mailbox import (
+    CommandState,
+    CoordinateSystem,
+    ExportProfile,
+    Opcode,
+    crc16,
+    program_texts,
+)
+from tests.unit._mailbox_client import LINE, NO_TOOL, linked
+
+HEARTBEAT, CRC = 9, 110
+NUMBERS = SmcNumbers(
+    no_such_movement=13001,
+    tool_incompatible=13002,
+    no_orientation_image=13002,
+    interrupted_by_single_axis=13003,
+)
+OPTIONS = PlcOptions(group=GroupOptions(numbers=NUMBERS), mailbox=MailboxOptions(device_id=77))
+SWITCHED_ON = {"boot_id": 3, "epoch": 8, "device_id": 77, "slots": {}}
+CYCLE_S = 0.004
+ABOUT_X = 0b1000
+READ_MODES = ("CURRENT", "ACTIVE", "LAST")
+
+
+def sources(kinematics="", profile=ExportProfile.FULL, change=lambda text: text):
+    """Return the exported texts, changed by ``change``."""
+    texts = program_texts(profile, kinematics=kinematics, read_modes=READ_MODES)
+    return [SourceText(name, change(texts[name]), kind) for name, kind in PROGRAM_SOURCES]
+
+
+def of_program(texts=None):
+    """Return what makes a PLC that executes the exported program."""
+
+    def make(model, parameters, options):
+        name = model.kinematics.name
+        given = texts or sources(name, ExportProfile(options.mailbox.profile))
+        return StructuredPlc(model, parameters, options, given)
+
+    return make
+
+
+class Bench:
+    """One PLC that has just been switched on, a client that owns it, and what it took down."""
+
+    def __init__(self, folder, make_plc=Plc, kinematics="Kin_Scara3_Z", options=OPTIONS):
+        state = folder / f"{len(list(folder.iterdir()))}.json"
+        document = {"schema": "robolink/plc-state/1", "machine": kinematics, "memory": SWITCHED_ON}
+        state.write_text(json.dumps(document))
+        self.plc = SoftMotionSimulator(
+            kinematics, options=options, state_path=state, make_plc=make_plc
+        )
+        self.client = linked(self.plc)
+        self.client.take()
+        self.taken = []
+
+    def note(self, seconds=0.05):
+        """Take the words down once all is still: heartbeat and checksum apart."""
+        self.client.wait(seconds)
+        words = list(self.client.link.read_response())
+        assert crc16(words[:CRC]) == words[CRC]
+        words[HEARTBEAT] = words[CRC] = 0
+        self.taken.append(words)
+
+    def tell(self, opcode, *operands, seconds=0.05, **fields):
+        self.client.tell(opcode, *operands, **fields)
+        self.note(seconds)
+        return self.taken[-1][2:4]
+
+    def enable(self):
+        assert self.tell(Opcode.ENABLE) == [CommandState.DONE, 0]
+
+    def set_tool(self, *tool):
+        """Write slot 2 and select it; return state and error class of the selection."""
+        pose = (*tool, *NO_TOOL)[:6]
+        assert self.tell(Opcode.WRITE_TOOL, 2, pose=pose, name="tip") == [CommandState.DONE, 0]
+        self.tell(Opcode.SELECT_TOOL, 2)
+        return self.taken[-1][2:4]
+
+    def set_anew(self, *tool):
+        """Write the selected slot with another tool."""
+        pose = (*tool, *NO_TOOL)[:6]
+        return self.tell(Opcode.WRITE_TOOL, 2, pose=pose, name="tip")
+
+    def read_tool(self):
+        self.tell(Opcode.READ_TOOL, 0)
+        self.taken.append(list(self.client.link.read_slot(2)))
+
+    def states(self, count):
+        """Take down the state of the group in each cycle."""
+        for _ in range(count):
+            self.client.beat()
+            self.taken.append(self.client.link.read_response()[7])
+            self.client.link.clock.sleep(CYCLE_S - 0.002)
+
+
+def b01_disabled(bench):
+    assert bench.set_tool(0.0, 0.0, 50.0) == [15, 201]
+    bench.read_tool()
+
+
+def b02_errorstop(bench):
+    bench.enable()
+    bench.set_tool(0.0, 0.0, 20.0)
+    bench.plc.panel.fail_axis(1)
+    assert bench.set_anew(0.0, 0.0, 50.0) == [15, 202]
+    bench.tell(Opcode.RESET)
+    bench.read_tool()
+
+
+def b03_scara2_keeps_its_tool(bench):
+    bench.enable()
+    assert bench.set_tool(0.0, 0.0, 20.0) == [10, 0]
+    assert bench.set_anew(10.0) == [15, 301]
+    bench.read_tool()
+
+
+def b04_scara2_takes_a_turned_tool(bench):
+    bench.enable()
+    assert bench.set_tool(0.0, 0.0, -35.0, 10.0, 20.0, 30.0) == [10, 0]
+    bench.read_tool()
+
+
+def b05_polar(bench):
+    bench.enable()
+    assert bench.set_tool(0.0, 1.0, 0.0) == [15, 301]
+    assert bench.set_tool(0.0, 0.0, 1.0) == [10, 0]
+
+
+def b06_rrr(bench):
+    bench.enable()
+    assert bench.set_tool(0.0, 0.0, 0.0, 15.0, 30.0, 45.0) == [10, 0]
+    assert bench.set_anew(0.0, 0.0, 1.0, 15.0, 30.0, 45.0) == [15, 301]
+    bench.read_tool()
+
+
+def b07_any_tool(bench):
+    bench.enable()
+    assert bench.set_tool(1.0, 2.0, 3.0, 4.0, 5.0, 6.0) == [10, 0]
+    bench.read_tool()
+
+
+def b08_set_kinematics(bench):
+    bench.enable()
+    bench.set_tool(0.0, 0.0, 20.0)
+    code = bench.taken[-1][88]
+    assert bench.tell(Opcode.SET_KINEMATICS, code & 0xFF, code >> 8) == [10, 0]
+    bench.read_tool()
+
+
+def b09_no_orientation_image(bench):
+    bench.enable()
+    assert bench.set_tool(1.0) == [15, 302]
+    assert bench.set_tool(0.0, 0.0, 1.0) == [15, 302]
+
+
+def b10_enable_and_disable_twice(bench):
+    bench.enable()
+    assert bench.tell(Opcode.ENABLE) == [15, 209]
+    bench.tell(Opcode.DISABLE)
+    assert bench.tell(Opcode.DISABLE) == [15, 201]
+
+
+def b11_nothing_to_reset(bench):
+    bench.enable()
+    assert bench.tell(Opcode.RESET) == [15, 205]
+
+
+def b12_a_line_ends_a_cycle_before_standby(bench):
+    bench.enable()
+    bench.client.move(z=-2.0, dynamics=(20.0, 500.0, 500.0, 10000.0))
+    bench.states(50)
+    bench.note()
+    assert bench.taken[-1][96:98] == [bench.client.sequence, 10]
+
+
+def b13_a_stop_is_held(bench):
+    bench.enable()
+    bench.client.move(z=-40.0, dynamics=LINE)
+    bench.client.wait(0.1)
+    assert bench.tell(Opcode.STOP, 0, seconds=0.4) == [10, 0]
+    assert bench.taken[-1][7] == 4
+    bench.client.move(z=-5.0)
+    bench.note()
+    assert bench.taken[-1][2:4] == [15, 203]
+    assert bench.tell(Opcode.STOP, 1) == [10, 0]
+    assert bench.taken[-1][7] == 1
+
+
+def b14_an_axis_alone(bench):
+    bench.enable()
+    bench.plc.panel.move_axis(0, bench.plc.plc.group.values[0] + 0.5)
+    bench.client.wait(0.5)
+    bench.note()
+    assert bench.taken[-1][7] == 1
+    bench.client.move(z=-40.0)
+    bench.client.wait(0.1)
+    try:
+        bench.plc.panel.move_axis(0, 0.0)
+    except ValueError:
+        bench.note()
+    assert bench.taken[-1][7] == 5
+    assert bench.taken[-1][96:99] == [bench.client.sequence, 14, 602]
+
+
+def b15_jog_about_x(bench):
+    bench.enable()
+    system = CoordinateSystem.MCS
+    before = bench.client.now().tcp
+    dynamics = (0.1, 0.5, 0.5, 0.5)
+    bench.client.tell(Opcode.JOG, ABOUT_X, 0, system, dynamics=dynamics)
+    bench.client.wait(0.3)
+    bench.client.tell(Opcode.JOG, 0, 0, system, dynamics=dynamics)
+    bench.client.wait(0.3)
+    after = bench.client.now().tcp
+    assert max(abs(a - b) for a, b in zip(before[:3], after[:3], strict=True)) < 1e-6
+    assert before[3:] != after[3:]
+    bench.client.tell(Opcode.JOG, ABOUT_X, ABOUT_X, system, dynamics=dynamics)
+    bench.note()
+    assert bench.client.now().tcp == after
+
+
+def block_of_before(bench):
+    """Not one of the sixteen: docs/mailbox.md, "When a command counts"."""
+    client = bench.client
+    first = client.command(Opcode.WRITE_TOOL, 3, pose=(1.0, 2.0, 3.0, 0.0, 0.0, 0.0))
+    for command in (first, client.command(Opcode.CLEAR_TOOL, 3), first):
+        client.write(command)
+        bench.note()
+    assert client.slot(3).counter == 2
+    for jump in (0x7FFF, 0x7FFF, 1):  # past 65535
+        client.sequence = (client.sequence + jump - 1) % 0xFFFF
+        bench.read_tool()
+    assert client.now().ack_head < 10
+
+
+def without_image(model):
+    """Return a machine whose kinematics does not tell its orientations."""
+    kinematics = type("Untold", (type(model.kinematics),), {"orientation_image": lambda *_: None})
+    untold: Any = object.__new__(kinematics)
+    for name in getattr(model.kinematics, "__slots__", ()) or vars(model.kinematics):
+        object.__setattr__(untold, name, getattr(model.kinematics, name))
+    return replace(model, kinematics=untold)

@@ -4,13 +4,17 @@ import json
 import os
 import subprocess
 import sys
+from contextlib import contextmanager
 from pathlib import Path
 
+import click
 import pytest
 from robolink_cli import main
 from robolink_cli.commands.simulate.planned_faults import plan_faults
+from robolink_cli.console.render import switch_json_on
 from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.faults import LinkKind
+from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 
 LOST = """
 schema = "robolink/faults/1"
@@ -31,10 +35,20 @@ def plan(tmp_path):
     return write
 
 
-def test_a_lost_answer_is_told_by_the_simulator_and_ends_the_client_in_doubt(
-    state_folder, capsys, plan
-):
-    path = plan("epson+tcp", "drop_reply", "TLSet 2, XY")
+@contextmanager
+def in_this_process(path, capsys):
+    """A simulator with the plan; its URL, and what returns the next line that it told."""
+    simulator = EpsonSimulator()
+    with click.Context(click.Command("sim")) as context:
+        switch_json_on(context)
+        plan_faults(simulator, Path(path), {LinkKind.EPSON_TCP})
+    with serve_tcp(simulator) as host:
+        yield host.url, lambda: capsys.readouterr().out
+
+
+@contextmanager
+def by_command(path, _capsys):
+    """The same of ``robolink sim`` in a process of its own."""
     arguments = ["sim", "epson", "--tcp", "127.0.0.1:0", "--faults", path]
     paths = os.pathsep.join(path for path in sys.path if path)
     with subprocess.Popen(
@@ -45,15 +59,23 @@ def test_a_lost_answer_is_told_by_the_simulator_and_ends_the_client_in_doubt(
     ) as served:
         assert served.stdout is not None
         try:
-            url = json.loads(served.stdout.readline())["url"]
-            tool = ["tool", "set", "2", "--x", "10", "--y", "0", "--z", "-50"]
-            assert main.run(["-c", url, "--timeout", "4", *tool]) == 6
-            told = served.stdout.readline()
+            yield json.loads(served.stdout.readline())["url"], served.stdout.readline
         finally:
             served.terminate()
         assert served.wait(timeout=20) == 0
-    capsys.readouterr()
-    document = json.loads(told)
+
+
+@pytest.mark.parametrize(
+    "served", [in_this_process, pytest.param(by_command, marks=pytest.mark.soak)]
+)
+def test_a_lost_answer_is_told_by_the_simulator_and_ends_the_client_in_doubt(
+    state_folder, capsys, plan, served
+):
+    path = plan("epson+tcp", "drop_reply", "TLSet 2, XY")
+    with served(path, capsys) as (url, told):
+        tool = ["tool", "set", "2", "--x", "10", "--y", "0", "--z", "-50"]
+        assert main.run(["-c", url, "--timeout", "0.8", *tool]) == 6
+        document = json.loads(next(line for line in told().splitlines() if line[0] == "{"))
     assert document["schema"] == "robolink/fault/1"
     assert document["fault"] == {"action": "drop_reply", "match": "TLSet 2, XY"}
     assert document["request"].startswith('$Execute,"TLSet 2, XY(10')

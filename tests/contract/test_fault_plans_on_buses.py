@@ -42,13 +42,13 @@ def served(bus, name):
         ("modbus-tcp", "truncate_reply", TransportTimeoutError),
         ("modbus-tcp", "reset", TransportBrokenError),
         ("modbus-tcp", "half_open", TransportTimeoutError),
-        ("modbus-rtu", "truncate_reply", TransportError),
+        pytest.param("modbus-rtu", "truncate_reply", TransportError, marks=pytest.mark.soak),
         ("modbus-rtu", "garble_reply", None),
         ("can", "lose_segment", TransportTimeoutError),
         ("can", "wrong_toggle", RemoteProtocolError),
         ("can", "foreign_node", RemoteProtocolError),
         ("can", "echo", None),
-        ("can", "drop_request", TransportTimeoutError),
+        pytest.param("can", "drop_request", TransportTimeoutError, marks=pytest.mark.soak),
     ],
 )
 def test_a_fault_meets_one_read_and_no_other(bus, action, error, tmp_path):
@@ -69,8 +69,15 @@ def test_a_fault_meets_one_read_and_no_other(bus, action, error, tmp_path):
             assert decode_response(link.read_response()).boot_id == 1
 
 
-@pytest.mark.parametrize("bus", ["modbus-tcp", "modbus-rtu"])
-@pytest.mark.parametrize("action", ["duplicate_reply", "split_reply"])
+@pytest.mark.parametrize(
+    ("bus", "action"),
+    [
+        ("modbus-tcp", "duplicate_reply"),
+        ("modbus-rtu", "split_reply"),
+        pytest.param("modbus-rtu", "duplicate_reply", marks=pytest.mark.soak),
+        pytest.param("modbus-tcp", "split_reply", marks=pytest.mark.soak),
+    ],
+)
 def test_frames_in_pieces_or_twice_give_no_other_values(bus, action):
     with served(bus, "") as (url, faults):
         with closing(open_mailbox_link(url, timeout_s=2.0)) as link:
@@ -84,7 +91,9 @@ def test_frames_in_pieces_or_twice_give_no_other_values(bus, action):
             assert len(faults.fired) == 1
 
 
-@pytest.mark.parametrize("segment", [0, 3, -1])
+@pytest.mark.parametrize(
+    "segment", [3, *(pytest.param(segment, marks=pytest.mark.soak) for segment in (0, -1))]
+)
 def test_the_segment_that_is_lost_is_the_one_that_the_plan_says(segment, tmp_path):
     """A slot of 36 words travels in 11 segments; what is lost shows in what was asked after."""
     asked: list[bytes] = []

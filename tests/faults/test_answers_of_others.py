@@ -24,6 +24,9 @@ from tests.contract._softmotion_cell import served
 from tests.faults._bending_relay import BendingRelay
 from tests.unit._scripted_modbus import rtu, words
 
+CUT = PlcFaultAction.TRUNCATE_REPLY
+SPLIT = PlcFaultAction.SPLIT_REPLY
+TWICE = PlcFaultAction.DUPLICATE_REPLY
 TIMEOUT_S = 0.8
 PATIENCE_S = 2.0
 """Where nothing has to time out: the computer may be busy."""
@@ -59,8 +62,8 @@ def asked(controller, tools):
     ("link", "late_s"),
     [
         pytest.param("modbus-tcp", 0.9, marks=pytest.mark.fault("F01")),
-        pytest.param("can-virtual", 0.9, marks=pytest.mark.fault("F01")),
-        pytest.param("modbus-rtu", 0.82, marks=pytest.mark.fault("F02")),
+        pytest.param("can-virtual", 0.9, marks=[pytest.mark.fault("F01"), pytest.mark.soak]),
+        pytest.param("modbus-rtu", 0.82, marks=[pytest.mark.fault("F02"), pytest.mark.soak]),
         pytest.param("modbus-rtu", 0.95, marks=pytest.mark.fault("F02")),
     ],
 )
@@ -78,21 +81,24 @@ def test_f01_f02_a_late_answer_of_a_plc_answers_no_other_question(link, late_s):
             assert asked(controller, SLOTS) == len(SLOTS)
 
 
-@pytest.mark.parametrize("link", ["modbus-tcp", "modbus-rtu"])
 @pytest.mark.parametrize(
-    "action",
+    ("action", "link"),
     [
-        pytest.param(PlcFaultAction.TRUNCATE_REPLY, marks=pytest.mark.fault("F04"), id="cut"),
-        pytest.param(PlcFaultAction.SPLIT_REPLY, marks=pytest.mark.fault("F05"), id="split"),
-        pytest.param(PlcFaultAction.DUPLICATE_REPLY, marks=pytest.mark.fault("F09"), id="twice"),
+        pytest.param(CUT, "modbus-rtu", marks=pytest.mark.fault("F04")),
+        pytest.param(CUT, "modbus-tcp", marks=[pytest.mark.fault("F04"), pytest.mark.soak]),
+        pytest.param(SPLIT, "modbus-tcp", marks=pytest.mark.fault("F05")),
+        pytest.param(SPLIT, "modbus-rtu", marks=[pytest.mark.fault("F05"), pytest.mark.soak]),
+        pytest.param(TWICE, "modbus-rtu", marks=pytest.mark.fault("F09")),
+        pytest.param(TWICE, "modbus-tcp", marks=[pytest.mark.fault("F09"), pytest.mark.soak]),
     ],
+    ids=lambda value: value if isinstance(value, str) else value.name.lower(),
 )
 def test_f04_f05_f09_an_answer_of_a_plc_that_is_cut_split_or_doubled(link, action):
     with served(link, SoftMotionSimulator(seed=7)) as cell:
         with cell.connect() as controller:
             for slot, value in SLOTS.items():
                 controller.tools.write(slot, value, expected=None)
-        split = action is PlcFaultAction.SPLIT_REPLY
+        split = action is SPLIT
         for at in (1, 40):
             cell.simulator.faults.add(PlcFault(action, match="read_slot 3", position=at))
             with cell.connect(timeout_s=PATIENCE_S if split else TIMEOUT_S) as controller:
@@ -125,7 +131,9 @@ def test_the_simulated_device_on_a_line_answers_one_request_after_the_other():
 
 
 @pytest.mark.fault("F03")
-@pytest.mark.parametrize("length", [3, 36, 112])
+@pytest.mark.parametrize(
+    "length", [36, *(pytest.param(n, marks=pytest.mark.soak) for n in (3, 112))]
+)
 def test_f03_old_answers_on_a_serial_line_are_thrown_away(length):
     """As long as the answer to the first question, to that for a slot, to that for the block."""
     simulator = SoftMotionSimulator(seed=7)

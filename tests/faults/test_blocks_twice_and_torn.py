@@ -36,11 +36,30 @@ def cell(request):
         yield cell
 
 
+def only(*links):
+    """Over these links in each run of the tests, over all in ``make soak``."""
+    others = [pytest.param(link, marks=pytest.mark.soak) for link in LINKS if link not in links]
+    return pytest.mark.parametrize("cell", [*links, *others], indirect=True)
+
+
 @pytest.mark.fault("F25")
 @pytest.mark.parametrize(
-    "how",
-    [PlcFaultAction.DROP_REPLY, PlcFaultAction.GARBLE_REPLY],
-    ids=lambda how: how.name.lower(),
+    ("cell", "how"),
+    [
+        ("modbus-tcp", PlcFaultAction.DROP_REPLY),
+        ("modbus-rtu", PlcFaultAction.GARBLE_REPLY),
+        *(
+            pytest.param(link, how, marks=pytest.mark.soak)
+            for link, how in (
+                ("modbus-tcp", PlcFaultAction.GARBLE_REPLY),
+                ("modbus-rtu", PlcFaultAction.DROP_REPLY),
+                ("can-virtual", PlcFaultAction.DROP_REPLY),
+                ("can-virtual", PlcFaultAction.GARBLE_REPLY),
+            )
+        ),
+    ],
+    indirect=["cell"],
+    ids=lambda value: value if isinstance(value, str) else value.name.lower(),
 )
 def test_f25_a_movement_whose_answer_is_lost_is_unproved_and_begun_once(cell, how):
     cell.simulator.faults.add(PlcFault(how, match="write_command MOVE_LINEAR"))
@@ -67,9 +86,12 @@ def test_f25_a_movement_whose_answer_is_lost_is_unproved_and_begun_once(cell, ho
 
 
 @pytest.mark.fault("F26")
-def test_f26_whichever_answer_of_a_movement_is_lost_it_is_begun_once():
-    """In process and in simulated time: one run for each answer, until none was lost."""
-    for lost in range(200):
+@pytest.mark.parametrize(
+    "first", [0, *(pytest.param(n, marks=pytest.mark.soak) for n in range(1, 8))]
+)
+def test_f26_whichever_answer_of_a_movement_is_lost_it_is_begun_once(first):
+    """In process and in simulated time: one run for every eighth answer, until none was lost."""
+    for lost in range(first, 200, 8):
         with served("sim", SoftMotionSimulator(seed=7)) as cell:
             cell.simulator.faults.add(PlcFault(PlcFaultAction.DROP_REPLY, on_exchange=lost))
             try:
@@ -87,6 +109,7 @@ def test_f26_whichever_answer_of_a_movement_is_lost_it_is_begun_once():
 
 
 @pytest.mark.fault("F27")
+@only("modbus-rtu", "can-virtual")
 def test_f27_a_block_that_reaches_the_plc_twice_is_carried_out_once(cell):
     with closing(open_mailbox_link(cell.url)) as link:
         client = MailboxClient(link)
@@ -118,6 +141,7 @@ def test_f28_f32_a_block_whose_rest_comes_late_is_carried_out_whole_and_once(at)
 
 
 @pytest.mark.fault("F28", "F32")
+@only("modbus-tcp", "can-virtual")
 def test_f28_f32_a_block_whose_rest_never_comes_triggers_nothing(cell):
     with closing(open_mailbox_link(cell.url)) as link:
         client = MailboxClient(link)
@@ -137,6 +161,7 @@ def test_f28_f32_a_block_whose_rest_never_comes_triggers_nothing(cell):
 
 
 @pytest.mark.fault("F29")
+@only("modbus-tcp")
 def test_f29_behind_the_highest_number_comes_1_and_0_is_never_sent(cell):
     with closing(open_mailbox_link(cell.url)) as link:
         client = MailboxClient(link)
@@ -155,7 +180,9 @@ def test_f29_behind_the_highest_number_comes_1_and_0_is_never_sent(cell):
 
 
 @pytest.mark.fault("F31")
-@pytest.mark.parametrize("match", ["read_response", "read_slot"])
+@pytest.mark.parametrize(
+    "match", [pytest.param("read_response", marks=pytest.mark.soak), "read_slot"]
+)
 def test_f31_a_torn_answer_is_read_again_and_never_half_believed(match):
     with served("modbus-tcp", SoftMotionSimulator(seed=7)) as cell:
         with cell.connect() as controller:

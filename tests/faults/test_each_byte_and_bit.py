@@ -118,7 +118,8 @@ def put_right(simulator, url):
 
 
 @pytest.mark.fault("F07")
-def test_f07_no_request_with_a_bent_bit_leaves_a_value_that_nobody_noticed():
+@pytest.mark.parametrize("first", [0, *(pytest.param(n, marks=pytest.mark.soak) for n in (1, 2))])
+def test_f07_no_request_with_a_bent_bit_leaves_a_value_that_nobody_noticed(first):
     simulator = EpsonSimulator(seed=5)
     bent_at = [0, 0]
 
@@ -137,7 +138,7 @@ def test_f07_no_request_with_a_bent_bit_leaves_a_value_that_nobody_noticed():
         port = int(host.url.rpartition(":")[2])
         with BendingRelay(port, to_server=bend) as relay:
             url = host.url.replace(str(port), str(relay.port))
-            for place in range(len("XY(12.750, -3.000, -20.500")):
+            for place in range(first, len("XY(12.750, -3.000, -20.500"), 3):
                 simulator.machine.tools.set(1, OLD)
                 bent_at[:] = [place, 1]
                 said = None
@@ -153,4 +154,4 @@ def test_f07_no_request_with_a_bent_bit_leaves_a_value_that_nobody_noticed():
                 held = simulator.machine.tools.get(1)
                 assert held == (NEW if said is None else OLD), f"place {place}: {said}"
     # A blank bent into another character may still be read as a blank; digits never.
-    assert refused > 15
+    assert refused > 4

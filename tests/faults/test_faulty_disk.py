@@ -59,7 +59,9 @@ def test_what_cannot_be_stored_is_an_error_and_nothing_that_was_stored_is_lost(f
     assert operations(place) == expected(len(stored) + 2)
 
 
-@pytest.mark.parametrize("seed", [None, *range(4)])
+@pytest.mark.parametrize(
+    "seed", [None, 0, *(pytest.param(n, marks=pytest.mark.soak) for n in (1, 2, 3))]
+)
 def test_a_power_cut_takes_nothing_that_was_acknowledged(folder, seed):
     """At each write and sync of the fifth entry; what a seed lets arrive, arrives torn."""
     disk, path = folder
@@ -99,13 +101,16 @@ def test_a_sync_that_lies_loses_what_was_acknowledged_at_a_power_cut_and_not_at_
     assert operations(killed) == expected(5)
 
 
+@pytest.mark.parametrize(
+    "seeds", [range(1), pytest.param(range(1, 100), marks=pytest.mark.soak)], ids=["one", "many"]
+)
 @pytest.mark.parametrize("page", range(4))
-def test_a_bent_page_is_never_read_as_another_record(folder, page):
+def test_a_bent_page_is_never_read_as_another_record(folder, page, seeds):
     _, path = folder
     place = path / "journal.db"
     added(open_journal(str(place)), 0, 40)
     close_files()
-    for seed in range(4):
+    for seed in seeds:
         bent = path / f"bent-{seed}.db"
         bent.write_bytes(place.read_bytes())
         bend_page(bent, page, seed=seed)

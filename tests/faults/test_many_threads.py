@@ -143,7 +143,13 @@ def test_f49_a_hundred_threads_on_an_epson_controller_each_hear_their_own_answer
 
 
 @pytest.mark.fault("F49")
-@pytest.mark.parametrize("bus", ["modbus-tcp", "modbus-rtu", "can-virtual"])
+@pytest.mark.parametrize(
+    "bus",
+    [
+        "modbus-tcp",
+        *(pytest.param(b, marks=pytest.mark.soak) for b in ("modbus-rtu", "can-virtual")),
+    ],
+)
 def test_f49_threads_on_a_plc_each_hear_their_own_answer(bus):
     with served(bus) as cell, cell.connect() as controller:
         for number in range(2, 8):

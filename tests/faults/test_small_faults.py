@@ -16,7 +16,7 @@ from tests.faults.small.faults_of_a_run import Pair, Planned, drawn, planned, re
 from tests.faults.small.outcomes import outcome
 from tests.faults.small.wire import Act, SmallFault
 
-_SAMPLE = {"EPSON": 6, "PLC": 3}
+_SAMPLE = {"EPSON": 6, "PLC": 1}
 _SHARES = 24
 
 DECISIVE = {
@@ -41,7 +41,7 @@ def test_a_sample_of_small_faults_costs_no_second_movement_and_no_wrong_value(ki
     runs = drawn(kind, _SAMPLE[kind], seed=15)
     ends = told(runs)
     print(f"\n{kind}: {ends.total()} faults in {len(runs)} runs: {dict(ends)}")  # noqa: T201
-    assert len(ends) > 1
+    assert set(ends) != {"done"}  # the driver met them
 
 
 @pytest.mark.soak

@@ -233,7 +233,7 @@ MACHINES = {"EPSON": EpsonToolTableMachine, "PLC": PlcToolTableMachine}
 
 @pytest.mark.parametrize("kind", MACHINES)
 def test_a_tool_table_is_a_dictionary_whatever_happens(kind):
-    run(MACHINES[kind], 6, 16, derandomize=True)
+    run(MACHINES[kind], 3, 14, derandomize=True)
 
 
 @pytest.mark.soak

@@ -2,9 +2,9 @@
 
 docs/security.md, "Two laptops on one controller", says what is shown here.
 
-The second one has a state folder of its own and types commands: in a process of its own where the
-first is connected at that time. What the controller itself keeps apart is kept apart; what it does
-not is said on the page, and shown here.
+The second one has a state folder of its own and types commands: while the first is connected in
+the same process too, and in ``make soak`` in a process of its own. What the controller itself
+keeps apart is kept apart; what it does not is said on the page, and shown here.
 """
 
 import json
@@ -43,22 +43,28 @@ OLD, MINE = ToolOffset(12.0, -3.5, -20.0), ToolOffset(12.1, -3.5, -20.0)
 class Laptop:
     """Another computer: another journal."""
 
-    def __init__(self, folder: Path, url: str, capsys, monkeypatch) -> None:
-        self.folder, self.url = folder, url
+    def __init__(self, folder: Path, url: str, capsys, monkeypatch, *, apart: bool) -> None:
+        self.folder, self.url, self.apart = folder, url, apart
         self._capsys, self._monkeypatch = capsys, monkeypatch
         folder.mkdir()
 
     def types(self, *words):
         """Return the exit code and the document of a command that is typed there."""
         close_files()
+        ended = self._typed(words)
+        close_files()
+        return ended
+
+    def _typed(self, words):
         with self._monkeypatch.context() as there:
             there.setenv("ROBOLINK_STATE_DIR", str(self.folder / "state"))
             code = main.run(["-c", self.url, "--json", *words])
-            close_files()
         return code, json.loads(self._capsys.readouterr().out)
 
     def types_meanwhile(self, *words):
-        """Do the same in another process, while this one is connected."""
+        """Do the same while this computer is connected: its journal stays open."""
+        if not self.apart:
+            return self._typed(words)
         clean = {k: v for k, v in os.environ.items() if not k.startswith("ROBOLINK")}
         done = subprocess.run(
             [sys.executable, "-m", "robolink_cli", "-c", self.url, "--json", *words],
@@ -79,8 +85,21 @@ def _this_computer(tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def laptop(tmp_path, capsys, monkeypatch):
-    return lambda name, url: Laptop(tmp_path / name, url, capsys, monkeypatch)
+def apart():
+    """Whether the other laptop has a process of its own beside a connection of this one."""
+    return False
+
+
+in_both_ways = pytest.mark.parametrize(
+    "apart",
+    [False, pytest.param(True, marks=pytest.mark.soak)],
+    ids=["one process", "two processes"],
+)
+
+
+@pytest.fixture
+def laptop(tmp_path, capsys, monkeypatch, apart):
+    return lambda name, url: Laptop(tmp_path / name, url, capsys, monkeypatch, apart=apart)
 
 
 @pytest.fixture
@@ -101,6 +120,7 @@ def plc(laptop):
 # ---- EPSON: one client is served at a time
 
 
+@in_both_ways
 def test_an_epson_controller_serves_one_laptop_the_other_can_not_even_look(epson):
     simulator, url, other = epson
     with robolink.connect(url) as mine:
@@ -151,6 +171,7 @@ def test_what_one_laptop_must_settle_holds_up_that_laptop_and_not_the_other(lapt
 # ---- a PLC: whoever commands owns the mailbox
 
 
+@in_both_ways
 def test_a_plc_shows_everything_to_both_and_is_written_by_its_owner(plc):
     _, url, other = plc
     with robolink.connect(url) as mine:
@@ -165,6 +186,7 @@ def test_a_plc_shows_everything_to_both_and_is_written_by_its_owner(plc):
         assert mine.tools.read(1) == before
 
 
+@in_both_ways
 def test_the_other_laptop_may_always_stop_a_plc(plc):
     simulator, url, other = plc
     with robolink.connect(url) as mine:

@@ -81,7 +81,7 @@ def events_of(codec, data):
     return found
 
 
-@fuzzed(25, 20_000, data=st.sampled_from(REQUESTS).flatmap(edited_bytes), cut=st.integers(0, 60))
+@fuzzed(10, 20_000, data=st.sampled_from(REQUESTS).flatmap(edited_bytes), cut=st.integers(0, 60))
 def test_a_device_reads_a_request_or_refuses_it(data, cut):
     whole = events_of(EpsonTextCodec(Role.DEVICE), data)
     codec = EpsonTextCodec(Role.DEVICE)
@@ -90,7 +90,7 @@ def test_a_device_reads_a_request_or_refuses_it(data, cut):
     assert whole is not None
 
 
-@fuzzed(25, 20_000, data=st.sampled_from(ANSWERS).flatmap(edited_bytes))
+@fuzzed(10, 20_000, data=st.sampled_from(ANSWERS).flatmap(edited_bytes))
 def test_a_host_reads_an_answer_or_refuses_it(data):
     events_of(EpsonTextCodec(Role.HOST), data)
 
@@ -118,7 +118,7 @@ class Listener(Client):
 STATEMENTS = tuple(statement.encode() for statement, _ in rows())
 
 
-@fuzzed(20, 5000, data=st.sampled_from(STATEMENTS).flatmap(edited_bytes))
+@fuzzed(10, 5000, data=st.sampled_from(STATEMENTS).flatmap(edited_bytes))
 def test_a_controller_survives_every_statement(data):
     simulator = EpsonSimulator(seed=3)
     client = Listener(simulator)
@@ -136,7 +136,7 @@ def test_a_controller_survives_every_statement(data):
         assert client.ask("$GetStatus").startswith("#GetStatus,") or client.link.closed
 
 
-@fuzzed(20, 5000, data=st.sampled_from(REQUESTS).flatmap(edited_bytes))
+@fuzzed(10, 5000, data=st.sampled_from(REQUESTS).flatmap(edited_bytes))
 def test_a_controller_answers_or_hangs_up_whatever_it_is_asked(data):
     simulator = EpsonSimulator(seed=3)
     client = Listener(simulator)
@@ -167,7 +167,7 @@ OLD, NEW = ToolOffset(12.5, -3.25, -20.0), ToolOffset(12.75, -3.0, -20.5)
 
 
 @pytest.mark.fault("F07")
-@fuzzed(20, 2500, data=st.data(), at=st.integers(0, 7))
+@fuzzed(10, 2500, data=st.data(), at=st.integers(0, 7))
 def test_the_driver_claims_nothing_that_is_not_so_whatever_is_answered(data, at):
     simulator, clock = EpsonSimulator(seed=3), ManualClock()
     simulator.machine.tools.set(1, OLD)

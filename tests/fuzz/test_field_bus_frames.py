@@ -53,12 +53,12 @@ def repaired(frame):
     return frame[:-2] + checksum(frame[:-2])
 
 
-@fuzzed(25, 20_000, data=st.sampled_from([answer for _, answer in TCP]).flatmap(edited_bytes))
+@fuzzed(10, 20_000, data=st.sampled_from([answer for _, answer in TCP]).flatmap(edited_bytes))
 def test_a_client_takes_an_answer_over_tcp_or_refuses_it(data):
     taken_or_refused(TcpFraming(), data)
 
 
-@fuzzed(25, 20_000, data=st.sampled_from([answer for _, answer in RTU]).flatmap(edited_bytes))
+@fuzzed(10, 20_000, data=st.sampled_from([answer for _, answer in RTU]).flatmap(edited_bytes))
 def test_a_client_takes_an_answer_from_a_line_or_refuses_it(data):
     for frame in (data, repaired(data)):
         taken_or_refused(RtuFraming(), frame)
@@ -73,7 +73,7 @@ def taken_or_refused(framing, data):
             assert all(0 <= value <= 0xFFFF for value in reply.values)
 
 
-@fuzzed(25, 5000, data=st.sampled_from([request for request, _ in TCP]).flatmap(edited_bytes))
+@fuzzed(10, 5000, data=st.sampled_from([request for request, _ in TCP]).flatmap(edited_bytes))
 def test_a_plc_takes_a_request_over_tcp_or_hangs_up(data):
     server = TcpFrames()
     server.feed(data)
@@ -82,7 +82,7 @@ def test_a_plc_takes_a_request_over_tcp_or_hangs_up(data):
             assert isinstance(request, PlcRequest)
 
 
-@fuzzed(25, 5000, data=st.sampled_from([request for request, _ in RTU]).flatmap(edited_bytes))
+@fuzzed(10, 5000, data=st.sampled_from([request for request, _ in RTU]).flatmap(edited_bytes))
 def test_a_plc_takes_a_request_from_a_line_or_drops_it(data):
     for frame in (data, repaired(data)):
         server = LineFrames()
@@ -131,7 +131,7 @@ FRAMES = st.lists(BYTES, max_size=8).map(bytes) | st.builds(
 )
 
 
-@fuzzed(20, 20_000, nth=st.integers(0, 40), other=FRAMES)
+@fuzzed(10, 20_000, nth=st.integers(0, 40), other=FRAMES)
 def test_a_transfer_over_can_ends_with_its_object_or_an_error(nth, other):
     clock = FakeClock()
     bus: Any = ScriptedBus(clock, Node(nth + 2, other))

@@ -140,7 +140,7 @@ def test_the_seed_of_each_kind_is_right(kind):
 
 
 @fuzzed(
-    60,
+    30,
     20_000,
     tried=st.sampled_from(sorted(READERS)).flatmap(
         lambda kind: st.tuples(st.just(kind), edited_bytes(READERS[kind][1]))

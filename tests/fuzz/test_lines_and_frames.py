@@ -44,7 +44,7 @@ def edited_lines(draw: st.DrawFn, line: CallbackLine) -> bytes:
     return f"{text}*{check_sum(text):X}".encode("latin-1")
 
 
-@fuzzed(25, 20_000, data=st.sampled_from(LINES).flatmap(edited_lines))
+@fuzzed(10, 20_000, data=st.sampled_from(LINES).flatmap(edited_lines))
 def test_a_line_of_the_call_back_is_read_or_refused(data):
     with suppress(RemoteProtocolError):
         line = decode_line(data)
@@ -110,13 +110,13 @@ def edited_frames(draw: st.DrawFn, whole: tuple[bytes, ...]) -> bytes:
     return frames[: draw(st.integers(1, len(frames)))]
 
 
-@fuzzed(25, 20_000, data=edited_frames(ASKED), cut=st.integers(0, 40))
+@fuzzed(10, 20_000, data=edited_frames(ASKED), cut=st.integers(0, 40))
 def test_a_controller_at_a_serial_line_reads_a_frame_or_refuses_it(data, cut):
     for event in frames_read(Role.DEVICE, data, cut):
         assert isinstance(event, (Request, BadRequest))
 
 
-@fuzzed(25, 20_000, data=edited_frames(ANSWERED), cut=st.integers(0, 40))
+@fuzzed(10, 20_000, data=edited_frames(ANSWERED), cut=st.integers(0, 40))
 def test_a_host_at_a_serial_line_reads_a_frame_or_refuses_it(data, cut):
     for event in frames_read(Role.HOST, data, cut):
         assert isinstance(event, (Reply, Refusal))

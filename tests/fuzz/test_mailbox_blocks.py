@@ -44,7 +44,7 @@ COMMAND = encode_command(
 """Blocks as they are when all goes well."""
 
 
-@fuzzed(25, 20_000, words=edited_words(RESPONSE))
+@fuzzed(10, 20_000, words=edited_words(RESPONSE))
 def test_a_response_is_decoded_or_refused(words):
     for block in (words, sealed(words, RESPONSE_CRC)):
         try:
@@ -56,7 +56,7 @@ def test_a_response_is_decoded_or_refused(words):
         assert repr(again) == repr(response)
 
 
-@fuzzed(25, 20_000, words=edited_words(SLOT))
+@fuzzed(10, 20_000, words=edited_words(SLOT))
 def test_a_slot_is_decoded_or_refused(words):
     for block in (words, sealed(words, SLOT_CRC)):
         try:
@@ -67,7 +67,7 @@ def test_a_slot_is_decoded_or_refused(words):
         assert len(slot.name) <= 16
 
 
-@fuzzed(25, 20_000, words=edited_words(COMMAND))
+@fuzzed(10, 20_000, words=edited_words(COMMAND))
 def test_a_command_is_decoded_or_refused(words):
     for block in (words, sealed(words, COMMAND_CRC)):
         try:
@@ -78,7 +78,7 @@ def test_a_command_is_decoded_or_refused(words):
         assert command.only_ends in (True, False)
 
 
-@fuzzed(25, 20_000, words=edited_words(encode_device_id(0x1234_BEEF)))
+@fuzzed(10, 20_000, words=edited_words(encode_device_id(0x1234_BEEF)))
 def test_a_device_number_is_decoded_or_refused(words):
     with suppress(BlockError):
         number = decode_device_id(words)
@@ -94,7 +94,7 @@ def test_a_block_of_another_length_is_refused(length):
                 decode((0,) * length)
 
 
-@fuzzed(12, 1500, data=st.data())
+@fuzzed(4, 1500, data=st.data())
 def test_a_plc_stays_sound_whatever_command_it_is_given(data):
     client, simulator = owning()
     for _ in range(12):
@@ -149,7 +149,7 @@ READS = (
 
 
 @pytest.mark.fault("F07")
-@fuzzed(15, 2500, data=st.data())
+@fuzzed(6, 2500, data=st.data())
 def test_the_driver_reads_or_refuses_whatever_a_plc_answers(data):
     cell = Cell()
     try:
@@ -175,7 +175,7 @@ def test_the_driver_reads_or_refuses_whatever_a_plc_answers(data):
         cell.close()
 
 
-@fuzzed(15, 2500, data=st.data())
+@fuzzed(6, 2500, data=st.data())
 def test_a_write_is_called_done_only_when_the_slot_holds_it(data):
     cell = Cell()
     try:

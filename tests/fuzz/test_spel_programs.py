@@ -150,7 +150,7 @@ def judged(
     return [str(fault) for fault in told]
 
 
-@fuzzed(25, 20_000, text=nearly_right(), undeclared=st.sampled_from(("error", "double")))
+@fuzzed(10, 20_000, text=nearly_right(), undeclared=st.sampled_from(("error", "double")))
 def test_a_program_is_built_or_refused_with_its_place(text, undeclared):
     judged(text, undeclared=undeclared)
 

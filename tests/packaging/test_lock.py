@@ -139,6 +139,7 @@ linux = pytest.mark.skipif(
 
 
 @linux
+@pytest.mark.soak
 def test_a_wheel_with_another_hash_ends_the_installation(index):
     done = installed(index, f"robolink-tiny==1.0 --hash=sha256:{'0' * 64}")
     assert done.returncode == 1

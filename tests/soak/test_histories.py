@@ -18,6 +18,13 @@ def test_every_rule_holds_in_forty_disturbed_hours(seed):
     assert sum(story.met.values()) >= HOURS // 2  # they came to pass, and were not only drawn
 
 
+def test_one_seed_is_one_history():
+    first = run(5, 1)
+    assert run(5, 1).hash == first.hash
+    assert run(6, 1).hash != first.hash
+
+
+@pytest.mark.soak
 def test_one_seed_is_one_history_in_every_process():
     program = "from robolink_simulators.soak import run; print(run(5, 1).hash, run(6, 1).hash)"
     told = subprocess.run(

@@ -1,5 +1,7 @@
 """A defect that is put in is found, told, cut short, and becomes a test."""
 
+from functools import cache
+
 import pytest
 from click.testing import CliRunner
 from robolink_simulators.soak import CellKind, live_through
@@ -16,7 +18,6 @@ HISTORY = History(
     (
         Hour(0, Deed.SET_TOOL, Habit(), ()),
         Hour(1, Deed.CHANGE_NOZZLE, Habit(impatient=True), (DROPPED,)),
-        Hour(2, Deed.SELECT_TOOL, Habit(person="ben"), ()),
     ),
 )
 FORGETFUL = {
@@ -25,6 +26,7 @@ FORGETFUL = {
 """A driver that moves although an earlier movement was not answered."""
 
 
+@cache
 def with_a_defect(history):
     return live_through(history, FORGETFUL)
 

@@ -9,11 +9,12 @@ from robolink.errors import JournalError
 from robolink.journal import EntryKind, NewEntry
 from tests.contract.journal._acts import marker
 
-SAMPLE = 40
+SAMPLE = {"few": 20, "many": 2000}
 
 
 @pytest.mark.fault("F62")
-def test_f62_no_bent_bit_is_taken_for_the_record_or_costs_it(tmp_path, open_anew):
+@pytest.mark.parametrize("sample", ["few", pytest.param("many", marks=pytest.mark.soak)])
+def test_f62_no_bent_bit_is_taken_for_the_record_or_costs_it(tmp_path, open_anew, sample):
     path = tmp_path / "journal.db"
     journal = open_anew(str(path))
     log = journal.log("cell")
@@ -28,7 +29,7 @@ def test_f62_no_bent_bit_is_taken_for_the_record_or_costs_it(tmp_path, open_anew
     whole, drawn = path.read_bytes(), random.Random(62)
     written = [place for place, byte in enumerate(whole) if byte]
     ends = {"refused": 0, "told": 0, "without a meaning": 0}
-    for _ in range(SAMPLE):
+    for _ in range(SAMPLE[sample]):
         bent = bytearray(whole)
         place = drawn.choice(written)
         bent[place] ^= 1 << drawn.randrange(8)
@@ -36,7 +37,7 @@ def test_f62_no_bent_bit_is_taken_for_the_record_or_costs_it(tmp_path, open_anew
         ends[self_judged(path, open_anew, right)] += 1
         for beside in path.parent.glob(f"{path.name}-*"):
             beside.unlink()
-    assert ends["refused"] + ends["told"] >= 5, ends
+    assert ends["refused"] + ends["told"] >= 3, ends
     print(ends)  # noqa: T201 - for pytest -s
 
 

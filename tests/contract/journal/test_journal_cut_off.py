@@ -40,7 +40,14 @@ def writes(simulator: EpsonSimulator) -> int:
 
 
 @pytest.mark.fault("F78")
-@pytest.mark.parametrize("when", ["before the change", "at the write", "once it is written"])
+@pytest.mark.parametrize(
+    "when",
+    [
+        pytest.param("before the change", marks=pytest.mark.soak),
+        "at the write",
+        pytest.param("once it is written", marks=pytest.mark.soak),
+    ],
+)
 def test_f78_without_the_shared_journal_nothing_new_begins_and_what_runs_ends_safely(
     server, firewall, epson, open_anew, when
 ):

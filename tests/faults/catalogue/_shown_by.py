@@ -42,7 +42,8 @@ def marked(file: Path) -> Iterator[Showing]:
         return
     name = str(file.relative_to(ROOT))
     borne = 0
-    module = ast.parse(source).body
+    tree = ast.parse(source)
+    module = tree.body
     all_soak = any(isinstance(node, ast.Assign) and _soaks(node) for node in module)
     for node in module:
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
@@ -51,7 +52,7 @@ def marked(file: Path) -> Iterator[Showing]:
             if marks:
                 soak = all_soak or any(_is_mark(d, "soak") for d in node.decorator_list)
                 yield Showing(name, node.name, tuple(_numbers(marks, name)), soak)
-    if borne != sum(1 for _ in _marks(ast.parse(source), "fault")):
+    if borne != sum(1 for _ in _marks(tree, "fault")):
         raise ValueError(f"{name}: a mark `fault` belongs above a test, or to its parameters")
 
 
@@ -68,7 +69,12 @@ def _marks(tree: ast.AST, name: str) -> Iterator[ast.Call]:
 
 
 def _is_mark(node: ast.AST, name: str) -> bool:
-    return isinstance(node, ast.Attribute) and ast.unparse(node) == f"pytest.mark.{name}"
+    # Asked for every node of every test: what costs most is looked at last.
+    return (
+        isinstance(node, ast.Attribute)
+        and node.attr == name
+        and ast.unparse(node) == f"pytest.mark.{name}"
+    )
 
 
 def _numbers(marks: list[ast.Call], file: str) -> Iterator[str]:

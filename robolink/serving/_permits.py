@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
+from robolink.controllers.softmotion.controller import MACHINE_WAITS
 from robolink.errors import CalibrationError, ConfigError, LeaseHeldError, RobolinkError
 from robolink.messages import tr
 from robolink.model import Controller, EntryKind, NewEntry, Pose, ToolOffset, plain_offset
@@ -154,7 +155,8 @@ class PermitCall:
         result = self._touches.solve(before)
         require_believed(result, before, self._limits)
         wanted = Wanted(plan.tool, result.offset, before, details=self._details(result))
-        with ToolChange(self._controller, (wanted,), verify=True) as change:
+        marked = {MACHINE_WAITS: True}
+        with ToolChange(self._controller, (wanted,), verify=True, marked=marked) as change:
             (receipt,) = change.write()
             written = receipt.read_back or result.offset
             for _ in range(plan.proofs):

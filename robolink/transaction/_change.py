@@ -77,6 +77,7 @@ class ToolChange:
         controller: The controller, connected.
         wanted: The tools to change, each once, in the order in which they are written.
         verify: Whether something is to be verified between the writes and :meth:`keep`.
+        marked: More for its durable marker, plain JSON.
         tell: Told, in sentences, what was put back.
     """
 
@@ -86,12 +87,14 @@ class ToolChange:
         wanted: Sequence[Wanted],
         *,
         verify: bool = False,
+        marked: Mapping[str, object] | None = None,
         tell: Callable[[str], None] = lambda _sentence: None,
     ) -> None:
         self._controller = controller
         self._wanted = tuple(wanted)
         self._several_steps = verify or len(self._wanted) > 1
         self._verify = verify
+        self._marked = marked or {}
         self._tell = tell
         self._own_id = False
         self._marker: Marker | None = None
@@ -153,6 +156,7 @@ class ToolChange:
                 "tools": tools,
                 "verify": self._verify,
                 "change": self._controller.outcomes.change,
+                **self._marked,
             }
             if self._selected is not None:
                 details["selected"] = self._selected

@@ -73,7 +73,7 @@ def test_doctor_names_an_address_at_which_what_is_open_can_be_settled(served, ca
     log.begin(Marker("a", MarkerKind.MOVE, "Move XY(1,2)", "then", {"target": [1, 2]}))
     log.close()
     _, out, err = run(capsys, "doctor")
-    assert f"robolink -c {url} recover" in out + err
+    assert f'robolink -c "{url}" recover' in out + err
 
 
 def test_an_address_that_was_never_met_is_told_from_an_empty_record(served, capsys):

@@ -38,7 +38,7 @@ def cell(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("example", ["scara-pin", "two-nozzles", "needle-beams"])
-def test_the_error_to_the_truth_is_inside_the_stated_interval(cell, example, capsys):
+def test_the_error_to_the_truth_is_what_the_interval_leads_to_expect(cell, example, capsys):
     words = ("recalibrate", str(EXAMPLES / f"{example}.toml"), "--assist", cell.url)
     began_ns = cell.clock.now_ns()
     code = main.run(["-c", cell.url, *words, "--nozzle", "N-7", "--lot", "L", "--yes", "--json"])
@@ -54,7 +54,8 @@ def test_the_error_to_the_truth_is_inside_the_stated_interval(cell, example, cap
         true = cell.simulator.world.tips[number]
         assert set(halves) == {"x_mm", "y_mm"}
         for name, half in halves.items():
-            # The controller keeps three decimals.
-            assert abs(getattr(found, name) - getattr(true, name)) <= half + 0.0005
+            # One draw: one in twenty lies outside of a 95 % interval, one in 10,000 outside of twice
+            # that; how many do is counted in soak. The controller keeps three decimals.
+            assert abs(getattr(found, name) - getattr(true, name)) <= 2 * half + 0.0005
             assert half <= 0.05
         assert tool["verification"]["passed"]

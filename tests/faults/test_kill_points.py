@@ -47,8 +47,8 @@ def check_the_next_command_says_what_is_selected(cell):
     assert shown.code == 0, shown.err
     if cell.selected_tool != 1:
         assert "Tool 0 is selected now; it was tool 1 before" in shown.err
-        assert f"'robolink -c {cell.url} recover' puts tool 1 back" in shown.err
-    assert shown.err.count("recover'") == len(markers)
+        assert "This puts tool 1 back, with the power mode and speed of then" in shown.err
+    assert shown.err.count(f'robolink -c "{cell.url}" recover') == len(markers)
     assert cell.open_markers() == markers
 
 

@@ -8,7 +8,7 @@ from tests.unit.test_sim_spel_motion import Cell
 
 @pytest.fixture
 def cell():
-    """A robot whose tip stands at about X 124, Y 496, Z -40."""
+    """A robot whose tip stands at about X 159, Y 495, Z -40."""
     return Cell()
 
 
@@ -76,7 +76,7 @@ def test_by_mode_1_the_way_of_a_go_counts(cell):
 
 
 def test_pulses_count_by_mode_1_alone_and_the_way_in_is_open(cell):
-    cell.run("P9 = Here; XYLim 150, 300, 0, 550; XYLimMode 1")
+    cell.run("XYLim 200, 300, 0, 550; XYLimMode 1")
     # It stands outside: it may come nearer, not go farther.
     assert outcome(cell, "JTran 1, 5") == 4001
     assert outcome(cell, "JTran 1, -2") == 0

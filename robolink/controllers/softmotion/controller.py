@@ -56,6 +56,9 @@ _RESETS: Final = (
 
 _SIMULATED: Final = "sim"
 
+MACHINE_WAITS: Final = "machine_waits"
+"""In the marker of a change: the machine's program goes on once the mailbox is given back."""
+
 _LEAVING_S: Final = 1.0
 """Longest time from the end of a reset to the state that follows it."""
 
@@ -212,16 +215,19 @@ class SoftMotionController(ControllerCore):
     def _take_leave(self) -> None:
         """Halt what nobody waited on, and give the mailbox back.
 
-        A machine takes that for the word that all its tools are settled (docs/plc-callback.md), so
-        after a change that is not, it stays taken until ``recover``, or for 10 s of silence.
+        A machine that called takes that for the word that its tool is settled
+        (docs/plc-callback.md), so while such a change is open the mailbox stays taken.
         """
         if self._mailbox.wire.alive:
             self.groups[0].abort_unfinished()
-            if not self._mailbox.wire.epoch or not self._change_is_open():
+            if not self._mailbox.wire.epoch or not self._machine_waits():
                 self._mailbox.commands.ownership.release()
 
-    def _change_is_open(self) -> bool:
-        return any(marker.kind is MarkerKind.CHANGE for marker in self.outcomes.open_markers())
+    def _machine_waits(self) -> bool:
+        return any(
+            marker.kind is MarkerKind.CHANGE and marker.details.get(MACHINE_WAITS) is True
+            for marker in self.outcomes.open_markers()
+        )
 
     def _close_link(self) -> None:
         self._mailbox.wire.close()

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from robolink_simulators.epson.definitions.added_arms import AddedArms
 from robolink_simulators.epson.definitions.arches import ArchTable
+from robolink_simulators.epson.definitions.curves import CurveFiles
 from robolink_simulators.epson.definitions.xy_limits import XYLimits
 
 
@@ -16,24 +17,28 @@ class KeptDefinitions:
     Attributes:
         arches: Those of Jump.
         arms: Added arms; that they are kept as tools are is assumed.
+        curves: The files of Curve.
         limits: Those of XYLim; that they are kept is assumed, their mode is not (documented).
     """
 
     def __init__(self, own_arm: Sequence[float]) -> None:
         self.arches = ArchTable()
         self.arms = AddedArms(own_arm)
+        self.curves = CurveFiles()
         self.limits = XYLimits()
 
     @property
     def changes(self) -> int:
         """How often something of it was changed."""
-        return self.arches.changes + self.arms.changes + self.limits.changes
+        parts = (self.arches, self.arms, self.curves, self.limits)
+        return sum(part.changes for part in parts)
 
     def to_state(self) -> dict[str, object]:
         """Return what survives power-off, ready for JSON."""
         return {
             "arches": self.arches.to_state(),
             "arms": self.arms.to_state(),
+            "curves": self.curves.to_state(),
             "limits": self.limits.to_state(),
         }
 
@@ -45,4 +50,5 @@ class KeptDefinitions:
         """
         self.arches.restore(state["arches"])
         self.arms.restore(state["arms"])
+        self.curves.restore(state["curves"])
         self.limits.restore(state["limits"])

@@ -117,6 +117,10 @@ class TreeBuilder(Transformer[Token, tuple[Statement, ...]]):
         value = number_value(word)
         return Literal(-value if sign == "-" else value)
 
+    def name_of_file(self, word: Token) -> Literal:
+        """Build the name of a curve."""
+        return self.text(word)
+
     def switch_on_the_way(self, word: Token, number: Expression) -> SwitchOnTheWay:
         """Build an output that Pass switches."""
         return SwitchOnTheWay(word.lower(), number)

@@ -38,7 +38,7 @@ _WORDS_NOT_SIMULATED = """
     limittorque limittorquelp limittorquestop limzmargin mcordr msgbox olaccel olrate opencom
     opennet outreal parsestr performmode plane plocal ptpboost ptrq qpdecelr qpdecels shutdown
     softcp speedrlimitation syncrobots taskstate tclim tcspeed diffpoint
-    atclr boxclr calib closecom closenet close cls copy curve cvmove
+    atclr boxclr calib closecom closenet close cls copy
     del eresume error exportpoints flush fmtstr homeclr hofsjointaccuracy importpoints
     input inputbox latchenable line loadpoints mcal mkdir
     pdescription planeclr ptclr ptran qp randomize read redim rename resetelapsedtime savepoints

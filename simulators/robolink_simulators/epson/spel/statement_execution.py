@@ -20,6 +20,7 @@ from robolink_simulators.epson.spel.expressions.printing import (
 )
 from robolink_simulators.epson.spel.expressions.values import Value, as_number, truth
 from robolink_simulators.epson.spel.statements.blending import blends, fall_ns, rest_of_way
+from robolink_simulators.epson.spel.statements.defined.curves import store_curve
 from robolink_simulators.epson.spel.statements.jump import DESCENT
 from robolink_simulators.epson.spel.statements.keywords import StatementOutcome, run_command
 from robolink_simulators.epson.spel.statements.motion import plan
@@ -364,16 +365,17 @@ class StatementExecution:
         match statement:
             case Print(items, newline):
                 values = [evaluator.shown(item) for item in items]
-                end = CRLF if newline else ""
-                session = evaluator.session
-                text = joined(values, session.options, session.machine.model)
-                return StatementOutcome(text + end)
+                text = joined(values, evaluator.session.options, machine.model)
+                return StatementOutcome(text + (CRLF if newline else ""))
             case KeywordStatement("wait"):
                 return self._wait(statement)
             case If():
                 return self._branch(statement)
             case KeywordStatement():
                 return run_command(evaluator, statement)
+            case MotionStatement("curve"):
+                store_curve(evaluator, statement)
+                return StatementOutcome()
             case MotionStatement():
                 return self._begin(statement)
             case Distance(percent):

@@ -207,7 +207,8 @@ class SwitchOnTheWay:
 
 
 Target = PointExpression | PointRange | SwitchOnTheWay | Literal
-"""What stands between the commas of a motion; a number is an angle or a radius of Arc."""
+"""What stands between the commas of a motion; a number is an angle or a radius of Arc, a
+text the file of a curve."""
 
 
 @dataclass(frozen=True, slots=True)

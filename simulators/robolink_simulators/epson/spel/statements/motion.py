@@ -21,6 +21,7 @@ from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.joint_functions import least_motion
 from robolink_simulators.epson.spel.expressions.values import out_of_range
+from robolink_simulators.epson.spel.statements.defined.curves import curve_leg
 from robolink_simulators.epson.spel.statements.defined.xy_limits import require_within_limits
 from robolink_simulators.epson.spel.statements.jump import jump, jump3
 from robolink_simulators.epson.spel.statements.legs import go_leg, held_leg, line_leg
@@ -46,6 +47,7 @@ _WORDS: Final = {
     "tgo": frozenset({"cp"}) | _UNTIL_WORDS,
     "bgo": frozenset({"cp"}) | _UNTIL_WORDS,
     "pass": frozenset({"cp", "ljm"}),
+    "cvmove": frozenset({"cp"}) | _UNTIL_WORDS,
     "move": _LINE_WORDS | {"ecp"},
     "tmove": _LINE_WORDS,
     "bmove": _LINE_WORDS,
@@ -84,6 +86,9 @@ def _planned(evaluator: Evaluator, motion: MotionStatement) -> list[Leg]:
     if motion.verb in ARC_VERBS:
         require_drives(machine)
         return [arc(evaluator, motion)]
+    if motion.verb == "cvmove":
+        require_drives(machine)
+        return [curve_leg(evaluator, motion)]
     points = _points(evaluator, motion)
     if motion.verb != "pass" and len(points) != _WAYPOINTS.get(motion.verb, 1):
         raise SpelRefusal(RefusalKind.SYNTAX, f"{motion.verb} does not take {len(points)} points")

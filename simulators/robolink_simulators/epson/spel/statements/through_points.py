@@ -49,7 +49,7 @@ def arc(evaluator: Evaluator, motion: MotionStatement) -> Leg:
         Refusal: They are no form of it, make no arc, or it leaves the envelope.
     """
     machine = evaluator.session.machine
-    given = [_worth(evaluator, target) for target in motion.targets]
+    given = [worth_of(evaluator, target) for target in motion.targets]
     points = [machine.pose_of(one) for one in given if isinstance(one, Point)]
     numbers = [one for one in given if not isinstance(one, Point)]
     in_order = all(isinstance(one, Point) for one in given[: len(points)])
@@ -97,8 +97,12 @@ def _of_radius(evaluator: Evaluator, end: Pose, numbers: Sequence[Number]) -> Le
     return way_leg(machine, end, way)
 
 
-def _worth(evaluator: Evaluator, target: Target) -> Point | Number:
-    """Return a point, or the number that a literal, a constant or a variable stands for."""
+def worth_of(evaluator: Evaluator, target: Target) -> Point | Number:
+    """Return a point, or the number that a literal, a constant or a variable stands for.
+
+    Raises:
+        Refusal: It is neither.
+    """
     match target:
         case Literal(int() | float() as number):
             return number

@@ -11,7 +11,7 @@ from robolink_simulators.epson.spel.tree import KeywordStatement, MotionStatemen
 _WORDS = """
     accel accels accelr arm armset base box cp ecp ecpset ecpclr fine home homeset inertia limz
     local motor power pulse range sfree slock speed speeds speedr tlset tlclr tool weight till
-    find sense jtran
+    find sense jtran arch armclr xylim xylimclr xylimmode
 """
 FORBIDDEN: Final = frozenset(_WORDS.split())
 _BOUND: Final = frozenset({TaskKind.NO_ABORT, TaskKind.BACKGROUND})
@@ -25,5 +25,5 @@ def forbidden_in(kind: TaskKind, statement: Statement) -> bool:
         case MotionStatement():
             return True
         case KeywordStatement(name, arguments):
-            return name in FORBIDDEN and bool(arguments or name in ("home", "slock"))
+            return name in FORBIDDEN and bool(arguments or name in ("home", "slock", "xylimclr"))
     return False

@@ -1,0 +1,76 @@
+"""Free curves that Curve stores and CVMove travels (docs/reference/spel.md 7.1)."""
+
+from collections.abc import Mapping
+from typing import Final, NamedTuple
+
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+
+Place = tuple[float, float, float, float]
+"""X, Y, Z in mm, U in degrees, in the robot's coordinates."""
+
+AXES_OF_CURVES: Final = (2, 3, 4)
+"""How many of X, Y, Z, U a curve rules; the others stay (assumed)."""
+
+
+class CurveSwitch(NamedTuple):
+    """A bit that switches as the tip passes a point; ``word`` is On, Off, MemOn or MemOff."""
+
+    point: int
+    word: str
+    number: int
+
+
+class FreeCurve(NamedTuple):
+    """What one Curve stored; ``places`` of a closed one end where they begin."""
+
+    axes: int
+    places: tuple[Place, ...]
+    switches: tuple[CurveSwitch, ...] = ()
+
+
+class CurveFiles:
+    """The curve files of one robot, by name in any case.
+
+    Attributes:
+        changes: How often one was stored.
+    """
+
+    def __init__(self) -> None:
+        self.changes = 0
+        self._files: dict[str, FreeCurve] = {}
+
+    def store(self, name: str, curve: FreeCurve) -> None:
+        """Store a curve; one of the same name is replaced."""
+        self._files[name.lower()] = curve
+        self.changes += 1
+
+    def get(self, name: str) -> FreeCurve:
+        """Return a curve.
+
+        Raises:
+            Refusal: There is no such file.
+        """
+        curve = self._files.get(name.lower())
+        if curve is None:
+            raise SpelRefusal(RefusalKind.NO_SUCH_FILE, f"There is no curve {name}")
+        return curve
+
+    def to_state(self) -> dict[str, object]:
+        """Return what survives power-off, ready for JSON."""
+        return dict(self._files)
+
+    def restore(self, state: object) -> None:
+        """Take over what :meth:`to_state` returned.
+
+        Raises:
+            TypeError, ValueError: It is something else.
+        """
+        if not isinstance(state, Mapping):
+            raise TypeError("not the curves of a robot")
+        self._files = {str(name): _restored(*parts) for name, parts in state.items()}
+
+
+def _restored(axes: int, places: list[list[float]], switches: list[list[object]]) -> FreeCurve:
+    read = tuple((float(x), float(y), float(z), float(u)) for x, y, z, u in places)
+    bits = tuple(CurveSwitch(int(str(at)), str(word), int(str(n))) for at, word, n in switches)
+    return FreeCurve(int(axes), read, bits)

@@ -61,14 +61,14 @@ def marker_notice(marker: "Marker", url: str) -> str:
         return _record_missing(marker, url)
     if marker.kind is MarkerKind.CHANGE:
         return tr(
-            "Not finished since {when}: {request}.\n  'robolink -c {url} recover' settles it.",
+            'Not finished since {when}: {request}.\n  This settles it: robolink -c "{url}" recover',
             when=marker.begun_at,
             request=marker.request,
             url=url,
         )
     return tr(
         "Sent {when} without a clear answer: {request}. It may or may not have run, so motion is "
-        "blocked.\n  'robolink -c {url} recover' settles it.",
+        'blocked.\n  This settles it: robolink -c "{url}" recover',
         when=marker.begun_at,
         request=marker.request,
         url=url,

@@ -54,13 +54,8 @@ def test_the_error_to_the_truth_is_what_the_interval_leads_to_expect(cell, examp
         true = cell.simulator.world.tips[number]
         assert set(halves) == {"x_mm", "y_mm"}
         for name, half in halves.items():
-<<<<<<< HEAD
-            # One draw: one in twenty lies outside of a 95 % interval, one in 10,000 outside of
-            # twice that; how many do is counted in soak. The controller keeps three decimals.
-=======
             # One draw: one in 20 lies outside of a 95 % interval, one in 10,000 outside of twice
             # that; how many do is counted in soak. The controller keeps three decimals.
->>>>>>> main
             assert abs(getattr(found, name) - getattr(true, name)) <= 2 * half + 0.0005
             assert half <= 0.05
         assert tool["verification"]["passed"]

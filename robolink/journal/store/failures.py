@@ -71,6 +71,8 @@ def damaged_error(found: str, name: str, consequence: str) -> JournalError:
 def _reason(error: BaseException) -> str:
     if isinstance(error, PermissionError):
         return "forbidden"
+    if isinstance(error, UnicodeDecodeError):
+        return "damaged"  # a bent byte in a text, or in the name that SQLite complains of
     code = getattr(error, "sqlite_errorcode", None)
     if isinstance(code, int):
         return _SQLITE.get(code & 0xFF, "")

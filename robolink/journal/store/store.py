@@ -189,7 +189,7 @@ class Store:
             except JournalError:
                 self._drop()
                 raise
-            except (SQLAlchemyError, OSError) as error:
+            except (SQLAlchemyError, OSError, UnicodeDecodeError) as error:
                 self._drop()
                 raise journal_error(error, self._place.name, consequence) from error
         if writing:

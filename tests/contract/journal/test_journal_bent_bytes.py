@@ -9,7 +9,7 @@ from robolink.errors import JournalError
 from robolink.journal import EntryKind, NewEntry
 from tests.contract.journal._acts import marker
 
-SAMPLE = {"few": 20, "many": 2000}
+SAMPLE = {"few": 20, "many": 40}
 
 
 @pytest.mark.fault("F62")
@@ -39,6 +39,21 @@ def test_f62_no_bent_bit_is_taken_for_the_record_or_costs_it(tmp_path, open_anew
             beside.unlink()
     assert ends["refused"] + ends["told"] >= 3, ends
     print(ends)  # noqa: T201 - for pytest -s
+
+
+@pytest.mark.fault("F62")
+def test_f62_a_name_in_the_file_that_is_no_text_any_more_is_damage(tmp_path, open_anew):
+    """SQLite complains of it by that name, which Python cannot read."""
+    path = tmp_path / "journal.db"
+    journal = open_anew(str(path))
+    journal.log("cell").append(NewEntry(EntryKind.RAW, tool=2, verdict="kept"))
+    journal.close()
+    with sqlite3.connect(path) as connection:
+        connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+    connection.close()
+    path.write_bytes(path.read_bytes().replace(b"CREATE TABLE", b"CREATE TAB\xc5E"))
+    with pytest.raises(JournalError, match="is damaged"):
+        open_anew(str(path)).log("cell").begin(marker("another"))
 
 
 def self_judged(path, open_anew, right):

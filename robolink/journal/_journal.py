@@ -254,10 +254,10 @@ def _entry(row: Mapping[str, Any]) -> Recorded:
     )
 
 
-def _details(text: str) -> Mapping[str, object]:
+def _details(text: str | None) -> Mapping[str, object]:
     try:
         found = json.loads(text)
-    except (ValueError, RecursionError):
+    except (ValueError, TypeError, RecursionError):
         found = None
     return found if isinstance(found, dict) else {"damaged": text}
 

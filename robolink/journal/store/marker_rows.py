@@ -1,6 +1,11 @@
-"""Statements about markers."""
+"""Statements about markers.
+
+Each carries a checksum among its details. Entries are chained by their hashes; a marker stands
+alone, and recovery writes the old value that it names.
+"""
 
 import json
+from hashlib import sha256
 from typing import Final, NamedTuple
 
 from sqlalchemy import BindParameter, bindparam, delete, func, insert, select, update
@@ -23,6 +28,9 @@ class _Stored(NamedTuple):
     begun_at: str
     details: str
 
+
+_SUM: Final = "_sum"
+"""Where the checksum stands. Markers of before have none, and nothing tells that one is bent."""
 
 _SAME: Final = (
     MARKERS.c.controller == bindparam("of_controller"),
@@ -60,8 +68,18 @@ class MarkerRows:
             "kind": str(marker.kind),
             "request": storable(marker.request),
             "begun_at": storable(marker.begun_at),
-            "details": canonical(marker.details),
         }
+        # As it will be read: other keys and numbers than those of JSON are told apart no more.
+        details = json.loads(canonical(marker.details))
+        stored = _Stored(
+            controller=values["of_controller"],
+            operation=values["of_operation"],
+            kind=values["kind"],
+            request=values["request"],
+            begun_at=values["begun_at"],
+            details=canonical(details),
+        )
+        values["details"] = canonical({**details, _SUM: _sum_of(stored)})
         if self._runner.run(_INSERT, values):
             return True
         self._runner.run(_UPDATE, values)
@@ -90,6 +108,9 @@ def _marker(row: _Stored) -> Marker:
         kind, details = MarkerKind(row.kind), json.loads(row.details)
         if not isinstance(details, dict):
             raise TypeError
+        told = details.pop(_SUM, None)
+        if told not in (None, _sum_of(row._replace(details=canonical(details)))):
+            raise ValueError(told)
     except (ValueError, TypeError) as error:
         raise JournalError(
             tr("A safety record of {controller} makes no sense.", controller=row.controller),
@@ -103,6 +124,11 @@ def _marker(row: _Stored) -> Marker:
             controller=row.controller,
         ) from error
     return Marker(row.operation, kind, row.request, row.begun_at, details)
+
+
+def _sum_of(row: _Stored) -> str:
+    """Return the checksum of a marker whose details have none; its controller may be renamed."""
+    return sha256("\n".join(row[1:]).encode("utf-8")).hexdigest()[:16]
 
 
 def _same(controller: str, operation: str) -> dict[str, str]:

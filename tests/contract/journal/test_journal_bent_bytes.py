@@ -2,6 +2,7 @@
 
 import random
 import sqlite3
+from dataclasses import replace
 
 import pytest
 
@@ -39,6 +40,26 @@ def test_f62_no_bent_bit_is_taken_for_the_record_or_costs_it(tmp_path, open_anew
             beside.unlink()
     assert ends["refused"] + ends["told"] >= 3, ends
     print(ends)  # noqa: T201 - for pytest -s
+
+
+@pytest.mark.fault("F62")
+@pytest.mark.parametrize(("was", "bent"), [("left open", "left o0en"), ("12.25", "12.75")])
+def test_f62_a_bent_marker_is_not_acted_on(tmp_path, open_anew, was, bent):
+    """Recovery writes the old value that a marker names."""
+    path = tmp_path / "journal.db"
+    journal = open_anew(str(path))
+    begun = marker("left open")
+    journal.log("cell").begin(replace(begun, details={"before": [12.25, -3.5, -20.0]}))
+    journal.close()
+    connection = sqlite3.connect(path)
+    with connection:
+        for column in ("operation", "details"):
+            connection.execute(
+                f"UPDATE markers SET {column} = replace({column}, ?, ?)", (was, bent)
+            )
+    connection.close()
+    with pytest.raises(JournalError, match="makes no sense"):
+        open_anew(str(path)).log("cell").open_markers()
 
 
 @pytest.mark.fault("F62")

@@ -256,8 +256,8 @@ def _entry(row: Mapping[str, Any]) -> Recorded:
 
 def _details(text: str | None) -> Mapping[str, object]:
     try:
-        found = json.loads(text)
-    except (ValueError, TypeError, RecursionError):
+        found = json.loads(text or "")
+    except (ValueError, RecursionError):
         found = None
     return found if isinstance(found, dict) else {"damaged": text}
 

@@ -200,7 +200,7 @@ def test_what_was_left_unfinished_is_resolved_by_the_cell_s_name(cell, simulator
     log.close()
     try:
         assert main.run(["-c", "a", "status"]) == 0
-        assert "robolink -c a recover" in capsys.readouterr().err
+        assert 'robolink -c "a" recover' in capsys.readouterr().err
     finally:
         memory_journal(URL).log(URL).clear("a")
 

@@ -149,7 +149,7 @@ class SoftMotionPlant(PlantWithWorld):
         self.note_hand(tool, offset)
 
     def advance(self) -> None:
-        """See :meth:`PlantMachine.advance`; the machine's own program goes on, too."""
+        """Let time pass; the machine's own program goes on, too."""
         super().advance()
         self._production.look(self.clock.now_ns())
 

@@ -18,6 +18,13 @@ def test_every_rule_holds_in_forty_disturbed_hours(seed):
     assert sum(story.met.values()) >= HOURS // 2  # they came to pass, and were not only drawn
 
 
+def test_two_threads_that_stop_a_plc_at_once_are_both_told_of_rest():
+    """The stop that came second ended the first one's, whose caller was told while it braked."""
+    story = run(371, 2)
+    assert story.broken == [], story.told()
+    assert story.checks["AtRestWhenStopped"] >= 2, "as it was drawn"
+
+
 def test_one_seed_is_one_history():
     first = run(5, 1)
     assert run(5, 1).hash == first.hash

@@ -8,6 +8,7 @@ away; where everybody waits for a time, virtual time goes on to the first of the
 import random
 import threading
 from collections.abc import Callable
+from math import ceil
 from types import TracebackType
 from typing import Final, Protocol
 
@@ -173,7 +174,8 @@ class TurnTaking:
         me = self.current
         me.ready = ready
         if timeout_s is not None:
-            me.until_ns = self._clock.now_ns() + round(timeout_s * NS_PER_S)
+            # Less than a nanosecond is one: who waits for it over and over would wait for ever.
+            me.until_ns = self._clock.now_ns() + ceil(timeout_s * NS_PER_S)
         try:
             while not me.can_go_on(self._clock.now_ns()):
                 self._hand_over(self._drawn())

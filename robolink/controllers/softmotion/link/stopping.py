@@ -12,7 +12,7 @@ from robolink.controllers.softmotion.link.commands import CommandSender
 from robolink.controllers.softmotion.link.snapshots import Snapshots
 from robolink.errors import OutcomeUnknownError, RejectedError
 from robolink.messages import tr
-from robolink.protocols.mailbox import ErrorClass, Response
+from robolink.protocols.mailbox import Bits, ErrorClass, Response
 from robolink.timing import Clock, Deadline
 
 REST_S: Final = 5.0
@@ -49,7 +49,8 @@ def bring_group_to_rest(
             if deadline.expired:
                 raise _restless(controller)
             now = snapshots.news(now)
-        stands = True
+        # A stop of another thread that came meanwhile ends ours before the group stands.
+        stands = not now.bits & Bits.BUSY
     except RejectedError as error:
         if error.code not in _ALREADY:
             raise

@@ -60,14 +60,14 @@ def wrong_mm(document, truth, axes):
 
 
 def recovered(done, truth, axes="xy"):
-    """Prove that the truth lies in the stated interval, no wider.
+    """Prove that the truth lies where the stated interval leads to expect it.
 
-    An interval of 95 % misses now and then: the cells here are those of one seed, in which none
-    does. How often it holds over many is counted in the long tests, below.
+    One in 20 lies outside of a 95 % interval, one in 10,000 outside of twice that. How often it
+    holds over many is counted in the long tests, below.
     """
     assert done.code == 0, done.err[-1500:] + done.out[-500:]
     for wrong, half in wrong_mm(done.document, truth, axes):
-        assert abs(wrong) <= half, (axes, wrong, half)
+        assert abs(wrong) <= 2 * half, (axes, wrong, half)
     assert done.document["verification"]["passed"]
     return done.document
 
@@ -116,7 +116,7 @@ def test_angles_and_then_one_touch_recover_two_needles(at):
     for axis in ("x_mm", "y_mm", "z_mm"):
         change = getattr(at.truth, axis) - getattr(tip, axis)
         error = getattr(at.stored, axis) - getattr(before, axis) - change
-        assert abs(error) <= done.document["fit"]["half_width95"][axis], axis
+        assert abs(error) <= 2 * done.document["fit"]["half_width95"][axis], axis
 
 
 @each("C8-C901S", "C12-C1401S", "CX4-A601SR", chosen={"CX4-A601SR"})
@@ -229,7 +229,7 @@ def test_a_recipe_measures_writes_and_proves(at, tmp_path):
     (tool,) = done.document["tools"]
     halves = tool["fit"]["half_width95"]
     for axis, half in halves.items():
-        assert abs(getattr(at.stored, axis) - getattr(at.truth, axis)) <= half < 0.1
+        assert abs(getattr(at.stored, axis) - getattr(at.truth, axis)) <= 2 * half < 0.2
     assert tool["verification"]["passed"]
 
 

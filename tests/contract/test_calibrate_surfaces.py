@@ -67,10 +67,13 @@ def slot(simulator):
 
 
 def inside(simulator, tool):
-    """Tell whether each length that was written is within its interval of the truth."""
+    """Tell whether each length that was written is within twice its interval of the truth.
+
+    One in 20 lies outside of a 95 % interval; how many do is counted in soak.
+    """
     truth, half = simulator.world.tips[1].components()[:3], tool["fit"]["half_width95"].values()
     found = zip(slot(simulator), truth, half, strict=True)
-    return all(abs(value - true) <= width for value, true, width in found)
+    return all(abs(value - true) <= 2 * width for value, true, width in found)
 
 
 def recalibrate(simulator, example, folder):

@@ -111,19 +111,16 @@ def require_true(
 
 
 @dataclass(frozen=True, slots=True)
-class CustomPosition:
+class _OwnKinematics:
     """A class of one's own as the simulated group works with it.
 
     Attributes:
         name: ``module:Class``.
         own: The object.
-        carries: Whether an orientation kinematics is coupled to it: then ISMPositionKinematics2
-            tells how its flange stands, as on the PLC.
     """
 
     name: str
     own: Any
-    carries: bool
 
     @property
     def kinds(self) -> tuple[AxisKind, ...]:
@@ -131,12 +128,24 @@ class CustomPosition:
         return tuple(self.own.kinds)
 
     def flange(self, axes: AxisValues) -> Frame:
-        """Return where the flange is."""
+        """Return where the flange is; of an orientation kinematics on the one that carries it."""
         return _asked(lambda: Frame(*self.own.axes_to_cartesian(axes)))
 
     def configuration(self, axes: AxisValues) -> Configuration:  # noqa: ARG002 - has none
         """Return that there is none: the solution nearest to the present axes is taken."""
         return ANY_CONFIGURATION
+
+
+@dataclass(frozen=True, slots=True)
+class CustomPosition(_OwnKinematics):
+    """A kinematics of one's own that moves the machine.
+
+    Attributes:
+        carries: Whether an orientation kinematics is coupled to it: then ISMPositionKinematics2
+            tells how its flange stands, as on the PLC.
+    """
+
+    carries: bool
 
     def axes_for(
         self,
@@ -158,29 +167,8 @@ class CustomPosition:
 
 
 @dataclass(frozen=True, slots=True)
-class CustomOrientation:
-    """An orientation kinematics of one's own as the simulated group works with it.
-
-    Attributes:
-        name: ``module:Class``.
-        own: The object.
-    """
-
-    name: str
-    own: Any
-
-    @property
-    def kinds(self) -> tuple[AxisKind, ...]:
-        """Its axes."""
-        return tuple(self.own.kinds)
-
-    def flange(self, axes: AxisValues) -> Frame:
-        """Return where its flange is on the one that carries it."""
-        return _asked(lambda: Frame(*self.own.axes_to_cartesian(axes)))
-
-    def configuration(self, axes: AxisValues) -> Configuration:  # noqa: ARG002 - has none
-        """Return that there is none."""
-        return ANY_CONFIGURATION
+class CustomOrientation(_OwnKinematics):
+    """A kinematics of one's own that turns a flange on another one."""
 
     def axes_for(
         self,

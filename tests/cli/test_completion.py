@@ -60,10 +60,10 @@ def test_a_click_without_that_shell_says_what_to_install(monkeypatch, capsys):
 @pytest.mark.parametrize(
     ("words", "offered"),
     [
-        (["robolink", "comp"], {"completion"}),
+        (["robolink", "expert", "comp"], {"completion"}),
         (["robolink", "-c", ""], {"line3", "a"}),
         (["robolink", "status", "-c", "li"], {"line3"}),
-        (["robolink", "config", "sh"], {"show"}),
+        (["robolink", "cell", "sh"], {"show"}),
     ],
 )
 def test_tab_in_bash_offers_what_fits(shell_environment, words, offered):

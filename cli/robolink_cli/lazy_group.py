@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, cast
 import click
 
 from robolink.messages import tr
+from robolink_cli.console.render import note
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -73,7 +74,7 @@ class LazyGroup(click.Group):
         if args[0] in self.renamed and not ctx.resilient_parsing and sys.stderr.isatty():
             typed = " ".join([*ctx.command_path.split()[1:], args[0]])
             now = self.renamed[args[0]][1]
-            click.echo(tr("{old} is now called {new}.", old=typed, new=now), err=True)
+            note(tr("{old} is now called {new}.", old=typed, new=now))
         return found
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

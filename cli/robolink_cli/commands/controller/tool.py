@@ -6,6 +6,7 @@ import click
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink_cli.access.completing import complete_tool
 from robolink_cli.access.warnings import note_change
 from robolink_cli.console.render import note, say
 from robolink_cli.lazy_group import LazyGroup
@@ -60,7 +61,7 @@ def list_tools(context: CliContext, published: bool) -> None:
 
 
 @tool.command("get")
-@click.argument("number", type=int, required=False)
+@click.argument("number", type=int, required=False, shell_complete=complete_tool)
 @click.option(
     "--mode",
     type=click.Choice(["set", "active", "last"]),
@@ -111,7 +112,7 @@ def _get_by_mode(context: CliContext, mode: str) -> None:
 
 
 @tool.command("set")
-@click.argument("number", type=int)
+@click.argument("number", type=int, shell_complete=complete_tool)
 @click.option("--x", type=DECIMAL, help="mm from the flange.")
 @click.option("--y", type=DECIMAL, help="mm from the flange.")
 @click.option("--z", type=DECIMAL, help="mm from the flange.")
@@ -189,7 +190,7 @@ def set_tool(
 
 
 @tool.command("clear")
-@click.argument("number", type=int)
+@click.argument("number", type=int, shell_complete=complete_tool)
 @then_select_option
 @controller_options
 @dry_run_option
@@ -247,7 +248,7 @@ def _clear_question(number: int, then_select: int | None) -> str:
 
 
 @tool.command("select")
-@click.argument("number", type=int)
+@click.argument("number", type=int, shell_complete=complete_tool)
 @controller_options
 @dry_run_option
 @yes_option

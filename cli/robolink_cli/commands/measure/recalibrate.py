@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from robolink.messages import tr
+from robolink_cli.access.completing import complete_recipe
 from robolink_cli.options.consent import dry_run_option, yes_option
 from robolink_cli.options.recipe_answers import answer_options
 from robolink_cli.options.sensor import sensor_option
@@ -13,7 +14,12 @@ from robolink_cli.session.operator_identity import nozzle_options
 
 
 @click.command()
-@click.argument("recipe", metavar="RECIPE.toml", type=click.Path(dir_okay=False, path_type=Path))
+@click.argument(
+    "recipe",
+    metavar="RECIPE.toml",
+    type=click.Path(dir_okay=False, path_type=Path),
+    shell_complete=complete_recipe,
+)
 @click.option(
     "--reference",
     is_flag=True,

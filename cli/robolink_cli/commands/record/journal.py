@@ -11,6 +11,7 @@ import click
 from robolink.messages import tr
 from robolink.model import EntryKind
 from robolink_cli.access.cell import complete_cell
+from robolink_cli.access.completing import complete_tool
 from robolink_cli.commands.record.journal_drift import drift
 from robolink_cli.commands.record.journal_lookup import (
     controller_meant,
@@ -41,7 +42,12 @@ def _filters(function: F) -> F:
             shell_complete=complete_cell,
             help=tr("Only of this controller; without it, of all."),
         ),
-        click.option("--tool", type=int, help=tr("Only about this tool.")),
+        click.option(
+            "--tool",
+            type=int,
+            shell_complete=complete_tool,
+            help=tr("Only about this tool."),
+        ),
         click.option(
             "--kind",
             "kinds",

@@ -18,6 +18,7 @@ from robolink.methods import (
     parameter_problems,
 )
 from robolink.stations import StationKind
+from robolink_cli.access.completing import complete_station
 from robolink_cli.commands.measure.calibrate.options import calibration_options, sigma_option
 from robolink_cli.commands.measure.calibrate.request import CalibrationRequest
 from robolink_cli.commands.measure.calibrate.values import as_typed, is_repeated, type_of
@@ -102,7 +103,11 @@ def _station_option(method: AnyMethod) -> Decorator:
     known = _STATIONS[needs.station]
     found = tr("Name of the pin; where it is found is kept, for one touch later.")
     return click.option(
-        "--station", metavar="ID", required=needs.named, help=found if needs.finds_pin else known
+        "--station",
+        metavar="ID",
+        required=needs.named,
+        shell_complete=complete_station,
+        help=found if needs.finds_pin else known,
     )
 
 

@@ -8,6 +8,7 @@ import click
 
 from robolink.messages import tr
 from robolink_cli.access.cell import with_cell_limits
+from robolink_cli.access.completing import complete_tool
 from robolink_cli.commands.measure.calibrate.request import request_from
 from robolink_cli.options.consent import dry_run_option, yes_option
 from robolink_cli.options.impact import impact_options
@@ -92,7 +93,13 @@ _FRAME: Final = (
 
 def _own_options() -> tuple[Callable[[Callable[..., Any]], Callable[..., Any]], ...]:
     return (
-        click.option("--tool", type=int, required=True, help=tr("Number of the tool, 1 to 15.")),
+        click.option(
+            "--tool",
+            type=int,
+            required=True,
+            shell_complete=complete_tool,
+            help=tr("Number of the tool, 1 to 15."),
+        ),
         motion_option(
             "--speed",
             "speed_mm_s",

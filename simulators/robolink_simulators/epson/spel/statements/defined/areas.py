@@ -6,12 +6,12 @@ from typing import Final
 from robolink.protocols.spel import decimal
 from robolink_simulators.epson.definitions.areas import CheckBox, CheckPlane, Span
 from robolink_simulators.epson.machine import Machine
-from robolink_simulators.epson.memory.frames_of_points import coordinates_of_points
 from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.printing import CRLF
 from robolink_simulators.epson.spel.expressions.values import as_integer, out_of_range
+from robolink_simulators.epson.spel.statements.defined.frames_of_points import coordinates_of_points
 from robolink_simulators.epson.spel.tree import (
     Expression,
     KeywordStatement,

@@ -5,16 +5,16 @@ from dataclasses import astuple
 from typing import Final
 
 from robolink.protocols.spel import decimal
-from robolink_simulators.epson.memory.frames_of_points import (
-    Pair,
-    coordinates_of_points,
-    fit_of_pairs,
-)
 from robolink_simulators.epson.memory.points import Local
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.printing import CRLF
 from robolink_simulators.epson.spel.expressions.values import out_of_range
+from robolink_simulators.epson.spel.statements.defined.frames_of_points import (
+    Pair,
+    coordinates_of_points,
+    fit_of_pairs,
+)
 from robolink_simulators.epson.spel.statements.points import point_argument
 from robolink_simulators.epson.spel.tree import (
     Expression,

@@ -5,9 +5,9 @@ from pathlib import Path
 import click
 
 from robolink.messages import tr
-from robolink_cli.access.completing import complete_tool
 from robolink_cli.options.consent import dry_run_option, published_option, yes_option
 from robolink_cli.prompts.questions import agree
+from robolink_cli.session.completing import complete_tool
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.opening import open_controller
 

@@ -6,7 +6,6 @@ import click
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink_cli.access.completing import complete_tool
 from robolink_cli.access.warnings import note_change
 from robolink_cli.console.render import note, say
 from robolink_cli.lazy_group import LazyGroup
@@ -19,6 +18,7 @@ from robolink_cli.options.consent import (
 from robolink_cli.options.numbers import DECIMAL
 from robolink_cli.prompts.jumps import Allowed, accept_jump, accept_jump_options, allowed_by
 from robolink_cli.prompts.questions import agree
+from robolink_cli.session.completing import complete_tool
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.opening import open_controller
 

@@ -5,10 +5,10 @@ from pathlib import Path
 import click
 
 from robolink.messages import tr
-from robolink_cli.access.completing import complete_recipe
 from robolink_cli.options.consent import dry_run_option, yes_option
 from robolink_cli.options.recipe_answers import answer_options
 from robolink_cli.options.sensor import sensor_option
+from robolink_cli.session.completing import complete_recipe
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.operator_identity import nozzle_options
 

@@ -3,8 +3,8 @@
 import click
 
 from robolink.messages import tr
-from robolink_cli.access.completing import complete_station, complete_tool
 from robolink_cli.options.consent import dry_run_option, yes_option
+from robolink_cli.session.completing import complete_station, complete_tool
 from robolink_cli.session.context import CliContext, controller_options
 
 

@@ -11,7 +11,6 @@ import click
 from robolink.messages import tr
 from robolink.model import EntryKind
 from robolink_cli.access.cell import complete_cell
-from robolink_cli.access.completing import complete_tool
 from robolink_cli.commands.record.journal_drift import drift
 from robolink_cli.commands.record.journal_lookup import (
     controller_meant,
@@ -22,6 +21,7 @@ from robolink_cli.commands.record.journal_lookup import (
 from robolink_cli.console.render import emit_json, json_is_on, say
 from robolink_cli.lazy_group import LazyGroup
 from robolink_cli.options.shared import json_option
+from robolink_cli.session.completing import complete_tool
 
 if TYPE_CHECKING:
     from robolink.journal import Journal

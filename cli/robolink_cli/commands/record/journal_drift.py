@@ -8,10 +8,10 @@ import click
 
 from robolink.messages import tr
 from robolink_cli.access.cell import complete_cell
-from robolink_cli.access.completing import complete_tool
 from robolink_cli.commands.record.journal_lookup import controller_meant, journal_to_read
 from robolink_cli.console.render import emit_json, json_is_on, say
 from robolink_cli.options.shared import json_option
+from robolink_cli.session.completing import complete_tool
 
 if TYPE_CHECKING:
     from robolink.drift import CellDrift

@@ -4,9 +4,9 @@ import click
 
 from robolink.errors import ConfigError, DeclinedError
 from robolink.messages import tr
-from robolink_cli.access.completing import complete_tool
 from robolink_cli.options.consent import dry_run_option, then_select_option, yes_option
 from robolink_cli.prompts.questions import agree, on_terminal
+from robolink_cli.session.completing import complete_tool
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.opening import open_controller
 

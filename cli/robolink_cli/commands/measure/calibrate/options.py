@@ -8,13 +8,13 @@ import click
 
 from robolink.messages import tr
 from robolink_cli.access.cell import with_cell_limits
-from robolink_cli.access.completing import complete_tool
 from robolink_cli.commands.measure.calibrate.request import request_from
 from robolink_cli.options.consent import dry_run_option, yes_option
 from robolink_cli.options.impact import impact_options
 from robolink_cli.options.motion import motion_option
 from robolink_cli.options.report import report_options
 from robolink_cli.prompts.jumps import USUAL_CHANGE_MM
+from robolink_cli.session.completing import complete_tool
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.operator_identity import nozzle_options
 

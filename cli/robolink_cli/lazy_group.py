@@ -12,6 +12,9 @@ from typing import TYPE_CHECKING, cast
 
 import click
 
+from robolink.messages import spoken
+from robolink_cli.console.help_pages import in_language
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -50,11 +53,11 @@ class LazyGroup(click.Group):
         elif cmd_name in self._lazy:
             target, summary = self._lazy[cmd_name]
             if self.listing:
-                return click.Command(cmd_name, short_help=summary)
+                return click.Command(cmd_name, short_help=spoken(summary))
         else:
             return super().get_command(ctx, cmd_name)
         module, name = target.split(":")
-        return cast(click.Command, getattr(import_module(module), name))
+        return in_language(cast(click.Command, getattr(import_module(module), name)))
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """List the commands in the help page."""

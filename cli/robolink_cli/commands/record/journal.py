@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 
-from robolink.messages import tr
+from robolink.messages import declared, tr
 from robolink.model import EntryKind
 from robolink_cli.access.cell import complete_cell
 from robolink_cli.commands.record.journal_drift import drift
@@ -38,17 +38,17 @@ def _filters(function: F) -> F:
             "--controller",
             metavar="CELL|URL",
             shell_complete=complete_cell,
-            help=tr("Only of this controller; without it, of all."),
+            help=declared("Only of this controller; without it, of all."),
         ),
-        click.option("--tool", type=int, help=tr("Only about this tool.")),
+        click.option("--tool", type=int, help=declared("Only about this tool.")),
         click.option(
             "--kind",
             "kinds",
             type=click.Choice(list(_KINDS), case_sensitive=False),
             multiple=True,
-            help=tr("Only of this kind; may be repeated."),
+            help=declared("Only of this kind; may be repeated."),
         ),
-        click.option("--change", metavar="ID", help=tr("Only of this tool change.")),
+        click.option("--change", metavar="ID", help=declared("Only of this tool change.")),
     )
     for option in reversed(options):
         function = option(function)
@@ -168,9 +168,9 @@ def diff(a: str, b: str) -> None:
     "--format",
     "form",
     type=click.Choice(["csv", "json", "jsonl"]),
-    help=tr("Form of the file; by default what its name ends with."),
+    help=declared("Form of the file; by default what its name ends with."),
 )
-@click.option("--force", is_flag=True, help=tr("Write over a file that is there already."))
+@click.option("--force", is_flag=True, help=declared("Write over a file that is there already."))
 @_filters
 @json_option
 def export(

@@ -5,7 +5,7 @@ from dataclasses import replace
 import click
 
 from robolink.errors import ConfigError
-from robolink.messages import tr
+from robolink.messages import declared, tr
 from robolink_cli.access.warnings import note_change
 from robolink_cli.console.render import note, say
 from robolink_cli.lazy_group import LazyGroup
@@ -27,13 +27,13 @@ _FROM_FILES = "robolink_cli.commands.controller.backup"
 _BESIDES = {
     "impact": (
         "robolink_cli.commands.measure.impact:impact",
-        tr("How far a tool change moves the tip at taught points."),
+        declared("How far a tool change moves the tip at taught points."),
     ),
-    "backup": (f"{_FROM_FILES}:backup", tr("Save all tools to a file.")),
-    "restore": (f"{_FROM_FILES}:restore", tr("Put the tools of a backup back.")),
+    "backup": (f"{_FROM_FILES}:backup", declared("Save all tools to a file.")),
+    "restore": (f"{_FROM_FILES}:restore", declared("Put the tools of a backup back.")),
     "compare": (
         f"{_FROM_FILES}:compare",
-        tr("What differs from a backup; exit code 1 when something does."),
+        declared("What differs from a backup; exit code 1 when something does."),
     ),
 }
 

@@ -64,6 +64,10 @@ peers: $(VENV)/.installed-dev $(JUDGES) ## Let foreign programs judge the field 
 $(JUDGES): $(VENV)/.installed-dev
 	$(BIN)/python -m pip install --quiet --no-deps --target $@ minimalmodbus==2.1.1 || true
 
+.PHONY: windows
+windows: $(VENV)/.installed-dev ## Run the wheel on a Windows CPython under wine, as far as that goes.
+	@$(BIN)/python -m tests.windows
+
 .PHONY: check
 check: $(VENV)/.installed-dev ## Check style, types and who imports whom.
 	$(BIN)/ruff check .

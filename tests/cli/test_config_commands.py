@@ -140,7 +140,7 @@ def test_show_takes_the_cell_from_c_as_well(cells, capsys, monkeypatch):
     assert main.run(["-c", "a", "config", "show", "--origin"]) == 0
     shown = capsys.readouterr().out
     assert shown.startswith("[cells.a]\n")
-    assert re.search(f"\n  box_mm +80 +{cells / 'site' / 'robolink.toml'}\n", shown)
+    assert re.search(f"\n  box_mm +80 +{re.escape(str(cells / 'site' / 'robolink.toml'))}\n", shown)
     monkeypatch.setenv("ROBOLINK_CONTROLLER", "b")
     assert main.run(["config", "show"]) == 0
     shown = capsys.readouterr().out

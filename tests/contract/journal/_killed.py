@@ -2,13 +2,17 @@
 
 Arguments: where the journal is, and ``again`` to do the steps of a tool write in it or ``anew``
 to make a journal for each run. For each run one line on stdout says how many steps were
-acknowledged before the process was killed; the last run comes to its end.
+acknowledged before the process was killed; the last run comes to its end. A process for each run
+is forked; where there is no fork, as on Windows, it is started, with the run's number as its third
+argument.
 """
 
 import os
 import signal
+import subprocess
 import sys
 from collections.abc import Callable
+from functools import partial
 from itertools import count
 
 from sqlalchemy import Engine, event
@@ -16,6 +20,9 @@ from sqlalchemy import Engine, event
 from robolink.journal import EntryKind, JournalOutcomeLog, NewEntry, close_files, open_journal
 from robolink.journal.store.prepared import StatementRunner
 from tests.contract.journal._acts import marker
+
+# On Windows os.kill ends a process by TerminateProcess, whatever signal it is given.
+KILL = getattr(signal, "SIGKILL", signal.SIGTERM)
 
 STEPS: tuple[Callable[[JournalOutcomeLog], None], ...] = (
     lambda log: log.look(),
@@ -34,7 +41,7 @@ def kill_at(number: int) -> None:
         nonlocal left
         left -= 1
         if left == 0:
-            os.kill(os.getpid(), signal.SIGKILL)
+            os.kill(os.getpid(), KILL)
 
     event.listen(Engine, "before_cursor_execute", step)
     event.listen(Engine, "commit", step)
@@ -74,26 +81,49 @@ def load_all(location: str) -> None:
     close_files()
 
 
+def killed_in_a_fork(number: int, location: str, anew: bool) -> tuple[int, bool]:
+    """Run once in a fork; return the steps acknowledged and whether it came to its end."""
+    reader, writer = os.pipe()
+    child = os.fork()
+    if child == 0:
+        if anew:
+            make_once(number, location)
+        else:
+            run_once(number, writer, location)
+        os._exit(0)
+    os.close(writer)
+    with open(reader, "rb") as pipe:
+        acknowledged = len(pipe.read())
+    _, status = os.waitpid(child, 0)
+    if os.WIFEXITED(status) and os.WEXITSTATUS(status):
+        sys.exit(os.WEXITSTATUS(status))
+    return acknowledged, os.WIFEXITED(status)
+
+
+def killed_in_a_process(number: int, location: str, anew: bool) -> tuple[int, bool]:
+    """Run once in a process of its own; return the same as :func:`killed_in_a_fork`."""
+    how = "anew" if anew else "again"
+    command = (sys.executable, "-m", "tests.contract.journal._killed", location, how, str(number))
+    done = subprocess.run(command, stdout=subprocess.PIPE, check=False)
+    if done.returncode not in {0, KILL}:
+        sys.exit(done.returncode)
+    return done.stdout.count(b"."), done.returncode == 0
+
+
 def main() -> None:
-    """Run until one run comes to its end."""
+    """Run until one run comes to its end, or the one run whose number is given."""
     location, anew = sys.argv[1], sys.argv[2] == "anew"
+    if len(sys.argv) > 3:
+        once = make_once if anew else partial(run_once, acknowledge=sys.stdout.fileno())
+        once(int(sys.argv[3]), location=location)
+        return
     load_all(f"{location}-0" if anew else location)
+    run = killed_in_a_fork if hasattr(os, "fork") else killed_in_a_process
     for number in count(1):
-        reader, writer = os.pipe()
-        child = os.fork()
-        if child == 0:
-            if anew:
-                make_once(number, location)
-            else:
-                run_once(number, writer, location)
-            os._exit(0)
-        os.close(writer)
-        with open(reader, "rb") as pipe:
-            acknowledged = len(pipe.read())
-        _, status = os.waitpid(child, 0)
+        acknowledged, ended = run(number, location, anew)
         print(acknowledged, flush=True)  # noqa: T201 - this is what the test reads
-        if os.WIFEXITED(status):
-            sys.exit(os.WEXITSTATUS(status))
+        if ended:
+            return
 
 
 if __name__ == "__main__":

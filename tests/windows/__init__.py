@@ -1,0 +1,1 @@
+"""robolink's wheel on a Windows CPython under wine: ``make windows``."""

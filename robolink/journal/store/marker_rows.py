@@ -16,7 +16,7 @@ from robolink.errors import JournalError
 from robolink.journal.store.chain import canonical, storable
 from robolink.journal.store.prepared import UNLESS_THERE, Prepared, StatementRunner
 from robolink.journal.store.tables import MARKERS
-from robolink.messages import tr
+from robolink.messages import plain, tr
 from robolink.model import Marker, MarkerKind
 
 
@@ -84,7 +84,7 @@ class MarkerRows:
             request=values["request"],
             begun_at=values["begun_at"],
             # As it will be read: other keys and numbers than JSON's are told apart no more.
-            details=canonical(json.loads(canonical(marker.details))),
+            details=canonical(json.loads(canonical(plain(marker.details)))),
         )
         values["details"] = _with_sum(stored)
         if self._runner.run(_INSERT, values):

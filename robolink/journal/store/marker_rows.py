@@ -133,8 +133,8 @@ def _marker(row: _Stored) -> Marker:
         if not isinstance(details, dict):
             raise TypeError
         told = details.pop(_SUM, None)
-        plain = row._replace(details=canonical(details))
-        if told not in (None, _sum_of(plain), _sum_of(plain[1:])):
+        summed = row._replace(details=canonical(details))
+        if told not in (None, _sum_of(summed), _sum_of(summed[1:])):
             raise ValueError(told)
     except (ValueError, TypeError) as error:
         raise JournalError(

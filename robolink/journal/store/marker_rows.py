@@ -14,7 +14,7 @@ from robolink.errors import JournalError
 from robolink.journal.store.chain import canonical, storable
 from robolink.journal.store.prepared import UNLESS_THERE, Prepared, StatementRunner
 from robolink.journal.store.tables import MARKERS
-from robolink.messages import tr
+from robolink.messages import plain, tr
 from robolink.model import Marker, MarkerKind
 
 
@@ -70,7 +70,7 @@ class MarkerRows:
             "begun_at": storable(marker.begun_at),
         }
         # As it will be read: other keys and numbers than those of JSON are told apart no more.
-        details = json.loads(canonical(marker.details))
+        details = json.loads(canonical(plain(marker.details)))
         stored = _Stored(
             controller=values["of_controller"],
             operation=values["of_operation"],

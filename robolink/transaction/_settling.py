@@ -13,6 +13,7 @@ from robolink.model import (
     Verdict,
     describe_offset,
     plain_offset,
+    put_right,
     read_offset,
 )
 from robolink.transaction._put_back import Step, put_back
@@ -148,7 +149,9 @@ class Settler:
         )
         backup = marker.details.get("backup")
         if backup:
-            sentence += " " + tr("'robolink compare {path}' shows what has changed.", path=backup)
+            sentence += " " + tr(
+                "'robolink tool compare {path}' shows what has changed.", path=backup
+            )
         entry = NewEntry(
             EntryKind.DECISION,
             verdict=tr("a person looked at the controller and begins a new record"),
@@ -170,6 +173,8 @@ class Settler:
             )
             for step in steps
         )
+        ways = {put_right(offset) for offset in now.values()}
+        sentence = " ".join((sentence, *filter(None, ways)))
         return _finding(marker, Verdict.CONFLICT, sentence, steps, now)
 
 

@@ -1,4 +1,4 @@
-"""What the ``config`` commands show."""
+"""What ``cell list``, ``show``, ``people``, ``files`` and ``validate`` show."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -15,6 +15,7 @@ from robolink.config import (
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli.access.cell import link_options
+from robolink_cli.console.columns import columns, padded
 from robolink_cli.console.render import say
 from robolink_cli.session.context import CliContext, origin_of
 
@@ -64,7 +65,7 @@ def show_check(payload: Mapping[str, Any]) -> None:
     if payload["disagreement"]:
         say(payload["disagreement"])
     if not payload["files"]:
-        say(tr("There is no cell file; 'robolink config path' shows where one may be."))
+        say(tr("There is no cell file; 'robolink cell files' shows where one may be."))
 
 
 def cells_payload(cells: Iterable[Cell]) -> dict[str, Any]:
@@ -80,11 +81,36 @@ def cells_payload(cells: Iterable[Cell]) -> dict[str, Any]:
 def show_cells(payload: Mapping[str, Any]) -> None:
     """Print one cell a line."""
     cells = payload["cells"]
-    width = max((len(name) for name in cells), default=0)
+    width = max((columns(name) for name in cells), default=0)
     for name, cell in cells.items():
-        say(f"{name:{width}}  {cell['url']}  {cell['robot'] or ''}".rstrip())
+        say(f"{padded(name, width)}  {cell['url']}  {cell['robot'] or ''}".rstrip())
     if not cells:
-        say(tr("There is no cell; 'robolink config path' shows where a cell file may be."))
+        say(tr("There is no cell; 'robolink cell files' shows where a cell file may be."))
+
+
+def people_payload(cells: Iterable[Cell]) -> dict[str, Any]:
+    """Return who works at each cell; ``None`` where its file names nobody."""
+    named = {
+        cell.name: None
+        if cell.settings.people is None
+        else {person: str(role) for person, role in cell.settings.people.items()}
+        for cell in cells
+    }
+    return {"cells": named}
+
+
+def show_people(payload: Mapping[str, Any]) -> None:
+    """Print the people of each cell, one a line."""
+    for name, people in payload["cells"].items():
+        if people is None:
+            say(tr("{cell}: nobody is named, so everybody may do everything.", cell=name))
+            continue
+        say(tr("{cell}:", cell=name))
+        width = max((len(person) for person in people), default=0)
+        for person, role in people.items():
+            say(f"  {person:{width}}  {role}")
+    if not payload["cells"]:
+        say(tr("There is no cell; 'robolink cell files' shows where a cell file may be."))
 
 
 def cell_payload(cell: Cell, context: CliContext, *, origin: bool) -> dict[str, Any]:

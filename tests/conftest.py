@@ -18,6 +18,11 @@ for _library in ("OPENBLAS", "OMP", "MKL"):
 CANARIES = Watch()
 """Every password of the test that runs, and what it made robolink say."""
 
+# Sentences are compared in English, in whatever language the tester's desktop is.
+for _name in ("LC_ALL", "LC_MESSAGES", "LANG"):
+    if os.environ.get(_name):
+        os.environ[_name] = "C.UTF-8"
+
 
 def pytest_sessionstart():
     """Let Ctrl-C interrupt: a shell starts what runs in the background with it ignored."""

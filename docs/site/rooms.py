@@ -29,6 +29,7 @@ WORDS = {
     "inspection": "a whole cell looked at, without moving",
     "stations": "pins, beams, surfaces, cameras by name",
     "config": "cell files",
+    "locale": "languages, and their catalogues",
     "transaction": "all tools or none",
     "runner": "runs a procedure, with a person",
     "backup": "all tools in a file",

@@ -11,6 +11,7 @@ from robolink.journal._records import Filter
 from robolink.journal.store.chain import canonical, digest, storable
 from robolink.journal.store.prepared import Prepared, StatementRunner
 from robolink.journal.store.tables import ENTRIES, HEAD, IN_A_CHANGE
+from robolink.messages import plain
 from robolink.model import PROOFS, EntryKind, NewEntry, Signature
 from robolink.timing import wall_time
 
@@ -149,7 +150,7 @@ def _chained(
     details, text = None, ""
     for entry in entries:
         if entry.details is not details:  # what was read back and what is done share theirs
-            details, text = entry.details, canonical(entry.details)
+            details, text = entry.details, canonical(plain(entry.details))
         number += 1
         row = {**common, **_fields(entry, change), "details": text}
         row["number"], row["previous"] = number, previous

@@ -5,7 +5,7 @@ from dataclasses import replace
 import click
 
 from robolink.errors import ConfigError
-from robolink.messages import tr
+from robolink.messages import declared, tr
 from robolink_cli.access.warnings import note_change
 from robolink_cli.console.render import note, say
 from robolink_cli.lazy_group import LazyGroup
@@ -27,13 +27,13 @@ _FROM_FILES = "robolink_cli.commands.controller.backup"
 _BESIDES = {
     "impact": (
         "robolink_cli.commands.measure.impact:impact",
-        tr("How far a tool change moves the tip at taught points."),
+        declared("How far a tool change moves the tip at taught points."),
     ),
-    "backup": (f"{_FROM_FILES}:backup", tr("Save all tools to a file.")),
-    "restore": (f"{_FROM_FILES}:restore", tr("Put the tools of a backup back.")),
+    "backup": (f"{_FROM_FILES}:backup", declared("Save all tools to a file.")),
+    "restore": (f"{_FROM_FILES}:restore", declared("Put the tools of a backup back.")),
     "compare": (
         f"{_FROM_FILES}:compare",
-        tr("What differs from a backup; exit code 1 when something does."),
+        declared("What differs from a backup; exit code 1 when something does."),
     ),
 }
 
@@ -156,7 +156,9 @@ def set_tool(
         controller.tools.require_writable(number)
         before = controller.tools.read(number)
         note_change(controller, number, before)
-        wanted = replace(before or ToolOffset(), **changes)
+        # Nothing of what no tool has is kept beside what was given.
+        kept_from = ToolOffset() if before is None or before.of_no_tool else before
+        wanted = replace(kept_from, **changes)
         kept = [name for name in units.values() if name not in changes]
         shown = offset_payload(before), offset_payload(wanted)
         if dry_run:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from robolink.errors import ConfigError, JournalError, NotReadyError, RobolinkError
-from robolink.messages import tr
+from robolink.messages import declared, tr
 from robolink_cli.access.cell import complete_cell
 from robolink_cli.console.exit_codes import DIFFERENT, exit_code
 from robolink_cli.console.render import note, say
@@ -44,7 +44,7 @@ class CheckedCell(NamedTuple):
 @click.option(
     "--since",
     type=click.DateTime(["%Y-%m-%d"]),
-    help=tr("Begin the charts anew at this day, after a repair (UTC)."),
+    help=declared("Begin the charts anew at this day, after a repair (UTC)."),
 )
 @published_option
 @controller_options

@@ -7,7 +7,7 @@ import click
 from click.core import ParameterSource
 
 from robolink.errors import ConfigError
-from robolink.messages import tr
+from robolink.messages import declared, tr
 from robolink.methods import (
     AnyMethod,
     Check,
@@ -28,10 +28,10 @@ from robolink_cli.session.completing import complete_station
 _METAVARS: Final = {"mm": "MM", "degrees": "DEG", "mm/s": "MM_S"}
 
 _STATIONS: Final = {
-    StationKind.PIN: tr("Name of the pin."),
-    StationKind.BEAMS: tr("Name of the beams."),
-    StationKind.TOUCH: tr("Name of the surface."),
-    StationKind.CAMERA: tr("Name of the camera's station."),
+    StationKind.PIN: declared("Name of the pin."),
+    StationKind.BEAMS: declared("Name of the beams."),
+    StationKind.TOUCH: declared("Name of the surface."),
+    StationKind.CAMERA: declared("Name of the camera's station."),
 }
 
 _LIMITS: Final = {
@@ -85,7 +85,7 @@ def _of_the_place(method: AnyMethod) -> list[Decorator]:
             motion_option(
                 "--at",
                 metavar="X,Y,Z",
-                help=tr("Where the station is, in the base; else what is known of it."),
+                help=declared("Where the station is, in the base; else what is known of it."),
             )
         )
     if method.from_poses is not None and method.pose_help is not None:

@@ -156,7 +156,9 @@ def set_tool(
         controller.tools.require_writable(number)
         before = controller.tools.read(number)
         note_change(controller, number, before)
-        wanted = replace(before or ToolOffset(), **changes)
+        # Nothing of what no tool has is kept beside what was given.
+        kept_from = ToolOffset() if before is None or before.of_no_tool else before
+        wanted = replace(kept_from, **changes)
         kept = [name for name in units.values() if name not in changes]
         shown = offset_payload(before), offset_payload(wanted)
         if dry_run:

@@ -47,6 +47,7 @@ from robolink.runner._steps import (
     SeenAt,
     TakenStep,
 )
+from robolink.runner._subjects import MoveSubject, regard
 from robolink.runner._yes_no import ask_yes_no
 from robolink.sensing import seen_once
 from robolink.ways import Way, way
@@ -113,6 +114,7 @@ class Runner:
         self._on_step = on_step
         self._camera = camera
         self._offers = offers
+        self._runs = False
         self._repeats_left = _MOST_REPEATS if offers and repeats else 0
 
     def run(self, procedure: Procedure[T]) -> T:
@@ -186,6 +188,8 @@ class Runner:
         return after
 
     def _take(self, step: TakenStep) -> StepDone:
+        if isinstance(step, (Notify, Confirm)):
+            regard(self._operator, [step.fit])
         if isinstance(step, Notify):
             self._operator.tell(step.text)
             return StepDone(step)
@@ -201,6 +205,8 @@ class Runner:
             return self._look(step)
         if isinstance(step, Seek):
             return self._seek(step)
+        going = MoveSubject(step.target, step.path, self._settings.speed_mm_s, step.purpose)
+        regard(self._operator, [going])
         return self.move(step.target, step.path)
 
     def _obstacle(self, move: Move, start: Pose | None) -> str:
@@ -255,6 +261,7 @@ class Runner:
             operator=self._operator,
             jog=self._jogged,
             line=self._line,
+            runs=lambda: self._runs,
         )
         return question.answer()
 
@@ -336,7 +343,9 @@ class Runner:
 
     def _watch(self) -> None:
         self._require_going()
-        obstacle = _ended_by(self._controller.status())
+        status = self._controller.status()
+        self._runs = status.running
+        obstacle = _ended_by(status)
         if obstacle:
             raise ControllerFaultError(
                 tr("{obstacle} while the operator was asked.", obstacle=obstacle),

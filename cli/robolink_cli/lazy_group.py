@@ -5,12 +5,16 @@ imports on demand still imports everything for ``--help`` and TAB. This one hand
 stand-ins while it lists (docs/decisions/0005-libraries-chosen.md).
 """
 
+import sys
 from collections.abc import Mapping
 from contextlib import contextmanager
 from importlib import import_module
 from typing import TYPE_CHECKING, cast
 
 import click
+
+from robolink.messages import tr
+from robolink_cli.console.render import note
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -23,32 +27,38 @@ class LazyGroup(click.Group):
 
     Args:
         lazy: Command name to ``("package.module:object", one-line help)``, in the order in
-            which they are listed.
-        aliases: Names of before to ``"package.module:object"``; they are listed nowhere.
+            which they are listed, after the commands that were added to the group itself.
+        unlisted: Names that work and are listed nowhere, to ``"package.module:object"``.
+        renamed: Names of before, to ``("package.module:object", full name of today)``. They are
+            listed nowhere; on a terminal a line says how the command is called now.
     """
 
     def __init__(
         self,
         *,
         lazy: Mapping[str, tuple[str, str]],
-        aliases: Mapping[str, str] | None = None,
+        unlisted: Mapping[str, str] | None = None,
+        renamed: Mapping[str, tuple[str, str]] | None = None,
         **options: object,
     ) -> None:
         super().__init__(**options)  # type: ignore[arg-type]
-        self._lazy = lazy
-        self._aliases = aliases or {}
+        self.lazy = lazy
+        self.renamed = renamed or {}
+        self._unlisted = dict(unlisted or {}) | {
+            name: target for name, (target, _) in self.renamed.items()
+        }
         self.listing = False
 
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the names in the order of the table."""
-        return [*self._lazy, *super().list_commands(ctx)]
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's form
+        """Return the names in the order of the tables."""
+        return [*self.commands, *self.lazy]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Return the command, or while listing its stand-in."""
-        if cmd_name in self._aliases:
-            target = self._aliases[cmd_name]
-        elif cmd_name in self._lazy:
-            target, summary = self._lazy[cmd_name]
+        if cmd_name in self._unlisted:
+            target = self._unlisted[cmd_name]
+        elif cmd_name in self.lazy:
+            target, summary = self.lazy[cmd_name]
             if self.listing:
                 return click.Command(cmd_name, short_help=summary)
         else:
@@ -56,18 +66,30 @@ class LazyGroup(click.Group):
         module, name = target.split(":")
         return cast(click.Command, getattr(import_module(module), name))
 
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return the command that was typed; say it when it has another name today."""
+        found = super().resolve_command(ctx, args)
+        if args[0] in self.renamed and not ctx.resilient_parsing and sys.stderr.isatty():
+            typed = " ".join([*ctx.command_path.split()[1:], args[0]])
+            now = self.renamed[args[0]][1]
+            note(tr("{old} is now called {new}.", old=typed, new=now))
+        return found
+
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """List the commands in the help page."""
-        with self._while_listing():
+        with self.while_listing():
             super().format_commands(ctx, formatter)
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> "list[CompletionItem]":
         """List the commands for TAB."""
-        with self._while_listing():
+        with self.while_listing():
             return super().shell_complete(ctx, incomplete)
 
     @contextmanager
-    def _while_listing(self) -> "Iterator[None]":
+    def while_listing(self) -> "Iterator[None]":
+        """Hand out stand-ins inside of the block: names and one-line helps, nothing loaded."""
         self.listing = True
         try:
             yield

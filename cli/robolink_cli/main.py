@@ -4,177 +4,34 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, Final, NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 import click
 
 from robolink import __version__
 from robolink.interrupts import Interrupted, one_ending
-from robolink.messages import tr
 from robolink.ways import speaking
+from robolink_cli.command_map import RENAMED, SECTIONS, SHORT_NAMES
 from robolink_cli.console.exit_codes import exit_code, report
 from robolink_cli.console.output import hand_over, watched_output
 from robolink_cli.console.render import dumps, note, print_document, say
 from robolink_cli.console.tolerance import colour_wanted, help_width, tolerate_any_console
 from robolink_cli.console.ways import SHELL_WAYS
-from robolink_cli.lazy_group import LazyGroup
+from robolink_cli.front_page import FrontPage
 from robolink_cli.options.shared import shared_options
 
 if TYPE_CHECKING:
     from robolink_cli.stopping.request import StopRequest
     from robolink_cli.stopping.stop_first import StopOutcome
 
-COMMANDS: Final = {
-    "demo": (
-        "robolink_cli.commands.simulate.demo:demo",
-        tr("A nozzle change on a simulated robot, from clogged to proved."),
-    ),
-    "sim": ("robolink_cli.commands.simulate.sim:sim", tr("Serve a simulated controller.")),
-    "status": (
-        "robolink_cli.commands.controller.operate:status",
-        tr("What the controller is doing."),
-    ),
-    "where": (
-        "robolink_cli.commands.controller.operate:where",
-        tr("Where the robot is, and with which tool."),
-    ),
-    "stop": ("robolink_cli.commands.controller.operate:stop", tr("Stop every motion.")),
-    "release": (
-        "robolink_cli.commands.controller.operate:release",
-        tr("Let the robot be moved again after a stop."),
-    ),
-    "reset": (
-        "robolink_cli.commands.controller.operate:reset",
-        tr("Clear an error of the controller."),
-    ),
-    "motors": (
-        "robolink_cli.commands.controller.operate:motors",
-        tr("Switch the motors on or off."),
-    ),
-    "enable": (
-        "robolink_cli.commands.controller.operate:enable",
-        tr("Enable the axis group of a PLC."),
-    ),
-    "disable": (
-        "robolink_cli.commands.controller.operate:disable",
-        tr("Disable the axis group of a PLC."),
-    ),
-    "take-ownership": (
-        "robolink_cli.commands.controller.take_ownership:take_ownership",
-        tr("Take a PLC's mailbox from another client, because a person insists."),
-    ),
-    "recover": (
-        "robolink_cli.commands.record.recover:recover",
-        tr("Settle what was begun and not proved finished."),
-    ),
-    "tool": (
-        "robolink_cli.commands.controller.tool:tool",
-        tr("Read, write, clear and select tool offsets."),
-    ),
-    "undo": (
-        "robolink_cli.commands.record.undo:undo",
-        tr("Put back what tools held before a change."),
-    ),
-    "journal": (
-        "robolink_cli.commands.record.journal:journal",
-        tr("What is on record: values, proofs, people. Reads only."),
-    ),
-    "report": (
-        "robolink_cli.commands.record.report:report",
-        tr("One page about one tool change, from the journal, to keep or print."),
-    ),
-    "backup": ("robolink_cli.commands.controller.backup:backup", tr("Save all tools to a file.")),
-    "restore": (
-        "robolink_cli.commands.controller.backup:restore",
-        tr("Put the tools of a backup back."),
-    ),
-    "compare": (
-        "robolink_cli.commands.controller.backup:compare",
-        tr("What differs from a backup; exit code 1 when something does."),
-    ),
-    "io": (
-        "robolink_cli.commands.controller.io:io",
-        tr("Read inputs, switch outputs and memory bits."),
-    ),
-    "var": (
-        "robolink_cli.commands.controller.var:var",
-        tr("Read and set the project's variables."),
-    ),
-    "verify-controller": (
-        "robolink_cli.commands.controller.verify_controller:verify_controller",
-        tr("Find out, reading only, what this controller really does."),
-    ),
-    "jog": ("robolink_cli.commands.controller.jog:jog", tr("Move a small step, in Power Low.")),
-    "calibrate": (
-        "robolink_cli.commands.measure.calibrate:calibrate",
-        tr("Measure a tool offset, propose it, write it and prove it."),
-    ),
-    "recalibrate": (
-        "robolink_cli.commands.measure.recalibrate:recalibrate",
-        tr("The scripted nozzle change: run a recipe."),
-    ),
-    "station": (
-        "robolink_cli.commands.measure.station:station",
-        tr("Pins, beams, surfaces and cameras of a cell: where they are, and how sure."),
-    ),
-    "solve": (
-        "robolink_cli.commands.measure.solve.command:solve",
-        tr("Calculate a tool offset from a file, offline."),
-    ),
-    "poses": (
-        "robolink_cli.commands.measure.poses:poses",
-        tr("What robolink understands of a file of poses."),
-    ),
-    "doctor": (
-        "robolink_cli.commands.computer.doctor:doctor",
-        tr("What could get in the way on this computer."),
-    ),
-    "ports": ("robolink_cli.commands.computer.ports:ports", tr("List the serial ports.")),
-    "scan": (
-        "robolink_cli.commands.computer.scan:scan",
-        tr("Try which of a few addresses answer."),
-    ),
-    "config": ("robolink_cli.commands.computer.config:config", tr("Look at the cell files.")),
-    "completion": (
-        "robolink_cli.commands.computer.completion:completion",
-        tr("Make TAB complete commands."),
-    ),
-    "execute-raw": (
-        "robolink_cli.commands.controller.operate:execute_raw",
-        tr("Run one SPEL+ statement as typed; for engineers."),
-    ),
-    "spel": (
-        "robolink_cli.commands.companions.spel:spel",
-        tr("SPEL+ programs: check them, run them, write the companions."),
-    ),
-    "serve": (
-        "robolink_cli.commands.companions.serve:serve",
-        tr("Answer programs that calibrate a tool themselves."),
-    ),
-    "plc": (
-        "robolink_cli.commands.companions.plc:plc",
-        tr("The register map and data types of a PLC's mailbox."),
-    ),
-    "impact": (
-        "robolink_cli.commands.measure.impact:impact",
-        tr("How far a tool change moves the tip at taught points."),
-    ),
-}
-"""Name, where it is, one-line help; in the order of the help page."""
-
-ALIASES: Final = {"resolve": "robolink_cli.commands.record.recover:resolve"}
-"""Names of before, which still work and are listed nowhere."""
-
 
 @click.group(
-    cls=LazyGroup,
-    lazy=COMMANDS,
-    aliases=ALIASES,
+    cls=FrontPage,
+    sections=SECTIONS,
+    lazy={},
+    unlisted=SHORT_NAMES,
+    renamed=RENAMED,
     context_settings={"help_option_names": ["-h", "--help"]},
-    help=tr(
-        "Measure, write and prove tool offsets on EPSON robots.\n\n"
-        "The options stand before or after the command's name."
-    ),
 )
 @click.version_option(__version__, prog_name="robolink", message="%(prog)s %(version)s")
 @shared_options

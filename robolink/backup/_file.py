@@ -46,7 +46,7 @@ def load(path: Path) -> Backup:
         cause = error.strerror if isinstance(error, OSError) else tr("it is not UTF-8 text")
         raise ConfigError(
             tr("The backup {path} cannot be read: {cause}.", path=path, cause=cause),
-            remedy=tr("Name a file that 'robolink backup' wrote."),
+            remedy=tr("Name a file that 'robolink tool backup' wrote."),
         ) from error
     return backup_from_text(text, source=str(path))
 

@@ -63,7 +63,7 @@ def find_cell(name: str) -> Cell:
         remedy = tr("These are known: {names}.", names=", ".join(cells))
     else:
         remedy = tr(
-            "No cell file was found; 'robolink config path' shows where one may be. A URL such "
+            "No cell file was found; 'robolink cell files' shows where one may be. A URL such "
             "as epson+tcp://192.168.0.1:5000 works without."
         )
     raise ConfigError(tr("There is no cell {name!r}.", name=name), remedy=remedy)

@@ -127,7 +127,7 @@ def not_ended_in_time(controller: str, request: str, timeout_s: float) -> Motion
             statement=request,
             timeout_s=timeout_s,
         ),
-        remedy=tr("Read where the robot is ('robolink where') before you go on."),
+        remedy=tr("Read where the robot is ('robolink robot where') before you go on."),
         controller=controller,
         request=request,
     )

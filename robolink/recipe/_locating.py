@@ -82,7 +82,8 @@ def _unknown(recipe: Recipe, why: str) -> ConfigError:
     return ConfigError(
         tr("The recipe does not say where {id} is, and {why}.", id=recipe.station.id, why=why),
         remedy=tr(
-            "Say it in the recipe or in the cell file, learn it with 'robolink station learn', or "
+            "Say it in the recipe or in the cell file, learn it with "
+            "'robolink cell station learn', or "
             "make a full calibration there. Nothing was moved."
         ),
     )

@@ -68,7 +68,7 @@ def find_station(
             tr("There is no station {name!r} here.", name=name),
             remedy=tr(
                 "These are known: {known}. Declare it in the cell file as "
-                "[cells.NAME.stations.ID], or learn it with 'robolink station learn'.",
+                "[cells.NAME.stations.ID], or learn it with 'robolink cell station learn'.",
                 known=known,
             ),
         )
@@ -80,7 +80,7 @@ def find_station(
                 found=found.kind.value,
                 wanted=kind.value,
             ),
-            remedy=tr("'robolink station list' shows the stations and their kinds."),
+            remedy=tr("'robolink cell station list' shows the stations and their kinds."),
         )
     return found
 

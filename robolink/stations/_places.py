@@ -135,7 +135,8 @@ def _unknown(station: Station, what: str) -> ConfigError:
     return ConfigError(
         tr("Nobody knows {what} of station {id}.", what=what, id=station.id),
         remedy=tr(
-            "Make a full calibration there ({calibrate}), learn it with 'robolink station learn "
+            "Make a full calibration there ({calibrate}), learn it with "
+            "'robolink cell station learn "
             "{id}', or state it in the cell file.",
             calibrate=way(Way.CALIBRATE_AT, station=station.id),
             id=station.id,

@@ -148,7 +148,9 @@ class Settler:
         )
         backup = marker.details.get("backup")
         if backup:
-            sentence += " " + tr("'robolink compare {path}' shows what has changed.", path=backup)
+            sentence += " " + tr(
+                "'robolink tool compare {path}' shows what has changed.", path=backup
+            )
         entry = NewEntry(
             EntryKind.DECISION,
             verdict=tr("a person looked at the controller and begins a new record"),

@@ -9,6 +9,8 @@ import click
 import pytest
 from robolink_cli import main
 from robolink_cli.access.warnings import marker_notice, note_unsettled
+from robolink_cli.command_map import SECTIONS
+from robolink_cli.commands.groups import cell, expert, robot
 from robolink_cli.session.opening import open_controller
 
 import robolink
@@ -41,10 +43,11 @@ HEAVY = {
     ("arguments", "environment"),
     [
         (["--help"], {}),
+        (["cell", "--help"], {}),
         (["--version"], {}),
         ([], {"_ROBOLINK_COMPLETE": "bash_complete", "COMP_WORDS": "robolink ", "COMP_CWORD": "1"}),
     ],
-    ids=["help", "version", "tab"],
+    ids=["help", "group", "version", "tab"],
 )
 def test_looking_at_the_commands_loads_none_of_the_heavy_packages(arguments, environment):
     program = (
@@ -65,20 +68,27 @@ def test_looking_at_the_commands_loads_none_of_the_heavy_packages(arguments, env
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines()[-1] == "loaded: []"
-    expected = "0.1.0" if arguments == ["--version"] else "calibrate"
+    expected = {"--version": "0.1.0", "cell": "doctor"}.get(" ".join(arguments[:1]), "calibrate")
     assert expected in done.stdout
 
 
-def test_every_command_of_the_table_exists_and_is_listed_with_its_line():
+def test_every_command_of_the_first_page_is_listed_with_its_line():
     listing = main.cli.get_help(click.Context(main.cli, info_name="robolink"))
-    for name, (target, summary) in main.COMMANDS.items():
+    for part in SECTIONS.values():
+        for name, (target, summary) in part.items():
+            assert f"  {name} " in listing
+            assert summary in listing
+            assert target.startswith("robolink_cli.")
+
+
+@pytest.mark.parametrize("group", [robot, cell, expert], ids=lambda group: group.name)
+def test_every_command_of_a_group_exists_and_is_listed_with_its_line(group):
+    context = click.Context(group, info_name=group.name)
+    listing = group.get_help(context)
+    for name, (_, summary) in group.lazy.items():
         assert f"  {name} " in listing
         assert summary[:30] in listing
-        assert target.startswith("robolink_cli.")
-
-
-def test_commands_are_listed_in_the_order_of_the_table():
-    assert main.cli.list_commands(click.Context(main.cli)) == list(main.COMMANDS)
+        assert isinstance(group.get_command(context, name), click.Command)
 
 
 def test_a_command_that_does_not_exist_is_a_usage_error(capsys):

@@ -1,4 +1,4 @@
-"""robolink io, var, and the alarms in status."""
+"""robolink robot io, var, and the alarms in status."""
 
 import json
 

@@ -60,16 +60,16 @@ def test_a_click_without_that_shell_says_what_to_install(monkeypatch, capsys):
 @pytest.mark.parametrize(
     ("words", "offered"),
     [
-        (["robolink", "comp"], {"completion"}),
+        (["robolink", "expert", "comp"], {"completion"}),
         (["robolink", "-c", ""], {"line3", "a"}),
         (["robolink", "status", "-c", "li"], {"line3"}),
-        (["robolink", "config", "sh"], {"show"}),
+        (["robolink", "cell", "sh"], {"show"}),
     ],
 )
 def test_tab_in_bash_offers_what_fits(shell_environment, words, offered):
     quoted = " ".join(f"'{word}'" for word in words)
     script = (
-        'eval "$(robolink completion bash)"\n'
+        'eval "$(robolink expert completion bash)"\n'
         f"COMP_WORDS=({quoted}); COMP_CWORD={len(words) - 1}\n"
         "_robolink_completion robolink\n"
         'printf "%s\\n" "${COMPREPLY[@]}"\n'

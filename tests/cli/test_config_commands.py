@@ -1,4 +1,4 @@
-"""config path, check, show: what they say about the cell files."""
+"""cell files, validate, show: what they say about the cell files."""
 
 import json
 import re

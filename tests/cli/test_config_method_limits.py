@@ -1,4 +1,4 @@
-"""``config check`` says what methods will refuse of a cell's limits, in the words they do it in."""
+"""``cell validate`` says what methods will refuse of a cell's limits, in their words."""
 
 import json
 

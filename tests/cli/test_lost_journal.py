@@ -54,7 +54,7 @@ def test_a_journal_without_history_of_a_known_controller_blocks_until_a_person_l
     assert code == 6
     assert "Nothing is unsettled" not in out + err
     assert "Tool 0 is selected" in out + err
-    assert "robolink compare" in out + err
+    assert "robolink tool compare" in out + err
     # It is not said to be settled by having been asked for.
     assert run("recover")[0] == 6
     assert run("resolve", "--yes")[0] == 0

@@ -27,32 +27,38 @@ POSES = ["--pose", "287.7,103.9,0", "--pose", "312.3,96.1,180"]
 
 NEEDS_A_CONTROLLER = {
     "status": [],
-    "where": [],
+    "robot where": [],
     "stop": [],
-    "reset": ["--yes"],
-    "motors": ["on", "--yes"],
+    "robot reset": ["--yes"],
+    "robot motors": ["on", "--yes"],
     "recover": ["--yes"],
     "tool list": [],
     "tool get": ["1"],
     "tool set": ["1", "--x", "13", "--yes"],
     "tool clear": ["1", "--then-select", "0", "--yes"],
     "tool select": ["0", "--yes"],
-    "backup": ["new.json"],
-    "restore": ["golden.json", "--yes"],
-    "compare": ["golden.json"],
-    "io get": ["1"],
-    "io set": ["1", "on", "--yes"],
-    "var get": ["g_Long"],
-    "var set": ["g_Long", "1", "--type", "Long", "--yes"],
-    "verify-controller": [],
-    "jog": ["z+1", "--yes"],
+    "tool backup": ["new.json"],
+    "tool restore": ["golden.json", "--yes"],
+    "tool compare": ["golden.json"],
+    "robot io get": ["1"],
+    "robot io set": ["1", "on", "--yes"],
+    "robot variable get": ["g_Long"],
+    "robot variable set": ["g_Long", "1", "--type", "Long", "--yes"],
+    "expert verify-controller": [],
+    "robot jog": ["z+1", "--yes"],
     "calibrate two-pose": ["--tool", "1", *POSES, "--yes"],
     "calibrate n-angle": ["--tool", "1", *POSES, "--pose", "296.1,87.7,90", "--yes"],
-    "impact": ["--tool", "1", "--x", "13", "--points", "1-5"],
+    "tool impact": ["--tool", "1", "--x", "13", "--points", "1-5"],
 }
 """Command and arguments with which it succeeds on a controller that is ready."""
 
-ANY_STATE = {"status", "recover", "verify-controller", "io get", "var get"}
+ANY_STATE = {
+    "status",
+    "recover",
+    "expert verify-controller",
+    "robot io get",
+    "robot variable get",
+}
 """What only reads, and by queries that are legal at any time."""
 
 STOPPABLE = set(STATES) - {"controller in Teach", "monitoring only"}
@@ -63,16 +69,16 @@ BAD = {
     "tool set": (["0", "--x", "1"], "never written"),
     "tool clear": (["16"], "There is no tool 16"),
     "tool select": (["-1"], "No such option"),
-    "motors": (["up"], "is not one of"),
-    "backup": (["golden.json"], "exists already"),
-    "restore": (["golden.json", "--tool", "16"], "16"),
-    "compare": (["missing.json"], "cannot be read"),
-    "io get": ([], "Exactly one place"),
-    "io set": (["70000", "on"], "70000"),
-    "var get": (["g_Long", "--index", "0"], "need --type"),
-    "var set": (["g_Long", "x", "--type", "Long"], "x"),
-    "verify-controller": (["--timeout", "0"], "0"),
-    "jog": (["--yes", "x0.1"], "is not a jog step"),
+    "robot motors": (["up"], "is not one of"),
+    "tool backup": (["golden.json"], "exists already"),
+    "tool restore": (["golden.json", "--tool", "16"], "16"),
+    "tool compare": (["missing.json"], "cannot be read"),
+    "robot io get": ([], "Exactly one place"),
+    "robot io set": (["70000", "on"], "70000"),
+    "robot variable get": (["g_Long", "--index", "0"], "need --type"),
+    "robot variable set": (["g_Long", "x", "--type", "Long"], "x"),
+    "expert verify-controller": (["--timeout", "0"], "0"),
+    "robot jog": (["--yes", "x0.1"], "is not a jog step"),
     "calibrate two-pose": (["--tool", "1", "--taught-tool", "0"], "--taught-tool"),
     "calibrate n-angle": (["--tool", "1", "--angles", "0,90"], "must hold at least 3"),
     "calibrate one-touch": (["--tool", "1"], "Missing option '--station'"),
@@ -96,25 +102,23 @@ BAD = {
     "calibrate sphere-touch": (["--tool", "1", "--radius", "30"], "must be more than"),
     "calibrate six-point": (["--tool", "0"], "never written"),
     "calibrate points": (["--tool", "1", "--points", "9-1"], "is not a point"),
-    "station list": (["all"], "unexpected extra argument"),
-    "station show": (["B"], "no station 'B'"),
-    "station learn": (["B", "--tool", "0"], "0 is not in the range"),
-    "impact": (["--tool", "1", "--x", "nan", "--points", "1"], "not a number"),
+    "cell station list": (["all"], "unexpected extra argument"),
+    "cell station show": (["B"], "no station 'B'"),
+    "cell station learn": (["B", "--tool", "0"], "0 is not in the range"),
+    "tool impact": (["--tool", "1", "--x", "nan", "--points", "1"], "not a number"),
     "status": (["--timeout", "-1"], "-1"),
-    "where": (["here"], "unexpected extra argument"),
+    "robot where": (["here"], "unexpected extra argument"),
     "stop": (["now"], "unexpected extra argument"),
-    "release": (["now"], "unexpected extra argument"),
-    "reset": (["--force"], "No such option"),
-    "recalibrate": (["missing.toml"], "missing.toml"),
-    "enable": (["--yes"], "no SoftMotion axis group"),
-    "disable": (["now"], "unexpected extra argument"),
-    "take-ownership": (["--yes"], "no SoftMotion axis group"),
+    "robot release": (["now"], "unexpected extra argument"),
+    "robot reset": (["--force"], "No such option"),
+    "change": (["missing.toml"], "missing.toml"),
+    "robot take-ownership": (["--yes"], "no SoftMotion axis group"),
     "recover": (["all"], "unexpected extra argument"),
-    "execute-raw": (["--yes", "Print\u20ac"], "printable ASCII"),
-    "plc export": (["golden.json"], "is a file"),
-    "plc check-map": ([], "is no PLC with a map"),
+    "expert execute-raw": (["--yes", "Print\u20ac"], "printable ASCII"),
+    "expert plc export": (["golden.json"], "is a file"),
+    "expert plc check-map": ([], "is no PLC with a map"),
     "undo": (["--to", "0"], "--to"),
-    "report": (["--points", "1-x"], "not a point"),
+    "journal report": (["--points", "1-x"], "not a point"),
     "journal list": (["--limit", "0"], "--limit"),
     "journal show": (["abcd"], "'abcd'"),
     "journal diff": (["1"], "Missing argument"),
@@ -127,30 +131,33 @@ BAD = {
     "sim softmotion": (["--modbus-tcp", "nowhere"], "no address to listen on"),
     "sim plc": (["--map", "missing.toml"], "missing.toml"),
     "sim assist": (["http://127.0.0.1:1", "look"], ""),
-    "solve": (["missing.json"], "missing.json"),
-    "poses show": (["missing.csv"], "missing.csv"),
-    "doctor": (["--fix"], "No such option"),
-    "ports": (["COM1"], "unexpected extra argument"),
-    "scan": (["localhost"], "no range of addresses"),
-    "config path": (["here"], "unexpected extra argument"),
-    "config check": (["--fix"], "No such option"),
-    "config show": (["nowhere"], "nowhere"),
-    "completion": (["tcsh"], "is not one of"),
-    "serve": (["--spel", "nowhere"], "no address to listen on"),
-    "spel export": (["golden.json"], "is a file"),
-    "spel check": (["nowhere.prg"], "does not exist"),
-    "spel run": (["nowhere.prg"], "does not exist"),
+    "expert solve": (["missing.json"], "missing.json"),
+    "expert poses show": (["missing.csv"], "missing.csv"),
+    "cell doctor": (["--fix"], "No such option"),
+    "cell ports": (["COM1"], "unexpected extra argument"),
+    "cell scan": (["localhost"], "no range of addresses"),
+    "cell list": (["all"], "unexpected extra argument"),
+    "cell people": (["nowhere"], "nowhere"),
+    "cell files": (["here"], "unexpected extra argument"),
+    "cell validate": (["--fix"], "No such option"),
+    "cell show": (["nowhere"], "nowhere"),
+    "expert completion": (["tcsh"], "is not one of"),
+    "expert serve": (["--spel", "nowhere"], "no address to listen on"),
+    "expert spel export": (["golden.json"], "is a file"),
+    "expert spel check": (["nowhere.prg"], "does not exist"),
+    "expert spel run": (["nowhere.prg"], "does not exist"),
 }
 """What is a mistake in the command: exit code 2, and at most reads are sent."""
 
 
 def leaves(command, path=()):
-    """Yield the full names of ``command``'s commands."""
+    """Yield the full names of ``command``'s commands, with those that the first page leaves out."""
     if not isinstance(command, click.Group):
         yield " ".join(path)
         return
     context = click.Context(command)
-    for name in command.list_commands(context):
+    besides = ["expert"] if command is main.cli else []
+    for name in command.list_commands(context) + besides:
         inner = command.get_command(context, name)
         assert inner is not None
         yield from leaves(inner, (*path, name))
@@ -244,7 +251,7 @@ def test_a_state_that_forbids_it(simulator, golden, shown, name, state):
     assert refused.code == document.code == 5
     check_refused(refused, 5, "")
     check_refused_as_document(document, 5)
-    if name not in ("stop", "reset"):
+    if name not in ("stop", "robot reset"):
         check_refused(refused, 5, words)
         assert json.loads(document.out)["error"]["reason"] == reason
     assert simulator.machine.tools.defined() == tools

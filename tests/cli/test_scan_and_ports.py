@@ -166,7 +166,7 @@ def test_serial_ports_are_listed_by_name_and_whether_they_may_be_used(plugged_in
     assert main.run(["ports"]) == 0
     assert capsys.readouterr().out == (
         f"{usable}\n{tmp_path}/ttyUSB1  adapter  USB VID:PID=0403:6001\n"
-        "    you may not use it; 'robolink doctor' says what to do\n"
+        "    you may not use it; 'robolink cell doctor' says what to do\n"
     )
 
 

@@ -1,4 +1,4 @@
-"""robolink serve: as a process that is killed, and who may call."""
+"""expert serve: as a process that is killed, and who may call."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""robolink serve --plc: the program of a PLC calls, and the machine goes on with a proved tool."""
+"""expert serve --plc: the program of a PLC calls, and the machine goes on with a proved tool."""
 
 import json
 import os

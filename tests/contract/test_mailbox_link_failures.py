@@ -81,7 +81,7 @@ def test_f55_a_serial_port_is_opened_by_one_program_alone():
 def test_a_serial_port_that_is_not_there_is_named():
     with pytest.raises(ConnectError, match="/dev/no-such-port") as caught:
         open_mailbox_link("softmotion+modbus-rtu:///dev/no-such-port")
-    assert "robolink ports" in caught.value.remedy
+    assert "robolink cell ports" in caught.value.remedy
 
 
 def test_a_unit_that_keeps_silent_is_found_on_opening():

@@ -1,4 +1,4 @@
-"""`robolink recalibrate RECIPE.toml`, disturbed at each instant of its run (F21, F22, F24).
+"""`robolink change RECIPE.toml`, disturbed at each instant of its run (F21, F22, F24).
 
 Ctrl-C ends a run with the old values in all tools, or with the new ones once all are proved,
 and with the selected tool, power and speed of before. After an emergency stop, an opened guard,

@@ -25,7 +25,7 @@ from robolink.protocols.mailbox import (
 )
 
 SHIPPED = Path(__file__).parents[2] / "companions" / "codesys"
-AGAIN = "run: robolink plc export companions/codesys --profile full --force"
+AGAIN = "run: robolink expert plc export companions/codesys --profile full --force"
 SIZES = {"UINT": 2, "INT": 2, "UDINT": 4, "DINT": 4, "REAL": 4, "LREAL": 8, "BYTE": 1}
 
 

@@ -100,7 +100,7 @@ def test_without_a_file_there_are_no_cells(places):
     assert cell_names() == []
     with pytest.raises(ConfigError) as caught:
         find_cell("a")
-    assert "config path" in caught.value.remedy
+    assert "cell files" in caught.value.remedy
 
 
 def test_a_file_that_was_named_must_be_there(places, monkeypatch):

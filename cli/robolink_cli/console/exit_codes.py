@@ -34,8 +34,8 @@ _ENDINGS: Final = {
 MEANINGS: Final[dict[int, str]] = {
     DONE: "done",
     DIFFERENT: (
-        "`compare` found a difference; `journal verify` found a damaged record; something stands "
-        "out in `journal drift`"
+        "`tool compare` found a difference; `journal verify` found a damaged record; something "
+        "stands out in `journal drift`"
     ),
     USAGE: "the command, a file, a setting or the journal is wrong",
     3: "the controller is not reached, or the link broke",

@@ -43,7 +43,7 @@ def keyboard() -> Iterator[Keyboard]:
     if not sys.stdin.isatty() or (termios is None and console is None):
         raise ConfigError(
             tr("Single keys cannot be read here."),
-            remedy=tr("Run it on a terminal, or type steps: robolink jog x+0.1"),
+            remedy=tr("Run it on a terminal, or type steps: robolink robot jog x+0.1"),
         )
     if termios is None:
         yield WindowsKeyboard(console)

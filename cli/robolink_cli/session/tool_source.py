@@ -31,7 +31,8 @@ def find_tools(controller: Controller, *, published: bool) -> ToolState:
         raise ConfigError(
             tr("The project in {url} publishes no tools.", url=controller.identity),
             remedy=tr(
-                "Add the program that 'robolink spel export DIR' writes and call RobolinkPublish "
+                "Add the program that 'robolink expert spel export DIR' "
+                "writes and call RobolinkPublish "
                 "once; docs/monitor-only.md says how."
             ),
         )

@@ -36,7 +36,8 @@ def heed_stop(url: str, controller: "Controller", *, yes: bool) -> None:
         raise StoppedError(
             found.sentence,
             remedy=tr(
-                "Look into the cell first. Then run 'robolink release' (or 'reset', where the "
+                "Look into the cell first. Then run 'robolink robot release' "
+                "(or 'reset', where the "
                 "controller wants one), or leave --yes out and answer the question."
             ),
             controller=url.partition("?")[0],

@@ -57,7 +57,10 @@ class Telling:
             told.append(tr("None of this kept the stop back."))
         if outcome.error is None:
             told.append(
-                tr("Nothing moves with --yes before 'robolink reset' or 'robolink release'.")
+                tr(
+                    "Nothing moves with --yes before 'robolink robot reset' or "
+                    "'robolink robot release'."
+                )
             )
         return told
 

@@ -1,4 +1,4 @@
-"""What the ``config`` commands show."""
+"""What ``cell list``, ``show``, ``people``, ``files`` and ``validate`` show."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -64,7 +64,7 @@ def show_check(payload: Mapping[str, Any]) -> None:
     if payload["disagreement"]:
         say(payload["disagreement"])
     if not payload["files"]:
-        say(tr("There is no cell file; 'robolink config path' shows where one may be."))
+        say(tr("There is no cell file; 'robolink cell files' shows where one may be."))
 
 
 def cells_payload(cells: Iterable[Cell]) -> dict[str, Any]:
@@ -84,7 +84,32 @@ def show_cells(payload: Mapping[str, Any]) -> None:
     for name, cell in cells.items():
         say(f"{name:{width}}  {cell['url']}  {cell['robot'] or ''}".rstrip())
     if not cells:
-        say(tr("There is no cell; 'robolink config path' shows where a cell file may be."))
+        say(tr("There is no cell; 'robolink cell files' shows where a cell file may be."))
+
+
+def people_payload(cells: Iterable[Cell]) -> dict[str, Any]:
+    """Return who works at each cell; ``None`` where its file names nobody."""
+    named = {
+        cell.name: None
+        if cell.settings.people is None
+        else {person: str(role) for person, role in cell.settings.people.items()}
+        for cell in cells
+    }
+    return {"cells": named}
+
+
+def show_people(payload: Mapping[str, Any]) -> None:
+    """Print the people of each cell, one a line."""
+    for name, people in payload["cells"].items():
+        if people is None:
+            say(tr("{cell}: nobody is named, so everybody may do everything.", cell=name))
+            continue
+        say(tr("{cell}:", cell=name))
+        width = max((len(person) for person in people), default=0)
+        for person, role in people.items():
+            say(f"  {person:{width}}  {role}")
+    if not payload["cells"]:
+        say(tr("There is no cell; 'robolink cell files' shows where a cell file may be."))
 
 
 def cell_payload(cell: Cell, context: CliContext, *, origin: bool) -> dict[str, Any]:

@@ -99,7 +99,8 @@ class MappedPlc(DriverLink):
                     identity=self.identity,
                 ),
                 remedy=tr(
-                    "Run 'robolink plc check-map' with the same -c and compare with the HMI. A map "
+                    "Run 'robolink expert plc check-map' with the same -c and "
+                    "compare with the HMI. A map "
                     "that was changed is confirmed anew. Nothing was written."
                 ),
                 controller=self.identity,

@@ -151,7 +151,7 @@ class OffsetValues:
             ),
             remedy=tr(
                 "Compare address, type and word_order in the map with the PLC's register list; "
-                "'robolink plc check-map' shows all values."
+                "'robolink expert plc check-map' shows all values."
             ),
             controller=self._identity,
         )

@@ -177,7 +177,7 @@ def _opened(
             tr("{device} cannot be opened: {cause}.", device=device, cause=cause),
             remedy=tr(
                 "Check that it is plugged in, that you may use it and that no other program "
-                "does; 'robolink ports' lists the ports."
+                "does; 'robolink cell ports' lists the ports."
             ),
             controller=url.identity,
         ) from error

@@ -282,5 +282,7 @@ def read_profile(path: Path) -> Mapping[str, str]:
     except (OSError, AttributeError, KeyError, RecursionError, TypeError, ValueError) as error:
         raise ConfigError(
             tr("{path} is not a cell profile.", path=path),
-            remedy=tr("Give a file that 'robolink verify-controller --profile' has written."),
+            remedy=tr(
+                "Give a file that 'robolink expert verify-controller --profile' has written."
+            ),
         ) from error

@@ -1,7 +1,8 @@
 """An interpreter for the subset of Structured Text that several compilers take alike.
 
-It executes what ``robolink plc export`` writes (docs/structured-text.md). It refuses, with file,
-line and column, what is outside of the subset, and what compilers are known to do differently.
+It executes what ``robolink expert plc export`` writes (docs/structured-text.md). It refuses, with
+file, line and column, what is outside of the subset, and what compilers are known to do
+differently.
 """
 
 from robolink_simulators.structured_text.parse import StructuredTextError as StructuredTextError

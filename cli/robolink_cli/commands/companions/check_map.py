@@ -64,7 +64,7 @@ def _start(context: CliContext, register_list: Path) -> None:
     note(
         tr(
             "{found} components of tools were found; {left} rows are left for you. Fill in what "
-            "is open, then 'robolink plc check-map MAP.toml'.",
+            "is open, then 'robolink expert plc check-map MAP.toml'.",
             found=draft.found,
             left=len(draft.left),
         )

@@ -63,7 +63,7 @@ def check_cell_files() -> Iterator[Remark]:
                 "cells",
                 Level.BAD,
                 tr("{path} has {count} errors.", path=path, count=len(problems)),
-                tr("Run: robolink config check"),
+                tr("Run: robolink cell validate"),
             )
         elif _others_may(path, 0o002):
             yield Remark(
@@ -118,7 +118,7 @@ def check_serial_ports() -> Iterator[Remark]:
                 "serial",
                 Level.WARN,
                 tr("{device} of {cells} is not there.", device=device, cells=", ".join(names)),
-                tr("Plug the adapter in; 'robolink ports' lists those that are there."),
+                tr("Plug the adapter in; 'robolink cell ports' lists those that are there."),
             )
 
 

@@ -11,10 +11,10 @@ def completion(shell: str) -> None:
     r"""Print the script that makes TAB complete commands, options and cells.
 
     \b
-    bash        echo 'eval "$(robolink completion bash)"' >> ~/.bashrc
-    zsh         echo 'eval "$(robolink completion zsh)"' >> ~/.zshrc
-    fish        robolink completion fish > ~/.config/fish/completions/robolink.fish
-    powershell  robolink completion powershell | Out-String | Invoke-Expression
+    bash        echo 'eval "$(robolink expert completion bash)"' >> ~/.bashrc
+    zsh         echo 'eval "$(robolink expert completion zsh)"' >> ~/.zshrc
+    fish        robolink expert completion fish > ~/.config/fish/completions/robolink.fish
+    powershell  robolink expert completion powershell | Out-String | Invoke-Expression
     """
     from click.shell_completion import get_completion_class
 

@@ -1,19 +1,14 @@
-"""config path, check, show: the cell files."""
+"""cell list, show, people, files, validate: cells that have a name, and where it stands."""
 
 from pathlib import Path
 
 import click
 
 from robolink_cli.console.render import emit_json, json_is_on
-from robolink_cli.session.context import CliContext, controller_options, json_option
+from robolink_cli.session.context import CliContext, controller_options, emit, json_option
 
 
-@click.group()
-def config() -> None:
-    """Look at the cell files: which there are, whether they are right, what they say."""
-
-
-@config.command("path")
+@click.command()
 @json_option
 def path() -> None:
     """Show the files that are looked at; the first that says something wins."""
@@ -26,7 +21,7 @@ def path() -> None:
         show_files(payload)
 
 
-@config.command("check")
+@click.command()
 @click.argument("file", type=click.Path(dir_okay=False, path_type=Path), required=False)
 @json_option
 def check(file: Path | None) -> int:
@@ -41,7 +36,7 @@ def check(file: Path | None) -> int:
     return 0 if payload["ok"] else 2
 
 
-@config.command("show")
+@click.command()
 @click.argument("cell", required=False)
 @click.option("--origin", is_flag=True, help="Say where each value came from.")
 @controller_options
@@ -61,3 +56,27 @@ def show(context: CliContext, cell: str | None, origin: bool) -> None:
     else:
         payload = cell_payload(chosen, context, origin=origin)
         context.emit("config-show", payload, lambda: show_cell(payload))
+
+
+@click.command("list")
+@json_option
+def list_cells() -> None:
+    """List the cells that the cell files name, with their addresses."""
+    from robolink.config import load_cells
+    from robolink_cli.views.cells import cells_payload, show_cells
+
+    payload = cells_payload(load_cells().values())
+    emit("cells", payload, lambda: show_cells(payload))
+
+
+@click.command()
+@click.argument("cell", required=False)
+@controller_options
+def people(context: CliContext, cell: str | None) -> None:
+    """List who works at one CELL, or at all, and in which role; an engineer may do everything."""
+    from robolink.config import find_cell, load_cells
+    from robolink_cli.views.cells import people_payload, show_people
+
+    chosen = find_cell(cell) if cell else context.cell
+    payload = people_payload([chosen] if chosen else load_cells().values())
+    context.emit("cell-people", payload, lambda: show_people(payload))

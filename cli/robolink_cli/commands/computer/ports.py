@@ -38,4 +38,4 @@ def _show(found: "list[SerialPort]", cells: dict[str, list[str]]) -> None:
         if names := cells.get(port.device):
             say(tr("    cells: {names}", names=", ".join(names)))
         if not port.usable:
-            say(tr("    you may not use it; 'robolink doctor' says what to do"))
+            say(tr("    you may not use it; 'robolink cell doctor' says what to do"))

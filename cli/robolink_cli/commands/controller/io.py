@@ -51,7 +51,7 @@ def get(
     if output and (memory or bit is None):
         raise ConfigError(
             tr("Outputs are read bit by bit, and are not memory."),
-            remedy=tr("Write for example 'robolink io get 3 --output'."),
+            remedy=tr("Write for example 'robolink robot io get 3 --output'."),
         )
     with open_controller(context) as controller:
         if bit is not None and not (output or memory):

@@ -63,7 +63,7 @@ def stop(dry_run: bool) -> None:
     """Bring the robot to rest, whoever moves it. Not an emergency stop, and no substitute for one.
 
     Nothing is asked and no file is waited for. What may move next is asked about, until 'robolink
-    reset' or 'robolink release'.
+    robot reset' or 'robolink robot release'.
     """
     from robolink_cli.stopping.outcome import Telling, requests_of
     from robolink_cli.stopping.stop_first import stop_first

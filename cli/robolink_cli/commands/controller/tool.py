@@ -8,6 +8,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli.access.warnings import note_change
 from robolink_cli.console.render import note, say
+from robolink_cli.lazy_group import LazyGroup
 from robolink_cli.options.consent import (
     dry_run_option,
     published_option,
@@ -20,8 +21,23 @@ from robolink_cli.prompts.questions import agree
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.opening import open_controller
 
+_FROM_FILES = "robolink_cli.commands.controller.backup"
 
-@click.group()
+_BESIDES = {
+    "impact": (
+        "robolink_cli.commands.measure.impact:impact",
+        tr("How far a tool change moves the tip at taught points."),
+    ),
+    "backup": (f"{_FROM_FILES}:backup", tr("Save all tools to a file.")),
+    "restore": (f"{_FROM_FILES}:restore", tr("Put the tools of a backup back.")),
+    "compare": (
+        f"{_FROM_FILES}:compare",
+        tr("What differs from a backup; exit code 1 when something does."),
+    ),
+}
+
+
+@click.group(cls=LazyGroup, lazy=_BESIDES)
 def tool() -> None:
     """Read and change the tool offsets stored in the controller."""
 

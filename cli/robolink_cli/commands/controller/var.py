@@ -51,7 +51,9 @@ def get(
     if (subscripts and kind is None) or (count is not None and not subscripts):
         raise ConfigError(
             tr("An array's elements need --type and --index."),
-            remedy=tr("Write for example 'robolink var get g_table --type Real --index 0,0'."),
+            remedy=tr(
+                "Write for example 'robolink robot variable get g_table --type Real --index 0,0'."
+            ),
         )
     with open_controller(context) as controller:
         value = _read(controller, name, kind, subscripts, count=count)

@@ -83,7 +83,7 @@ def _verify_plc(context: CliContext, url: str, kind: str) -> None:
     if kind != "softmotion":
         raise ConfigError(
             tr("There is nothing to find out about a PLC with registers of its own."),
-            remedy=tr('Compare its map instead: robolink -c "{url}" plc check-map', url=url),
+            remedy=tr('Compare its map instead: robolink -c "{url}" expert plc check-map', url=url),
         )
     # Nothing is written, so nothing is recorded.
     log = memory_journal(url).log(url)

@@ -192,7 +192,12 @@ class Recalibration:
             show_report(one)
         if run.takes_reference:
             say(tr("The reference was recorded; nothing was written."))
-        say(tr("On record as change {change}: robolink report {change}", change=report.change[:8]))
+        say(
+            tr(
+                "On record as change {change}: robolink journal report {change}",
+                change=report.change[:8],
+            )
+        )
         return {
             "recipe": self._loaded.name,
             "recipe_hash": self._loaded.sha256,

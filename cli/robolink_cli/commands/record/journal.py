@@ -19,6 +19,7 @@ from robolink_cli.commands.record.journal_lookup import (
     journal_to_read,
 )
 from robolink_cli.console.render import emit_json, json_is_on, say
+from robolink_cli.lazy_group import LazyGroup
 from robolink_cli.options.shared import json_option
 
 if TYPE_CHECKING:
@@ -95,7 +96,15 @@ class _Wanted:
         return iter((found[::-1] if newest_first else found)[:limit])
 
 
-@click.group()
+_BESIDES: Final = {
+    "report": (
+        "robolink_cli.commands.record.report:report",
+        tr("One page about one tool change, from the journal, to keep or print."),
+    )
+}
+
+
+@click.group(cls=LazyGroup, lazy=_BESIDES)
 def journal() -> None:
     """Look at what is on record about tools: values, proofs, people. Never changes it."""
 

@@ -82,7 +82,7 @@ def sim_plc(
             [
                 tr("SIMULATED PLC: {name} (seed {seed}).", name=register_map.name, seed=seed),
                 *(tr("  {bus}  {url}", bus=bus.ljust(10), url=url) for bus, url in urls.items()),
-                tr('Try: robolink -c "{url}" plc check-map', url=first),
+                tr('Try: robolink -c "{url}" expert plc check-map', url=first),
                 tr("Ctrl-C ends it."),
             ],
         )

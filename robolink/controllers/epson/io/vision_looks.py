@@ -63,7 +63,9 @@ class EpsonLooks:
                 raise
             raise ConfigError(
                 tr("The project in the controller has no robolink_vision.prg."),
-                remedy=tr("Write it with 'robolink spel export', add it to the project, build."),
+                remedy=tr(
+                    "Write it with 'robolink expert spel export', add it to the project, build."
+                ),
                 controller=self._link.identity,
             ) from error
 

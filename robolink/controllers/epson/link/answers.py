@@ -121,13 +121,13 @@ def _stopped(status: ControllerStatus) -> tuple[NotReadyReason, str, str] | None
         return (
             NotReadyReason.EMERGENCY_STOP,
             tr("The emergency stop is pressed."),
-            tr("Clear the danger, release it, then run 'robolink reset'."),
+            tr("Clear the danger, release it, then run 'robolink robot reset'."),
         )
     if status.fault:
         return (
             NotReadyReason.FAULT,
             tr("The controller is in error (code {code:04d}).", code=status.code),
-            tr("Find the cause, then run 'robolink reset' (it may switch outputs off)."),
+            tr("Find the cause, then run 'robolink robot reset' (it may switch outputs off)."),
         )
     if status.guard_open:
         return (

@@ -194,7 +194,9 @@ class CommandWindow:
             cause = tr("error {code:04d}", code=status.code)
             text = self.error_text(status.code)
             cause = f"{cause} ({text})" if text else cause
-            remedy = tr("Find the cause, then run 'robolink reset' (it may switch outputs off).")
+            remedy = tr(
+                "Find the cause, then run 'robolink robot reset' (it may switch outputs off)."
+            )
         return ControllerFaultError(
             tr(
                 "{statement!r} was ended by the controller: {cause}.",

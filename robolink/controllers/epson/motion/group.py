@@ -239,7 +239,7 @@ class EpsonGroup(MotionGroupCore):
             raise NotReadyError(
                 tr("The motors are off."),
                 reason=NotReadyReason.MOTORS_OFF,
-                remedy=tr("Run 'robolink motors on' when the cell is clear."),
+                remedy=tr("Run 'robolink robot motors on' when the cell is clear."),
                 controller=self._link.identity,
                 request=statement,
             )

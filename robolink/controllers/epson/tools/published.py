@@ -105,7 +105,7 @@ def _understood(
                 found=layout,
                 own=LAYOUT,
             ),
-            remedy=tr("Export the companion again with 'robolink spel export' and rebuild."),
+            remedy=tr("Export the companion again with 'robolink expert spel export' and rebuild."),
         )
     tools: dict[int, ToolOffset | None] = {}
     for tool, there in zip(_TOOLS, defined, strict=True):

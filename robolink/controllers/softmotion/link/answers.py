@@ -122,9 +122,11 @@ def _remedy(error_class: int, raw_error: int = 0) -> str:
         ErrorClass.NOT_PERMITTED: tr(
             "The machine's program gives the permit (xPermit); bring it to its service state."
         ),
-        ErrorClass.DISABLED: tr("Run 'robolink enable' when the cell is clear."),
-        ErrorClass.ERRORSTOP: tr("Find the cause, then run 'robolink reset'."),
-        ErrorClass.STOPPING: tr("Run 'robolink reset' to release the stop when the cell is clear."),
+        ErrorClass.DISABLED: tr("Run 'robolink robot motors on' when the cell is clear."),
+        ErrorClass.ERRORSTOP: tr("Find the cause, then run 'robolink robot reset'."),
+        ErrorClass.STOPPING: tr(
+            "Run 'robolink robot reset' to release the stop when the cell is clear."
+        ),
         ErrorClass.MOVING: tr("Wait for the end of the movement."),
         ErrorClass.BUSY: tr("Wait for the command in work, or stop it."),
         ErrorClass.QUEUE_FULL: tr("Wait for the first movement to end."),

@@ -175,19 +175,19 @@ def _obstacle(now: Response) -> tuple[NotReadyReason, str, str] | None:
         return (
             NotReadyReason.FAULT,
             tr("The axis group is in its error state."),
-            tr("Find the cause, then run 'robolink reset'."),
+            tr("Find the cause, then run 'robolink robot reset'."),
         )
     if now.group_state == GroupState.STOPPING:
         return (
             NotReadyReason.PAUSED,
             tr("The axis group is held by a stop."),
-            tr("Run 'robolink reset' to release it when the cell is clear."),
+            tr("Run 'robolink robot reset' to release it when the cell is clear."),
         )
     if now.group_state == GroupState.DISABLED:
         return (
             NotReadyReason.MOTORS_OFF,
             tr("The axis group is disabled."),
-            tr("Run 'robolink enable' when the cell is clear."),
+            tr("Run 'robolink robot motors on' when the cell is clear."),
         )
     return None
 

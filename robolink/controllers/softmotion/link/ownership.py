@@ -80,7 +80,7 @@ class Ownership:
                 ),
                 remedy=tr(
                     "Close the other program; 10 s after its last sign the mailbox is free. A "
-                    "person at the cell may insist: 'robolink take-ownership'."
+                    "person at the cell may insist: 'robolink robot take-ownership'."
                 ),
                 controller=self._wire.identity,
             )

@@ -102,7 +102,7 @@ def _foreign(meaning: str, controller: str) -> RemoteProtocolError:
         ),
         remedy=tr(
             "Nothing was written. Compare the addresses in the URL and the program in the PLC "
-            "with 'robolink plc export'."
+            "with 'robolink expert plc export'."
         ),
         controller=controller,
     )

@@ -113,7 +113,7 @@ class SoftMotionMotion:
                     request=self._request,
                     timeout_s=timeout_s,
                 ),
-                remedy=tr("Read where the robot is ('robolink where') before you go on."),
+                remedy=tr("Read where the robot is ('robolink robot where') before you go on."),
                 controller=mailbox.identity,
                 request=self._request,
             )

@@ -26,14 +26,14 @@ EDSVersion=4.0
 Description=robolink mailbox, version 1
 CreationTime=12:00PM
 CreationDate=11-21-2026
-CreatedBy=robolink plc export
+CreatedBy=robolink expert plc export
 ModificationTime=12:00PM
 ModificationDate=11-21-2026
-ModifiedBy=robolink plc export
+ModifiedBy=robolink expert plc export
 
 [Comments]
 Lines=2
-Line1=SPDX-License-Identifier: 0BSD. Made by robolink plc export; not to be edited.
+Line1=SPDX-License-Identifier: 0BSD. Made by robolink expert plc export; not to be edited.
 Line2=Vendor-ID and product code are 0: put in those of the PLC's own data sheet.
 
 """

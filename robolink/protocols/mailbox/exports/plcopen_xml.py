@@ -34,7 +34,7 @@ _ARRAY: Final = re.compile(r"ARRAY \[(-?\d+)\.\.(-?\d+)\] OF (.+)", re.DOTALL)
 
 _FRAME: Final = """\
 <?xml version="1.0" encoding="utf-8"?>
-<!-- SPDX-License-Identifier: 0BSD. Made by robolink plc export; not to be edited. -->
+<!-- SPDX-License-Identifier: 0BSD. Made by robolink expert plc export; not to be edited. -->
 <project xmlns="http://www.plcopen.org/xml/tc6_0200">
   <fileHeader companyName="" productName="robolink" productVersion="1" \
 creationDateTime="2026-01-01T00:00:00" />

@@ -91,7 +91,7 @@ def register_map_markdown(profile: ExportProfile = ExportProfile.FULL, base: int
 
 _HEAD = f"""# Mailbox, version 1: register map
 
-Made by `robolink plc export`; not to be edited.
+Made by `robolink expert plc export`; not to be edited.
 
 Words of 16 bits. Values of several words stand low word first. Addresses count from 0, as they
 go over the wire; the reference in brackets counts from 1. The response block and the fifteen

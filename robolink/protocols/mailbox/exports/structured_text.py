@@ -32,7 +32,7 @@ _HEAD: Final = """\
 // robolink_mailbox_types.st: the mailbox's blocks and codes, version 1.
 // SPDX-License-Identifier: 0BSD
 //
-// Made by robolink plc export; not to be edited.
+// Made by robolink expert plc export; not to be edited.
 //
 // The structures are packed, so that they are what the registers hold. Copy values in and out
 // of them; keep no pointer or reference to a member: some targets fault on REAL and LREAL that

@@ -22,7 +22,7 @@ _PEER: Final = "127.0.0.1"
 
 
 class ProgramService:
-    """Answers a program as ``robolink serve`` does, in one process that may die.
+    """Answers a program as ``robolink expert serve`` does, in one process that may die.
 
     Args:
         clock: The virtual time.

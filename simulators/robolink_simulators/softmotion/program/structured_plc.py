@@ -157,7 +157,7 @@ def sources_in(folder: Path) -> tuple[SourceText, ...]:
         except (OSError, UnicodeError) as error:
             raise ConfigError(
                 tr("{path} cannot be read: {cause}.", path=folder / name, cause=error),
-                remedy=tr("Name a folder that 'robolink plc export' has written."),
+                remedy=tr("Name a folder that 'robolink expert plc export' has written."),
             ) from error
         sources.append(SourceText(name, text, dialect))
     return tuple(sources)

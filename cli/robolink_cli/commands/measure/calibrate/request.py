@@ -185,10 +185,10 @@ def _refuse_to_show_nothing(impact: ImpactRequest | None, report: ReportRequest 
     if impact is not None:
         raise ConfigError(
             tr("A dry run measures nothing, so there is no impact to show."),
-            remedy=tr("Leave --impact out, or use 'robolink impact' with an offset."),
+            remedy=tr("Leave --impact out, or use 'robolink tool impact' with an offset."),
         )
     if report is not None:
         raise ConfigError(
             tr("A dry run measures nothing, so there is nothing to report."),
-            remedy=tr("Leave --report out, or use 'robolink impact' with an offset."),
+            remedy=tr("Leave --report out, or use 'robolink tool impact' with an offset."),
         )

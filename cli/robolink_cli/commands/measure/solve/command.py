@@ -18,7 +18,7 @@ from robolink_cli.session.context import json_option
 @click.option(
     "--method",
     type=click.Choice(["two_pose", "n_angle", "n_angle_robust", "pivot", "pivot_robust"]),
-    help="FILE holds poses only, of any kind that 'robolink poses show' reads.",
+    help="FILE holds poses only, of any kind that 'robolink expert poses show' reads.",
 )
 @reading_options
 @click.option("--sigma", "sigma_mm", type=DECIMAL, help="Standard deviation of one placement, mm.")

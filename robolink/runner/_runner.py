@@ -31,7 +31,7 @@ from robolink.model import (
     TipSensor,
 )
 from robolink.runner._foreseeing import considered
-from robolink.runner._jog_steps import jog_target, way_in_words
+from robolink.runner._jog_steps import jog_target, parse_steps, way_in_words
 from robolink.runner._operator import Operator, Question
 from robolink.runner._place_question import MOST_REFUSED, PlaceQuestion, ended_by_operator
 from robolink.runner._settings import RunSettings
@@ -47,7 +47,7 @@ from robolink.runner._steps import (
     SeenAt,
     TakenStep,
 )
-from robolink.runner._subjects import MoveSubject, regard
+from robolink.runner._subjects import GuidedOperator, JogSubject, MoveSubject, regard
 from robolink.runner._yes_no import ask_yes_no
 from robolink.sensing import seen_once
 from robolink.ways import Way, way
@@ -183,7 +183,10 @@ class Runner:
         before = self._group.pose()
         target, path = jog_target(before, steps, self._settings)
         after = self.move(target, path)
-        if self._settings.tell_jogs:
+        if isinstance(self._operator, GuidedOperator):
+            longest = max(map(abs, parse_steps(steps).values()))
+            self._operator.regard(JogSubject(before, after, longest))
+        elif self._settings.tell_jogs:
             self._operator.tell(way_in_words(before, after))
         return after
 

@@ -89,6 +89,20 @@ class MoveSubject:
     purpose: str
 
 
+@dataclass(frozen=True, slots=True)
+class JogSubject:
+    """A step that a person made.
+
+    Attributes:
+        before, after: Where the tip was and is, as it was read.
+        longest: The longest part of the step, mm or degrees.
+    """
+
+    before: Pose
+    after: Pose
+    longest: float
+
+
 @runtime_checkable
 class GuidedOperator(Operator, Protocol):
     """An operator who is shown what it is about, before it is said or asked.

@@ -11,6 +11,7 @@ from robolink.messages import tr
 from robolink.runner import FINEST_STEP, Operator, Question, parse_steps
 from robolink_cli.console.render import note
 from robolink_cli.prompts.lines import QUIET_S, Lines, open_lines
+from robolink_cli.wizard.present import present_desk
 
 if TYPE_CHECKING:
     from robolink_simulators.assist.port import AssistClient, InProcessEyes
@@ -84,9 +85,16 @@ def _how(kind: Question) -> str:
     return tr("steps like x+5 z-0.5; ENTER when it is there; q ends")
 
 
+def terminal() -> Operator:
+    """Return the one operator of this process's terminal: two would share the input badly.
+
+    While a wizard shows it, that is the one whom the wizard asks.
+    """
+    return present_desk() or _plain_terminal()
+
+
 @cache
-def terminal() -> TerminalOperator:
-    """Return the one operator of this process's terminal: two would share the input badly."""
+def _plain_terminal() -> TerminalOperator:
     return TerminalOperator(note)
 
 

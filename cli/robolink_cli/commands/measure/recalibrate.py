@@ -68,6 +68,7 @@ def recalibrate(
     from robolink_cli.commands.measure.recipe_events import EventStream
     from robolink_cli.console.render import note
     from robolink_cli.options.recipe_answers import answers_from
+    from robolink_cli.session.guidance import guided_if_alone
 
     events = EventStream(click.get_current_context(), on=jsonl)
     with events.closing():
@@ -77,7 +78,7 @@ def recalibrate(
         prepared = answers_from(
             loaded.recipe, texts=answers, z_mm=z_mm, nozzle=nozzle, lot=lot, yes=yes
         )
-        Recalibration(
+        run = Recalibration(
             context,
             loaded,
             prepared,
@@ -86,4 +87,11 @@ def recalibrate(
             take_reference=reference,
             accepted_change_mm=accepted_change_mm,
             sensor=sensor,
-        ).run(dry_run=dry_run)
+        )
+        guided_if_alone(
+            context,
+            lambda: run.run(dry_run=dry_run),
+            job=loaded.name,
+            tools=tuple(tool.number for tool in loaded.recipe.tools),
+            alone=assist is None and not dry_run,
+        )

@@ -52,7 +52,7 @@ faults: $(VENV)/.installed-dev ## Run the fault catalogue, F01 to F80, and print
 
 # Their files are called judge_*.py: a plain pytest, which takes test_*.py, leaves them out.
 .PHONY: peers
-peers: $(VENV)/.installed-dev $(JUDGES) ## Let mbpoll, libmodbus and tshark judge the field buses.
+peers: $(VENV)/.installed-dev $(JUDGES) ## Let foreign programs judge the field buses and the PLC program.
 	@{ command -v mbpoll && command -v tshark && command -v cc && pkg-config --exists libmodbus; } \
 		>/dev/null || { \
 		echo "Not all judges are here. On Debian and Ubuntu:" \
@@ -87,10 +87,12 @@ docs: $(VENV)/.installed-docs ## Build the pages and the API into build/docs/htm
 	$(BIN)/python docs/site/build.py
 
 .PHONY: messages
-messages: $(VENV)/.installed-dev ## Collect every sentence shown to a person.
-	$(BIN)/pybabel --quiet extract --mapping=pyproject.toml --keywords=tr --no-default-keywords --no-location \
+messages: $(VENV)/.installed-dev ## Collect every sentence shown to a person, keep its translations.
+	$(BIN)/python -m babel.messages.frontend --quiet extract --mapping=pyproject.toml \
+		--keywords=tr --keywords=declared --no-default-keywords --no-location \
 		--omit-header --sort-output --width=100 --output-file=$(POT) \
 		robolink cli/robolink_cli simulators/robolink_simulators
+	@$(BIN)/python tools/translations.py || true
 
 .PHONY: build
 build: $(VENV)/.installed-dev ## Build wheel, source archive, bill of materials, licences: dist/.

@@ -2,13 +2,39 @@
 
 Every sentence shown to a person is written as ``tr("...")`` where it is used and
 collected into ``robolink/locale/robolink.pot`` by ``make messages``; a test fails when
-that catalogue is stale. A translation is installed once per process with
-:func:`install`; without one the English source sentence is shown.
+that catalogue is stale. A language is installed once per process with
+:func:`install`; without one the English source sentence is shown. Which languages there
+are says :mod:`robolink.locale.languages`.
+
+What is made when a module is imported is made before a language is known: it is
+``declared("...")``, and goes through :func:`spoken` when it is shown.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 
 _translate: Callable[[str], str] | None = None
+
+
+class Translated(str):
+    """A sentence in the language of the process, which knows what it is in English.
+
+    Records are read by other people than the one at the screen, and compared with each other:
+    they are kept in English (:func:`in_english`).
+    """
+
+    __slots__ = ("english",)
+
+    english: str
+
+    def __new__(cls, text: str, english: str) -> "Translated":
+        """Return ``text``, which says what ``english`` says."""
+        made = super().__new__(cls, text)
+        made.english = english
+        return made
+
+    def __reduce__(self) -> tuple[type["Translated"], tuple[str, str]]:
+        """Return what a copy is made from."""
+        return Translated, (str.__str__(self), self.english)
 
 
 def install(translate: Callable[[str], str] | None) -> None:
@@ -22,5 +48,66 @@ def install(translate: Callable[[str], str] | None) -> None:
 
 def tr(sentence: str, /, **values: object) -> str:
     """Translate ``sentence`` and fill its ``{placeholders}`` from ``values``."""
-    text = sentence if _translate is None else _translate(sentence)
-    return text.format(**values) if values else text
+    if _translate is None:
+        return sentence.format(**values) if values else sentence
+    return _translated(_translate, sentence, values)
+
+
+def declared(sentence: str, /) -> str:
+    """Return ``sentence`` as it stands, to be collected; :func:`spoken` translates it."""
+    return sentence
+
+
+def spoken(sentence: str, /) -> str:
+    """Return a sentence that was declared, in the language of the process.
+
+    What no catalogue knows, such as the declaration of another package, comes back as it is.
+    """
+    return sentence if _translate is None else _translated(_translate, sentence, {})
+
+
+def joined(between: str, sentences: Iterable[str]) -> str:
+    """Return whole sentences one after the other, to be kept in English like each of them."""
+    parts = list(sentences)
+    text = between.join(parts)
+    english = between.join(in_english(part) for part in parts)
+    return text if text == english else Translated(text, english)
+
+
+def in_english(text: str) -> str:
+    """Return what a record keeps of a text that a person was shown."""
+    return text.english if isinstance(text, Translated) else text
+
+
+def plain(value: object) -> object:
+    """Return plain values, mappings and lists with every sentence in them in English."""
+    match value:
+        case str():
+            return in_english(value)
+        case Mapping():
+            return {key: plain(one) for key, one in value.items()}
+        case list() | tuple():
+            return type(value)(plain(one) for one in value) if _is_bare(value) else value
+        case _:
+            return value
+
+
+def _is_bare(value: object) -> bool:
+    """Tell a list or tuple from a class of one's own, such as a named tuple."""
+    return type(value) in (list, tuple)
+
+
+def _translated(
+    translate: Callable[[str], str], sentence: str, values: Mapping[str, object]
+) -> str:
+    if not sentence:
+        return ""  # the name under which gettext keeps the head of a catalogue
+    text = translate(sentence)
+    if not values:
+        return text if text == sentence else Translated(text, sentence)
+    english = sentence.format(**{name: plain(value) for name, value in values.items()})
+    try:
+        filled = text.format(**values)
+    except (LookupError, ValueError, AttributeError, TypeError):
+        return english  # a faulty translation keeps nobody from what has to be said
+    return filled if filled == english else Translated(filled, english)

@@ -8,6 +8,7 @@ import sys
 import pytest
 
 from tests._canary import Watch, install
+from tests._from_both_ends import import_from_the_other_end
 
 # Before anything imports numpy: threads for matrices of six rows cost far more than they bring,
 # the more so the more cores a machine has.
@@ -17,6 +18,11 @@ for _library in ("OPENBLAS", "OMP", "MKL"):
 
 CANARIES = Watch()
 """Every password of the test that runs, and what it made robolink say."""
+
+# Sentences are compared in English, in whatever language the tester's desktop is.
+for _name in ("LC_ALL", "LC_MESSAGES", "LANG"):
+    if os.environ.get(_name):
+        os.environ[_name] = "C.UTF-8"
 
 
 def pytest_sessionstart():
@@ -45,6 +51,11 @@ def no_password_shows(request):
     folders = {given[name] for name in ("tmp_path", "robolink_state") if name in given}
     if leaks := CANARIES.leaks(*folders):
         pytest.fail("a password shows: " + ", ".join(leaks), pytrace=False)
+
+
+def pytest_collection(session):
+    """Share the compiling of the tests between the processes that share them."""
+    import_from_the_other_end(session.config)
 
 
 def pytest_collection_modifyitems(config, items):

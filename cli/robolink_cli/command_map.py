@@ -7,7 +7,7 @@ working, with the same options and the same exit codes.
 
 from typing import Final
 
-from robolink.messages import tr
+from robolink.messages import declared
 
 _CONTROLLER: Final = "robolink_cli.commands.controller"
 _MEASURE: Final = "robolink_cli.commands.measure"
@@ -20,22 +20,25 @@ _GROUPS: Final = "robolink_cli.commands.groups"
 _EVERY_DAY: Final = {
     "change": (
         f"{_MEASURE}.recalibrate:recalibrate",
-        tr("Change a needle or nozzle: guided, measured, written, tested"),
+        declared("Change a needle or nozzle: guided, measured, written, tested"),
     ),
     "status": (
         f"{_CONTROLLER}.operate:status",
-        tr("What the robot is doing and which tool is selected"),
+        declared("What the robot is doing and which tool is selected"),
     ),
-    "stop": (f"{_CONTROLLER}.operate:stop", tr("Stop every motion now")),
+    "stop": (f"{_CONTROLLER}.operate:stop", declared("Stop every motion now")),
     "recover": (
         f"{_RECORD}.recover:recover",
-        tr("After a stop, a crash or a lost link: what is open, put it right"),
+        declared("After a stop, a crash or a lost link: what is open, put it right"),
     ),
-    "undo": (f"{_RECORD}.undo:undo", tr("Take the last tool change back")),
+    "undo": (f"{_RECORD}.undo:undo", declared("Take the last tool change back")),
 }
 
 _MEASURE_AND_MOVE: Final = {
-    "calibrate": (f"{_MEASURE}.calibrate:calibrate", tr("Measure one tool, in one of many ways")),
+    "calibrate": (
+        f"{_MEASURE}.calibrate:calibrate",
+        declared("Measure one tool, in one of many ways"),
+    ),
     "tool": (
         f"{_CONTROLLER}.tool:tool",
         "list get set clear select impact backup restore compare",
@@ -49,18 +52,18 @@ _LOOK_BACK: Final = {
 
 _SET_UP: Final = {
     "cell": (f"{_GROUPS}:cell", "list show doctor scan ports people station"),
-    "sim": (f"{_SIMULATE}.sim:sim", tr("Simulated controllers to practise on")),
+    "sim": (f"{_SIMULATE}.sim:sim", declared("Simulated controllers to practise on")),
     "demo": (
         f"{_SIMULATE}.demo:demo",
-        tr("A whole needle change on a simulated robot, nothing needed"),
+        declared("A whole needle change on a simulated robot, nothing needed"),
     ),
 }
 
 SECTIONS: Final = {
-    tr("Every day"): _EVERY_DAY,
-    tr("Measure and move"): _MEASURE_AND_MOVE,
-    tr("Look back"): _LOOK_BACK,
-    tr("Set up"): _SET_UP,
+    declared("Every day"): _EVERY_DAY,
+    declared("Measure and move"): _MEASURE_AND_MOVE,
+    declared("Look back"): _LOOK_BACK,
+    declared("Set up"): _SET_UP,
 }
 """The first help page: heading, then name, where it is and one line of help."""
 

@@ -5,7 +5,10 @@ Nothing is imported here that a stop does not need before its frame (docs/decisi
 
 import sys
 from collections.abc import Sequence
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
+
+if TYPE_CHECKING:
+    from robolink_cli.stopping.request import StopRequest
 
 
 def main() -> NoReturn:
@@ -25,12 +28,18 @@ def run(arguments: Sequence[str], *, last: bool = False) -> int:
 
         request = read_stop(arguments)
         if request is not None:
-            from robolink_cli.stopping.stop_first import stop_first
-
-            outcome = stop_first(request)
-            from robolink_cli.main import tell_stop
-
-            return tell_stop(request, outcome)
+            return _stop(request, arguments)
     from robolink_cli.main import run as run_any
 
     return run_any(arguments, last=last)
+
+
+def _stop(request: "StopRequest", arguments: Sequence[str]) -> int:
+    from robolink_cli.console.language import speaking_for
+    from robolink_cli.stopping.stop_first import stop_first
+
+    with speaking_for(arguments):
+        outcome = stop_first(request)
+        from robolink_cli.main import tell_stop
+
+        return tell_stop(request, outcome)

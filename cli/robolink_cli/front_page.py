@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 import click
 
-from robolink.messages import tr
+from robolink.messages import spoken, tr
 from robolink_cli.lazy_group import LazyGroup
 
 _NAME_COLUMNS = 9
@@ -37,11 +37,15 @@ class FrontPage(LazyGroup):
         formatter.write_usage(ctx.command_path, f"[-c CELL] {language}[--json] COMMAND ...")
         for heading, commands in self._sections.items():
             formatter.write_paragraph()
-            formatter.write(f"{heading}\n")
+            formatter.write(f"{spoken(heading)}\n")
             formatter.indent()
             formatter.write_dl(
-                [(name.ljust(_NAME_COLUMNS), summary) for name, (_, summary) in commands.items()]
+                [
+                    (name.ljust(_NAME_COLUMNS), spoken(summary))
+                    for name, (_, summary) in commands.items()
+                ]
             )
             formatter.dedent()
         formatter.write_paragraph()
         formatter.write_text(tr("First time here? robolink demo. More: robolink expert --help"))
+        self.format_epilog(ctx, formatter)

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, cast
 
 import click
 
-from robolink.messages import tr
+from robolink.messages import spoken, tr
+from robolink_cli.console.help_pages import in_language
 from robolink_cli.console.render import note
 
 if TYPE_CHECKING:
@@ -60,11 +61,11 @@ class LazyGroup(click.Group):
         elif cmd_name in self.lazy:
             target, summary = self.lazy[cmd_name]
             if self.listing:
-                return click.Command(cmd_name, short_help=summary)
+                return click.Command(cmd_name, short_help=spoken(summary))
         else:
             return super().get_command(ctx, cmd_name)
         module, name = target.split(":")
-        return cast(click.Command, getattr(import_module(module), name))
+        return in_language(cast(click.Command, getattr(import_module(module), name)))
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]

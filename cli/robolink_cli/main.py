@@ -4,15 +4,18 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Final, NoReturn
 
 import click
 
 from robolink import __version__
 from robolink.interrupts import Interrupted, one_ending
+from robolink.messages import declared, spoken
 from robolink.ways import speaking
 from robolink_cli.command_map import RENAMED, SECTIONS, SHORT_NAMES
 from robolink_cli.console.exit_codes import exit_code, report
+from robolink_cli.console.help_pages import in_language
+from robolink_cli.console.language import speaking_for
 from robolink_cli.console.output import hand_over, watched_output
 from robolink_cli.console.render import dumps, note, print_document, say
 from robolink_cli.console.tolerance import colour_wanted, help_width, tolerate_any_console
@@ -51,7 +54,8 @@ def run(arguments: Sequence[str], *, last: bool = False) -> int:
         arguments: The command line without the program's name.
         last: Whether the process ends then.
     """
-    return _guarded(lambda: _answer(arguments), last=last)
+    with speaking_for(arguments):
+        return _guarded(lambda: _answer(arguments), last=last)
 
 
 def tell_stop(request: "StopRequest", outcome: "StopOutcome") -> int:
@@ -87,9 +91,20 @@ def _tell_stop(request: "StopRequest", outcome: "StopOutcome") -> int:
     return code
 
 
+_UNREAD: Final = declared("Not yet read by a native technician: tell us what reads wrong.")
+"""Under the help page of each translation."""
+
+
+def _root() -> click.Command:
+    """Return the root of the commands, in the language of the process."""
+    root, said = in_language(cli), spoken(_UNREAD)
+    root.epilog = None if said == _UNREAD else said
+    return root
+
+
 def _answer(arguments: Sequence[str]) -> int:
     if "_ROBOLINK_COMPLETE" in os.environ:
-        cli.main(list(arguments), prog_name="robolink")  # answers the shell and exits
+        _root().main(list(arguments), prog_name="robolink")  # answers the shell and exits
     try:
         return _invoke(arguments)
     except click.exceptions.Exit as end:
@@ -106,7 +121,7 @@ def _answer(arguments: Sequence[str]) -> int:
 def _invoke(arguments: Sequence[str]) -> int:
     colour = colour_wanted()
     width = help_width()
-    with cli.make_context(
+    with _root().make_context(
         "robolink", list(arguments), color=colour, terminal_width=width
     ) as context:
         code = cli.invoke(context)

@@ -28,6 +28,7 @@ WORDS = {
     "procedures": "what methods share: ways, touches, looks, sampling",
     "stations": "pins, beams, surfaces, cameras by name",
     "config": "cell files",
+    "locale": "languages, and their catalogues",
     "transaction": "all tools or none",
     "runner": "runs a procedure, with a person",
     "backup": "all tools in a file",

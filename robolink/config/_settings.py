@@ -5,6 +5,7 @@ from typing import Annotated
 from pydantic import BaseModel, Field, ValidationInfo, field_validator
 
 from robolink.config._station_settings import STRICT, StationSettings
+from robolink.locale.languages import language_named
 from robolink.messages import tr
 from robolink.model import PersonRole
 from robolink.transport import parse_url
@@ -124,4 +125,12 @@ class CellFile(BaseModel):
 
     model_config = STRICT
 
+    language: str = ""
     cells: dict[str, CellSettings] = Field(default_factory=dict)
+
+    @field_validator("language")
+    @classmethod
+    def _is_spoken(cls, language: str) -> str:
+        if language_named(language) is None and language:
+            raise ValueError(tr("must be zh or en"))
+        return language

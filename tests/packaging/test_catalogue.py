@@ -12,7 +12,7 @@ CATALOGUE = ROOT / "robolink" / "locale" / "robolink.pot"
 def recipe():
     """Return the options with which ``make messages`` collects."""
     makefile = (ROOT / "Makefile").read_text().replace("\\\n", " ")
-    (line,) = re.findall(r"pybabel (.*)", makefile)
+    (line,) = re.findall(r"babel\.messages\.frontend (--quiet extract .*)", makefile)
     return line.split()
 
 

@@ -1,6 +1,8 @@
 """What is installed is what was meant to be, and nothing else."""
 
 import configparser
+import gettext
+import io
 import os
 import subprocess
 import sys
@@ -54,7 +56,7 @@ def test_every_source_and_data_file_is_in_the_wheel(names, package):
     files = {
         f"{package}/{path.relative_to(folder).as_posix()}"
         for path in folder.rglob("*")
-        if path.is_file() and "__pycache__" not in path.parts
+        if path.is_file() and "__pycache__" not in path.parts and path.suffix != ".po"
     }
     assert f"{package}/py.typed" in files
     assert files - names == set()
@@ -63,6 +65,14 @@ def test_every_source_and_data_file_is_in_the_wheel(names, package):
 def test_the_wheel_brings_grammar_and_catalogue(names):
     assert any(name.endswith("/grammar.lark") for name in names)
     assert "robolink/locale/robolink.pot" in names
+
+
+def test_the_wheel_brings_the_chinese_sentences_as_gettext_reads_them(wheel, names):
+    folder = "robolink/locale/zh_CN/LC_MESSAGES"
+    assert not any(name.endswith(".po") for name in names)
+    for name, english in (("robolink", "Stop every motion now"), ("click", "Usage:")):
+        translations = gettext.GNUTranslations(io.BytesIO(wheel.read(f"{folder}/{name}.mo")))
+        assert translations.gettext(english) != english
 
 
 def test_the_wheel_brings_the_programs_for_controllers_and_their_licence(wheel, names):

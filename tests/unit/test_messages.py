@@ -19,8 +19,35 @@ def sources():
 
 def sentences(path):
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "tr":
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") in ("tr", "declared"):
             yield node
+
+
+def when_imported(node):
+    """Yield what runs when a module is imported: bodies of functions do not."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.FunctionDef):
+            defaults = [one for one in child.args.kw_defaults if one is not None]
+            for part in (*child.decorator_list, *child.args.defaults, *defaults):
+                yield part
+                yield from when_imported(part)
+        elif not isinstance(child, ast.Lambda):
+            yield child
+            yield from when_imported(child)
+
+
+def too_early(tree):
+    """Yield the calls of ``tr`` at import, and those whose text click keeps."""
+    kept = (
+        keyword.value
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call)
+        for keyword in node.keywords
+        if keyword.arg in ("help", "short_help", "epilog")
+    )
+    for node in (*when_imported(tree), *kept):
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "tr":
+            yield node.lineno
 
 
 def placeholders(sentence):
@@ -63,3 +90,20 @@ def test_every_sentence_is_a_literal_that_gets_exactly_its_values():
                 wrong.append(f"{place}: the sentence wants {wanted}, gets {given}")
     assert not wrong
     assert seen > 1000
+
+
+def test_nothing_is_translated_before_the_language_is_known():
+    wrong = [
+        f"{path.relative_to(ROOT)}:{line}: declared(...) here, spoken(...) where it is shown"
+        for path in sources()
+        for line in too_early(ast.parse(path.read_text(encoding="utf-8")))
+    ]
+    assert not wrong
+
+
+def test_what_would_be_translated_too_early_is_found():
+    source = (
+        'A = tr("a")\nclass B:\n    c = {1: tr("c")}\n@option(help=tr("d"))\ndef f(x=tr("x")):\n'
+        '    g = option(help=tr("g"))\n    return tr("no")\n'
+    )
+    assert sorted(set(too_early(ast.parse(source)))) == [1, 3, 4, 5, 6]

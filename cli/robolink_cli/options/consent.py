@@ -5,7 +5,7 @@ from typing import Any, TypeVar
 
 import click
 
-from robolink.messages import tr
+from robolink.messages import declared
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -30,7 +30,7 @@ def then_select_option(function: F) -> F:
         "--then-select",
         type=click.IntRange(0, 15),
         metavar="NUMBER",
-        help=tr(
+        help=declared(
             "The tool that the machine is to have selected in place of one that is selected and "
             "loses its definition; 0 is the flange."
         ),

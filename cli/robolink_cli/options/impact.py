@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from robolink.errors import ConfigError
-from robolink.messages import tr
+from robolink.messages import declared, tr
 from robolink_cli.access.capabilities import points_of
 from robolink_cli.console.render import say, table
 from robolink_cli.options.pose_source import point_numbers
@@ -41,12 +41,12 @@ def impact_options(function: F) -> F:
     function = click.option(
         "--impact-pts",
         type=click.Path(dir_okay=False, path_type=Path),
-        help=tr("The same for all points of a .pts file of EPSON RC+."),
+        help=declared("The same for all points of a .pts file of EPSON RC+."),
     )(function)
     return click.option(
         "--impact",
         metavar="1-50",
-        help=tr("Before the write, show how far the tip moves at these taught points."),
+        help=declared("Before the write, show how far the tip moves at these taught points."),
     )(function)
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from robolink.messages import tr
+from robolink.messages import declared
 from robolink.pose_tables import ReadingChoices
 
 
@@ -28,17 +28,19 @@ def reading_options(function: Callable[..., Any]) -> Callable[..., Any]:
         click.option(
             "--euler",
             metavar="NAME",
-            help=tr("How its angles turn: epson, kuka, fanuc, xyzrpw, codesys, rotvec, RzRyRx .."),
+            help=declared(
+                "How its angles turn: epson, kuka, fanuc, xyzrpw, codesys, rotvec, RzRyRx .."
+            ),
         ),
         click.option(
             "--length",
             type=click.Choice(["mm", "cm", "m", "in"]),
-            help=tr("Unit of its lengths, when the file does not say it."),
+            help=declared("Unit of its lengths, when the file does not say it."),
         ),
         click.option(
             "--columns",
             metavar="x,y,z,u",
-            help=tr("What its columns are, when the file does not say it; '-' skips one."),
+            help=declared("What its columns are, when the file does not say it; '-' skips one."),
         ),
     ):
         command = option(command)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 import click
 
 from robolink.errors import ConfigError
-from robolink.messages import tr
+from robolink.messages import declared, tr
 from robolink.pose_tables import NOTHING_SAID, ReadingChoices
 from robolink_cli.options.numbers import decimal
 from robolink_cli.options.pose_reading import reading_options
@@ -107,7 +107,7 @@ def pose_source_options(
             "--taught-tool",
             type=click.IntRange(0, 15),
             metavar="N",
-            help=tr("The tool that was selected when the poses were taught (0, the flange)."),
+            help=declared("The tool that was selected when the poses were taught (0, the flange)."),
         ),
     )
 

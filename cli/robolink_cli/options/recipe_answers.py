@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from robolink.errors import ConfigError
-from robolink.messages import tr
+from robolink.messages import declared, tr
 
 if TYPE_CHECKING:
     from robolink.recipe import Answers, Recipe
@@ -25,14 +25,14 @@ def answer_options(function: F) -> F:
             "answers",
             metavar="N=TEXT",
             multiple=True,
-            help=tr("Answer to prompt number N of the recipe, counted from 1."),
+            help=declared("Answer to prompt number N of the recipe, counted from 1."),
         ),
         click.option(
             "--z",
             "z_mm",
             metavar="TOOL=MM",
             multiple=True,
-            help=tr('Z of a new tip in mm from the flange, for a recipe with z = "typed".'),
+            help=declared('Z of a new tip in mm from the flange, for a recipe with z = "typed".'),
         ),
     )
     for option in reversed(options):

@@ -10,7 +10,7 @@ import click
 
 from robolink import __version__
 from robolink.errors import ConfigError
-from robolink.messages import tr
+from robolink.messages import declared, tr
 from robolink_cli.console.render import note
 
 if TYPE_CHECKING:
@@ -35,14 +35,16 @@ def report_options(function: F) -> F:
     function = click.option(
         "--force",
         is_flag=True,
-        help=tr("Let --report replace a file that is there; it forces nothing else."),
+        help=declared("Let --report replace a file that is there; it forces nothing else."),
     )(function)
     return click.option(
         "--report",
         "report_path",
         metavar="FILE.html",
         type=click.Path(dir_okay=False, path_type=Path),
-        help=tr("Write a page to keep: the offsets, the taught points as a table and a picture."),
+        help=declared(
+            "Write a page to keep: the offsets, the taught points as a table and a picture."
+        ),
     )(function)
 
 

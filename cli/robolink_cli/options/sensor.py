@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from robolink.messages import tr
+from robolink.messages import declared
 
 
 def sensor_option(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -13,6 +13,6 @@ def sensor_option(function: Callable[..., Any]) -> Callable[..., Any]:
     decorate: Callable[[Callable[..., Any]], Callable[..., Any]] = click.option(
         "--sensor",
         metavar="NAME|URL",
-        help=tr("The camera: a plug-in's name or URL, or a simulator's assist or sim URL."),
+        help=declared("The camera: a plug-in's name or URL, or a simulator's assist or sim URL."),
     )
     return decorate(function)

@@ -1,15 +1,21 @@
 """The options that stand before or after a command's name."""
 
+import os
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 from click.core import ParameterSource
 
-from robolink.messages import tr
+from robolink.locale.languages import ENGLISH, LANGUAGES, language_named
+from robolink.messages import declared, tr
 from robolink_cli.access.cell import complete_cell
+from robolink_cli.console.language import OPTION, VARIABLE
 from robolink_cli.console.render import switch_json_on
 from robolink_cli.options.line import LINE
+
+if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
 
 CommandT = TypeVar("CommandT", bound=Callable[..., Any])
 
@@ -27,15 +33,54 @@ def shared_options(command: CommandT) -> CommandT:
     return json_option(_link_options(command))
 
 
+class _Language(click.ParamType[str]):
+    """A language by any of its names; what the environment says is not refused."""
+
+    name = "language"
+
+    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Return the language, English for what a variable names and nobody speaks here."""
+        found = language_named(value)
+        if found is None and value != os.environ.get(VARIABLE):
+            self.fail(
+                tr("{value!r} is no language of robolink: zh or en.", value=value), param, ctx
+            )
+        return found or ENGLISH
+
+    def shell_complete(
+        self,
+        ctx: click.Context,  # noqa: ARG002 - click's form
+        param: click.Parameter,  # noqa: ARG002 - click's form
+        incomplete: str,
+    ) -> "list[CompletionItem]":
+        """Offer the languages for TAB."""
+        from click.shell_completion import CompletionItem
+
+        return [CompletionItem(one) for one in LANGUAGES if one.startswith(incomplete)]
+
+
 def json_option(command: CommandT) -> CommandT:
-    """Add ``--json`` alone, for a command that needs no controller."""
+    """Add ``--json`` and ``--lang`` alone, for a command that needs no controller."""
     return click.option(
         "--json",
         "json_",
         is_flag=True,
         expose_value=False,
         callback=_note_json,
-        help=tr("Print one JSON document on stdout; text goes to stderr."),
+        help=declared("Print one JSON document on stdout; text goes to stderr."),
+    )(lang_option(command))
+
+
+def lang_option(command: CommandT) -> CommandT:
+    """Add ``--lang``. Which language is meant was found out before click read the line."""
+    return click.option(
+        OPTION,
+        type=_Language(),
+        metavar="|".join(LANGUAGES),
+        envvar=VARIABLE,
+        show_envvar=True,
+        expose_value=False,
+        help=declared("Language of the sentences; what --json prints is always English."),
     )(command)
 
 
@@ -57,14 +102,16 @@ def _link_options(command: CommandT) -> CommandT:
             expose_value=False,
             callback=_keep,
             shell_complete=complete_cell,
-            help=tr("A cell of the cell files, or a URL like epson+tcp://192.168.0.1:5000."),
+            help=declared("A cell of the cell files, or a URL like epson+tcp://192.168.0.1:5000."),
         ),
         click.option(
             "--password-file",
             type=click.Path(dir_okay=False),
             expose_value=False,
             callback=_keep,
-            help=tr("File whose first line is the controller's password; readable by you only."),
+            help=declared(
+                "File whose first line is the controller's password; readable by you only."
+            ),
         ),
         click.option(
             "--timeout",
@@ -73,7 +120,7 @@ def _link_options(command: CommandT) -> CommandT:
             type=click.FloatRange(min=0, min_open=True),
             expose_value=False,
             callback=_keep,
-            help=tr("Longest wait for one answer, in seconds (3)."),
+            help=declared("Longest wait for one answer, in seconds (3)."),
         ),
         click.option(
             "--remote-timeout",
@@ -82,7 +129,7 @@ def _link_options(command: CommandT) -> CommandT:
             type=click.FloatRange(min=0),
             expose_value=False,
             callback=_keep,
-            help=tr(
+            help=declared(
                 "The remote time-out set in the controller, in seconds (60); 0 forbids motion."
             ),
         ),
@@ -94,7 +141,7 @@ def _link_options(command: CommandT) -> CommandT:
             show_envvar=True,
             expose_value=False,
             callback=_keep,
-            help=tr("Badge or name of who works here, for the record and the role."),
+            help=declared("Badge or name of who works here, for the record and the role."),
         ),
         click.option(
             "--record",
@@ -102,7 +149,7 @@ def _link_options(command: CommandT) -> CommandT:
             type=click.Path(dir_okay=False),
             expose_value=False,
             callback=_keep,
-            help=tr("Append the dialogue with the controller to FILE, without the password."),
+            help=declared("Append the dialogue with the controller to FILE, without the password."),
         ),
     )
     for option in reversed(options):

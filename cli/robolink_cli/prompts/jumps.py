@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
 import click
 
 from robolink.errors import DeclinedError
-from robolink.messages import tr
+from robolink.messages import declared, tr
 from robolink_cli.console.render import json_is_on
 from robolink_cli.prompts.questions import asked, on_terminal
 
@@ -59,14 +59,18 @@ def accept_jump_options(function: F) -> F:
             "accepted_mm",
             metavar="MM",
             type=positive,
-            help=tr("Accept a change up to MM this time, beyond the cell's limit; for engineers."),
+            help=declared(
+                "Accept a change up to MM this time, beyond the cell's limit; for engineers."
+            ),
         ),
         click.option(
             "--accept-turn",
             "accepted_deg",
             metavar="DEG",
             type=positive,
-            help=tr("Accept a turn up to DEG this time, beyond the cell's limit; for engineers."),
+            help=declared(
+                "Accept a turn up to DEG this time, beyond the cell's limit; for engineers."
+            ),
         ),
     )
     for option in reversed(options):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from robolink.errors import ConfigError
-from robolink.messages import tr
+from robolink.messages import declared, tr
 from robolink_cli.console.render import json_is_on
 from robolink_cli.options.line import LINE
 
@@ -25,9 +25,9 @@ def nozzle_options(function: F) -> F:
             "--nozzle",
             metavar="ID",
             type=LINE,
-            help=tr("Id of the nozzle or needle that is mounted, for the record."),
+            help=declared("Id of the nozzle or needle that is mounted, for the record."),
         ),
-        click.option("--lot", metavar="LOT", type=LINE, help=tr("Its lot, for the record.")),
+        click.option("--lot", metavar="LOT", type=LINE, help=declared("Its lot, for the record.")),
     )
     for option in reversed(options):
         function = option(function)

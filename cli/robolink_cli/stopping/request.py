@@ -12,9 +12,10 @@ VALUES: Final = {
     "--remote-timeout": "",
     "--operator": "operator",
     "--record": "record",
+    "--lang": "",
 }
 """Options with a value that may stand beside ``stop``, and where it is kept; a stop needs no
-remote time-out. A test compares them with click's."""
+remote time-out, and the language is found elsewhere. A test compares them with click's."""
 
 FLAGS: Final = {"--json": "json"}
 

@@ -15,6 +15,7 @@ from robolink.config import (
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli.access.cell import link_options
+from robolink_cli.console.columns import columns, padded
 from robolink_cli.console.render import say
 from robolink_cli.session.context import CliContext, origin_of
 
@@ -80,9 +81,9 @@ def cells_payload(cells: Iterable[Cell]) -> dict[str, Any]:
 def show_cells(payload: Mapping[str, Any]) -> None:
     """Print one cell a line."""
     cells = payload["cells"]
-    width = max((len(name) for name in cells), default=0)
+    width = max((columns(name) for name in cells), default=0)
     for name, cell in cells.items():
-        say(f"{name:{width}}  {cell['url']}  {cell['robot'] or ''}".rstrip())
+        say(f"{padded(name, width)}  {cell['url']}  {cell['robot'] or ''}".rstrip())
     if not cells:
         say(tr("There is no cell; 'robolink cell files' shows where a cell file may be."))
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from hashlib import sha256
 from typing import Any, Final
 
-from robolink.messages import tr
+from robolink.messages import in_english, tr
 
 FIRST: Final = ""
 """What the first entry holds in place of the hash of the one before."""
@@ -28,7 +28,8 @@ def canonical(value: object) -> str:
 
 
 def storable(text: str) -> str:
-    """Return ``text`` as every database stores it: valid Unicode without NUL."""
+    """Return ``text`` as every database stores it: in English, valid Unicode without NUL."""
+    text = in_english(text)
     if text.isascii() and "\0" not in text:
         return text
     return text.encode("utf-8", "backslashreplace").decode().replace("\0", "\\x00")

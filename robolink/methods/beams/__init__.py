@@ -3,7 +3,7 @@
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING
 
-from robolink.messages import tr
+from robolink.messages import declared
 from robolink.methods.beams.parameters import BeamsParameters
 from robolink.methods.declaration.method import Method, Needs
 from robolink.methods.declaration.site import Site
@@ -29,8 +29,8 @@ def _source(parameters: BeamsParameters, site: Site) -> "TipSource":
 
 METHOD = Method(
     name="beams",
-    summary=tr("Drive the tip through two crossed light beams: X and Y."),
-    description=tr(
+    summary=declared("Drive the tip through two crossed light beams: X and Y."),
+    description=declared(
         "Drive the tip through two crossed light beams: X and Y; nobody touches anything.\n\n"
         "As soon as the crossings check each other it says after each how well they agree and how "
         "sure the tip is. At the end the one that fits worst is named and may be made again.\n\n"
@@ -41,5 +41,5 @@ METHOD = Method(
     measures=("x_mm", "y_mm"),
     needs=Needs(station=StationKind.BEAMS),
     source=_source,
-    unmeasured_z=tr('cannot be "measured" with beams; write "typed" or "kept"'),
+    unmeasured_z=declared('cannot be "measured" with beams; write "typed" or "kept"'),
 )

@@ -8,7 +8,7 @@ from annotated_types import Ge, Le, Len
 
 from robolink.calibration import MIN_ROTATION_DEG
 from robolink.files.toml import Problem
-from robolink.messages import tr
+from robolink.messages import declared, tr
 from robolink.methods.declaration.method import (
     DEGREES,
     MM,
@@ -33,11 +33,11 @@ _LEAST_ANGLE_DEG: Final = 20.0
 class BeamLine:
     """Where one light beam is, from the reference record."""
 
-    input: Annotated[InputNumber, Help(tr("Number of the input that the beam switches."))]
-    x_mm: Annotated[float, MM, Help(tr("X of a point of the beam, base."))]
-    y_mm: Annotated[float, MM, Help(tr("Y of the same point, base."))]
+    input: Annotated[InputNumber, Help(declared("Number of the input that the beam switches."))]
+    x_mm: Annotated[float, MM, Help(declared("X of a point of the beam, base."))]
+    y_mm: Annotated[float, MM, Help(declared("Y of the same point, base."))]
     direction_deg: Annotated[
-        Angle, Help(tr("Direction of the beam in the base, counter-clockwise from X."))
+        Angle, Help(declared("Direction of the beam in the base, counter-clockwise from X."))
     ]
 
 
@@ -49,18 +49,20 @@ class BeamsParameters(MethodParameters):
         tuple[BeamLine, ...] | None,
         Len(2, 2),
         Option(flag="--beam", metavar="INPUT,X,Y,DEG"),
-        Help(tr("The two beams; without them, those of the station.")),
+        Help(declared("The two beams; without them, those of the station.")),
     ] = None
     z_mm: Annotated[
         float | None,
         MM,
         Option(flag="--beams-z", metavar="MM"),
-        Help(tr("Height of the beams in the base, where they cross; goes with the beams.")),
+        Help(declared("Height of the beams in the base, where they cross; goes with the beams.")),
     ] = None
     off_when_broken: Annotated[
         bool,
         Help(
-            tr("Whether an input goes off, not on, while its beam is broken; goes with the beams.")
+            declared(
+                "Whether an input goes off, not on, while its beam is broken; goes with the beams."
+            )
         ),
     ] = False
     turn_deg: Annotated[
@@ -70,7 +72,7 @@ class BeamsParameters(MethodParameters):
         DEGREES,
         Option(metavar="DEG"),
         Help(
-            tr(
+            declared(
                 "By how much U differs at a second measurement, so that moved beams do no harm; 0 "
                 "for none."
             )
@@ -80,41 +82,47 @@ class BeamsParameters(MethodParameters):
         int,
         Ge(1),
         Le(10),
-        Help(tr("How often each beam is crossed both ways; once leaves no residual.")),
+        Help(declared("How often each beam is crossed both ways; once leaves no residual.")),
     ] = 2
     search_mm: Annotated[
         float,
         Ge(0.5),
         Le(20),
         MM,
-        Help(tr("How far beside the beam the tip starts; the new tip may be off by less.")),
+        Help(declared("How far beside the beam the tip starts; the new tip may be off by less.")),
     ] = 2.0
     aside_mm: Annotated[
         float,
         Ge(1),
         Le(50),
         MM,
-        Help(tr("How far from where the beams cross each of them is crossed.")),
+        Help(declared("How far from where the beams cross each of them is crossed.")),
     ] = 5.0
     dip_mm: Annotated[
-        float, Ge(0.2), Le(20), MM, Help(tr("How far below the beams the end of the tip is."))
+        float, Ge(0.2), Le(20), MM, Help(declared("How far below the beams the end of the tip is."))
     ] = 1.5
     shaft_mm: Annotated[
         float,
         Ge(0),
         Le(20),
         MM,
-        Help(tr("How much deeper the shaft is measured too, to tell a bent needle; 0 for not.")),
+        Help(
+            declared("How much deeper the shaft is measured too, to tell a bent needle; 0 for not.")
+        ),
     ] = 3.0
     max_lean_deg: Annotated[
-        float, Ge(0.1), Le(20), DEGREES, Help(tr("Largest angle at which the shaft may lean."))
+        float,
+        Ge(0.1),
+        Le(20),
+        DEGREES,
+        Help(declared("Largest angle at which the shaft may lean.")),
     ] = 2.0
     lift_mm: Annotated[
         float,
         Ge(1),
         Le(100),
         MM,
-        Help(tr("How far above the beams the tip comes, goes and turns.")),
+        Help(declared("How far above the beams the tip comes, goes and turns.")),
     ] = 10.0
     crossing_mm_s: Annotated[
         float,
@@ -122,17 +130,21 @@ class BeamsParameters(MethodParameters):
         Le(20),
         MM_S,
         Option(flag="--crossing-speed"),
-        Help(tr("How fast the tip crosses a beam; the faster, the later it stops past an edge.")),
+        Help(
+            declared(
+                "How fast the tip crosses a beam; the faster, the later it stops past an edge."
+            )
+        ),
     ] = 5.0
     until_mm: Annotated[
         Length | None,
         Option(metavar="MM"),
-        Help(tr("End early when X and Y together are known within this, in 95 %.")),
+        Help(declared("End early when X and Y together are known within this, in 95 %.")),
     ] = None
     retake: Annotated[
         bool,
         Option(flag="--retake/--no-retake", default=True),
-        Help(tr("Whether the crossing that fits worst is offered to be made again.")),
+        Help(declared("Whether the crossing that fits worst is offered to be made again.")),
     ] = False
 
     @property

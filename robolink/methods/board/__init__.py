@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from robolink.messages import tr
+from robolink.messages import declared
 from robolink.methods.board.parameters import BoardParameters
 from robolink.methods.declaration.look_parameters import PLACE, UNMEASURED_Z, camera_at
 from robolink.methods.declaration.method import Method, Needs
@@ -26,8 +26,8 @@ def _source(parameters: BoardParameters, site: Site) -> "TipSource":
 
 METHOD = Method(
     name="board",
-    summary=tr("See the fiducials of a held board: X, Y and U."),
-    description=tr(
+    summary=declared("See the fiducials of a held board: X, Y and U."),
+    description=declared(
         "See the fiducials of a held board with an up-looking camera: X, Y and U of the board.\n\n"
         "The tool that is stored says where the board is expected: the fiducials must then lie in "
         "the image one at a time. Say where they are: how far two are apart, or where each of "

@@ -10,7 +10,7 @@ from annotated_types import Ge, Len
 
 from robolink.calibration import LEAST_SPACING_MM, BoardDrawing
 from robolink.files.toml import Problem
-from robolink.messages import tr
+from robolink.messages import declared, tr
 from robolink.methods.declaration.look_parameters import LookParameters, Turns
 from robolink.methods.declaration.method import MM, Check, Help, Option, Pair
 from robolink.procedures import TWO_ANGLES_DEG
@@ -25,7 +25,11 @@ class BoardParameters(LookParameters):
         Len(2, 24),
         MM,
         Option(flag="--fiducial", metavar="X,Y", moves=False),
-        Help(tr("A fiducial in the axes that the tool is to have; in the order of their numbers.")),
+        Help(
+            declared(
+                "A fiducial in the axes that the tool is to have; in the order of their numbers."
+            )
+        ),
     ] = None
     spacing_mm: Annotated[
         float | None,
@@ -33,7 +37,9 @@ class BoardParameters(LookParameters):
         MM,
         Option(metavar="MM", moves=False),
         Help(
-            tr("Two fiducials this far apart: the origin half way, X from 2 to 1 (EPSON's board).")
+            declared(
+                "Two fiducials this far apart: the origin half way, X from 2 to 1 (EPSON's board)."
+            )
         ),
     ] = None
     turns_deg: Turns = TWO_ANGLES_DEG

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from robolink.messages import tr
+from robolink.messages import declared
 from robolink.methods.camera.parameters import CameraParameters
 from robolink.methods.declaration.look_parameters import PLACE, UNMEASURED_Z, camera_at
 from robolink.methods.declaration.method import Method, Needs
@@ -24,8 +24,8 @@ def _source(parameters: CameraParameters, site: Site) -> "TipSource":
 
 METHOD = Method(
     name="camera",
-    summary=tr("See the tip with a calibrated, up-looking camera: X and Y."),
-    description=tr(
+    summary=declared("See the tip with a calibrated, up-looking camera: X and Y."),
+    description=declared(
         "See the tip with an up-looking camera: X and Y; nobody touches anything.\n\n"
         "What a pixel means is known from 'calibrate camera-affine', or stands in the cell file, "
         "or the camera answers in millimetres. Looks at several angles tell the tip from what the "

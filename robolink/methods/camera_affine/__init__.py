@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from robolink.messages import tr
+from robolink.messages import declared
 from robolink.methods.camera_affine.parameters import CameraAffineParameters
 from robolink.methods.declaration.look_parameters import PLACE, UNMEASURED_Z, camera_at
 from robolink.methods.declaration.method import Former, Method, Needs
@@ -27,8 +27,8 @@ def _source(parameters: CameraAffineParameters, site: Site) -> "TipSource":
 
 METHOD = Method(
     name="camera-affine",
-    summary=tr("Find an up-looking camera and the tip together."),
-    description=tr(
+    summary=declared("Find an up-looking camera and the tip together."),
+    description=declared(
         "Find an up-looking camera and the tip together: X and Y, scale, turn and mirror.\n\n"
         "Say to the command, or in the cell file, where the camera looks to within its field of "
         "view. The tip goes to four corners of the image and turns in its middle. What was found "

@@ -5,7 +5,7 @@ from typing import Annotated, Final
 
 from annotated_types import Ge, Le
 
-from robolink.messages import tr
+from robolink.messages import declared
 from robolink.methods.declaration.look_parameters import LookParameters
 from robolink.methods.declaration.method import MM, Help, Option, Pair, Rows
 
@@ -22,18 +22,22 @@ class CameraAffineParameters(LookParameters):
         Ge(LEAST_SPAN_MM),
         Le(50),
         MM,
-        Help(tr("How far the tip goes from the middle of the image, in X and in Y.")),
+        Help(declared("How far the tip goes from the middle of the image, in X and in Y.")),
     ] = 3.0
     new_camera: Annotated[
         bool,
-        Help(tr("Camera, lens or mount were changed: do not compare with the last calibration.")),
+        Help(
+            declared(
+                "Camera, lens or mount were changed: do not compare with the last calibration."
+            )
+        ),
     ] = False
     mm_per_px: Annotated[
         Rows | None,
         MM,
         Option(flag="--mm-per-px", metavar="XX,XY,YX,YY", moves=False),
         Help(
-            tr(
+            declared(
                 "What a pixel was in the base when the camera was found last; a camera that "
                 "differs is refused. Else the station's record says so, and without that nothing "
                 "is compared."
@@ -44,7 +48,9 @@ class CameraAffineParameters(LookParameters):
         Pair | None,
         MM,
         Option(metavar="X,Y", moves=False),
-        Help(tr("Base point that was seen at pixel (0, 0) then; goes with what a pixel was.")),
+        Help(
+            declared("Base point that was seen at pixel (0, 0) then; goes with what a pixel was.")
+        ),
     ] = None
 
     @property

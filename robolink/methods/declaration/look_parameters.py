@@ -9,7 +9,7 @@ from annotated_types import Ge, Le, MaxLen, MinLen
 from robolink.calibration import MIN_ROTATION_DEG, CameraModel, angle_spread_deg
 from robolink.errors import ConfigError
 from robolink.files.toml import Problem
-from robolink.messages import tr
+from robolink.messages import declared, tr
 from robolink.methods.declaration.method import (
     DEGREES,
     MM,
@@ -35,16 +35,16 @@ Turns = Annotated[
     MaxLen(24),
     DEGREES,
     Option(flag="--angles", metavar="0,60,.."),
-    Help(tr("U of each look, counted toward zero from where the tool stands.")),
+    Help(declared("U of each look, counted toward zero from where the tool stands.")),
 ]
 
 PLACE = (
-    tr("where the camera looks"),
-    tr("the height in focus"),
+    declared("where the camera looks"),
+    declared("the height in focus"),
 )
 """What X and Y of the station are, and what Z is."""
 
-UNMEASURED_Z = tr('cannot be "measured" by a camera; write "typed" or "kept"')
+UNMEASURED_Z = declared('cannot be "measured" by a camera; write "typed" or "kept"')
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,14 +55,14 @@ class LookParameters(MethodParameters):
         str | None,
         MinLen(1),
         Option(metavar="NAME|URL", moves=False),
-        Help(tr("The camera: a plug-in's name or URL, or a simulator's assist or sim URL.")),
+        Help(declared("The camera: a plug-in's name or URL, or a simulator's assist or sim URL.")),
     ] = None
     mm_per_px: Annotated[
         Rows | None,
         MM,
         Option(flag="--mm-per-px", metavar="XX,XY,YX,YY", moves=False),
         Help(
-            tr(
+            declared(
                 "What a pixel is in the base: X along the image's first and second axis, then Y; "
                 "as camera-affine found it. Not for a camera that answers in mm."
             )
@@ -72,26 +72,29 @@ class LookParameters(MethodParameters):
         Pair | None,
         MM,
         Option(metavar="X,Y", moves=False),
-        Help(tr("Base point that is seen at pixel (0, 0); goes with what a pixel is.")),
+        Help(declared("Base point that is seen at pixel (0, 0); goes with what a pixel is.")),
     ] = None
     turns_deg: Turns = HALF_ROUND_DEG
     pictures: Annotated[
-        int, Ge(1), Le(25), Help(tr("How many pictures are taken at each look; the median counts."))
+        int,
+        Ge(1),
+        Le(25),
+        Help(declared("How many pictures are taken at each look; the median counts.")),
     ] = 3
     lift_mm: Annotated[
-        float, Ge(1), Le(100), MM, Help(tr("How far the tip is lifted before it turns."))
+        float, Ge(1), Le(100), MM, Help(declared("How far the tip is lifted before it turns."))
     ] = 10.0
     beside_mm: Annotated[
         float,
         Ge(0),
         Le(10),
         MM,
-        Help(tr("From how far beside every place is approached, always from the same side.")),
+        Help(declared("From how far beside every place is approached, always from the same side.")),
     ] = 1.0
     retake: Annotated[
         bool,
         Option(flag="--retake/--no-retake", default=True),
-        Help(tr("Whether the look that fits worst is offered to be taken again.")),
+        Help(declared("Whether the look that fits worst is offered to be taken again.")),
     ] = False
 
     @property

@@ -8,7 +8,7 @@ from annotated_types import Ge, Le
 
 from robolink.calibration import HIGHEST_MM
 from robolink.files.toml import Problem
-from robolink.messages import tr
+from robolink.messages import declared, tr
 from robolink.methods.declaration.method import (
     MM,
     Check,
@@ -27,23 +27,25 @@ class PinParameters(MethodParameters):
     """How a tip is taken off a pin and brought back."""
 
     lift_mm: Annotated[
-        float, Ge(1), Le(100), MM, Help(tr("How far the tip is lifted before it turns."))
+        float, Ge(1), Le(100), MM, Help(declared("How far the tip is lifted before it turns."))
     ] = 10.0
     clearance_mm: Annotated[
         float,
         Ge(0.5),
         Le(50),
         MM,
-        Help(tr("How far above the pin the tip stops at least; the rest is the person's.")),
+        Help(declared("How far above the pin the tip stops at least; the rest is the person's.")),
     ] = 2.0
     contact_input: Annotated[
         InputNumber | None,
         Option(metavar="N"),
-        Help(tr("Number of the input that shows contact of tip and pin, where there is one.")),
+        Help(
+            declared("Number of the input that shows contact of tip and pin, where there is one.")
+        ),
     ] = None
     off_in_contact: Annotated[
         bool,
-        Help(tr("Whether that input goes off, not on, in contact.")),
+        Help(declared("Whether that input goes off, not on, in contact.")),
     ] = False
 
     @property
@@ -75,7 +77,7 @@ class UprightPinParameters(PinParameters):
         LengthRule,
         Option(moves=False),
         Help(
-            tr(
+            declared(
                 "Where the heights of the touches show that the tip is longer or shorter: ask a "
                 "person, write Z by the difference, or keep Z. Where nobody can be asked, ask "
                 "means that nothing is written."

@@ -5,7 +5,7 @@ from typing import Annotated
 
 from annotated_types import Ge, Le
 
-from robolink.messages import tr
+from robolink.messages import declared
 from robolink.methods.declaration.method import DEGREES, MM, Help, InputNumber, Option
 from robolink.methods.declaration.pin_parameters import PinParameters
 
@@ -15,19 +15,27 @@ class SurfaceParameters(PinParameters):
     """How a tip is taken off a surface and brought back; the surface stands for the pin."""
 
     lift_mm: Annotated[
-        float, Ge(1), Le(100), MM, Help(tr("How far the tip is lifted before it tilts and turns."))
+        float,
+        Ge(1),
+        Le(100),
+        MM,
+        Help(declared("How far the tip is lifted before it tilts and turns.")),
     ] = 12.0
     clearance_mm: Annotated[
         float,
         Ge(0.5),
         Le(50),
         MM,
-        Help(tr("How far from the surface the tip stops at least; the rest is the person's.")),
+        Help(
+            declared("How far from the surface the tip stops at least; the rest is the person's.")
+        ),
     ] = 2.0
     contact_input: Annotated[
         InputNumber | None,
         Option(metavar="N"),
-        Help(tr("Number of the input that shows contact of tip and surface, if there is one.")),
+        Help(
+            declared("Number of the input that shows contact of tip and surface, if there is one.")
+        ),
     ] = None
     tilt_deg: Annotated[
         float,
@@ -35,7 +43,7 @@ class SurfaceParameters(PinParameters):
         Le(45),
         DEGREES,
         Option(metavar="DEG"),
-        Help(tr("How far the tool leans, against the first touch.")),
+        Help(declared("How far the tool leans, against the first touch.")),
     ] = 30.0
 
     def states_station(self) -> bool:

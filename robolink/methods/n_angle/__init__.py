@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from robolink.messages import tr
+from robolink.messages import declared
 from robolink.methods.declaration.method import Former, Method, Needs, PoseHelp
 from robolink.methods.declaration.site import Site
 from robolink.methods.n_angle.parameters import NAngleParameters
@@ -31,8 +31,8 @@ def _from_poses(_parameters: NAngleParameters, site: Site) -> "PoseMethod":
 
 METHOD = Method(
     name="n-angle",
-    summary=tr("Touch one pin at several angles of U; the touches check each other."),
-    description=tr(
+    summary=declared("Touch one pin at several angles of U; the touches check each other."),
+    description=declared(
         "Touch one pin at several angles of U; the touches check each other.\n\n"
         "After each touch from the third on it says how well they agree and how sure the tip is. "
         "At the end the pose that fits worst is named and may be taken again.\n\n"
@@ -44,9 +44,11 @@ METHOD = Method(
     source=_source,
     from_poses=_from_poses,
     pose_help=PoseHelp(
-        points=tr("Three points or more taught on the pendant, for example 901-904."),
-        typed=tr("A pose in mm and degrees, for example 287.5,103.25,180; give three or more."),
-        path=tr("A file with three poses or more."),
+        points=declared("Three points or more taught on the pendant, for example 901-904."),
+        typed=declared(
+            "A pose in mm and degrees, for example 287.5,103.25,180; give three or more."
+        ),
+        path=declared("A file with three poses or more."),
     ),
     tells_height=True,
     formerly=(Former(kind="operator", method="n_angle"),),

@@ -9,7 +9,7 @@ from annotated_types import Ge, Le, MaxLen, MinLen
 
 from robolink.calibration import MIN_ROTATION_DEG, planar_sigma_gain
 from robolink.files.toml import Problem
-from robolink.messages import tr
+from robolink.messages import declared, tr
 from robolink.methods.declaration.method import DEGREES, Angle, Check, Help, Length, Option
 from robolink.methods.declaration.pin_parameters import UprightPinParameters
 from robolink.model import Pose, angle_difference_deg
@@ -26,7 +26,7 @@ class NAngleParameters(UprightPinParameters):
         int,
         Ge(3),
         Le(24),
-        Help(tr("Number of touches, spread evenly over a full turn.")),
+        Help(declared("Number of touches, spread evenly over a full turn.")),
     ] = 6
     angles_deg: Annotated[
         tuple[Angle, ...] | None,
@@ -34,17 +34,21 @@ class NAngleParameters(UprightPinParameters):
         MaxLen(24),
         DEGREES,
         Option(flag="--angles", metavar="0,120,.."),
-        Help(tr("In place of a count: U of each touch, counted from the first one, which is 0.")),
+        Help(
+            declared(
+                "In place of a count: U of each touch, counted from the first one, which is 0."
+            )
+        ),
     ] = None
     until_mm: Annotated[
         Length | None,
         Option(metavar="MM"),
-        Help(tr("End early when X and Y together are known within this, in 95 %.")),
+        Help(declared("End early when X and Y together are known within this, in 95 %.")),
     ] = None
     retake: Annotated[
         bool,
         Option(flag="--retake/--no-retake", default=True),
-        Help(tr("Whether the pose that fits worst is offered to be taken again.")),
+        Help(declared("Whether the pose that fits worst is offered to be taken again.")),
     ] = False
 
     @property

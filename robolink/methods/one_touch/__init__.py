@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from robolink.messages import tr
+from robolink.messages import declared, tr
 from robolink.methods.declaration.method import Former, Method, Needs, PoseHelp
 from robolink.methods.declaration.site import Site
 from robolink.methods.one_touch.parameters import OneTouchParameters
@@ -59,8 +59,8 @@ def _from_poses(parameters: OneTouchParameters, site: Site) -> "PoseMethod":
 
 METHOD = Method(
     name="one-touch",
-    summary=tr("Touch a known pin once: X, Y and Z, for a change of the needle."),
-    description=tr(
+    summary=declared("Touch a known pin once: X, Y and Z, for a change of the needle."),
+    description=declared(
         "Touch a pin once: X, Y and Z of the new tip, for a change of the needle.\n\n"
         "The tool must have been calibrated on that pin before, for example with n-angle. What is "
         "written is the stored offset moved by how much the tip differs from the old "
@@ -72,9 +72,9 @@ METHOD = Method(
     source=_source,
     from_poses=_from_poses,
     pose_help=PoseHelp(
-        points=tr("The one point taught on the pendant with the tip on the pin."),
-        typed=tr("The pose X,Y,Z,U in mm and degrees with the tip on the pin."),
-        path=tr("A file with the one pose."),
+        points=declared("The one point taught on the pendant with the tip on the pin."),
+        typed=declared("The pose X,Y,Z,U in mm and degrees with the tip on the pin."),
+        path=declared("A file with the one pose."),
     ),
     by_reference=False,
     formerly=(Former(kind="one_touch"),),

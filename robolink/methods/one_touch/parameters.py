@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from annotated_types import Ge, Le
 
-from robolink.messages import tr
+from robolink.messages import declared, tr
 from robolink.methods.declaration.method import MM, Help, Option
 from robolink.methods.declaration.pin_parameters import PinParameters
 
@@ -17,21 +17,21 @@ class OneTouchParameters(PinParameters):
     basis: Annotated[
         Literal["difference", "absolute"],
         Option(flag="--absolute", chooses="absolute", moves=False, from_recipe="basis"),
-        Help(tr("Trust the place of the pin, and not the last touch of this tool on it.")),
+        Help(declared("Trust the place of the pin, and not the last touch of this tool on it.")),
     ] = "difference"
     max_changes: Annotated[
         int,
         Ge(1),
         Le(1000),
         Option(moves=False),
-        Help(tr("Differences after which a full calibration is due in any case.")),
+        Help(declared("Differences after which a full calibration is due in any case.")),
     ] = 20
     lift_mm: Annotated[
         float,
         Ge(1),
         Le(100),
         MM,
-        Help(tr("How far above the pin the tip comes and goes, and turns.")),
+        Help(declared("How far above the pin the tip comes and goes, and turns.")),
     ] = 10.0
     clearance_mm: Annotated[
         float,
@@ -39,7 +39,9 @@ class OneTouchParameters(PinParameters):
         Le(50),
         MM,
         Help(
-            tr("How far above the pin the old tip would stop: more than the new one may be longer.")
+            declared(
+                "How far above the pin the old tip would stop: more than the new one may be longer."
+            )
         ),
     ] = 5.0
 

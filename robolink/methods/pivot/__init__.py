@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from robolink.messages import tr
+from robolink.messages import declared
 from robolink.methods.declaration.method import Method, Needs, PoseHelp
 from robolink.methods.declaration.site import Site
 from robolink.methods.pivot.parameters import PivotParameters
@@ -33,8 +33,10 @@ def _from_poses(_parameters: PivotParameters, site: Site) -> "PoseMethod":
 
 METHOD = Method(
     name="pivot",
-    summary=tr("Touch one pin with the tool tilted and turned: X, Y and Z, on five axes or six."),
-    description=tr(
+    summary=declared(
+        "Touch one pin with the tool tilted and turned: X, Y and Z, on five axes or six."
+    ),
+    description=declared(
         "Touch one pin with the tool tilted and turned: X, Y and Z, on five axes or six.\n\n"
         "Put the tip some millimetres above a fixed pin first, the tool as it stands in "
         "production. After the first touch the robot lifts it, tilts and turns it in the air, and "
@@ -48,8 +50,8 @@ METHOD = Method(
     source=_source,
     from_poses=_from_poses,
     pose_help=PoseHelp(
-        points=tr("Three points or more taught on the pendant, the tool tilted and turned."),
-        typed=tr("A pose X,Y,Z,U,V,W in mm and degrees; give it three times or more."),
-        path=tr("A file of poses that state X to W."),
+        points=declared("Three points or more taught on the pendant, the tool tilted and turned."),
+        typed=declared("A pose X,Y,Z,U,V,W in mm and degrees; give it three times or more."),
+        path=declared("A file of poses that state X to W."),
     ),
 )

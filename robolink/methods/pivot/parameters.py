@@ -5,7 +5,7 @@ from typing import Annotated
 
 from annotated_types import Ge, Le
 
-from robolink.messages import tr
+from robolink.messages import declared
 from robolink.methods.declaration.method import DEGREES, MM, Help, Length, Option
 from robolink.methods.declaration.pin_parameters import PinParameters
 from robolink.procedures import SamplingPolicy
@@ -19,7 +19,11 @@ class PivotParameters(PinParameters):
         int,
         Ge(4),
         Le(12),
-        Help(tr("Number of touches, the first one in the orientation in which the tool stands.")),
+        Help(
+            declared(
+                "Number of touches, the first one in the orientation in which the tool stands."
+            )
+        ),
     ] = 6
     tilt_deg: Annotated[
         float,
@@ -27,20 +31,24 @@ class PivotParameters(PinParameters):
         Le(45),
         DEGREES,
         Option(metavar="DEG"),
-        Help(tr("How far the tool leans in the others, against the first one.")),
+        Help(declared("How far the tool leans in the others, against the first one.")),
     ] = 20.0
     lift_mm: Annotated[
-        float, Ge(1), Le(100), MM, Help(tr("How far the tip is lifted before it tilts and turns."))
+        float,
+        Ge(1),
+        Le(100),
+        MM,
+        Help(declared("How far the tip is lifted before it tilts and turns.")),
     ] = 10.0
     until_mm: Annotated[
         Length | None,
         Option(metavar="MM"),
-        Help(tr("End early when X, Y and Z together are known within this, in 95 %.")),
+        Help(declared("End early when X, Y and Z together are known within this, in 95 %.")),
     ] = None
     retake: Annotated[
         bool,
         Option(flag="--retake/--no-retake", default=True),
-        Help(tr("Whether the pose that fits worst is offered to be taken again.")),
+        Help(declared("Whether the pose that fits worst is offered to be taken again.")),
     ] = False
 
     @property

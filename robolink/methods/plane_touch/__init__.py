@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from robolink.messages import tr
+from robolink.messages import declared
 from robolink.methods.declaration.method import Method, Needs, PoseHelp
 from robolink.methods.declaration.site import Site
 from robolink.methods.plane_touch.parameters import PlaneTouchParameters
@@ -33,8 +33,8 @@ def _from_poses(_parameters: PlaneTouchParameters, site: Site) -> "PoseMethod":
 
 METHOD = Method(
     name="plane-touch",
-    summary=tr("Touch a flat surface with the tool upright and tilted: X, Y and Z."),
-    description=tr(
+    summary=declared("Touch a flat surface with the tool upright and tilted: X, Y and Z."),
+    description=declared(
         "Touch a flat surface with the tool upright and tilted: X, Y and Z. No pin is needed, and "
         "nobody has to hit a point.\n\n"
         "Put the tip some millimetres above the surface first, the tool as it stands in "
@@ -50,8 +50,8 @@ METHOD = Method(
     source=_source,
     from_poses=_from_poses,
     pose_help=PoseHelp(
-        points=tr("Seven points or more taught on the pendant, the tool upright and tilted."),
-        typed=tr("A pose X,Y,Z,U,V,W in mm and degrees; give it seven times or more."),
-        path=tr("A file of poses that state X to W."),
+        points=declared("Seven points or more taught on the pendant, the tool upright and tilted."),
+        typed=declared("A pose X,Y,Z,U,V,W in mm and degrees; give it seven times or more."),
+        path=declared("A file of poses that state X to W."),
     ),
 )

@@ -8,7 +8,7 @@ from annotated_types import Ge, Le
 
 from robolink.calibration import HIGHEST_MM
 from robolink.files.toml import Problem
-from robolink.messages import tr
+from robolink.messages import declared, tr
 from robolink.methods.declaration.method import MM, Check, Help, Option
 from robolink.methods.declaration.surface_parameters import SurfaceParameters
 from robolink.methods.plane_touch.survey import LEAST_COUNT, PlaneSurvey
@@ -22,7 +22,11 @@ class PlaneTouchParameters(SurfaceParameters):
         int,
         Ge(LEAST_COUNT),
         Le(24),
-        Help(tr("Number of touches; the first three in the orientation in which the tool stands.")),
+        Help(
+            declared(
+                "Number of touches; the first three in the orientation in which the tool stands."
+            )
+        ),
     ] = 10
     spread_mm: Annotated[
         float,
@@ -30,7 +34,7 @@ class PlaneTouchParameters(SurfaceParameters):
         Le(100),
         MM,
         Option(metavar="MM"),
-        Help(tr("How far from the first touch the others are; the plane must reach as far.")),
+        Help(declared("How far from the first touch the others are; the plane must reach as far.")),
     ] = 10.0
 
     @property

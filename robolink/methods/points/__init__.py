@@ -6,7 +6,7 @@ Typed poses and those of a file are given to the method that solves them, such a
 from typing import TYPE_CHECKING
 
 from robolink.errors import ConfigError
-from robolink.messages import tr
+from robolink.messages import declared, tr
 from robolink.methods.declaration.method import Method, Needs, PoseHelp
 from robolink.methods.declaration.site import Site
 from robolink.methods.points.parameters import PointsParameters
@@ -84,8 +84,8 @@ def _from_file(
 
 METHOD = Method(
     name="points",
-    summary=tr("Take points that were taught on the pendant: X and Y; nothing moves."),
-    description=tr(
+    summary=declared("Take points that were taught on the pendant: X and Y; nothing moves."),
+    description=declared(
         "Take points that were taught on the pendant: X and Y; nothing moves.\n\n"
         "The points touch one pin. They are read from the controller, and solved as two-pose or "
         "n-angle would. No tool is selected, and nothing is proved by turning about the new tip."
@@ -96,9 +96,11 @@ METHOD = Method(
     source=_source,
     from_poses=_solver,
     pose_help=PoseHelp(
-        points=tr("Numbers of the points that touch the pin, for example 901,902 or 901-904."),
+        points=declared(
+            "Numbers of the points that touch the pin, for example 901,902 or 901-904."
+        ),
         typed="",
         path="",
     ),
-    unmeasured_z=tr('cannot be "measured" from taught points; write "typed" or "kept"'),
+    unmeasured_z=declared('cannot be "measured" from taught points; write "typed" or "kept"'),
 )

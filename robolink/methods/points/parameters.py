@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from annotated_types import Ge, Le
 
 from robolink.files.toml import Problem
-from robolink.messages import tr
+from robolink.messages import declared, tr
 from robolink.methods.declaration.method import Check, Help, MethodParameters, Option
 from robolink.methods.declaration.pin_parameters import two_poses_agree
 
@@ -19,7 +19,9 @@ class PointsParameters(MethodParameters):
     method: Annotated[
         Literal["two-pose", "n-angle"],
         Option(moves=False),
-        Help(tr("Two points for each tool, or three and more of which each checks the others.")),
+        Help(
+            declared("Two points for each tool, or three and more of which each checks the others.")
+        ),
     ] = "two-pose"
     taught_tool: Annotated[
         int,
@@ -27,7 +29,9 @@ class PointsParameters(MethodParameters):
         Le(15),
         Option(metavar="N", moves=False),
         Help(
-            tr("Number of the tool that was selected when the points were taught; 0 is the flange.")
+            declared(
+                "Number of the tool that was selected when the points were taught; 0 is the flange."
+            )
         ),
     ] = 0
 

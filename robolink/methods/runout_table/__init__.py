@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from robolink.messages import tr
+from robolink.messages import declared
 from robolink.methods.declaration.look_parameters import PLACE, UNMEASURED_Z, camera_at
 from robolink.methods.declaration.method import Method, Needs
 from robolink.methods.declaration.site import Site
@@ -24,8 +24,8 @@ def _source(parameters: RunoutTableParameters, site: Site) -> "TipSource":
 
 METHOD = Method(
     name="runout-table",
-    summary=tr("See how a pick nozzle wobbles: X and Y, and a table by angle."),
-    description=tr(
+    summary=declared("See how a pick nozzle wobbles: X and Y, and a table by angle."),
+    description=declared(
         "See the tip with a calibrated, up-looking camera all round: X and Y, and a table of how "
         "far beside them it is at each angle of U; nobody touches anything.\n\n"
         "The table is for nozzles that wobble when they turn. It goes on record and into the JSON "

@@ -7,7 +7,7 @@ from typing import Annotated
 from annotated_types import MaxLen, MinLen
 
 from robolink.files.toml import Problem
-from robolink.messages import tr
+from robolink.messages import declared, tr
 from robolink.methods.declaration.look_parameters import LookParameters
 from robolink.methods.declaration.method import DEGREES, Angle, Check, Help, Option
 from robolink.procedures import LookPlan
@@ -44,7 +44,7 @@ class RunoutTableParameters(LookParameters):
         DEGREES,
         Option(flag="--angles", metavar="0,30,.."),
         Help(
-            tr(
+            declared(
                 "U of each look, counted from where the tool stands: all round, in steps of 60 or "
                 "less. Each becomes a row of the table."
             )

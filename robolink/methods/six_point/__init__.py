@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from robolink.messages import tr
+from robolink.messages import declared
 from robolink.methods.declaration.method import Method, Needs, PoseHelp
 from robolink.methods.declaration.site import Site
 from robolink.methods.six_point.parameters import SixPointParameters
@@ -36,8 +36,8 @@ def _from_poses(parameters: SixPointParameters, site: Site) -> "PoseMethod":
 
 METHOD = Method(
     name="six-point",
-    summary=tr("A pivot and two ways along the tool's axes: all six components."),
-    description=tr(
+    summary=declared("A pivot and two ways along the tool's axes: all six components."),
+    description=declared(
         "Find all six components: a pivot, then a way along the tool's X and one along its Z.\n\n"
         "The touches go as in 'calibrate pivot'. Then, in the air and without turning, you bring "
         "the tip to where it has room, and jog it along the tool's own +X; the robot goes straight "
@@ -53,8 +53,8 @@ METHOD = Method(
     source=_source,
     from_poses=_from_poses,
     pose_help=PoseHelp(
-        points=tr("The points on the pin, then the one along X and the one along Z."),
-        typed=tr("A pose X,Y,Z,U,V,W in mm and degrees; give it five times or more."),
-        path=tr("A file of poses that state X to W."),
+        points=declared("The points on the pin, then the one along X and the one along Z."),
+        typed=declared("A pose X,Y,Z,U,V,W in mm and degrees; give it five times or more."),
+        path=declared("A file of poses that state X to W."),
     ),
 )

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from annotated_types import Ge, Le
 
-from robolink.messages import tr
+from robolink.messages import declared
 from robolink.methods.declaration.method import MM, Help, Option
 from robolink.methods.pivot.parameters import PivotParameters
 
@@ -20,12 +20,14 @@ class SixPointParameters(PivotParameters):
         Le(200),
         MM,
         Option(metavar="MM"),
-        Help(tr("Least length of each of the two ways; the longer, the surer the axes.")),
+        Help(declared("Least length of each of the two ways; the longer, the surer the axes.")),
     ] = 50.0
     second_is: Annotated[
         Literal["z", "xz"],
         Option(moves=False),
-        Help(tr("What the second way shows: the tool's +Z, or its XZ plane on the side of +Z.")),
+        Help(
+            declared("What the second way shows: the tool's +Z, or its XZ plane on the side of +Z.")
+        ),
     ] = "z"
 
     def height_mm(self) -> float:

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from robolink.messages import tr
+from robolink.messages import declared
 from robolink.methods.declaration.method import Method, Needs, PoseHelp
 from robolink.methods.declaration.site import Site
 from robolink.methods.sphere_touch.parameters import SphereTouchParameters
@@ -33,8 +33,8 @@ def _from_poses(_parameters: SphereTouchParameters, site: Site) -> "PoseMethod":
 
 METHOD = Method(
     name="sphere-touch",
-    summary=tr("Touch a sphere from several sides, the tool upright and tilted: X, Y and Z."),
-    description=tr(
+    summary=declared("Touch a sphere from several sides, the tool upright and tilted: X, Y and Z."),
+    description=declared(
         "Touch a sphere from several sides, the tool upright and tilted: X, Y and Z. A ball of a "
         "bearing or of a gauge will do; nobody has to hit a point.\n\n"
         "Put the tip some millimetres above the top of the sphere first, the tool as it stands in "
@@ -50,10 +50,10 @@ METHOD = Method(
     source=_source,
     from_poses=_from_poses,
     pose_help=PoseHelp(
-        points=tr(
+        points=declared(
             "Eight points or more taught on the pendant from several sides, the tool tilted."
         ),
-        typed=tr("A pose X,Y,Z,U,V,W in mm and degrees; give it eight times or more."),
-        path=tr("A file of poses that state X to W."),
+        typed=declared("A pose X,Y,Z,U,V,W in mm and degrees; give it eight times or more."),
+        path=declared("A file of poses that state X to W."),
     ),
 )

@@ -8,7 +8,7 @@ from annotated_types import Ge, Le
 
 from robolink.calibration import HIGHEST_MM
 from robolink.files.toml import Problem
-from robolink.messages import tr
+from robolink.messages import declared, tr
 from robolink.methods.declaration.method import MM, Check, Help, Option
 from robolink.methods.declaration.surface_parameters import SurfaceParameters
 from robolink.methods.sphere_touch.survey import LEAST_COUNT, SphereSurvey
@@ -24,7 +24,11 @@ class SphereTouchParameters(SurfaceParameters):
         int,
         Ge(LEAST_COUNT),
         Le(24),
-        Help(tr("Number of touches; the first four in the orientation in which the tool stands.")),
+        Help(
+            declared(
+                "Number of touches; the first four in the orientation in which the tool stands."
+            )
+        ),
     ] = 12
     radius_mm: Annotated[
         float,
@@ -32,7 +36,9 @@ class SphereTouchParameters(SurfaceParameters):
         Le(50),
         MM,
         Option(metavar="MM"),
-        Help(tr("About the radius of the sphere: it guides the robot; the true one is found.")),
+        Help(
+            declared("About the radius of the sphere: it guides the robot; the true one is found.")
+        ),
     ] = _USUAL_MM
 
     @property

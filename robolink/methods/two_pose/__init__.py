@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from robolink.messages import tr
+from robolink.messages import declared
 from robolink.methods.declaration.method import Former, Method, Needs, PoseHelp
 from robolink.methods.declaration.site import Site
 from robolink.methods.two_pose.parameters import TwoPoseParameters
@@ -26,8 +26,8 @@ def _from_poses(_parameters: TwoPoseParameters, site: Site) -> "PoseMethod":
 
 METHOD = Method(
     name="two-pose",
-    summary=tr("Touch one pin at two angles of U, half a turn apart."),
-    description=tr(
+    summary=declared("Touch one pin at two angles of U, half a turn apart."),
+    description=declared(
         "Touch one pin at two angles of U, half a turn apart.\n\n"
         "Put the tip some millimetres above a fixed pin first. The robot moves in Power Low only: "
         "it lifts before it turns and comes down to a clearance; you do the rest by typing "
@@ -41,9 +41,9 @@ METHOD = Method(
     source=_source,
     from_poses=_from_poses,
     pose_help=PoseHelp(
-        points=tr("Two points taught on the pendant, for example 901,902. Nothing moves."),
-        typed=tr("A pose in mm and degrees, for example 287.5,103.25,180; give it twice."),
-        path=tr("A file with the two poses."),
+        points=declared("Two points taught on the pendant, for example 901,902. Nothing moves."),
+        typed=declared("A pose in mm and degrees, for example 287.5,103.25,180; give it twice."),
+        path=declared("A file with the two poses."),
     ),
     tells_height=True,
     formerly=(Former(kind="operator", method="two_pose", usual=True),),

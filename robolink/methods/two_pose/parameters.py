@@ -6,7 +6,7 @@ from typing import Annotated
 from annotated_types import Ge, Le
 
 from robolink.calibration import MIN_ROTATION_DEG, planar_sigma_gain
-from robolink.messages import tr
+from robolink.messages import declared
 from robolink.methods.declaration.method import DEGREES, Help, Option
 from robolink.methods.declaration.pin_parameters import UprightPinParameters, two_poses_agree
 from robolink.model import Pose
@@ -23,7 +23,7 @@ class TwoPoseParameters(UprightPinParameters):
         Le(360 - MIN_ROTATION_DEG),
         DEGREES,
         Option(metavar="DEG"),
-        Help(tr("By how much U differs between the two touches.")),
+        Help(declared("By how much U differs between the two touches.")),
     ] = 180.0
 
     @property

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from robolink.messages import tr
+from robolink.messages import declared
 from robolink.methods.declaration.method import Former, Method, Needs
 from robolink.methods.declaration.site import Site
 from robolink.methods.z_touch.parameters import ZTouchParameters
@@ -25,8 +25,8 @@ def _source(parameters: ZTouchParameters, site: Site) -> "TipSource":
 
 METHOD = Method(
     name="z-touch",
-    summary=tr("Touch a surface that switches an input: Z."),
-    description=tr(
+    summary=declared("Touch a surface that switches an input: Z."),
+    description=declared(
         "Touch a surface that switches an input: Z; nobody touches anything.\n\n"
         "X and Y are kept. The tip stops at the touch and retreats; two speeds tell the latency. "
         "After each touch from the third on it says how well they agree and how sure Z is; at the "
@@ -37,8 +37,8 @@ METHOD = Method(
     needs=Needs(
         station=StationKind.TOUCH,
         place=(
-            tr("where to touch"),
-            tr("the surface"),
+            declared("where to touch"),
+            declared("the surface"),
         ),
     ),
     source=_source,

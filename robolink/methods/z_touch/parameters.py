@@ -8,7 +8,7 @@ from annotated_types import Ge, Le, MinLen
 
 from robolink.calibration import MIN_ROTATION_DEG
 from robolink.files.toml import Problem
-from robolink.messages import tr
+from robolink.messages import declared, tr
 from robolink.methods.declaration.method import (
     DEGREES,
     MM,
@@ -33,11 +33,11 @@ class ZTouchParameters(MethodParameters):
 
     input: Annotated[
         InputNumber | None,
-        Help(tr("Number of the input that the surface switches; else the station's.")),
+        Help(declared("Number of the input that the surface switches; else the station's.")),
     ] = None
     off_when_touched: Annotated[
         bool,
-        Help(tr("Whether the input goes off, not on, at a touch; goes with the input.")),
+        Help(declared("Whether the input goes off, not on, at a touch; goes with the input.")),
     ] = False
     speeds_mm_s: Annotated[
         tuple[Annotated[float, Ge(0.1), Le(10)], ...],
@@ -45,7 +45,7 @@ class ZTouchParameters(MethodParameters):
         MM_S,
         Option(metavar="2,1,.."),
         Help(
-            tr(
+            declared(
                 "Speed of each touch; two that differ tell the latency of the trigger, three in "
                 "four touches or more also how far the robot runs on while it brakes."
             )
@@ -56,24 +56,24 @@ class ZTouchParameters(MethodParameters):
         Ge(0.5),
         Le(20),
         MM,
-        Help(tr("How far above the expected touch the tip begins to seek it.")),
+        Help(declared("How far above the expected touch the tip begins to seek it.")),
     ] = 3.0
     beyond_mm: Annotated[
         float,
         Ge(0.1),
         Le(10),
         MM,
-        Help(tr("How far below it the search ends; a new tip may be shorter by less.")),
+        Help(declared("How far below it the search ends; a new tip may be shorter by less.")),
     ] = 2.0
     back_off_mm: Annotated[
-        float, Ge(0.2), Le(10), MM, Help(tr("How far the tip is lifted after each touch."))
+        float, Ge(0.2), Le(10), MM, Help(declared("How far the tip is lifted after each touch."))
     ] = 1.0
     lift_mm: Annotated[
         float,
         Ge(1),
         Le(100),
         MM,
-        Help(tr("How far above the surface the tip comes, goes and turns.")),
+        Help(declared("How far above the surface the tip comes, goes and turns.")),
     ] = 10.0
     proof_turn_deg: Annotated[
         float,
@@ -82,7 +82,7 @@ class ZTouchParameters(MethodParameters):
         DEGREES,
         Option(metavar="DEG"),
         Help(
-            tr(
+            declared(
                 "By how much U differs at the touch that proves the new value; 0 on a machine that "
                 "cannot turn, such as a gantry."
             )
@@ -91,12 +91,12 @@ class ZTouchParameters(MethodParameters):
     until_mm: Annotated[
         Length | None,
         Option(metavar="MM"),
-        Help(tr("End early when half the 95 % interval of Z is at most this.")),
+        Help(declared("End early when half the 95 % interval of Z is at most this.")),
     ] = None
     retake: Annotated[
         bool,
         Option(flag="--retake/--no-retake", default=True),
-        Help(tr("Whether the touch that fits worst is offered to be made again.")),
+        Help(declared("Whether the touch that fits worst is offered to be made again.")),
     ] = False
 
     @property

@@ -5,7 +5,7 @@ from dataclasses import fields
 from typing import Final
 
 from robolink.config import Problem
-from robolink.messages import tr
+from robolink.messages import spoken, tr
 from robolink.methods import (
     NOTHING_STATED,
     Check,
@@ -64,7 +64,7 @@ def place(draft: Draft) -> Iterator[Problem]:
 
 
 def _missing(kind: str, what: str) -> str:
-    return tr('is missing: with kind = "{kind}" it is {what}', kind=kind, what=what)
+    return tr('is missing: with kind = "{kind}" it is {what}', kind=kind, what=spoken(what))
 
 
 def both_coordinates(draft: Draft) -> Iterator[Problem]:
@@ -83,7 +83,7 @@ def height(draft: Draft) -> Iterator[Problem]:
     if draft.z != "measured" and method.only_z:
         yield Problem("z", tr('must be "measured": a touch tells Z and nothing else'))
     if draft.z == "measured" and method.unmeasured_z:
-        yield Problem("z", method.unmeasured_z)
+        yield Problem("z", spoken(method.unmeasured_z))
 
 
 def orientation(draft: Draft) -> Iterator[Problem]:

@@ -1,18 +1,27 @@
 """One client's connection to the simulated PLC: what comes, what leaves and when."""
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Final, Protocol
 
 from robolink.timing import NS_PER_S
 from robolink_simulators.faults import Departure
 from robolink_simulators.faults.departing import DepartingReplies
 from robolink_simulators.plc.frames import Frames, PlcRequest
 
+_SILENCE_NS: Final = 50_000_000
+"""Silence on a line that ends a frame: 3.5 characters (Modbus over serial line 1.02, 2.5.1.1).
+
+A simulated line carries a frame at once, at no baud rate; so it is longer here than at the slowest
+of them, and no busy computer cuts a frame in two.
+"""
+
 
 class ServedFrame(Protocol):
     """The PLC, as its connections see it."""
 
-    now_ns: int
+    @property
+    def now_ns(self) -> int:
+        """The simulated time."""
 
     def advance(self, now_ns: int) -> None:
         """Let simulated time reach ``now_ns``."""
@@ -39,6 +48,7 @@ class PlcLink:
         self._frames = frames
         self._outbox = DepartingReplies()
         self._late: list[PlcRequest] = []
+        self._heard_ns = plc.now_ns
         self._over = False
 
     @property
@@ -63,6 +73,9 @@ class PlcLink:
             return
         if not data:
             self._over = True
+        if self._frames.shared and self._plc.now_ns - self._heard_ns > _SILENCE_NS:
+            self._frames.forget()
+        self._heard_ns = self._plc.now_ns
         self._frames.feed(data)
         try:
             self._answer_all()
@@ -77,6 +90,11 @@ class PlcLink:
     def next_change(self) -> int | None:
         """Return when something leaves, or the link carries again."""
         return self._outbox.next_change(self._plc.now_ns)
+
+    def cut(self) -> None:
+        """End this connection, after what leaves now."""
+        self._outbox.post(None, self._plc.now_ns)
+        self._over = True
 
     def stall(self, request: PlcRequest, seconds: float) -> None:
         """Carry nothing for a while; then a request arrives, and what was sent behind it."""

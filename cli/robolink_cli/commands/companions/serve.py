@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from robolink.messages import tr
+from robolink.messages import declared, tr
 from robolink_cli.console.render import note
 from robolink_cli.session.context import CliContext, controller_options
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     "--spel",
     "address",
     metavar="HOST:PORT",
-    help=tr(
+    help=declared(
         "Where SPEL+ programs call, for example 127.0.0.1:5001. A cell that is named besides says "
         "where its stations are."
     ),
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     "--plc",
     "method",
     type=click.Choice(["n-angle", "pivot"]),
-    help=tr(
+    help=declared(
         "Answer the program of the PLC that is named: it touches a pin, by this method. "
         "docs/plc-callback.md"
     ),
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     "--allow",
     multiple=True,
     metavar="ADDRESS",
-    help=tr(
+    help=declared(
         "Address of a controller that may call; needed for any HOST but this computer's own. "
         "May be repeated."
     ),
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     "controllers",
     multiple=True,
     metavar="NAME",
-    help=tr(
+    help=declared(
         "Name under which a robot is on record; by default epson: and its serial number. For a "
         "controller with several robots repeat it: each name ends in the robot's serial number."
     ),
@@ -55,33 +55,43 @@ if TYPE_CHECKING:
     type=float,
     default=0.1,
     show_default=True,
-    help=tr("Largest drift about the new tip, and widest interval."),
+    help=declared("Largest drift about the new tip, and widest interval."),
 )
 @click.option(
     "--max-change-mm",
     type=float,
     default=2.0,
     show_default=True,
-    help=tr("Largest change of the offset that is believed."),
+    help=declared("Largest change of the offset that is believed."),
 )
-@click.option("--sigma-mm", type=float, help=tr("How far one touch scatters, where it is known."))
 @click.option(
-    "--tool", type=click.IntRange(1, 15), help=tr("With a PLC: the slot that its program measures.")
+    "--sigma-mm", type=float, help=declared("How far one touch scatters, where it is known.")
+)
+@click.option(
+    "--tool",
+    type=click.IntRange(1, 15),
+    help=declared("With a PLC: the slot that its program measures."),
 )
 @click.option(
     "--touches",
     type=int,
     default=5,
     show_default=True,
-    help=tr("With a PLC: touches before the write."),
+    help=declared("With a PLC: touches before the write."),
 )
 @click.option(
-    "--proofs", type=int, default=2, show_default=True, help=tr("With a PLC: touches afterwards.")
+    "--proofs",
+    type=int,
+    default=2,
+    show_default=True,
+    help=declared("With a PLC: touches afterwards."),
 )
 @click.option(
     "--permit-is-contact",
     is_flag=True,
-    help=tr("With a PLC: its permit comes only by the contact of tip and pin while it calibrates."),
+    help=declared(
+        "With a PLC: its permit comes only by the contact of tip and pin while it calibrates."
+    ),
 )
 @controller_options
 def serve(

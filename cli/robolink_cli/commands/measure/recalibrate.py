@@ -4,38 +4,44 @@ from pathlib import Path
 
 import click
 
-from robolink.messages import tr
+from robolink.messages import declared
 from robolink_cli.options.consent import dry_run_option, yes_option
 from robolink_cli.options.recipe_answers import answer_options
 from robolink_cli.options.sensor import sensor_option
+from robolink_cli.session.completing import complete_recipe
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.operator_identity import nozzle_options
 
 
 @click.command()
-@click.argument("recipe", metavar="RECIPE.toml", type=click.Path(dir_okay=False, path_type=Path))
+@click.argument(
+    "recipe",
+    metavar="RECIPE.toml",
+    type=click.Path(dir_okay=False, path_type=Path),
+    shell_complete=complete_recipe,
+)
 @click.option(
     "--reference",
     is_flag=True,
-    help=tr("Measure and record a reference for differences; nothing is written."),
+    help=declared("Measure and record a reference for differences; nothing is written."),
 )
 @click.option(
     "--accept-jump",
     "accepted_change_mm",
     metavar="MM",
     type=click.FloatRange(min=0, min_open=True),
-    help=tr("Accept a change up to MM this time, beyond the recipe's limit; for engineers."),
+    help=declared("Accept a change up to MM this time, beyond the recipe's limit; for engineers."),
 )
 @click.option(
     "--assist",
     metavar="URL",
-    help=tr("A simulator's assist or sim URL: its operator brings the tip onto the pin."),
+    help=declared("A simulator's assist or sim URL: its operator brings the tip onto the pin."),
 )
 @sensor_option
 @click.option(
     "--jsonl",
     is_flag=True,
-    help=tr("One JSON line on stdout for every event, the last one result or error."),
+    help=declared("One JSON line on stdout for every event, the last one result or error."),
 )
 @answer_options
 @nozzle_options

@@ -2,8 +2,9 @@
 
 import click
 
-from robolink.messages import tr
+from robolink.messages import declared, tr
 from robolink_cli.options.consent import dry_run_option, yes_option
+from robolink_cli.session.completing import complete_station, complete_tool
 from robolink_cli.session.context import CliContext, controller_options
 
 
@@ -15,7 +16,7 @@ def station() -> None:
 _robot_option = click.option(
     "--robot",
     metavar="NAME",
-    help=tr("A controller with several robots: which one, as 'station list' names it."),
+    help=declared("A controller with several robots: which one, as 'station list' names it."),
 )
 
 
@@ -32,7 +33,7 @@ def list_stations(context: CliContext, robot: str | None) -> None:
 
 
 @station.command("show")
-@click.argument("name", metavar="ID")
+@click.argument("name", metavar="ID", shell_complete=complete_station)
 @_robot_option
 @controller_options
 def show(context: CliContext, name: str, robot: str | None) -> None:
@@ -45,14 +46,20 @@ def show(context: CliContext, name: str, robot: str | None) -> None:
 
 
 @station.command("learn")
-@click.argument("name", metavar="ID")
-@click.option("--tool", type=click.IntRange(1, 15), required=True, help=tr("The known tool."))
+@click.argument("name", metavar="ID", shell_complete=complete_station)
+@click.option(
+    "--tool",
+    type=click.IntRange(1, 15),
+    required=True,
+    shell_complete=complete_tool,
+    help=declared("The known tool."),
+)
 @click.option(
     "--sigma",
     "sigma_mm",
     type=click.FloatRange(min=0, min_open=True),
     metavar="MM",
-    help=tr("Standard deviation of one coordinate of one touch, where it is known."),
+    help=declared("Standard deviation of one coordinate of one touch, where it is known."),
 )
 @click.option(
     "--speed",
@@ -60,7 +67,7 @@ def show(context: CliContext, name: str, robot: str | None) -> None:
     type=click.FloatRange(1, 100),
     default=20.0,
     metavar="MM_S",
-    help=tr("Speed of straight moves, in Power Low."),
+    help=declared("Speed of straight moves, in Power Low."),
 )
 @click.option(
     "--box",
@@ -68,23 +75,25 @@ def show(context: CliContext, name: str, robot: str | None) -> None:
     type=click.FloatRange(min=1),
     default=150.0,
     show_default=True,
-    help=tr("How far, sideways, the flange may go from where it is."),
+    help=declared("How far, sideways, the flange may go from where it is."),
 )
 @click.option(
     "--assist",
     metavar="URL",
-    help=tr("A simulator's assist or sim URL: its operator brings the tip onto the pin."),
+    help=declared("A simulator's assist or sim URL: its operator brings the tip onto the pin."),
 )
 @click.option(
     "--contact-input",
     type=click.IntRange(0, 0xFFFF),
     metavar="N",
-    help=tr("A pin: number of the input that shows contact of tip and pin, where there is one."),
+    help=declared(
+        "A pin: number of the input that shows contact of tip and pin, where there is one."
+    ),
 )
 @click.option(
     "--off-in-contact",
     is_flag=True,
-    help=tr("Whether that input goes off, not on, in contact."),
+    help=declared("Whether that input goes off, not on, in contact."),
 )
 @controller_options
 @dry_run_option

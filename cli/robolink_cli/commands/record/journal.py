@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 
-from robolink.messages import tr
+from robolink.messages import declared, tr
 from robolink.model import EntryKind
 from robolink_cli.access.cell import complete_cell
 from robolink_cli.commands.record.journal_drift import drift
@@ -21,6 +21,7 @@ from robolink_cli.commands.record.journal_lookup import (
 from robolink_cli.console.render import emit_json, json_is_on, say
 from robolink_cli.lazy_group import LazyGroup
 from robolink_cli.options.shared import json_option
+from robolink_cli.session.completing import complete_tool
 
 if TYPE_CHECKING:
     from robolink.journal import Journal
@@ -39,17 +40,22 @@ def _filters(function: F) -> F:
             "--controller",
             metavar="CELL|URL",
             shell_complete=complete_cell,
-            help=tr("Only of this controller; without it, of all."),
+            help=declared("Only of this controller; without it, of all."),
         ),
-        click.option("--tool", type=int, help=tr("Only about this tool.")),
+        click.option(
+            "--tool",
+            type=int,
+            shell_complete=complete_tool,
+            help=declared("Only about this tool."),
+        ),
         click.option(
             "--kind",
             "kinds",
             type=click.Choice(list(_KINDS), case_sensitive=False),
             multiple=True,
-            help=tr("Only of this kind; may be repeated."),
+            help=declared("Only of this kind; may be repeated."),
         ),
-        click.option("--change", metavar="ID", help=tr("Only of this tool change.")),
+        click.option("--change", metavar="ID", help=declared("Only of this tool change.")),
     )
     for option in reversed(options):
         function = option(function)
@@ -99,7 +105,7 @@ class _Wanted:
 _BESIDES: Final = {
     "report": (
         "robolink_cli.commands.record.report:report",
-        tr("One page about one tool change, from the journal, to keep or print."),
+        declared("One page about one tool change, from the journal, to keep or print."),
     )
 }
 
@@ -177,9 +183,9 @@ def diff(a: str, b: str) -> None:
     "--format",
     "form",
     type=click.Choice(["csv", "json", "jsonl"]),
-    help=tr("Form of the file; by default what its name ends with."),
+    help=declared("Form of the file; by default what its name ends with."),
 )
-@click.option("--force", is_flag=True, help=tr("Write over a file that is there already."))
+@click.option("--force", is_flag=True, help=declared("Write over a file that is there already."))
 @_filters
 @json_option
 def export(

@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING
 
 import click
 
-from robolink.messages import tr
+from robolink.messages import declared, tr
 from robolink_cli.access.cell import complete_cell
 from robolink_cli.commands.record.journal_lookup import controller_meant, journal_to_read
 from robolink_cli.console.render import emit_json, json_is_on, say
 from robolink_cli.options.shared import json_option
+from robolink_cli.session.completing import complete_tool
 
 if TYPE_CHECKING:
     from robolink.drift import CellDrift
@@ -24,29 +25,29 @@ if TYPE_CHECKING:
     "--controller",
     metavar="CELL|URL",
     shell_complete=complete_cell,
-    help=tr("Only of this controller; without it, of all."),
+    help=declared("Only of this controller; without it, of all."),
 )
-@click.option("--tool", type=int, help=tr("Only this tool."))
+@click.option("--tool", type=int, shell_complete=complete_tool, help=declared("Only this tool."))
 @click.option(
     "--since",
     type=click.DateTime(["%Y-%m-%d"]),
-    help=tr("Begin anew at this day, after a repair or with another kind of nozzle (UTC)."),
+    help=declared("Begin anew at this day, after a repair or with another kind of nozzle (UTC)."),
 )
 @click.option(
     "--baseline",
     type=click.IntRange(min=20, max=1000),
     default=20,
     show_default=True,
-    help=tr("On how many of the first changes the limits rest."),
+    help=declared("On how many of the first changes the limits rest."),
 )
-@click.option("--plots", is_flag=True, help=tr("Draw every chart, not only what stands out."))
+@click.option("--plots", is_flag=True, help=declared("Draw every chart, not only what stands out."))
 @click.option(
     "--page",
     type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE",
-    help=tr("Also write all charts to FILE, a page for a browser."),
+    help=declared("Also write all charts to FILE, a page for a browser."),
 )
-@click.option("--force", is_flag=True, help=tr("Write over a file that is there already."))
+@click.option("--force", is_flag=True, help=declared("Write over a file that is there already."))
 @json_option
 def drift(
     *,

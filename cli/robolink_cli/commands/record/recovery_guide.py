@@ -4,7 +4,7 @@ from contextlib import suppress
 from typing import Final
 
 from robolink.errors import ControllerError
-from robolink.messages import tr
+from robolink.messages import declared, spoken, tr
 from robolink.model import Controller, Finding, MarkerKind, Pose
 from robolink.transaction import Recovery, Settler, look, recover
 from robolink_cli.console.render import json_is_on, note, say
@@ -13,7 +13,7 @@ from robolink_cli.views.documents import finding_payload, pose_payload
 
 DECLINED: Final = 9
 LEFT: Final = 6
-_NOTHING: Final = tr("Nothing is unsettled on this controller.")
+_NOTHING: Final = declared("Nothing is unsettled on this controller.")
 
 
 class Guide:
@@ -43,13 +43,13 @@ class Guide:
         """
         done = recover(self._controller, keep=self._keep, confirm=self._confirmed, tell=self._ended)
         if not done.settled and not done.left:
-            note(_NOTHING)
+            note(spoken(_NOTHING))
         return done
 
     def look(self) -> Recovery:
         """Show what is open; reads only."""
         findings = look(self._controller, keep=self._keep, tell=_foretell)
-        note(tr("Nothing was done.") if findings else _NOTHING)
+        note(tr("Nothing was done.") if findings else spoken(_NOTHING))
         return Recovery((), findings)
 
     def forget(self, *, yes: bool, dry_run: bool) -> int:

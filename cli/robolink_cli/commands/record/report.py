@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from robolink.messages import tr
+from robolink.messages import declared, tr
 from robolink_cli.console.render import note, say
 from robolink_cli.options.pose_source import point_numbers
 from robolink_cli.session.context import CliContext, controller_options
@@ -15,11 +15,11 @@ _ENDINGS = (".html", ".htm")
 @click.command()
 @click.argument("change", required=False)
 @click.argument("file", type=click.Path(dir_okay=False, path_type=Path), required=False)
-@click.option("--force", is_flag=True, help=tr("Write over a file that is there already."))
+@click.option("--force", is_flag=True, help=declared("Write over a file that is there already."))
 @click.option(
     "--points",
     metavar="1-50",
-    help=tr("Also show how far the tip moves at these taught points, read now from -c."),
+    help=declared("Also show how far the tip moves at these taught points, read now from -c."),
 )
 @controller_options
 def report(

@@ -6,7 +6,6 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import click
-from click.core import ParameterSource
 from robolink_simulators.assist.port import serve_assist
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson import EpsonOptions, EpsonSimulator
@@ -14,7 +13,6 @@ from robolink_simulators.epson.options import options_from_text, read_profile
 from robolink_simulators.epson.vision.vision_file import install_vision
 from robolink_simulators.hosting.streams.epson_serial import serve_serial
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
-from robolink_simulators.serial_numbers import drawn_serial
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
@@ -49,7 +47,7 @@ def serve_epson(
             tcp = serve_tcp(simulator, *address, clock=clock, allow_remote=allow_remote)
             url = stack.enter_context(tcp).url
         assist = stack.enter_context(serve_assist(simulator, clock=clock))
-        _announce(url, assist.url, simulator.machine.model.name, simulator.seed)
+        _announce(simulator, url, assist.url, stopped.state_dir)
         stopped.wait()
 
 
@@ -111,17 +109,8 @@ def habits(options: Sequence[str], profile: Path | None) -> EpsonOptions:
     return options_from_text({**settled, **pairs})
 
 
-def serial_of(seed: int) -> str:
-    """Return the serial number of a simulated robot: another one each time, but for a given seed.
-
-    Two simulators that were started alike are two controllers all the same, unless a person
-    asked for the very same one.
-    """
-    given = click.get_current_context().get_parameter_source("seed")
-    return drawn_serial(f"seed {seed}" if given is ParameterSource.COMMANDLINE else "")
-
-
-def _announce(url: str, assist_url: str, robot: str, seed: int) -> None:
+def _announce(simulator: EpsonSimulator, url: str, assist_url: str, state_dir: str) -> None:
+    robot, seed = simulator.machine.model.name, simulator.seed
     document: dict[str, object] = {"url": url, "assist": assist_url, "robot": robot, "seed": seed}
     lines = (
         tr("SIMULATED EPSON {robot} (seed {seed}). No robot moves.", robot=robot, seed=seed),
@@ -130,4 +119,4 @@ def _announce(url: str, assist_url: str, robot: str, seed: int) -> None:
         tr('Try: robolink -c "{url}" status', url=url),
         tr("Ctrl-C ends it."),
     )
-    announce(document, lines)
+    announce(document, lines, state_dir)

@@ -138,7 +138,6 @@ def epson(
         habits,
         load_programs,
         password_in,
-        serial_of,
         serve_epson,
     )
 
@@ -147,7 +146,6 @@ def epson(
         seed=seed,
         password=password_in(password_env),
         options=habits(options, profile),
-        serial=serial_of(seed),
         state_path=state,
         world=world_from(world),
     )

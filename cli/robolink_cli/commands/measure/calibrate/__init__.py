@@ -7,8 +7,9 @@ command is made from what it declares (``_command``).
 
 import click
 
-from robolink.messages import tr
+from robolink.messages import declared, spoken
 from robolink.methods import find_method, method_names
+from robolink_cli.console.help_pages import in_language
 from robolink_cli.lazy_group import LazyGroup
 
 
@@ -25,16 +26,16 @@ class MethodGroup(LazyGroup):
             return None
         method = find_method(cmd_name)
         if self.listing:
-            return click.Command(cmd_name, short_help=method.summary)
+            return click.Command(cmd_name, short_help=spoken(method.summary))
         from robolink_cli.commands.measure.calibrate.method_command import command_of
 
-        return command_of(method)
+        return in_language(command_of(method))
 
 
 @click.group(
     cls=MethodGroup,
     lazy={},
-    help=tr("Measure where a tool's tip is, propose the offset, write it and prove it."),
+    help=declared("Measure where a tool's tip is, propose the offset, write it and prove it."),
 )
 def calibrate() -> None:
     """Root of the methods."""

@@ -7,7 +7,7 @@ import click
 from click.core import ParameterSource
 
 from robolink.errors import ConfigError
-from robolink.messages import tr
+from robolink.messages import declared, tr
 from robolink.methods import (
     AnyMethod,
     Check,
@@ -23,14 +23,15 @@ from robolink_cli.commands.measure.calibrate.request import CalibrationRequest
 from robolink_cli.commands.measure.calibrate.values import as_typed, is_repeated, type_of
 from robolink_cli.options.motion import MotionOption, motion_option
 from robolink_cli.options.pose_source import PoseSource, pose_source_options, taught_points_option
+from robolink_cli.session.completing import complete_station
 
 _METAVARS: Final = {"mm": "MM", "degrees": "DEG", "mm/s": "MM_S"}
 
 _STATIONS: Final = {
-    StationKind.PIN: tr("Name of the pin."),
-    StationKind.BEAMS: tr("Name of the beams."),
-    StationKind.TOUCH: tr("Name of the surface."),
-    StationKind.CAMERA: tr("Name of the camera's station."),
+    StationKind.PIN: declared("Name of the pin."),
+    StationKind.BEAMS: declared("Name of the beams."),
+    StationKind.TOUCH: declared("Name of the surface."),
+    StationKind.CAMERA: declared("Name of the camera's station."),
 }
 
 _LIMITS: Final = {
@@ -84,7 +85,7 @@ def _of_the_place(method: AnyMethod) -> list[Decorator]:
             motion_option(
                 "--at",
                 metavar="X,Y,Z",
-                help=tr("Where the station is, in the base; else what is known of it."),
+                help=declared("Where the station is, in the base; else what is known of it."),
             )
         )
     if method.from_poses is not None and method.pose_help is not None:
@@ -102,7 +103,11 @@ def _station_option(method: AnyMethod) -> Decorator:
     known = _STATIONS[needs.station]
     found = tr("Name of the pin; where it is found is kept, for one touch later.")
     return click.option(
-        "--station", metavar="ID", required=needs.named, help=found if needs.finds_pin else known
+        "--station",
+        metavar="ID",
+        required=needs.named,
+        shell_complete=complete_station,
+        help=found if needs.finds_pin else known,
     )
 
 

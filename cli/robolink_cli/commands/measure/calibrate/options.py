@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import click
 
-from robolink.messages import tr
+from robolink.messages import declared
 from robolink_cli.access.cell import with_cell_limits
 from robolink_cli.commands.measure.calibrate.request import request_from
 from robolink_cli.options.consent import dry_run_option, yes_option
@@ -14,6 +14,7 @@ from robolink_cli.options.impact import impact_options
 from robolink_cli.options.motion import motion_option
 from robolink_cli.options.report import report_options
 from robolink_cli.prompts.jumps import USUAL_CHANGE_MM
+from robolink_cli.session.completing import complete_tool
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.operator_identity import nozzle_options
 
@@ -62,7 +63,9 @@ def sigma_option(function: Callable[..., Any]) -> Callable[..., Any]:
         "sigma_mm",
         type=_LENGTH,
         metavar="MM",
-        help=tr("Standard deviation of one coordinate of one measurement, where it is known."),
+        help=declared(
+            "Standard deviation of one coordinate of one measurement, where it is known."
+        ),
     )(function)
     return command
 
@@ -92,14 +95,20 @@ _FRAME: Final = (
 
 def _own_options() -> tuple[Callable[[Callable[..., Any]], Callable[..., Any]], ...]:
     return (
-        click.option("--tool", type=int, required=True, help=tr("Number of the tool, 1 to 15.")),
+        click.option(
+            "--tool",
+            type=int,
+            required=True,
+            shell_complete=complete_tool,
+            help=declared("Number of the tool, 1 to 15."),
+        ),
         motion_option(
             "--speed",
             "speed_mm_s",
             type=click.FloatRange(1, 100),
             default=20.0,
             metavar="MM_S",
-            help=tr("Speed of straight moves, in Power Low."),
+            help=declared("Speed of straight moves, in Power Low."),
         ),
         motion_option(
             "--box",
@@ -107,7 +116,7 @@ def _own_options() -> tuple[Callable[[Callable[..., Any]], Callable[..., Any]], 
             type=click.FloatRange(min=1),
             default=150.0,
             show_default=True,
-            help=tr("How far, sideways, the flange may go from where it is."),
+            help=declared("How far, sideways, the flange may go from where it is."),
         ),
         click.option(
             "--max-change",
@@ -115,7 +124,7 @@ def _own_options() -> tuple[Callable[[Callable[..., Any]], Callable[..., Any]], 
             type=_LENGTH,
             default=USUAL_CHANGE_MM,
             show_default=True,
-            help=tr(
+            help=declared(
                 "Largest plausible change against the stored offset; more than the cell allows "
                 "takes an engineer."
             ),
@@ -125,21 +134,21 @@ def _own_options() -> tuple[Callable[[Callable[..., Any]], Callable[..., Any]], 
             "rms_mm",
             type=_LENGTH,
             metavar="MM",
-            help=tr("Largest rms of the residuals that is believed."),
+            help=declared("Largest rms of the residuals that is believed."),
         ),
         click.option(
             "--max-residual",
             "residual_mm",
             type=_LENGTH,
             metavar="MM",
-            help=tr("Largest residual of one pose that is believed."),
+            help=declared("Largest residual of one pose that is believed."),
         ),
         click.option(
             "--max-interval",
             "interval_mm",
             type=_LENGTH,
             metavar="MM",
-            help=tr("Largest half of a 95 % interval that is believed."),
+            help=declared("Largest half of a 95 % interval that is believed."),
         ),
         motion_option(
             "--tolerance",
@@ -147,14 +156,16 @@ def _own_options() -> tuple[Callable[[Callable[..., Any]], Callable[..., Any]], 
             type=_LENGTH,
             default=0.2,
             show_default=True,
-            help=tr("Largest drift about the new tip that passes."),
+            help=declared("Largest drift about the new tip that passes."),
         ),
         motion_option(
-            "--no-verify", is_flag=True, help=tr("Do not turn about the new tip afterwards.")
+            "--no-verify", is_flag=True, help=declared("Do not turn about the new tip afterwards.")
         ),
         motion_option(
             "--assist",
             metavar="URL",
-            help=tr("A simulator's assist or sim URL: its operator brings the tip onto the pin."),
+            help=declared(
+                "A simulator's assist or sim URL: its operator brings the tip onto the pin."
+            ),
         ),
     )

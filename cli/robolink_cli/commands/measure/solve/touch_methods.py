@@ -5,7 +5,7 @@ from typing import Final
 
 from robolink import calibration as cal
 from robolink.errors import CalibrationError
-from robolink.messages import tr
+from robolink.messages import declared, spoken, tr
 from robolink_cli.commands.measure.solve.case import Node, read_pose, unusable
 
 Payload = dict[str, object]
@@ -84,19 +84,21 @@ def _verdict(codes: tuple[str, ...], *, refuses: bool) -> Payload:
     return {
         "status": "error",
         "codes": list(codes),
-        "what": " ".join(_GROUNDS[code] for code in codes),
+        "what": " ".join(spoken(_GROUNDS[code]) for code in codes),
         "remedy": tr("Touch the pin again, each time until the tip is on it."),
     }
 
 
 _GROUNDS: Final = {
-    "not_touched": tr("A touch was not made: the robot is where it stopped."),
-    "typed_ahead": tr("An answer came before its question could be read."),
-    "touch_heights_differ": tr("Heights differ on one pin: at least one touch was in the air."),
-    "touch_not_proven": tr("The standoffs before the touches were not undone."),
-    "large_residual": tr("One touch does not fit the others."),
-    "large_drift": tr("The tip drifts too far."),
-    "drift_undecided": tr("The drift is neither surely inside the tolerance nor outside."),
+    "not_touched": declared("A touch was not made: the robot is where it stopped."),
+    "typed_ahead": declared("An answer came before its question could be read."),
+    "touch_heights_differ": declared(
+        "Heights differ on one pin: at least one touch was in the air."
+    ),
+    "touch_not_proven": declared("The standoffs before the touches were not undone."),
+    "large_residual": declared("One touch does not fit the others."),
+    "large_drift": declared("The tip drifts too far."),
+    "drift_undecided": declared("The drift is neither surely inside the tolerance nor outside."),
 }
 
 

@@ -1,0 +1,45 @@
+"""How many columns of a terminal a text takes: a Chinese character takes two."""
+
+import re
+from typing import Final
+
+_WIDE: Final = "\u1100-\u115f\u2e80-\u303e\u3041-\ua4cf\uac00-\ud7a3\uf900-\ufaff\ufe30-\ufe6f"
+_WIDE_FORMS: Final = "\uff00-\uff60\uffe0-\uffe6"
+_CLOSING: Final = "\u3001\u3002\uff0c\uff1a\uff1b\uff01\uff1f\uff09\u201d\u300b,.:;!?)"
+_HAS_WIDE: Final = re.compile(f"[{_WIDE}{_WIDE_FORMS}]")
+_PIECES: Final = re.compile(
+    rf"[{_WIDE}{_WIDE_FORMS}][{_CLOSING}]*|[^\s{_WIDE}{_WIDE_FORMS}]+[{_CLOSING}]*|\s+"
+)
+"""What stays on one line: a wide character with the sign that closes it, a word, a blank."""
+
+
+def has_wide(text: str) -> bool:
+    """Tell whether a text holds a character of two columns."""
+    return _HAS_WIDE.search(text) is not None
+
+
+def padded(text: str, width: int) -> str:
+    """Return ``text`` with blanks behind it, ``width`` columns in all."""
+    return text + " " * (width - columns(text))
+
+
+def columns(text: str) -> int:
+    """Return how many columns of a terminal a line takes."""
+    if text.isascii():
+        return len(text)
+    from rich.cells import cell_len  # here, because English help pages do without rich
+
+    return cell_len(text)
+
+
+def filled(text: str, width: int, *, indent: str = "") -> str:
+    """Return one paragraph in lines of at most ``width`` columns."""
+    lines, line = [], indent
+    for piece in _PIECES.findall(text):
+        piece = " " if piece.isspace() else piece
+        if line.strip() and columns(line + piece.rstrip()) > width:
+            lines.append(line.rstrip())
+            line = indent
+        if piece != " " or line.strip():
+            line += piece
+    return "\n".join([*lines, line.rstrip()])

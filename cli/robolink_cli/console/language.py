@@ -1,0 +1,194 @@
+"""In which language this command speaks, and whether the console can show it.
+
+``--lang``, ROBOLINK_LANG, ``language`` in the cell file or the user's, what the system is set to;
+what names no language that we have is English (docs/languages.md). Nothing of it is looked at
+before the first sentence is made, so a stop has sent its frame by then.
+"""
+
+import os
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Final
+
+from robolink.locale.languages import CLICK, ENGLISH, FOLDER, TERRITORY, language_named, translator
+from robolink.messages import install, tr
+
+OPTION: Final = "--lang"
+VARIABLE: Final = "ROBOLINK_LANG"
+
+_FOR_MACHINES: Final = ("--json", "--jsonl")
+"""What is read by programs is in English, whoever started them."""
+
+_SYSTEM: Final = ("LC_ALL", "LC_MESSAGES", "LANG")
+_KEY: Final = "language"
+_SAMPLE: Final = {"zh": "\u673a\u5668\u4eba"}
+
+
+@contextmanager
+def speaking_for(arguments: Sequence[str]) -> Iterator[None]:
+    """Speak the language of one command line, for the block.
+
+    Args:
+        arguments: The command line without the program's name; it may be wrong.
+    """
+    listener = _Listener(arguments)
+    install(listener)
+    try:
+        yield
+    finally:
+        install(None)
+        listener.end()
+
+
+class _Listener:
+    """Stands for the translation until the first sentence asks for it."""
+
+    def __init__(self, arguments: Sequence[str]) -> None:
+        self._arguments = arguments
+        self._before: str | None = None
+        self._of_click = ""
+
+    def __call__(self, sentence: str) -> str:
+        """Find the language, install it, and translate the first sentence."""
+        install(None)
+        translate = self._find()
+        install(translate)
+        return sentence if translate is None else translate(sentence)
+
+    def _find(self) -> Callable[[str], str] | None:
+        language = chosen_language(self._arguments, os.environ)
+        if language == ENGLISH or not _shown_here(language):
+            return None
+        translate = translator(language)
+        if translate is None:
+            _remark(tr("The Chinese sentences are not compiled here: make messages does it."))
+        else:
+            self._let_click_speak(language)
+        return translate
+
+    def _let_click_speak(self, language: str) -> None:
+        """Hand click its own sentences, which it asks gettext for."""
+        import gettext
+
+        self._before = os.environ.get("LANGUAGE", "")
+        self._of_click = gettext.textdomain()
+        os.environ["LANGUAGE"] = TERRITORY[language]
+        gettext.bindtextdomain(CLICK, FOLDER)
+        gettext.textdomain(CLICK)
+
+    def end(self) -> None:
+        """Leave the process as it was found."""
+        if self._before is None:
+            return
+        import gettext
+
+        gettext.textdomain(self._of_click)
+        if self._before:
+            os.environ["LANGUAGE"] = self._before
+        else:
+            del os.environ["LANGUAGE"]
+
+
+def chosen_language(arguments: Sequence[str], environment: Mapping[str, str]) -> str:
+    """Return the language that a command line speaks; English for what we do not have.
+
+    Args:
+        arguments: The command line without the program's name.
+        environment: The variables of the process.
+    """
+    if any(word in arguments for word in _FOR_MACHINES):
+        return ENGLISH
+    for name in (_typed(arguments), environment.get(VARIABLE), _from_files(environment)):
+        if name:
+            return language_named(name) or ENGLISH
+    name = next((environment[key] for key in _SYSTEM if environment.get(key)), "")
+    return language_named(name or _of_windows()) or ENGLISH
+
+
+def _typed(arguments: Sequence[str]) -> str:
+    """Return what stands behind ``--lang``, the last that was typed."""
+    found = ""
+    for place, word in enumerate(arguments):
+        if word == "--":
+            break
+        if word.startswith(f"{OPTION}="):
+            found = word.partition("=")[2]
+        elif word == OPTION and place + 1 < len(arguments):
+            found = arguments[place + 1]
+    return found
+
+
+def _from_files(environment: Mapping[str, str]) -> str:
+    """Return ``language`` of the first cell file that has one; the site's speaks for nobody."""
+    named = environment.get("ROBOLINK_CONFIG", "")
+    files = [os.path.expanduser(named)] if named else []
+    for path in (*files, "robolink.toml", _of_user(environment)):
+        try:
+            with open(path, encoding="utf-8") as file:
+                text = file.read()
+        except (OSError, UnicodeError):
+            continue  # whoever needs the file says what is wrong with it
+        if _KEY in text and (language := _language_in(text)):
+            return language
+    return ""
+
+
+def _language_in(text: str) -> str:
+    import tomllib  # here, because few files name a language
+
+    try:
+        language = tomllib.loads(text).get(_KEY, "")
+    except tomllib.TOMLDecodeError:
+        return ""
+    return language if isinstance(language, str) else ""
+
+
+def _of_user(environment: Mapping[str, str]) -> str:
+    """Return the user's cell file.
+
+    A test compares it with platformdirs, which ``--help`` does not load: it costs as much as
+    half of click.
+    """
+    if os.name == "nt":
+        folder = environment.get("LOCALAPPDATA", "")
+    elif sys.platform == "darwin":
+        folder = os.path.expanduser("~/Library/Application Support")
+    else:
+        folder = environment.get("XDG_CONFIG_HOME", "").strip() or os.path.expanduser("~/.config")
+    return os.path.join(folder, "robolink", "robolink.toml")
+
+
+def _of_windows() -> str:
+    """Return the language of the desktop; Windows sets no variable for it."""
+    if sys.platform != "win32":
+        return ""
+    import ctypes
+    import locale
+
+    return locale.windows_locale.get(ctypes.windll.kernel32.GetUserDefaultUILanguage(), "")
+
+
+def _shown_here(language: str) -> bool:
+    """Tell whether the console has the characters, and say why not."""
+    sample = _SAMPLE[language]
+    for stream in (sys.stdout, sys.stderr):
+        encoding = getattr(stream, "encoding", None)
+        try:
+            sample.encode(encoding or "utf-8")
+        except (UnicodeError, LookupError):
+            _remark(
+                tr(
+                    "This window cannot show Chinese (its encoding is {encoding}), so this is "
+                    "English.",
+                    encoding=encoding,
+                )
+            )
+            return False
+    return True
+
+
+def _remark(sentence: str) -> None:
+    from robolink_cli.console.output import show
+
+    show(sentence, beside=True)

@@ -1,0 +1,1 @@
+"""The languages of robolink, and their catalogues of sentences."""

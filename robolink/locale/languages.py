@@ -1,0 +1,142 @@
+"""The languages that robolink speaks, and where their sentences come from.
+
+A wheel brings its catalogues compiled (``tools/compile_catalogues.py``). In a clone, and where
+robolink is installed in place, a catalogue is compiled again when its source is newer; Babel is
+asked for that, so where it is missing what was compiled last is used.
+"""
+
+import os
+from collections.abc import Callable
+from contextlib import suppress
+from typing import TYPE_CHECKING, Final
+
+from robolink.messages import install
+
+if TYPE_CHECKING:
+    from gettext import GNUTranslations
+
+ENGLISH: Final = "en"
+CHINESE: Final = "zh"
+
+LANGUAGES: Final = (CHINESE, ENGLISH)
+"""The names by which a person asks for a language."""
+
+FOLDER: Final = os.path.dirname(os.path.abspath(__file__))
+"""Where the catalogues lie, ``LANGUAGE/LC_MESSAGES/NAME.po``."""
+
+TERRITORY: Final = {CHINESE: "zh_CN"}
+"""The folder of each language that has a catalogue."""
+
+OURS: Final = "robolink"
+CLICK: Final = "click"
+"""The two catalogues: our own sentences, and those that click shows by itself."""
+
+_TRADITIONAL: Final = ("hant", "tw", "hk", "mo", "taiwan", "hong kong", "macao", "traditional")
+
+
+def language_named(text: str) -> str | None:
+    """Return the language that a name in any of the usual forms means, ``None`` if we lack it.
+
+    Args:
+        text: A tag (``zh-Hans``), a POSIX locale (``zh_CN.GBK``) or a Windows name
+            (``Chinese_China.936``).
+    """
+    name = text.partition(".")[0].partition("@")[0].strip().lower().replace("-", "_")
+    language, *details = name.split("_")
+    if language in ("en", "eng", "english", "c", "posix"):
+        return ENGLISH
+    if language in ("zh", "zho", "chi") or language.startswith("chinese"):
+        # Somebody who reads the other script is better served in English than by a guess.
+        other_script = any(word in part for part in (language, *details) for word in _TRADITIONAL)
+        return None if other_script else CHINESE
+    return None
+
+
+def speak(language: str) -> bool:
+    """Show every sentence in ``language`` from now on; return whether it can be.
+
+    Where its catalogue is not there, English stays.
+
+    Args:
+        language: One of :data:`LANGUAGES`.
+    """
+    translate = translator(language)
+    install(translate)
+    return translate is not None or language == ENGLISH
+
+
+def translator(language: str) -> Callable[[str], str] | None:
+    """Return what translates our sentences, ``None`` for English or without a catalogue."""
+    if language not in TERRITORY:
+        return None
+    ours = catalogue(language, OURS)
+    if ours is None:
+        return None
+    # Help pages show sentences of click beside ours.
+    clicks = catalogue(language, CLICK)
+    if clicks is not None:
+        ours.add_fallback(clicks)
+    return ours.gettext
+
+
+def catalogue(language: str, name: str) -> "GNUTranslations | None":
+    """Return a catalogue, compiled anew where its source is newer; ``None`` if there is none.
+
+    Args:
+        language: One of :data:`LANGUAGES` that has a folder.
+        name: :data:`OURS` or :data:`CLICK`.
+    """
+    import gettext
+    import io
+
+    source = os.path.join(FOLDER, TERRITORY[language], "LC_MESSAGES", f"{name}.po")
+    compiled = os.path.splitext(source)[0] + ".mo"
+    try:
+        if _is_newer(source, compiled):
+            return gettext.GNUTranslations(io.BytesIO(_compile(source, compiled)))
+    except ImportError:
+        pass  # no Babel: what was compiled last holds, without the sentences since
+    try:
+        with open(compiled, "rb") as file:
+            return gettext.GNUTranslations(file)
+    except OSError:
+        return None
+
+
+def _is_newer(source: str, compiled: str) -> bool:
+    """Tell whether there is a source and no compiled catalogue that was made since."""
+    try:
+        written = os.stat(source).st_mtime_ns
+    except OSError:
+        return False
+    try:
+        return os.stat(compiled).st_mtime_ns < written
+    except OSError:
+        return True
+
+
+def _compile(source: str, compiled: str) -> bytes:
+    """Return a catalogue as gettext reads it, and keep it where that is possible.
+
+    Raises:
+        ImportError: Babel is not installed.
+    """
+    import io
+
+    from babel.messages.mofile import write_mo
+    from babel.messages.pofile import read_po
+
+    with open(source, "rb") as file:
+        read = read_po(file)
+    made = io.BytesIO()
+    write_mo(made, read)
+    # Written whole or not at all: another process may be reading it.
+    draft = f"{compiled}.{os.getpid()}"
+    try:
+        with open(draft, "wb") as file:
+            file.write(made.getvalue())
+        os.replace(draft, compiled)
+    except OSError:
+        with suppress(OSError):
+            os.remove(draft)
+    return made.getvalue()

@@ -1,0 +1,106 @@
+"""Every translation fills in the same values, in a form that a terminal shows straight."""
+
+import re
+from string import Formatter
+
+import pytest
+from babel.messages.pofile import read_po
+from robolink_cli.console.columns import columns
+
+from tests.packaging.test_catalogue import CATALOGUE
+
+CHINESE = CATALOGUE.parent / "zh_CN" / "LC_MESSAGES"
+
+AMBIGUOUS = "\u00b1\u00b0\u2192\u2026\u201c\u201d\u2500"
+"""One column wide on some consoles and two on others (cp936)."""
+
+OTHER_WORDS = {"刀具": "工具", "标定": "校准", "教导": "示教", "马达": "电机", "重置": "复位"}
+"""A word that is not used, and the one that is: one word for one thing."""
+
+NAMED = re.compile(r"(?<![\w-])--[a-z][a-z-]+|\b[a-z]+_(?:mm|deg)\b|\$[A-Z]\w+|[\w/]+\.(?:md|toml)")
+"""Names of options, keys, statements and files, which are the same in every language."""
+
+
+def entries(path):
+    with path.open("rb") as file:
+        return [message for message in read_po(file) if message.id]
+
+
+@pytest.fixture(scope="module")
+def translated():
+    return [(message.id, message.string) for message in entries(CHINESE / "robolink.po")]
+
+
+def values(sentence):
+    """Return the placeholders with their conversions, in no order."""
+    return sorted(part[1:] for part in map(str_part, Formatter().parse(sentence)) if part[1])
+
+
+def str_part(part):
+    return tuple(piece or "" for piece in part)
+
+
+def is_filled(sentence):
+    """Tell whether ``tr`` fills the sentence in: braces alone are text."""
+    return re.search(r"(?<!{){[a-z_]\w*[^{}]*}", sentence) is not None
+
+
+def faults(english, chinese):
+    if is_filled(english):
+        try:
+            same = values(english) == values(chinese)
+        except ValueError:
+            same = False
+        if not same:
+            yield "other placeholders"
+    if (
+        english[: len(english) - len(english.lstrip())]
+        != chinese[: len(chinese) - len(chinese.lstrip())]
+    ):
+        yield "other blanks in front"
+    yield from (f"{word}: write {other}" for word, other in OTHER_WORDS.items() if word in chinese)
+    yield from (f"{sign!r} is two columns wide somewhere" for sign in AMBIGUOUS if sign in chinese)
+    yield from (f"{name} is missing" for name in NAMED.findall(english) if name not in chinese)
+
+
+def test_a_translation_says_what_the_sentence_says(translated):
+    wrong = [
+        f"{english!r}: {fault}"
+        for english, chinese in translated
+        if chinese
+        for fault in faults(english, chinese)
+    ]
+    assert not wrong
+
+
+@pytest.mark.parametrize(
+    ("english", "chinese", "fault"),
+    [
+        ("{a:.3f} mm", "{b:.3f} mm", "other placeholders"),
+        ("{a:.3f} mm", "{a:.2f} mm", "other placeholders"),
+        ("{a} mm", "{a} {a} mm", "other placeholders"),
+        ("{a} mm", "毫米", "other placeholders"),
+        ("{a} mm", "{a 毫米", "other placeholders"),
+        ("  {a} mm", "{a} 毫米", "other blanks in front"),
+        ("Give --tool.", "给出 --工具。", "--tool is missing"),
+        ("A tool.", "刀具。", "刀具: write 工具"),
+    ],
+)
+def test_a_faulty_translation_is_found(english, chinese, fault):
+    assert fault in list(faults(english, chinese))
+    assert not list(faults(english, english))
+
+
+def test_what_click_says_is_translated_with_the_same_values():
+    said = [(one.id, one.string) for one in entries(CHINESE / "click.po")]
+    assert len(said) > 50
+    for ids, strings in said:
+        english, chinese = (text if isinstance(text, str) else text[0] for text in (ids, strings))
+        assert chinese, english
+        if "{" in english:
+            assert values(english) == values(chinese), english
+
+
+def test_columns_are_counted_as_a_terminal_shows_them():
+    assert columns("Tool 1") == 6
+    assert columns("工具 1") == 6

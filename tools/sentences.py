@@ -1,0 +1,56 @@
+"""Collects the sentences of the sources, for ``make messages``.
+
+Babel finds ``tr("...")`` and ``declared("...")``. The help of a command is written as click wants
+it, as ``help="..."`` and as the command's docstring, so that is read here.
+"""
+
+import ast
+import inspect
+from collections.abc import Iterator, Mapping, Sequence
+from typing import IO, Any, Final
+
+from babel.messages.extract import extract_python
+
+_HELP: Final = ("help", "short_help")
+_MAKERS: Final = ("command", "group")
+_Found = tuple[Any, ...]
+"""Line, keyword, sentence and comments, in Babel's order."""
+
+
+def collect(
+    file: IO[bytes],
+    keywords: Mapping[str, Any],
+    comment_tags: Sequence[str],
+    options: Mapping[str, Any],
+) -> Iterator[_Found]:
+    """Yield the sentences of a module of the command line; the form is Babel's."""
+    yield from extract_python(file, keywords, comment_tags, dict(options))  # type: ignore[arg-type]
+    file.seek(0)
+    for node in ast.walk(ast.parse(file.read())):
+        if isinstance(node, ast.Call):
+            yield from _of_call(node)
+        elif isinstance(node, ast.FunctionDef) and any(map(_makes, node.decorator_list)):
+            docstring = ast.get_docstring(node, clean=False)
+            if docstring:
+                yield node.lineno, None, _as_click_reads(docstring), []
+
+
+def _of_call(node: ast.Call) -> Iterator[_Found]:
+    for keyword in node.keywords:
+        value = keyword.value
+        if keyword.arg in _HELP and isinstance(value, ast.Constant) and value.value:
+            yield node.lineno, None, str(value.value), []
+
+
+def _makes(decorator: ast.expr) -> bool:
+    """Tell whether a decorator makes a command out of a function."""
+    if not isinstance(decorator, ast.Call):
+        return False
+    made_by = decorator.func
+    name = made_by.attr if isinstance(made_by, ast.Attribute) else getattr(made_by, "id", "")
+    # With ``help=`` the docstring is for programmers.
+    return name in _MAKERS and not any(one.arg == "help" for one in decorator.keywords)
+
+
+def _as_click_reads(docstring: str) -> str:
+    return inspect.cleandoc(docstring).partition("\f")[0]

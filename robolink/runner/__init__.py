@@ -70,8 +70,7 @@ __getattr__ = lazy_exports(
         "_settings": "RunSettings",
         "_steps": "Ask Confirm Consider Look Move Notify Procedure Seek SeenAt Step TakenStep "
         "TeachPrompt TouchedAt",
-        "_subjects": "FitRow FitSubject GuidedOperator JogSubject MoveSubject TouchSubject "
-        "regard",
+        "_subjects": "FitRow FitSubject GuidedOperator JogSubject MoveSubject TouchSubject regard",
         "_yes_no": "ask_yes_no yes_or_no",
     },
 )

@@ -11,7 +11,7 @@ from robolink.messages import tr
 from robolink.runner import FINEST_STEP, Operator, Question, parse_steps
 from robolink_cli.console.render import note
 from robolink_cli.prompts.lines import QUIET_S, Lines, open_lines
-from robolink_cli.wizard.present import present_desk
+from robolink_cli.prompts.present import present_desk
 
 if TYPE_CHECKING:
     from robolink_simulators.assist.port import AssistClient, InProcessEyes

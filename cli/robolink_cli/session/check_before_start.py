@@ -4,17 +4,17 @@ from typing import TYPE_CHECKING
 
 from robolink.errors import DeclinedError, NotReadyError, NotReadyReason
 from robolink.messages import tr
+from robolink_cli.prompts.present import present_desk
 from robolink_cli.session.motion_consent import (
     agree_to_motion,
     heed_what_was_left,
     motion_question,
 )
-from robolink_cli.wizard.present import present_desk
 
 if TYPE_CHECKING:
     from robolink.model import Controller
+    from robolink_cli.prompts.present import AskingDesk
     from robolink_cli.wizard.check_list import CheckPoint
-    from robolink_cli.wizard.desk import Desk
 
 
 def agree_to_procedure(
@@ -70,7 +70,7 @@ def check_before_start(
         controller.motors(True)
 
 
-def _answer_to_list(desk: "Desk", controller: "Controller", purpose: str, plan: str) -> str:
+def _answer_to_list(desk: "AskingDesk", controller: "Controller", purpose: str, plan: str) -> str:
     """Show the list; return ``y``, or that the motors are to be switched on.
 
     Raises:

@@ -167,6 +167,12 @@ def looking_options(command: Callable[..., int | None]) -> Callable[..., int | N
     return shared_options(with_context)
 
 
+def context_at(cell: str) -> CliContext:
+    """Return what the command was told, at a cell that was chosen since."""
+    given = click.get_current_context().meta.get(GIVEN, {})
+    return _context_from({**given, "url": cell})
+
+
 def _context_from(given: Mapping[str, Any]) -> CliContext:
     name = given.get("url")
     if name is None or not is_cell_name(name):

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from robolink_cli.wizard.present import present_desk
+from robolink_cli.prompts.present import present_desk
 
 if TYPE_CHECKING:
     from robolink.model import Controller

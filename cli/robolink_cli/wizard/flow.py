@@ -10,6 +10,7 @@ from dataclasses import replace
 from robolink.messages import tr
 from robolink.runner import SETTLING_S, FitSubject, JogSubject, MoveSubject, Question
 from robolink_cli.wizard.check_list import CheckSubject
+from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.happenings import (
     Command,
     Effect,
@@ -30,6 +31,7 @@ from robolink_cli.wizard.state import (
     ARMED_AFTER_S,
     LEAST_WAY_MM,
     STEP_SIZES,
+    Header,
     Jogging,
     WizardState,
 )
@@ -102,6 +104,8 @@ def _regarding(state: WizardState, subject: object) -> WizardState:
         return replace(state, jogging=jogging, reading=reading, message="")
     if isinstance(subject, MoveSubject):
         return replace(state, subject=subject, question=None, waits=False, message="")
+    if isinstance(subject, Header):
+        return replace(state, header=subject)
     if isinstance(subject, FitSubject):
         return replace(state, subject=subject, fit=subject)
     return replace(state, subject=subject)
@@ -121,6 +125,7 @@ def _asked(state: WizardState, asked: WasAsked) -> WizardState:
         question=asked,
         waits=False,
         typed="",
+        marked=state.subject.marked if isinstance(state.subject, ChoiceSubject) else None,
         message="",
         ending=False,
         jogging=Jogging(size=size, quarters=state.jogging.quarters),

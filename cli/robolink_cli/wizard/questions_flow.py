@@ -10,6 +10,7 @@ from robolink.messages import tr
 from robolink.nozzle_change import WriteSubject
 from robolink.runner import FitSubject, Question
 from robolink_cli.wizard.check_list import SWITCH_ON, CheckSubject, Mark
+from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.happenings import KeyPressed
 from robolink_cli.wizard.keys import folded, meaning_of
 from robolink_cli.wizard.state import WizardState
@@ -35,6 +36,8 @@ def answered_by_key(state: WizardState, key: KeyPressed) -> Answered:
     question, subject = state.question, state.subject
     if question is None:
         return state
+    if isinstance(subject, ChoiceSubject):
+        return _choice_key(state, subject, key)
     if question.kind is Question.TEXT:
         return _text_key(state, key)
     if isinstance(subject, WriteSubject):
@@ -53,6 +56,10 @@ def answered_by_line(state: WizardState, line: str) -> Answered:
     question, subject = state.question, state.subject
     if question is None:
         return state
+    if isinstance(subject, ChoiceSubject):
+        word = folded(line)
+        known = word.isdigit() and 1 <= int(word) <= len(subject.options)
+        return word if known else state.says(tr("Type the number of a row."))
     if question.kind is Question.TEXT:
         return line.strip() or state.says(tr("Nothing was typed."))
     meaning = meaning_of(line)
@@ -83,6 +90,18 @@ def _fit_key(state: WizardState, fit: FitSubject, key: KeyPressed) -> Answered:
         return "y" if main else answers.get(key.name, state)
     answers = {"1": "y", "y": "y", "n": "n"}
     return "n" if main else answers.get(key.name, state)
+
+
+def _choice_key(state: WizardState, subject: ChoiceSubject, key: KeyPressed) -> Answered:
+    """Mark a row with the arrows; take the marked one."""
+    marked, last = state.marked, len(subject.options) - 1
+    if key.name == "2":
+        return replace(state, marked=0 if marked is None else min(marked + 1, last), message="")
+    if key.name == "8":
+        return replace(state, marked=last if marked is None else max(marked - 1, 0), message="")
+    if key.name in ("5", "main", "enter"):
+        return state.says(tr("Mark a row first.")) if marked is None else str(marked + 1)
+    return state
 
 
 def _text_key(state: WizardState, key: KeyPressed) -> Answered:

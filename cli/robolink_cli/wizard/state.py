@@ -7,6 +7,7 @@ from typing import Final
 from robolink.model import Pose
 from robolink.nozzle_change import WriteSubject
 from robolink.runner import FINEST_STEP, FitSubject, Question, TouchSubject
+from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.happenings import Reading, WasAsked
 
 STEP_SIZES: Final = (0.01, 0.1, 0.5, 1.0, 5.0)
@@ -60,13 +61,11 @@ class Header:
         cell: Name of the cell, or how the controller is reached.
         job: What is done.
         simulated: Whether nothing real moves.
-        tools: Numbers of the tools at work.
     """
 
     cell: str
     job: str
     simulated: bool = False
-    tools: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +82,7 @@ class WizardState:
         checked: Which points of a check list the person has confirmed.
         jogging: The steps made.
         typed: What stands in the field.
+        marked: Index of the marked row of a list.
         remarks: What was told last, oldest first.
         message: The row above the keys.
         ending: Whether the work was told to end.
@@ -97,6 +97,7 @@ class WizardState:
     checked: frozenset[str] = frozenset()
     jogging: Jogging = field(default_factory=Jogging)
     typed: str = ""
+    marked: int | None = None
     remarks: tuple[str, ...] = ()
     message: str = ""
     ending: bool = False
@@ -127,6 +128,8 @@ class WizardState:
     def has_field(self) -> bool:
         """Whether characters are written into a field."""
         question = self.question
+        if isinstance(self.subject, ChoiceSubject):
+            return False
         return self.writing is not None or (question is not None and question.kind is Question.TEXT)
 
     @property

@@ -12,6 +12,7 @@ from robolink_cli.access.capabilities import io_of
 from robolink_cli.commands.measure.recipe_events import EventStream, Progress
 from robolink_cli.console.render import note, say
 from robolink_cli.prompts.operator import operator_at
+from robolink_cli.prompts.present import present_desk
 from robolink_cli.prompts.questions import asked, on_terminal
 from robolink_cli.session.check_before_start import check_before_start
 from robolink_cli.session.context import CliContext
@@ -19,7 +20,6 @@ from robolink_cli.session.motion_consent import agree_to_motion, motion_question
 from robolink_cli.session.opening import open_controller
 from robolink_cli.views.calibration import report_payload, show_report
 from robolink_cli.views.planned_steps import steps_payload
-from robolink_cli.wizard.present import present_desk
 
 
 class Recalibration:

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from robolink_cli.wizard.host import Face
+    from robolink_cli.wizard.work import Face
 
 
 def face_here() -> "Face":

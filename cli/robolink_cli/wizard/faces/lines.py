@@ -26,7 +26,7 @@ from robolink_cli.wizard.screens.told import told_after_jog, told_before, told_q
 from robolink_cli.wizard.state import WizardState
 
 if TYPE_CHECKING:
-    from robolink_cli.wizard.host import Work
+    from robolink_cli.wizard.work import Work
 
 _TURN_S: Final = 0.05
 
@@ -82,7 +82,7 @@ class LineFace:
                 if self._lines is None:
                     self._lines = open_lines()
                 self._forget(QUIET_S)
-                if kind is Question.YES_NO:
+                if kind in (Question.YES_NO, Question.TEXT):
                     for row in told_before(state):
                         _put(visible(row))
             case WaitsForAnswer(number=number) if number != self._shown:

@@ -1,8 +1,9 @@
 """Screen (b): what is looked at before the robot starts."""
 
 from robolink.messages import tr
+from robolink_cli.console.columns import padded
 from robolink_cli.wizard.check_list import CheckPoint, CheckSubject, Mark
-from robolink_cli.wizard.screens.layout import Screen, broken, padded
+from robolink_cli.wizard.screens.layout import Screen, broken
 from robolink_cli.wizard.screens.rows import status_row, title_row
 from robolink_cli.wizard.state import WizardState
 

@@ -4,7 +4,9 @@ from robolink.messages import tr
 from robolink.nozzle_change import WriteSubject
 from robolink.runner import FitSubject, Question
 from robolink_cli.wizard.check_list import CheckSubject
+from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.screens.checking import check_screen
+from robolink_cli.wizard.screens.choosing import choice_screen
 from robolink_cli.wizard.screens.fitting import fit_screen
 from robolink_cli.wizard.screens.layout import BODY, Screen, broken
 from robolink_cli.wizard.screens.moving import moving_screen
@@ -26,6 +28,8 @@ def screen_of(state: WizardState, now_s: float) -> Screen:
         return moving_screen(state, now_s)
     if state.at_place:
         return touch_screen(state, now_s)
+    if isinstance(subject, ChoiceSubject):
+        return choice_screen(state, subject, now_s)
     if question.kind is Question.YES_NO:
         match subject:
             case WriteSubject():

@@ -5,8 +5,9 @@ from typing import Final
 
 from robolink.messages import tr
 from robolink.runner import FitRow, FitSubject
+from robolink_cli.console.columns import padded
 from robolink_cli.wizard.questions_flow import worst_first
-from robolink_cli.wizard.screens.layout import Screen, padded
+from robolink_cli.wizard.screens.layout import Screen
 from robolink_cli.wizard.screens.rows import mm, title_row
 from robolink_cli.wizard.state import WizardState
 

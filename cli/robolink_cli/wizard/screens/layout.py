@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from wcwidth import wcwidth
+from robolink_cli.console.columns import columns, filled
 
 WIDTH: Final = 80
 HEIGHT: Final = 24
@@ -62,11 +62,6 @@ def key_rows(actions: Sequence[tuple[str, str]]) -> Iterator[str]:
     yield row.rstrip()
 
 
-def columns(text: str) -> int:
-    """Return how many columns a text takes on a terminal."""
-    return sum(max(0, wcwidth(character)) for character in text)
-
-
 def cut(text: str, width: int = WIDTH) -> str:
     """Return as much of a text as fits into a width."""
     if columns(text) <= width:
@@ -79,50 +74,15 @@ def cut(text: str, width: int = WIDTH) -> str:
     return kept
 
 
-def padded(text: str, width: int, *, right: bool = False) -> str:
-    """Return a text filled with blanks up to a width."""
-    blanks = " " * max(0, width - columns(text))
-    return blanks + text if right else text + blanks
-
-
 def broken(text: str, width: int = WIDTH) -> Iterator[str]:
-    """Yield the rows of a text, broken at blanks, and within a word only where it must be.
-
-    Chinese has no blanks: there any place will do.
-    """
+    """Yield the rows of a text; one that fits keeps its blanks."""
     for line in text.split("\n"):
-        row = ""
-        for word in _words(line):
-            if columns(row + word.rstrip()) > width and row:
-                yield row.rstrip()
-                row = word.lstrip()
-            else:
-                row += word
-            while columns(row) > width and columns(row.rstrip()) > width:
-                part = cut(row, width)
-                yield part
-                row = row[len(part) :]
-        yield row.rstrip()
-
-
-def _words(line: str) -> Iterator[str]:
-    """Yield pieces between which a line may be broken, blanks at their ends kept."""
-    piece = ""
-    for character in line:
-        if wcwidth(character) == 2:
-            if piece:
-                yield piece
-            piece = ""
-            yield character
-            continue
-        piece += character
-        if character == " ":
-            yield piece
-            piece = ""
-    if piece:
-        yield piece
+        if columns(line) <= width:
+            yield line.rstrip()
+        else:
+            yield from filled(line, width).split("\n")
 
 
 def row_of(values: Sequence[str], width: int = 11) -> str:
     """Return values in columns of equal width, each to the right."""
-    return "".join(padded(value, width, right=True) for value in values)
+    return "".join(" " * max(0, width - columns(value)) + value for value in values)

@@ -5,7 +5,8 @@ import math
 from robolink.messages import tr
 from robolink.model import Path, Pose, angle_difference_deg
 from robolink.runner import MoveSubject
-from robolink_cli.wizard.screens.layout import Screen, broken, padded
+from robolink_cli.console.columns import padded
+from robolink_cli.wizard.screens.layout import Screen, broken
 from robolink_cli.wizard.screens.picture import COLUMNS, ROWS, picture
 from robolink_cli.wizard.screens.rows import status_row, title_row
 from robolink_cli.wizard.state import WizardState

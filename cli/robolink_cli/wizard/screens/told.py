@@ -6,21 +6,22 @@ from robolink.messages import tr
 from robolink.nozzle_change import WriteSubject
 from robolink.runner import FitSubject, Question
 from robolink_cli.wizard.check_list import CheckSubject
+from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.screens.checking import mark_of
 from robolink_cli.wizard.screens.fitting import fit_lines
 from robolink_cli.wizard.screens.rows import mm
 from robolink_cli.wizard.screens.touching import instruction, touch_title
-from robolink_cli.wizard.screens.values import value_lines
 from robolink_cli.wizard.state import WizardState
 
 
 def told_before(state: WizardState) -> list[str]:
     """Return what is to be read before a yes-or-no question."""
     match state.subject:
-        case WriteSubject() as subject:
-            return value_lines(subject)
         case FitSubject() as fit:
             return fit_lines(fit)
+        case ChoiceSubject() as subject:
+            rows = [f"  {number} {one}" for number, one in enumerate(subject.options, start=1)]
+            return [*subject.above, *rows]
         case CheckSubject() as subject:
             points = [
                 f"  {mark_of(point, state.checked)}: {point.text}"
@@ -39,6 +40,8 @@ def told_question(state: WizardState) -> str:
         return ""
     if state.at_place:
         return _place(state)
+    if isinstance(subject, ChoiceSubject):
+        return tr("{question} [Type the number of a row. To leave: stop.]", question=question.text)
     if question.kind is Question.TEXT:
         return tr("{question} [Type or scan it, then Enter. To end: stop.]", question=question.text)
     if isinstance(subject, WriteSubject):

@@ -4,7 +4,8 @@ import math
 
 from robolink.messages import tr
 from robolink.runner import Question, TouchSubject
-from robolink_cli.wizard.screens.layout import Screen, padded, row_of
+from robolink_cli.console.columns import padded
+from robolink_cli.wizard.screens.layout import Screen, row_of
 from robolink_cli.wizard.screens.rows import mm, signed, status_row, title_row
 from robolink_cli.wizard.state import STEP_SIZES, WizardState
 

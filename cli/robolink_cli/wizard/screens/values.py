@@ -5,7 +5,8 @@ import math
 from robolink.messages import tr
 from robolink.model import ToolOffset
 from robolink.nozzle_change import LimitVerdict, Proposal, WriteSubject
-from robolink_cli.wizard.screens.layout import Screen, padded, row_of
+from robolink_cli.console.columns import padded
+from robolink_cli.wizard.screens.layout import Screen, row_of
 from robolink_cli.wizard.screens.rows import mm, signed, title_row
 from robolink_cli.wizard.state import WizardState
 

@@ -146,7 +146,6 @@ def calibrate_live(frame: CalibrationRequest, source: Callable[[Controller], Tip
         frame.context,
         lambda: _calibrate(frame, source),
         job=tr("Measure tool {tool}", tool=frame.tool),
-        tools=(frame.tool,),
         alone=alone,
     )
 

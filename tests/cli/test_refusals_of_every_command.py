@@ -78,7 +78,7 @@ BAD = {
     "robot variable get": (["g_Long", "--index", "0"], "need --type"),
     "robot variable set": (["g_Long", "x", "--type", "Long"], "x"),
     "expert verify-controller": (["--timeout", "0"], "0"),
-    "robot jog": (["--yes", "x0.1"], "is not a jog step"),
+    "robot jog": (["--yes", "x0.1"], "is no step"),
     "calibrate two-pose": (["--tool", "1", "--taught-tool", "0"], "--taught-tool"),
     "calibrate n-angle": (["--tool", "1", "--angles", "0,90"], "must hold at least 3"),
     "calibrate one-touch": (["--tool", "1"], "Missing option '--station'"),

@@ -52,7 +52,7 @@ faults: $(VENV)/.installed-dev ## Run the fault catalogue, F01 to F80, and print
 
 # Their files are called judge_*.py: a plain pytest, which takes test_*.py, leaves them out.
 .PHONY: peers
-peers: $(VENV)/.installed-dev $(JUDGES) ## Let mbpoll, libmodbus and tshark judge the field buses.
+peers: $(VENV)/.installed-dev $(JUDGES) ## Let foreign programs judge the field buses and the PLC program.
 	@{ command -v mbpoll && command -v tshark && command -v cc && pkg-config --exists libmodbus; } \
 		>/dev/null || { \
 		echo "Not all judges are here. On Debian and Ubuntu:" \

@@ -12,9 +12,11 @@ from robolink.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from robolink.config._cells import Cell as Cell
+    from robolink.config._cells import CellGlimpse as CellGlimpse
     from robolink.config._cells import cell_names as cell_names
     from robolink.config._cells import check_file as check_file
     from robolink.config._cells import find_cell as find_cell
+    from robolink.config._cells import glimpse_of_cell as glimpse_of_cell
     from robolink.config._cells import load_cells as load_cells
     from robolink.config._cells import settings_of_file as settings_of_file
     from robolink.config._files import ConfigFile as ConfigFile
@@ -31,7 +33,8 @@ else:
     __getattr__ = lazy_exports(
         __name__,
         {
-            "_cells": "Cell cell_names check_file find_cell load_cells settings_of_file",
+            "_cells": "Cell CellGlimpse cell_names check_file find_cell glimpse_of_cell load_cells "
+            "settings_of_file",
             "_files": "ConfigFile Source config_files",
             "_reach": "Expected Reach glance_at_cell proof_of_files reach_cell remember_reach",
             "_settings": "CellSettings",

@@ -1,10 +1,10 @@
 """From the cell files to one cell, and where each of its values came from."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from robolink.config._files import CELL_FILE, config_files, read_document
 from robolink.config._problems import dotted, problems_of
@@ -20,6 +20,18 @@ _Said = dict[str, tuple[Path, object]]
 """What files say about a cell: each value with the file that said it."""
 
 _CELL_NAME = re.compile(r"[^\s+:/\\]+")
+
+
+class CellGlimpse(NamedTuple):
+    """What is said of a cell, as it is written and unchecked.
+
+    Attributes:
+        url: The controller's URL; empty where none is said.
+        stations: Ids of the stations that are declared.
+    """
+
+    url: str
+    stations: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,14 +148,33 @@ def settings_of_file(path: Path) -> "Mapping[str, CellSettings]":
 def cell_names() -> list[str]:
     """Return the names of all cells; for TAB, so files that are wrong are passed over."""
     names: dict[str, None] = {}
+    for cells in _unchecked():
+        names |= dict.fromkeys(cells)
+    return list(names)
+
+
+def glimpse_of_cell(name: str) -> CellGlimpse:
+    """Return what files say of a cell, unchecked; for TAB, so what is wrong is passed over."""
+    url, stations = "", dict[str, None]()
+    for cells in _unchecked():
+        said = cells.get(name)
+        if isinstance(said, dict):
+            named = said.get("stations")
+            stations |= dict.fromkeys(named if isinstance(named, dict) else ())
+            url = url or str(said.get("url", ""))
+    return CellGlimpse(url, tuple(stations))
+
+
+def _unchecked() -> Iterator[dict[str, object]]:
+    """Yield the cells of each file that can be read, the one that wins first."""
     for file in config_files():
         if file.present:
             try:
                 cells = read_document(file.path).get("cells")
             except ConfigError:
                 continue
-            names |= dict.fromkeys(cells if isinstance(cells, dict) else ())
-    return list(names)
+            if isinstance(cells, dict):
+                yield cells
 
 
 def _together(farther: _Said, nearer: _Said) -> _Said:

@@ -147,13 +147,13 @@ def _unrestored(failure: RobolinkError, tool: int) -> str:
     """
     if isinstance(failure, JournalError):
         return tr(
-            "Tool {tool} is selected again, which could not be recorded ({cause}) 'robolink "
+            "Tool {tool} is selected again, which could not be recorded: {cause} 'robolink "
             "recover' settles it.",
             tool=tool,
             cause=failure.what,
         )
     return tr(
-        "The tool of before, tool {tool}, could not be selected again ({cause}) 'robolink "
+        "The tool of before, tool {tool}, could not be selected again: {cause} 'robolink "
         "recover' selects it.",
         tool=tool,
         cause=failure.what,

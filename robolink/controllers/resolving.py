@@ -15,6 +15,7 @@ from robolink.model import (
     Verdict,
     describe_offset,
     plain_offset,
+    put_right,
     read_offset,
 )
 from robolink.ways import Way, way
@@ -55,6 +56,7 @@ def examine_write(tools: ToolTable, marker: Marker) -> Finding:
             before=describe_offset(before),
             requested=describe_offset(requested),
         )
+        sentence = f"{sentence} {put_right(now)}".rstrip()
     return Finding(marker, verdict, sentence, entries=(_entry(marker, tool, verdict, now),))
 
 

@@ -15,6 +15,8 @@ from robolink.model import Signature as Signature
 
 if TYPE_CHECKING:
     from robolink.journal._glancing import GlancingLog as GlancingLog
+    from robolink.journal._glancing import NamesOnRecord as NamesOnRecord
+    from robolink.journal._glancing import names_on_record as names_on_record
     from robolink.journal._glancing import nothing_is_open as nothing_is_open
     from robolink.journal._journal import Journal as Journal
     from robolink.journal._looking import LookingLog as LookingLog
@@ -34,7 +36,7 @@ else:
     __getattr__ = lazy_exports(
         __name__,
         {
-            "_glancing": "GlancingLog nothing_is_open",
+            "_glancing": "GlancingLog NamesOnRecord names_on_record nothing_is_open",
             "_journal": "Journal",
             "_outcome_log": "JournalOutcomeLog",
             "_looking": "LookingLog",

@@ -9,7 +9,7 @@ trouble with the file, opens the journal as for everybody.
 import sqlite3
 from collections.abc import Collection, Iterator
 from contextlib import AbstractContextManager, closing
-from typing import Final
+from typing import Any, Final, NamedTuple
 
 from robolink.errors import ConfigError
 from robolink.journal._opening import open_log
@@ -20,6 +20,15 @@ _QUESTION: Final = """
     SELECT
         EXISTS (SELECT 1 FROM markers) OR EXISTS (SELECT 1 FROM leases WHERE token <> ''),
         EXISTS (SELECT 1 FROM addresses WHERE address = ?)
+"""
+_NAMES: Final = """
+    SELECT DISTINCT tool, station FROM entries
+    WHERE ? = '' OR controller IN (
+        SELECT controller FROM addresses WHERE address = ?
+        UNION SELECT robots.name FROM robots
+            JOIN addresses ON addresses.controller = robots.controller WHERE address = ?
+        UNION VALUES (?)
+    )
 """
 _WAIT_S: Final = 1.0
 """Longest wait for another process that writes; after it the journal says what is the matter."""
@@ -149,6 +158,34 @@ class GlancingLog:
         return self._opened
 
 
+class NamesOnRecord(NamedTuple):
+    """What a journal has entries about.
+
+    Attributes:
+        tools: Numbers of tools, in their order.
+        stations: Ids of stations, in the order of the alphabet.
+    """
+
+    tools: tuple[int, ...] = ()
+    stations: tuple[str, ...] = ()
+
+
+def names_on_record(address: str) -> NamesOnRecord:
+    """Return the tools and stations on record, for TAB: no database code but Python's is loaded.
+
+    Args:
+        address: How the controller is reached; empty for all controllers.
+
+    Returns:
+        Nothing where the journal is on a server, or its file is missing or cannot be read.
+    """
+    rows = _asked(_NAMES, (address,) * 4)
+    return NamesOnRecord(
+        tuple(sorted({tool for tool, _ in rows if isinstance(tool, int)})),
+        tuple(sorted({str(station) for _, station in rows if station})),
+    )
+
+
 def nothing_is_open(address: str) -> bool:
     """Tell whether the journal is a readable file that has nothing to say about a look.
 
@@ -159,13 +196,18 @@ def nothing_is_open(address: str) -> bool:
     Returns:
         False also where that cannot be told; a server is not asked.
     """
+    rows = _asked(_QUESTION, (address,))
+    return any(known and not unfinished for unfinished, known in rows)
+
+
+def _asked(question: str, values: tuple[str, ...]) -> list[tuple[Any, ...]]:
+    """Return the rows that an SQLite file answers; none where there is none, or it is not well."""
     try:
         path = place_of(default_location()).path
         if path is None or not path.exists():
-            return False
+            return []
         uri = f"{path.absolute().as_uri()}?mode=ro"
         with closing(sqlite3.connect(uri, uri=True, timeout=_WAIT_S)) as file:
-            ((unfinished, known),) = file.execute(_QUESTION, (address,))
+            return file.execute(question, values).fetchall()
     except (ConfigError, OSError, ValueError, sqlite3.Error):
-        return False
-    return bool(known and not unfinished)
+        return []

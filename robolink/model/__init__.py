@@ -35,7 +35,9 @@ if TYPE_CHECKING:
     from robolink.model._tools import ToolReceipt as ToolReceipt
     from robolink.model._tools import ToolTable as ToolTable
     from robolink.model._tools import describe_offset as describe_offset
+    from robolink.model._tools import of_no_tool as of_no_tool
     from robolink.model._tools import plain_offset as plain_offset
+    from robolink.model._tools import put_right as put_right
     from robolink.model._tools import read_offset as read_offset
     from robolink.model._tools import tool_changed as tool_changed
     from robolink.model.motion.custom_kinematics import AxisKind as AxisKind
@@ -134,7 +136,7 @@ else:
             "motion.tip_sensor": "Spot SpotUnit TIP TipSensor",
             "_tools": (
                 "ANY Expect Expected Jump KinematicToolTable ToolOffset ToolReceipt ToolTable "
-                "describe_offset plain_offset read_offset tool_changed"
+                "describe_offset of_no_tool plain_offset put_right read_offset tool_changed"
             ),
             "motion.until_input": "InputEdge MotionUntilInput",
         },

@@ -10,6 +10,11 @@ from robolink.errors import ConfigError, ToolChangedError
 from robolink.messages import tr
 from robolink.model.motion.geometry import angle_difference_deg
 
+_LEAST: Final = 1e-100
+_MOST: Final = 1e9
+"""Beyond what any tool has in any unit, rounding included. A round number whose words are in
+another order is far below; of any other one in six lies in between."""
+
 _COMPONENTS: Final = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
 
 
@@ -42,6 +47,11 @@ class ToolOffset:
         """Return x, y, z in mm and u, v, w in degrees."""
         return (self.x_mm, self.y_mm, self.z_mm, self.u_deg, self.v_deg, self.w_deg)
 
+    @property
+    def of_no_tool(self) -> bool:
+        """Whether a number in it is one that no tool has, as words in another order make it."""
+        return of_no_tool(self.components())
+
     def rounded(self, decimals: int) -> "ToolOffset":
         """Return the value that a controller printing ``decimals`` places can hold."""
         return ToolOffset(*[round(value, decimals) + 0.0 for value in self.components()])
@@ -62,15 +72,32 @@ class ToolOffset:
         )
 
 
+def of_no_tool(values: Sequence[float]) -> bool:
+    """Tell whether one of these numbers is none that a tool has, in whatever unit."""
+    return any(value and not _LEAST < abs(value) < _MOST for value in values)
+
+
 def describe_offset(offset: ToolOffset | None) -> str:
     """Return an offset as a person reads it; V and W only where they are not 0."""
     if offset is None:
         return tr("undefined")
+    if offset.of_no_tool:
+        numbers = ", ".join(f"{value:g}" for value in offset.components())
+        return tr("the values of no tool ({numbers})", numbers=numbers)
     names = ("X", "Y", "Z", "U", "V", "W")
     pairs = zip(names, offset.components(), strict=True)
     # Adding 0.0 takes the sign off a negative zero.
     shown = [(name, round(value, 3) + 0.0) for name, value in pairs]
     return " ".join(f"{name} {value:.3f}" for name, value in shown if name not in "VW" or value)
+
+
+def put_right(offset: ToolOffset | None) -> str:
+    """Return how a person puts a tool right that holds the values of none, empty for others."""
+    if offset is None or not offset.of_no_tool:
+        return ""
+    return tr(
+        "'robolink tool set' gives such a tool other values, 'robolink tool clear' removes it."
+    )
 
 
 def plain_offset(offset: ToolOffset | None) -> list[float] | None:

@@ -13,6 +13,7 @@ from robolink.model import (
     Verdict,
     describe_offset,
     plain_offset,
+    put_right,
     read_offset,
 )
 from robolink.transaction._put_back import Step, put_back
@@ -172,6 +173,8 @@ class Settler:
             )
             for step in steps
         )
+        ways = {put_right(offset) for offset in now.values()}
+        sentence = " ".join((sentence, *filter(None, ways)))
         return _finding(marker, Verdict.CONFLICT, sentence, steps, now)
 
 

@@ -218,7 +218,8 @@ def test_the_keyring_is_looked_at(monkeypatch, ring, level):
     monkeypatch.setattr(backends, "fail", Fail, raising=False)
     monkeypatch.setitem(sys.modules, "keyring", keyring)
     monkeypatch.setitem(sys.modules, "keyring.backends", backends)
-    assert checkup.check_keyring().level is level
+    (found,) = checkup.check_keyring()
+    assert found.level is level
 
 
 def test_a_serial_port_that_may_not_be_used_names_its_group(monkeypatch):
@@ -255,3 +256,46 @@ def test_a_journal_that_makes_no_sense_is_bad(tmp_path, monkeypatch, content):
     (remark,) = checkup.check_journal()
     assert remark.level is Level.BAD
     assert str(journal) in remark.what
+
+
+def fails(*_arguments, **_options):
+    raise OSError(5, "Input/output error")
+
+
+BROKEN = {
+    "serial": "serial.tools.list_ports.comports",
+    "name": "importlib.metadata.packages_distributions",
+    "python": "importlib.metadata.distribution",
+    "click": "importlib.metadata.version",
+    "state": "os.access",
+    "cells": "platformdirs.user_config_path",
+}
+"""Subject of a look, and what of the system under it fails."""
+
+
+@pytest.mark.parametrize("subject", BROKEN)
+def test_a_look_that_breaks_off_is_one_line_and_the_others_go_on(capsys, monkeypatch, subject):
+    monkeypatch.setattr(BROKEN[subject], fails)
+    code = main.run(["doctor", "--json"])
+    document = json.loads(capsys.readouterr().out)
+    assert code in (0, 1)
+    (broken,) = {
+        (check["what"], check["level"])
+        for check in document["checks"]
+        if "Input/output error" in check["what"]
+    }
+    assert broken == (
+        "this could not be looked at (OSError: [Errno 5] Input/output error).",
+        "warn",
+    )
+    assert {"journal", "keyring"} <= {check["subject"] for check in document["checks"]}
+
+
+def test_what_is_wrong_stands_first(capsys, monkeypatch):
+    install(monkeypatch, {"robolink": "0.1.0", "click": "9.5"}, ["click<9,>=8.1"])
+    monkeypatch.setattr("importlib.metadata.packages_distributions", fails)
+    assert main.run(["doctor"]) == 1
+    lines = [line.split()[0] for line in capsys.readouterr().out.splitlines()[:-1]]
+    levels = [word for word in lines if word in ("bad", "warn", "ok")]
+    assert levels[:2] == ["bad", "warn"]
+    assert set(levels[2:]) == {"ok"}

@@ -103,6 +103,22 @@ def test_a_mailbox_is_looked_at_and_nothing_is_written(shown, serve):
     assert commands(simulator) == []
 
 
+def test_a_slot_with_the_values_of_no_tool_is_shown_refused_and_put_right(shown, serve):
+    url, simulator = serve()
+    simulator.plc.memory.define(3, (-1.5e-27, 1.6e-314, -10.0, 0.0, 0.0, 0.0), "Tool 3")
+    _, out, _ = shown("-c", url, "tool", "list")
+    assert "holding the values of no tool: 3" in out
+    code, _, err = shown("-c", url, "tool", "select", "3")
+    assert (code, "'robolink tool clear'" in err) == (5, True)
+    code, out, _ = shown("-c", url, "verify-controller")
+    assert "these cannot be used: 3" in out
+    code, out, _ = shown("-c", url, "tool", "set", "3", "--x", "1.25")
+    assert (code, "written, read back" in out) == (0, True)
+    _, out, _ = shown("-c", url, "--json", "tool", "get", "3")
+    assert list(json.loads(out)["offset"].values()) == [1.25, 0, 0, 0, 0, 0]
+    assert shown("-c", url, "tool", "select", "3")[0] == 0
+
+
 def test_what_is_wrong_with_a_mailbox_is_named_with_a_remedy(shown, serve):
     torn = [
         PlcFault(PlcFaultAction.TEAR_REPLY, match="read_slot 3", on_exchange=n) for n in range(3)

@@ -148,7 +148,11 @@ def test_no_serial_port_is_said(plugged_in, capsys):
     assert main.run(["ports"]) == 0
     assert capsys.readouterr().out == "No serial port was found.\n"
     assert main.run(["ports", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out) == {"schema": "robolink/ports/1", "ports": []}
+    assert json.loads(capsys.readouterr().out) == {
+        "schema": "robolink/ports/1",
+        "ports": [],
+        "problems": [],
+    }
 
 
 def test_serial_ports_are_listed_by_name_and_whether_they_may_be_used(plugged_in, capsys, tmp_path):
@@ -291,3 +295,19 @@ def test_ports_and_doctor_know_the_cells_on_a_line(
     main.run(["doctor"])
     shown = capsys.readouterr()
     assert "/dev/ttyUSB77 of gone is not there." in shown.out + shown.err
+
+
+@pytest.mark.parametrize(
+    ("command", "code"), [(["ports"], 1), (["scan", "127.0.0.1", "--port", "1"], 0)]
+)
+def test_a_system_that_does_not_list_its_ports_is_one_line(capsys, monkeypatch, command, code):
+    def fails():
+        raise OSError(13, "Permission denied")
+
+    monkeypatch.setattr("serial.tools.list_ports.comports", fails)
+    sentence = "The serial ports of this computer could not be listed (PermissionError: "
+    assert main.run(command) == code
+    assert sentence in capsys.readouterr().out
+    assert main.run([*command, "--json"]) == code
+    (problem,) = json.loads(capsys.readouterr().out)["problems"]
+    assert problem.startswith(sentence)

@@ -21,10 +21,12 @@ from robolink.protocols.mailbox import (
     SLOT,
     ErrorClass,
     ExportProfile,
+    Kinematics,
     program_texts,
 )
 
 FULL, TOOLS = ExportProfile.FULL, ExportProfile.TOOLS
+COUPLED = "Kin_Gantry3+Kin_CAxis"
 CORE, ADAPTER = "robolink_core.st", "robolink_softmotion.st"
 MODES = ("CURRENT", "ACTIVE", "LAST")
 MOVING = re.compile(r"MC_Move|Jog|MC_GroupHalt|MC_GroupStop|\b(2102|2103|30004|30007|30008)\b")
@@ -34,17 +36,17 @@ XML = "{http://www.plcopen.org/xml/tc6_0200}"
 
 def every_text():
     for profile in ExportProfile:
-        for modes in ((), MODES):
-            texts = program_texts(profile, kinematics="Kin_Scara3_Z", read_modes=modes)
+        for modes, kinematics in (((), COUPLED), (MODES, "Kin_Scara3_Z"), ((), "")):
+            texts = program_texts(profile, kinematics=kinematics, read_modes=modes)
             for name, text in texts.items():
-                yield pytest.param(name, text, id=f"{profile}-{len(modes)}-{name}")
+                yield pytest.param(name, text, id=f"{profile}-{kinematics}-{name}")
 
 
 @pytest.mark.parametrize(("name", "text"), list(every_text()))
 def test_every_text_is_complete_and_under_0bsd(name, text):
     assert "SPDX-License-Identifier: 0BSD" in text
     assert text.isascii()
-    left = ("full:", "kinematics:", "read tool:", "from memory:", "_SYMBOL", "_TYPE;")
+    left = ("full:", "kinematics:", "read tool:", "from memory:", "_SYMBOL", "_TYPE;", "coupled:")
     assert [mark for mark in left if mark in text] == []
     parse(name, text, dict(PROGRAM_SOURCES)[name])
 
@@ -79,6 +81,33 @@ def test_only_the_adapter_names_the_vendors_blocks():
         names = [word for word in ("SMC_Group", "MC_Group", "MC_Move", "MC_Set") if word in text]
         told = "RL_Machine.st", "robolink_softmotion.st"
         assert not names or name in told, (name, names)
+
+
+def test_two_kinematics_are_coupled_by_the_block_for_that():
+    texts = program_texts(FULL, kinematics=COUPLED)
+    glue = texts[PROGRAM_FILES[-1]]
+    declared = dict(re.findall(r"(\w*[kK]inematics) : (TRAFO\.\w+);", glue))
+    assert declared == {
+        "positionKinematics": "TRAFO.Kin_Gantry3",
+        "orientationKinematics": "TRAFO.Kin_CAxis",
+        "kinematics": "TRAFO.Kin_Coupled",
+    }
+    assert re.findall(r"kinematics\.(\w+) := (\w+);", glue) == [
+        ("itfPosKin", "positionKinematics"),
+        ("itfOriKin", "orientationKinematics"),
+    ]
+    assert f"kinematics : UINT := {32 * 256 + 11};" in texts["RL_Machine.st"]
+    assert "TRAFO.Kin_Coupled" in texts[ADAPTER]
+
+
+def test_the_core_knows_every_code_of_a_kinematics():
+    core = program_texts(FULL)[CORE]
+    rules = re.findall(r"found := (\(\((o[01]) >= 0.*);", core)
+    assert [operand for _, operand in rules] == ["o0", "o1"]
+    for rule, operand in rules:
+        python = rule.replace(" AND ", " and ").replace(" OR ", " or ").replace(" = ", " == ")
+        known = {code for code in range(-1, 300) if eval(python, {operand: code})}
+        assert known == {code.value for code in Kinematics}
 
 
 def test_the_errors_have_the_members_and_classes_of_the_program():
@@ -138,8 +167,10 @@ def test_a_foreign_parser_reads_every_file(profile, name):
 
 def test_what_cannot_be_exported_is_told(tmp_path, capsys):
     folder = str(tmp_path / "plc")
-    assert main.run(["plc", "export", folder, "--kinematics", "Kin_Nothing"]) == 2
-    assert "Kin_Nothing" in capsys.readouterr().err
+    refused = ("Kin_Nothing", "Kin_CAxis", "Kin_Scara3_Z+Kin_CAxis", "Kin_Gantry3+Kin_Polar")
+    for name in refused:
+        assert main.run(["plc", "export", folder, "--kinematics", name]) == 2
+        assert name in capsys.readouterr().err
     assert main.run(["plc", "export", folder, "--read-modes", "A.B", "C", "D"]) == 2
     assert not (tmp_path / "plc").exists()
     arguments = ["--profile", "full", "--kinematics", "Kin_Scara3_Z", "--read-modes", *MODES]

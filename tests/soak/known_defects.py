@@ -220,10 +220,6 @@ DEFECTS: Final = (
         "a tool change after a restart of the PLC goes on",
         {"robolink.controllers.softmotion.link.snapshots.Snapshots._other_plc": stand_ins.nothing},
         CellKind.SOFTMOTION,
-        missed_because=(
-            "a start between two commands that are no movement is drawn too rarely; in a movement "
-            "other guards notice it"
-        ),
         found_by="users of pyads",
     ),
     KnownDefect(

@@ -132,3 +132,13 @@ def test_on_a_serial_line_what_is_damaged_or_for_another_unit_is_not_answered(pl
     assert link.outgoing()[:3] == bytes.fromhex("01 03 02")
     link.receive(on_line(ReadHoldingRegistersRequest(address=60000, count=1)), 0)
     assert link.outgoing()[:3] == bytes.fromhex("01 83 02")
+
+
+def test_on_a_serial_line_silence_ends_half_a_request(plc):
+    link = plc.connect(0, LineFrames())
+    frame = on_line(WriteMultipleRegistersRequest(address=100, registers=[7, 8]))
+    short_of_its_count = frame[:6] + frame[7:]
+    link.receive(short_of_its_count, 0)
+    link.receive(on_line(ReadHoldingRegistersRequest(address=100, count=1)), 60_000_000)
+    assert link.outgoing()[:3] == bytes.fromhex("01 03 02")
+    assert plc.writes == []

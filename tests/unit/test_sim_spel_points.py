@@ -17,8 +17,8 @@ NUMBERS = SpelNumbers()
 class Window:
     """A command window."""
 
-    def __init__(self, **habits):
-        self.machine = Machine(find_robot("T6-602S"))
+    def __init__(self, robot="T6-602S", **habits):
+        self.machine = Machine(find_robot(robot))
         self._interpreter = Interpreter(self.machine, EpsonOptions(**habits), random.Random(1))
 
     def __call__(self, statement):
@@ -262,6 +262,6 @@ def test_the_robot_says_what_it_is(window):
     assert window("Print RobotType, Robot, CtrlDev") == "3 1 26\r\n"
     assert window('Print RobotModel$, " ", RobotSerial$') == "T6-602S SIM00001\r\n"
     assert window("Robot 1; Robot") == "1\r\n"
-    assert window.error("Robot 2") == NUMBERS.value_out_of_range
+    assert window.error("Robot 2") == NUMBERS.robot_number
     assert window("Print Agl(2), Pls(2), Hand") == "60 136533 1\r\n"
     assert window.error("Print Agl(5)") == NUMBERS.value_out_of_range

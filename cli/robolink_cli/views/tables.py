@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from robolink.messages import tr
+from robolink.model import of_no_tool
 from robolink_cli.console.render import say, table
 from robolink_cli.views.documents import number, offset_cells
 
@@ -84,9 +85,17 @@ def show_tools(tools: Mapping[str, Mapping[str, object] | None], selected: int |
             rows.append([f"{mark}{tool}", *offset_cells(offset)])
     if rows:
         table(tr("tools (* in force)"), (tr("tool"), *AXES), rows)
+    odd = [tool for tool, offset in tools.items() if offset is not None and _of_no_tool(offset)]
+    if odd:
+        say(tr("  holding the values of no tool: {tools}", tools=", ".join(odd)))
     missing = [tool for tool, offset in tools.items() if offset is None]
     if missing:
         say(tr("  undefined: {tools}", tools=", ".join(missing)))
+
+
+def _of_no_tool(offset: Mapping[str, object]) -> bool:
+    """Whether a number in a document's offset is one that no tool has."""
+    return of_no_tool([float(str(value)) for value in offset.values()])
 
 
 def show_offset(title: str, offset: Mapping[str, object] | None) -> None:

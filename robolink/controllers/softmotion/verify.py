@@ -8,6 +8,7 @@ from robolink.controllers.softmotion.facts import MailboxFacts
 from robolink.controllers.softmotion.link.mailbox import Mailbox
 from robolink.errors import RemoteProtocolError
 from robolink.messages import tr
+from robolink.model import of_no_tool
 from robolink.protocols.mailbox import OPCODES, PROBE, SLOTS, Bits, GroupState, Opcode, Response
 from robolink.timing import NS_PER_S
 
@@ -131,7 +132,9 @@ def _slots(mailbox: Mailbox) -> MailboxFinding:
         except RemoteProtocolError:
             broken.append(number)
             continue
-        if slot.defined:
+        if of_no_tool(slot.tool):
+            broken.append(number)
+        elif slot.defined:
             defined.append(number)
     if broken:
         return MailboxFinding(

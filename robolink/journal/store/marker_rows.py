@@ -1,10 +1,12 @@
 """Statements about markers.
 
-Each carries a checksum among its details. Entries are chained by their hashes; a marker stands
-alone, and recovery writes the old value that it names.
+Each carries a checksum among its details, over the name of its controller too. Entries are chained
+by their hashes; a marker stands alone, and recovery writes the old value that it names. Under a
+name that is damaged it would block nobody, so whoever is about to change something looks at all.
 """
 
 import json
+from collections.abc import Sequence
 from hashlib import sha256
 from typing import Final, NamedTuple
 
@@ -30,7 +32,8 @@ class _Stored(NamedTuple):
 
 
 _SUM: Final = "_sum"
-"""Where the checksum stands. Markers of before have none, and nothing tells that one is bent."""
+"""Where the checksum stands. Markers of before have none, and nothing tells that one is bent; or
+one that leaves the name of their controller out."""
 
 _SAME: Final = (
     MARKERS.c.controller == bindparam("of_controller"),
@@ -45,6 +48,11 @@ _NAMES: Final[dict[str, BindParameter[object]]] = {
 _UPDATE: Final = Prepared(update(MARKERS).where(*_SAME).values(**_STATE))
 _NEXT: Final = select(func.coalesce(func.max(MARKERS.c.id), 0) + 1).scalar_subquery()
 _INSERT: Final = Prepared(insert(MARKERS).values(id=_NEXT, **_NAMES, **_STATE), UNLESS_THERE)
+_RENAME: Final = Prepared(
+    update(MARKERS)
+    .where(*_SAME)
+    .values(controller=bindparam("to_controller"), details=_STATE["details"])
+)
 _DELETE: Final = Prepared(delete(MARKERS).where(*_SAME))
 _LISTING: Final = select(*(MARKERS.c[name] for name in _Stored._fields)).order_by(MARKERS.c.id)
 _SELECT: Final = Prepared(_LISTING.where(MARKERS.c.controller == bindparam("of_controller")))
@@ -69,17 +77,16 @@ class MarkerRows:
             "request": storable(marker.request),
             "begun_at": storable(marker.begun_at),
         }
-        # As it will be read: other keys and numbers than those of JSON are told apart no more.
-        details = json.loads(canonical(plain(marker.details)))
         stored = _Stored(
             controller=values["of_controller"],
             operation=values["of_operation"],
             kind=values["kind"],
             request=values["request"],
             begun_at=values["begun_at"],
-            details=canonical(details),
+            # As it will be read: other keys and numbers than JSON's are told apart no more.
+            details=canonical(json.loads(canonical(plain(marker.details)))),
         )
-        values["details"] = canonical({**details, _SUM: _sum_of(stored)})
+        values["details"] = _with_sum(stored)
         if self._runner.run(_INSERT, values):
             return True
         self._runner.run(_UPDATE, values)
@@ -88,6 +95,19 @@ class MarkerRows:
     def remove(self, controller: str, operation: str) -> bool:
         """Forget a marker; return whether it was there."""
         return self._runner.run(_DELETE, _same(controller, operation)) == 1
+
+    def rename(self, controller: str, to: str) -> None:
+        """Make the markers of a controller those of another name.
+
+        Raises:
+            JournalError: One of them is damaged.
+        """
+        for row in self._runner.rows(_SELECT, {"of_controller": storable(controller)}):
+            old = _Stored(*row)
+            details = canonical(_marker(old).details)
+            new = old._replace(controller=storable(to), details=details)
+            values = {**_same(old.controller, old.operation), "details": _with_sum(new)}
+            self._runner.run(_RENAME, {**values, "to_controller": new.controller})
 
     def of(self, *names: str) -> tuple[Marker, ...]:
         """Return the markers of a controller, under each of its names, oldest first."""
@@ -98,7 +118,11 @@ class MarkerRows:
         return tuple(found)
 
     def of_all(self) -> tuple[tuple[str, Marker], ...]:
-        """Return every marker with the identity of its controller, oldest first."""
+        """Return every marker with the identity of its controller, oldest first.
+
+        Raises:
+            JournalError: One of them is damaged.
+        """
         found = [_Stored(*row) for row in self._runner.rows(_SELECT_ALL)]
         return tuple([(row.controller, _marker(row)) for row in found])
 
@@ -109,7 +133,8 @@ def _marker(row: _Stored) -> Marker:
         if not isinstance(details, dict):
             raise TypeError
         told = details.pop(_SUM, None)
-        if told not in (None, _sum_of(row._replace(details=canonical(details)))):
+        summed = row._replace(details=canonical(details))
+        if told not in (None, _sum_of(summed), _sum_of(summed[1:])):
             raise ValueError(told)
     except (ValueError, TypeError) as error:
         raise JournalError(
@@ -126,9 +151,14 @@ def _marker(row: _Stored) -> Marker:
     return Marker(row.operation, kind, row.request, row.begun_at, details)
 
 
-def _sum_of(row: _Stored) -> str:
-    """Return the checksum of a marker whose details have none; its controller may be renamed."""
-    return sha256("\n".join(row[1:]).encode("utf-8")).hexdigest()[:16]
+def _with_sum(row: _Stored) -> str:
+    """Return the details of a marker, which have no checksum yet, with one."""
+    return canonical({**json.loads(row.details), _SUM: _sum_of(row)})
+
+
+def _sum_of(fields: Sequence[str]) -> str:
+    """Return the checksum of the fields of a marker whose details have none."""
+    return sha256("\n".join(fields).encode("utf-8")).hexdigest()[:16]
 
 
 def _same(controller: str, operation: str) -> dict[str, str]:

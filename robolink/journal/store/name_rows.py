@@ -10,6 +10,7 @@ from typing import Final
 from sqlalchemy import BindParameter, bindparam, func, insert, select, update
 
 from robolink.journal.store.chain import storable
+from robolink.journal.store.marker_rows import MarkerRows
 from robolink.journal.store.prepared import UNLESS_THERE, Prepared, StatementRunner
 from robolink.journal.store.tables import (
     ADDRESSES,
@@ -52,9 +53,6 @@ _ROBOTS_OF: Final = Prepared(
 )
 _ROBOT: Final = Prepared(insert(ROBOTS).values(name=_OF, controller=_TO), UNLESS_THERE)
 _MOVE_ROBOT: Final = Prepared(update(ROBOTS).where(ROBOTS.c.name == _OF).values(controller=_TO))
-_MOVE_MARKERS: Final = Prepared(
-    update(MARKERS).where(MARKERS.c.controller == _OF).values(controller=_TO)
-)
 _OTHER: Final = LEASES.alias("other")
 # Where the controller has a lease under its own name, that one counts.
 _MOVE_LEASE: Final = Prepared(
@@ -133,8 +131,9 @@ class NameRows:
         values = _pair(name, controller)
         if not self._runner.run(_SUCCEED, values):
             return False
-        for statement in (_PASS_ON, _MOVE_MARKERS, _MOVE_LEASE):
+        for statement in (_PASS_ON, _MOVE_LEASE):
             self._runner.run(statement, values)
+        MarkerRows(self._runner).rename(name, controller)
         return True
 
     def note_robot(self, robot: str, controller: str) -> None:
@@ -146,8 +145,8 @@ class NameRows:
         values = _pair(robot, controller)
         if not self._runner.run(_ROBOT, values):
             self._runner.run(_MOVE_ROBOT, values)
-        for statement in (_MOVE_MARKERS, _MOVE_LEASE):
-            self._runner.run(statement, values)
+        self._runner.run(_MOVE_LEASE, values)
+        MarkerRows(self._runner).rename(robot, controller)
 
     def _one(self, statement: Prepared, name: str) -> str:
         rows = self._runner.rows(statement, {"of_name": storable(name)}) if self._known else ()

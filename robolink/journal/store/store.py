@@ -53,7 +53,7 @@ class Tables:
     ) -> None:
         self.connection = connection
         self.runner = StatementRunner(connection)
-        self.entries = EntryRows(connection, self.runner)
+        self.entries = EntryRows(self.runner)
         self.markers = MarkerRows(self.runner)
         self.leases = LeaseRows(self.runner)
         self.names = NameRows(
@@ -147,6 +147,8 @@ class Store:
         consequence = tr("The command was not sent.")
         with self.read(consequence) as tables:
             found = next(tables.damage(names), "")
+            if not found:
+                tables.markers.of_all()  # one under a name that is damaged would block nobody
         if found:
             raise damaged_error(found, self._place.name, consequence)
 

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from robolink.protocols.mailbox._frames import to_frame as to_frame
     from robolink.protocols.mailbox._kinematics import Kinematics as Kinematics
     from robolink.protocols.mailbox._kinematics import find_kinematics as find_kinematics
+    from robolink.protocols.mailbox._kinematics import find_kinematics_word as find_kinematics_word
     from robolink.protocols.mailbox._kinematics import kinematics_word as kinematics_word
     from robolink.protocols.mailbox._opcodes import OPCODES as OPCODES
     from robolink.protocols.mailbox._opcodes import Opcode as Opcode
@@ -102,7 +103,7 @@ else:
             "exports.plc_program": "PROGRAM_FILES program_texts",
             "exports.plcopen_xml": "plcopen_xml",
             "_frames": "frames_match from_frame to_frame",
-            "_kinematics": "Kinematics find_kinematics kinematics_word",
+            "_kinematics": "Kinematics find_kinematics find_kinematics_word kinematics_word",
             "blocks.register_layouts": (
                 "COMMAND COMMAND_WORDS DEVICE DEVICE_START DEVICE_WORDS PROBE RESPONSE "
                 "RESPONSE_WORDS SLOT SLOTS SLOT_WORDS VERSION slot_start"

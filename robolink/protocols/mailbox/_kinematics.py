@@ -80,6 +80,39 @@ def find_kinematics(block_name: str) -> Kinematics | None:
     return next((code for code, name in _BLOCKS.items() if name == block_name), None)
 
 
+_CARRIES_NONE: Final = frozenset(
+    {
+        Kinematics.SCARA3_Z,
+        Kinematics.ARTICULATED_6DOF,
+        Kinematics.PALLETIZER_4_AXIS,
+        Kinematics.FIVE_AXES,
+    }
+)
+"""Position kinematics that turn the flange themselves, so that none is coupled to them."""
+
+_FIRST_ORIENTATION: Final = 32
+
+
+def find_kinematics_word(name: str) -> int | None:
+    """Return the word of a function block that moves a group, or of two that are coupled.
+
+    Args:
+        name: Such as ``Kin_Scara3_Z``, or ``Kin_Gantry3+Kin_CAxis``.
+
+    Returns:
+        The word, or ``None`` when one has no code or the two are not coupled.
+    """
+    before, plus, behind = name.partition("+")
+    position, orientation = find_kinematics(before), find_kinematics(behind)
+    if position is None or position >= _FIRST_ORIENTATION:
+        return None
+    if not plus:
+        return kinematics_word(position)
+    if orientation is None or orientation < _FIRST_ORIENTATION or position in _CARRIES_NONE:
+        return None
+    return kinematics_word(position, orientation)
+
+
 def kinematics_word(position: int, orientation: int = Kinematics.NONE) -> int:
     """Return the word that names a kinematics and an orientation kinematics coupled to it."""
     return orientation << 8 | position

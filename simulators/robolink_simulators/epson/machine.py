@@ -117,14 +117,28 @@ class Machine:
         """The robot in force."""
         return self.robots[self.robot_number - 1]
 
+    @property
+    def moving(self) -> bool:
+        """Whether any arm moves."""
+        return any(robot.arm.moving for robot in self.robots)
+
+    def numbered(self, number: int) -> DrivenRobot:
+        """Return a robot by its number.
+
+        Raises:
+            Refusal: There is no such robot.
+        """
+        if not 1 <= number <= len(self.robots):
+            raise SpelRefusal(RefusalKind.ROBOT_NUMBER, f"There is no robot {number}")
+        return self.robots[number - 1]
+
     def choose(self, number: int) -> None:
         """Put a robot in force.
 
         Raises:
             Refusal: There is no such robot.
         """
-        if not 1 <= number <= len(self.robots):
-            raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"There is no robot {number}")
+        self.numbered(number)
         self.robot_number = number
 
     @property

@@ -41,6 +41,11 @@ class SpelNumbers:
     arm_undefined: int = 4012
     ecp_undefined: int = 4013
     pallet_undefined: int = 4014
+    box_number: int = 2216  # docs/reference/spel.md 10
+    box_undefined: int = 2217  # docs/reference/spel.md 10
+    plane_number: int = 2218  # docs/reference/spel.md 10
+    plane_undefined: int = 2219  # docs/reference/spel.md 10
+    robot_number: int = 2262  # docs/reference/spel.md 10
     tool_undefined: int = 4015
     tool_zero_fixed: int = 4016
     tool_in_force: int = 4017

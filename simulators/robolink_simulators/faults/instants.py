@@ -92,7 +92,7 @@ def drawn_instant(rng: random.Random, cell: str, deed: str) -> tuple[Instant, in
     return instant, instant.first + rng.randrange(instant.count)
 
 
-RARE_SHARE: Final = 0.06
+RARE_SHARE: Final = 0.09
 """Share of hours in which one of these comes besides."""
 
 RARE: Final[Mapping[str, Sequence[Instant]]] = {
@@ -105,6 +105,8 @@ RARE: Final[Mapping[str, Sequence[Instant]]] = {
     "softmotion": (
         Instant("disk", "lost", ""),
         Instant("wire", "DROP_REPLY", "WRITE_TOOL", 1, _TYPED),
+        # A start of the PLC behind the first look at a tool, before anything is written.
+        Instant("machine", "RESTART", "read_slot"),
     ),
 }
 """What the shares of the others leave out too often; drawn by itself, so that it moves no other."""

@@ -1,12 +1,19 @@
 """One client's connection to the simulated PLC: what comes, what leaves and when."""
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Final, Protocol
 
 from robolink.timing import NS_PER_S
 from robolink_simulators.faults import Departure
 from robolink_simulators.faults.departing import DepartingReplies
 from robolink_simulators.plc.frames import Frames, PlcRequest
+
+_SILENCE_NS: Final = 50_000_000
+"""Silence on a line that ends a frame: 3.5 characters (Modbus over serial line 1.02, 2.5.1.1).
+
+A simulated line carries a frame at once, at no baud rate; so it is longer here than at the slowest
+of them, and no busy computer cuts a frame in two.
+"""
 
 
 class ServedFrame(Protocol):
@@ -39,6 +46,7 @@ class PlcLink:
         self._frames = frames
         self._outbox = DepartingReplies()
         self._late: list[PlcRequest] = []
+        self._heard_ns = plc.now_ns
         self._over = False
 
     @property
@@ -63,6 +71,9 @@ class PlcLink:
             return
         if not data:
             self._over = True
+        if self._frames.shared and self._plc.now_ns - self._heard_ns > _SILENCE_NS:
+            self._frames.forget()
+        self._heard_ns = self._plc.now_ns
         self._frames.feed(data)
         try:
             self._answer_all()

@@ -8,7 +8,7 @@ from typing import Final
 from robolink_cli.prompts.operator import AssistedOperator
 
 from robolink.errors import NotReadyError, RobolinkError
-from robolink.model import Controller, Finding, ToolOffset
+from robolink.model import Controller, Finding, ToolOffset, Verdict, read_offset
 from robolink.nozzle_change import ChangePlan, ChangeReport, NozzleChange, ToolPlan
 from robolink.runner import Question
 from robolink.timing import Clock
@@ -134,9 +134,25 @@ def put_right(
     done = recover(controller, keep=habit.keeps, confirm=looked)
     for finding in done.settled:
         tell(f"settled: {finding.verdict} {finding.marker.request}")
+        _replace_what_is_no_tool(controller, finding, tell)
     if moved_by_robolink and controller.tools.selected() != TOOL:
         controller.tools.select(TOOL)
     return not done.left and not controller.outcomes.open_markers()
+
+
+def _replace_what_is_no_tool(controller: Controller, finding: Finding, tell: Tell) -> None:
+    """Type the offset of before, as a finding says, where a tool holds the values of none."""
+    if finding.verdict is not Verdict.CONFLICT:
+        return
+    details = finding.marker.details
+    several = details.get("tools")
+    values = several if isinstance(several, dict) else {details.get("tool"): details}
+    for number, value in values.items():
+        tool, before = int(str(number)), read_offset(value.get("before"))
+        held = controller.tools.read(tool)
+        if held is not None and held.of_no_tool:
+            change_tools(controller, [Wanted(tool, before, held)], tell=tell)
+            tell(f"tool {tool} held the values of none; it was typed anew")
 
 
 class _PersonWithHabits(AssistedOperator):

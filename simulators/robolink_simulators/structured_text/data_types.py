@@ -171,13 +171,19 @@ class BlockType:
 
 @dataclass(frozen=True, slots=True)
 class OpaqueType:
-    """A type whose inside no program sees; its one value is whatever the host puts there."""
+    """A type whose inside no program sees.
+
+    Attributes:
+        name: As it is written.
+        inside: What each variable of it holds; where it is ``None`` the host gives it later.
+    """
 
     name: str
+    inside: Value = field(default=None, compare=False)
 
-    def initial(self) -> None:
-        """Return nothing: the host gives it."""
-        return
+    def initial(self) -> Value:
+        """Return what a variable holds at first."""
+        return self.inside
 
 
 DataType = ScalarType | ArrayType | StructType | BlockType | OpaqueType

@@ -1,16 +1,25 @@
 """Statements of the text, translated into functions of the frame."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Final
 
 from lark import Token
 
 from robolink.messages import tr
-from robolink_simulators.structured_text.data_types import Family, Frame, Getter, ScalarType, copier
+from robolink_simulators.structured_text.data_types import (
+    BlockType,
+    Family,
+    Frame,
+    Getter,
+    OpaqueType,
+    ScalarType,
+    copier,
+)
 from robolink_simulators.structured_text.expressions import ExpressionTranslator
 from robolink_simulators.structured_text.invocations import call
 from robolink_simulators.structured_text.parse import (
     Node,
+    TextDialect,
     TextPlace,
     refused,
 )
@@ -26,6 +35,7 @@ Action = Callable[[Frame], int]
 """Executes a statement; returns how it ended."""
 
 _ON, _EXIT, _RETURN = range(3)
+_MOST_LABELS: Final = 4
 
 TURNS_A_CYCLE: Final = 200_000
 """Turns of loops in one cycle; a real PLC's watchdog would have stepped in long before."""
@@ -73,7 +83,12 @@ class StatementTranslator(ExpressionTranslator):
         value = self.expression(value_tree)
         if isinstance(target.type, ScalarType):
             return _storing(target, kept(value, target.type, place))
-        source, get = fitted(value, target.type, place).get, target.get
+        fits = fitted(value, target.type, place)
+        if isinstance(target.type, OpaqueType):
+            return _storing(target, fits.get)
+        if isinstance(target.type, BlockType):
+            raise refused(place, tr("{name} is a function block, not a value", name=target.name))
+        source, get = fits.get, target.get
         copy = copier(target.type)
 
         def assign(frame: Frame) -> int:
@@ -131,6 +146,7 @@ class StatementTranslator(ExpressionTranslator):
                 otherwise = self.block(part)
                 continue
             *labels, block = part.children
+            self._require_short(labels, part)
             action = self.block(block)
             for label in labels:
                 self._label(label, action, singles, ranges)
@@ -143,6 +159,13 @@ class StatementTranslator(ExpressionTranslator):
             return action(frame)
 
         return choose
+
+    def _require_short(self, labels: Sequence[Node], branch: Node) -> None:
+        """Refuse more labels than STruC++ reads (docs/reference/structured_text.md 1)."""
+        signs = sum(1 if label.children[1] is None else 2 for label in labels)
+        if signs > _MOST_LABELS and self._scope.dialect is TextDialect.COMMON:
+            place = self.place(branch)
+            raise refused(place, tr("a branch has four labels at most; a range counts as two"))
 
     def _label(
         self,

@@ -10,11 +10,12 @@ from robolink.errors import JournalError
 from robolink.journal import EntryKind, NewEntry
 from tests.contract.journal._acts import marker
 
-SAMPLE = {"few": 20, "many": 40}
+SAMPLE = {"few": 20, "many": 2000}
+MANY = pytest.param("many", marks=[pytest.mark.soak, pytest.mark.timeout(600)])
 
 
 @pytest.mark.fault("F62")
-@pytest.mark.parametrize("sample", ["few", pytest.param("many", marks=pytest.mark.soak)])
+@pytest.mark.parametrize("sample", ["few", MANY])
 def test_f62_no_bent_bit_is_taken_for_the_record_or_costs_it(tmp_path, open_anew, sample):
     path = tmp_path / "journal.db"
     journal = open_anew(str(path))
@@ -60,6 +61,20 @@ def test_f62_a_bent_marker_is_not_acted_on(tmp_path, open_anew, was, bent):
     connection.close()
     with pytest.raises(JournalError, match="makes no sense"):
         open_anew(str(path)).log("cell").open_markers()
+
+
+@pytest.mark.fault("F62")
+def test_f62_a_marker_under_another_name_blocks_who_does_not_know_it(tmp_path, open_anew):
+    """Nobody would find it: the controller that it holds back has another name."""
+    path = tmp_path / "journal.db"
+    journal = open_anew(str(path))
+    journal.log("cell").begin(marker("left open"))
+    journal.close()
+    with sqlite3.connect(path) as connection:
+        connection.execute("UPDATE markers SET controller = 'cemm'")
+    connection.close()
+    with pytest.raises(JournalError, match="of cemm makes no sense"):
+        open_anew(str(path)).log("cell").begin(marker("another"))
 
 
 @pytest.mark.fault("F62")

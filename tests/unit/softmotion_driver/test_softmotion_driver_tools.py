@@ -20,11 +20,12 @@ from robolink.errors import (
     ReservedToolError,
     SelectedToolError,
     ToolChangedError,
+    ToolError,
     ToolIndexError,
     TransportTimeoutError,
     UndefinedToolError,
 )
-from robolink.model import ANY, EntryKind, ToolOffset, Verdict
+from robolink.model import ANY, EntryKind, ToolOffset, Verdict, describe_offset
 from robolink.protocols.mailbox import (
     Bits,
     Capability,
@@ -36,6 +37,7 @@ from robolink.protocols.mailbox import (
     Slot,
     kinematics_word,
 )
+from robolink.transaction import Wanted, change_tools, recover
 from tests.unit.softmotion_driver._plc import STRANGER
 
 OLD = ToolOffset(1.5, -2.0, 40.0, 10.0)
@@ -373,3 +375,46 @@ def test_a_slot_in_the_middle_of_a_change_is_read_again(cell, plc, controller):
     torn = iter([True, False])
     cell.link.read_slot = lambda slot: (*whole(slot)[:-1], 1) if next(torn) else whole(slot)
     assert controller.tools.read(3) is not None
+
+
+NO_TOOL = (-1.5e-27, 1.6e-314, 1.6e-314, 0.0, 0.0, 0.0)
+"""5.012, -1 and -10 whose words somebody has swapped."""
+
+
+def test_a_slot_with_the_values_of_no_tool_is_named_and_never_worked_with(plc, controller):
+    plc.slots[3] = replace(plc.slots[3], tool=NO_TOOL)
+    held = controller.tools.read(3)
+    assert held.components() == NO_TOOL
+    assert "the values of no tool" in describe_offset(held)
+    with pytest.raises(ToolError, match="values of no tool") as refusal:
+        controller.tools.select(3)
+    assert "'robolink tool clear'" in refusal.value.remedy
+    with pytest.raises(ToolError, match="values of no tool"):
+        controller.tools.write(4, held, expected=None)
+    assert plc.executed == []
+
+
+@pytest.mark.parametrize("wanted", [NEW, None])
+def test_a_slot_with_the_values_of_no_tool_is_written_or_cleared(plc, controller, wanted):
+    plc.slots[3] = replace(plc.slots[3], tool=NO_TOOL)
+    held = controller.tools.read(3)
+    (receipt,) = change_tools(controller, [Wanted(3, wanted, held)])
+    assert receipt.before == held
+    assert controller.tools.same(controller.tools.read(3), wanted)
+
+
+def test_an_angle_that_no_tool_has_is_not_taken_for_a_rotation(plc, controller):
+    plc.slots[3] = replace(plc.slots[3], tool=(1.0, 2.0, 3.0, 1e200, 0.0, 0.0))
+    with pytest.raises(ToolError, match="values of no tool"):
+        controller.tools.select(3)
+
+
+def test_a_write_that_left_the_values_of_no_tool_is_settled_with_a_way_out(cell, plc, controller):
+    cell.link.lose_answer("write_command")
+    with pytest.raises(OutcomeUnknownError):
+        controller.tools.write(3, NEW, expected=OLD)
+    plc.slots[3] = replace(plc.slots[3], tool=NO_TOOL)
+    done = recover(cell.connect(), confirm=lambda _finding: True)
+    (finding,) = done.settled
+    assert finding.verdict is Verdict.CONFLICT
+    assert "'robolink tool set' gives such a tool other values" in finding.sentence

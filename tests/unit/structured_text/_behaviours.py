@@ -5,24 +5,34 @@ not know.
 """
 
 import json
+from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any
 
+import pytest
+from robolink_simulators.cell.clock import ManualClock, ScaledClock
+from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
+from robolink_simulators.hosting.in_process import softmotion
 from robolink_simulators.softmotion import GroupOptions, SmcNumbers
 from robolink_simulators.softmotion.mailbox import MailboxOptions, PlcOptions, SoftMotionSimulator
 from robolink_simulators.softmotion.mailbox.plc import Plc
 from robolink_simulators.softmotion.program.structured_plc import PROGRAM_SOURCES, StructuredPlc
 from robolink_simulators.structured_text import SourceText
 
+from robolink.controllers import connect
+from robolink.errors import RobolinkError
 from robolink.protocols.mailbox import (
     CommandState,
     CoordinateSystem,
     ExportProfile,
     Opcode,
+    WordOrder,
     crc16,
+    find_probe,
     program_texts,
 )
-from tests.unit._mailbox_client import LINE, NO_TOOL, linked
+from robolink.transport import open_mailbox_link
+from tests.unit._mailbox_client import LINE, NO_TOOL, MailboxClient, linked
 
 HEARTBEAT, CRC = 9, 110
 NUMBERS = SmcNumbers(
@@ -58,16 +68,34 @@ def of_program(texts=None):
 class Bench:
     """One PLC that has just been switched on, a client that owns it, and what it took down."""
 
-    def __init__(self, folder, make_plc=Plc, kinematics="Kin_Scara3_Z", options=OPTIONS):
+    def __init__(self, folder, make_plc=Plc, kinematics="Kin_Scara3_Z", options=OPTIONS, bus="sim"):
         state = folder / f"{len(list(folder.iterdir()))}.json"
         document = {"schema": "robolink/plc-state/1", "machine": kinematics, "memory": SWITCHED_ON}
         state.write_text(json.dumps(document))
         self.plc = SoftMotionSimulator(
             kinematics, options=options, state_path=state, make_plc=make_plc
         )
-        self.client = linked(self.plc)
+        self._served = ExitStack()
+        self.client = self._connected(bus)
         self.client.take()
         self.taken = []
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self._served.close()
+
+    def _connected(self, bus):
+        """Meet the PLC in this process or over TCP, in either case on a clock that stands still."""
+        if bus == "sim":
+            return linked(self.plc)
+        clock = ManualClock()
+        host = serve_modbus_tcp(self.plc, clock=ScaledClock(base=clock))
+        self._served.enter_context(host)
+        link = open_mailbox_link(host.url, clock=clock)
+        self._served.callback(link.close)
+        return MailboxClient(link)
 
     def note(self, seconds=0.05):
         """Take the words down once all is still: heartbeat and checksum apart."""
@@ -102,11 +130,12 @@ class Bench:
         self.taken.append(list(self.client.link.read_slot(2)))
 
     def states(self, count):
-        """Take down the state of the group in each cycle."""
+        """Take down the state of the group in the middle of each cycle."""
+        clock = self.client.link.clock
         for _ in range(count):
+            clock.sleep(1.5 * CYCLE_S - clock.now_ns() / 1e9 % CYCLE_S)
             self.client.beat()
             self.taken.append(self.client.link.read_response()[7])
-            self.client.link.clock.sleep(CYCLE_S - 0.002)
 
 
 def b01_disabled(bench):
@@ -160,6 +189,14 @@ def b08_set_kinematics(bench):
     bench.set_tool(0.0, 0.0, 20.0)
     code = bench.taken[-1][88]
     assert bench.tell(Opcode.SET_KINEMATICS, code & 0xFF, code >> 8) == [10, 0]
+    bench.read_tool()
+
+
+def refused_kinematics(bench):
+    """Not one of the sixteen: codes that nothing has, and those of another machine."""
+    for codes, error_class in ((18, 0), 111), ((2, 300), 111), ((-1, 0), 111), ((0, 0), 303):
+        assert bench.tell(Opcode.SET_KINEMATICS, *codes) == [15, error_class]
+    assert bench.tell(Opcode.SET_KINEMATICS, 2, 255) == [15, 303]
     bench.read_tool()
 
 
@@ -249,6 +286,40 @@ def block_of_before(bench):
     assert client.now().ack_head < 10
 
 
+def high_first(text):
+    """Return a text whose author laid the words of an LREAL the other way round."""
+    return text.replace("* 65536.0;\n    part := TRUNC(mant);\n    w0 := DINT_TO_WORD(part);", SWAP)
+
+
+SWAP = """* 65536.0;
+    part := TRUNC(mant);
+    w0 := w3;
+    w3 := DINT_TO_WORD(part);
+    part := WORD_TO_DINT(w1);
+    w1 := w2;
+    w2 := DINT_TO_WORD(part);"""
+
+
+def b16_words_the_other_way_round(folder, make_plc):
+    """Require that the driver finds it and writes nothing."""
+    with Bench(folder, make_plc) as bench:
+        probe = find_probe(bench.client.link.read_response())
+        assert probe is not None
+        assert probe.order is WordOrder.HIGH_FIRST
+        written = _writes(bench.plc)
+        softmotion.register("swapped", bench.plc)
+        try:
+            with pytest.raises(RobolinkError, match="order"):
+                connect("softmotion+sim://swapped")
+        finally:
+            softmotion.unregister("swapped")
+        assert _writes(bench.plc) == written
+
+
+def _writes(plc):
+    return [text for _, _, text in plc.log if text.startswith("write")]
+
+
 def without_image(model):
     """Return a machine whose kinematics does not tell its orientations."""
     kinematics = type("Untold", (type(model.kinematics),), {"orientation_image": lambda *_: None})
@@ -256,3 +327,51 @@ def without_image(model):
     for name in getattr(model.kinematics, "__slots__", ()) or vars(model.kinematics):
         object.__setattr__(untold, name, getattr(model.kinematics, name))
     return replace(model, kinematics=untold)
+
+
+RUNS = [
+    (b01_disabled, "Kin_Scara3_Z"),
+    (b02_errorstop, "Kin_Scara3_Z"),
+    (b03_scara2_keeps_its_tool, "Kin_Scara2_Z"),
+    (b04_scara2_takes_a_turned_tool, "Kin_Scara2_Z"),
+    (b05_polar, "Kin_Polar_Z"),
+    (b06_rrr, "Kin_Pos_RRR"),
+    (b07_any_tool, "Kin_Gantry3"),
+    (b07_any_tool, "Kin_Tripod_Rotary"),
+    (b07_any_tool, "Kin_ArticulatedRobot_6DOF"),
+    (b07_any_tool, "Kin_4AxisPalletizer"),
+    (b07_any_tool, "Kin_5Axes"),
+    (b07_any_tool, "Kin_Bipod_Rotary"),
+    (b08_set_kinematics, "Kin_Scara3_Z"),
+    (b08_set_kinematics, "Kin_Gantry3+Kin_CAxis"),
+    (b08_set_kinematics, "Kin_Polar_Z+Kin_Wrist2"),
+    (b09_no_orientation_image, "Kin_Scara3_Z"),
+    (b10_enable_and_disable_twice, "Kin_Scara3_Z"),
+    (b11_nothing_to_reset, "Kin_Scara3_Z"),
+    (b12_a_line_ends_a_cycle_before_standby, "Kin_Scara3_Z"),
+    (b13_a_stop_is_held, "Kin_Scara3_Z"),
+    (b14_an_axis_alone, "Kin_Scara3_Z"),
+    (b15_jog_about_x, "Kin_ArticulatedRobot_6DOF"),
+    (block_of_before, "Kin_Scara3_Z"),
+    (refused_kinematics, "Kin_Gantry3+Kin_CAxis"),
+]
+"""Each behaviour with each kinematics that it names; the sixteenth is of its own kind."""
+
+
+def named(value):
+    """Return what stands for a behaviour, or a kinematics, in the name of a test."""
+    return getattr(value, "__name__", value)
+
+
+def taken(folder, behaviour, kinematics, make_plc, **served):
+    """Return the words that a behaviour takes down from a PLC of its own."""
+    if behaviour is b09_no_orientation_image:
+        make_plc = untold(make_plc)
+    with Bench(folder, make_plc, kinematics, **served) as bench:
+        behaviour(bench)
+    return bench.taken
+
+
+def untold(make_plc):
+    """Return what makes the same PLC for a kinematics that does not tell its orientations."""
+    return lambda model, parameters, options: make_plc(without_image(model), parameters, options)

@@ -75,6 +75,9 @@ BEYOND = [
     ("w[4] := 1;", "w : ARRAY [0..3] OF INT;", 5, 2),
     ("{region}", "r : INT;", 5, 1),
     ("t(PT := T#1s, PT := T#2s);", "t : TON;", 5, 15),
+    ("s := t;", "s, t : TON;", 5, 1),
+    ("CASE r OF 1, 2, 3, 4, 5: r := 2; END_CASE;", "r : INT;", 5, 11),
+    ("CASE r OF 1..2, 3..4, 5: r := 2; END_CASE;", "r : INT;", 5, 11),
 ]
 
 

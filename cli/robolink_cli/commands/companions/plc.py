@@ -47,7 +47,8 @@ def _symbols(given: tuple[str, str, str] | None) -> tuple[str, ...]:
     "--kinematics",
     default="",
     metavar="NAME",
-    help="Kinematics of the axis group, such as Kin_Scara3_Z; opcode 30004 sets it again.",
+    help="Kinematics of the axis group, such as Kin_Scara3_Z or Kin_Gantry3+Kin_CAxis;"
+    " opcode 30004 sets it again.",
 )
 @click.option(
     "--read-modes",

@@ -10,7 +10,7 @@ from robolink.protocols.mailbox import (
     ExportProfile,
     electronic_data_sheet,
     error_table_csv,
-    find_kinematics,
+    find_kinematics_word,
     plcopen_xml,
     program_texts,
     register_map_csv,
@@ -27,13 +27,14 @@ def plc_texts(
     Args:
         profile: Which opcodes the program holds.
         base: The first register of both blocks.
-        kinematics: Block name of the group's kinematics, for opcode 30004; empty for none.
+        kinematics: Block name of the group's kinematics, or two with a + between them, for opcode
+            30004; empty for none.
         read_modes: The three symbols of SMC_READ_TOOL_MODE, or none.
 
     Raises:
         ConfigError: There is no such kinematics.
     """
-    if kinematics and find_kinematics(kinematics) is None:
+    if kinematics and find_kinematics_word(kinematics) is None:
         raise ConfigError(
             tr("{name} is no kinematics of the register map.", name=kinematics),
             remedy=tr("See the table of kinematics in register_map.md."),

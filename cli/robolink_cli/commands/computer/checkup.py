@@ -1,30 +1,33 @@
 """The checks of ``doctor``: this computer, never a controller."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 from robolink.config import cell_names, check_file, config_files
 from robolink.errors import ConfigError
 from robolink.files.durable import state_folder
 from robolink.messages import tr
-from robolink_cli.commands.computer.doctor_finding import Level, Remark
+from robolink_cli.commands.computer.doctor_finding import Level, Remark, guarded
 from robolink_cli.commands.computer.lines import devices_of_cells
 from robolink_cli.commands.computer.requirements import check_name, check_versions
 from robolink_cli.commands.computer.serial_ports import serial_ports
 
 
 def check_up() -> list[Remark]:
-    """Return everything that was looked at."""
-    return [
-        *check_versions(),
-        *check_name(),
-        *check_state_folder(),
-        *check_cell_files(),
-        check_keyring(),
-        *check_serial_ports(),
-        *check_journal(),
-    ]
+    """Return everything that was looked at, what is worst first."""
+    looks: dict[str, Callable[[], Iterable[Remark]]] = {
+        "packages": check_versions,
+        "name": check_name,
+        "state": check_state_folder,
+        "cells": check_cell_files,
+        "keyring": check_keyring,
+        "serial": check_serial_ports,
+        "lines": check_lines_of_cells,
+        "journal": check_journal,
+    }
+    found = [remark for subject, look in looks.items() for remark in guarded(subject, look)]
+    return sorted(found, key=lambda remark: list(Level).index(remark.level), reverse=True)
 
 
 def check_state_folder() -> Iterator[Remark]:
@@ -80,18 +83,20 @@ def check_cell_files() -> Iterator[Remark]:
         yield Remark("cells", Level.OK, tr("there is no cell file; -c takes a URL."))
 
 
-def check_keyring() -> Remark:
+def check_keyring() -> Iterator[Remark]:
     """See whether passwords can be kept in the system's keyring."""
     other = tr("A password can come from --password-file or ROBOLINK_PASSWORD.")
     try:
         import keyring
         from keyring.backends import fail
     except ImportError:
-        return Remark("keyring", Level.OK, tr("not installed; it is optional."), other)
+        yield Remark("keyring", Level.OK, tr("not installed; it is optional."), other)
+        return
     found = keyring.get_keyring()
     if isinstance(found, fail.Keyring):
-        return Remark("keyring", Level.WARN, tr("this computer has no keyring service."), other)
-    return Remark("keyring", Level.OK, type(found).__module__)
+        yield Remark("keyring", Level.WARN, tr("this computer has no keyring service."), other)
+    else:
+        yield Remark("keyring", Level.OK, type(found).__module__)
 
 
 def check_serial_ports() -> Iterator[Remark]:
@@ -112,8 +117,13 @@ def check_serial_ports() -> Iterator[Remark]:
             )
     if not ports:
         yield Remark("serial", Level.OK, tr("there is no serial port."))
+
+
+def check_lines_of_cells() -> Iterator[Remark]:
+    """See whether the ports that cells name are there."""
+    known = [port.device for port in serial_ports()]
     for device, names in devices_of_cells().items():
-        if not Path(device).exists() and device not in [port.device for port in ports]:
+        if not Path(device).exists() and device not in known:
             yield Remark(
                 "serial",
                 Level.WARN,

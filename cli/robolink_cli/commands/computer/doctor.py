@@ -12,7 +12,8 @@ from robolink_cli.session.context import json_option
 def doctor() -> int:
     """Look at versions, folders, cell files, passwords, ports and unsettled work.
 
-    No controller is spoken to and nothing is changed. Ends with 1 when something is bad.
+    No controller is spoken to and nothing is changed. What is wrong stands first; then the exit
+    code is 1.
     """
     from dataclasses import asdict
 
@@ -29,5 +30,9 @@ def doctor() -> int:
             say(f"{remark.level:4}  {remark.subject}: {remark.what}")
             if remark.remedy:
                 say(f"      {remark.remedy}")
-        say(tr("No obstacle was found.") if healthy else tr("Something is in the way; see above."))
+        say(
+            tr("No obstacle was found.")
+            if healthy
+            else tr("Something is in the way; see the first lines.")
+        )
     return 0 if healthy else 1

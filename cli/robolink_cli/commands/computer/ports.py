@@ -14,19 +14,33 @@ if TYPE_CHECKING:
 
 @click.command()
 @json_option
-def ports() -> None:
-    """List the serial ports, the cells on them, and whether you may use them. Opens none."""
+def ports() -> int:
+    """List the serial ports, the cells on them, and whether you may use them. Opens none.
+
+    Ends with 1 when the system or a cell file could not be asked; what could be is shown.
+    """
     from dataclasses import asdict
 
+    from robolink_cli.commands.computer.doctor_finding import tried
     from robolink_cli.commands.computer.lines import devices_of_cells
-    from robolink_cli.commands.computer.serial_ports import serial_ports
+    from robolink_cli.commands.computer.serial_ports import ports_unknown, serial_ports
 
-    found, cells = serial_ports(), devices_of_cells()
+    problems: list[str] = []
+    found = tried(serial_ports, ports_unknown, problems) or []
+    cells = tried(devices_of_cells, _cells_unknown, problems) or {}
     if json_is_on():
         entries = [{**asdict(port), "cells": cells.get(port.device, [])} for port in found]
-        emit_json("robolink/ports/1", {"ports": entries})
+        emit_json("robolink/ports/1", {"ports": entries, "problems": problems})
     else:
-        _show(found, cells)
+        for problem in problems:
+            say(problem)
+        if found or not problems:
+            _show(found, cells)
+    return 1 if problems else 0
+
+
+def _cells_unknown(error: str) -> str:
+    return tr("Which cells are on serial ports could not be found out ({error}).", error=error)
 
 
 def _show(found: "list[SerialPort]", cells: dict[str, list[str]]) -> None:

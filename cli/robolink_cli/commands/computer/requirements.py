@@ -3,13 +3,14 @@
 import re
 import sys
 from collections.abc import Iterator
+from functools import partial
 from importlib import metadata
 from pathlib import Path
 from typing import Final, NamedTuple
 
 import robolink
 from robolink.messages import tr
-from robolink_cli.commands.computer.doctor_finding import Level, Remark
+from robolink_cli.commands.computer.doctor_finding import Level, Remark, guarded
 
 _REQUIREMENT: Final = re.compile(
     r"(?P<name>[\w.-]+)\s*(\[[^]]*])?\s*\(?(?P<range>[^;()]*)\)?"
@@ -77,9 +78,7 @@ def check_versions() -> Iterator[Remark]:
         return
     yield _python(own.metadata["Requires-Python"])
     for text in own.requires or ():
-        wanted = requirement(text)
-        if wanted.extra != _DEVELOPMENT:
-            yield _package(wanted)
+        yield from guarded(text, partial(_required, text))
 
 
 def check_name() -> Iterator[Remark]:
@@ -128,6 +127,12 @@ def _python(versions: str) -> Remark:
         tr("{version} is installed, {versions} is needed.", version=version, versions=versions),
         tr("Install robolink with a newer Python."),
     )
+
+
+def _required(text: str) -> Iterator[Remark]:
+    wanted = requirement(text)
+    if wanted.extra != _DEVELOPMENT:
+        yield _package(wanted)
 
 
 def _package(wanted: Requirement) -> Remark:

@@ -47,9 +47,10 @@ def scan(addresses: str | None, port: int, timeout_s: float, lines: tuple[str, .
     and tell the status. That changes and moves nothing on an EPSON controller; do not name a line
     with a device on it that these five bytes could harm.
     """
+    from robolink_cli.commands.computer.doctor_finding import tried
     from robolink_cli.commands.computer.lines import as_json, ask_lines, show_lines
     from robolink_cli.commands.computer.scanning import State, parse_range, probe_all
-    from robolink_cli.commands.computer.serial_ports import serial_ports
+    from robolink_cli.commands.computer.serial_ports import ports_unknown, serial_ports
 
     if addresses is None and not lines:
         raise click.UsageError(tr("Give a range of addresses, or a serial line with --line."))
@@ -57,7 +58,8 @@ def scan(addresses: str | None, port: int, timeout_s: float, lines: tuple[str, .
     asked = ask_lines(lines, timeout_s)
     probes = probe_all(wanted, port, timeout_s) if wanted else []
     answering = [f"epson+tcp://{p.address}:{port}" for p in probes if p.state is State.OPEN]
-    serial = [found.device for found in serial_ports()]
+    problems: list[str] = []
+    serial = [found.device for found in tried(serial_ports, ports_unknown, problems) or []]
     if json_is_on():
         entries = [
             {"address": p.address, "state": p.state, "elapsed_ms": p.elapsed_ms} for p in probes
@@ -69,13 +71,17 @@ def scan(addresses: str | None, port: int, timeout_s: float, lines: tuple[str, .
             "probes": entries,
             "serial_ports": serial,
             "lines": [as_json(line) for line in asked],
+            "problems": problems,
         }
         emit_json("robolink/scan/1", document)
         return
     show_lines(asked)
     if wanted:
         _show(probes, port, timeout_s, answering)
-    say(tr("serial ports of this computer: {ports}", ports=", ".join(serial) or tr("none")))
+    for problem in problems:
+        say(problem)
+    if not problems:
+        say(tr("serial ports of this computer: {ports}", ports=", ".join(serial) or tr("none")))
 
 
 def _show(

@@ -3,6 +3,8 @@
 import os
 from dataclasses import dataclass
 
+from robolink.messages import tr
+
 
 @dataclass(frozen=True, slots=True)
 class SerialPort:
@@ -38,6 +40,11 @@ def serial_ports() -> list[SerialPort]:
         )
         for port in sorted(list_ports.comports())
     ]
+
+
+def ports_unknown(error: str) -> str:
+    """Return the sentence for a system that did not list its ports."""
+    return tr("The serial ports of this computer could not be listed ({error}).", error=error)
 
 
 def _group_of(device: str) -> str:

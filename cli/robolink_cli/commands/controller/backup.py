@@ -7,6 +7,7 @@ import click
 from robolink.messages import tr
 from robolink_cli.options.consent import dry_run_option, published_option, yes_option
 from robolink_cli.prompts.questions import agree
+from robolink_cli.session.completing import complete_tool
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.opening import open_controller
 
@@ -94,7 +95,14 @@ def compare(
 
 @click.command()
 @click.argument("file", type=_FILE)
-@click.option("--tool", "tools", type=int, multiple=True, help="Only this tool; may be repeated.")
+@click.option(
+    "--tool",
+    "tools",
+    type=int,
+    multiple=True,
+    shell_complete=complete_tool,
+    help="Only this tool; may be repeated.",
+)
 @click.option("--selected", is_flag=True, help="Also put the backup's tool in force.")
 @click.option(
     "--other-controller",

@@ -18,6 +18,7 @@ from robolink_cli.options.consent import (
 from robolink_cli.options.numbers import DECIMAL
 from robolink_cli.prompts.jumps import Allowed, accept_jump, accept_jump_options, allowed_by
 from robolink_cli.prompts.questions import agree
+from robolink_cli.session.completing import complete_tool
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.opening import open_controller
 
@@ -60,7 +61,7 @@ def list_tools(context: CliContext, published: bool) -> None:
 
 
 @tool.command("get")
-@click.argument("number", type=int, required=False)
+@click.argument("number", type=int, required=False, shell_complete=complete_tool)
 @click.option(
     "--mode",
     type=click.Choice(["set", "active", "last"]),
@@ -111,7 +112,7 @@ def _get_by_mode(context: CliContext, mode: str) -> None:
 
 
 @tool.command("set")
-@click.argument("number", type=int)
+@click.argument("number", type=int, shell_complete=complete_tool)
 @click.option("--x", type=DECIMAL, help="mm from the flange.")
 @click.option("--y", type=DECIMAL, help="mm from the flange.")
 @click.option("--z", type=DECIMAL, help="mm from the flange.")
@@ -155,7 +156,9 @@ def set_tool(
         controller.tools.require_writable(number)
         before = controller.tools.read(number)
         note_change(controller, number, before)
-        wanted = replace(before or ToolOffset(), **changes)
+        # Nothing of what no tool has is kept beside what was given.
+        kept_from = ToolOffset() if before is None or before.of_no_tool else before
+        wanted = replace(kept_from, **changes)
         kept = [name for name in units.values() if name not in changes]
         shown = offset_payload(before), offset_payload(wanted)
         if dry_run:
@@ -189,7 +192,7 @@ def set_tool(
 
 
 @tool.command("clear")
-@click.argument("number", type=int)
+@click.argument("number", type=int, shell_complete=complete_tool)
 @then_select_option
 @controller_options
 @dry_run_option
@@ -247,7 +250,7 @@ def _clear_question(number: int, then_select: int | None) -> str:
 
 
 @tool.command("select")
-@click.argument("number", type=int)
+@click.argument("number", type=int, shell_complete=complete_tool)
 @controller_options
 @dry_run_option
 @yes_option

@@ -11,12 +11,19 @@ from robolink_cli.console.render import say
 from robolink_cli.options.impact import impact_payload, impact_request, show_impact
 from robolink_cli.options.numbers import DECIMAL
 from robolink_cli.options.report import report_options, report_request, reporting
+from robolink_cli.session.completing import complete_tool
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.opening import open_controller
 
 
 @click.command()
-@click.option("--tool", type=click.IntRange(1, 15), required=True, help="Number of the tool.")
+@click.option(
+    "--tool",
+    type=click.IntRange(1, 15),
+    required=True,
+    shell_complete=complete_tool,
+    help="Number of the tool.",
+)
 @click.option("--x", type=DECIMAL, help="New offset, mm from the flange; left out: as stored.")
 @click.option("--y", type=DECIMAL, help="mm from the flange.")
 @click.option("--z", type=DECIMAL, help="mm from the flange.")

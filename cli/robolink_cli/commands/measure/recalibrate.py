@@ -8,12 +8,18 @@ from robolink.messages import declared
 from robolink_cli.options.consent import dry_run_option, yes_option
 from robolink_cli.options.recipe_answers import answer_options
 from robolink_cli.options.sensor import sensor_option
+from robolink_cli.session.completing import complete_recipe
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.operator_identity import nozzle_options
 
 
 @click.command()
-@click.argument("recipe", metavar="RECIPE.toml", type=click.Path(dir_okay=False, path_type=Path))
+@click.argument(
+    "recipe",
+    metavar="RECIPE.toml",
+    type=click.Path(dir_okay=False, path_type=Path),
+    shell_complete=complete_recipe,
+)
 @click.option(
     "--reference",
     is_flag=True,

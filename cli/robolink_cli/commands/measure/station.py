@@ -4,6 +4,7 @@ import click
 
 from robolink.messages import declared, tr
 from robolink_cli.options.consent import dry_run_option, yes_option
+from robolink_cli.session.completing import complete_station, complete_tool
 from robolink_cli.session.context import CliContext, controller_options
 
 
@@ -32,7 +33,7 @@ def list_stations(context: CliContext, robot: str | None) -> None:
 
 
 @station.command("show")
-@click.argument("name", metavar="ID")
+@click.argument("name", metavar="ID", shell_complete=complete_station)
 @_robot_option
 @controller_options
 def show(context: CliContext, name: str, robot: str | None) -> None:
@@ -45,8 +46,14 @@ def show(context: CliContext, name: str, robot: str | None) -> None:
 
 
 @station.command("learn")
-@click.argument("name", metavar="ID")
-@click.option("--tool", type=click.IntRange(1, 15), required=True, help=declared("The known tool."))
+@click.argument("name", metavar="ID", shell_complete=complete_station)
+@click.option(
+    "--tool",
+    type=click.IntRange(1, 15),
+    required=True,
+    shell_complete=complete_tool,
+    help=declared("The known tool."),
+)
 @click.option(
     "--sigma",
     "sigma_mm",

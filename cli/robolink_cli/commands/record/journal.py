@@ -21,6 +21,7 @@ from robolink_cli.commands.record.journal_lookup import (
 from robolink_cli.console.render import emit_json, json_is_on, say
 from robolink_cli.lazy_group import LazyGroup
 from robolink_cli.options.shared import json_option
+from robolink_cli.session.completing import complete_tool
 
 if TYPE_CHECKING:
     from robolink.journal import Journal
@@ -41,7 +42,12 @@ def _filters(function: F) -> F:
             shell_complete=complete_cell,
             help=declared("Only of this controller; without it, of all."),
         ),
-        click.option("--tool", type=int, help=declared("Only about this tool.")),
+        click.option(
+            "--tool",
+            type=int,
+            shell_complete=complete_tool,
+            help=declared("Only about this tool."),
+        ),
         click.option(
             "--kind",
             "kinds",

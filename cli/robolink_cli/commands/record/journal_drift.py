@@ -11,6 +11,7 @@ from robolink_cli.access.cell import complete_cell
 from robolink_cli.commands.record.journal_lookup import controller_meant, journal_to_read
 from robolink_cli.console.render import emit_json, json_is_on, say
 from robolink_cli.options.shared import json_option
+from robolink_cli.session.completing import complete_tool
 
 if TYPE_CHECKING:
     from robolink.drift import CellDrift
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     shell_complete=complete_cell,
     help=declared("Only of this controller; without it, of all."),
 )
-@click.option("--tool", type=int, help=declared("Only this tool."))
+@click.option("--tool", type=int, shell_complete=complete_tool, help=declared("Only this tool."))
 @click.option(
     "--since",
     type=click.DateTime(["%Y-%m-%d"]),

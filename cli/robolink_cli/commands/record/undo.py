@@ -6,13 +6,16 @@ from robolink.errors import ConfigError, DeclinedError
 from robolink.messages import declared, tr
 from robolink_cli.options.consent import dry_run_option, then_select_option, yes_option
 from robolink_cli.prompts.questions import agree, on_terminal
+from robolink_cli.session.completing import complete_tool
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.opening import open_controller
 
 
 @click.command()
 @click.argument("change", required=False)
-@click.option("--tool", type=int, help=declared("Only this tool of the change."))
+@click.option(
+    "--tool", type=int, shell_complete=complete_tool, help=declared("Only this tool of the change.")
+)
 @click.option(
     "--to",
     type=click.IntRange(min=1),

@@ -10,7 +10,7 @@ from robolink.controllers.softmotion.link.snapshots import Snapshots
 from robolink.controllers.softmotion.link.wire import MailboxWire
 from robolink.errors import RemoteProtocolError
 from robolink.messages import tr
-from robolink.model import OutcomeLog, Pose, ToolOffset
+from robolink.model import OutcomeLog, Pose, ToolOffset, of_no_tool
 from robolink.protocols.mailbox import (
     Command,
     Response,
@@ -95,8 +95,15 @@ class Mailbox(DriverLink):
         return ToolOffset(*self.coordinates(frame))
 
     def tool_in(self, slot: Slot) -> ToolOffset | None:
-        """Return what a slot holds, ``None`` when it is empty."""
-        return self.from_plc(slot.tool) if slot.defined else None
+        """Return what a slot holds, ``None`` when it is empty.
+
+        Values of no tool come as they are: an angle of 1e200 degrees made a rotation would look
+        like one that somebody meant.
+        """
+        if not slot.defined:
+            return None
+        tool = self.from_plc(slot.tool)
+        return ToolOffset(*slot.tool) if of_no_tool(slot.tool) else tool
 
     def pose(self, frame: Six, *, tool: int | None) -> Pose:
         """Return where a frame that the PLC tells is, without the tilt that is mere rounding.
@@ -122,7 +129,8 @@ class Mailbox(DriverLink):
         Raises:
             RemoteProtocolError: A number in it is not finite.
         """
-        if not all(map(math.isfinite, frame)):
+        x, y, z, *_ = frame
+        if not all(map(math.isfinite, (*frame, *(v * self.unit_um for v in (x, y, z))))):
             raise self.wire.ended(
                 RemoteProtocolError(
                     tr("{identity} sent a position with no number.", identity=self.identity),

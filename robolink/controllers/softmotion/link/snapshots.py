@@ -22,6 +22,7 @@ from robolink.errors import (
     TransportTimeoutError,
 )
 from robolink.messages import tr
+from robolink.model import of_no_tool
 from robolink.protocols.mailbox import (
     PROBE,
     RESPONSE,
@@ -123,11 +124,6 @@ LOOK_S: Final = 0.3
 
 _READS: Final = 3
 
-_LEAST: Final = 1e-100
-_MOST: Final = 1e9
-"""Beyond what any tool has in any unit, rounding included. A round number whose words are in
-another order is far below; of any other one in six lies in between."""
-
 T = TypeVar("T")
 
 
@@ -199,17 +195,23 @@ class Snapshots:
         """Read a tool slot; needs no ownership, and raises like :meth:`take`.
 
         A slot has no probe. So values that no tool has are looked into: a program that was
-        changed while it ran may lay them in another order (docs/reference/faults.md F33).
+        changed while it ran may lay them in another order (docs/reference/faults.md F33). Where
+        that is not so, the slot really holds them, and a person has to be able to replace them:
+        whoever reads it asks :attr:`robolink.model.ToolOffset.of_no_tool`.
 
         Args:
             number: Of the slot.
             keep: Whether the session goes on after a slot that cannot be used.
         """
         name = tr("Tool slot {number}", number=number)
-        slot = self._whole(lambda: self._wire.read_slot(number), decode_slot, name, keep=keep)
-        if any(value and not _LEAST < abs(value) < _MOST for value in slot.tool):
+
+        def read() -> Slot:
+            return self._whole(lambda: self._wire.read_slot(number), decode_slot, name, keep=keep)
+
+        slot = read()
+        if of_no_tool(slot.tool):
             self.take()  # tells by the probe what is the matter, if it is the order
-            raise self._useless(name, tr("its values are those of no tool"), keep=keep)
+            return read()
         return slot
 
     def news(

@@ -6,7 +6,7 @@ from importlib.resources import files
 from typing import Final
 
 from robolink.protocols.mailbox._codes import ExportProfile
-from robolink.protocols.mailbox._kinematics import find_kinematics
+from robolink.protocols.mailbox._kinematics import find_kinematics_word
 
 PROGRAM_FILES: Final = (
     "robolink_core.st",
@@ -34,17 +34,21 @@ def program_texts(
     Args:
         profile: With ``TOOLS`` nothing that moves is in the text.
         base: The first word of inputs and outputs.
-        kinematics: Block name of the axis group's kinematics, such as ``Kin_Scara3_Z``; opcode
-            30004 sets it again. Without one, and for a coupled one, that opcode is not served.
+        kinematics: Block name of the axis group's kinematics, such as ``Kin_Scara3_Z``, or of two
+            that are coupled, ``Kin_Gantry3+Kin_CAxis``; opcode 30004 sets it again. Without one
+            that opcode is refused, 303.
         read_modes: Symbols of SMC_READ_TOOL_MODE for the set tool, that of the active movement
             and that of the movement commanded last. With them the program reads the tool by
             SMC_GroupReadTool; without, since no document names them, it remembers the one that
             it set last.
     """
     folder = files(__package__) / "program_sources"
-    code = find_kinematics(kinematics) or 0
+    code = find_kinematics_word(kinematics) or 0
+    position, coupled, orientation = kinematics.partition("+")
     keep = {"full": profile is ExportProfile.FULL}
     keep["kinematics"] = keep["full"] and bool(code)
+    keep["no kinematics"] = not keep["kinematics"]
+    keep["coupled"] = keep["kinematics"] and bool(coupled)
     keep |= {"read tool": bool(read_modes), "from memory": not read_modes}
     texts = {}
     for name in PROGRAM_FILES:
@@ -52,7 +56,9 @@ def program_texts(
         for section, kept in keep.items():
             pattern = re.compile(_SECTION.format(name=section), re.DOTALL)
             text = pattern.sub(r"\1" if kept else "", text)
-        text = text.replace("RL_KINEMATICS_TYPE", f"TRAFO.{kinematics}")
+        text = text.replace("RL_KINEMATICS_TYPE", "Kin_Coupled" if coupled else kinematics)
+        text = text.replace("RL_POSITION_TYPE", position)
+        text = text.replace("RL_ORIENTATION_TYPE", orientation)
         for placeholder, symbol in zip(_READ_MODES, read_modes, strict=False):
             text = text.replace(placeholder, symbol)
         text = text.replace("kinematics : UINT := 0;", f"kinematics : UINT := {code};")

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from robolink_simulators.epson.definitions.added_arms import AddedArms
 from robolink_simulators.epson.definitions.arches import ArchTable
+from robolink_simulators.epson.definitions.areas import CheckedAreas
 from robolink_simulators.epson.definitions.curves import CurveFiles
 from robolink_simulators.epson.definitions.xy_limits import XYLimits
 
@@ -17,6 +18,7 @@ class KeptDefinitions:
     Attributes:
         arches: Those of Jump.
         arms: Added arms; that they are kept as tools are is assumed.
+        areas: Boxes and planes that are checked.
         curves: The files of Curve.
         limits: Those of XYLim; that they are kept is assumed, their mode is not (documented).
     """
@@ -24,13 +26,14 @@ class KeptDefinitions:
     def __init__(self, own_arm: Sequence[float]) -> None:
         self.arches = ArchTable()
         self.arms = AddedArms(own_arm)
+        self.areas = CheckedAreas()
         self.curves = CurveFiles()
         self.limits = XYLimits()
 
     @property
     def changes(self) -> int:
         """How often something of it was changed."""
-        parts = (self.arches, self.arms, self.curves, self.limits)
+        parts = (self.arches, self.arms, self.areas, self.curves, self.limits)
         return sum(part.changes for part in parts)
 
     def to_state(self) -> dict[str, object]:
@@ -38,6 +41,7 @@ class KeptDefinitions:
         return {
             "arches": self.arches.to_state(),
             "arms": self.arms.to_state(),
+            "areas": self.areas.to_state(),
             "curves": self.curves.to_state(),
             "limits": self.limits.to_state(),
         }
@@ -50,5 +54,7 @@ class KeptDefinitions:
         """
         self.arches.restore(state["arches"])
         self.arms.restore(state["arms"])
+        if "areas" in state:  # a file of before there were any
+            self.areas.restore(state["areas"])
         self.curves.restore(state["curves"])
         self.limits.restore(state["limits"])

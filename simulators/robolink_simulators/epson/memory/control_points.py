@@ -32,6 +32,10 @@ class ControlPoints:
             raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"There is no control point {number}")
         return number in self._places
 
+    def numbers(self) -> list[int]:
+        """Return the numbers of those that are defined."""
+        return sorted(self._places)
+
     def get(self, number: int) -> Coordinates:
         """Return where one is, X Y Z in mm and U V W in degrees.
 

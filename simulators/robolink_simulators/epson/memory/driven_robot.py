@@ -97,6 +97,12 @@ class DrivenRobot:
         check_ranges(self.model, joints)
         return self._tip_of(forward(self.model, joints))
 
+    def tip_on_the_way(self, instant_ns: int | None) -> Pose:
+        """Return the tip at an instant of the motion under way, or for ``None`` at the present."""
+        if instant_ns is None:
+            return self.tip()
+        return self._tip_of(forward(self.model, self.arm.position_at(instant_ns)))
+
     def joints_for(self, target: Point) -> Joints:
         """Return the joints that bring the selected tool's tip to a point.
 

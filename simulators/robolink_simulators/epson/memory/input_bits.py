@@ -33,6 +33,11 @@ class InputBits(BitBank):
         """Whether any input follows the robot."""
         return bool(self._senses)
 
+    @property
+    def instant_ns(self) -> int | None:
+        """The instant that is looked at inside :meth:`as_at`, ``None`` for the present."""
+        return self._instant_ns
+
     def connect(self, number: int, sense: Sense) -> None:
         """Let an input follow something whose state depends on where the robot is.
 

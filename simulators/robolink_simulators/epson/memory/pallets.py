@@ -19,11 +19,13 @@ class Pallet:
         corners: Corners 1, 2 and 3, and the one opposite to 1 if it was given.
         columns: How many.
         rows: How many.
+        outside: Whether places beyond its edges may be named by column and row.
     """
 
     corners: tuple[Point, ...]
     columns: int
     rows: int
+    outside: bool = False
 
     def place(self, *position: int) -> Point:
         """Return a place by its number, counted along the columns from 1, or by column and row.
@@ -38,7 +40,8 @@ class Pallet:
             row, column = divmod(position[0] - 1, self.columns)
         else:
             column, row = (number - 1 for number in position)
-        if not (0 <= column < self.columns and 0 <= row < self.rows):
+        named = len(position) > 1 and self.outside
+        if not named and not (0 <= column < self.columns and 0 <= row < self.rows):
             raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"No place {position} on the pallet")
         along, across = _share(column, self.columns), _share(row, self.rows)
         x, y, z = (self._coordinate(axis, along, across) for axis in range(3))
@@ -73,7 +76,19 @@ class PalletTable:
             raise SpelRefusal(RefusalKind.PALLET_UNDEFINED, f"Pallet {number} is not defined")
         return self._pallets[number]
 
-    def define(self, number: int, corners: Sequence[Point], columns: int, rows: int) -> None:
+    def all(self) -> dict[int, Pallet]:
+        """Return the pallets by their numbers."""
+        return dict(sorted(self._pallets.items()))
+
+    def define(
+        self,
+        number: int,
+        corners: Sequence[Point],
+        columns: int,
+        rows: int,
+        *,
+        outside: bool = False,
+    ) -> None:
         """Define a pallet.
 
         Raises:
@@ -83,7 +98,7 @@ class PalletTable:
             raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"Pallet {number}, {columns}, {rows}")
         if columns * rows > _MOST_PLACES:
             raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"{columns * rows} places")
-        self._pallets[number] = Pallet(tuple(corners), columns, rows)
+        self._pallets[number] = Pallet(tuple(corners), columns, rows, outside)
 
     def clear(self, number: int) -> None:
         """Forget a pallet; one that is not defined may be forgotten."""

@@ -46,6 +46,20 @@ class Point:
         x, y, z, u, v, w = (value if i == index else old for i, old in enumerate(self.coordinates))
         return replace(self, coordinates=(x, y, z, u, v, w), given=max(self.given, index + 1))
 
+    def assigned(self, what: str, value: float) -> "Point":
+        """Return the point with a coordinate replaced, or for ``LOCAL`` its local.
+
+        Raises:
+            Refusal: There is no such local, or no such coordinate.
+        """
+        if what == "LOCAL":
+            if not 0 <= value <= HIGHEST_LOCAL:
+                raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"There is no local {value:g}")
+            return replace(self, local=int(value))
+        if what not in AXES:
+            raise SpelRefusal(RefusalKind.OTHER_ROBOT, f"This robot has no axis {what}")
+        return self.with_axis(what, value)
+
     def shifted(self, axis: str, by: float) -> "Point":
         """Return the point with ``by`` added to one coordinate."""
         return self.with_axis(axis, self.coordinates[AXES.index(axis)] + by)
@@ -60,7 +74,11 @@ class Point:
 
 @dataclass(frozen=True, slots=True)
 class Local:
-    """A local coordinate system, seen from the base (V and W are 0 on a SCARA)."""
+    """A local coordinate system, seen from the base (V and W are 0 on a SCARA).
+
+    Attributes:
+        base_u: Whether U of its points is that of the base (BaseU).
+    """
 
     x_mm: float = 0.0
     y_mm: float = 0.0
@@ -68,6 +86,7 @@ class Local:
     u_deg: float = 0.0
     v_deg: float = 0.0
     w_deg: float = 0.0
+    base_u: bool = False
 
     @property
     def frame(self) -> Frame:
@@ -78,13 +97,14 @@ class Local:
         """Express coordinates of this planar local in the base frame, U taken literally."""
         x, y, z, u, v, w = coordinates
         dx_mm, dy_mm = rotate_xy(x, y, self.u_deg)
-        return (self.x_mm + dx_mm, self.y_mm + dy_mm, self.z_mm + z, u + self.u_deg, v, w)
+        turned_deg = u if self.base_u else u + self.u_deg
+        return (self.x_mm + dx_mm, self.y_mm + dy_mm, self.z_mm + z, turned_deg, v, w)
 
     def from_base(self, coordinates: Coordinates) -> Coordinates:
         """Express base coordinates in this planar local."""
         x, y, z, u, v, w = coordinates
         in_x, in_y = rotate_xy(x - self.x_mm, y - self.y_mm, -self.u_deg)
-        return (in_x, in_y, z - self.z_mm, u - self.u_deg, v, w)
+        return (in_x, in_y, z - self.z_mm, u if self.base_u else u - self.u_deg, v, w)
 
 
 def frame_at(coordinates: Coordinates) -> Frame:
@@ -108,6 +128,10 @@ class LocalTable:
     def __init__(self, *, tilting: bool = False) -> None:
         self.tilting = tilting
         self._locals: dict[int, Local] = {0: Local()}
+
+    def defined(self, number: int) -> bool:
+        """Tell whether a local is defined (LocalDef)."""
+        return number in self._locals
 
     def get(self, number: int) -> Local:
         """Return a local.
@@ -148,7 +172,8 @@ class LocalTable:
         local = self.get(point.local)
         if point.local == 0:
             return point
-        if self.tilting:
+        # A local of two pairs is turned about Z alone: with BaseU its U is simply not added.
+        if self.tilting and not local.base_u:
             coordinates = coordinates_of_frame(local.frame @ frame_at(point.coordinates))
         else:
             coordinates = local.to_base(point.coordinates)
@@ -161,7 +186,7 @@ class LocalTable:
         base, local = self.to_base(point), self.get(number)
         if number == 0:
             return base
-        if self.tilting:
+        if self.tilting and not local.base_u:
             seen = local.frame.inverse() @ frame_at(base.coordinates)
             return replace(base, coordinates=coordinates_of_frame(seen), local=number)
         return replace(base, coordinates=local.from_base(base.coordinates), local=number)
@@ -173,6 +198,20 @@ class PointTable:
     def __init__(self) -> None:
         self._points: dict[int, Point] = {}
         self._labels: dict[str, int] = {}
+        self._descriptions: dict[int, str] = {}
+
+    def describe(self, number: int, text: str) -> None:
+        """Keep a description of a stored point (PDescription).
+
+        Raises:
+            Refusal: The point is not defined.
+        """
+        self.get(number)
+        self._descriptions[number] = text
+
+    def description(self, number: int) -> str:
+        """Return the description of a point, nothing where it has none."""
+        return self._descriptions.get(number, "")
 
     def label(self, number: int, name: str) -> None:
         """Give a point a name; where it was the name of another point, it is moved."""
@@ -191,6 +230,7 @@ class PointTable:
         """Forget every point and label."""
         self._points.clear()
         self._labels.clear()
+        self._descriptions.clear()
 
     def get(self, number: int) -> Point:
         """Return a stored point.
@@ -225,6 +265,7 @@ class PointTable:
         """Forget a range of points; undefined ones are fine (docs/reference/spel.md 5.1)."""
         for number in self.numbers(first, last):
             del self._points[number]
+            self._descriptions.pop(number, None)
 
     def numbers(self, first: int = 0, last: int = HIGHEST_POINT) -> list[int]:
         """Return the numbers of the stored points in a range.

@@ -63,7 +63,14 @@ class TreeBuilder(Transformer[Token, tuple[Statement, ...]]):
 
     def command(self, word: Token, items: Items | None, trailing: Token | None) -> KeywordStatement:
         """Build a keyword statement."""
-        return KeywordStatement(word.lower(), items or (), trailing is not None)
+        name, given = word.lower(), items or ()
+        if name == "box":
+            given = _with_area_local(given)
+        elif name == "local":
+            given = _with_words(given)
+        elif name.startswith("pallet") and name != "palletclr":
+            name = " ".join(name.rstrip(", \t").split())
+        return KeywordStatement(name, given, trailing is not None)
 
     def motion(self, verb: Token, *parts: Target | MotionOptions) -> MotionStatement:
         """Build a motion and join its options, which stand in any order."""
@@ -264,6 +271,35 @@ class TreeBuilder(Transformer[Token, tuple[Statement, ...]]):
     def name(self, word: Token, items: Items | None) -> Name:
         """Build a constant, a variable or a call."""
         return Name(word.lower(), items)
+
+
+_WORDS_OF_LOCAL = frozenset({"l", "r", "x", "y", "baseu"})
+_FEWEST_BEFORE_WORDS = 3
+
+
+def _with_words(items: Items) -> Items:
+    """Return the arguments of Local with the words at their end as texts, not as names."""
+    words = list[Expression]()
+    while len(items) > _FEWEST_BEFORE_WORDS:
+        match items[-1]:
+            case Name(word, None) if word in _WORDS_OF_LOCAL:
+                words.insert(0, Literal(word))
+                items = items[:-1]
+            case _:
+                break
+    return (*items, *words)
+
+
+def _with_area_local(items: Items) -> Items:
+    """Return the arguments of Box with ``/LOCAL1`` or ``/LOCAL(i)``, read as a division, apart."""
+    match items:
+        case (*before, Binary("/", left, Name("local", (number,)))):
+            return (*before, left, Literal("/local"), number)
+        case (*before, Binary("/", left, Name(name, None))) if name[:5] == "local":
+            digits = name.removeprefix("local")
+            if digits.isdecimal():
+                return (*before, left, Literal("/local"), Literal(int(digits)))
+    return items
 
 
 def _as_expression(value: Expression | Token) -> Expression:

@@ -388,7 +388,7 @@ class StatementExecution:
                 return StatementOutcome()
             case AssignCoordinate(axis, place, value):
                 number_of_point = evaluator.stored_number(place)
-                changed = machine.points.get(number_of_point).with_axis(
+                changed = machine.points.get(number_of_point).assigned(
                     axis, float(evaluator.number(value))
                 )
                 machine.points.store(number_of_point, changed)

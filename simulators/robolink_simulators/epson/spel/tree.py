@@ -1,7 +1,7 @@
 """Statements and expressions after parsing: plain values, nothing evaluated yet."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from enum import Enum
 
 
@@ -265,6 +265,17 @@ Statement = (
     | AssignCoordinate
     | If
 )
+
+
+def names_in(node: object) -> frozenset[str]:
+    """Return the names and point functions in a part of the tree, in lower case."""
+    if isinstance(node, tuple):
+        return frozenset[str]().union(*map(names_in, node))
+    if not is_dataclass(node) or isinstance(node, type):
+        return frozenset()
+    own = [node.name] if isinstance(node, (Name, PointFunction, LabelledPoint)) else []
+    parts = (names_in(getattr(node, part.name)) for part in fields(node))
+    return frozenset(own).union(*parts)
 
 
 SHIFTING = frozenset(

@@ -17,12 +17,13 @@ from robolink_simulators.softmotion.program.foreign_types import (
     READ_MODE,
     SYMBOLS,
     foreign_types,
+    kinematics_types,
 )
 from robolink_simulators.softmotion.program.motion_blocks import MotionBlocks
 from robolink_simulators.softmotion.program.reading_blocks import reading_blocks
 from robolink_simulators.softmotion.signals import SIGNALS
 from robolink_simulators.structured_text import SourceText, StructuredProgram
-from robolink_simulators.structured_text.data_types import DataType, OpaqueType
+from robolink_simulators.structured_text.data_types import DataType
 from robolink_simulators.structured_text.program import ForeignParts
 
 MAIN: Final = "RL_PRG"
@@ -236,12 +237,10 @@ class ExecutedMailbox:
             program.put(f"RL_Machine.numbers.{name}", number)
 
     def _foreign(self, sources: Sequence[SourceText]) -> ForeignParts:
-        name = self._group.kinematics.name
-        types: dict[str, DataType] = dict(foreign_types())
-        own = OpaqueType(f"TRAFO.{name}")
-        types[own.name.upper()] = own
+        own = kinematics_types(self._group.kinematics.name)
         blocks = MotionBlocks(self._units, self._numbers, self._group.kinematics)
-        types |= blocks.blocks(own)
+        types: dict[str, DataType] = {**foreign_types(), **own}
+        types |= blocks.blocks(list(own.values())[-1])
         types |= reading_blocks(self._units, self._numbers)
         symbols = {**SYMBOLS, READ_MODE: _read_modes(sources)}
         return ForeignParts(types, symbols, {"AxisGroup": (AXIS_GROUP, self._group)})

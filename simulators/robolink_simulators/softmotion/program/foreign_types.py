@@ -12,6 +12,7 @@ from robolink_simulators.structured_text.data_types import (
     ELEMENTARY,
     LREAL,
     ArrayType,
+    BlockType,
     DataType,
     Family,
     OpaqueType,
@@ -24,6 +25,7 @@ SIX: Final = ArrayType(((0, 5),), LREAL)
 MASKS: Final = ArrayType(((0, 5),), BOOL)
 ERROR_ID: Final = ELEMENTARY["DINT"]
 COORD_SYSTEM: Final = ScalarType("SMC_COORD_SYSTEM", Family.INTEGER, 16, True)
+COUPLED: Final = "TRAFO.Kin_Coupled"
 BUFFER_MODE: Final = ScalarType("MC_BUFFER_MODE", Family.INTEGER, 16, True)
 READ_MODE: Final = ScalarType("SMC_READ_TOOL_MODE", Family.INTEGER, 16, True)
 AXIS_GROUP: Final = OpaqueType("AXIS_GROUP_REF_SM3")
@@ -43,6 +45,27 @@ _MODES: Final = (
 
 SYMBOLS: Final[Mapping[ScalarType, Sequence[str]]] = {COORD_SYSTEM: _SYSTEMS, BUFFER_MODE: _MODES}
 """The names of enumerations, in the order of their numbers."""
+
+
+def kinematics_types(name: str) -> Mapping[str, DataType]:
+    """Return the blocks of a kinematics by name, in capital letters.
+
+    Of two that are coupled there are three: each, and ``Kin_Coupled``, whose inputs take them
+    (docs/reference/softmotion.md 3.1).
+
+    Args:
+        name: Of a block, or of two with a + between them.
+    """
+    position, plus, orientation = name.partition("+")
+    if not plus:
+        return {f"TRAFO.{name}".upper(): OpaqueType(f"TRAFO.{name}", name)}
+    first = OpaqueType(f"TRAFO.{position}", position)
+    second = OpaqueType(f"TRAFO.{orientation}", orientation)
+    # Types of the same name, empty until the program fills them.
+    empty = (OpaqueType(first.name), OpaqueType(second.name))
+    pins = members_of(tuple(zip(("itfPosKin", "itfOriKin"), empty, strict=True)), "var_input")
+    made = (first, second, BlockType(COUPLED, pins))
+    return {of.name.upper(): of for of in made}
 
 
 def foreign_types() -> Mapping[str, DataType]:

@@ -27,6 +27,7 @@ from robolink_simulators.softmotion.program.foreign_types import (
     MASKS,
     POSITION,
 )
+from robolink_simulators.softmotion.smc_errors import ErrorKind
 from robolink_simulators.structured_text.data_types import (
     BOOL,
     LREAL,
@@ -81,8 +82,12 @@ class MotionBlocks:
         self._numbers = numbers
         self._kinematics = kinematics
 
-    def blocks(self, kinematics_type: OpaqueType) -> Mapping[str, BlockType]:
-        """Return the blocks by name."""
+    def blocks(self, kinematics_type: DataType) -> Mapping[str, BlockType]:
+        """Return the blocks by name.
+
+        Args:
+            kinematics_type: What ``MC_SetKinTransform`` takes.
+        """
         transform: Pins = (("kintransform", kinematics_type, _BOTH),)
         rows: Sequence[tuple[str, Pins, Act]] = (
             ("SMC_GroupSetTool", (("tooloffset", COORD_REF, _IN),), self._set_tool),
@@ -189,7 +194,12 @@ class MotionBlocks:
         x, y, z, a, b, c = pins["tooloffset"]
         return group.set_tool(self._units.tool((x, y, z, a, b, c)))
 
-    def _set_kinematics(self, group: AxisGroup, _: Mapping[str, Any]) -> BlockExecution:
+    def _set_kinematics(self, group: AxisGroup, pins: Mapping[str, Any]) -> BlockExecution:
+        given = pins["kintransform"]
+        if isinstance(given, list) and None in given:  # Kin_Coupled without one of the two
+            execution = BlockExecution()
+            execution.fail(group.options.numbers.error(ErrorKind.AXES_MISMATCH))
+            return execution
         return group.set_kin_transform(self._kinematics)
 
     def _target(self, group: AxisGroup, pins: Mapping[str, Any]) -> Target:

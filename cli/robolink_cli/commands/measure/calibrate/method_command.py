@@ -23,6 +23,7 @@ from robolink_cli.commands.measure.calibrate.request import CalibrationRequest
 from robolink_cli.commands.measure.calibrate.values import as_typed, is_repeated, type_of
 from robolink_cli.options.motion import MotionOption, motion_option
 from robolink_cli.options.pose_source import PoseSource, pose_source_options, taught_points_option
+from robolink_cli.session.completing import complete_station
 
 _METAVARS: Final = {"mm": "MM", "degrees": "DEG", "mm/s": "MM_S"}
 
@@ -102,7 +103,11 @@ def _station_option(method: AnyMethod) -> Decorator:
     known = _STATIONS[needs.station]
     found = tr("Name of the pin; where it is found is kept, for one touch later.")
     return click.option(
-        "--station", metavar="ID", required=needs.named, help=found if needs.finds_pin else known
+        "--station",
+        metavar="ID",
+        required=needs.named,
+        shell_complete=complete_station,
+        help=found if needs.finds_pin else known,
     )
 
 

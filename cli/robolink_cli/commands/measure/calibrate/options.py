@@ -14,6 +14,7 @@ from robolink_cli.options.impact import impact_options
 from robolink_cli.options.motion import motion_option
 from robolink_cli.options.report import report_options
 from robolink_cli.prompts.jumps import USUAL_CHANGE_MM
+from robolink_cli.session.completing import complete_tool
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.operator_identity import nozzle_options
 
@@ -95,7 +96,11 @@ _FRAME: Final = (
 def _own_options() -> tuple[Callable[[Callable[..., Any]], Callable[..., Any]], ...]:
     return (
         click.option(
-            "--tool", type=int, required=True, help=declared("Number of the tool, 1 to 15.")
+            "--tool",
+            type=int,
+            required=True,
+            shell_complete=complete_tool,
+            help=declared("Number of the tool, 1 to 15."),
         ),
         motion_option(
             "--speed",

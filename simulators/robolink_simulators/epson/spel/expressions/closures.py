@@ -12,8 +12,12 @@ from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.constants import CONSTANTS
 from robolink_simulators.epson.spel.expressions.data_types import Variable
+from robolink_simulators.epson.spel.expressions.defined.areas import ANY_ROBOT
 from robolink_simulators.epson.spel.expressions.functions import PLAIN_FUNCTIONS
-from robolink_simulators.epson.spel.expressions.machine_functions import MACHINE_FUNCTIONS
+from robolink_simulators.epson.spel.expressions.machine_functions import (
+    MACHINE_FUNCTIONS,
+    OF_POINT_NUMBERS,
+)
 from robolink_simulators.epson.spel.expressions.operators import binary, unary
 from robolink_simulators.epson.spel.expressions.state_functions import STATE_FUNCTIONS
 from robolink_simulators.epson.spel.expressions.values import LARGEST_INT, Value, checked
@@ -71,6 +75,9 @@ _WHOLE: Final[dict[str, Callable[[int, int], int]]] = {
     "xor": operator.xor,
     "mask": operator.and_,
 }
+_OF_ANY_ROBOT: Final = frozenset({"insidebox", "insideplane"})
+"""Functions that take All for the number of a robot."""
+
 _JUDGED: Final[dict[str, Callable[[int, int], bool]]] = {
     "=": operator.eq,
     "<>": operator.ne,
@@ -163,6 +170,13 @@ def _named(name: str, arguments: tuple[Expression, ...] | None, scope: Scope) ->
         # PDef(P1), PDef(P(n)), PDef(label) and PDef(1) all name point 1
         # (docs/reference/spel.md 5.1).
         return lambda t: t.session.machine.points.defined(t.point_number(given[0]))
+    if name in OF_POINT_NUMBERS and len(given) == 1:
+        told = OF_POINT_NUMBERS[name]
+        return lambda t: told(t.session.machine.points, t.point_number(given[0]))
+    if name == "pnumber" and len(given) == 1 and _names_a_point(given[0]):
+        return lambda t: t.point_number(given[0])
+    if name in _OF_ANY_ROBOT and given[-1:] == (Name("all"),):
+        given = (*given[:-1], Literal(ANY_ROBOT))
     inner = tuple(closure(argument, scope) for argument in given)
     if name in PLAIN_FUNCTIONS:
         counts, plain = PLAIN_FUNCTIONS[name]
@@ -177,6 +191,13 @@ def _named(name: str, arguments: tuple[Expression, ...] | None, scope: Scope) ->
         check_count(name, given, counts)
         return lambda t: checked(state(t.session, [run(t) for run in inner]))
     return scope.unknown(name, arguments)
+
+
+def _names_a_point(argument: Expression) -> bool:
+    """Tell whether PNumber is given a point itself, and not a text with its label."""
+    if isinstance(argument, Name):
+        return argument.arguments is None and not argument.name.endswith("$")
+    return isinstance(argument, PointExpression)
 
 
 def check_count(name: str, arguments: Sequence[Expression], counts: range) -> None:

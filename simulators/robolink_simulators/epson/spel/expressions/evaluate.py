@@ -58,6 +58,9 @@ _ELBOWS = {"A": Elbow.ABOVE, "B": Elbow.BELOW}
 _WRISTS = {"NF": Wrist.NO_FLIP, "F": Wrist.FLIP}
 
 
+_ADDITIONAL: Final = frozenset({"R", "S", "T", "ST"})
+"""Axes of joint robots, and additional ones (docs/reference/spel.md 5.2)."""
+
 _MOST_REMEMBERED: Final = 2000
 
 
@@ -243,7 +246,9 @@ class Evaluator:
     def _changed(self, point: Point, modifier: Modifier) -> Point:
         amount = 0.0 if modifier.value is None else float(self.number(modifier.value))
         if modifier.kind is ModifierKind.REPLACE:
-            return point.with_axis(modifier.word, amount)
+            return point.assigned(modifier.word, amount)
+        if modifier.word in _ADDITIONAL:
+            raise SpelRefusal(RefusalKind.OTHER_ROBOT, f"This robot has no axis {modifier.word}")
         tilts = self.session.machine.model.six_axes
         return (_tilted if tilts else _shifted)(point, modifier.word, amount)
 

@@ -9,10 +9,15 @@ from typing import Final
 from robolink.model import ToolOffset
 from robolink_simulators.epson.arm.kinematics import forward
 from robolink_simulators.epson.memory.bits import BitBank
-from robolink_simulators.epson.memory.points import AXES, Point
+from robolink_simulators.epson.memory.points import AXES, Point, PointTable
 from robolink_simulators.epson.refusals import OutOfReach, RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.defined.added_arms import ARM_FUNCTIONS
 from robolink_simulators.epson.spel.expressions.defined.arches import ARCH_FUNCTIONS
+from robolink_simulators.epson.spel.expressions.defined.areas import (
+    AREA_FUNCTIONS,
+    corner_of_box,
+    plane_as_point,
+)
 from robolink_simulators.epson.spel.expressions.defined.xy_limits import (
     LIMIT_FUNCTIONS,
     corner_of_limits,
@@ -132,11 +137,19 @@ def _point_number(session: Session, arguments: Arguments) -> Value:
     return number
 
 
-def _point_label(session: Session, arguments: Arguments) -> Value:
-    """Return the label of a point that is told by its number, nothing where it has none."""
-    number = as_integer(arguments[0])
-    labels = session.machine.points.labels()
-    return next((name for name, at in labels.items() if at == number), "")
+def _label_of_point(points: PointTable, number: int) -> Value:
+    """Return the label of a point, nothing where it has none."""
+    return next((name for name, at in points.labels().items() if at == number), "")
+
+
+def _of_another_robot(axis: str) -> MachineFunction:
+    """Return CR, CS or CT: of joint robots, and of those with additional axes (documented)."""
+
+    def refuse(_: Session, arguments: Arguments) -> Value:
+        as_point(arguments[0])
+        raise SpelRefusal(RefusalKind.OTHER_ROBOT, f"This robot has no axis {axis}")
+
+    return refuse
 
 
 def _calibration_information(session: Session, arguments: Arguments) -> Value:
@@ -146,16 +159,19 @@ def _calibration_information(session: Session, arguments: Arguments) -> Value:
 
 MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     **{f"c{axis.lower()}": (range(1, 2), _coordinate(axis)) for axis in AXES},
+    **{f"c{axis}": (range(1, 2), _of_another_robot(axis.upper())) for axis in "rst"},
     **{name: (range(2), function) for name, function in FLAG_FUNCTIONS.items()},
     **ARCH_FUNCTIONS,
     **ARM_FUNCTIONS,
     **LIMIT_FUNCTIONS,
+    **AREA_FUNCTIONS,
     "pagl": (range(2, 3), joint_of_point),
     "ppls": (range(2, 3), pulses_of_point),
     "avoidsingularity": (range(1), lambda s, _: s.machine.settings.avoid_singularity),
     "singularityangle": (range(1), lambda s, _: s.machine.settings.surroundings.angle_deg),
     "singularityspeed": (range(1), lambda s, _: s.machine.settings.surroundings.speed_percent),
     "singularitydist": (range(1), lambda s, _: s.machine.settings.surroundings.distance_mm),
+    "localdef": (range(1, 2), lambda s, a: s.machine.locals.defined(as_integer(a[0]))),
     "plocal": (range(1, 2), lambda _, a: as_point(a[0]).local),
     "tool": (range(1), lambda s, _: s.machine.tools.selected),
     "tldef": (range(1, 2), _tool_defined),
@@ -209,11 +225,17 @@ MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     "ionumber": (range(1, 2), _number_of),
     "iodef": (range(1, 2), lambda s, a: as_text(a[0]).lower() in s.machine.io_labels),
     "pnumber": (range(1, 2), _point_number),
-    "plabel$": (range(1, 2), _point_label),
     "vxcalinfo": (range(2, 3), _calibration_information),
     "ctrldev": (range(1), lambda s, _: s.machine.control_device),
 }
 """Name to the numbers of arguments allowed and the function."""
+
+
+OF_POINT_NUMBERS: Final[dict[str, Callable[[PointTable, int], Value]]] = {
+    "plabel$": _label_of_point,
+    "pdescription$": PointTable.description,
+}
+"""Functions of a point's own number: of P1, P(n), a label or a number."""
 
 
 def clock_of(session: Session) -> datetime:
@@ -282,8 +304,8 @@ def _tool_point(session: Session, arguments: Arguments) -> Point:
 
 
 def _local_point(session: Session, arguments: Arguments) -> Point:
-    local = session.machine.locals.get(as_integer(arguments[0]))
-    return Point(astuple(local))
+    x, y, z, u, v, w, _ = astuple(session.machine.locals.get(as_integer(arguments[0])))
+    return Point((x, y, z, u, v, w))
 
 
 def _place_of_pixel(session: Session, arguments: Arguments) -> Point:
@@ -307,6 +329,8 @@ POINT_FUNCTIONS: Final[dict[str, tuple[range, PointFunction]]] = {
     "tlset": (range(1, 2), _tool_point),
     "local": (range(1, 2), _local_point),
     "xylim": (range(1, 2), corner_of_limits),
+    "box": (range(2, 4), corner_of_box),
+    "plane": (range(1, 3), plane_as_point),
     "vxtrans": (range(2, 4), _place_of_pixel),
     "ecpset": (range(1, 2), lambda s, a: Point(s.machine.control_points.get(as_integer(a[0])))),
 }

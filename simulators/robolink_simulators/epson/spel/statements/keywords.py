@@ -24,6 +24,10 @@ from robolink_simulators.epson.spel.expressions.joint_functions import (
 from robolink_simulators.epson.spel.expressions.machine_functions import clock_of
 from robolink_simulators.epson.spel.expressions.printing import CRLF, number_text
 from robolink_simulators.epson.spel.expressions.values import out_of_range
+from robolink_simulators.epson.spel.statements.defined.areas import AREA_STATEMENTS
+from robolink_simulators.epson.spel.statements.defined.locals_and_pallets import (
+    PLACE_STATEMENTS,
+)
 from robolink_simulators.epson.spel.statements.defined.xy_limits import require_within_limits
 from robolink_simulators.epson.spel.statements.legs import go_leg
 from robolink_simulators.epson.spel.statements.motion import require_drives
@@ -67,7 +71,7 @@ def run_command(evaluator: Evaluator, command: KeywordStatement) -> StatementOut
     Raises:
         Refusal: It cannot be carried out; nothing was changed.
     """
-    if command.open_ended and command.name != "plist":
+    if command.open_ended and command.name not in _MAY_END_OPEN:
         raise SpelRefusal(RefusalKind.SYNTAX, f"{command.name} does not end with a comma")
     session = evaluator.session
     setting = SETTINGS.get(command.name) or ROBOT_SETTINGS.get(command.name)
@@ -76,10 +80,8 @@ def run_command(evaluator: Evaluator, command: KeywordStatement) -> StatementOut
         if setting is None:
             return StatementOutcome(accel(session.machine, numbers, session.options.accel_max))
         return StatementOutcome(setting(session.machine, numbers))
-    if command.name in BIT_STATEMENTS:
-        return StatementOutcome(BIT_STATEMENTS[command.name](evaluator, command))
-    if command.name in POINT_STATEMENTS:
-        return StatementOutcome(POINT_STATEMENTS[command.name](evaluator, command))
+    if command.name in _AT_ONCE:
+        return StatementOutcome(_AT_ONCE[command.name](evaluator, command))
     return _HANDLERS[command.name](evaluator, command)
 
 
@@ -302,6 +304,16 @@ def _reset(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
         session.machine.clear_outputs()
     return StatementOutcome()
 
+
+_MAY_END_OPEN: Final = frozenset({"plist", "plane"})
+
+_AT_ONCE: Final = {
+    **BIT_STATEMENTS,
+    **POINT_STATEMENTS,
+    **PLACE_STATEMENTS,
+    **AREA_STATEMENTS,
+}
+"""Statements that take no time: keyword to what carries it out and returns what it prints."""
 
 _HANDLERS: Final[dict[str, Callable[[Evaluator, KeywordStatement], StatementOutcome]]] = {
     "tlset": _tlset,

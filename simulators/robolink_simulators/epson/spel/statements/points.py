@@ -1,13 +1,12 @@
-"""Keyword statements about points, locals and pallets; each returns what it prints.
+"""Keyword statements about points and control points; each returns what it prints.
 
 Source: docs/reference/spel.md 5.
 """
 
 from collections.abc import Callable
-from dataclasses import astuple
 from typing import Final
 
-from robolink_simulators.epson.memory.points import HIGHEST_POINT, Local, Point
+from robolink_simulators.epson.memory.points import HIGHEST_POINT, Point
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.joint_functions import (
@@ -18,7 +17,7 @@ from robolink_simulators.epson.spel.expressions.joint_functions import (
 )
 from robolink_simulators.epson.spel.expressions.machine_functions import coordinates_of
 from robolink_simulators.epson.spel.expressions.printing import CRLF, number_text, point_line
-from robolink_simulators.epson.spel.expressions.values import as_number, as_text, out_of_range
+from robolink_simulators.epson.spel.expressions.values import as_number, as_text
 from robolink_simulators.epson.spel.tree import Expression, KeywordStatement
 
 
@@ -70,34 +69,18 @@ def _pdel(evaluator: Evaluator, command: KeywordStatement) -> str:
     return ""
 
 
-def _local(evaluator: Evaluator, command: KeywordStatement) -> str:
-    arguments = _expect(command, 1, 2, 5, 7)
-    number, locals_ = evaluator.integer(arguments[0]), evaluator.session.machine.locals
-    if len(arguments) == 1:
-        # The layout is not shown anywhere: as ArmSet prints (assumed).
-        local = locals_.get(number)
-        values = astuple(local)
-        return f"Local {number}: " + ", ".join(f"{v:.3f}" for v in values) + CRLF
-    x, y, z, u, v, w = point_argument(evaluator, arguments[1:]).coordinates
-    if (v != 0 or w != 0) and not locals_.tilting:
-        raise out_of_range("V and W of a local are 0 on a SCARA")
-    locals_.define(number, Local(x, y, z, u, v, w))
-    return ""
-
-
 def _label(evaluator: Evaluator, command: KeywordStatement) -> str:
     number, name = _expect(command, 2)
     points = evaluator.session.machine.points
-    points.label(evaluator.integer(number), as_text(evaluator.value(name)))
+    points.label(evaluator.point_number(number), as_text(evaluator.value(name)))
     return ""
 
 
-def _pallet(evaluator: Evaluator, command: KeywordStatement) -> str:
-    """Define a pallet from three or four corners, columns and rows; Outside is not simulated."""
-    number, *corners, columns, rows = _expect(command, 6, 7)
-    points = [evaluator.point_of(corner) for corner in corners]
-    counts = (evaluator.integer(columns), evaluator.integer(rows))
-    evaluator.session.machine.pallets.define(evaluator.integer(number), points, *counts)
+def _describe(evaluator: Evaluator, command: KeywordStatement) -> str:
+    """PDescription p, text."""
+    point, text = _expect(command, 2)
+    number = evaluator.point_number(point)
+    evaluator.session.machine.points.describe(number, as_text(evaluator.value(text)))
     return ""
 
 
@@ -127,10 +110,18 @@ _SINGULAR_ANGLES: Final = {"j1angle": 1, "j4angle": 4}
 
 
 def _control_point(evaluator: Evaluator, command: KeywordStatement) -> str:
-    """Define an external control point; flags and local of the point do not count (assumed)."""
-    number, *values = _expect(command, 2, 5, 7)
-    place = point_argument(evaluator, tuple(values)).coordinates
-    evaluator.session.machine.control_points.set(evaluator.integer(number), place)
+    """Define an external control point, or list one or all as TLSet lists tools (assumed).
+
+    Flags and local of the point do not count (assumed).
+    """
+    arguments = _expect(command, 0, 1, 2, 5, 7)
+    control_points = evaluator.session.machine.control_points
+    if len(arguments) < 2:
+        numbers = map(evaluator.integer, arguments) if arguments else control_points.numbers()
+        listed = ((n, control_points.get(n)) for n in numbers)
+        return "".join(f"ECP {n}: " + ", ".join(f"{v:.3f}" for v in at) + CRLF for n, at in listed)
+    place = point_argument(evaluator, arguments[1:]).coordinates
+    control_points.set(evaluator.integer(arguments[0]), place)
     return ""
 
 
@@ -146,28 +137,13 @@ def _clear_points(evaluator: Evaluator, command: KeywordStatement) -> str:
     return ""
 
 
-def _clear_local(evaluator: Evaluator, command: KeywordStatement) -> str:
-    (number,) = _expect(command, 1)
-    evaluator.session.machine.locals.clear(evaluator.integer(number))
-    return ""
-
-
-def _clear_pallet(evaluator: Evaluator, command: KeywordStatement) -> str:
-    (number,) = _expect(command, 1)
-    evaluator.session.machine.pallets.clear(evaluator.integer(number))
-    return ""
-
-
 POINT_STATEMENTS: Final[dict[str, Callable[[Evaluator, KeywordStatement], str]]] = {
     "here": _here,
     "plist": _plist,
     "pdel": _pdel,
     "plabel": _label,
+    "pdescription": _describe,
     "clearpoints": _clear_points,
-    "localclr": _clear_local,
-    "palletclr": _clear_pallet,
-    "pallet": _pallet,
-    "local": _local,
     "ecpset": _control_point,
     "ecpclr": _no_control_point,
     **dict.fromkeys(FLAG_FUNCTIONS, _flag),

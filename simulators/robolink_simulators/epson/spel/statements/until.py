@@ -14,7 +14,16 @@ from robolink_simulators.epson.memory.input_bits import InputsAsked
 from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.values import truth
-from robolink_simulators.epson.spel.tree import Binary, Expression, Literal, Name, Unary, Until
+from robolink_simulators.epson.spel.statements.waiting import follows_robot
+from robolink_simulators.epson.spel.tree import (
+    Binary,
+    Expression,
+    Literal,
+    Name,
+    Unary,
+    Until,
+    names_in,
+)
 
 _SAMPLE_NS: Final = 1_000_000
 """A condition that holds for less is not seen (assumed: controllers sample their inputs)."""
@@ -49,7 +58,8 @@ class Watch:
 
     def foresee(self, start_ns: int, end_ns: int) -> None:
         """Find out when the motion that has just been started meets the condition."""
-        if not self._evaluator.session.machine.inputs.connected:
+        machine = self._evaluator.session.machine
+        if not follows_robot(names_in(self._condition), machine):
             return
         scan = _Scan(self)
         before_ns = start_ns

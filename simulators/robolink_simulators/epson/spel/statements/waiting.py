@@ -6,6 +6,7 @@ Source: docs/reference/spel.md 4.6, 7.1.
 from typing import Final
 
 from robolink.timing import NS_PER_S
+from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
@@ -19,6 +20,7 @@ from robolink_simulators.epson.spel.tree import (
     Name,
     PointExpression,
     Unary,
+    names_in,
 )
 
 LONGEST_WAIT_S: Final = 2_147_483
@@ -33,6 +35,26 @@ _EVENT_WORDS = """
     mcalcomplete motor lof erroron safetyon estopon teachon pauseon athome latchstate windowsstatus
 """
 _EVENTS: Final = frozenset(_EVENT_WORDS.split())
+
+LOOK_NS: Final = 2_000_000
+"""Assumed: how often a condition is looked at that another place of a moving robot may meet."""
+
+_OF_THE_PLACE = """
+    getrobotinsidebox getrobotinsideplane insidebox insideplane athome inpos here curpos realpos
+    agl pls realpls tcpspeed stat robotinfo
+"""
+_OF_THE_ROBOT: Final = frozenset(_OF_THE_PLACE.split())
+_OF_INPUTS: Final = frozenset({"sw", "in", "inw", "inbcd", "inreal"})
+
+
+def follows_robot(names: frozenset[str], machine: Machine) -> bool:
+    """Tell whether what a condition asks for may change because a robot moves.
+
+    Args:
+        names: Those in the condition.
+        machine: Whose inputs may follow what the tip meets.
+    """
+    return bool(names & _OF_THE_ROBOT) or (machine.inputs.connected and bool(names & _OF_INPUTS))
 
 
 def is_condition(expression: Expression) -> bool:
@@ -68,6 +90,7 @@ class Waiting:
     ) -> None:
         self._evaluator = evaluator
         self._condition = _with_right_sides(evaluator, condition)
+        self._names = names_in(condition)
         self._own_limit = limit_s is not None
         session = evaluator.session
         self._seconds = (session.memory.wait_limit_s or None) if limit_s is None else limit_s
@@ -93,8 +116,12 @@ class Waiting:
                 return seen_ns + 1  # switched just now
         except SpelRefusal:
             return seen_ns + 1  # whoever looks then is told why
-        coming_ns = self._evaluator.session.machine.timed_bits.next_change()
-        return min(self._end_ns, NEVER_NS if coming_ns is None else coming_ns)
+        machine = self._evaluator.session.machine
+        coming_ns = machine.timed_bits.next_change()
+        look_ns = min(self._end_ns, NEVER_NS if coming_ns is None else coming_ns)
+        if machine.moving and follows_robot(self._names, machine):
+            return min(look_ns, seen_ns + LOOK_NS)
+        return look_ns
 
     def is_over(self, now_ns: int) -> bool:
         """Tell whether it ends, and note for TW how.

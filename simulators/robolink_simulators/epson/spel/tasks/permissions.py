@@ -9,9 +9,9 @@ from robolink_simulators.epson.spel.tasks.task import TaskKind
 from robolink_simulators.epson.spel.tree import KeywordStatement, MotionStatement, Statement
 
 _WORDS = """
-    accel accels accelr arm armset base box cp ecp ecpset ecpclr fine home homeset inertia limz
-    local motor power pulse range sfree slock speed speeds speedr tlset tlclr tool weight till
-    find sense jtran arch armclr xylim xylimclr xylimmode
+    accel accels accelr arm armset base box boxclr plane planeclr cp ecp ecpset ecpclr fine home
+    homeset inertia limz local motor power pulse range sfree slock speed speeds speedr tlset
+    tlclr tool weight till find sense jtran arch armclr xylim xylimclr xylimmode
 """
 FORBIDDEN: Final = frozenset(_WORDS.split())
 _BOUND: Final = frozenset({TaskKind.NO_ABORT, TaskKind.BACKGROUND})

@@ -138,6 +138,12 @@ class ProgramRunner:
         self._heed()
         while self.tasks:
             task, due_ns, others_ns = self._next()
+            look_ns = self.traps.next_look(self._seen_ns)
+            if look_ns is not None and look_ns < due_ns and look_ns <= now_ns:
+                self.session.machine.advance(look_ns)
+                self._seen_ns = look_ns
+                self.traps.look(look_ns)
+                continue
             if task is None or due_ns > now_ns:
                 break
             with self.robot_of(task):
@@ -157,6 +163,9 @@ class ProgramRunner:
         if not self.tasks:
             return None
         task, due_ns, _ = self._next()
+        look_ns = self.traps.next_look(self._seen_ns)
+        if look_ns is not None and look_ns < due_ns:
+            return look_ns
         if task is None or due_ns >= NEVER_NS:
             return None
         return due_ns if task.waiting is not None else due_ns + BURST_NS

@@ -6,6 +6,7 @@ from typing import Any, Final
 from robolink_simulators.epson.refusals import SpelRefusal
 from robolink_simulators.epson.spel.expressions.closures import Run
 from robolink_simulators.epson.spel.expressions.values import truth
+from robolink_simulators.epson.spel.statements.waiting import LOOK_NS, follows_robot
 from robolink_simulators.epson.spel.tasks.compiled import CompiledFunction, JumpTarget
 from robolink_simulators.epson.spel.tasks.task import CallFrame, SpelTask, TaskKind
 
@@ -24,6 +25,7 @@ class SetTrap:
         label: Where that task goes on, for GoTo.
         function: What it calls or starts, for Call and Xqt.
         starts: Whether the function is started as a task.
+        names: What its condition asks for.
     """
 
     task: SpelTask
@@ -32,6 +34,7 @@ class SetTrap:
     label: JumpTarget | None
     function: CompiledFunction | None
     starts: bool
+    names: frozenset[str] = frozenset()
 
 
 class Traps:
@@ -91,13 +94,20 @@ class Traps:
             if holds and self._conditions.pop(number, None) is not None:
                 self._fire(trap, now_ns)
 
+    def next_look(self, seen_ns: int) -> int | None:
+        """Return when to look again because a robot moves, ``None`` where nothing asks for that."""
+        machine = self._runner.session.machine
+        following = any(follows_robot(trap.names, machine) for trap in self._conditions.values())
+        return seen_ns + LOOK_NS if following and machine.moving else None
+
     def _fire(self, trap: SetTrap, now_ns: int) -> None:
         task = trap.task
         if trap.function is not None and trap.starts:
             self._start(trap.function, now_ns)
             return
         if task.waiting is not None:
-            task.waiting.suspend(now_ns)
+            with self._runner.robot_of(task):
+                task.waiting.suspend(now_ns)
             task.waiting = None
         task.now_ns = max(task.now_ns, now_ns)
         if trap.label is not None and trap.frame in task.frames:

@@ -7,7 +7,7 @@ from robolink_simulators.epson.spel.programs.emitter import Emitter
 from robolink_simulators.epson.spel.tasks.compiled import CompiledFunction, JumpTarget, Operation
 from robolink_simulators.epson.spel.tasks.task import SpelTask
 from robolink_simulators.epson.spel.tasks.traps import EVENTS, HIGHEST_TRAP, SetTrap
-from robolink_simulators.epson.spel.tree import Name
+from robolink_simulators.epson.spel.tree import Name, names_in
 
 
 def compile_trap(emitter: Emitter, node: Trap, label: JumpTarget | None) -> Operation:
@@ -20,7 +20,7 @@ def compile_trap(emitter: Emitter, node: Trap, label: JumpTarget | None) -> Oper
     if isinstance(node.event, Name) and node.event.name in EVENTS:
         event = node.event.name
         return lambda t: t.runner.traps.on_event(event, function)
-    number, condition = emitter.run(node.event), None
+    number, condition, names = emitter.run(node.event), None, names_in(node.condition)
     if node.condition is not None:
         condition = emitter.run(node.condition)
     if (condition is None) is not (node.action is None):
@@ -33,7 +33,7 @@ def compile_trap(emitter: Emitter, node: Trap, label: JumpTarget | None) -> Oper
         trap = None
         if condition is not None:
             starts = node.action == "xqt"
-            trap = SetTrap(t, t.frame, condition, label, function, starts)
+            trap = SetTrap(t, t.frame, condition, label, function, starts, names)
         t.runner.traps.set(wanted, trap)
 
     return go

@@ -1,0 +1,132 @@
+"""Box, BoxClr, Plane and PlaneClr (docs/reference/spel.md 5.5)."""
+
+from collections.abc import Callable, Iterable
+from typing import Final
+
+from robolink.protocols.spel import decimal
+from robolink_simulators.epson.definitions.areas import CheckBox, CheckPlane, Span
+from robolink_simulators.epson.machine import Machine
+from robolink_simulators.epson.memory.points import Point
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
+from robolink_simulators.epson.spel.expressions.printing import CRLF
+from robolink_simulators.epson.spel.expressions.values import as_integer, out_of_range
+from robolink_simulators.epson.spel.statements.defined.frames_of_points import coordinates_of_points
+from robolink_simulators.epson.spel.tree import (
+    Expression,
+    KeywordStatement,
+    Literal,
+    PointExpression,
+)
+
+_LOCAL: Final = Literal("/local")
+_SPANS: Final = 6
+_WITH_LOGIC: Final = 7
+_POINTS: Final = (1, 3)
+
+
+def _box(evaluator: Evaluator, command: KeywordStatement) -> str:
+    """Box n[, robot], the lowest and highest of each axis[, On | Off] [/LOCALn]."""
+    machine, (arguments, local) = evaluator.session.machine, _without_local(command)
+    if len(arguments) <= 2:
+        return _listing(machine, [evaluator.integer(a) for a in arguments], _boxes)
+    number, *values = (evaluator.number(argument) for argument in arguments)
+    robot = machine.robot
+    # Whose On or Off follows names its robot too (documented): eight values are a robot's.
+    if len(values) > _SPANS:
+        robot = machine.numbered(int(values.pop(0)))
+    shows_on = bool(values.pop()) if len(values) == _WITH_LOGIC else True
+    if len(values) != _SPANS:
+        raise _miscounted(command)
+    frame = 0 if local is None else evaluator.integer(local)
+    robot.locals.get(frame)
+    x, y, z = (_span(*map(float, values[at : at + 2])) for at in range(0, _SPANS, 2))
+    robot.kept.areas.boxes.set(int(number), CheckBox((x, y, z), frame, shows_on))
+    return ""
+
+
+def _without_local(command: KeywordStatement) -> tuple[list[Expression], Expression | None]:
+    match command.arguments:
+        case (*before, literal, local) if literal == _LOCAL:
+            return before, local
+    return list(command.arguments), None
+
+
+def _span(low: float, high: float) -> Span:
+    if low > high:
+        raise out_of_range("A lower limit lies above its upper")
+    return low, high
+
+
+def _boxes(machine: Machine, robot: int, number: int | None) -> Iterable[str]:
+    boxes = machine.numbered(robot).kept.areas.boxes
+    for at, box in boxes.all().items() if number is None else [(number, boxes.get(number))]:
+        values = ", ".join(decimal(end) for span in box.spans for end in span)
+        logic = "ON" if box.shows_on else "OFF"
+        yield f"Box {at}: {robot}, {values}, {logic} /LOCAL{box.local}"
+
+
+def _planes(machine: Machine, robot: int, number: int | None) -> Iterable[str]:
+    """List planes as boxes are listed: their layout is shown nowhere (assumed)."""
+    planes = machine.numbered(robot).kept.areas.planes
+    for at, plane in planes.all().items() if number is None else [(number, planes.get(number))]:
+        values = ", ".join(decimal(value) for value in plane.coordinates)
+        yield f"Plane {at}: {robot}, {values}"
+
+
+def _listing(
+    machine: Machine,
+    asked: list[int],
+    lines: Callable[[Machine, int, int | None], Iterable[str]],
+) -> str:
+    """Return one area, or all of all robots."""
+    if asked:
+        robots, number = asked[1:] or [machine.robot_number], asked[0]
+        return "".join(line + CRLF for robot in robots for line in lines(machine, robot, number))
+    every = range(1, len(machine.robots) + 1)
+    return "".join(line + CRLF for robot in every for line in lines(machine, robot, None))
+
+
+def _plane(evaluator: Evaluator, command: KeywordStatement) -> str:
+    """Plane n[, robot], a coordinate system, or its origin and a point on its X and Y axis."""
+    machine, arguments = evaluator.session.machine, list(command.arguments)
+    points = list[Point]()
+    while arguments and isinstance(arguments[-1], PointExpression):
+        points.insert(0, evaluator.point_of(arguments.pop()))
+    asked = [evaluator.integer(argument) for argument in arguments]
+    if len(asked) > 2 or (not asked and points):
+        raise _miscounted(command)
+    if not points:
+        return _listing(machine, asked, _planes)
+    robot = machine.numbered(asked[1]) if len(asked) > 1 else machine.robot
+    if len(points) not in _POINTS:
+        raise _miscounted(command)
+    places = [robot.locals.to_base(point).coordinates for point in points]
+    place = places[0] if len(places) == 1 else coordinates_of_points(*places)
+    robot.kept.areas.planes.set(asked[0], CheckPlane(place))
+    return ""
+
+
+def _clear(evaluator: Evaluator, command: KeywordStatement) -> str:
+    """BoxClr or PlaneClr n[, robot]."""
+    if not 1 <= len(command.arguments) <= 2:
+        raise _miscounted(command)
+    number, *robots = (as_integer(evaluator.value(a)) for a in command.arguments)
+    machine = evaluator.session.machine
+    areas = (machine.numbered(robots[0]) if robots else machine.robot).kept.areas
+    (areas.boxes if command.name == "boxclr" else areas.planes).clear(number)
+    return ""
+
+
+def _miscounted(command: KeywordStatement) -> SpelRefusal:
+    text = f"{command.name} does not take {len(command.arguments)} arguments here"
+    return SpelRefusal(RefusalKind.SYNTAX, text)
+
+
+AREA_STATEMENTS: Final[dict[str, Callable[[Evaluator, KeywordStatement], str]]] = {
+    "box": _box,
+    "boxclr": _clear,
+    "plane": _plane,
+    "planeclr": _clear,
+}
+"""Keyword to what carries it out."""

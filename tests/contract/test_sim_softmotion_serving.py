@@ -104,7 +104,14 @@ def test_the_assist_port_looks_jogs_and_tells_the_truth(assisted):
     assert abs(assist.look().dx_mm) < 1e-6
     truth = assist.truth()
     assert truth == json.loads(json.dumps(simulator.truth()))
-    assert truth["stored"]["1"] == list(client.slot(1).tool)
+    x, y, z, *angles = client.slot(1).tool
+    assert not any(angles)  # A, B, C of no rotation
+    assert truth["stored"]["1"] == {
+        "x_mm": x,
+        "y_mm": y,
+        "z_mm": z,
+        **dict.fromkeys(("u_deg", "v_deg", "w_deg"), 0.0),
+    }
     assert truth["selected_tool"] == 1
     assert assist.do("change_nozzle")["tip"] == assist.truth()["tips"]["1"]
 
@@ -127,7 +134,7 @@ def test_the_assist_port_pushes_buttons(assisted):
     assert client.now() == client.now()
     assist.do("thaw")
     counters = assist.do("counters")
-    assert (counters["moves_started"], counters["slot_writes"], counters["starts"]) == (0, 1, 1)
+    assert (counters["moves_started"], counters["tool_writes"], counters["starts"]) == (0, 1, 1)
     with pytest.raises(ConfigError, match="axis 9"):
         assist.do("fail_axis", number=9)
     with pytest.raises(ConfigError, match="in error"):

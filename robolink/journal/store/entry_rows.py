@@ -24,7 +24,12 @@ _LOOKS: Final = 100
 
 # The kinds whose value was read on the controller.
 # What is recorded of a controller without anything being changed on it.
-_NO_HISTORY: Final = (EntryKind.IDENTITY, EntryKind.RECONNECT, EntryKind.LEASE)
+_NO_HISTORY: Final = (
+    EntryKind.IDENTITY,
+    EntryKind.RECONNECT,
+    EntryKind.LEASE,
+    EntryKind.CHECK,
+)
 
 _HEAD_OF: Final = select(HEAD.c.number, HEAD.c.hash)
 _SELECT_HEAD: Final = Prepared(_HEAD_OF)

@@ -115,11 +115,11 @@ def _chosen(context: CliContext) -> "tuple[CliContext, LoadedRecipe]":
     """Have cell and recipe chosen, as far as the line does not name them."""
     from robolink_cli.commands.measure.choosing import choose_cell, choose_recipe
     from robolink_cli.prompts.present import present_desk
-    from robolink_cli.session.context import context_at
+    from robolink_cli.session.context import context_of_cell
     from robolink_cli.session.guidance import header_of
 
     desk = present_desk()
     assert desk is not None  # noqa: S101 - looked at by whoever calls
-    at = context if context.url is not None else context_at(choose_cell(desk).name)
+    at = context if context.url is not None else context_of_cell(choose_cell(desk).name)
     desk.regard(header_of(at, tr("Change needle")))
     return at, choose_recipe(desk, at.cell)

@@ -12,7 +12,6 @@ from robolink.runner import SETTLING_S, FitSubject, JogSubject, MoveSubject, Que
 from robolink_cli.wizard.check_list import CheckSubject
 from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.happenings import (
-    Command,
     Effect,
     Happening,
     KeyPressed,
@@ -24,6 +23,7 @@ from robolink_cli.wizard.happenings import (
     WasRead,
     WasRegarded,
     WasTold,
+    WizardCommand,
 )
 from robolink_cli.wizard.keys import folded, meaning_of, step_of, with_point
 from robolink_cli.wizard.questions_flow import answered_by_key, answered_by_line
@@ -146,12 +146,12 @@ def _stop(state: WizardState) -> Advanced:
     ending = replace(state, ending=True, message=tr("Stopping."))
     question = state.question
     if question is None or not state.waits:
-        return ending, [Command.END_WORK]
+        return ending, [WizardCommand.END_WORK]
     if question.kind is not Question.YES_NO:
         return ending, [SendAnswer(question.number, "q")]
     if state.writing is not None or confirms(state) is not None:
         return ending, [SendAnswer(question.number, "n")]
-    return ending, [Command.END_WORK]  # a no would go on
+    return ending, [WizardCommand.END_WORK]  # a no would go on
 
 
 def _armed(state: WizardState, at_s: float) -> bool:

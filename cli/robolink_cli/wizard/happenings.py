@@ -119,11 +119,11 @@ class SendAnswer:
     text: str
 
 
-class Command(Enum):
+class WizardCommand(Enum):
     """What the flow wants besides an answer."""
 
     END_WORK = "end"
     """End what is under way, as Ctrl-C would."""
 
 
-Effect = SendAnswer | Command
+Effect = SendAnswer | WizardCommand

@@ -4,7 +4,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from robolink_cli.wizard.happenings import (
-    Command,
     KeyPressed,
     LineTyped,
     Reading,
@@ -14,6 +13,7 @@ from robolink_cli.wizard.happenings import (
     WasRead,
     WasRegarded,
     WasTold,
+    WizardCommand,
 )
 from robolink_cli.wizard.state import STEP_SIZES
 
@@ -148,8 +148,8 @@ def test_the_worst_touch_is_offered_first_only_where_it_stands_out():
         (None, Question.TEXT, "q"),
         (write_subject(1), Question.YES_NO, "n"),
         (CHECK, Question.YES_NO, "n"),
-        (None, Question.YES_NO, Command.END_WORK),
-        (fit_subject(0.1, 0.01, 0.01, worst=0), Question.YES_NO, Command.END_WORK),
+        (None, Question.YES_NO, WizardCommand.END_WORK),
+        (fit_subject(0.1, 0.01, 0.01, worst=0), Question.YES_NO, WizardCommand.END_WORK),
     ],
 )
 def test_stop_ends_without_a_question_wherever_it_is_pressed(subject, kind, sent):
@@ -157,7 +157,7 @@ def test_stop_ends_without_a_question_wherever_it_is_pressed(subject, kind, sent
     hand = Sitting().asked(subject, kind)
     hand.key("main" if kind is Question.PLACE else "enter")
     busy = Sitting()
-    assert busy.key("stop").sent == [Command.END_WORK]
+    assert busy.key("stop").sent == [WizardCommand.END_WORK]
 
 
 def test_a_text_takes_digits_and_ends_with_enter():

@@ -12,7 +12,6 @@ from robolink_cli.prompts.lines import QUIET_S, Lines, open_lines
 from robolink_cli.wizard.desk import Desk
 from robolink_cli.wizard.flow import advance
 from robolink_cli.wizard.happenings import (
-    Command,
     Effect,
     Happening,
     LineTyped,
@@ -21,6 +20,7 @@ from robolink_cli.wizard.happenings import (
     WasAsked,
     WasRegarded,
     WasTold,
+    WizardCommand,
 )
 from robolink_cli.wizard.screens.told import told_after_jog, told_before, told_question
 from robolink_cli.wizard.state import WizardState
@@ -107,7 +107,7 @@ def _carry_out(desk: Desk, effects: list[Effect]) -> None:
     for effect in effects:
         if isinstance(effect, SendAnswer):
             desk.answer(effect)
-        elif effect is Command.END_WORK:
+        elif effect is WizardCommand.END_WORK:
             end(EndedBy.CTRL_C)
 
 

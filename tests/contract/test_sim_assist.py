@@ -53,7 +53,7 @@ def test_the_assist_port_looks_jogs_and_tells_the_truth(assisted):
     flange = assist.jog_onto_pin()
     assert flange["u_deg"] == pytest.approx(simulator.machine.arm.flange().u_deg, abs=1e-9)
     assert abs(assist.look().dx_mm) < 1e-6
-    assert assist.truth() == json.loads(json.dumps(simulator.world.truth()))
+    assert assist.truth() == json.loads(json.dumps(simulator.truth()))
 
 
 def test_the_assist_port_shows_the_axes_of_the_true_tool(assisted):
@@ -78,7 +78,7 @@ def test_the_assist_port_pushes_buttons(assisted):
         exchange(client, b"$Reset\r\n")
         assist.do("raise_error", number=4002)
         assert exchange(client, b"$GetStatus\r\n") == b"#GetStatus,00100001001,4002\r\n"
-        assist.do("set_input", bit=3, on=True)
+        assist.do("set_input", number=3, on=True)
         assert exchange(client, b"$GetIO,3\r\n") == b"#GetIO,1\r\n"
         assist.do("cut_link")
         assert client.receive(deadline=soon(client)) == b""
@@ -86,7 +86,7 @@ def test_the_assist_port_pushes_buttons(assisted):
 
 def test_the_assist_port_counts_and_changes_the_nozzle(assisted):
     _, assist, simulator = assisted
-    counted = {"exchanges": 0, "moves_started": 0, "flash_writes": 0, "touches": 0}
+    counted = {"exchanges": 0, "moves_started": 0, "tool_writes": 0, "starts": 1, "touches": 0}
     assert assist.do("counters") == counted
     tip = assist.do("change_nozzle")["tip"]
     assert tip["x_mm"] == simulator.world.tips[1].x_mm
@@ -98,7 +98,7 @@ def test_the_assist_port_counts_and_changes_the_nozzle(assisted):
         ("dance", {}, "Known are"),
         ("raise_error", {}, "whole number"),
         ("raise_error", {"number": "4002"}, "whole number"),
-        ("set_input", {"bit": 9000}, "no bit"),
+        ("set_input", {"number": 9000}, "no bit"),
     ],
 )
 def test_what_the_assist_port_cannot_do_is_said(assisted, act, parameters, words):

@@ -45,7 +45,7 @@ def _change_nozzle(simulator: EpsonSimulator, request: Parameters) -> Answer:
 
 
 def _set_input(simulator: EpsonSimulator, request: Parameters) -> Answer:
-    simulator.panel.switch_input(whole_number(request, "bit"), bool(request.get("on", True)))
+    simulator.panel.switch_input(whole_number(request, "number"), bool(request.get("on", True)))
     return {}
 
 
@@ -55,12 +55,7 @@ def _restart(simulator: EpsonSimulator, _request: Parameters) -> Answer:
 
 
 def _counters(simulator: EpsonSimulator, _request: Parameters) -> Answer:
-    return {
-        "exchanges": simulator.exchanges,
-        "moves_started": simulator.machine.arm.moves_started,
-        "flash_writes": simulator.machine.flash_writes,
-        "touches": simulator.world.operator.touches,
-    }
+    return {**simulator.counters()}
 
 
 def _plain(name: str) -> Act:
@@ -83,7 +78,7 @@ EPSON_ACTS: Final[Mapping[str, Act]] = {
     "look": _look,
     "jog_onto_pin": _jog_onto_pin,
     "teach_point": _teach_point,
-    "truth": lambda simulator, _request: simulator.world.truth(),
+    "truth": lambda simulator, _request: simulator.truth(),
     "counters": _counters,
     "change_nozzle": _change_nozzle,
     "set_input": _set_input,

@@ -41,14 +41,7 @@ def _fail_axis(simulator: SoftMotionSimulator, request: Parameters) -> Answer:
 
 
 def _counters(simulator: SoftMotionSimulator, _request: Parameters) -> Answer:
-    slots = simulator.plc.memory.defined().values()
-    return {
-        "exchanges": simulator.exchanges,
-        "moves_started": simulator.plc.group.movements_started,
-        "slot_writes": sum(slot.counter for slot in slots),
-        "starts": simulator.plc.starts,
-        "touches": simulator.world.operator.touches,
-    }
+    return {**simulator.counters()}
 
 
 def _plain(name: str) -> Act:

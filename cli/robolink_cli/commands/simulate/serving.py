@@ -5,6 +5,7 @@ import signal
 import threading
 from collections.abc import Sequence
 from dataclasses import replace
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from robolink.errors import ConfigError
@@ -17,11 +18,17 @@ if TYPE_CHECKING:
 
 
 class Termination:
-    """Makes SIGTERM an orderly end; Ctrl-C stays what it is."""
+    """Makes SIGTERM an orderly end; Ctrl-C stays what it is.
+
+    Attributes:
+        state_dir: A folder for what clients of this simulator keep on record, gone at its end.
+    """
 
     def __init__(self) -> None:
         self._stopped = threading.Event()
         self._before: Any = None
+        self._folder = TemporaryDirectory(prefix="robolink-sim-", ignore_cleanup_errors=True)
+        self.state_dir = self._folder.name
 
     def wait(self) -> None:
         """Block until SIGTERM."""
@@ -40,15 +47,24 @@ class Termination:
 
     def __exit__(self, *_details: object) -> None:
         signal.signal(signal.SIGTERM, self._before)
+        self._folder.cleanup()
 
 
-def announce(document: dict[str, object], lines: Sequence[str]) -> None:
+def announce(document: dict[str, object], lines: Sequence[str], state_dir: str) -> None:
     """Print the first output: one line of JSON, or ``lines`` for a person.
+
+    Scripts give ``state_dir`` to their clients as ROBOLINK_STATE_DIR, so that nothing of a run is
+    left in a journal of somebody's own.
 
     click flushes it, because whoever started us waits for it.
     """
     if json_is_on():
-        document = {"schema": "robolink/sim/1", **document, "simulated": True}
+        document = {
+            "schema": "robolink/sim/1",
+            **document,
+            "state_dir": state_dir,
+            "simulated": True,
+        }
         hand_over(json.dumps(document))
     else:
         show("\n".join(lines))

@@ -3,18 +3,18 @@
 import os
 from collections.abc import Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 
 import click
-from click.core import ParameterSource
 from robolink_simulators.assist.port import serve_assist
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson import EpsonOptions, EpsonSimulator
 from robolink_simulators.epson.options import options_from_text, read_profile
+from robolink_simulators.epson.spel.tasks.channels.serial_link import COM_NUMBERS
 from robolink_simulators.epson.vision.vision_file import install_vision
 from robolink_simulators.hosting.streams.epson_serial import serve_serial
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
-from robolink_simulators.serial_numbers import drawn_serial
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
@@ -49,15 +49,51 @@ def serve_epson(
             tcp = serve_tcp(simulator, *address, clock=clock, allow_remote=allow_remote)
             url = stack.enter_context(tcp).url
         assist = stack.enter_context(serve_assist(simulator, clock=clock))
-        _announce(url, assist.url, simulator.machine.model.name, simulator.seed)
+        _announce(simulator, url, assist.url, stopped.state_dir)
         stopped.wait()
+
+
+@dataclass(frozen=True, slots=True)
+class ProjectSurroundings:
+    """What a project needs beside its files: what ``--vision``, ``--com`` and ``--files`` name.
+
+    Attributes:
+        vision: The vision project.
+        lines: Serial lines, as they were typed.
+        folder: Where files lie.
+    """
+
+    vision: Path | None = None
+    lines: Sequence[str] = ()
+    folder: Path | None = None
+
+    @property
+    def named(self) -> str | None:
+        """The first of the options that was given, ``None`` where none was."""
+        given = (("--vision", self.vision), ("--com", self.lines), ("--files", self.folder))
+        return next((option for option, value in given if value), None)
+
+    def install(self, simulator: EpsonSimulator) -> None:
+        """Give them to a simulator whose program is loaded.
+
+        Raises:
+            ConfigError: The vision project makes no sense.
+            click.UsageError: A serial line makes none.
+        """
+        runner = simulator.program
+        assert runner is not None  # noqa: S101 - loaded before
+        runner.ports.devices |= _lines(self.lines)
+        if self.folder is not None:
+            runner.session.files.root = self.folder
+        if self.vision is not None:
+            install_vision(simulator, self.vision)
 
 
 def load_programs(
     simulator: EpsonSimulator,
     programs: Sequence[Path],
     points: Sequence[Path],
-    vision: Path | None = None,
+    surroundings: ProjectSurroundings,
 ) -> None:
     """Load a project, if any; what its tasks print is shown beside the announcement.
 
@@ -65,21 +101,19 @@ def load_programs(
         simulator: Into which.
         programs: Its programs.
         points: Its point files.
-        vision: Its vision project.
+        surroundings: Its camera, serial lines and folder.
 
     Raises:
         ConfigError: It cannot be built, or a file cannot be read.
-        click.UsageError: There are points or a vision project, and no programs.
+        click.UsageError: There is something that goes with programs, and no programs.
     """
     if not programs:
-        if points:
-            raise click.UsageError(tr("--points goes with --program."))
-        if vision is not None:
-            raise click.UsageError(tr("--vision goes with --program."))
+        named = "--points" if points else surroundings.named
+        if named is not None:
+            raise click.UsageError(tr("{option} goes with --program.", option=named))
         return
     runner = simulator.load(programs, points)
-    if vision is not None:
-        install_vision(simulator, vision)
+    surroundings.install(simulator)
     runner.on_print = lambda text: note(text.rstrip("\r\n"))
 
 
@@ -111,17 +145,8 @@ def habits(options: Sequence[str], profile: Path | None) -> EpsonOptions:
     return options_from_text({**settled, **pairs})
 
 
-def serial_of(seed: int) -> str:
-    """Return the serial number of a simulated robot: another one each time, but for a given seed.
-
-    Two simulators that were started alike are two controllers all the same, unless a person
-    asked for the very same one.
-    """
-    given = click.get_current_context().get_parameter_source("seed")
-    return drawn_serial(f"seed {seed}" if given is ParameterSource.COMMANDLINE else "")
-
-
-def _announce(url: str, assist_url: str, robot: str, seed: int) -> None:
+def _announce(simulator: EpsonSimulator, url: str, assist_url: str, state_dir: str) -> None:
+    robot, seed = simulator.machine.model.name, simulator.seed
     document: dict[str, object] = {"url": url, "assist": assist_url, "robot": robot, "seed": seed}
     lines = (
         tr("SIMULATED EPSON {robot} (seed {seed}). No robot moves.", robot=robot, seed=seed),
@@ -130,4 +155,17 @@ def _announce(url: str, assist_url: str, robot: str, seed: int) -> None:
         tr('Try: robolink -c "{url}" status', url=url),
         tr("Ctrl-C ends it."),
     )
-    announce(document, lines)
+    announce(document, lines, state_dir)
+
+
+def _lines(texts: Sequence[str]) -> dict[int, str]:
+    """Return the serial line of each port that ``--com`` names."""
+    named = dict[int, str]()
+    for text in texts:
+        number, _, device = text.partition("=")
+        if not device or number not in map(str, COM_NUMBERS):
+            raise click.UsageError(
+                tr("--com takes 1 to 4 or 1001 to 1008, and a device: 1=/dev/pts/3.")
+            )
+        named[int(number)] = device
+    return named

@@ -61,7 +61,7 @@ def serve_plc(simulator: SoftMotionSimulator, buses: Buses, *, speed: float) -> 
         stopped = stack.enter_context(Termination())
         urls = _served(stack, simulator, buses, clock)
         assist = stack.enter_context(serve_assist(simulator, clock=clock))
-        _announce(simulator, urls, assist.url)
+        _announce(simulator, urls, assist.url, stopped.state_dir)
         stopped.wait()
 
 
@@ -114,7 +114,9 @@ def _can_place(text: str, node: int) -> "CanPlace":
     return CanPlace(interface, channel, int(port), node)
 
 
-def _announce(simulator: SoftMotionSimulator, urls: Mapping[str, str], assist_url: str) -> None:
+def _announce(
+    simulator: SoftMotionSimulator, urls: Mapping[str, str], assist_url: str, state_dir: str
+) -> None:
     kinematics = simulator.plc.group.kinematics.name
     document: dict[str, object] = {
         "url": simulator.url,
@@ -134,4 +136,4 @@ def _announce(simulator: SoftMotionSimulator, urls: Mapping[str, str], assist_ur
         tr('Try: robolink -c "{url}" status', url=simulator.url),
         tr("Ctrl-C ends it."),
     )
-    announce(document, lines)
+    announce(document, lines, state_dir)

@@ -85,5 +85,6 @@ def sim_plc(
                 tr('Try: robolink -c "{url}" expert plc check-map', url=first),
                 tr("Ctrl-C ends it."),
             ],
+            stopped.state_dir,
         )
         stopped.wait()

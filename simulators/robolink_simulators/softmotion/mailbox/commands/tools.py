@@ -101,6 +101,14 @@ class ToolDesk:
         self._memory.define(number, self._units.given(tool), "nozzle")
         self._apply(number, self._memory.slot(number).tool, "nozzle")
 
+    def preselect(self, number: int) -> None:
+        """Put the tool of a slot in force past the mailbox; 0 for none."""
+        if number:
+            slot = self._memory.slot(number)
+            self._apply(number, slot.tool, slot.name)
+        else:
+            self.forget()
+
     def set_tool(self) -> Answer:
         """Return the tool in force for movements to come."""
         return self._answer(self._group.tool)

@@ -51,7 +51,7 @@ _LOOK_BACK: Final = {
 }
 
 _SET_UP: Final = {
-    "cell": (f"{_GROUPS}:cell", "list show doctor scan ports people station"),
+    "cell": (f"{_GROUPS}:cell", "list show check doctor scan ports people station"),
     "sim": (f"{_SIMULATE}.sim:sim", declared("Simulated controllers to practise on")),
     "demo": (
         f"{_SIMULATE}.demo:demo",
@@ -67,8 +67,13 @@ SECTIONS: Final = {
 }
 """The first help page: heading, then name, where it is and one line of help."""
 
-SHORT_NAMES: Final = {"config": f"{_GROUPS}:config", "expert": f"{_GROUPS}:expert"}
-"""Names that work and stand in no list; what ``config`` held says itself how it is called now."""
+SHORT_NAMES: Final = {
+    "check": f"{_RECORD}.cell_check:check",
+    "config": f"{_GROUPS}:config",
+    "expert": f"{_GROUPS}:expert",
+}
+"""Names that work and stand in no list. ``check`` is short for ``cell check``; what ``config``
+held says itself how it is called now."""
 
 RENAMED: Final = {
     "backup": (f"{_CONTROLLER}.backup:backup", "tool backup"),

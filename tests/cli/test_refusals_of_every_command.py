@@ -137,6 +137,7 @@ BAD = {
     "cell ports": (["COM1"], "unexpected extra argument"),
     "cell scan": (["localhost"], "no range of addresses"),
     "cell list": (["all"], "unexpected extra argument"),
+    "cell check": (["--since", "yesterday"], "does not match the format"),
     "cell people": (["nowhere"], "nowhere"),
     "cell files": (["here"], "unexpected extra argument"),
     "cell validate": (["--fix"], "No such option"),

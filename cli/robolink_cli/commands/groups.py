@@ -15,6 +15,7 @@ _CONTROLLER: Final = "robolink_cli.commands.controller"
 _COMPUTER: Final = "robolink_cli.commands.computer"
 _COMPANIONS: Final = "robolink_cli.commands.companions"
 _MEASURE: Final = "robolink_cli.commands.measure"
+_RECORD: Final = "robolink_cli.commands.record"
 
 _ROBOT: Final = {
     "where": (
@@ -42,6 +43,12 @@ _ROBOT: Final = {
 _CELL: Final = {
     "list": (f"{_COMPUTER}.config:list_cells", declared("The cells that have a name here.")),
     "show": (f"{_COMPUTER}.config:show", declared("All that is in force for one cell.")),
+    "check": (
+        f"{_RECORD}.cell_check:check",
+        declared(
+            "Whether cells are in order and nothing is due; for a nightly job, moves nothing."
+        ),
+    ),
     "files": (f"{_COMPUTER}.config:path", declared("Which cell files are looked at.")),
     "validate": (f"{_COMPUTER}.config:check", declared("Whether the cell files are right.")),
     "doctor": (

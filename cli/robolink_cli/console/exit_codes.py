@@ -35,7 +35,8 @@ MEANINGS: Final[dict[int, str]] = {
     DONE: "done",
     DIFFERENT: (
         "`tool compare` found a difference; `journal verify` found a damaged record; something "
-        "stands out in `journal drift`; `cell doctor` or `cell ports` found something in the way"
+        "stands out in `journal drift`; `cell doctor`, `cell ports` or `cell check` found "
+        "something to see to"
     ),
     USAGE: "the command, a file, a setting or the journal is wrong",
     3: "the controller is not reached, or the link broke",

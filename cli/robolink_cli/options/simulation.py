@@ -143,3 +143,36 @@ def faults_option(function: F) -> F:
         type=click.Path(exists=True, dir_okay=False, path_type=Path),
         help="What is planned to go wrong: a file, as docs/fault-plans.md explains.",
     )(function)
+
+
+_PROJECT_OPTIONS: tuple[Callable[[Any], Any], ...] = (
+    click.option(
+        "--vision",
+        type=click.Path(exists=True, dir_okay=False, path_type=Path),
+        metavar="FILE",
+        help="Vision project of the programs, for VRun; docs/spel-programs.md shows one.",
+    ),
+    click.option(
+        "--com",
+        "lines",
+        multiple=True,
+        metavar="NUMBER=DEVICE",
+        help="Serial line of a port of OpenCom, as 1=/dev/pts/3; no other is reached. "
+        "May be repeated.",
+    ),
+    click.option(
+        "--files",
+        "folder",
+        type=click.Path(exists=True, file_okay=False, path_type=Path),
+        metavar="DIR",
+        help="Folder for the files that programs write and read; no other is reached. "
+        "Without it they are gone at the end.",
+    ),
+)
+
+
+def project_options(function: Any) -> Any:  # noqa: ANN401 - a decorator of click
+    """Add ``--vision``, ``--com`` and ``--files``: ``vision``, ``lines`` and ``folder``."""
+    for option in reversed(_PROJECT_OPTIONS):
+        function = option(function)
+    return function

@@ -41,7 +41,7 @@ from robolink_simulators.epson.remote.service import Service
 from robolink_simulators.epson.remote.wire_text import shown_reply, shown_request
 from robolink_simulators.epson.spel import Interpreter
 from robolink_simulators.epson.spel.programs.loading import load_project
-from robolink_simulators.epson.spel.tasks.ports import Ports
+from robolink_simulators.epson.spel.tasks.channels.ports import Ports
 from robolink_simulators.epson.spel.tasks.runner import ProgramRunner
 from robolink_simulators.epson.world import World
 from robolink_simulators.faults import Departure, Fault, FaultAction, FaultPlan, LinkKind

@@ -192,6 +192,16 @@ def b08_set_kinematics(bench):
     bench.read_tool()
 
 
+def reads_of_no_movement(bench):
+    """Not one of the sixteen: what is read that is not there, before and after what is."""
+    bench.enable()
+    for mode in (1, 0, 2, 0, 1):
+        assert bench.tell(Opcode.READ_TOOL, mode) == ([15, 206] if mode else [10, 0])
+    bench.client.end_of(bench.client.move(z=-2.0).ack_head)
+    for mode in (1, 2, 0):
+        bench.tell(Opcode.READ_TOOL, mode)
+
+
 def refused_kinematics(bench):
     """Not one of the sixteen: codes that nothing has, and those of another machine."""
     for codes, error_class in ((18, 0), 111), ((2, 300), 111), ((-1, 0), 111), ((0, 0), 303):
@@ -353,6 +363,7 @@ RUNS = [
     (b14_an_axis_alone, "Kin_Scara3_Z"),
     (b15_jog_about_x, "Kin_ArticulatedRobot_6DOF"),
     (block_of_before, "Kin_Scara3_Z"),
+    (reads_of_no_movement, "Kin_Scara3_Z"),
     (refused_kinematics, "Kin_Gantry3+Kin_CAxis"),
 ]
 """Each behaviour with each kinematics that it names; the sixteenth is of its own kind."""

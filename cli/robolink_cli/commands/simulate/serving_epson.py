@@ -3,6 +3,7 @@
 import os
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 
 import click
@@ -11,6 +12,7 @@ from robolink_simulators.cell.clock import SteeredClock
 from robolink_simulators.control.cell import ControlledCell
 from robolink_simulators.epson import EpsonOptions, EpsonSimulator
 from robolink_simulators.epson.options import options_from_text, read_profile
+from robolink_simulators.epson.spel.tasks.channels.serial_link import COM_NUMBERS
 from robolink_simulators.epson.vision.vision_file import install_vision
 from robolink_simulators.hosting.streams.epson_serial import serve_serial
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
@@ -63,11 +65,47 @@ def serve_epson(
         stopped.wait(lambda: simulator.log.added + control.requests)
 
 
+@dataclass(frozen=True, slots=True)
+class ProjectSurroundings:
+    """What a project needs beside its files: what ``--vision``, ``--com`` and ``--files`` name.
+
+    Attributes:
+        vision: The vision project.
+        lines: Serial lines, as they were typed.
+        folder: Where files lie.
+    """
+
+    vision: Path | None = None
+    lines: Sequence[str] = ()
+    folder: Path | None = None
+
+    @property
+    def named(self) -> str | None:
+        """The first of the options that was given, ``None`` where none was."""
+        given = (("--vision", self.vision), ("--com", self.lines), ("--files", self.folder))
+        return next((option for option, value in given if value), None)
+
+    def install(self, simulator: EpsonSimulator) -> None:
+        """Give them to a simulator whose program is loaded.
+
+        Raises:
+            ConfigError: The vision project makes no sense.
+            click.UsageError: A serial line makes none.
+        """
+        runner = simulator.program
+        assert runner is not None  # noqa: S101 - loaded before
+        runner.ports.devices |= _lines(self.lines)
+        if self.folder is not None:
+            runner.session.files.root = self.folder
+        if self.vision is not None:
+            install_vision(simulator, self.vision)
+
+
 def load_programs(
     simulator: EpsonSimulator,
     programs: Sequence[Path],
     points: Sequence[Path],
-    vision: Path | None = None,
+    surroundings: ProjectSurroundings,
 ) -> None:
     """Load a project, if any; what its tasks print is shown beside the announcement.
 
@@ -75,21 +113,19 @@ def load_programs(
         simulator: Into which.
         programs: Its programs.
         points: Its point files.
-        vision: Its vision project.
+        surroundings: Its camera, serial lines and folder.
 
     Raises:
         ConfigError: It cannot be built, or a file cannot be read.
-        click.UsageError: There are points or a vision project, and no programs.
+        click.UsageError: There is something that goes with programs, and no programs.
     """
     if not programs:
-        if points:
-            raise click.UsageError(tr("--points goes with --program."))
-        if vision is not None:
-            raise click.UsageError(tr("--vision goes with --program."))
+        named = "--points" if points else surroundings.named
+        if named is not None:
+            raise click.UsageError(tr("{option} goes with --program.", option=named))
         return
     runner = simulator.load(programs, points)
-    if vision is not None:
-        install_vision(simulator, vision)
+    surroundings.install(simulator)
     runner.on_print = lambda text: note(text.rstrip("\r\n"))
 
 
@@ -135,3 +171,16 @@ def _announce(
         tr("Ctrl-C ends it."),
     )
     announce(document, lines, state_dir)
+
+
+def _lines(texts: Sequence[str]) -> dict[int, str]:
+    """Return the serial line of each port that ``--com`` names."""
+    named = dict[int, str]()
+    for text in texts:
+        number, _, device = text.partition("=")
+        if not device or number not in map(str, COM_NUMBERS):
+            raise click.UsageError(
+                tr("--com takes 1 to 4 or 1001 to 1008, and a device: 1=/dev/pts/3.")
+            )
+        named[int(number)] = device
+    return named

@@ -6,7 +6,7 @@ import click
 
 from robolink_cli.commands.simulate.sim_plc import sim_plc
 from robolink_cli.commands.simulate.sim_softmotion import softmotion
-from robolink_cli.options.simulation import simulation_options
+from robolink_cli.options.simulation import project_options, simulation_options
 from robolink_cli.session.context import json_option
 
 
@@ -87,12 +87,7 @@ sim.add_command(softmotion)
     metavar="FILE",
     help="Point file (.pts) of the programs. May be repeated.",
 )
-@click.option(
-    "--vision",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    metavar="FILE",
-    help="Vision project of the programs, for VRun; docs/spel-programs.md shows one.",
-)
+@project_options
 @simulation_options
 @json_option
 def epson(
@@ -113,6 +108,8 @@ def epson(
     programs: tuple[Path, ...],
     points: tuple[Path, ...],
     vision: Path | None,
+    lines: tuple[str, ...],
+    folder: Path | None,
     allow_remote: bool,
 ) -> None:
     """Serve a simulated EPSON controller with Remote Ethernet, or RS232, until Ctrl-C.
@@ -135,6 +132,7 @@ def epson(
     from robolink_cli.commands.simulate.planned_faults import plan_faults
     from robolink_cli.commands.simulate.serving import world_from
     from robolink_cli.commands.simulate.serving_epson import (
+        ProjectSurroundings,
         habits,
         load_programs,
         password_in,
@@ -149,7 +147,8 @@ def epson(
         state_path=state,
         world=world_from(world),
     )
-    load_programs(simulator, programs, points, vision)
+    surroundings = ProjectSurroundings(vision, lines, folder)
+    load_programs(simulator, programs, points, surroundings)
     plan_faults(simulator, faults, {LinkKind.EPSON_SERIAL if serial else LinkKind.EPSON_TCP})
     place = None if serial else listen
     serve_epson(simulator, place, speed=speed, allow_remote=allow_remote, baud=baud)

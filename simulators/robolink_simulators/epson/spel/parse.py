@@ -36,13 +36,12 @@ _WORDS_NOT_SIMULATED = """
     atrq autoljm dispdev enctemper finedist hofs hordr hour jrange limittorque limittorquelp
     limittorquestop limzmargin mcordr msgbox olaccel olrate opencom opennet outreal parsestr
     performmode ptpboost ptrq qpdecelr qpdecels shutdown softcp speedrlimitation syncrobots
-    taskstate tclim tcspeed diffpoint atclr calib closecom closenet close cls copy del eresume
-    error exportpoints flush fmtstr homeclr hofsjointaccuracy importpoints input inputbox
-    latchenable line loadpoints mcal mkdir ptclr ptran qp randomize read redim rename
-    resetelapsedtime savepoints setcom setinreal setlatch setnet signal simset taskwait tc
-    tmreset toff ton vcal vcalpoints waitnet waitsig write writebin abortmotion cont restart
-    recover vdefgetmotionrange vdefsetmotionrange vshowmodel vtrain sysconfig workque_list
-    cnv_quelist history clearhistory
+    taskstate tclim tcspeed diffpoint atclr calib closecom closenet close cls eresume error
+    flush fmtstr homeclr hofsjointaccuracy input inputbox latchenable line mcal ptclr ptran qp
+    randomize read redim resetelapsedtime setcom setinreal setlatch setnet signal simset
+    taskwait tc tmreset toff ton vcal vcalpoints waitnet waitsig write writebin abortmotion cont
+    restart recover vdefgetmotionrange vdefsetmotionrange vshowmodel vtrain sysconfig
+    workque_list cnv_quelist history clearhistory
 """
 
 NOT_SIMULATED: Final = frozenset(_WORDS_NOT_SIMULATED.split())
@@ -70,22 +69,20 @@ _OF_PROGRAMS_ALONE = """
     rundialog simget gshow declare vrun vget vset vload vsave vcls vdeftool vdefarm vdeflocal
     vgocenter vteach vstatsreset vstatssave vstatsshow vcreateobject vcreatesequence
     vdeleteobject vdeletesequence vsaveimage vloadmodel vsavemodel vxcalib vxcalsave vxcalload
-    vxcaldelete chdir chdrive rmdir closedb opendb selectdb updatedb deletedb setpriority
-    copyfile aopen bopen
+    vxcaldelete closedb opendb selectdb updatedb deletedb setpriority copyfile
 """
 
 _UNSIMULATED_FUNCTIONS = """
-    opencom chkcom folderexists fileexists eof freefile curdir$ curdrive$ currobot ptrq atrq
-    avgspeed peakspeed olrate sense till vxcalinfo vxcalpoints hand_on hand_off aio_in aio_inw
-    aio_out aio_outw recover latchpos recoverpos lookup diffpoint difftoolorientation
-    windowsstatus loadtype projectname$ robotname hour joint restart setcom here eval
+    opencom chkcom currobot ptrq atrq avgspeed peakspeed olrate sense till vxcalinfo vxcalpoints
+    hand_on hand_off aio_in aio_inw aio_out aio_outw recover latchpos recoverpos lookup
+    diffpoint difftoolorientation windowsstatus loadtype projectname$ robotname hour joint
+    restart setcom here eval
 """
 
 _WITH_A_FORM_OF_THEIR_OWN = """
     opencom opennet parsestr eresume error fmtstr input line read redim setcom setnet signal
     taskwait waitnet waitsig write writebin readbin close closecom closenet flush cont restart
-    tmreset resetelapsedtime randomize loadpoints savepoints vrun vget vset vload vsave vcls
-    vcal vxcalib
+    tmreset resetelapsedtime randomize vrun vget vset vload vsave vcls vcal vxcalib
 """
 
 WINDOW_ONLY: Final = frozenset(

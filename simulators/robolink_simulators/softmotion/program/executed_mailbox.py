@@ -5,6 +5,7 @@ import struct
 from collections.abc import Mapping, Sequence
 from typing import Final
 
+from robolink import ambient
 from robolink.protocols.mailbox import Capability, Command, Opcode, WordOrder, Words, encode_command
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
 from robolink_simulators.softmotion.group.condition import SmcGroupState
@@ -56,6 +57,7 @@ class ExecutedMailbox:
         structured: The program.
         inbox: What clients have written.
         cycles: Cycles executed since the program was loaded.
+        stands: Whether none is executed, as in a PLC that was stopped.
 
     Raises:
         StructuredTextError: A text is not in the subset.
@@ -71,6 +73,10 @@ class ExecutedMailbox:
     ) -> None:
         self.inbox = Inbox(WordOrder.LOW_FIRST)
         self.cycles = 0
+        self.stands = False
+        # The clock of a PLC began when it was switched on, nobody knows when; from it the program
+        # draws its number, where none is given.
+        self._began_us = 0 if options.mailbox.device_id else _US * ambient.random_number(31)
         self._group = group
         self._units = units
         self._kinematics = kinematics
@@ -153,8 +159,7 @@ class ExecutedMailbox:
 
     def run(self, now_ns: int) -> None:
         """Do what is due now."""
-        due_ns = self.next_change(now_ns)
-        if due_ns is not None and now_ns >= due_ns:
+        if now_ns >= self._due_ns:
             self._catch_up(now_ns)
 
     def refresh(self, now_ns: int) -> None:
@@ -164,15 +169,17 @@ class ExecutedMailbox:
 
     def _catch_up(self, now_ns: int) -> None:
         began_ns = now_ns // self._cycle_ns * self._cycle_ns
-        if began_ns > self._scanned_ns:
+        if began_ns > self._scanned_ns and not self.stands:
             self._scan(began_ns)
 
     def next_change(self, now_ns: int) -> int | None:
         """Return when the next cycle is due that is not left out."""
-        waits = 1 if self._restless else self._left_out
-        return max(
-            self._scanned_ns + waits * self._cycle_ns, now_ns // self._cycle_ns * self._cycle_ns
-        )
+        return max(self._due_ns, (now_ns // self._cycle_ns + 1) * self._cycle_ns)
+
+    @property
+    def _due_ns(self) -> int:
+        """When the next cycle begins that is not left out; past when the program stood still."""
+        return self._scanned_ns + (1 if self._restless else self._left_out) * self._cycle_ns
 
     def _scan(self, began_ns: int) -> None:
         self._scanned_ns = began_ns
@@ -187,7 +194,7 @@ class ExecutedMailbox:
             program.put("RL_Machine.xForeignTool", True)
         inputs = [group.inputs.read(number, group.values) for number in range(SIGNALS)]
         program.put("RL_Machine.inputs", inputs)
-        program.cycle(began_ns // _US)
+        program.cycle(began_ns // _US + self._began_us)
         self._tool = group.tool
         self._switch_outputs()
         self._judge_rest()

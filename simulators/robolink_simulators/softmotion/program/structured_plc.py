@@ -86,6 +86,7 @@ class StructuredPlc(Plc):
             self.group.enable()
         x, y, z, a, b, c = self._units.given(tool)
         self.memory.define(_FIRST_SLOT, (x, y, z, a, b, c), "nozzle")
+        epoch_before = self.memory.epoch
         sequence, epoch = 1, 0
         wanted = ((Opcode.OWNERSHIP, 1), (Opcode.SELECT_TOOL, _FIRST_SLOT), (Opcode.OWNERSHIP, 0))
         for opcode, operand in wanted:
@@ -95,6 +96,7 @@ class StructuredPlc(Plc):
             self._executed.tell_before(encode_command(command))
             sequence, epoch = next_number(sequence), self.memory.epoch
         self.memory.tool_changed = False  # the machine's program has seen that
+        self.memory.epoch = epoch_before
         self._take_over()
 
     def lay_words(self, order: WordOrder) -> None:
@@ -106,6 +108,16 @@ class StructuredPlc(Plc):
         """Refuse: the heartbeat is the program's own."""
         del now_ns
         raise _not_in_a_program()
+
+    def freeze(self, now_ns: int) -> None:
+        """Stop the mailbox program; what moves goes on."""
+        super().freeze(now_ns)
+        self._executed.stands = True
+
+    def thaw(self) -> None:
+        """Let the mailbox program go on."""
+        super().thaw()
+        self._executed.stands = False
 
     def output(self, now_ns: int) -> Words:
         """Return response, slots and device block, one behind the other."""

@@ -24,6 +24,8 @@ from robolink_simulators.epson.spel.expressions.joint_functions import (
 from robolink_simulators.epson.spel.expressions.machine_functions import clock_of
 from robolink_simulators.epson.spel.expressions.printing import CRLF, number_text
 from robolink_simulators.epson.spel.expressions.values import out_of_range
+from robolink_simulators.epson.spel.file_commands import FILE_COMMANDS
+from robolink_simulators.epson.spel.point_file_commands import POINT_FILE_COMMANDS
 from robolink_simulators.epson.spel.statements.defined.areas import AREA_STATEMENTS
 from robolink_simulators.epson.spel.statements.defined.locals_and_pallets import (
     PLACE_STATEMENTS,
@@ -312,6 +314,8 @@ _AT_ONCE: Final = {
     **POINT_STATEMENTS,
     **PLACE_STATEMENTS,
     **AREA_STATEMENTS,
+    **FILE_COMMANDS,
+    **POINT_FILE_COMMANDS,
 }
 """Statements that take no time: keyword to what carries it out and returns what it prints."""
 

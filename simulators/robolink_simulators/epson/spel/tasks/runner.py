@@ -11,9 +11,10 @@ from robolink_simulators.epson.spel.expressions.data_types import Variable
 from robolink_simulators.epson.spel.session import Session
 from robolink_simulators.epson.spel.statement_execution import StatementExecution
 from robolink_simulators.epson.spel.statements.waiting import NEVER_NS
+from robolink_simulators.epson.spel.tasks.channels.numbered import NumberedChannels
+from robolink_simulators.epson.spel.tasks.channels.ports import Ports
 from robolink_simulators.epson.spel.tasks.compiled import CompiledFunction, SpelProject
 from robolink_simulators.epson.spel.tasks.permissions import forbidden_in
-from robolink_simulators.epson.spel.tasks.ports import Ports
 from robolink_simulators.epson.spel.tasks.shared import TaskSharing
 from robolink_simulators.epson.spel.tasks.task import (
     SpelTask,
@@ -47,6 +48,8 @@ class ProgramRunner:
         ports: The TCP/IP ports of the controller.
 
     Attributes:
+        ports: The TCP/IP and serial ports.
+        channels: Ports, files and the window of a person, by their numbers.
         tasks: Those that are not over, by their numbers.
         console: What Print has shown, the last lines of it.
         on_print: Called with what is printed.
@@ -63,6 +66,8 @@ class ProgramRunner:
         self.session = session
         self.project = project
         self.ports = ports
+        keeps_ports = session.options.ports_of_ended_task == "open"
+        self.channels = NumberedChannels(ports, session.files, self.show, keeps_ports=keeps_ports)
         self.tasks: dict[int, SpelTask] = {}
         self.console: deque[str] = deque(maxlen=_CONSOLE_LINES)
         self.on_print: Callable[[str], None] | None = None
@@ -376,8 +381,7 @@ class ProgramRunner:
             del self.tasks[task.task_number]
             self.sharing.release(task)
             self.traps.forget(task)
-            if self.session.options.ports_of_ended_task == "closed":
-                self.ports.close_of(task)
+            self.channels.close_of(task)
         normal = any(task.kind is not TaskKind.BACKGROUND for task in self.tasks.values())
         if over and not normal and self._condition.task is Task.RUNNING:
             self._condition.task = Task.NONE
@@ -388,5 +392,5 @@ class ProgramRunner:
         self.tasks.clear()
         self.sharing = TaskSharing()
         self.traps.clear()
-        self.ports.close_all()
+        self.channels.close_all()
         self._paused = False

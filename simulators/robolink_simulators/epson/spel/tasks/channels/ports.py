@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final, Protocol
 
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.values import LONGEST_STRING, out_of_range
-from robolink_simulators.epson.spel.tasks.serial_link import (
+from robolink_simulators.epson.spel.tasks.channels.serial_link import (
     COM_NUMBERS,
     SerialFormat,
     SerialLink,
@@ -278,6 +278,13 @@ class Ports:
         taken = bytes(port.received[:count])
         del port.received[:count]
         return taken
+
+    def foreign(self, number: int, task: "SpelTask") -> bool:
+        """Tell whether a port is not this task's."""
+        return self._port(number).owner is not task
+
+    def require_binary(self, number: int, task: "SpelTask") -> None:
+        """Let bytes pass: every port carries them."""
 
     def _of(self, number: int, task: "SpelTask") -> _Port:
         port = self._port(number)

@@ -1,7 +1,7 @@
-"""Points and labels of a project, as RC+ writes them (docs/reference/spel.md 16)."""
+"""The point files of a project, as RC+ writes them (docs/reference/spel.md 16)."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Final
 
@@ -9,15 +9,6 @@ from robolink.errors import ConfigError
 from robolink.files.named import read_named
 from robolink.messages import tr
 from robolink.model import Elbow, Hand, Posture, Wrist
-from robolink_simulators.epson.memory.io_labels import (
-    BIT,
-    BYTE,
-    INPUT,
-    MEMORY,
-    OUTPUT,
-    WORD,
-    IOLabel,
-)
 from robolink_simulators.epson.memory.points import HIGHEST_LOCAL, HIGHEST_POINT, Point
 from robolink_simulators.epson.spel.source.source_text import decoded
 
@@ -25,14 +16,16 @@ _BLOCK: Final = re.compile(r"([A-Za-z]+?)(\d*)\s*\{$")
 _PAIR: Final = re.compile(r"([A-Za-z0-9]+)=(.*)$")
 _AXES: Final = "XYZUVW"
 _UNDEFINED_AXES: Final = 0b111111
-_KINDS: Final = {"Input": INPUT, "Output": OUTPUT, "Memory": MEMORY}
-_WIDTHS: Final = {"Bit": BIT, "Byte": BYTE, "Word": WORD}
-_LABELS: Final = re.compile(r"(Input|Output|Memory)(Bit|Byte|Word)Labels$")
 
 Pairs = dict[str, str]
 
 
-def _text(path: Path, encoding: str | None) -> str:
+def project_text(path: Path, encoding: str | None) -> str:
+    """Return the text of a file of a project.
+
+    Raises:
+        ConfigError: It cannot be read.
+    """
     try:
         return decoded(read_named(path), encoding)
     except OSError as error:
@@ -42,7 +35,7 @@ def _text(path: Path, encoding: str | None) -> str:
         ) from error
 
 
-def _blocks(text: str) -> Iterator[tuple[tuple[str, ...], Pairs]]:
+def blocks(text: str) -> Iterator[tuple[tuple[str, ...], Pairs]]:
     """Yield each innermost block: the names of what it stands in, and its own pairs."""
     names, pairs = list[str](), Pairs()
     for line in map(str.strip, text.splitlines()):
@@ -68,7 +61,7 @@ def read_points(path: Path, encoding: str | None = None) -> tuple[dict[int, Poin
         ConfigError: It cannot be read, or a point makes no sense.
     """
     points, labels = dict[int, Point](), dict[str, int]()
-    for names, pairs in _blocks(_text(path, encoding)):
+    for names, pairs in blocks(project_text(path, encoding)):
         if names[-1] != "Point":
             continue
         try:
@@ -115,18 +108,30 @@ _FLAGS: Final = {
 }
 
 
-def read_io_labels(path: Path, encoding: str | None = None) -> dict[str, IOLabel]:
-    """Return the labels of inputs, outputs and memory bits, by their names in lower case.
+def points_text(points: Mapping[int, Point], labels: Mapping[str, int]) -> str:
+    """Return a point file of some points, which :func:`read_points` reads as the same points.
 
-    Raises:
-        ConfigError: It cannot be read.
+    Its first line is not known beyond its beginning (docs/reference/spel.md 16).
     """
-    labels = dict[str, IOLabel]()
-    for names, pairs in _blocks(_text(path, encoding)):
-        kind = _LABELS.match(names[-2]) if len(names) > 1 else None
-        number = next((v for k, v in pairs.items() if k in ("nBit", "nByte", "nWord", "nPort")), "")
-        name = pairs.get("sLabel", "")
-        if kind is None or not name or not number.isdecimal():
-            continue
-        labels[name.lower()] = IOLabel(_KINDS[kind[1]], _WIDTHS[kind[2]], int(number), name)
-    return labels
+    names = {number: label for label, number in labels.items()}
+    lines = ["ENVT0100", 'sVersion="2.0.0"', f"nNumberOfPoints={len(points)}"]
+    for at, (number, point) in enumerate(sorted(points.items()), start=1):
+        lines += [f"Point{at} {{", f"\tnNumber={number}", f'\tsLabel="{names.get(number, "")}"']
+        lines += [f"\t{key}={value}" for key, value in _pairs(point).items()]
+        lines.append("}")
+    return "".join(line + "\r\n" for line in lines)
+
+
+def _pairs(point: Point) -> dict[str, float]:
+    posture = point.posture or Posture()
+    return {
+        "nUndefined": 0,
+        **{f"r{axis}": at for axis, at in zip(_AXES, point.coordinates, strict=True)},
+        "nLocal": point.local,
+        "nHand": 2 if point.hand is Hand.LEFT else 1,
+        "nElbow": 2 if posture.elbow is Elbow.BELOW else 1,
+        "nWrist": 2 if posture.wrist is Wrist.FLIP else 1,
+        **{key: getattr(posture, name) for name, key in _FLAGS.items()},
+        "rJ1Angle": posture.j1_angle_deg or 0,
+        "rJ4Angle": posture.j4_angle_deg or 0,
+    }

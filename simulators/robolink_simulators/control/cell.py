@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Final
 
 from robolink_simulators.cell.clock import ManualClock, ScaledClock
 from robolink_simulators.device.hosted import KeptMoment
@@ -12,6 +13,13 @@ from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 AnySimulator = EpsonSimulator | SoftMotionSimulator | PlcSimulator
 """A simulated controller of any kind."""
+
+_NOT_SERVED: Final = {
+    "epson": (LinkKind.EPSON_SIM,),
+    "softmotion": (LinkKind.MAILBOX_SIM,),
+    "plc": (LinkKind.PLC_TCP,),
+}
+"""What counts for one whose host has not said where it is."""
 
 
 @dataclass(slots=True)
@@ -32,6 +40,7 @@ class ControlledCell:
 
     @property
     def links(self) -> tuple[LinkKind, ...]:
-        """The kinds of links that it is served on."""
+        """The kinds of links that it is served on, at least one."""
         urls = tuple(self.urls.values()) or (self.simulator.url,)
-        return tuple(LinkKind(url.partition("://")[0]) for url in urls if "://" in url)
+        served = tuple(LinkKind(url.partition("://")[0]) for url in urls if "://" in url)
+        return served or _NOT_SERVED[self.simulator.kind]

@@ -59,9 +59,9 @@ class ControlClient(ClosedAtExit):
         self._connection.close()
 
     def _asked(self, method: str, path: str, given: dict[str, object]) -> dict[str, Any]:
+        if self._connection.sock is None:
+            self._connect()
         try:
-            if self._connection.sock is None:
-                self._connect()
             body = json.dumps(given) if method == "POST" else None
             self._connection.request(method, self._path + path, body)
             reply = self._connection.getresponse()

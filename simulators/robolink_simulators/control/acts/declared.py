@@ -156,10 +156,11 @@ def shown_flange(flange: Pose) -> dict[str, float]:
     return {"x_mm": x_mm, "y_mm": y_mm, "z_mm": z_mm, "u_deg": u_deg}
 
 
-def panel_act(name: str, *takes: Taken, method: str = "") -> ControlAct:
+def panel_act(panel: type, name: str, *takes: Taken, method: str = "") -> ControlAct:
     """Return the act that does what the panel of the simulator has a method for.
 
     Args:
+        panel: The class of the panel.
         name: Its name.
         takes: What the method takes, in its order.
         method: The method's name, where it is another one.
@@ -169,5 +170,5 @@ def panel_act(name: str, *takes: Taken, method: str = "") -> ControlAct:
         getattr(cell.simulator.panel, method or name)(*given.values())
         return {}
 
-    act.__doc__ = f"Do at the panel: {name.replace('_', ' ')}."
+    act.__doc__ = getattr(panel, method or name).__doc__
     return ControlAct(name, act, takes)

@@ -16,6 +16,7 @@ from robolink_simulators.control.acts.declared import (
 )
 from robolink_simulators.control.cell import ControlledCell
 from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.epson.panel import EpsonPanel
 
 
 def _teach_point(cell: ControlledCell, given: Given) -> Answer:
@@ -44,21 +45,21 @@ def _epson(cell: ControlledCell) -> EpsonSimulator:
 EPSON_ACTS: Final = (
     ControlAct("teach_point", _teach_point, (NUMBER, Taken("u_deg", least=-360, most=360))),
     ControlAct("push", _push, (Taken("text", "text"),)),
-    panel_act("set_input", NUMBER, ON, method="switch_input"),
-    panel_act("teach"),
-    panel_act("auto"),
-    panel_act("press_estop"),
-    panel_act("release_estop"),
-    panel_act("open_guard"),
-    panel_act("close_guard"),
-    panel_act("raise_error", NUMBER),
-    panel_act("raise_warning", NUMBER),
-    panel_act("raise_alarm", NUMBER),
-    panel_act("raise_serious_error"),
-    panel_act("set_monitoring_only", Taken("on", "flag")),
-    panel_act("start_production"),
-    panel_act("stop_production"),
-    panel_act("lose_login"),
-    panel_act("cut_link"),
+    panel_act(EpsonPanel, "set_input", NUMBER, ON, method="switch_input"),
+    panel_act(EpsonPanel, "teach"),
+    panel_act(EpsonPanel, "auto"),
+    panel_act(EpsonPanel, "press_estop"),
+    panel_act(EpsonPanel, "release_estop"),
+    panel_act(EpsonPanel, "open_guard"),
+    panel_act(EpsonPanel, "close_guard"),
+    panel_act(EpsonPanel, "raise_error", NUMBER),
+    panel_act(EpsonPanel, "raise_warning", NUMBER),
+    panel_act(EpsonPanel, "raise_alarm", NUMBER),
+    panel_act(EpsonPanel, "raise_serious_error"),
+    panel_act(EpsonPanel, "set_monitoring_only", Taken("on", "flag")),
+    panel_act(EpsonPanel, "start_production"),
+    panel_act(EpsonPanel, "stop_production"),
+    panel_act(EpsonPanel, "lose_login"),
+    panel_act(EpsonPanel, "cut_link"),
 )
 """Acts at an EPSON controller."""

@@ -113,7 +113,7 @@ class NozzleChange:
         require_contacts(self._controller, self._plan)
         plan, listener, context = self._plan, self._listener, self._context()
         measuring = Measuring(context, listener)
-        measuring.go_to(plan.safe, tr("go to the safe pose"))
+        measuring.go_to(plan.safe, tr("Moving to the safe pose."))
         listener.moment(Moment.START, context)
         proposals: Proposals = [(one, measuring.propose(one)) for one in plan.tools]
         proposals = self._checked(context, proposals, write=write)
@@ -128,7 +128,7 @@ class NozzleChange:
                 ToolReport(proposal, None, None, one.criteria.verdicts(proposal))
                 for one, proposal in proposals
             )
-        measuring.go_to(plan.safe, tr("go to the safe pose"))
+        measuring.go_to(plan.safe, tr("Moving to the safe pose."))
         listener.moment(Moment.END, context)
         return ChangeReport(self._controller.outcomes.change, reports)
 

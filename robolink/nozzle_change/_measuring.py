@@ -58,7 +58,7 @@ class Measuring:
 
     def _attempt(self, plan: ToolPlan) -> Proposal:
         context, tool = self._context, plan.tool
-        self.go_to(plan.approach, tr("go to where tool {tool} is measured", tool=tool))
+        self.go_to(plan.approach, tr("Moving to where tool {tool} is measured.", tool=tool))
         self._listener.moment(Moment.BEFORE_MEASURE, context, tool)
         before = context.controller.tools.read(tool)
         with self._watched(plan):
@@ -76,7 +76,7 @@ class Measuring:
         )
         context.controller.outcomes.append(entry)
         self._listener.moment(Moment.AFTER_MEASURE, context, tool)
-        self.go_to(plan.retreat, tr("go away from where tool {tool} is measured", tool=tool))
+        self.go_to(plan.retreat, tr("Moving away from where tool {tool} is measured.", tool=tool))
         return proposal
 
     def _station_record(self, name: str) -> dict[str, object]:

@@ -6,7 +6,7 @@ from typing import Final, Protocol, TypeVar
 
 from robolink.calibration import CalibrationResult
 from robolink.errors import CalibrationError
-from robolink.messages import tr
+from robolink.messages import joined, tr
 from robolink.runner import Confirm, Notify, Procedure
 
 MOST_REPEATED: Final = 3
@@ -31,7 +31,7 @@ class Sampler(Protocol[PlaceT_contra, TakenT, ResultT_co]):
 
     @property
     def known(self) -> str:
-        """Which lengths become known, for a person: "X and Y are known"."""
+        """Which lengths become known, for a person: "X and Y"."""
 
     def counted(self, count: int) -> str:
         """Return how many were taken, for a person: "6 touches"."""
@@ -107,23 +107,25 @@ def agreement(
         fit: What they say; it has a degree of freedom.
         last: Index of the one that was taken last.
     """
-    known, half_mm, region_mm = "", fit.half95_mm, fit.region95_radius_mm
-    if half_mm is not None:
-        known = tr("; {known} to ±{half:.3f} mm", known=method.known, half=half_mm)
-        if region_mm is not None and region_mm > half_mm:
-            known = tr(
-                "; {known} to ±{half:.3f} mm each, within {region:.3f} mm together",
-                known=method.known,
-                half=half_mm,
-                region=region_mm,
-            )
-    return tr(
-        "{counted} agree within {rms:.3f} mm rms, the last within {last:.3f} mm{known}.",
+    agree = tr(
+        "{counted} agree within {rms:.3f} mm; the last is {last:.3f} mm off.",
         counted=method.counted(len(fit.residuals_mm)),
         rms=fit.rms_mm,
         last=fit.residual_distances_mm[last],
-        known=known,
     )
+    half_mm, region_mm = fit.half95_mm, fit.region95_radius_mm
+    if half_mm is None:
+        return agree
+    if region_mm is None or region_mm <= half_mm:
+        sure = tr("{known}: sure to +-{half:.3f} mm (95 %).", known=method.known, half=half_mm)
+    else:
+        sure = tr(
+            "{known}: each sure to +-{half:.3f} mm (95 %), together within {region:.3f} mm.",
+            known=method.known,
+            half=half_mm,
+            region=region_mm,
+        )
+    return joined(" ", (agree, sure))
 
 
 LEAST_DOF_TO_STOP: Final = 4
@@ -234,8 +236,8 @@ def _progress(
         return told
     better = method.gain([*taken, following]) / method.gain(taken)
     gain = tr(
-        "One more, at {where}, leaves {share:.0f} % of that.",
+        "One more, at {where}, would leave {share:.0f} % of that.",
         where=method.named(following),
         share=100 * better,
     )
-    return f"{told} {gain}"
+    return joined(" ", (told, gain))

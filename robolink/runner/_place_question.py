@@ -183,6 +183,6 @@ def inputs_of(controller: Controller) -> DigitalIo:
 def ended_by_operator() -> DeclinedError:
     """Return the end that a person asked for."""
     return DeclinedError(
-        tr("The procedure was ended by the operator."),
+        tr("You stopped it."),
         remedy=tr("Nothing was written."),
     )

@@ -163,8 +163,8 @@ class Runner:
         outcome = self._seen_through(go, target)
         if outcome is not MotionOutcome.ARRIVED:
             raise StoppedError(
-                tr("The movement was stopped before it arrived."),
-                remedy=tr("Nothing goes on by itself; start again when the cell is clear."),
+                tr("The robot was stopped on its way."),
+                remedy=tr("The robot will not move by itself. Start again when the cell is clear."),
                 controller=self._controller.identity,
             )
         return self._group.pose()
@@ -339,8 +339,8 @@ class Runner:
         obstacle = _ended_by(self._controller.status())
         if obstacle:
             raise ControllerFaultError(
-                tr("{obstacle} while the operator was asked.", obstacle=obstacle),
-                remedy=tr("Clear the cause and start again; nothing goes on by itself."),
+                tr("{obstacle} The job has ended.", obstacle=obstacle),
+                remedy=tr("Remove the cause and start again. The robot will not move by itself."),
                 controller=self._controller.identity,
             )
 
@@ -358,13 +358,13 @@ def ask_for_pose(instruction: str) -> Procedure[Pose]:
 
 def _ended_by(status: ControllerStatus) -> str:
     if status.serious_fault:
-        return tr("The controller reported a serious error")
+        return tr("The controller reported a serious error.")
     if status.emergency_stop:
-        return tr("The emergency stop was pressed")
+        return tr("The emergency stop was pressed.")
     if status.guard_open:
-        return tr("The safety guard was opened")
+        return tr("The safety guard was opened.")
     if status.fault:
-        return tr("The controller went into error {code:04d}", code=status.code)
+        return tr("The controller went into error {code:04d}.", code=status.code)
     return ""
 
 

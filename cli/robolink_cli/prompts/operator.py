@@ -62,7 +62,7 @@ class TerminalOperator:
             return self._lines.next(wait_s)
         except EOFError as error:
             raise DeclinedError(
-                tr("The input ended before the question was answered."),
+                tr("The keyboard is gone. Nothing was answered for you."),
                 remedy=tr("Run it on a terminal, or with --assist on a simulator."),
             ) from error
 
@@ -76,12 +76,12 @@ class TerminalOperator:
 def _how(kind: Question) -> str:
     """Return how a question is answered."""
     if kind is Question.PLACE:
-        return tr("steps like x+0.1 z-0.5; ENTER when it is on the pin; q ends")
+        return tr("Steps: x+0.1 z-0.5. ENTER when it is on the pin. To end: q.")
     if kind is Question.TEXT:
-        return tr("type it, then ENTER; q ends")
+        return tr("Type or scan it, then ENTER. To end: q.")
     if kind is Question.YES_NO:
         return tr("y or n")
-    return tr("steps like x+5 z-0.5; ENTER when it is there; q ends")
+    return tr("Steps: x+5 z-0.5. ENTER when it is there. To end: q.")
 
 
 @cache

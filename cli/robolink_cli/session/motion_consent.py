@@ -43,8 +43,8 @@ def agree_to_motion(question: str, *, yes: bool, in_tool: bool = True) -> None:
         return
     if not questions.on_terminal():
         raise DeclinedError(
-            tr("The robot would move, and nobody can be asked here."),
-            remedy=tr("Run it on a terminal, or give --yes when the cell is clear."),
+            tr("The robot would move, but there is nobody to ask."),
+            remedy=tr("Add --yes when the cell is clear, or run it on a terminal."),
         )
     questions.require_yes(question)
 
@@ -62,8 +62,8 @@ def motion_question(
     group.require_able(purpose)
     terms = group.terms()
     return tr(
-        "{who} will move at most {speed:g} mm/s fast, within {box:g} mm, {purpose}. {watch} "
-        "Is the cell clear?",
+        "{who} will move by itself {purpose}: up to {speed:g} mm/s, at most {box:g} mm from "
+        "here. {watch} Is everybody out of the cell?",
         who=terms.who,
         speed=speed_mm_s,
         box=box_mm,

@@ -95,7 +95,7 @@ class _NAngleSampler:
 
     @property
     def known(self) -> str:
-        return tr("X and Y are known")
+        return tr("X and Y")
 
     def counted(self, count: int) -> str:
         return tr("{count} touches", count=count)

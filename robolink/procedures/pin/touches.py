@@ -45,7 +45,7 @@ class PinTouches(WitnessedTouches):
         Args:
             key: By which a later touch takes the place of this one; ``None`` for its U.
         """
-        return (yield from self.shown(tr("Bring the tip onto the pin."), key=key))
+        return (yield from self.shown(tr("Jog the tip onto the pin."), key=key))
 
     def again(
         self, expected: Pose, *, key: Hashable, turning: str, instruction: str
@@ -79,9 +79,7 @@ class PinTouches(WitnessedTouches):
 
     def come_down(self, target: Pose) -> Procedure[Pose]:
         """Go straight down to a standoff; returns the pose on arrival."""
-        arrival: Pose = yield self._move(
-            target, Path.STRAIGHT, tr("come down beside the pin, to the clearance")
-        )
+        arrival: Pose = yield self._move(target, Path.STRAIGHT, tr("Lowering beside the pin."))
         return arrival
 
     def require_made(self) -> None:
@@ -136,7 +134,9 @@ class PinTouches(WitnessedTouches):
 
 def lift_off(plan: TouchPlan, touch: Pose) -> Move:
     """Return the step that takes the tip off the pin, after which it may turn."""
-    return Move(offset_z(plain_pose(touch), plan.lift_mm), Path.STRAIGHT, tr("lift off the pin"))
+    return Move(
+        offset_z(plain_pose(touch), plan.lift_mm), Path.STRAIGHT, tr("Lifting off the pin.")
+    )
 
 
 def touch_again(
@@ -157,8 +157,8 @@ def touch_again(
         yield from touches.again(
             _turned(last, u_deg, guess),
             key=u_deg,
-            turning=tr("turn in the air"),
-            instruction=tr("Bring the tip onto the pin again, with the tool turned."),
+            turning=tr("Turning in the air."),
+            instruction=tr("Jog the tip onto the pin again; the tool is turned now."),
         )
     )
 

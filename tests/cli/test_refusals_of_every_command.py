@@ -131,6 +131,7 @@ BAD = {
     "sim softmotion": (["--modbus-tcp", "nowhere"], "no address to listen on"),
     "sim plc": (["--map", "missing.toml"], "missing.toml"),
     "sim assist": (["http://127.0.0.1:1", "look"], ""),
+    "sim ctl": (["look", "--at", "assist+tcp://127.0.0.1:1"], "control URL"),
     "expert solve": (["missing.json"], "missing.json"),
     "expert poses show": (["missing.csv"], "missing.csv"),
     "cell doctor": (["--fix"], "No such option"),

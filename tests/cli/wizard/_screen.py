@@ -28,7 +28,7 @@ class ScreenHand:
     def __init__(self, words, simulator=None, tool=1, *, columns=80, rows=24):
         self.screen = pyte.Screen(columns, rows)
         self.stream = pyte.ByteStream(self.screen)
-        self.raw, self.keys, self.tool = b"", 0, tool
+        self.raw, self.keys, self.tool, self.host = b"", 0, tool, None
         self.eyes = InProcessEyes(simulator) if simulator is not None else None
         self.master, near = pty.openpty()
         self.size(columns, rows)
@@ -116,6 +116,7 @@ class ScreenHand:
         self.press(["1", "3", "5"])
 
     def left_mm(self):
+        assert self.eyes is not None
         seen = self.eyes.look(self.tool)
         return seen.dx_mm, seen.dy_mm, seen.dz_mm
 

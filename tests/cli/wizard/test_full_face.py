@@ -15,7 +15,7 @@ from prompt_toolkit.input import create_pipe_input
 from prompt_toolkit.output.vt100 import Vt100_Output
 from robolink_cli.wizard.faces.full import FullFace
 from robolink_cli.wizard.happenings import Reading
-from robolink_cli.wizard.host import Work
+from robolink_cli.wizard.work import Work
 from robolink_cli.wizard.state import WizardState
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator

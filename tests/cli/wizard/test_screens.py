@@ -111,8 +111,7 @@ def test_a_screen_is_the_stored_one(name, request):
 def test_the_picture_finds_the_elbow_by_angles_alone():
     from robolink_cli.wizard.screens.picture import elbow_of
 
-    x, y = elbow_of(Pose(349.3, 442.9, -60.0, 0.0), SCARA)
-    assert (x, y) == pytest.approx((111.2, 305.4), abs=1.0)
+    assert elbow_of(Pose(349.3, 442.9, -60.0, 0.0), SCARA) == pytest.approx((111.2, 305.4), abs=1.0)
     assert elbow_of(ARRIVAL, ()) is None
     assert elbow_of(ARRIVAL, (0.0, 0.5, 0.0)) is None
     assert elbow_of(ARRIVAL, (170.0, 120.0)) is None

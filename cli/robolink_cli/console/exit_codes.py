@@ -157,7 +157,7 @@ def _ending_in_words(by: EndedBy) -> str:
         return tr("The window was closed, or the line to it is gone (SIGHUP).")
     if by is EndedBy.OUTPUT_CLOSED:
         return tr("Nobody reads the output any more, so the command was ended.")
-    return tr("Interrupted.")
+    return tr("You stopped it (Ctrl-C).")
 
 
 def _sentences(error: BaseException) -> tuple[str, str]:
@@ -168,7 +168,7 @@ def _sentences(error: BaseException) -> tuple[str, str]:
     if isinstance(error, KeyboardInterrupt):
         return _ending_in_words(_ending(error)), ""
     if isinstance(error, (EOFError, click.Abort)):
-        return tr("Interrupted."), ""
+        return tr("You stopped it (Ctrl-C)."), ""
     return (
         tr(
             "A defect in robolink: {kind}: {error}",

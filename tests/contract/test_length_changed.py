@@ -69,7 +69,7 @@ def test_small_changes_do_not_add_up_unseen(arm):
 def test_a_person_is_asked_once_with_both_values(arm, monkeypatch):
     assert arm.calibrate("n-angle", *THREE, NO_PROOF).code == 0
     monkeypatch.setattr(
-        "robolink_cli.commands.measure.calibrate.live.agree_to_motion", lambda *_, **__: None
+        "robolink_cli.session.check_before_start.agree_to_motion", lambda *_, **__: None
     )
     asked, answer, says_yes = [], _operator.AssistedOperator.ask, [True]
 

@@ -15,6 +15,7 @@ _RECORD: Final = "robolink_cli.commands.record"
 _SIMULATE: Final = "robolink_cli.commands.simulate"
 _COMPUTER: Final = "robolink_cli.commands.computer"
 _COMPANIONS: Final = "robolink_cli.commands.companions"
+_SHIPPED: Final = "robolink_cli.commands.shipped"
 _GROUPS: Final = "robolink_cli.commands.groups"
 
 _EVERY_DAY: Final = {
@@ -70,10 +71,12 @@ SECTIONS: Final = {
 SHORT_NAMES: Final = {
     "check": f"{_RECORD}.cell_check:check",
     "config": f"{_GROUPS}:config",
+    "docs": f"{_SHIPPED}.docs:docs",
     "expert": f"{_GROUPS}:expert",
+    "recipe": f"{_SHIPPED}.recipe:recipe",
 }
-"""Names that work and stand in no list. ``check`` is short for ``cell check``; what ``config``
-held says itself how it is called now."""
+"""Names that work and stand in no list. ``check``, ``docs`` and ``recipe`` are short for
+what ``cell`` and ``expert`` list; what ``config`` held says itself how it is called now."""
 
 RENAMED: Final = {
     "backup": (f"{_CONTROLLER}.backup:backup", "tool backup"),

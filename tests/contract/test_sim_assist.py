@@ -7,10 +7,10 @@ from contextlib import ExitStack, closing, suppress
 from dataclasses import asdict
 
 import pytest
-from robolink_simulators.assist.acts import _acts_at
 from robolink_simulators.assist.port import LONGEST_LINE, MOST_CLIENTS, AssistClient, serve_assist
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.cell.world_parameters import parameter_names
+from robolink_simulators.control.acts.registry import ACTS
 from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
@@ -64,7 +64,7 @@ def test_the_assist_port_shows_the_axes_of_the_true_tool(assisted):
     aside = [50 * math.cos(u_deg), 50 * math.sin(u_deg), 0]
     assert assist.way_along("z", 50.0, 1) == pytest.approx(aside, abs=1e-9)
     assert assist.way_along("x", 50.0, 1) == pytest.approx([0, 0, -50], abs=1e-9)
-    with pytest.raises(ConfigError, match="no axis 'y'"):
+    with pytest.raises(ConfigError, match=r"way_along needs axis.*x, z"):
         assist.do("way_along", axis="y", length_mm=50)
 
 
@@ -116,17 +116,15 @@ HOSTILE = [HUGE, -HUGE, 1e308, -1e308, math.nan, math.inf, "x" * 900, [[]], {}, 
 @pytest.mark.parametrize("simulated", [EpsonSimulator, SoftMotionSimulator])
 def test_no_value_of_any_act_stops_the_assist_port(simulated):
     simulator, clock = simulated(seed=3), ScaledClock(50)
-    buttons = ("number", "bit", "tool", "mark", "u_deg", "x_mm", "y_mm", "z_mm", "length_mm")
-    places = ("heading_deg", "noise_mm", "radius_mm", "tilt_deg", "axis", "on", "touch")
-    parameters = [*buttons, *places]
-    usual = dict.fromkeys(parameters, 1) | {"axis": "z"}
-    acts = ["look", *_acts_at(simulator)]
+    acts = {name: act for name, act in ACTS[simulator.kind].items() if name != "set_world"}
+    usual = {"axis": "z", "text": "a", "name": "a", "action": "delay", "order": "low_first"}
     with serve_assist(simulator, clock=clock) as port, AssistClient(port.url) as assist:
         for value in HOSTILE:
-            for act in acts:
-                for name in parameters:
+            for act in acts.values():
+                given = {taken.name: usual.get(taken.name, 1) for taken in act.takes}
+                for name in (*given, "unknown"):
                     with suppress(ConfigError):
-                        assist.do(act, **{**usual, name: value})
+                        assist.do(act.name, **{**given, name: value})
             for name in parameter_names():
                 with suppress(ConfigError):
                     assist.do("set_world", **{name: value})

@@ -16,6 +16,7 @@ _COMPUTER: Final = "robolink_cli.commands.computer"
 _COMPANIONS: Final = "robolink_cli.commands.companions"
 _MEASURE: Final = "robolink_cli.commands.measure"
 _RECORD: Final = "robolink_cli.commands.record"
+_SHIPPED: Final = "robolink_cli.commands.shipped"
 
 _ROBOT: Final = {
     "where": (
@@ -92,6 +93,11 @@ _EXPERT: Final = {
     "poses": (
         f"{_MEASURE}.poses:poses",
         declared("What robolink understands of a file of poses."),
+    ),
+    "docs": (f"{_SHIPPED}.docs:docs", declared("Read the pages of the documentation.")),
+    "recipe": (
+        f"{_SHIPPED}.recipe:recipe",
+        declared("Copy a recipe to begin with; check your own."),
     ),
     "completion": (
         f"{_COMPUTER}.completion:completion",

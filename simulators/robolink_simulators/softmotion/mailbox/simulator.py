@@ -137,8 +137,14 @@ class SoftMotionSimulator(HostedDevice):
         """Let simulated time reach ``now_ns``, stopping wherever something changes."""
         # Most calls come at the instant of the last one: then nothing lies in between.
         while now_ns > self._now_ns < (change := self.next_change() or now_ns) < now_ns:
+            before_ns = self._presently_ns()
             self._step(change)
+            self.plc.keep_pace(self._presently_ns() - before_ns)
         self._step(max(now_ns, self._now_ns))
+
+    def _presently_ns(self) -> int:
+        """The host's own time, which goes on while this computer works."""
+        return self._now_ns if self.present_ns is None else self.present_ns()
 
     def next_change(self) -> int | None:
         """Return when :meth:`advance` will next do something by itself, if ever."""

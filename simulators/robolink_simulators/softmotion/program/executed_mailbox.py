@@ -3,7 +3,7 @@
 import re
 import struct
 from collections.abc import Mapping, Sequence
-from typing import Final
+from typing import Any, Final
 
 from robolink import ambient
 from robolink.protocols.mailbox import Capability, Command, Opcode, WordOrder, Words, encode_command
@@ -34,6 +34,8 @@ FIRST_LEFT_OUT: Final = 25
 _GOING: Final = 1
 _REPLY: Final = 9
 """Members of RL_Call: whether it is under way, and the state that the adapter replied."""
+_ENDED: Final = 10
+"""The lowest state of a command that has ended."""
 _HEARTBEAT: Final = 9
 _TOOL_SLOT: Final = 11
 _CAPABILITIES: Final = 90
@@ -74,6 +76,7 @@ class ExecutedMailbox:
         self.inbox = Inbox(WordOrder.LOW_FIRST)
         self.cycles = 0
         self.stands = False
+        self._overrun = self._paced = 0
         # The clock of a PLC began when it was switched on, nobody knows when; from it the program
         # draws its number, where none is given.
         self._began_us = 0 if options.mailbox.device_id else _US * ambient.random_number(31)
@@ -88,7 +91,7 @@ class ExecutedMailbox:
         self._permitted = True
         self._tool = group.tool
         self.structured = StructuredProgram(sources, MAIN, foreign=self._foreign(sources))
-        self._seen: Words = ()
+        self._seen: object = ()
 
     @property
     def permitted(self) -> bool:
@@ -172,6 +175,16 @@ class ExecutedMailbox:
         if began_ns > self._scanned_ns and not self.stands:
             self._scan(began_ns)
 
+    def keep_pace(self, took_ns: int) -> None:
+        """Leave out cycles when one was worked out in more than half of the period.
+
+        Args:
+            took_ns: The simulated time that went by meanwhile.
+        """
+        if self.cycles != self._paced:
+            self._paced = self.cycles
+            self._overrun = 2 * took_ns // self._cycle_ns
+
     def next_change(self, now_ns: int) -> int | None:
         """Return when the next cycle is due that is not left out."""
         return max(self._due_ns, (now_ns // self._cycle_ns + 1) * self._cycle_ns)
@@ -179,7 +192,8 @@ class ExecutedMailbox:
     @property
     def _due_ns(self) -> int:
         """When the next cycle begins that is not left out; past when the program stood still."""
-        return self._scanned_ns + (1 if self._restless else self._left_out) * self._cycle_ns
+        waits = 1 if self._restless else self._left_out
+        return self._scanned_ns + max(waits, 1 + self._overrun) * self._cycle_ns
 
     def _scan(self, began_ns: int) -> None:
         self._scanned_ns = began_ns
@@ -208,18 +222,19 @@ class ExecutedMailbox:
         """A cycle may be left out when this one was like the one before and nothing goes on."""
         words = tuple(self.structured.value("outbox"))
         still = (*words[:_HEARTBEAT], *words[_HEARTBEAT + 1 : _CRC])
-        going = any(call[_GOING] or call[_REPLY] for call in self._calls())
-        moving = self._group.state in (SmcGroupState.MOVING, SmcGroupState.STOPPING)
-        self._restless = still != self._seen or going or moving
+        calls, seen = self._calls(), self._seen
+        going = any((going or reply) and not (going and reply >= _ENDED) for going, reply in calls)
+        moving = self._group.state is SmcGroupState.MOVING or not self._group.motion.resting
+        self._seen = (still, calls)  # a stop that is held goes on with its end replied
+        self._restless = self._seen != seen or going or moving
         self._left_out = FIRST_LEFT_OUT if self._restless else 2 * self._left_out
-        self._seen = still
 
-    def _calls(self) -> Sequence[Sequence[object]]:
+    def _calls(self) -> Sequence[tuple[bool, int]]:
         try:
-            calls: Sequence[Sequence[object]] = self.structured.value("calls")
+            calls: Sequence[Sequence[Any]] = self.structured.value("calls")
         except KeyError:  # a program of another make
             return ()
-        return calls
+        return [(call[_GOING], call[_REPLY]) for call in calls]
 
     def _imaged(self) -> bool:
         rotation = self._group.flange().rotation

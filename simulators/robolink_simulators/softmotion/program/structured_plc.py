@@ -4,6 +4,8 @@ Theory of operation. The task runs at multiples of its period. At each, the inpu
 are put where the project wires them, the program is executed once, and its outputs are taken. A
 cycle in which nothing was written or read, nothing is under way and nothing has moved may be left
 out: at first 25 in a row, then twice as many each time. Heartbeat and timers go on in such steps.
+On a computer that needs more than half of the period for a cycle, as many are left out as it
+takes to keep up with the time.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -118,6 +120,10 @@ class StructuredPlc(Plc):
         """Let the mailbox program go on."""
         super().thaw()
         self._executed.stands = False
+
+    def keep_pace(self, took_ns: int) -> None:
+        """Let the program leave out cycles on a computer that is too slow for all of them."""
+        self._executed.keep_pace(took_ns)
 
     def output(self, now_ns: int) -> Words:
         """Return response, slots and device block, one behind the other."""

@@ -110,7 +110,7 @@ def _decimal(session: Session, arguments: Arguments) -> Value:
     byte = session.machine.inputs.get_byte(as_integer(arguments[0]))
     tens, units = byte >> 4, byte & 0xF
     if tens > 9 or units > 9:
-        raise out_of_range(f"{byte:#x} is no decimal code")
+        raise SpelRefusal(RefusalKind.DECIMAL_IN, f"{byte:#x} is no decimal code")
     return tens * 10 + units
 
 
@@ -126,14 +126,14 @@ def _label_of(session: Session, arguments: Arguments) -> Value:
 def _number_of(session: Session, arguments: Arguments) -> Value:
     label = session.machine.io_labels.get(as_text(arguments[0]).lower())
     if label is None:
-        raise SpelRefusal(RefusalKind.NAME_UNDEFINED, f"Nothing is called {arguments[0]}")
+        raise SpelRefusal(RefusalKind.LABEL_UNDEFINED, f"Nothing is called {arguments[0]}")
     return label.number
 
 
 def _point_number(session: Session, arguments: Arguments) -> Value:
     number = session.machine.points.labelled(as_text(arguments[0]))
     if number is None:
-        raise SpelRefusal(RefusalKind.POINT_UNDEFINED, f"No point is called {arguments[0]}")
+        raise SpelRefusal(RefusalKind.POINT_LABEL_UNDEFINED, f"No point is called {arguments[0]}")
     return number
 
 

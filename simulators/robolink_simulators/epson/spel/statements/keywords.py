@@ -161,7 +161,7 @@ def _switch(command: KeywordStatement, evaluator: Evaluator, *, on: bool) -> Sta
         raise SpelRefusal(RefusalKind.SYNTAX, "A memory bit takes no time")
     seconds = float(evaluator.number(arguments[1]))
     if not SHORTEST_PULSE_S <= seconds <= LONGEST_PULSE_S:
-        raise out_of_range(f"A time of {seconds} s")
+        raise SpelRefusal(RefusalKind.OUTPUT_TIME, f"A time of {seconds} s")
     goes_on = len(arguments) > 2 and evaluator.integer(arguments[2]) == 0
     bank.set(number, on)
     duration_ns = round(seconds * NS_PER_S)

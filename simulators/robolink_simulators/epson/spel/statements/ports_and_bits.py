@@ -23,7 +23,7 @@ def _two(evaluator: Evaluator, command: KeywordStatement) -> tuple[int, int]:
 def _virtual(evaluator: Evaluator) -> None:
     """Inputs of a real controller are not set by a program (documented)."""
     if not evaluator.session.options.virtual_io:
-        raise SpelRefusal(RefusalKind.NOT_ALLOWED_HERE, "Virtual I/O is off")
+        raise SpelRefusal(RefusalKind.VIRTUAL_IO_OFF, "Virtual I/O is off")
 
 
 def _set_switch(evaluator: Evaluator, command: KeywordStatement) -> str:
@@ -56,7 +56,7 @@ def _set_word(evaluator: Evaluator, command: KeywordStatement) -> str:
 def _decimal(evaluator: Evaluator, command: KeywordStatement) -> str:
     port, value = _two(evaluator, command)
     if not 0 <= value <= _HIGHEST_DECIMAL:
-        raise out_of_range(f"Not two digits: {value}")
+        raise SpelRefusal(RefusalKind.DECIMAL_OUT, f"Not two digits: {value}")
     evaluator.session.machine.outputs.set_byte(port, value // 10 << 4 | value % 10)
     return ""
 

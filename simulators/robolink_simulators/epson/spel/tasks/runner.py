@@ -133,9 +133,13 @@ class ProgramRunner:
         """
         numbers = {TaskKind.BACKGROUND: _BACKGROUND, TaskKind.TRAP: _TRAPS}.get(kind, _NORMAL)
         if wanted is None:
-            wanted = next((n for n in numbers if n not in self.tasks), 0)
-        if wanted not in numbers or wanted in self.tasks:
-            raise SpelRefusal(RefusalKind.TASK_NUMBER, f"Task {wanted} is not free")
+            wanted = next((n for n in numbers if n not in self.tasks), None)
+        if wanted is None:
+            raise SpelRefusal(RefusalKind.TASKS_FULL, "Too many tasks")
+        if wanted not in numbers:
+            raise SpelRefusal(RefusalKind.TASK_NUMBER, f"There is no task {wanted}")
+        if wanted in self.tasks:
+            raise SpelRefusal(RefusalKind.TASK_BUSY, f"Task {wanted} is not free")
         return wanted
 
     def advance(self, now_ns: int) -> None:

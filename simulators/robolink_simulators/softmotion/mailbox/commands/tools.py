@@ -139,9 +139,11 @@ class ToolDesk:
         return Told(told.execution, self.set_tool())
 
     def _read(self, command: Command) -> Told:
-        mode = require_operand(command.operands[0], range(len(ReadToolMode)))
+        mode = ReadToolMode(require_operand(command.operands[0], range(len(ReadToolMode))))
+        # What was interrupted is the active movement of the mailbox.
+        waits = mode is ReadToolMode.ACTIVE_MOVEMENT and self._group.motion.interrupted
         try:
-            tool = self._group.read_tool(ReadToolMode(mode))
+            tool = self._group.continue_tool_offset() if waits else self._group.read_tool(mode)
         except BlockRefused as refused:
             error_class = class_of(refused.kind, self._group.state)
             number = self._group.options.numbers.error(refused.kind).number

@@ -136,14 +136,19 @@ def _await(emitter: Emitter, node: ChannelStatement) -> Operation:
 
     def go(t: SpelTask) -> Blocking:
         at = number(t)
-        end_ns = None
-        if limit is not None:
-            end_ns = t.now_ns + round(float(as_number(limit(t))) * NS_PER_S)
+        seconds = t.session.memory.wait_limit_s if limit is None else as_number(limit(t))
+        unlimited = limit is None and not seconds
+
+        def late() -> None:
+            if limit is None:
+                raise SpelRefusal(RefusalKind.NET_WAIT_TIMED_OUT, "The time of TMOut ran out")
+            _timed(t, True)
+
         return Blocking(
             lambda: t.runner.ports.connected(at),
             lambda: _timed(t, False),
-            end_ns=end_ns,
-            out_of_time=lambda: _timed(t, True),
+            end_ns=None if unlimited else t.now_ns + round(float(seconds) * NS_PER_S),
+            out_of_time=late,
             polled=True,
         )
 

@@ -140,8 +140,16 @@ def _numbers(emitter: Emitter, node: TaskStatement, most: int) -> list[Run]:
 
 
 def _until(t: SpelTask, runs: list[Run]) -> int | None:
-    """Return when the time that a statement names is up."""
-    return t.now_ns + round(float(as_number(runs[1](t))) * NS_PER_S) if len(runs) > 1 else None
+    """Return when the time is up that a statement names, or TMOut's."""
+    seconds = as_number(runs[1](t)) if len(runs) > 1 else t.session.memory.wait_limit_s or None
+    return None if seconds is None else t.now_ns + round(float(seconds) * NS_PER_S)
+
+
+def _late(t: SpelTask, runs: list[Run]) -> None:
+    """Note for TW that its own time ran out; TMOut's is an error (documented: 2281)."""
+    if len(runs) < 2:
+        raise SpelRefusal(RefusalKind.SHARED_WAIT_TIMED_OUT, "The time of TMOut ran out")
+    _timed(t, True)
 
 
 def _timed(t: SpelTask, out: bool) -> None:
@@ -163,7 +171,7 @@ def _lock(emitter: Emitter, node: TaskStatement) -> Operation:
             lambda: sharing.may_lock(number, t),
             take,
             end_ns=_until(t, runs),
-            out_of_time=lambda: _timed(t, True),
+            out_of_time=lambda: _late(t, runs),
         )
 
     return go
@@ -188,7 +196,7 @@ def _await_signal(emitter: Emitter, node: TaskStatement) -> Operation:
 
         def out() -> None:
             sharing.cease(number, t)
-            _timed(t, True)
+            _late(t, runs)
 
         return Blocking(
             lambda: sharing.signalled(number, t),

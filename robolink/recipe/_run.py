@@ -191,7 +191,7 @@ class RecipeRun:
         signature = self._controller.outcomes.signature
         if signature.role == PersonRole.OPERATOR:
             raise NotAllowedError(
-                tr("Letting a tool jump takes an engineer."),
+                tr("A change this large needs an engineer."),
                 remedy=tr(
                     "Nothing was moved. Give {operator}, or leave {accept_jump} out.",
                     operator=way(Way.OPERATOR),

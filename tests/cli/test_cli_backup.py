@@ -222,7 +222,7 @@ def test_a_person_who_says_no_leaves_everything_as_it_was(run, simulator, golden
     monkeypatch.setattr(questions, "require_yes", say_no)
     simulator.machine.tools.set(1, ToolOffset(99))
     code, out, err = run("restore", golden)
-    assert (code, "99.000" in out, "Write this" in err) == (9, True, True)
+    assert (code, "99.000" in out, "Write these values" in err) == (9, True, True)
     assert simulator.machine.tools.get(1) == ToolOffset(99)
 
 

@@ -145,7 +145,7 @@ def test_show_takes_the_cell_from_c_as_well(cells, capsys, monkeypatch):
     assert main.run(["config", "show"]) == 0
     shown = capsys.readouterr().out
     assert shown.startswith("[cells.b]\n")
-    assert "Nothing moves: no remote time-out is confirmed" in shown
+    assert "The robot stays still: nobody has confirmed" in shown
 
 
 @pytest.mark.parametrize("arguments", [["config", "show", "c"], ["-c", "c", "status"]])

@@ -177,7 +177,8 @@ def four_poses(stack: ExitStack) -> dict[str, Any]:
 
 def one_plc(stack: ExitStack) -> dict[str, Any]:
     simulator = stack.enter_context(softmotion())
-    return {"then": lambda: list(simulator.truth()["stored"]["3"][:3]) == [1.25, -0.4, 60.0]}
+    wanted = {"x_mm": 1.25, "y_mm": -0.4, "z_mm": 60.0}
+    return {"then": lambda: wanted.items() <= simulator.truth()["stored"]["3"].items()}
 
 
 def a_connected_plc(stack: ExitStack) -> dict[str, Any]:

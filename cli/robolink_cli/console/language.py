@@ -25,6 +25,16 @@ _KEY: Final = "language"
 _SAMPLE: Final = {"zh": "\u673a\u5668\u4eba"}
 
 
+_now: Final[list[str]] = []
+"""The language of the command line that is carried out, where it is not English."""
+
+
+def language_now() -> str:
+    """Return the language in which the command line that is carried out speaks."""
+    tr("")  # it is found with the first sentence, whichever that is
+    return _now[-1] if _now else ENGLISH
+
+
 @contextmanager
 def speaking_for(arguments: Sequence[str]) -> Iterator[None]:
     """Speak the language of one command line, for the block.
@@ -65,6 +75,7 @@ class _Listener:
             _remark(tr("The Chinese sentences are not compiled here: make messages does it."))
         else:
             self._let_click_speak(language)
+            _now.append(language)
         return translate
 
     def _let_click_speak(self, language: str) -> None:
@@ -81,6 +92,7 @@ class _Listener:
         """Leave the process as it was found."""
         if self._before is None:
             return
+        _now.clear()
         import gettext
 
         gettext.textdomain(self._of_click)

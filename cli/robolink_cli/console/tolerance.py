@@ -53,3 +53,8 @@ def help_width() -> int:
     except (OSError, ValueError):
         columns = 80
     return max(min(columns, 80) - 2, 50)
+
+
+def may_be_guided() -> bool:
+    """Tell whether a person sits at both ends of this process's terminal."""
+    return sys.stdin is not None and sys.stdin.isatty() and sys.stderr.isatty()

@@ -1,8 +1,10 @@
 """The options that every command has that serves a simulated controller."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Any, Final, TypeVar, cast
 
 import click
 
@@ -51,6 +53,54 @@ def simulation_options(function: F) -> F:
     for option in reversed(options):
         function = option(function)
     return function
+
+
+@dataclass(frozen=True, slots=True)
+class ServedLife:
+    """How a served simulator is controlled, and when it ends by itself.
+
+    Attributes:
+        control: Where its control API listens, HOST:PORT.
+        with_parent: Whether it ends when the process that started it has ended.
+        idle_exit_s: After how many seconds without a request it ends; ``None`` for never.
+    """
+
+    control: str
+    with_parent: bool
+    idle_exit_s: float | None
+
+
+def life_options(function: F) -> F:
+    """Add ``--control``, ``--with-parent``, ``--idle-exit`` and hand them over as ``life``."""
+
+    @wraps(function)
+    def packed(*, control: str, with_parent: bool, idle_exit: float | None, **given: Any) -> Any:  # noqa: ANN401 - whatever the command takes
+        return function(life=ServedLife(control, with_parent, idle_exit), **given)
+
+    options = (
+        click.option(
+            "--control",
+            metavar="HOST:PORT",
+            default="127.0.0.1:0",
+            show_default=True,
+            help="Where the control API listens (docs/control-api.md); port 0 takes a free one.",
+        ),
+        click.option(
+            "--with-parent",
+            is_flag=True,
+            help="End when the process that started this one has ended.",
+        ),
+        click.option(
+            "--idle-exit",
+            type=click.FloatRange(min=0.1),
+            metavar="SECONDS",
+            help="End when nobody has asked for anything for so long.",
+        ),
+    )
+    command: Any = packed
+    for option in reversed(options):
+        command = option(command)
+    return cast("F", command)
 
 
 def modbus_options(function: F) -> F:

@@ -59,7 +59,13 @@ class Guide:
             DeclinedError: The answer was no.
         """
         markers = self._controller.outcomes.open_markers()
-        agree(tr("Forget {count} open entries without looking?", count=len(markers)), yes=yes)
+        agree(
+            tr(
+                "Unblock the robot WITHOUT a check? Unfinished jobs that are dropped: {count}.",
+                count=len(markers),
+            ),
+            yes=yes,
+        )
         if not dry_run:
             settler = Settler(self._controller)
             for marker in markers:

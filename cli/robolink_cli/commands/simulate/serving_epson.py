@@ -1,28 +1,33 @@
 """sim epson: serving a simulated EPSON controller."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
 import click
-from click.core import ParameterSource
 from robolink_simulators.assist.port import serve_assist
-from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.cell.clock import SteeredClock
+from robolink_simulators.control.cell import ControlledCell
 from robolink_simulators.epson import EpsonOptions, EpsonSimulator
 from robolink_simulators.epson.options import options_from_text, read_profile
 from robolink_simulators.epson.spel.tasks.channels.serial_link import COM_NUMBERS
 from robolink_simulators.epson.vision.vision_file import install_vision
 from robolink_simulators.hosting.streams.epson_serial import serve_serial
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
-from robolink_simulators.serial_numbers import drawn_serial
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Secret
-from robolink_cli.commands.simulate.serving import Termination, announce, named_values
+from robolink_cli.commands.simulate.serving import (
+    Termination,
+    announce,
+    controlled,
+    named_values,
+)
 from robolink_cli.console.render import note
+from robolink_cli.options.simulation import ServedLife
 
 
 def serve_epson(
@@ -31,28 +36,33 @@ def serve_epson(
     *,
     speed: float,
     allow_remote: bool,
+    life: ServedLife,
     baud: int = 0,
 ) -> None:
-    """Serve a simulator and its assist port until SIGTERM or Ctrl-C.
+    """Serve a simulator, its assist port and its control API until SIGTERM or Ctrl-C.
 
     Args:
         simulator: What to serve.
         address: Where Remote Ethernet listens; ``None`` for a serial line in its place.
         speed: How many times faster than real the simulated time passes.
         allow_remote: Whether an address that other machines can reach is taken.
+        life: Where it is controlled, and when it ends by itself.
         baud: How fast the serial line is; 0 for at once.
     """
-    clock = ScaledClock(speed)
+    clock = SteeredClock(speed)
     with ExitStack() as stack:
-        stopped = stack.enter_context(Termination())
+        stopped = stack.enter_context(Termination(life))
         if address is None:
             url = stack.enter_context(serve_serial(simulator, baud=baud, clock=clock)).url
         else:
             tcp = serve_tcp(simulator, *address, clock=clock, allow_remote=allow_remote)
             url = stack.enter_context(tcp).url
         assist = stack.enter_context(serve_assist(simulator, clock=clock))
-        _announce(url, assist.url, simulator.machine.model.name, simulator.seed)
-        stopped.wait()
+        cell = ControlledCell(simulator, clock, {"serial" if address is None else "tcp": url})
+        control = stack.enter_context(controlled({"cell": cell}, life, allow_remote=allow_remote))
+        beside = {"assist": assist.url, "control": control.url_of("cell")}
+        _announce(simulator, url, beside, stopped.state_dir)
+        stopped.wait(lambda: simulator.log.added + control.requests)
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,26 +157,20 @@ def habits(options: Sequence[str], profile: Path | None) -> EpsonOptions:
     return options_from_text({**settled, **pairs})
 
 
-def serial_of(seed: int) -> str:
-    """Return the serial number of a simulated robot: another one each time, but for a given seed.
-
-    Two simulators that were started alike are two controllers all the same, unless a person
-    asked for the very same one.
-    """
-    given = click.get_current_context().get_parameter_source("seed")
-    return drawn_serial(f"seed {seed}" if given is ParameterSource.COMMANDLINE else "")
-
-
-def _announce(url: str, assist_url: str, robot: str, seed: int) -> None:
-    document: dict[str, object] = {"url": url, "assist": assist_url, "robot": robot, "seed": seed}
+def _announce(
+    simulator: EpsonSimulator, url: str, beside: Mapping[str, str], state_dir: str
+) -> None:
+    robot, seed = simulator.machine.model.name, simulator.seed
+    document: dict[str, object] = {"url": url, **beside, "robot": robot, "seed": seed}
     lines = (
         tr("SIMULATED EPSON {robot} (seed {seed}). No robot moves.", robot=robot, seed=seed),
         tr("  controller  {url}", url=url),
-        tr("  assist      {url}", url=assist_url),
+        tr("  assist      {url}", url=beside["assist"]),
+        tr("  control     {url}", url=beside["control"]),
         tr('Try: robolink -c "{url}" status', url=url),
         tr("Ctrl-C ends it."),
     )
-    announce(document, lines)
+    announce(document, lines, state_dir)
 
 
 def _lines(texts: Sequence[str]) -> dict[int, str]:

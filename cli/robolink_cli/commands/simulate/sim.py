@@ -6,7 +6,12 @@ import click
 
 from robolink_cli.commands.simulate.sim_plc import sim_plc
 from robolink_cli.commands.simulate.sim_softmotion import softmotion
-from robolink_cli.options.simulation import project_options, simulation_options
+from robolink_cli.options.simulation import (
+    ServedLife,
+    life_options,
+    project_options,
+    simulation_options,
+)
 from robolink_cli.session.context import json_option
 
 
@@ -89,6 +94,7 @@ sim.add_command(softmotion)
 )
 @project_options
 @simulation_options
+@life_options
 @json_option
 def epson(
     *,
@@ -111,6 +117,7 @@ def epson(
     lines: tuple[str, ...],
     folder: Path | None,
     allow_remote: bool,
+    life: ServedLife,
 ) -> None:
     """Serve a simulated EPSON controller with Remote Ethernet, or RS232, until Ctrl-C.
 
@@ -136,7 +143,6 @@ def epson(
         habits,
         load_programs,
         password_in,
-        serial_of,
         serve_epson,
     )
 
@@ -145,7 +151,6 @@ def epson(
         seed=seed,
         password=password_in(password_env),
         options=habits(options, profile),
-        serial=serial_of(seed),
         state_path=state,
         world=world_from(world),
     )
@@ -153,7 +158,7 @@ def epson(
     load_programs(simulator, programs, points, surroundings)
     plan_faults(simulator, faults, {LinkKind.EPSON_SERIAL if serial else LinkKind.EPSON_TCP})
     place = None if serial else listen
-    serve_epson(simulator, place, speed=speed, allow_remote=allow_remote, baud=baud)
+    serve_epson(simulator, place, speed=speed, allow_remote=allow_remote, life=life, baud=baud)
 
 
 @sim.command()
@@ -171,3 +176,28 @@ def assist(url: str, act: str, values: tuple[str, ...]) -> None:
     from robolink_cli.commands.simulate.assisting import do_act
 
     do_act(url, act, values)
+
+
+@sim.command()
+@click.argument("act")
+@click.argument("values", nargs=-1, metavar="[NAME=VALUE]...")
+@click.option(
+    "--at",
+    "url",
+    metavar="URL",
+    envvar="ROBOLINK_CONTROL",
+    show_envvar=True,
+    required=True,
+    help="The control URL that 'robolink sim' prints.",
+)
+@json_option
+def ctl(act: str, values: tuple[str, ...], url: str) -> None:
+    """Do something to a simulated controller and its cell past the wire.
+
+    ACT is for example truth, press_estop, add_fault action=drop_reply match=TLSet, log, reset,
+    set_clock factor=0, step seconds=2. An unknown one lists them all, and docs/control-api.md
+    explains each.
+    """
+    from robolink_cli.commands.simulate.assisting import do_controlled
+
+    do_controlled(url, act, values)

@@ -101,6 +101,14 @@ class ToolDesk:
         self._memory.define(number, self._units.given(tool), "nozzle")
         self._apply(number, self._memory.slot(number).tool, "nozzle")
 
+    def preselect(self, number: int) -> None:
+        """Put the tool of a slot in force past the mailbox; 0 for none."""
+        if number:
+            slot = self._memory.slot(number)
+            self._apply(number, slot.tool, slot.name)
+        else:
+            self.forget()
+
     def set_tool(self) -> Answer:
         """Return the tool in force for movements to come."""
         return self._answer(self._group.tool)
@@ -131,9 +139,11 @@ class ToolDesk:
         return Told(told.execution, self.set_tool())
 
     def _read(self, command: Command) -> Told:
-        mode = require_operand(command.operands[0], range(len(ReadToolMode)))
+        mode = ReadToolMode(require_operand(command.operands[0], range(len(ReadToolMode))))
+        # What was interrupted is the active movement of the mailbox.
+        waits = mode is ReadToolMode.ACTIVE_MOVEMENT and self._group.motion.interrupted
         try:
-            tool = self._group.read_tool(ReadToolMode(mode))
+            tool = self._group.continue_tool_offset() if waits else self._group.read_tool(mode)
         except BlockRefused as refused:
             error_class = class_of(refused.kind, self._group.state)
             number = self._group.options.numbers.error(refused.kind).number

@@ -10,7 +10,7 @@ FINE_PULSES: Final = 10
 """Default of Fine; per model in the reference, 10 in its sample (docs/reference/spel.md 7.3)."""
 
 UP_FIRST: Final = (0b0100, 0b1011, 0, 0)
-"""Default of Hordr on four axes; that six move all at once is assumed (spel.md 7.3)."""
+"""Default of Hordr on four axes (docs/reference/spel.md 7.2); six move all at once (assumed)."""
 
 
 @dataclass(frozen=True, slots=True)

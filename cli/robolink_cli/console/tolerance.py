@@ -9,6 +9,9 @@ from typing import Final
 PLAINLY: Final = "robolink.plainly"
 """Name of what stands in for characters that an encoding lacks: signs in letters, else escapes."""
 
+PLAIN: Final = "robolink.plain"
+"""Where a command finds that lines are wanted in place of screens."""
+
 _IN_ASCII: Final = {"\u00b1": "+-", "\u221e": "inf", "\u00b0": " deg", "\u2192": "->"}
 
 

@@ -42,6 +42,7 @@ class Desk:
         self._number = 0
         self._told_waiting = False
         self._gone = False
+        self._looked_s = 0.0
         self.glance: Callable[[], Reading | None] = lambda: None
 
     def tell(self, text: str) -> None:
@@ -81,9 +82,10 @@ class Desk:
             try:
                 answer = self._answers.get(timeout=max(0.0, min(GLANCE_S, left_s)))
             except queue.Empty:
-                if left_s <= GLANCE_S:
+                if self._now_s() - self._looked_s >= GLANCE_S:
+                    self._look()
+                if self._now_s() >= end_s:
                     return None
-                self._look()
                 continue
             if answer.number == self._number:
                 self._told_waiting = False
@@ -107,6 +109,7 @@ class Desk:
         self._answers.put(answer)
 
     def _look(self) -> None:
+        self._looked_s = self._now_s()
         reading = self.glance()
         if reading is not None:
             self._happened.put(WasRead(reading))

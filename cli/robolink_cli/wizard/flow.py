@@ -8,6 +8,7 @@ import math
 from dataclasses import replace
 
 from robolink.messages import tr
+from robolink.nozzle_change import ChangeReport
 from robolink.runner import SETTLING_S, FitSubject, JogSubject, MoveSubject, Question
 from robolink_cli.wizard.check_list import CheckSubject
 from robolink_cli.wizard.choices import ChoiceSubject
@@ -106,6 +107,8 @@ def _regarding(state: WizardState, subject: object) -> WizardState:
         return replace(state, subject=subject, question=None, waits=False, message="")
     if isinstance(subject, Header):
         return replace(state, header=subject)
+    if isinstance(subject, ChangeReport):
+        return replace(state, report=subject)
     if isinstance(subject, FitSubject):
         return replace(state, subject=subject, fit=subject)
     return replace(state, subject=subject)

@@ -4,8 +4,10 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from robolink_cli.console.output import shown_by
+from robolink_cli.console.render import note
 from robolink_cli.prompts.present import sitting_at
 from robolink_cli.wizard.desk import Desk
+from robolink_cli.wizard.screens.ending import done_lines, stopped_lines
 from robolink_cli.wizard.state import Header, WizardState
 from robolink_cli.wizard.work import Work
 
@@ -28,7 +30,15 @@ def guided(header: Header, do: Callable[[], T]) -> T:
     face = face_here()
     with sitting_at(desk), shown_by(lambda text, _beside: desk.tell(text)):
         work.start()
-        face.run(desk, state, work)
+        state = face.run(desk, state, work)
     if work.error is not None:
+        _leave(stopped_lines(state))
         raise work.error
+    if state.report is not None:
+        _leave(done_lines(state, state.report))
     return work.result  # type: ignore[return-value]
+
+
+def _leave(lines: list[str]) -> None:
+    """Print what stays when the screen is gone."""
+    note("\n".join(lines))

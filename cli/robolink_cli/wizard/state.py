@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import Final
 
 from robolink.model import Pose
-from robolink.nozzle_change import WriteSubject
+from robolink.nozzle_change import ChangeReport, WriteSubject
 from robolink.runner import FINEST_STEP, FitSubject, Question, TouchSubject
 from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.happenings import Reading, WasAsked
@@ -86,6 +86,7 @@ class WizardState:
         remarks: What was told last, oldest first.
         message: The row above the keys.
         ending: Whether the work was told to end.
+        report: What was reached, ``None`` before the end.
     """
 
     header: Header
@@ -101,6 +102,7 @@ class WizardState:
     remarks: tuple[str, ...] = ()
     message: str = ""
     ending: bool = False
+    report: ChangeReport | None = None
 
     def says(self, message: str) -> "WizardState":
         """Return the same with another message."""

@@ -25,6 +25,7 @@ class Work(Generic[T]):
     def __init__(self, do: Callable[[], T]) -> None:
         self._do = do
         self._ended = threading.Event()
+        self._begun = threading.Event()
         self._click = click.get_current_context()
         self.result: T | None = None
         self.error: BaseException | None = None
@@ -35,9 +36,10 @@ class Work(Generic[T]):
         return self._ended.is_set()
 
     def start(self) -> None:
-        """Begin."""
+        """Begin; return when whatever ends the command reaches it."""
         here = contextvars.copy_context()
         threading.Thread(target=here.run, args=(self._run,), name="work", daemon=True).start()
+        self._begun.wait()
 
     def wait(self, seconds: float) -> bool:
         """Wait for its end for so long; return whether it has come."""
@@ -46,10 +48,12 @@ class Work(Generic[T]):
     def _run(self) -> None:
         try:
             with self._click.scope(cleanup=False), heard_by_this_thread():
+                self._begun.set()
                 self.result = self._do()
         except BaseException as error:
             self.error = error
         finally:
+            self._begun.set()
             self._ended.set()
 
 

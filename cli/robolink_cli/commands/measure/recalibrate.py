@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import click
 
 from robolink.messages import declared, tr
-from robolink_cli.options.consent import dry_run_option, yes_option
+from robolink_cli.options.consent import dry_run_option, plain_option, yes_option
 from robolink_cli.options.recipe_answers import answer_options
 from robolink_cli.options.sensor import sensor_option
 from robolink_cli.session.completing import complete_recipe
@@ -53,6 +53,7 @@ if TYPE_CHECKING:
 @controller_options
 @dry_run_option
 @yes_option
+@plain_option
 def recalibrate(
     context: CliContext,
     recipe: Path | None,

@@ -208,7 +208,10 @@ class Recalibration:
     def _carry_out(self, controller: Controller, run: RecipeRun) -> dict[str, object]:
         report = run.run()
         # Now, because Ctrl-C may come before the logout is answered.
-        for one in report.tools:
+        desk = present_desk()
+        if desk is not None:
+            desk.regard(report)
+        for one in report.tools if desk is None else ():
             show_report(one)
         if run.takes_reference:
             say(tr("The reference was recorded; nothing was written."))

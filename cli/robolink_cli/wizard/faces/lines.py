@@ -4,23 +4,20 @@ import sys
 import time
 from typing import TYPE_CHECKING, Any, Final
 
-from robolink.interrupts import EndedBy, end
 from robolink.messages import tr
 from robolink.runner import Question
 from robolink_cli.console.output import visible
 from robolink_cli.prompts.lines import QUIET_S, Lines, open_lines
 from robolink_cli.wizard.desk import Desk
+from robolink_cli.wizard.faces.effects import carry_out
 from robolink_cli.wizard.flow import advance
 from robolink_cli.wizard.happenings import (
-    Effect,
     Happening,
     LineTyped,
-    SendAnswer,
     WaitsForAnswer,
     WasAsked,
     WasRegarded,
     WasTold,
-    WizardCommand,
 )
 from robolink_cli.wizard.screens.told import told_after_jog, told_before, told_question
 from robolink_cli.wizard.state import WizardState
@@ -40,12 +37,17 @@ class LineFace:
 
     def run(self, desk: Desk, state: WizardState, work: "Work[Any]") -> WizardState:
         """Show it until the work has ended; return the last state."""
+        if state.question is not None and state.waits:
+            # Taken over from a screen that has become too small.
+            self._begin_question(state, state.question.kind)
+            self._shown = state.question.number
+            _put(visible(told_question(state)))
         while True:
             ended = work.ended
             for happening in desk.happened():
                 state, effects = advance(state, happening)
                 self._tell(happening, state)
-                _carry_out(desk, effects)
+                carry_out(desk, effects)
             if ended:
                 return state
             if state.question is None or not state.waits:
@@ -64,7 +66,7 @@ class LineFace:
             return state
         typed = LineTyped(line, time.monotonic())
         state, effects = advance(state, typed)
-        _carry_out(desk, effects)
+        carry_out(desk, effects)
         if not effects:
             if state.at_place and not line.strip():
                 _put(told_after_jog(state))
@@ -79,12 +81,7 @@ class LineFace:
                 self._forget(0.0)
                 _put(visible(text))
             case WasAsked(kind=kind):
-                if self._lines is None:
-                    self._lines = open_lines()
-                self._forget(QUIET_S)
-                if kind in (Question.YES_NO, Question.TEXT):
-                    for row in told_before(state):
-                        _put(visible(row))
+                self._begin_question(state, kind)
             case WaitsForAnswer(number=number) if number != self._shown:
                 self._shown = number
                 _put(visible(told_question(state)))
@@ -95,20 +92,20 @@ class LineFace:
             case _:
                 pass
 
+    def _begin_question(self, state: WizardState, kind: Question) -> None:
+        if self._lines is None:
+            self._lines = open_lines()
+        self._forget(QUIET_S)
+        if kind in (Question.YES_NO, Question.TEXT):
+            for row in told_before(state):
+                _put(visible(row))
+
     def _forget(self, quiet_s: float) -> None:
         if self._lines is None:
             return
         for line in self._lines.forget(quiet_s):
             if line.strip():
                 _put(tr("Typed too early, so it was not taken: {line!r}", line=line))
-
-
-def _carry_out(desk: Desk, effects: list[Effect]) -> None:
-    for effect in effects:
-        if isinstance(effect, SendAnswer):
-            desk.answer(effect)
-        elif effect is WizardCommand.END_WORK:
-            end(EndedBy.CTRL_C)
 
 
 def _put(text: str) -> None:

@@ -11,7 +11,7 @@ from robolink_cli.wizard.screens.layout import Screen
 from robolink_cli.wizard.screens.rows import mm, title_row
 from robolink_cli.wizard.state import WizardState
 
-_BAR: Final = 24
+_BAR: Final = 20
 _MOST_ROWS: Final = 9
 
 

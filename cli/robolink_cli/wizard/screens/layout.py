@@ -42,7 +42,9 @@ class Screen:
         keys = list(key_rows(self.actions))
         messages = list(broken(self.message))[:2] if self.message else []
         room = HEIGHT - len(shown) - 2 - len(keys) - len(messages)
-        return [cut(row) for row in [*shown, rule, *body[:room], *messages, rule, *keys]]
+        # The keys stand at the same place on every screen.
+        below = [""] * (room - len(body))
+        return [cut(row) for row in [*shown, rule, *body[:room], *below, *messages, rule, *keys]]
 
 
 def key_rows(actions: Sequence[tuple[str, str]]) -> Iterator[str]:

@@ -94,7 +94,7 @@ def _contact(touch: TouchSubject | None) -> list[str]:
 def _keypad(state: WizardState) -> list[str]:
     jogging = state.jogging
     right, up, left, down = _turned(("X+", "Y+", "X-", "Y-"), jogging.quarters)
-    sizes = "   ".join(
+    sizes = " ".join(
         f"({size:.2f})" if size == jogging.step else f" {size:.2f} " for size in STEP_SIZES
     )
     step = tr("Step   {mm} mm", mm=f"{jogging.step:.2f}")

@@ -6,7 +6,7 @@ from robolink.messages import tr
 from robolink.model import ToolOffset
 from robolink.nozzle_change import LimitVerdict, Proposal, WriteSubject
 from robolink_cli.console.columns import padded
-from robolink_cli.wizard.screens.layout import Screen, row_of
+from robolink_cli.wizard.screens.layout import Screen, broken, row_of
 from robolink_cli.wizard.screens.rows import mm, signed, title_row
 from robolink_cli.wizard.state import WizardState
 
@@ -54,7 +54,11 @@ def judgement(proposal: Proposal, verdicts: tuple[LimitVerdict, ...]) -> list[st
             )
         )
     doubts = [*proposal.notes, *known_doubts(proposal.result.warnings)]
-    lines += [f" {padded(tr('LOOK'), 5)}{doubt}" for doubt in doubts]
+    lines += [
+        f" {padded(tr('LOOK'), 5)}{row}" if first else f"      {row}"
+        for doubt in doubts
+        for first, row in ((at == 0, row) for at, row in enumerate(broken(doubt, 73)))
+    ]
     if "z_mm" in proposal.kept:
         z = mm((proposal.before or ToolOffset()).z_mm)
         lines.append(f" {padded(tr('LOOK'), 5)}" + tr("Z {z} is not measured, stays.", z=z))

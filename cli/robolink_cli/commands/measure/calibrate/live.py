@@ -26,6 +26,7 @@ from robolink_cli.console.render import note
 from robolink_cli.options.impact import ImpactRequest, impact_payload, show_impact
 from robolink_cli.options.report import ReportDraft, reporting
 from robolink_cli.prompts.operator import operator_at
+from robolink_cli.prompts.present import present_desk
 from robolink_cli.session.check_before_start import agree_to_procedure
 from robolink_cli.session.guidance import guided_if_alone
 from robolink_cli.session.opening import open_controller
@@ -118,7 +119,11 @@ class LiveCalibration:
                 listener=self._listener,
                 earlier=partial(earlier_corrections, self._controller),
             )
-            (self._report,) = change.run().tools
+            whole = change.run()
+            (self._report,) = whole.tools
+        desk = present_desk()
+        if desk is not None:
+            desk.regard(whole)
         impact = self._listener.impact
         return {
             **report_payload(self._report),
@@ -128,7 +133,7 @@ class LiveCalibration:
 
     def show_end(self) -> None:
         """Say how it ended."""
-        if self._report is not None:
+        if self._report is not None and present_desk() is None:
             show_report(self._report)
 
 

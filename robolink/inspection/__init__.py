@@ -13,11 +13,13 @@ if TYPE_CHECKING:
     from robolink.inspection._findings import InspectionCode as InspectionCode
     from robolink.inspection._findings import InspectionFinding as InspectionFinding
     from robolink.inspection._looking import inspect as inspect
+    from robolink.inspection._measuring import measured_findings as measured_findings
 else:
     __getattr__ = lazy_exports(
         __name__,
         {
             "_findings": "Inspection InspectionCode InspectionFinding",
             "_looking": "inspect",
+            "_measuring": "measured_findings",
         },
     )

@@ -1,7 +1,7 @@
 """What a look at a cell found, for people, for programs and for the record."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from robolink.messages import tr
@@ -16,6 +16,8 @@ class InspectionCode(StrEnum):
     TOOLS_NOT_READ = "tools_not_read"
     TOOL_CHANGED = "tool_changed"
     STATION_DUE = "station_due"
+    TIP_MOVED = "tip_moved"
+    TIP_NOT_MEASURED = "tip_not_measured"
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +56,10 @@ class Inspection:
     stations: tuple[str, ...]
     changes: int
     findings: tuple[InspectionFinding, ...]
+
+    def with_findings(self, more: Iterable[InspectionFinding]) -> "Inspection":
+        """Return the same with what else was found."""
+        return replace(self, findings=(*self.findings, *more))
 
     @property
     def entry(self) -> NewEntry:

@@ -4,7 +4,7 @@ What it reads is legal at any time but the tool table of an EPSON controller, wh
 controller at rest or a project that publishes it (docs/monitor-only.md).
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 
 from robolink.backup import ToolState
 from robolink.config import Cell
@@ -12,6 +12,7 @@ from robolink.drift import KINDS, drift_of
 from robolink.errors import NotReadyError
 from robolink.inspection._findings import Inspection, InspectionCode, InspectionFinding
 from robolink.messages import tr
+from robolink.methods import all_methods
 from robolink.model import (
     Controller,
     ControllerStatus,
@@ -26,7 +27,6 @@ def inspect(
     controller: Controller,
     tools: ToolState | NotReadyError,
     *,
-    finds_pin: Callable[[str], bool],
     cell: Cell | None = None,
     since: str = "",
 ) -> Inspection:
@@ -36,7 +36,6 @@ def inspect(
         controller: The controller, connected.
         tools: Its tools and the selected one as they were read just now, or why they could not be:
             while production runs, an EPSON controller is asked for no tool.
-        finds_pin: Tells whether a method, by its name, finds its pin with the offset.
         cell: The cell, whose file may declare stations.
         since: Changes with an earlier label (ISO 8601) are left out of the charts.
 
@@ -47,7 +46,10 @@ def inspect(
     outcomes = controller.outcomes
     stations = find_stations(cell, outcomes.recorded(kinds=(EntryKind.STATION,)))
     newest_first = list(outcomes.recorded(kinds=KINDS))
-    course = drift_of(controller.identity, reversed(newest_first), finds_pin=finds_pin, since=since)
+    finding = {method.name for method in all_methods() if method.needs.finds_pin}
+    course = drift_of(
+        controller.identity, reversed(newest_first), finds_pin=finding.__contains__, since=since
+    )
     read = {} if isinstance(tools, NotReadyError) else dict(tools.tools)
     selected = None if isinstance(tools, NotReadyError) else tools.selected
     findings = (

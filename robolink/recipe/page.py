@@ -14,9 +14,9 @@ _OPENING: Final = """\
 This page is made from the code: `python -m robolink.recipe.page > docs/recipe-keys.md`.
 [Recipes](recipes.md) says how one is written, and which decisions have no default.
 
-Limits are inclusive. Lengths are mm, angles degrees. Poses are of the flange (Tool 0), in base coordinates. The keys
-at the top stand above the first line with a `[table]`; what a `[source]` may say besides its `kind` is the method's
-own: [methods](methods.md).
+Limits are inclusive. Lengths are mm, angles degrees. Poses are of the flange (Tool 0), in base
+coordinates. The keys at the top stand above the first line with a `[table]`; what a `[source]` may
+say besides its `kind` is the method's own: [methods](methods.md).
 """
 
 _TABLES: Final = {

@@ -1,16 +1,21 @@
 """cell check: what it finds, what it records, and that nothing on the controller changes."""
 
 import json
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from robolink_cli import main
+from robolink_simulators.cell.tip_switches import LightBeam
 
+from robolink.errors import DeclinedError
 from robolink.journal import open_journal
 from robolink.model import EntryKind, Marker, MarkerKind, NewEntry
 from tests.cli.test_journal_drift import entries
 from tests.drift._courses import course
 from tests.faults._requests import changes
 
+ROOT = Path(__file__).parents[2]
 PIN = '[cells.line3.stations.PIN-07]\nkind = "pin"\ncheck_every_days = 90\n'
 
 
@@ -19,7 +24,8 @@ def cells(simulator, tmp_path, monkeypatch, capsys):
     """Write the cell file; return what runs ``cell check`` and gives code, document and errors."""
     file = tmp_path / "cells.toml"
     monkeypatch.setenv("ROBOLINK_CONFIG", str(file))
-    file.write_text(f'[cells.line3]\nurl = "{simulator.url}"\n')
+    stated = "remote_timeout_s = 60\nremote_timeout_confirmed_by = 'me'\n"
+    file.write_text(f'[cells.line3]\nurl = "{simulator.url}"\n{stated}')
 
     def checked(*arguments, more=""):
         file.write_text(file.read_text() + more)
@@ -145,3 +151,71 @@ def test_a_plc_is_checked_alike(cells):
     code, document = cells("plc", more=f'[cells.plc]\nurl = "{url}"\n')
     assert (code, found(document)) == (0, [])
     assert document["cells"][0]["controller"].startswith("softmotion")
+
+
+@pytest.fixture
+def watched(simulator, monkeypatch, tmp_path):
+    """Two beams, a recipe that measures by them, and a person at the terminal who says yes."""
+    for number, heading_deg in ((3, 2.0), (4, 91.0)):
+        beam = LightBeam((175.0, 488.0, -106.0), heading_deg, radius_mm=0.1)
+        simulator.world.connect(number, beam, latency_s=0.002, noise_mm=0.003)
+    simulator.machine.motors_on = True
+    example = ROOT / "examples" / "recipes" / "needle-beams.toml"
+    (tmp_path / "beams.toml").write_bytes(example.read_bytes())
+    asked: list[str] = []
+
+    def answers(yes):
+        def require_yes(question):
+            asked.append(question)
+            if not yes:
+                raise DeclinedError("You said no.")
+
+        monkeypatch.setattr("robolink_cli.prompts.questions.on_terminal", lambda: True)
+        monkeypatch.setattr("robolink_cli.commands.measure.sensor_check.on_terminal", lambda: True)
+        monkeypatch.setattr("robolink_cli.prompts.questions.require_yes", require_yes)
+        return asked
+
+    return answers
+
+
+def test_a_sensor_measures_after_a_yes_and_nothing_is_written(cells, simulator, watched):
+    asked = watched(yes=True)
+    simulator.machine.tools.set(1, simulator.world.tips[1])
+    before = simulator.machine.tools.defined()
+    code, document = cells("--measure", "beams.toml")
+    assert (code, found(document)) == (0, [])
+    assert len(asked) == 1
+    assert "nothing is written" in asked[0]
+    assert simulator.machine.arm.moves_started > 0
+    tip = simulator.world.tips[1]
+    simulator.machine.tools.set(1, replace(tip, x_mm=tip.x_mm + 0.4))
+    code, document = cells("--measure", "beams.toml")
+    assert (code, found(document)) == (1, ["tip_moved"])
+    assert "0.4" in document["cells"][0]["findings"][0]["sentence"]
+    assert not [text for _, way, text in simulator.log if way == ">" and "TLSet 1," in text]
+    assert set(simulator.machine.tools.defined()) == set(before)
+    assert simulator.machine.tools.selected == 1
+    assert recorded()[-1].verdict == "To see to: tip_moved."
+
+
+def test_nothing_moves_without_a_person_s_yes(cells, simulator, watched, tmp_path, capsys):
+    moves = simulator.machine.arm.moves_started
+    assert main.run(["check", "--measure", str(tmp_path / "beams.toml")]) == 9
+    assert "run it on a terminal" in capsys.readouterr().err
+    assert recorded() == []
+    watched(yes=False)
+    code, document = cells("--measure", "beams.toml")
+    assert (code, document["cells"][0]["error"]["kind"]) == (9, "DeclinedError")
+    assert document["cells"][0]["tools"]["1"]["x_mm"] == 12.0
+    assert simulator.machine.arm.moves_started == moves
+    assert [entry.verdict for entry in recorded()] == ["In order."]
+
+
+def test_a_recipe_by_which_a_person_touches_measures_nothing(cells, simulator, watched, tmp_path):
+    asked = watched(yes=True)
+    example = ROOT / "examples" / "recipes" / "scara-pin.toml"
+    code, document = cells("--measure", str(example))
+    assert code == 2
+    assert "a person touches" in document["cells"][0]["error"]["what"]
+    assert asked == []
+    assert simulator.machine.arm.moves_started == 0

@@ -199,16 +199,16 @@ class SameJog(AssistedOperator):
     def ask(self, question, kind):
         super().ask(question, kind)
         self.asked += 1
-        self.jogged = False
+        self.words = None
 
     def poll(self, wait_s):
         word = super().poll(wait_s)
         if self.asked == 1 or word is None:
             return word
-        if self.jogged:
-            return ""
-        self.jogged = True
-        return self.later()
+        if self.words is None:
+            # They end in a fine step, as is asked of them, and are where they were.
+            self.words = [self.later(), "z+0.1", "z-0.1", ""]
+        return self.words.pop(0) if self.words else ""
 
     def later(self):
         """Return what is typed at each touch but the first."""

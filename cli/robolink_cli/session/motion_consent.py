@@ -34,11 +34,7 @@ def agree_to_motion(question: str, *, yes: bool, in_tool: bool = True) -> None:
         DeclinedError: The answer was no, or nobody could be asked; or the selected tool may be
             a wrong one.
     """
-    meta = click.get_current_context().meta
-    if REACHED in meta:
-        heed_stop(meta[REACHED], meta[WATCHED], yes=yes)
-    if in_tool and WATCHED in meta:
-        heed_selection(meta[WATCHED], meta.get(CELL), yes=yes)
+    heed_what_was_left(yes=yes, in_tool=in_tool)
     if yes:
         return
     if not questions.on_terminal():
@@ -47,6 +43,19 @@ def agree_to_motion(question: str, *, yes: bool, in_tool: bool = True) -> None:
             remedy=tr("Add --yes when the cell is clear, or run it on a terminal."),
         )
     questions.require_yes(question)
+
+
+def heed_what_was_left(*, yes: bool, in_tool: bool = True) -> None:
+    """Ask about what others left on the controller, before the robot moves.
+
+    Raises:
+        StoppedError, DeclinedError: As :func:`agree_to_motion`.
+    """
+    meta = click.get_current_context().meta
+    if REACHED in meta:
+        heed_stop(meta[REACHED], meta[WATCHED], yes=yes)
+    if in_tool and WATCHED in meta:
+        heed_selection(meta[WATCHED], meta.get(CELL), yes=yes)
 
 
 def motion_question(

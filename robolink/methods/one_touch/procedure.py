@@ -36,7 +36,7 @@ def measure_one_touch(
     """
     guess = require_known_length(stored)
     contact = carrying(replace(here, u_deg=u_deg), guess, pin_mm)
-    touches = PinTouches(plan)
+    touches = PinTouches(plan, total=1)
     yield from approach_path(
         offset_z(contact, plan.lift_mm), here=here, purpose=tr("Moving above the pin.")
     )

@@ -97,7 +97,7 @@ class _Turning:
     ) -> None:
         self._plan, self._contact = plan, contact
         self._written, self._tip = written, tip
-        self._touches = PinTouches(plan)
+        self._touches = PinTouches(plan, proof=True)
         self._count = 0
 
     def shown(self, angle_deg: float) -> Procedure[tuple[Pose, TouchedAt]]:

@@ -125,8 +125,8 @@ class Tool(Table):
     retreat: FlangePose | None = None
     """Flange pose to which the robot goes after the measurement."""
     points: Annotated[tuple[PointNumber, ...], Field(strict=False, min_length=2)] | None = None
-    """Numbers, 0 to 999, of the taught points that touch the pin with this tool, 2 for "two-pose", 3
-    and more for "n-angle"; source "points" only, which needs them or a file of poses."""
+    """Numbers, 0 to 999, of the taught points that touch the pin with this tool, 2 for "two-pose",
+    3 and more for "n-angle"; source "points" only, which needs them or a file of poses."""
     poses: PoseFile | None = None
     """File with the poses that touch the pin with this tool, in place of points."""
 

@@ -1,16 +1,19 @@
 """cell check: whether cells are as they were left, and whether anything is due. Moves nothing."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
-from robolink.errors import ConfigError, JournalError, NotReadyError, RobolinkError
+from robolink.errors import ConfigError, NotReadyError, RobolinkError
 from robolink.messages import declared, tr
 from robolink_cli.access.cell import complete_cell
 from robolink_cli.console.exit_codes import DIFFERENT, exit_code
 from robolink_cli.console.render import note, say
 from robolink_cli.options.consent import published_option
+from robolink_cli.session.completing import complete_recipe
 from robolink_cli.session.context import CliContext, context_of_cell, controller_options
 from robolink_cli.session.opening import open_controller
 
@@ -18,6 +21,21 @@ if TYPE_CHECKING:
     from robolink.backup import ToolState
     from robolink.inspection import Inspection
     from robolink.model import NewEntry
+    from robolink_cli.commands.measure.sensor_check import SensorCheck
+
+
+class CheckScope(NamedTuple):
+    """What is looked at, and how.
+
+    Attributes:
+        published: Whether the tools are those that the companion program published.
+        since: Changes before this day are left out of the charts; empty for none.
+        sensor: What measures besides, ``None`` for nothing: then nothing moves.
+    """
+
+    published: bool
+    since: str
+    sensor: "SensorCheck | None"
 
 
 class CheckedCell(NamedTuple):
@@ -26,7 +44,7 @@ class CheckedCell(NamedTuple):
     Attributes:
         name: Its name, or its URL where it has none.
         inspection: What was found; ``None`` where it could not be looked at.
-        error: Why not.
+        error: Why not, or not further.
     """
 
     name: str
@@ -36,7 +54,8 @@ class CheckedCell(NamedTuple):
     @property
     def well(self) -> bool:
         """Whether it was looked at and nobody has to see to anything."""
-        return self.inspection is not None and not self.inspection.findings
+        found = self.inspection
+        return self.error is None and found is not None and not found.findings
 
 
 @click.command()
@@ -46,9 +65,27 @@ class CheckedCell(NamedTuple):
     type=click.DateTime(["%Y-%m-%d"]),
     help=declared("Begin the charts anew at this day, after a repair (UTC)."),
 )
+@click.option(
+    "--measure",
+    "recipe",
+    metavar="RECIPE.toml",
+    type=click.Path(dir_okay=False, path_type=Path),
+    shell_complete=complete_recipe,
+    help=declared(
+        "Also measure the tips as this recipe says, by its sensor; the robot moves after a yes on "
+        "a terminal. Nothing is written."
+    ),
+)
 @published_option
 @controller_options
-def check(context: CliContext, cells: tuple[str, ...], *, since: Any, published: bool) -> int:  # noqa: ANN401 - click's form
+def check(
+    context: CliContext,
+    cells: tuple[str, ...],
+    *,
+    since: datetime | None,
+    recipe: Path | None,
+    published: bool,
+) -> int:
     """Look whether cells are in order, for a job that runs every night. Nothing moves.
 
     Without a CELL that of -c is meant, or else all cells of the cell files. Compared are the tools
@@ -56,8 +93,12 @@ def check(context: CliContext, cells: tuple[str, ...], *, since: Any, published:
     changes with its limits; each look goes on record as one entry of the journal. Exit code 1 when
     somebody should see to something; when a cell could not be looked at, the code of why not.
     """
-    begin = f"{since:%Y-%m-%d}" if since else ""
-    checked = [_checked(one, published=published, since=begin) for one in _contexts(context, cells)]
+    from robolink_cli.commands.measure.sensor_check import SensorCheck
+
+    contexts = _contexts(context, cells)
+    sensor = None if recipe is None else SensorCheck.of(recipe, cells=len(contexts))
+    scope = CheckScope(published, f"{since:%Y-%m-%d}" if since else "", sensor)
+    checked = [_checked(one, scope) for one in contexts]
     payload = {"ok": all(one.well for one in checked), "cells": [_payload(one) for one in checked]}
     context.emit("check", payload, lambda: _show(checked))
     for one in checked:
@@ -83,39 +124,46 @@ def _contexts(context: CliContext, names: Sequence[str]) -> list[CliContext]:
     return [context_of_cell(name) for name in names]
 
 
-def _checked(context: CliContext, *, published: bool, since: str) -> CheckedCell:
+def _checked(context: CliContext, scope: CheckScope) -> CheckedCell:
     """Look at one cell; what keeps it from being looked at stands in the result."""
     name = context.cell.name if context.cell else context.require_url()
+    seen: list[Inspection] = []
     try:
-        return CheckedCell(name, _inspect(context, published=published, since=since))
-    except (ConfigError, JournalError) as error:
-        return CheckedCell(name, None, error)
+        _inspect(context, scope, seen)
     except RobolinkError as error:
-        _record_that_nobody_looked(context, error)
-        return CheckedCell(name, None, error)
+        if not (seen or isinstance(error, ConfigError)):
+            _record_that_nobody_looked(context, error)
+        return CheckedCell(name, seen[-1] if seen else None, error)
+    return CheckedCell(name, seen[-1])
 
 
-def _inspect(context: CliContext, *, published: bool, since: str) -> "Inspection":
+def _inspect(context: CliContext, scope: CheckScope, seen: "list[Inspection]") -> None:
+    """Look at one cell and put on record what was found.
+
+    Args:
+        context: The cell.
+        scope: What is looked at, and how.
+        seen: Takes what was found; by reading, then with what was measured.
+
+    Raises:
+        RobolinkError: What keeps it from being looked at, or from being looked at further.
+    """
     from robolink.inspection import inspect
-    from robolink.methods import all_methods
     from robolink_cli.session.tool_source import find_tools
 
-    finding = {method.name for method in all_methods() if method.needs.finds_pin}
-    with open_controller(context, quiet=True) as controller:
+    with open_controller(context, quiet=True, changes=scope.sensor is not None) as controller:
         tools: ToolState | NotReadyError
         try:
-            tools = find_tools(controller, published=published)
+            tools = find_tools(controller, published=scope.published)
         except NotReadyError as error:
             tools = error
-        inspection = inspect(
-            controller,
-            tools,
-            finds_pin=finding.__contains__,
-            cell=context.cell,
-            since=since,
-        )
-        controller.outcomes.append(inspection.entry)
-    return inspection
+        seen.append(inspect(controller, tools, cell=context.cell, since=scope.since))
+        try:
+            if scope.sensor is not None:
+                measured = scope.sensor.findings(controller, context.cell)
+                seen.append(seen[-1].with_findings(measured))
+        finally:
+            controller.outcomes.append(seen[-1].entry)
 
 
 def _record_that_nobody_looked(context: CliContext, error: RobolinkError) -> None:
@@ -148,18 +196,18 @@ def _not_looked(error: RobolinkError) -> "NewEntry":
 def _payload(one: CheckedCell) -> Mapping[str, object]:
     from robolink_cli.views.documents import offset_payload
 
+    error = one.error and {
+        "kind": type(one.error).__name__,
+        "what": one.error.what,
+        "remedy": one.error.remedy,
+    }
     if one.inspection is None:
-        error = one.error
-        assert error is not None  # noqa: S101 - one of the two is given
-        return {
-            "cell": one.name,
-            "ok": False,
-            "error": {"kind": type(error).__name__, "what": error.what, "remedy": error.remedy},
-        }
+        return {"cell": one.name, "ok": False, "error": error}
     found = one.inspection
     return {
         "cell": one.name,
         "ok": one.well,
+        "error": error,
         "controller": found.controller,
         "tools": {str(number): offset_payload(value) for number, value in found.tools.items()},
         "selected_tool": found.selected,
@@ -196,3 +244,5 @@ def _show(checked: Sequence[CheckedCell]) -> None:
             say(f"  {found.sentence}")
             if found.remedy:
                 say(f"    {found.remedy}")
+        if one.error is not None:
+            say(f"  {one.error}")

@@ -10,6 +10,7 @@ import robolink
 from robolink import ToolOffset
 from robolink.errors import ConfigError, OutcomeUnknownError, RobolinkError
 from robolink.journal import EntryKind
+from robolink.transaction import Wanted, change_tools
 
 WANTED = ToolOffset(1.0, 2.0, -30.0)
 
@@ -151,12 +152,14 @@ def test_a_cell_is_put_back_between_two_looks(epson_sim, softmotion_sim, fault_p
         assert cell.truth()["stored"]["2"]["z_mm"] == pytest.approx(WANTED.z_mm)
 
 
-def test_the_journal_of_the_test_tells_what_was_done(epson_sim, robolink_journal):
-    write(epson_sim)
-    with robolink.connect(epson_sim.url) as controller:
+def test_the_journal_of_the_test_tells_what_was_done(epson_factory, robolink_journal):
+    """On a port: what happens in the process is kept in the process."""
+    cell = epson_factory(medium="tcp")
+    with robolink.connect(cell.url) as controller:
+        change_tools(controller, [Wanted(2, WANTED, robolink.ANY)])
         who = controller.outcomes.identity
     assert who.startswith("epson:C-SIM")
-    (entry,) = [it for it in robolink_journal.entries(who) if it.kind is EntryKind.DONE]
+    (entry,) = robolink_journal.entries(controller=who, kinds=[EntryKind.DONE])
     assert entry.tool == 2
 
 

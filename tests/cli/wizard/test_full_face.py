@@ -15,8 +15,8 @@ from prompt_toolkit.input import create_pipe_input
 from prompt_toolkit.output.vt100 import Vt100_Output
 from robolink_cli.wizard.faces.full import FullFace
 from robolink_cli.wizard.happenings import Reading
-from robolink_cli.wizard.work import Work
 from robolink_cli.wizard.state import WizardState
+from robolink_cli.wizard.work import Work
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp

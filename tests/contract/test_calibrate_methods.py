@@ -151,7 +151,7 @@ def test_a_sensor_stops_inside_the_tolerance_and_its_worst_is_offered_for_retaki
 ):
     """The simulated person accepts each offer; the answers are on record."""
     monkeypatch.setattr(
-        "robolink_cli.commands.measure.calibrate.live.agree_to_motion", lambda *_, **__: None
+        "robolink_cli.session.check_before_start.agree_to_motion", lambda *_, **__: None
     )
     with method_cell(kind, tmp_path, monkeypatch) as cell:
         cell.mount()

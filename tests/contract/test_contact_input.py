@@ -94,7 +94,7 @@ def test_a_movement_beside_the_pin_finds_nothing(cell):
     assert seek_down(controller) is None
 
 
-@pytest.mark.parametrize("kind", HOSTS)
+@pytest.mark.parametrize("kind", ["epson", pytest.param("softmotion", marks=pytest.mark.soak)])
 def test_a_person_who_jogs_onto_the_pin_switches_it_each_time(kind):
     with wired_cell(kind, eye_sigma_mm=0.03, pin_bumped_after_touch=2, pin_bump_mm=2) as both:
         controller, simulator = both

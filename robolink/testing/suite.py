@@ -18,11 +18,14 @@ class CheckOutcome:
         name: Of the check.
         promise: What is promised, in a sentence.
         broken: What was found in place of it; empty where it is kept.
+        error: The error that kept the check from being made, ``None`` for none: the controller
+            may just be in a state in which it refuses.
     """
 
     name: str
     promise: str
     broken: str = ""
+    error: RobolinkError | None = None
 
 
 def outcomes(subject: Subject, checks: Iterable[Check] = READING_CHECKS) -> Iterator[CheckOutcome]:
@@ -33,13 +36,15 @@ def outcomes(subject: Subject, checks: Iterable[Check] = READING_CHECKS) -> Iter
         checks: Which; by default those that only read.
     """
     for check in checks:
-        broken = ""
+        broken, kept_from = "", None
         try:
             check(subject)
-        except (ContractBrokenError, RobolinkError) as error:
+        except ContractBrokenError as error:
             broken = str(error)
+        except RobolinkError as error:
+            broken, kept_from = str(error), error
         promise = " ".join((check.__doc__ or "").split())
-        yield CheckOutcome(check.__name__, promise, broken)
+        yield CheckOutcome(check.__name__, promise, broken, kept_from)
 
 
 def check_controller(subject: Subject, *, writes: bool = True, moves: bool = True) -> None:

@@ -32,7 +32,7 @@ class Drifting(dict[int, ToolOffset]):
 
     looks = count()
 
-    def get(self, tool: int, other: object = None) -> ToolOffset:  # type: ignore[override]
+    def get(self, tool: int, other: object = None) -> ToolOffset:
         return ToolOffset(float(next(self.looks)))
 
 

@@ -19,7 +19,7 @@ def check_contract(context: CliContext) -> int:
 
     For a cell of your own, and for a driver of your own. Nothing is written and nothing moves;
     tests of yours hold a driver to the rest, with robolink.testing. Ends with 1 where a promise
-    is broken.
+    is broken; what a controller refuses to show in its present state is an error, as elsewhere.
     """
     from robolink.testing import READING_CHECKS, Subject, outcomes
 
@@ -32,6 +32,9 @@ def check_contract(context: CliContext) -> int:
         subject = Subject(connected, tool=min(controller.tools.indices()))
         identity = controller.outcomes.identity
     found = list(outcomes(subject, READING_CHECKS))
+    for one in found:
+        if one.error is not None:
+            raise one.error
     broken = [one for one in found if one.broken]
 
     def show() -> None:

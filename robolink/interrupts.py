@@ -77,7 +77,8 @@ class _Handler:
     """The one handler of this process, for all gates and for the command.
 
     Attributes:
-        depth: How many times the main thread is inside a gate.
+        worker: The thread whose work is ended in place of the main thread's, ``None`` for none.
+        depth: How many times the thread that is ended is inside a gate.
         held: What came while it was.
         ended_by: What ended the command that is under way, ``None`` while nothing has.
     """
@@ -86,6 +87,7 @@ class _Handler:
         self._watchers: dict[int, int] = {}
         self._commands = 0
         self._ended_s = 0.0
+        self.worker: int | None = None
         self.depth = 0
         self.held: EndedBy | None = None
         self.ended_by: EndedBy | None = None
@@ -134,7 +136,7 @@ class _Handler:
             if self.ended_by is not None and now_s - self._ended_s < _PATIENCE_S:
                 return
             self.ended_by, self._ended_s = self.ended_by or by, now_s
-        if self.depth:
+        if self.depth or self.worker is not None:
             self.held = self.held or by
         else:
             raise Interrupted(by)
@@ -142,8 +144,59 @@ class _Handler:
     def _came(self, number: int, frame: FrameType | None) -> None:  # noqa: ARG002 - signal's form
         self.arrived(_OF_A_COMMAND[number])
 
+    def heard_here(self) -> bool:
+        """Tell whether this is the thread whose work is ended."""
+        return threading.get_ident() == (_MAIN if self.worker is None else self.worker)
+
+    def let_out(self) -> None:
+        """Raise what was held back, if anything was and no gate is closed.
+
+        Raises:
+            Interrupted: It was.
+        """
+        if self.held is not None and not self.depth:
+            by, self.held = self.held, None
+            raise Interrupted(by)
+
 
 _handler = _Handler()
+
+
+@contextmanager
+def heard_by_this_thread() -> Iterator[None]:
+    """Let what would end the program end the work of this thread, a worker's, for the block.
+
+    The main thread is then free to show a screen and to wait for keys. A signal, or :func:`end`,
+    is raised here as :class:`Interrupted` where a gate opens, which is after the exchange that is
+    under way, and where :func:`heed` is called: the same places at which Ctrl-C is let out of
+    the main thread, so that what follows is cleaned up alike.
+    """
+    _handler.worker = threading.get_ident()
+    try:
+        yield
+    finally:
+        _handler.worker = None
+        # It was meant for the work, and that has ended.
+        _handler.held = None
+
+
+def heed() -> None:
+    """End the work of this thread where that was asked for; for whoever waits outside a gate.
+
+    Raises:
+        Interrupted: It was.
+    """
+    if _handler.heard_here():
+        _handler.let_out()
+
+
+def end(by: EndedBy) -> None:
+    """End the work of :func:`heard_by_this_thread`, as the signal would.
+
+    Raises:
+        Interrupted: There is none, so that the main thread is ended.
+    """
+    _handler.arrived(by)
 
 
 @contextmanager
@@ -190,7 +243,8 @@ class InterruptGate:
     before whoever could abort it knows of it. The outermost end lets Ctrl-C out.
 
     It stands aside where it is not needed: outside the main thread, where Python delivers no
-    signals, and where the program has a SIGINT handler of its own.
+    signals, but for a worker of :func:`heard_by_this_thread`; and where the program has a SIGINT
+    handler of its own.
     """
 
     def __init__(self) -> None:
@@ -207,17 +261,17 @@ class InterruptGate:
         """Start to watch SIGINT, if this is the main thread and the program does not."""
         if not self._open:
             self._taken = _handler.watch(_OF_A_SESSION)
-            self._open = threading.current_thread() is threading.main_thread()
+            self._open = _handler.heard_here()
 
     def close(self) -> None:
         """Stop watching. Idempotent; from another thread the handler just stays harmless."""
-        if self._open and threading.current_thread() is threading.main_thread():
+        if self._open and _handler.heard_here():
             self._open = False
             _handler.leave(self._taken)
             self._taken = []
 
     def __enter__(self) -> None:
-        if self._open and threading.get_ident() == _MAIN:
+        if self._open and _handler.heard_here():
             self._depth += 1
             _handler.depth += 1
 
@@ -227,12 +281,10 @@ class InterruptGate:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        if self._depth and threading.get_ident() == _MAIN:
+        if self._depth and _handler.heard_here():
             self._depth -= 1
             _handler.depth -= 1
-            if _handler.held is not None and not _handler.depth:
-                by, _handler.held = _handler.held, None
-                raise Interrupted(by)
+            _handler.let_out()
 
 
 _MAIN = threading.main_thread().ident

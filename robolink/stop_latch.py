@@ -187,5 +187,6 @@ class StopLatch:
 
 def _remedy() -> str:
     return tr(
-        "Nothing goes on by itself: when the cell is clear, release the stop and start again."
+        "The robot will not move by itself. When the cell is clear, release the stop and "
+        "start again."
     )

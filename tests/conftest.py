@@ -8,6 +8,7 @@ import sys
 import pytest
 
 from tests._canary import Watch, install
+from tests._from_both_ends import import_from_the_other_end
 
 # Before anything imports numpy: threads for matrices of six rows cost far more than they bring,
 # the more so the more cores a machine has.
@@ -50,6 +51,11 @@ def no_password_shows(request):
     folders = {given[name] for name in ("tmp_path", "robolink_state") if name in given}
     if leaks := CANARIES.leaks(*folders):
         pytest.fail("a password shows: " + ", ".join(leaks), pytrace=False)
+
+
+def pytest_collection(session):
+    """Share the compiling of the tests between the processes that share them."""
+    import_from_the_other_end(session.config)
 
 
 def pytest_collection_modifyitems(config, items):

@@ -1,7 +1,9 @@
-"""Compiles the catalogues of sentences where a wheel, or an installation in place, is made.
+"""Compiles the catalogues of sentences, and gathers the pages, where a wheel is made.
 
 Hatchling calls it (``pyproject.toml``). The wheel holds what gettext reads, so that whoever
-installs it needs no Babel; the sources of the translations stay in the source archive.
+installs it needs no Babel; the sources of the translations stay in the source archive. Of the
+folder of pages it holds what ``robolink docs`` shows: pages and pictures, no program that makes
+them.
 """
 
 from pathlib import Path
@@ -13,10 +15,10 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 
 class CatalogueHook(BuildHookInterface):  # type: ignore[type-arg]
-    """Writes a ``.mo`` beside each ``.po`` before files are gathered."""
+    """Writes a ``.mo`` beside each ``.po`` before files are gathered, and names the pages."""
 
-    def initialize(self, version: str, build_data: dict[str, Any]) -> None:  # noqa: ARG002
-        """Compile every catalogue; a source archive needs none.
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+        """Compile every catalogue and gather the pages; a source archive needs none.
 
         Args:
             version: ``standard`` or ``editable``.
@@ -27,3 +29,14 @@ class CatalogueHook(BuildHookInterface):  # type: ignore[type-arg]
         for source in sorted(Path(self.root, "robolink", "locale").glob("*/LC_MESSAGES/*.po")):
             with source.open("rb") as read, source.with_suffix(".mo").open("wb") as compiled:
                 write_mo(compiled, read_po(read))
+        if version == "standard":
+            build_data["force_include"].update(self._pages())
+
+    def _pages(self) -> dict[str, str]:
+        """Return where each page and picture goes; installed in place they are where they are."""
+        docs = Path(self.root, "docs")
+        patterns = ("*.md", "reference/*.md", "pictures/*.svg")
+        found = (path for pattern in patterns for path in docs.glob(pattern))
+        return {
+            str(path): f"robolink_cli/docs/{path.relative_to(docs).as_posix()}" for path in found
+        }

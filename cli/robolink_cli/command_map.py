@@ -15,6 +15,7 @@ _RECORD: Final = "robolink_cli.commands.record"
 _SIMULATE: Final = "robolink_cli.commands.simulate"
 _COMPUTER: Final = "robolink_cli.commands.computer"
 _COMPANIONS: Final = "robolink_cli.commands.companions"
+_SHIPPED: Final = "robolink_cli.commands.shipped"
 _GROUPS: Final = "robolink_cli.commands.groups"
 
 _EVERY_DAY: Final = {
@@ -51,7 +52,7 @@ _LOOK_BACK: Final = {
 }
 
 _SET_UP: Final = {
-    "cell": (f"{_GROUPS}:cell", "list show doctor scan ports people station"),
+    "cell": (f"{_GROUPS}:cell", "list show check doctor scan ports people station"),
     "sim": (f"{_SIMULATE}.sim:sim", declared("Simulated controllers to practise on")),
     "demo": (
         f"{_SIMULATE}.demo:demo",
@@ -67,8 +68,15 @@ SECTIONS: Final = {
 }
 """The first help page: heading, then name, where it is and one line of help."""
 
-SHORT_NAMES: Final = {"config": f"{_GROUPS}:config", "expert": f"{_GROUPS}:expert"}
-"""Names that work and stand in no list; what ``config`` held says itself how it is called now."""
+SHORT_NAMES: Final = {
+    "check": f"{_COMPUTER}.cell_check:check",
+    "config": f"{_GROUPS}:config",
+    "docs": f"{_SHIPPED}.docs:docs",
+    "expert": f"{_GROUPS}:expert",
+    "recipe": f"{_SHIPPED}.recipe:recipe",
+}
+"""Names that work and stand in no list. ``check``, ``docs`` and ``recipe`` are short for
+what ``cell`` and ``expert`` list; what ``config`` held says itself how it is called now."""
 
 RENAMED: Final = {
     "backup": (f"{_CONTROLLER}.backup:backup", "tool backup"),

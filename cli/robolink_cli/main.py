@@ -18,7 +18,12 @@ from robolink_cli.console.help_pages import in_language
 from robolink_cli.console.language import speaking_for
 from robolink_cli.console.output import hand_over, watched_output
 from robolink_cli.console.render import dumps, note, print_document, say
-from robolink_cli.console.tolerance import colour_wanted, help_width, tolerate_any_console
+from robolink_cli.console.tolerance import (
+    colour_wanted,
+    help_width,
+    may_be_guided,
+    tolerate_any_console,
+)
 from robolink_cli.console.ways import SHELL_WAYS
 from robolink_cli.front_page import FrontPage
 from robolink_cli.options.shared import shared_options
@@ -119,6 +124,8 @@ def _answer(arguments: Sequence[str]) -> int:
 
 
 def _invoke(arguments: Sequence[str]) -> int:
+    if not arguments and may_be_guided():
+        arguments = ["change"]  # whoever types nothing is asked what is wanted
     colour = colour_wanted()
     width = help_width()
     with _root().make_context(

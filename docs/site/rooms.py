@@ -26,6 +26,7 @@ WORDS = {
     "nozzle_change": "measure, propose, ask, write, prove, keep or put back",
     "methods": "one folder a calibration method",
     "procedures": "what methods share: ways, touches, looks, sampling",
+    "inspection": "a whole cell looked at, without moving",
     "stations": "pins, beams, surfaces, cameras by name",
     "config": "cell files",
     "locale": "languages, and their catalogues",

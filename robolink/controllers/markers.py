@@ -192,12 +192,13 @@ class MarkerStore:
         for marker in unsettled:
             raise OutcomeUnknownError(
                 tr(
-                    "{request!r} was not sent: {earlier!r} of {when} is not settled.",
+                    "{request!r} was not sent: an earlier job ({earlier!r}, {when}) did not "
+                    "finish.",
                     request=request,
                     earlier=marker.request,
                     when=marker.begun_at,
                 ),
-                remedy=tr("Run 'robolink recover'; motion is blocked until then."),
+                remedy=tr("Next: 'robolink recover'. The robot stays blocked until then."),
                 controller=self._identity,
                 request=request,
             )

@@ -137,7 +137,7 @@ def stopped_before_edge(controller: str, request: str) -> StoppedError:
     """Return the error for a movement that ended before its input switched, nor arrived."""
     return StoppedError(
         tr("The movement was stopped before the input switched."),
-        remedy=tr("Nothing goes on by itself; start again when the cell is clear."),
+        remedy=tr("The robot will not move by itself. Start again when the cell is clear."),
         controller=controller,
         request=request,
     )

@@ -95,7 +95,9 @@ class LeaseSighting:
         else:
             holder = describe(self.who())
             verdict = tr(
-                "The lease was taken from {holder}: {because}.", holder=holder, because=because
+                "{holder} was at work on this controller before: {because}.",
+                holder=holder,
+                because=because,
             )
         details = {
             "epoch": self.epoch + 1,

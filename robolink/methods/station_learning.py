@@ -83,8 +83,8 @@ def _pin(
     second = yield from touches.again(
         first,
         key="second",
-        turning=tr("go beside the pin"),
-        instruction=tr("Bring the tip onto the pin once more."),
+        turning=tr("Moving beside the pin."),
+        instruction=tr("Jog the tip onto the pin once more."),
     )
     if not plan.nominal:
         touches.require_made()

@@ -38,7 +38,7 @@ def require_engineer(outcomes: OutcomeLog, act: str, **details: object) -> None:
     if signature.role == PersonRole.OPERATOR:
         person = signature.operator or tr("somebody who gave no name")
         raise NotAllowedError(
-            tr("{person} may not {act}: it takes an engineer.", person=person, act=act),
+            tr("{person} may not {act}. Ask an engineer.", person=person, act=act),
             remedy=tr(
                 "Nothing was sent. One whom the cell file calls an engineer may, with {operator}.",
                 operator=way(Way.OPERATOR),

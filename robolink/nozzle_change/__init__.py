@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from robolink.nozzle_change._proposal import LimitVerdict as LimitVerdict
     from robolink.nozzle_change._proposal import Proposal as Proposal
     from robolink.nozzle_change._proposal import ToolReport as ToolReport
+    from robolink.nozzle_change._proposal import WriteSubject as WriteSubject
     from robolink.nozzle_change._records import touches_made as touches_made
     from robolink.nozzle_change._seating import height_is_known as height_is_known
     from robolink.nozzle_change._seating import tip_sigma_mm as tip_sigma_mm
@@ -42,7 +43,7 @@ __getattr__ = lazy_exports(
         "_plan": "ChangePlan Limits ToolPlan clearance_too_small require_contact_input "
         "require_ready usual_box",
         "_preview": "PlannedStep flange_now foresee preview require_inside",
-        "_proposal": "ChangeReport Proposal ToolReport LimitVerdict",
+        "_proposal": "ChangeReport Proposal ToolReport LimitVerdict WriteSubject",
         "_records": "touches_made",
         "_seating": "height_is_known tip_sigma_mm touching_as_recorded",
     },

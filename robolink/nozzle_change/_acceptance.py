@@ -143,7 +143,7 @@ class AcceptanceCriteria:
         if self.max_residual_mm is not None:
             yield tr("residual up to {limit:g} mm", limit=self.max_residual_mm)
         if self.interval_mm is not None:
-            yield tr("95 % interval up to ±{limit:g} mm", limit=self.interval_mm)
+            yield tr("95 % interval up to +-{limit:g} mm", limit=self.interval_mm)
 
     def _of_fit(self, result: CalibrationResult) -> Iterator[LimitVerdict]:
         for code, name, found_mm, limit_mm in (
@@ -205,7 +205,7 @@ def require_proved(result: VerifyResult, identity: str) -> None:
         )
     else:
         what = tr(
-            "The tip drifts {drift:.3f} mm when the tool turns; {limit:.3f} mm are allowed.",
+            "Turn test failed: {drift:.3f} mm off, limit {limit:.3f} mm.",
             drift=drift_mm,
             limit=limit_mm,
         )

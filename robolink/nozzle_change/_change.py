@@ -26,11 +26,16 @@ from robolink.nozzle_change._plan import (
     require_inputs,
     require_measurable,
 )
-from robolink.nozzle_change._proposal import ChangeReport, Proposal, ToolReport
+from robolink.nozzle_change._proposal import (
+    ChangeReport,
+    Proposal,
+    ToolReport,
+    WriteSubject,
+)
 from robolink.nozzle_change._records import decision_entry, refusal_entry, verification_entry
 from robolink.nozzle_change._station_check import Proposals, check_stations, stations_found
 from robolink.procedures import TOUCH_CODES, MeasurementContext
-from robolink.runner import Operator
+from robolink.runner import Operator, regard
 from robolink.transaction import ToolChange, Wanted
 
 Earlier = Callable[[int], Sequence[float]]
@@ -113,7 +118,7 @@ class NozzleChange:
         require_contacts(self._controller, self._plan)
         plan, listener, context = self._plan, self._listener, self._context()
         measuring = Measuring(context, listener)
-        measuring.go_to(plan.safe, tr("go to the safe pose"))
+        measuring.go_to(plan.safe, tr("Moving to the safe pose."))
         listener.moment(Moment.START, context)
         proposals: Proposals = [(one, measuring.propose(one)) for one in plan.tools]
         proposals = self._checked(context, proposals, write=write)
@@ -121,14 +126,14 @@ class NozzleChange:
         self._judge(proposals)
         if write:
             listener.moment(Moment.BEFORE_WRITE, context)
-            self._ask(context)
+            self._ask(context, proposals)
             reports = self._write(context, proposals)
         else:
             reports = tuple(
                 ToolReport(proposal, None, None, one.criteria.verdicts(proposal))
                 for one, proposal in proposals
             )
-        measuring.go_to(plan.safe, tr("go to the safe pose"))
+        measuring.go_to(plan.safe, tr("Moving to the safe pose."))
         listener.moment(Moment.END, context)
         return ChangeReport(self._controller.outcomes.change, reports)
 
@@ -179,12 +184,15 @@ class NozzleChange:
                     ),
                 )
 
-    def _ask(self, context: MeasurementContext) -> None:
+    def _ask(self, context: MeasurementContext, proposals: Proposals) -> None:
         outcomes = self._controller.outcomes
         if not self._plan.ask_before_write:
             outcomes.append(decision_entry(tr("accepted beforehand"), accepted=True))
             return
         numbers = ", ".join(str(plan.tool) for plan in self._plan.tools)
+        judged = [(one, plan.criteria.verdicts(one)) for plan, one in proposals]
+        shown, verdicts = zip(*judged, strict=True)
+        regard(self._operator, [WriteSubject(shown, verdicts)])
         accepted = context.runner().confirm(tr("Write this to tool {tool}?", tool=numbers))
         verdict = tr("accepted") if accepted else tr("declined")
         outcomes.append(decision_entry(verdict, accepted=accepted))

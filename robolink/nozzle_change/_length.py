@@ -287,12 +287,12 @@ def in_words(tool: int, told: LengthChange) -> str:
     if told.longer_mm > 0:
         return tr(
             "The tip of tool {tool} is {apart:.2f} mm longer (flange {up:+.2f} mm on the same pin, "
-            "±{half:.2f}).",
+            "+-{half:.2f}).",
             **values,
         )
     return tr(
         "The tip of tool {tool} is {apart:.2f} mm shorter (flange {up:+.2f} mm on the same pin, "
-        "±{half:.2f}).",
+        "+-{half:.2f}).",
         **values,
     )
 

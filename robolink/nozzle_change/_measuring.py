@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
+from typing import Final
 
 from robolink.errors import CalibrationError, ConfigError, RobolinkError
 from robolink.messages import tr
@@ -12,8 +13,11 @@ from robolink.nozzle_change._plan import ToolPlan
 from robolink.nozzle_change._proposal import Proposal
 from robolink.nozzle_change._records import calibration_entry, decision_entry, refusal_entry
 from robolink.procedures import MeasurementContext, approach_path
-from robolink.runner import Ask, Confirm, Look, Seek, StepDone
+from robolink.runner import AGAIN, Ask, Confirm, Look, Seek, StepDone
 from robolink.stations import find_stations
+
+MOST_ANEW: Final = 5
+"""So often a person may begin the touches of one tool anew."""
 
 
 class Measuring:
@@ -36,14 +40,17 @@ class Measuring:
             CalibrationError: The last measurement is not trusted either; it is on record.
             RobolinkError: Anything else that ended it.
         """
-        for left in reversed(range(plan.attempts)):
+        left, anew = plan.attempts - 1, MOST_ANEW
+        while True:
             try:
                 return self._attempt(plan)
             except CalibrationError as error:
-                self._listener.refused(plan.tool, error, again=left > 0)
-                if not left:
+                # A person who begins anew takes none of the attempts of the plan.
+                by_hand = error.code == AGAIN and anew > 0
+                self._listener.refused(plan.tool, error, again=by_hand or left > 0)
+                if not by_hand and not left:
                     raise
-        raise AssertionError("a plan allows one attempt at least")
+                anew, left = (anew - 1, left) if by_hand else (anew, left - 1)
 
     def go_to(self, pose: Pose | None, purpose: str) -> None:
         """Drive the flange to ``pose``: up, over, down; nowhere when there is none."""
@@ -58,7 +65,7 @@ class Measuring:
 
     def _attempt(self, plan: ToolPlan) -> Proposal:
         context, tool = self._context, plan.tool
-        self.go_to(plan.approach, tr("go to where tool {tool} is measured", tool=tool))
+        self.go_to(plan.approach, tr("Moving to where tool {tool} is measured.", tool=tool))
         self._listener.moment(Moment.BEFORE_MEASURE, context, tool)
         before = context.controller.tools.read(tool)
         with self._watched(plan):
@@ -76,7 +83,7 @@ class Measuring:
         )
         context.controller.outcomes.append(entry)
         self._listener.moment(Moment.AFTER_MEASURE, context, tool)
-        self.go_to(plan.retreat, tr("go away from where tool {tool} is measured", tool=tool))
+        self.go_to(plan.retreat, tr("Moving away from where tool {tool} is measured.", tool=tool))
         return proposal
 
     def _station_record(self, name: str) -> dict[str, object]:

@@ -150,16 +150,16 @@ def _procedures(
 
     The pose is where it ends, of one that does so wherever it begins.
     """
-    yield plan.safe, partial(_journey, plan.safe, tr("go to the safe pose"))
+    yield plan.safe, partial(_journey, plan.safe, tr("Moving to the safe pose."))
     for one in plan.tools:
         tool, source = one.tool, one.moving
         if source is None:
             continue
         stored = controller.tools.read(tool)
-        there = tr("go to where tool {tool} is measured", tool=tool)
+        there = tr("Moving to where tool {tool} is measured.", tool=tool)
         yield one.approach, partial(_journey, one.approach, there)
         yield None, partial(_measurement, source, stored)
-        away = tr("go away from where tool {tool} is measured", tool=tool)
+        away = tr("Moving away from where tool {tool} is measured.", tool=tool)
         yield one.retreat, partial(_journey, one.retreat, away)
 
 

@@ -101,6 +101,24 @@ class Proposal:
 
 
 @dataclass(frozen=True, slots=True)
+class WriteSubject:
+    """What a question before a write is about, for a face that draws.
+
+    Attributes:
+        proposals: What is to be written.
+        verdicts: What the limits say, one tuple a proposal.
+    """
+
+    proposals: tuple[Proposal, ...]
+    verdicts: tuple[tuple[LimitVerdict, ...], ...]
+
+    @property
+    def tools(self) -> tuple[int, ...]:
+        """Numbers of the tools."""
+        return tuple(proposal.tool for proposal in self.proposals)
+
+
+@dataclass(frozen=True, slots=True)
 class ToolReport:
     """What a nozzle change did to one tool.
 

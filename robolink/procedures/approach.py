@@ -49,6 +49,6 @@ def seek_or_retract(step: Seek, *, here: Pose, safe_z_mm: float) -> Procedure[Po
         found: Pose = yield step
     except CalibrationError as error:
         stands = step.target if error.code == "no_edge" else here
-        yield Move(replace(stands, z_mm=safe_z_mm), Path.STRAIGHT, tr("draw the tip back"))
+        yield Move(replace(stands, z_mm=safe_z_mm), Path.STRAIGHT, tr("Backing away."))
         raise
     return found

@@ -65,11 +65,11 @@ class CameraDrive:
         seen = list[SeenAt]()
         for place in places:
             if before_camera and place.u_deg == here.u_deg:
-                yield Move(self._beside(place), Path.STRAIGHT, tr("go on before the camera"))
+                yield Move(self._beside(place), Path.STRAIGHT, tr("Moving on before the camera."))
             else:
                 yield from self._turn_to(place, here)
             here, before_camera = self.pose(place), True
-            yield Move(here, Path.STRAIGHT, tr("come before the camera from the same side"))
+            yield Move(here, Path.STRAIGHT, tr("Coming before the camera from the same side."))
             seen.append((yield from self._look(place)))
         return seen
 
@@ -140,7 +140,7 @@ class CameraDrive:
 
     def lifted(self, place: Place) -> Procedure[None]:
         """Lift off the camera from where :meth:`looks` ended."""
-        yield Move(self.above(place), Path.STRAIGHT, tr("lift off the camera"))
+        yield Move(self.above(place), Path.STRAIGHT, tr("Lifting off the camera."))
 
     def above(self, place: Place) -> Pose:
         """Return where :meth:`lifted` ends."""
@@ -156,16 +156,20 @@ class CameraDrive:
         above = self._above(self._beside(place))
         high_mm = max(here.z_mm, above.z_mm)
         if here.z_mm < high_mm:
-            yield Move(replace(here, z_mm=high_mm), Path.STRAIGHT, tr("lift before the tool turns"))
-        yield Move(replace(above, z_mm=high_mm), Path.JOINT, tr("go above the camera"))
-        yield Move(self._beside(place), Path.STRAIGHT, tr("come down before the camera"))
+            yield Move(replace(here, z_mm=high_mm), Path.STRAIGHT, tr("Lifting before the turn."))
+        yield Move(replace(above, z_mm=high_mm), Path.JOINT, tr("Moving above the camera."))
+        yield Move(self._beside(place), Path.STRAIGHT, tr("Lowering before the camera."))
 
     def _beside(self, place: Place) -> Pose:
         pose, by_mm = self.pose(place), self.plan.beside_mm
         return replace(pose, x_mm=pose.x_mm - by_mm, y_mm=pose.y_mm - by_mm)
 
     def _look(self, place: Place) -> Procedure[SeenAt]:
-        purpose = tr("look") if place.mark == TIP else tr("look at fiducial {n}", n=place.mark)
+        purpose = (
+            tr("Looking at the tip.")
+            if place.mark == TIP
+            else tr("Looking at fiducial {n}.", n=place.mark)
+        )
         try:
             seen: SeenAt = yield Look(purpose, self._middle(place), place.mark, self.plan.pictures)
         except CalibrationError:
@@ -233,7 +237,7 @@ class CameraSamples(Generic[ResultT]):
     @property
     def known(self) -> str:
         """Which lengths become known."""
-        return tr("X and Y are known")
+        return tr("X and Y")
 
     def counted(self, count: int) -> str:
         """Say how many were taken."""

@@ -1,13 +1,13 @@
 """Samples taken in sequence: live residuals, an early end, the worst one repeated."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Protocol, TypeVar
 
 from robolink.calibration import CalibrationResult
 from robolink.errors import CalibrationError
-from robolink.messages import tr
-from robolink.runner import Confirm, Notify, Procedure
+from robolink.messages import joined, tr
+from robolink.runner import Confirm, FitRow, FitSubject, Notify, Procedure
 
 MOST_REPEATED: Final = 3
 """How often one is offered to be taken again; after that the measurement stands as it is."""
@@ -31,7 +31,7 @@ class Sampler(Protocol[PlaceT_contra, TakenT, ResultT_co]):
 
     @property
     def known(self) -> str:
-        """Which lengths become known, for a person: "X and Y are known"."""
+        """Which lengths become known, for a person: "X and Y"."""
 
     def counted(self, count: int) -> str:
         """Return how many were taken, for a person: "6 touches"."""
@@ -87,7 +87,8 @@ def finalize_samples(
             which=method.which(worst + 1, held[worst]),
             distance=distances[worst],
         )
-        if not (yield Confirm(question)):
+        shown = fit_subject(method, result, held, worst=worst)
+        if not (yield Confirm(question, fit=shown)):
             break
         times[worst] += 1
         held[worst] = yield from method.take(places[worst])
@@ -107,23 +108,47 @@ def agreement(
         fit: What they say; it has a degree of freedom.
         last: Index of the one that was taken last.
     """
-    known, half_mm, region_mm = "", fit.half95_mm, fit.region95_radius_mm
-    if half_mm is not None:
-        known = tr("; {known} to ±{half:.3f} mm", known=method.known, half=half_mm)
-        if region_mm is not None and region_mm > half_mm:
-            known = tr(
-                "; {known} to ±{half:.3f} mm each, within {region:.3f} mm together",
-                known=method.known,
-                half=half_mm,
-                region=region_mm,
-            )
-    return tr(
-        "{counted} agree within {rms:.3f} mm rms, the last within {last:.3f} mm{known}.",
+    agree = tr(
+        "{counted} agree within {rms:.3f} mm; the last is {last:.3f} mm off.",
         counted=method.counted(len(fit.residuals_mm)),
         rms=fit.rms_mm,
         last=fit.residual_distances_mm[last],
-        known=known,
     )
+    half_mm, region_mm = fit.half95_mm, fit.region95_radius_mm
+    if half_mm is None:
+        return agree
+    if region_mm is None or region_mm <= half_mm:
+        sure = tr("{known}: sure to +-{half:.3f} mm (95 %).", known=method.known, half=half_mm)
+    else:
+        sure = tr(
+            "{known}: each sure to +-{half:.3f} mm (95 %), together within {region:.3f} mm.",
+            known=method.known,
+            half=half_mm,
+            region=region_mm,
+        )
+    return joined(" ", (agree, sure))
+
+
+def fit_subject(
+    method: Sampler[PlaceT, TakenT, ResultT],
+    fit: CalibrationResult,
+    taken: Sequence[TakenT],
+    *,
+    worst: int | None = None,
+) -> FitSubject:
+    """Return what a screen shows of a fit.
+
+    Args:
+        method: How samples are named.
+        fit: What they say; it has a degree of freedom.
+        taken: They.
+        worst: Index of the one that is offered to be taken again.
+    """
+    rows = tuple(
+        FitRow(number, method.which(number, one), off)
+        for number, (one, off) in enumerate(zip(taken, fit.residuals_mm, strict=True), start=1)
+    )
+    return FitSubject(rows, fit.rms_mm, half95_mm=fit.half95_mm, worst=worst)
 
 
 LEAST_DOF_TO_STOP: Final = 4
@@ -196,7 +221,7 @@ def sample_sequentially(
         if not fit.dof:
             continue
         following = None if number == len(places) else method.foreseen(places[number])
-        yield Notify(_progress(method, fit, taken, following))
+        yield _progress(method, fit, taken, following)
         if following is not None and _enough(fit, sampling.until_mm):
             counted = method.counted(len(taken))
             yield Notify(tr("That is enough: {counted} were taken.", counted=counted))
@@ -227,15 +252,17 @@ def _progress(
     fit: CalibrationResult,
     taken: Sequence[TakenT],
     following: TakenT | None,
-) -> str:
+) -> Notify:
     """Return what those so far say."""
     told = agreement(method, fit, last=len(taken) - 1)
+    shown = fit_subject(method, fit, taken)
     if following is None or fit.half95_mm is None:
-        return told
+        return Notify(told, fit=shown)
     better = method.gain([*taken, following]) / method.gain(taken)
     gain = tr(
-        "One more, at {where}, leaves {share:.0f} % of that.",
+        "One more, at {where}, would leave {share:.0f} % of that.",
         where=method.named(following),
         share=100 * better,
     )
-    return f"{told} {gain}"
+    told = joined(" ", (told, gain))
+    return Notify(told, fit=replace(shown, next_mm=fit.half95_mm * better))

@@ -75,8 +75,8 @@ class SurfaceTouches(WitnessedTouches):
         x_mm, y_mm, z_mm = (away_mm * along for along in normal)
         beside = replace(expected, x_mm=expected.x_mm + x_mm, y_mm=expected.y_mm + y_mm)
         above_mm = self._plan.lift_mm
-        yield Move(offset_z(beside, above_mm), Path.JOINT, tr("go over the surface"))
-        down = tr("come down to the clearance")
+        yield Move(offset_z(beside, above_mm), Path.JOINT, tr("Moving over the surface."))
+        down = tr("Lowering to just above the place.")
         arrival: Pose = yield Move(offset_z(beside, z_mm), Path.STRAIGHT, down)
         touch = yield from self.touched(
             expected,
@@ -91,7 +91,7 @@ class SurfaceTouches(WitnessedTouches):
     def off(self, touch: Pose) -> Move:
         """Return the step that lifts the tip off the surface."""
         lifted = offset_z(plain_pose(touch), self._plan.lift_mm)
-        return Move(lifted, Path.STRAIGHT, tr("lift off the surface"))
+        return Move(lifted, Path.STRAIGHT, tr("Lifting off the surface."))
 
     def require_made(self, columns: "Floats", misses_mm: "Floats") -> None:
         """Refuse touches that were not made, whatever each of them looked like.

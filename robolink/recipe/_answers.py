@@ -116,7 +116,8 @@ def confirm_height(context: MeasurementContext, tool: int, name: str) -> None:
         DeclinedError: It is not.
     """
     question = tr(
-        "Z of tool {tool} {name} is kept. Is the new tip just as long as the old one?",
+        "Z of tool {tool} {name} is not measured and stays. Is the new tip exactly as long "
+        "as the old one?",
         tool=tool,
         name=name,
     )

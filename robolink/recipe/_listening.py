@@ -38,6 +38,7 @@ class RecipeListener(Listener):
         answers: What was answered beforehand.
         references: The references of basis "difference", by tool.
         taking_reference: Whether this run only takes them.
+        measure_only: Whether nothing follows from what is measured, so that no length is asked for.
         stated_pin: The pin as the cell file has it, ``None`` where it says nothing.
         audience: Told of everything as well.
     """
@@ -50,6 +51,7 @@ class RecipeListener(Listener):
         *,
         references: Mapping[int, Reference],
         taking_reference: bool = False,
+        measure_only: bool = False,
         stated_pin: Station | None = None,
         audience: Listener,
     ) -> None:
@@ -59,6 +61,7 @@ class RecipeListener(Listener):
         self._answers = answers
         self._references = references
         self._taking_reference = taking_reference
+        self._measure_only = measure_only
         self._stated_pin = stated_pin
         self._signature: Signature = controller.outcomes.signature
         self._nozzles: dict[int, str] = {}
@@ -82,7 +85,7 @@ class RecipeListener(Listener):
         """Return what the recipe proposes from a measurement."""
         tool = proposal.tool
         typed = None
-        if not self._taking_reference:
+        if not (self._taking_reference or self._measure_only):
             typed = self._height(context, tool)
         made = proposed(
             self._recipe,

@@ -86,8 +86,9 @@ def find_reference(controller: Controller, tool: int, station: str) -> Reference
             value=describe_offset(newest.value),
         ),
         remedy=tr(
-            "Somebody changed the tool since. Put the value of the reference back, or take a new "
-            "reference with {reference} and the nozzle for which the stored value is right.",
+            "The tool is not what the reference left. Put the value of the reference back, "
+            "or take a new reference with {reference} and the nozzle for which the stored "
+            "value is right.",
             reference=way(Way.REFERENCE),
         ),
     )

@@ -51,11 +51,13 @@ class RecipeRun:
         sensor: The camera in place of the recipe's: an open one, which is left open, or its name
             or URL.
         cell: The cell, whose file may say where stations are.
+        measure_only: Whether nothing is written, kept or asked about lengths; only for methods
+            that measure by a sensor.
 
     Raises:
         CalibrationError: ``rank_deficient``: this robot cannot tilt its tool, and would have to.
-        ConfigError: Neither the recipe nor the station's record says where the station is, or the
-            recipe takes no reference.
+        ConfigError: Neither the recipe nor the station's record says where the station is, the
+            recipe takes no reference, or a person would have to touch where only is measured.
     """
 
     def __init__(
@@ -71,8 +73,12 @@ class RecipeRun:
         ask_before_write: bool = True,
         sensor: str | TipSensor | None = None,
         cell: Cell | None = None,
+        measure_only: bool = False,
     ) -> None:
+        if measure_only:
+            _require_sensor(loaded)
         self._controller = controller
+        self._measure_only = measure_only
         self._loaded, station, self._remark = _located(loaded, controller, cell)
         self._operator = operator
         self._answers = answers or Answers()
@@ -125,6 +131,11 @@ class RecipeRun:
                     self._references[tool] = reference
             # One without a reference makes all of them wait: all are written, or none.
             self.takes_reference = len(self._references) < len(stored)
+        if self.takes_reference and self._measure_only:
+            raise ConfigError(
+                tr("This recipe has no reference yet: there is nothing to compare with."),
+                remedy=tr("Run it once with 'robolink change', which records it."),
+            )
         require_ready(controller, self.plan)
         require_inside(controller, preview(controller, self.plan))
 
@@ -151,6 +162,7 @@ class RecipeRun:
             self._answers,
             references={} if self.takes_reference else self._references,
             taking_reference=self.takes_reference,
+            measure_only=self._measure_only,
             stated_pin=self.plan.tools[0].stated_pin,
             audience=self._audience,
         )
@@ -162,7 +174,7 @@ class RecipeRun:
             earlier=partial(earlier_corrections, self._controller),
         )
         try:
-            return change.run(write=not self.takes_reference)
+            return change.run(write=not (self.takes_reference or self._measure_only))
         except RobolinkError as error:
             error.remedy = f"{error.remedy} {self._outputs_left(listener)}".strip()
             raise
@@ -191,13 +203,30 @@ class RecipeRun:
         signature = self._controller.outcomes.signature
         if signature.role == PersonRole.OPERATOR:
             raise NotAllowedError(
-                tr("Letting a tool jump takes an engineer."),
+                tr("A change this large needs an engineer."),
                 remedy=tr(
                     "Nothing was moved. Give {operator}, or leave {accept_jump} out.",
                     operator=way(Way.OPERATOR),
                     accept_jump=way(Way.ACCEPT_JUMP),
                 ),
             )
+
+
+def _require_sensor(loaded: LoadedRecipe) -> None:
+    """Refuse a recipe by which a person would touch something.
+
+    Raises:
+        ConfigError: It is one.
+    """
+    method = loaded.recipe.source.of_method
+    if not method.needs.by_sensor:
+        raise ConfigError(
+            tr(
+                "By {method!r} a person touches; a check measures by beams, a switch or a camera.",
+                method=method.name,
+            ),
+            remedy=tr("Name a recipe that measures by a sensor."),
+        )
 
 
 def _switched(listener: RecipeListener, *, stopped: bool) -> str:

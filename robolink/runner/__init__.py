@@ -13,6 +13,9 @@ from robolink.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from robolink.runner._arm_ahead import ArmAhead as ArmAhead
+    from robolink.runner._capture import FINEST_STEP as FINEST_STEP
+    from robolink.runner._capture import SETTLING_S as SETTLING_S
+    from robolink.runner._capture import NotYet as NotYet
     from robolink.runner._foreseeing import ForeseenStep as ForeseenStep
     from robolink.runner._foreseeing import considered as considered
     from robolink.runner._foreseeing import first_clear as first_clear
@@ -23,6 +26,7 @@ if TYPE_CHECKING:
     from robolink.runner._jog_steps import parse_steps as parse_steps
     from robolink.runner._operator import Operator as Operator
     from robolink.runner._operator import Question as Question
+    from robolink.runner._place_question import AGAIN as AGAIN
     from robolink.runner._place_question import MOST_REFUSED as MOST_REFUSED
     from robolink.runner._place_question import inputs_of as inputs_of
     from robolink.runner._runner import POLL_S as POLL_S
@@ -43,6 +47,13 @@ if TYPE_CHECKING:
     from robolink.runner._steps import TakenStep as TakenStep
     from robolink.runner._steps import TeachPrompt as TeachPrompt
     from robolink.runner._steps import TouchedAt as TouchedAt
+    from robolink.runner._subjects import FitRow as FitRow
+    from robolink.runner._subjects import FitSubject as FitSubject
+    from robolink.runner._subjects import GuidedOperator as GuidedOperator
+    from robolink.runner._subjects import JogSubject as JogSubject
+    from robolink.runner._subjects import MoveSubject as MoveSubject
+    from robolink.runner._subjects import TouchSubject as TouchSubject
+    from robolink.runner._subjects import regard as regard
     from robolink.runner._yes_no import ask_yes_no as ask_yes_no
     from robolink.runner._yes_no import yes_or_no as yes_or_no
 
@@ -50,14 +61,16 @@ __getattr__ = lazy_exports(
     __name__,
     {
         "_arm_ahead": "ArmAhead",
+        "_capture": "FINEST_STEP NotYet SETTLING_S",
         "_foreseeing": "ForeseenStep considered first_clear foreseen_steps nothing_in_the_way",
         "_jog_steps": "jog_target parse_decimal parse_steps",
         "_operator": "Operator Question",
-        "_place_question": "MOST_REFUSED inputs_of",
+        "_place_question": "AGAIN MOST_REFUSED inputs_of",
         "_runner": "POLL_S Runner StepDone ask_for_pose",
         "_settings": "RunSettings",
         "_steps": "Ask Confirm Consider Look Move Notify Procedure Seek SeenAt Step TakenStep "
         "TeachPrompt TouchedAt",
+        "_subjects": "FitRow FitSubject GuidedOperator JogSubject MoveSubject TouchSubject regard",
         "_yes_no": "ask_yes_no yes_or_no",
     },
 )

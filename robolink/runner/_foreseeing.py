@@ -133,7 +133,7 @@ def first_clear(
         refusals.append(refusal)
     move, why = refusals[0]
     raise LimitError(
-        tr("{step}: {refusal} Nothing was moved for it.", step=move.purpose, refusal=why),
+        tr("{step} {refusal} Nothing was moved for it.", step=move.purpose, refusal=why),
         remedy=tr(
             "Tilt or turn the tool otherwise at the first place, or put the reference point where "
             "the arm has room and stays away from its singular places."

@@ -42,7 +42,11 @@ def jog_target(here: Pose, steps: str, settings: RunSettings) -> tuple[Pose, Pat
         limit = settings.max_jog_deg if axis == "u" else settings.max_jog_mm
         if abs(delta) > limit:
             raise LimitError(
-                tr("{axis}{delta:+g} is too large for one step.", axis=axis, delta=delta),
+                tr(
+                    "{axis}{delta:+g} is more than one step may be. Nothing moved.",
+                    axis=axis,
+                    delta=delta,
+                ),
                 remedy=tr("Steps of up to {limit:g} are allowed; take several.", limit=limit),
             )
     target = replace(
@@ -125,9 +129,9 @@ def parse_steps(text: str) -> dict[str, float]:
 
 def _no_step(word: str) -> ConfigError:
     return ConfigError(
-        tr("{word!r} is not a jog step.", word=word),
+        tr("{word!r} is no step. A step is x+0.1: axis, sign, number, with a point.", word=word),
         remedy=tr(
-            "Type an axis x, y, z or u, a sign and a number, for example x+0.1 z-0.5; "
-            "ENTER when the tip is on the pin, q to end."
+            "Axes are x, y, z and u, for example x+0.1 z-0.5. ENTER when the tip is on the "
+            "pin, q to end."
         ),
     )

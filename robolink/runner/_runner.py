@@ -31,7 +31,7 @@ from robolink.model import (
     TipSensor,
 )
 from robolink.runner._foreseeing import considered
-from robolink.runner._jog_steps import jog_target, way_in_words
+from robolink.runner._jog_steps import jog_target, parse_steps, way_in_words
 from robolink.runner._operator import Operator, Question
 from robolink.runner._place_question import MOST_REFUSED, PlaceQuestion, ended_by_operator
 from robolink.runner._settings import RunSettings
@@ -47,6 +47,7 @@ from robolink.runner._steps import (
     SeenAt,
     TakenStep,
 )
+from robolink.runner._subjects import GuidedOperator, JogSubject, MoveSubject, regard
 from robolink.runner._yes_no import ask_yes_no
 from robolink.sensing import seen_once
 from robolink.ways import Way, way
@@ -113,6 +114,7 @@ class Runner:
         self._on_step = on_step
         self._camera = camera
         self._offers = offers
+        self._runs = False
         self._repeats_left = _MOST_REPEATS if offers and repeats else 0
 
     def run(self, procedure: Procedure[T]) -> T:
@@ -163,8 +165,8 @@ class Runner:
         outcome = self._seen_through(go, target)
         if outcome is not MotionOutcome.ARRIVED:
             raise StoppedError(
-                tr("The movement was stopped before it arrived."),
-                remedy=tr("Nothing goes on by itself; start again when the cell is clear."),
+                tr("The robot was stopped on its way."),
+                remedy=tr("The robot will not move by itself. Start again when the cell is clear."),
                 controller=self._controller.identity,
             )
         return self._group.pose()
@@ -181,11 +183,16 @@ class Runner:
         before = self._group.pose()
         target, path = jog_target(before, steps, self._settings)
         after = self.move(target, path)
-        if self._settings.tell_jogs:
+        if isinstance(self._operator, GuidedOperator):
+            longest = max(map(abs, parse_steps(steps).values()))
+            self._operator.regard(JogSubject(before, after, longest))
+        elif self._settings.tell_jogs:
             self._operator.tell(way_in_words(before, after))
         return after
 
     def _take(self, step: TakenStep) -> StepDone:
+        if isinstance(step, (Notify, Confirm)):
+            regard(self._operator, [step.fit])
         if isinstance(step, Notify):
             self._operator.tell(step.text)
             return StepDone(step)
@@ -201,6 +208,8 @@ class Runner:
             return self._look(step)
         if isinstance(step, Seek):
             return self._seek(step)
+        going = MoveSubject(step.target, step.path, self._settings.speed_mm_s, step.purpose)
+        regard(self._operator, [going])
         return self.move(step.target, step.path)
 
     def _obstacle(self, move: Move, start: Pose | None) -> str:
@@ -255,6 +264,7 @@ class Runner:
             operator=self._operator,
             jog=self._jogged,
             line=self._line,
+            runs=lambda: self._runs,
         )
         return question.answer()
 
@@ -336,11 +346,13 @@ class Runner:
 
     def _watch(self) -> None:
         self._require_going()
-        obstacle = _ended_by(self._controller.status())
+        status = self._controller.status()
+        self._runs = status.running
+        obstacle = _ended_by(status)
         if obstacle:
             raise ControllerFaultError(
-                tr("{obstacle} while the operator was asked.", obstacle=obstacle),
-                remedy=tr("Clear the cause and start again; nothing goes on by itself."),
+                tr("{obstacle} The job has ended.", obstacle=obstacle),
+                remedy=tr("Remove the cause and start again. The robot will not move by itself."),
                 controller=self._controller.identity,
             )
 
@@ -358,13 +370,13 @@ def ask_for_pose(instruction: str) -> Procedure[Pose]:
 
 def _ended_by(status: ControllerStatus) -> str:
     if status.serious_fault:
-        return tr("The controller reported a serious error")
+        return tr("The controller reported a serious error.")
     if status.emergency_stop:
-        return tr("The emergency stop was pressed")
+        return tr("The emergency stop was pressed.")
     if status.guard_open:
-        return tr("The safety guard was opened")
+        return tr("The safety guard was opened.")
     if status.fault:
-        return tr("The controller went into error {code:04d}", code=status.code)
+        return tr("The controller went into error {code:04d}.", code=status.code)
     return ""
 
 

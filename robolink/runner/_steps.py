@@ -5,12 +5,14 @@ is a proposal. It knows no controller, no clock and no person, so it can be test
 it numbers, shown before anything moves, and replayed from a record.
 """
 
-from collections.abc import Generator
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Generator
+from dataclasses import dataclass, field, fields
 from enum import Enum
 from typing import Any, TypeVar
 
 from robolink.model import TIP, InputEdge, Path, Pose, Spot, SpotUnit
+from robolink.runner._capture import NotYet
+from robolink.runner._subjects import FitSubject, TouchSubject
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +60,11 @@ class Ask:
         shown: What the pose shows then.
         foreseen: About where that is, for a look ahead; ``None`` for where the frame is already.
         contact: The input that shows contact with the pin, ``None`` where there is none.
-        evidence: Whether anything rests on the answer, so that one that was typed ahead is none.
+        evidence: Whether anything rests on the answer, so that one that was typed ahead is none,
+            and one that comes after a long step is not taken yet.
+        subject: What a screen shows of it.
+        judge: Says why a touch does not count yet, while the tip is still there; ``None`` for a
+            place that proves nothing.
     """
 
     instruction: str
@@ -66,6 +72,8 @@ class Ask:
     foreseen: Pose | None = None
     contact: InputEdge | None = None
     evidence: bool = True
+    subject: TouchSubject | None = None
+    judge: "Callable[[TouchedAt], NotYet | None] | None" = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,9 +184,15 @@ class Consider:
 
 @dataclass(frozen=True, slots=True)
 class Notify:
-    """Let a person know how it goes; answered with ``None``."""
+    """Let a person know how it goes; answered with ``None``.
+
+    Attributes:
+        text: In a sentence.
+        fit: What a screen shows of it.
+    """
 
     text: str
+    fit: FitSubject | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,9 +200,14 @@ class Confirm:
     """Offer something that a person may accept; answered with whether they did.
 
     Where nobody is to be asked, the answer is ``False``: a measurement never depends on it.
+
+    Attributes:
+        question: What is offered.
+        fit: What a screen shows of it.
     """
 
     question: str
+    fit: FitSubject | None = field(default=None, compare=False)
 
 
 TakenStep = Move | Ask | Seek | Look | Notify | Confirm

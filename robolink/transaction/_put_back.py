@@ -93,7 +93,7 @@ def _put_one_back(controller: Controller, step: Step, *, spoiled: bool, selected
                 tools.write(tool, before, expected=now)
     except RobolinkError as error:
         return _failed(step, error)
-    sentence = tr("The old value of tool {tool} was written back.", tool=tool)
+    sentence = tr("The old value of tool {tool} is back.", tool=tool)
     return _restored(step, sentence, written=True)
 
 
@@ -113,8 +113,8 @@ def _restored(step: Step, sentence: str, *, written: bool) -> PutBack:
 
 def _conflict(step: Step, now: ToolOffset | None) -> PutBack:
     sentence = tr(
-        "Tool {tool} holds {now}: neither its old value {before} nor the new one {requested}. "
-        "Somebody else wrote it, so it was left alone.",
+        "Tool {tool} holds {now}, neither the old value {before} nor the new one "
+        "{requested}. It was left as it is.",
         tool=step.tool,
         now=describe_offset(now),
         before=describe_offset(step.before),
@@ -127,7 +127,8 @@ def _conflict(step: Step, now: ToolOffset | None) -> PutBack:
 
 def _failed(step: Step, error: RobolinkError) -> PutBack:
     sentence = tr(
-        "The old value of tool {tool} could NOT be written back: {error}",
+        "DO NOT START THE CELL. Tool {tool} holds an untested value; the old one could not "
+        "be written back: {error}",
         tool=step.tool,
         error=error,
     )

@@ -1,58 +1,37 @@
-"""Pytest fixtures that bring a simulated controller; tests connect by URL themselves.
+"""Pytest fixtures that bring simulated controllers; tests connect by URL themselves.
 
 What robolink would keep about a controller in the tester's own state folder (journal, markers,
-backups) goes into a folder of the test's own.
+backups) goes into a folder of the test's own. docs/testing.md shows each fixture.
 
-Importing this module costs next to nothing: every pytest run of an environment in which
-robolink is installed imports it.
+Nothing is used unless a test asks for it, and importing this module costs next to nothing: every
+pytest run of an environment in which robolink is installed imports it.
 """
 
 import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import pytest
 
 if TYPE_CHECKING:
-    from robolink_simulators.epson.device import EpsonSimulator
-    from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
+    from robolink.journal import Journal
+    from robolink_simulators.cell.clock import ManualClock
+    from robolink_simulators.testkit.asked import CellRequest
+    from robolink_simulators.testkit.served import OwnFolder, SimulatedCell
 
 _STATE: Final = ("ROBOLINK_STATE_DIR", "ROBOLINK_JOURNAL")
 """What says where the journal, the backups and the like are kept."""
 
 _OF_THE_DEVELOPER: Final = {name: os.environ.get(name) for name in _STATE}
+_MARKER: Final = "robolink"
+_CELLS: Final = pytest.StashKey[list["SimulatedCell"]]()
+"""The simulated cells of a test."""
 
-
-@dataclass(frozen=True, slots=True)
-class ServedEpson:
-    """A simulated EPSON controller.
-
-    Attributes:
-        url: Where to connect to: ``epson+sim://NAME``, or ``epson+tcp://127.0.0.1:PORT``.
-        simulator: The device; hold its ``lock`` while touching it.
-        assist: ``assist+tcp://TOKEN@127.0.0.1:PORT``; ``None`` without a port.
-    """
-
-    url: str
-    simulator: "EpsonSimulator"
-    assist: str | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class ServedSoftMotion:
-    """A simulated SoftMotion PLC with a mailbox.
-
-    Attributes:
-        url: Where to connect to.
-        simulator: The device; hold its ``lock`` while touching it.
-    """
-
-    url: str
-    simulator: "SoftMotionSimulator"
+Factory = Callable[..., "SimulatedCell"]
+"""Makes one more cell: takes what the marker takes, and ``medium``."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -67,9 +46,28 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
 
 
-def pytest_report_header(config: pytest.Config) -> str:
-    """Show the seed, so that a failure can be repeated."""
-    return f"robolink: simulated controllers, seed {config.getoption('--robolink-seed')}"
+def pytest_configure(config: pytest.Config) -> None:
+    """Declare the marker."""
+    config.addinivalue_line(
+        "markers",
+        "robolink(robot, kinematics, seed, password, options, world, faults, speed, true_tool, "
+        "map): how the simulated cells of this test are to be (docs/testing.md)",
+    )
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item,
+    call: pytest.CallInfo[None],  # noqa: ARG001 - part of the hook
+) -> Any:  # noqa: ANN401 - what the hook gives
+    """Attach wire log, seed and state of the simulated cells to a test that failed."""
+    report: pytest.TestReport = yield
+    cells: list[SimulatedCell] | None = item.stash.get(_CELLS, None)
+    if report.failed and cells:
+        from robolink_simulators.testkit.report import sections_of
+
+        report.sections += sections_of(cells)
+    return report
 
 
 @pytest.fixture
@@ -96,74 +94,130 @@ def robolink_state(
 
 
 @pytest.fixture
-def epson_sim(
-    request: pytest.FixtureRequest,
-    robolink_state: Path,  # noqa: ARG001 - the state of the test, not the tester's
-) -> Iterator[ServedEpson]:
-    """A simulated EPSON controller in this process, whose time passes only while you wait."""
-    from robolink_simulators.epson.device import EpsonSimulator
-    from robolink_simulators.hosting.in_process.epson import register, unregister
+def robolink_journal(
+    robolink_state: Path,  # noqa: ARG001 - the journal of the test, not the tester's
+) -> "Journal":
+    """The journal of this test; what tests and commands did on its cells stands in it."""
+    from robolink.journal import open_journal
 
-    simulator = EpsonSimulator(seed=request.config.getoption("--robolink-seed"))
-    name = f"pytest-{id(simulator):x}"
-    url = register(name, simulator)
-    yield ServedEpson(url, simulator)
-    unregister(name)
+    return open_journal()
 
 
 @pytest.fixture
-def epson_tcp(
+def virtual_clock() -> "ManualClock":
+    """The time of the cells in the process: it stands still until somebody waits or steps it."""
+    from robolink_simulators.cell.clock import ManualClock
+
+    return ManualClock()
+
+
+@pytest.fixture
+def _robolink_own(
     request: pytest.FixtureRequest,
     robolink_state: Path,  # noqa: ARG001 - the state of the test, not the tester's
-) -> Iterator[ServedEpson]:
-    """A simulated EPSON controller on a loopback TCP port, with its assist port."""
-    from robolink_simulators.assist.port import serve_assist
-    from robolink_simulators.cell.clock import ScaledClock
-    from robolink_simulators.epson.device import EpsonSimulator
-    from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Iterator["OwnFolder"]:
+    from robolink_simulators.testkit.served import OwnFolder
 
-    simulator = EpsonSimulator(seed=request.config.getoption("--robolink-seed"))
-    clock = ScaledClock()
+    cells = request.node.stash.setdefault(_CELLS, [])
+    seed = request.config.getoption("--robolink-seed")
     with ExitStack() as stack:
-        tcp = stack.enter_context(serve_tcp(simulator, clock=clock))
-        assist = stack.enter_context(serve_assist(simulator, clock=clock))
-        yield ServedEpson(tcp.url, simulator, assist.url)
+        yield OwnFolder(stack, tmp_path_factory.mktemp("robolink-cell"), seed, cells)
 
 
 @pytest.fixture
-def softmotion_sim(
-    request: pytest.FixtureRequest,
-    robolink_state: Path,  # noqa: ARG001 - the state of the test, not the tester's
-) -> Iterator[ServedSoftMotion]:
+def epson_factory(request: pytest.FixtureRequest, _robolink_own: "OwnFolder") -> Factory:
+    """A maker of EPSON controllers: ``epson_factory(medium="tcp", robot="C8-C901S")``."""
+    from robolink_simulators.testkit.making import make_epson
+
+    def make(*, medium: str = "sim", person: bool = False, **given: Any) -> "SimulatedCell":  # noqa: ANN401 - as the marker
+        asked = _asked(request, given)
+        return make_epson(_robolink_own, asked, medium, _clock_of(request), person=person)
+
+    return make
+
+
+@pytest.fixture
+def softmotion_factory(request: pytest.FixtureRequest, _robolink_own: "OwnFolder") -> Factory:
+    """A maker of SoftMotion PLCs: ``softmotion_factory(medium="can", kinematics="Kin_5Axes")``."""
+    from robolink_simulators.testkit.making import make_softmotion
+
+    def make(*, medium: str = "sim", person: bool = False, **given: Any) -> "SimulatedCell":  # noqa: ANN401 - as the marker
+        asked = _asked(request, given)
+        return make_softmotion(_robolink_own, asked, medium, _clock_of(request), person=person)
+
+    return make
+
+
+@pytest.fixture
+def plc_factory(request: pytest.FixtureRequest, _robolink_own: "OwnFolder") -> Factory:
+    """A maker of PLCs with a register map: ``plc_factory(map="machine.toml")``."""
+    from robolink_simulators.testkit.making import make_plc
+
+    def make(*, medium: str = "modbus-tcp", **given: Any) -> "SimulatedCell":  # noqa: ANN401 - as the marker
+        return make_plc(_robolink_own, _asked(request, given), medium)
+
+    return make
+
+
+@pytest.fixture
+def epson_sim(request: pytest.FixtureRequest, epson_factory: Factory) -> "SimulatedCell":
+    """A simulated EPSON controller in this process, whose time passes only while you wait.
+
+    Parametrize it indirectly for other ways to reach it: ``sim``, ``tcp``, ``serial``.
+    """
+    return epson_factory(medium=getattr(request, "param", "sim"))
+
+
+@pytest.fixture
+def epson_tcp(epson_factory: Factory, request: pytest.FixtureRequest) -> "SimulatedCell":
+    """A simulated EPSON controller on a loopback TCP port, with its assist port, in real time.
+
+    The marker's ``speed`` makes it faster.
+    """
+    given = {} if _asked(request, {}).speed is not None else {"speed": 1.0}
+    return epson_factory(medium="tcp", person=True, **given)
+
+
+@pytest.fixture
+def softmotion_sim(request: pytest.FixtureRequest, softmotion_factory: Factory) -> "SimulatedCell":
     """A simulated SoftMotion PLC in this process.
 
     Parametrize it indirectly for other ways to reach it: ``sim``, ``modbus-tcp``,
     ``modbus-rtu`` (not on Windows) and ``can``.
     """
-    from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
-
-    simulator = SoftMotionSimulator(seed=request.config.getoption("--robolink-seed"))
-    with ExitStack() as stack:
-        _serve(simulator, getattr(request, "param", "sim"), stack)
-        yield ServedSoftMotion(simulator.url, simulator)
+    return softmotion_factory(medium=getattr(request, "param", "sim"))
 
 
-def _serve(simulator: "SoftMotionSimulator", medium: str, stack: ExitStack) -> None:
-    name = f"pytest-{id(simulator):x}"
-    if medium == "sim":
-        from robolink_simulators.hosting.in_process.softmotion import register, unregister
+@pytest.fixture
+def plc_sim(request: pytest.FixtureRequest, plc_factory: Factory) -> "SimulatedCell":
+    """A simulated PLC with a register map, on Modbus TCP; ``modbus-rtu`` by parametrizing."""
+    return plc_factory(medium=getattr(request, "param", "modbus-tcp"))
 
-        register(name, simulator)
-        stack.callback(unregister, name)
-    elif medium == "can":
-        from robolink_simulators.hosting.fieldbus.canopen_node import CanPlace, serve_canopen
 
-        stack.enter_context(serve_canopen(simulator, CanPlace("virtual", name)))
-    else:
-        from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_rtu, serve_modbus_tcp
+@pytest.fixture
+def epson_cell(request: pytest.FixtureRequest, epson_factory: Factory) -> "SimulatedCell":
+    """An EPSON cell on a TCP port, with a person, a pin, a recipe; ``serial`` by parametrizing."""
+    return epson_factory(medium=getattr(request, "param", "tcp"), person=True)
 
-        tcp = medium == "modbus-tcp"
-        stack.enter_context(serve_modbus_tcp(simulator) if tcp else serve_modbus_rtu(simulator))
+
+@pytest.fixture
+def softmotion_cell(request: pytest.FixtureRequest, softmotion_factory: Factory) -> "SimulatedCell":
+    """A SoftMotion cell on Modbus TCP, with a person, a pin, a recipe; or another bus."""
+    return softmotion_factory(medium=getattr(request, "param", "modbus-tcp"), person=True)
+
+
+@pytest.fixture
+def fault_plan() -> Callable[..., dict[str, object]]:
+    """Plans faults at a cell: ``fault_plan(cell, "drop_reply", match="TLSet 2, XY", times=2)``.
+
+    Returns what has happened and what waits; without an action it only tells that.
+    """
+
+    def plan(cell: "SimulatedCell", action: str = "", **given: object) -> dict[str, object]:
+        return cell.do("add_fault", action=action, **given) if action else cell.do("faults")
+
+    return plan
 
 
 @pytest.fixture
@@ -193,3 +247,21 @@ def epson_replay(
     ]
     if differences:
         pytest.fail("\n".join(differences), pytrace=False)
+
+
+def _asked(request: pytest.FixtureRequest, given: dict[str, Any]) -> "CellRequest":
+    from robolink_simulators.testkit.asked import CellRequest
+
+    asked: dict[str, Any] = {}
+    for marker in reversed(list(request.node.iter_markers(_MARKER))):
+        if marker.args:
+            raise pytest.UsageError("the marker robolink takes names: robolink(seed=3)")
+        asked |= marker.kwargs
+    return CellRequest.of(asked | given)
+
+
+def _clock_of(request: pytest.FixtureRequest) -> "ManualClock | None":
+    if "virtual_clock" not in request.fixturenames:
+        return None
+    clock: ManualClock = request.getfixturevalue("virtual_clock")
+    return clock

@@ -5,6 +5,7 @@ import random
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from robolink.calibration import rotation_of
 from robolink.model import Pose, ToolOffset
@@ -15,6 +16,25 @@ STORED = ToolOffset(12.0, -3.5, -20.0)
 TIP = ToolOffset(12.4, -3.2, -20.5)
 START = Pose(300.0, 100.0, -50.0, 72.0, tool=0)
 PLAN = TouchPlan(lift_mm=12.0, clearance_mm=2.0, seed=5)
+
+_SLIPS = {"right": (0, 0, 0), "x": (0.3, 0, 0), "y": (0, 0.3, 0), "z": (0, 0, 0.3)}
+
+
+def slips(*robots):
+    """Return each robot with a tip that slipped in each direction or in none.
+
+    Each direction is tried with one of two robots; with the other one it is left to ``make soak``.
+    """
+    return [
+        pytest.param(
+            *robot,
+            aside,
+            id="-".join(map(str, (*robot, name))),
+            marks=() if name == "right" or number % 2 == place else pytest.mark.soak,
+        )
+        for place, robot in enumerate(robots)
+        for number, (name, aside) in enumerate(_SLIPS.items())
+    ]
 
 
 class Plate:

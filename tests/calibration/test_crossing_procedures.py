@@ -215,9 +215,9 @@ def test_each_crossing_that_others_check_tells_how_it_fits_and_how_sure_the_tip_
     assert [text.partition(" agree")[0] for text in cell.told] == [
         f"{count} crossings" for count in (5, 6, 7, 8)
     ]
-    assert all("the last within 0.00" in text for text in cell.told)
-    assert all("X and Y are known to ±0.0" in text for text in cell.told)
-    assert "One more, at beam 2, leaves" in cell.told[0]
+    assert all("the last is 0.00" in text for text in cell.told)
+    assert all("X and Y: each sure to +-0.0" in text for text in cell.told)
+    assert "One more, at beam 2, would leave" in cell.told[0]
     assert "One more" not in cell.told[-1]
     assert cell.offers == []
 
@@ -226,7 +226,7 @@ def test_where_the_beams_are_is_not_relied_on_before_the_tool_has_turned():
     cell = IdealCell(TIP, noise_mm=0.003)
     cell.run(measure_beams(STATION, BeamsParameters(turn_deg=180.0), here=HERE, stored=STORED))
     assert [int(text.split()[0]) for text in cell.told] == [5, 6, 7, 8, *range(11, 17)]
-    assert ["are known to" in text for text in cell.told] == [False] * 4 + [True] * 6
+    assert ["sure to" in text for text in cell.told] == [False] * 4 + [True] * 6
     assert "One more, at beam 2 and U -60.0" in cell.told[4]
 
 
@@ -256,7 +256,7 @@ def test_the_crossing_that_fits_worst_is_offered_and_it_alone_is_driven_again(
     assert last.path is Path.STRAIGHT
     assert (found.offset.x_mm, found.offset.y_mm) == pytest.approx((TIP.x_mm, TIP.y_mm), abs=1e-3)
     assert found.max_residual_mm < 1e-3
-    assert "the last within 0.000" in cell.told[-1]
+    assert "the last is 0.000" in cell.told[-1]
 
 
 def test_of_two_crossings_that_only_check_each_other_the_second_offer_is_the_other():
@@ -359,8 +359,8 @@ def test_each_touch_tells_how_it_fits_and_the_worst_alone_is_made_again():
     assert [text.partition(" agree")[0] for text in cell.told] == [
         f"{count} touches" for count in (3, 4, 5, 6, 6)
     ]
-    assert "; Z is known to ±" in cell.told[0]
-    assert "One more, at 1 mm/s, leaves 75 % of that." in cell.told[0]
+    assert " Z: each sure to +-" in cell.told[0]
+    assert "One more, at 1 mm/s, would leave 75 % of that." in cell.told[0]
     (question, when), *_ = cell.offers
     assert question.startswith("Touch 3, at 2 mm/s, fits worst: it is 0.2")
     down, seek, back_off, lift = cell.steps[when:]

@@ -227,7 +227,7 @@ def test_the_look_that_fits_worst_is_offered_and_taken_again():
     assert cell.offers[0].startswith("Look 2, at U 60.0, fits worst: it is 0.2")
     assert len(cell.offers) == 2
     assert len(cell.looks) == 1 + 4 + 1
-    assert cell.told[-1].startswith("4 looks agree within 0.000 mm rms, the last within 0.000 mm")
+    assert cell.told[-1].startswith("4 looks agree within 0.000 mm; the last is 0.000 mm off")
     assert miss(result.offset, TIP) < 1e-9
     assert cell.told[0] == "seen X +0.310 Y +0.346 mm from where it is expected"
     assert cell.frame.z_mm == STATION.z_mm - STORED.z_mm + LookPlan().lift_mm

@@ -10,7 +10,7 @@ from robolink.errors import CalibrationError
 from robolink.methods import OverPin, PlaneSurvey, Tilt, measure_plane_touch
 from robolink.methods.plane_touch.proof import verify_on_plane
 from robolink.model import Pose, ToolOffset
-from tests.calibration._surface_person import PLAN, START, STORED, TIP, Plate, SurfacePerson
+from tests.calibration._surface_person import PLAN, START, STORED, TIP, Plate, SurfacePerson, slips
 
 DOWN = Pose(300.0, 100.0, -20.0, -150.0, 0.0, 180.0, tool=0)
 ASKEW = Pose(300.0, 100.0, -45.0, 30.0, 8.0, -12.0, tool=0)
@@ -22,8 +22,20 @@ def measured(person, *, axes=6, count=10, tilt_deg=30.0, stored=STORED):
     return person.run(measure_plane_touch(PLAN, survey, stored=stored, axes=axes))
 
 
-@pytest.mark.parametrize("lean_deg", [0.0, 25.0])
-@pytest.mark.parametrize("start", [START, DOWN, ASKEW])
+LONG = pytest.mark.soak
+
+
+@pytest.mark.parametrize(
+    ("start", "lean_deg"),
+    [
+        (START, 0.0),
+        (DOWN, 25.0),
+        (ASKEW, 0.0),
+        pytest.param(START, 25.0, marks=LONG),
+        pytest.param(DOWN, 0.0, marks=LONG),
+        pytest.param(ASKEW, 25.0, marks=LONG),
+    ],
+)
 def test_exact_touches_give_tip_and_plane_and_the_tip_keeps_clear(start, lean_deg):
     person = SurfacePerson(Plate(lean_deg, 50.0), start=start, sigma_mm=0.0)
     result = measured(person)
@@ -105,11 +117,8 @@ def measured_once(axes, lean_deg):
     return plate, measured(SurfacePerson(plate, sigma_mm=0.0), axes=axes)
 
 
-@pytest.mark.parametrize(
-    "aside", [(0, 0, 0), (0.3, 0, 0), (0, 0.3, 0), (0, 0, 0.3)], ids=["right", "x", "y", "z"]
-)
-@pytest.mark.parametrize(("axes", "lean_deg"), [(6, 0.0), (5, 20.0)])
-def test_the_proof_shows_a_tip_that_slipped_in_any_direction(aside, axes, lean_deg):
+@pytest.mark.parametrize(("axes", "lean_deg", "aside"), slips((6, 0.0), (5, 20.0)))
+def test_the_proof_shows_a_tip_that_slipped_in_any_direction(axes, lean_deg, aside):
     plate, result = measured_once(axes, lean_deg)
     slipped = ToolOffset(*(np.array(LENGTHS) + aside))
     found = proved(plate, result, slipped, axes=axes)

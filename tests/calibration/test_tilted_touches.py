@@ -66,7 +66,7 @@ def test_it_tells_how_sure_all_three_lengths_are_and_ends_when_that_is_enough():
     person = Person()
     result = course(person, count=12, until_mm=0.1)
     assert person.told[0].startswith("3 touches agree within")
-    assert "X, Y and Z are known to" in person.told[0]
+    assert "X, Y and Z: each sure to" in person.told[0]
     assert "One more, at U" in person.told[0]
     assert "touches were taken" in person.told[-1]
     assert 4 <= len(result.inputs) < 12

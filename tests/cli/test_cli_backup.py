@@ -97,6 +97,7 @@ def test_one_golden_file_is_compared_with_many_cells(golden, capsys):
         name = f"backup-{next(_numbers)}"
         url = register(name, other)
         if seed == 2:
+            other.machine.tools.select(0)
             other.machine.tools.clear(1)
         codes.append(main.run(["compare", golden, "-c", url]))
         unregister(name)
@@ -221,7 +222,7 @@ def test_a_person_who_says_no_leaves_everything_as_it_was(run, simulator, golden
     monkeypatch.setattr(questions, "require_yes", say_no)
     simulator.machine.tools.set(1, ToolOffset(99))
     code, out, err = run("restore", golden)
-    assert (code, "99.000" in out, "Write this" in err) == (9, True, True)
+    assert (code, "99.000" in out, "Write these values" in err) == (9, True, True)
     assert simulator.machine.tools.get(1) == ToolOffset(99)
 
 

@@ -142,7 +142,7 @@ def test_a_usage_error_is_a_document_too(command, capsys, arguments):
 def test_an_interruption_is_130(command, capsys, error):
     command(raising(error))
     assert main.run(["status"]) == 130
-    assert capsys.readouterr().err == "robolink: Interrupted.\n"
+    assert capsys.readouterr().err == "robolink: You stopped it (Ctrl-C).\n"
 
 
 def test_a_defect_is_one_sentence_that_says_how_to_see_more(command, capsys, monkeypatch):

@@ -33,6 +33,7 @@ HEAVY = {
     "lark",
     "platformdirs",
     "keyring",
+    "prompt_toolkit",
     "importlib.metadata",
     "robolink.controllers",
     "robolink_simulators",

@@ -143,7 +143,7 @@ def test_without_a_way_to_read_keys_it_says_so(monkeypatch, is_terminal):
     monkeypatch.setitem(sys.modules, "termios", None)
     monkeypatch.setitem(sys.modules, "msvcrt", None if is_terminal else Console(""))
     monkeypatch.setattr(sys, "stdin", SimpleNamespace(isatty=lambda: is_terminal))
-    with pytest.raises(ConfigError, match="Single keys"), keyboard():
+    with pytest.raises(ConfigError, match="single keys"), keyboard():
         pass
 
 

@@ -60,7 +60,7 @@ def check_nothing_was_changed(cell):
 
 
 STATES = {
-    "controller in Teach": ("teach", "teach", "Teach mode"),
+    "controller in Teach": ("teach", "teach", "TEACH"),
     "e-stop pressed": ("press_estop", "emergency_stop", "emergency stop is pressed"),
     "guard open": ("open_guard", "guard_open", "guard is open"),
     "running": ("start_production", "running", "program is running"),
@@ -120,9 +120,9 @@ NUMBERS = {
     "NaN": (["tool", "set", "1", "--x", "nan"], "x_mm is not a number"),
     "infinity": (["tool", "set", "1", "--u", "inf"], "u_deg is not a number"),
     "no component": (["tool", "set", "1"], "No component was given"),
-    "no jog step": (["jog", "--yes", "x0.1"], "is not a jog step"),
-    "jog NaN": (["jog", "--yes", "x+nan"], "is not a jog step"),
-    "too large a step": (["jog", "--yes", "x+50"], "too large for one step"),
+    "no jog step": (["jog", "--yes", "x0.1"], "is no step"),
+    "jog NaN": (["jog", "--yes", "x+nan"], "is no step"),
+    "too large a step": (["jog", "--yes", "x+50"], "more than one step may be"),
     "clearance above the lift": (
         ["calibrate", "two-pose", "--tool", "1", "--clearance", "20"],
         "must be more than 1.8 below --lift",
@@ -256,7 +256,7 @@ def test_a_drift_beyond_the_tolerance_puts_the_old_value_back(cell):
     refused = cell.run(*cell.calibration, "--tolerance", "0.0001", "--json")
     check_refused_as_document(refused, 8, kind="VerifyError")
     remedy = json.loads(refused.out)["error"]["remedy"]
-    assert "The old value of tool 1 was written back." in remedy
+    assert "The old value of tool 1 is back." in remedy
     assert cell.tool_1 == OLD_TIP
     assert cell.simulator.machine.flash_writes == 2
     cell.check_nothing_else_was_written()

@@ -49,7 +49,7 @@ COMMANDS = {
         "tool in force: 2 (was 1)",
     ),
     "jog": (["jog", "x+0.5", "z+1", "--yes"], "robolink/jog/1", "tool 1 in local 0"),
-    "calibrate two-pose": ([], "robolink/calibration/1", "Tool 1 was written and read back."),
+    "calibrate two-pose": ([], "robolink/calibration/1", "Tool 1 is written and read back."),
     "recover with a word": (["recover", "--yes"], "robolink/recover/1", ""),
 }
 
@@ -136,7 +136,12 @@ def test_a_command_then_sends_what_its_dry_run_showed(cell, name):
 def test_the_dry_run_of_a_calibration_shows_every_step_and_writes_nothing(cell):
     shown = cell.run(*cell.calibration, "--dry-run")
     assert shown.code == 0, shown.err
-    for words in ("lift off the pin", "turn in the air", '$Execute,"Go XY(', '$Execute,"Move XY('):
+    for words in (
+        "Lifting off the pin.",
+        "Turning in the air.",
+        '$Execute,"Go XY(',
+        '$Execute,"Move XY(',
+    ):
         assert words in shown.out
     document = json.loads(cell.run(*cell.calibration, "--dry-run", "--json").out)
     assert document["schema"] == "robolink/dry-run/1"
@@ -203,7 +208,13 @@ def test_the_demo_gives_truth_and_error_as_one_document(capsys):
 def test_the_demo_shows_before_after_drift_and_what_was_sent_on_the_wire(capsys):
     assert main.run(["demo", "--speed", "20"]) == 0
     shown = capsys.readouterr().out
-    for words in ("before", "measured", "drifts", "sent on the wire", '> $Execute,"TLSet 1, XY('):
+    for words in (
+        "before",
+        "measured",
+        "Turn test passed",
+        "sent on the wire",
+        '> $Execute,"TLSet 1, XY(',
+    ):
         assert words in shown
 
 

@@ -127,6 +127,17 @@ NAMES = st.text(max_size=300) | st.sampled_from(
 @settings(max_examples=30, deadline=None, derandomize=True)
 @given(NAMES)
 def test_no_identity_leads_out_of_its_folder(identity):
+    require_in_its_folder(identity)
+
+
+@pytest.mark.soak
+@settings(max_examples=2000, deadline=None)
+@given(NAMES)
+def test_no_identity_of_many_leads_out_of_its_folder(identity):
+    require_in_its_folder(identity)
+
+
+def require_in_its_folder(identity):
     try:
         name = file_name(identity)
     except UnicodeEncodeError:

@@ -83,7 +83,7 @@ def all_finite(value: object) -> bool:
 
 FILES = st.lists(CASES, min_size=1, max_size=6)
 A_FEW = settings(
-    max_examples=40,
+    max_examples=20,
     deadline=None,
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
 )

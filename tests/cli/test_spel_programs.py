@@ -1,11 +1,15 @@
 """spel check, spel run, and a program in a served controller, as a person types them."""
 
+import io
 import json
 import os
 import tty
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from robolink_cli.commands.simulate.serving_epson import ProjectSurroundings
+from robolink_simulators.epson import EpsonSimulator
 
 GOOD = (
     'Function main\n  Print "one", 2\n  Wait 0.5\n  other\nFend\nFunction other\n  Print 3\nFend\n'
@@ -135,3 +139,35 @@ def test_run_reaches_the_serial_line_that_it_is_told(ended, program):
     end = ended("spel", "run", path, "--com", "9=/dev/pts/3")
     assert end.code == 2
     assert "1 to 4 or 1001 to 1008" in end.err
+
+
+def test_run_writes_files_into_the_folder_that_it_is_told(ended, program, tmp_path):
+    path = program('Function main\n  WOpen "log.txt" As #30\n  Print #30, 7\n  Close #30\nFend\n')
+    (tmp_path / "data").mkdir()
+    assert ended("spel", "run", path, "--files", str(tmp_path / "data")).code == 0
+    assert (tmp_path / "data" / "c" / "log.txt").read_bytes() == b"7\r\n"
+    assert not list(tmp_path.glob("log.txt"))
+
+
+def test_run_hands_what_is_typed_to_input(ended, program, monkeypatch):
+    path = program("Function main\n  Integer n\n  Input n\n  Print 2 * n\n  Input n\nFend\n")
+    monkeypatch.setattr("sys.stdin", io.StringIO("21\n"))
+    end = ended("spel", "run", path)
+    assert (end.code, end.out) == (5, "?\n42\n?\n")
+    assert "Error 2505 in main" in end.err
+
+
+@pytest.mark.parametrize("option", ["--com", "--files"])
+def test_what_goes_with_a_program_is_refused_without_one(ended, option, tmp_path):
+    value = {"--com": "1=/dev/pts/3", "--files": str(tmp_path)}[option]
+    end = ended("sim", "epson", "--tcp", "127.0.0.1:0", option, value)
+    assert end.code == 2
+    assert f"{option} goes with --program" in end.err
+
+
+def test_a_served_program_has_the_line_and_the_folder_that_were_named(tmp_path, program):
+    simulator = EpsonSimulator()
+    runner = simulator.load([Path(program(GOOD))])
+    ProjectSurroundings(lines=["2=/dev/pts/9"], folder=tmp_path).install(simulator)
+    assert runner.ports.devices == {2: "/dev/pts/9"}
+    assert runner.session.files.root == tmp_path

@@ -151,7 +151,7 @@ def test_an_operator_by_the_cell_file_is_refused(simulator, changed, capsys, tmp
         encoding="utf-8",
     )
     assert main.run(["-c", "five", "--operator", "Bob", "undo", "--yes"]) == 9
-    assert "takes an engineer" in capsys.readouterr().err
+    assert "Ask an engineer" in capsys.readouterr().err
     assert tool_1(simulator) == NEW
     assert main.run(["-c", "five", "--operator", "Ann", "undo", "--yes"]) == 0
     assert tool_1(simulator) == OLD

@@ -35,7 +35,7 @@ def named(kind):
     HOSTS[kind].unregister(name)
 
 
-@pytest.mark.parametrize("kind", HOSTS)
+@pytest.mark.parametrize("kind", [pytest.param("epson", marks=pytest.mark.soak), "softmotion"])
 def test_a_side_fixed_in_the_tool_is_what_the_offset_is_wrong_by(named, capsys):
     # A bias that turns with the tool looks like another tool to every touch, so nothing can tell.
     bare, simulator = named

@@ -133,7 +133,7 @@ def test_a_board_is_measured_by_its_fiducials(desk):
     assert miss_mm(document, truth) < 0.01
     assert document["proposed"]["u_deg"] == pytest.approx(truth.u_deg, abs=0.02)
     assert document["verification"]["passed"]
-    assert "look at fiducial 4" in messages
+    assert "Looking at fiducial 4." in messages
 
 
 RECIPE = """
@@ -246,5 +246,5 @@ def test_a_look_before_shows_every_step_and_moves_nothing(desk):
         "--dry-run", "--json",
     )  # fmt: skip
     assert code == 0
-    assert [step["text"] for step in document["steps"]].count("look") == 8
+    assert [step["text"] for step in document["steps"]].count("Looking at the tip.") == 8
     assert opened.cell.simulator.machine.arm.moves_started == 0

@@ -88,8 +88,8 @@ def test_taught_points_give_the_tip_and_what_was_not_measured_is_kept(command, s
     code, out, _ = command(*calibrate("--points", "901,902", "--yes"))
     assert code == 0
     assert stored(simulator) == ToolOffset(12.3, -3.9, -20.0)
-    assert "Z kept at -20.000: not measured" in out
-    assert "Tool 1 was written and read back." in out
+    assert "Z -20.000: not measured, stays" in out
+    assert "Tool 1 is written and read back." in out
     assert "not proved by turning" in out
 
 

@@ -128,12 +128,12 @@ def test_a_sensor_measures_at_its_station_and_nobody_is_asked(cell, method, stat
     for axis in axes:
         assert found[f"{axis}_mm"] == pytest.approx(getattr(cell.truth, f"{axis}_mm"), abs=0.02)
     assert done.document["verification"]["passed"]
-    assert "nobody touches anything" in done.err
-    what, known = ("crossings", "X and Y are") if method == "beams" else ("touches", "Z is")
+    assert "Nobody touches anything" in done.err
+    what, known = ("crossings", "X and Y") if method == "beams" else ("touches", "Z")
     assert f" {what} agree within 0.0" in done.err
-    assert f"; {known} known to ±0.0" in done.err
+    assert f" {known}: sure to +-0.0" in done.err or f" {known}: each sure to +-0.0" in done.err
     assert "One more, at " in done.err
-    proof = "Touched again it is" if method == "z-touch" else "Turned about the new tip it drifts"
+    proof = "Touched again:" if method == "z-touch" else "Turn test passed:"
     assert proof in done.err
     assert ("is to be checked every 90 days" in done.err) is (station == "BEAMS-02")
     assert cell.recorded(EntryKind.DONE)[0].signature.station == station
@@ -151,7 +151,7 @@ def test_a_sensor_stops_inside_the_tolerance_and_its_worst_is_offered_for_retaki
 ):
     """The simulated person accepts each offer; the answers are on record."""
     monkeypatch.setattr(
-        "robolink_cli.commands.measure.calibrate.live.agree_to_motion", lambda *_, **__: None
+        "robolink_cli.session.check_before_start.agree_to_motion", lambda *_, **__: None
     )
     with method_cell(kind, tmp_path, monkeypatch) as cell:
         cell.mount()
@@ -196,7 +196,7 @@ def test_four_axes_cannot_tilt_and_say_so_before_anything_moves(cell, method):
         (("n-angle", "--angles", "0,10,370"), 2, "must be at most 360"),
         (("n-angle", "--angles", "0,10,20", "--no-verify"), 2, "must spread over at least 30"),
         (("n-angle", "--station", "PLATE"), 2, "of kind touch; pin is needed"),
-        (("n-angle", "--box", "5"), 2, "outside the work box"),
+        (("n-angle", "--box", "5"), 2, "would leave the allowed area"),
         (("n-angle", "--max-rms", "0.0005"), 7, "large_rms"),
     ],
 )

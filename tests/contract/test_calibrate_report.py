@@ -191,5 +191,5 @@ def test_a_failed_verification_is_reported_with_its_drifts(simulator, capsys, tm
     assert (code, document["error"]["kind"]) == (8, "VerifyError")
     # So small a tolerance lies within what the touches themselves scatter.
     verdict = "<strong>undecided, which does not pass</strong>"
-    for said in ("The verification failed", "was written back.", verdict):
+    for said in ("The verification failed", "is back.", verdict):
         assert said in page

@@ -150,7 +150,7 @@ def test_two_poses_of_a_flange_that_leans_are_refused_before_it_turns(at):
     at.world.pin_mm = (x_mm + 3.0, y_mm - 3.0, z_mm - 4.0)
     done = at.calibrate("two-pose")
     assert (done.code, done.document["error"]["code"]) == (7, "tilted_pose")
-    assert "turn in the air" not in done.err
+    assert "Turning in the air." not in done.err
 
 
 @each(*ROBOTS, *PLANAR, chosen={"C8-C901S"})

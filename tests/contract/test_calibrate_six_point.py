@@ -73,7 +73,7 @@ def test_place_and_orientation_are_found_written_and_proved(plc, tmp_path):
     assert max(list(half)[3:]) < 0.1
     assert document["off_square_deg"] == pytest.approx(0.0, abs=0.1)
     assert document["verification"]["passed"]
-    assert "ways along the tool's axes shown by a person: 2" in said
+    assert "Ways along the tool's axes shown by you: 2" in said
     assert "The ways are 0.0" in said
     with_tool = replace(ToolOffset(), **document["proposed"])
     a_deg, b_deg, c_deg = plc.plc.memory.slot(1).tool[3:]
@@ -133,7 +133,7 @@ def test_over_a_bus_touches_and_ways_go_the_same():
 @pytest.mark.parametrize(
     ("words", "code", "what"),
     [
-        (("--box", "40", "--yes"), 2, "outside the work box"),
+        (("--box", "40", "--yes"), 2, "would leave the allowed area"),
         (("--way", "5", "--yes"), 2, "--way"),
         (("--way", "60", "--pose", "1,2,3,4,5,6"), 2, "says how to move"),
         ((), 9, ""),

@@ -11,7 +11,7 @@ from robolink.methods import TwoPoseSource
 from robolink.model import InputEdge
 from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
 from robolink.procedures import TouchPlan
-from tests.contract._method_cell import KINDS, method_cell
+from tests.contract._method_cell import method_cell, on
 from tests.contract.test_third_kind import Fitter, install
 from tests.contract.test_touches_not_made import RECIPE
 from tests.contract.third_kind import BenchServer
@@ -21,9 +21,12 @@ pytestmark = pytest.mark.simulator_only
 NOWHERE = "600"
 
 
-@pytest.fixture(params=KINDS)
-def cell(request, tmp_path, monkeypatch):
-    with method_cell(request.param, tmp_path, monkeypatch) as cell:
+LONG = pytest.mark.soak
+
+
+@pytest.fixture
+def cell(kind, tmp_path, monkeypatch):
+    with method_cell(kind, tmp_path, monkeypatch) as cell:
         yield cell
 
 
@@ -49,7 +52,17 @@ def recipe(cell, folder):
     return cell.run("recalibrate", str(path), "--assist", cell.cell.url, "--yes", "--json")
 
 
-@pytest.mark.parametrize("way", ["command", "recipe", "learn"])
+@pytest.mark.parametrize(
+    ("kind", "way"),
+    [
+        ("epson", "command"),
+        ("plc", "recipe"),
+        ("epson", "learn"),
+        pytest.param("plc", "command", marks=LONG),
+        pytest.param("epson", "recipe", marks=LONG),
+        pytest.param("plc", "learn", marks=LONG),
+    ],
+)
 def test_an_input_that_is_not_there_ends_it_with_the_robot_where_it_was(cell, tmp_path, way):
     asked = cell.world.operator.touches
     here = cell.world.robot.placement()
@@ -66,12 +79,19 @@ def test_an_input_that_is_not_there_ends_it_with_the_robot_where_it_was(cell, tm
     assert "Bring the tip" not in done.err
 
 
-@pytest.mark.parametrize("more", [("--dry-run",), ("--yes",)], ids=["looked at", "run"])
-@pytest.mark.parametrize("method", ["two-pose", "n-angle"])
+@pytest.mark.parametrize(
+    ("method", "more"),
+    [
+        ("two-pose", "--dry-run"),
+        ("n-angle", "--yes"),
+        pytest.param("two-pose", "--yes", marks=LONG),
+        pytest.param("n-angle", "--dry-run", marks=LONG),
+    ],
+)
 def test_a_controller_without_inputs_is_refused_with_the_plan(bench, capsys, method, more):
     here = bench.machine.tip(robolink.ToolOffset())
     words = ["-c", bench.url, "calibrate", method, "--tool", "1", "--contact-input", "3", "--json"]
-    assert main.run([*words, *more]) == 2
+    assert main.run([*words, more]) == 2
     error = json.loads(capsys.readouterr().out)["error"]
     assert (error["kind"], "no inputs" in error["what"]) == ("ConfigError", True)
     assert bench.machine.tip(robolink.ToolOffset()) == here
@@ -91,9 +111,9 @@ def test_a_script_is_refused_in_the_same_words(bench):
     assert not person.reads
 
 
-@pytest.mark.parametrize("method", ["two-pose"])
-def test_the_document_says_how_each_touch_was_made_as_the_journal_does(cell, method):
-    done = cell.calibrate(method)
+@pytest.mark.parametrize("kind", on("epson"))
+def test_the_document_says_how_each_touch_was_made_as_the_journal_does(cell):
+    done = cell.calibrate("two-pose")
     assert done.code == 0, done.err
     measured, proved = done.document, done.document["verification"]
     (entry,) = cell.recorded(robolink.journal.EntryKind.CALIBRATION)

@@ -64,7 +64,7 @@ POSITION = r"X +(-?[\d.]+)  Y +(-?[\d.]+)  Z +(-?[\d.]+)  U +(-?[\d.]+)   step (
 def test_keys_move_the_arm_by_steps_and_show_where_it_is(jog, simulator):
     start = flange(simulator)
     terminal = jog()
-    terminal.wait_for(r"Is the cell clear\? \[y or n\]")
+    terminal.wait_for(r"Is everybody out of the cell\? \[y or n\]")
     terminal.press(b"y")
     terminal.wait_for(r"box: X ")
     first = terminal.wait_for(POSITION)
@@ -86,7 +86,7 @@ def test_a_step_out_of_the_box_is_refused_and_jogging_goes_on(jog, simulator):
     terminal = jog("--yes", "--box", "0.05")
     terminal.wait_for(POSITION)
     terminal.press(RIGHT)
-    terminal.wait_for("outside the work box")
+    terminal.wait_for("would leave the allowed area")
     terminal.wait_for(POSITION)  # until then, keys are dropped
     terminal.press(b"-")
     terminal.wait_for(r"step 0\.01\s")

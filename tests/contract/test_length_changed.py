@@ -14,6 +14,8 @@ pytestmark = pytest.mark.simulator_only
 AT_PIN = ("--station", "PIN-07")
 THREE = ("--count", "3", *AT_PIN)
 TWO = ("two-pose", *AT_PIN)
+NO_PROOF = "--no-verify"
+"""Where a run only puts touches on record, or is refused: what follows a length is proved."""
 
 
 @pytest.fixture
@@ -27,7 +29,7 @@ def station_z(arm):
 
 
 def test_z_follows_the_heights_or_is_kept_where_that_was_decided(arm):
-    assert arm.calibrate("n-angle", *THREE).code == 0
+    assert arm.calibrate("n-angle", *THREE, NO_PROOF).code == 0
     before = arm.stored
     arm.lengthen(-0.5)
     followed = arm.calibrate("n-angle", *THREE, "--if-length-changed", "difference")
@@ -57,7 +59,7 @@ def test_small_changes_do_not_add_up_unseen(arm):
     """Each is below what touches tell; compared with the last run alone, none would ever show."""
     codes: list[int] = []
     while len(codes) < 4 and 7 not in codes:
-        codes.append(arm.calibrate("n-angle", *THREE).code)
+        codes.append(arm.calibrate("n-angle", *THREE, NO_PROOF).code)
         arm.lengthen(0.08)
     assert codes[0] == 0
     assert codes[1] == 0, "one alone is below what touches tell"
@@ -65,9 +67,9 @@ def test_small_changes_do_not_add_up_unseen(arm):
 
 
 def test_a_person_is_asked_once_with_both_values(arm, monkeypatch):
-    assert arm.calibrate("n-angle", *THREE).code == 0
+    assert arm.calibrate("n-angle", *THREE, NO_PROOF).code == 0
     monkeypatch.setattr(
-        "robolink_cli.commands.measure.calibrate.live.agree_to_motion", lambda *_, **__: None
+        "robolink_cli.session.check_before_start.agree_to_motion", lambda *_, **__: None
     )
     asked, answer, says_yes = [], _operator.AssistedOperator.ask, [True]
 
@@ -87,7 +89,7 @@ def test_a_person_is_asked_once_with_both_values(arm, monkeypatch):
         asked.clear()
         done = arm.run(
             "calibrate", "n-angle", "--tool", "1", *THREE, "--no-retake", "--speed", "100",
-            "--assist", arm.cell.url, "--json",
+            "--assist", arm.cell.url, "--json", NO_PROOF,
         )  # fmt: skip
         assert done.code == 0, done.err
         questions = [question for question in asked if "instead of keeping" in question]
@@ -97,13 +99,13 @@ def test_a_person_is_asked_once_with_both_values(arm, monkeypatch):
 
 
 def test_the_height_of_a_pin_is_never_learnt_from_a_z_that_was_kept(arm):
-    assert arm.calibrate(*TWO).code == 0
+    assert arm.calibrate(*TWO, NO_PROOF).code == 0
     assert station_z(arm) is None
     with arm.cell.connected() as controller:
         controller.tools.write(2, ToolOffset(12.0, -3.5, -19.0), expected=None)
     arm.world.tips[2] = ToolOffset(12.2, -3.4, -20.3)
     # Tool 2 has no touch of its own there, and nothing trustworthy says how high the pin is.
-    second = arm.calibrate(*TWO, tool=2)
+    second = arm.calibrate(*TWO, NO_PROOF, tool=2)
     assert second.code == 0, second.err
     assert second.document["length"] is None
     assert any("how high the pin is" in note for note in second.document["notes"])
@@ -111,7 +113,7 @@ def test_the_height_of_a_pin_is_never_learnt_from_a_z_that_was_kept(arm):
 
 def test_a_pin_of_known_height_shows_that_another_tool_s_z_is_wrong(arm):
     learn = ("station", "learn", "PIN-07", "--tool", "1", "--assist", arm.cell.url, "--yes")
-    assert arm.calibrate(*TWO).code == 0
+    assert arm.calibrate(*TWO, NO_PROOF).code == 0
     # Nobody ever showed Z of tool 1, so it shows no height either.
     assert "was never measured" in arm.run(*learn).err
     assert station_z(arm) is None
@@ -142,7 +144,7 @@ def replace_z(offset, by_mm):
 
 
 def test_on_a_pin_that_moved_a_length_is_not_told_and_that_is_said(arm):
-    nozzle = ("--nozzle", "N-1")
+    nozzle = ("--nozzle", "N-1", NO_PROOF)
     assert arm.calibrate(*TWO, *nozzle).code == 0
     before = arm.stored
     arm.bump_pin(0.4, -0.3)

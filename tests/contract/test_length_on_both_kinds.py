@@ -188,7 +188,7 @@ def test_a_person_on_a_plc_is_asked_once(tmp_path, monkeypatch):
     with method_cell("plc", tmp_path, monkeypatch) as cell:
         words = ("two-pose", "--tool", "1", *AT_PIN, "--assist", cell.cell.url, "--json")
         monkeypatch.setattr(
-            "robolink_cli.commands.measure.calibrate.live.agree_to_motion", lambda *_, **__: None
+            "robolink_cli.session.check_before_start.agree_to_motion", lambda *_, **__: None
         )
         asked, answer = [], _operator.AssistedOperator.ask
 

@@ -17,7 +17,7 @@ def test_a_stand_in_that_never_reaches_the_pin_ends_it_with_9(kind, tmp_path, mo
         assert done.code == 9, done.err
         said = done.document["error"]["what"]
         assert "10 jogs in a row were refused" in said
-        assert "outside the work box" in said
+        assert "would leave the allowed area" in said
         assert cell.stored == before
         with cell.cell.connected() as controller:
             assert controller.tools.selected() == 1

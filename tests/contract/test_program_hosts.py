@@ -5,7 +5,7 @@ from contextlib import closing
 import pytest
 from robolink_cli import main
 from robolink_simulators.hosting.fieldbus.canopen_node import CanPlace, serve_canopen
-from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
+from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_rtu, serve_modbus_tcp
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 from robolink_simulators.structured_text import StructuredTextError
 
@@ -18,11 +18,13 @@ from tests.unit.structured_text._behaviours import of_program
 def hosts(simulator, bus):
     if bus == "modbus-tcp":
         return serve_modbus_tcp(simulator)
+    if bus == "modbus-rtu":
+        return serve_modbus_rtu(simulator)
     return serve_canopen(simulator, CanPlace("virtual", "program-of-a-plc"))
 
 
 @pytest.mark.soak
-@pytest.mark.parametrize("bus", ["modbus-tcp", "can"])
+@pytest.mark.parametrize("bus", ["modbus-tcp", "modbus-rtu", "can"])
 def test_a_client_commands_the_program_on_each_bus(bus):
     simulator = SoftMotionSimulator(make_plc=of_program())
     with (

@@ -69,7 +69,7 @@ def controller(simulator):
 def ask(controller, operator):
     group = controller.groups[0]
     runner = Runner(controller, group, operator, RunSettings(WorkBox()))
-    return runner.run(ask_for_pose("Bring the tip onto the pin."))
+    return runner.run(ask_for_pose("Jog the tip onto the pin."))
 
 
 def test_30_virtual_minutes_at_a_prompt_keep_the_session(simulator, controller):
@@ -99,8 +99,8 @@ def test_a_prompt_that_is_not_polled_would_lose_the_session(controller):
 @pytest.mark.parametrize(
     ("danger", "words"),
     [
-        ("press_estop", "The emergency stop was pressed while the operator was asked"),
-        ("open_guard", "The safety guard was opened while the operator was asked"),
+        ("press_estop", "The emergency stop was pressed. The job has ended"),
+        ("open_guard", "The safety guard was opened. The job has ended"),
     ],
 )
 def test_e_stop_and_guard_show_within_one_poll(simulator, controller, danger, words):

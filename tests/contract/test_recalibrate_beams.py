@@ -84,7 +84,7 @@ def test_a_look_before_shows_every_step_and_moves_nothing(cell):
     mount_beams(cell)
     shown = cell.run("recalibrate", RECIPE, "--dry-run", "--assist", cell.assist_url)
     assert shown.code == 0, shown.err
-    assert "seek beam 1" in shown.out + shown.err
+    assert "Looking for beam 1." in shown.out + shown.err
     assert cell.moves_requested == 0
 
 

@@ -128,6 +128,6 @@ def test_a_look_before_shows_the_plan_and_moves_nothing(here, example, looks):
     code, document, messages = run(example, "--dry-run")
     assert code == 0, messages
     steps = document["steps"]
-    assert sum(step["text"].startswith("look") for step in steps) == looks
+    assert sum(step["text"].startswith("Looking at") for step in steps) == looks
     assert not any(step["refusal"] for step in steps)
     assert cell.simulator.machine.arm.moves_started == 0

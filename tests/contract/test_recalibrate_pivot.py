@@ -104,6 +104,6 @@ def test_a_box_that_a_tilt_leaves_is_refused_before_anything_moves(machine, tmp_
     path.write_text(EXAMPLE.read_text().replace("sideways_mm = 60", "sideways_mm = 6"))
     code, document, _ = recalibrate(simulator, path, "--nozzle", "N-1")
     assert code == 2
-    assert "outside the work box" in document["error"]["what"]
+    assert "would leave the allowed area" in document["error"]["what"]
     assert simulator.plc.group.movements_started == 0
     assert slot(simulator) == STORED

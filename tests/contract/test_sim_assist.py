@@ -7,10 +7,10 @@ from contextlib import ExitStack, closing, suppress
 from dataclasses import asdict
 
 import pytest
-from robolink_simulators.assist.acts import _acts_at
 from robolink_simulators.assist.port import LONGEST_LINE, MOST_CLIENTS, AssistClient, serve_assist
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.cell.world_parameters import parameter_names
+from robolink_simulators.control.acts.registry import ACTS
 from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
@@ -53,7 +53,7 @@ def test_the_assist_port_looks_jogs_and_tells_the_truth(assisted):
     flange = assist.jog_onto_pin()
     assert flange["u_deg"] == pytest.approx(simulator.machine.arm.flange().u_deg, abs=1e-9)
     assert abs(assist.look().dx_mm) < 1e-6
-    assert assist.truth() == json.loads(json.dumps(simulator.world.truth()))
+    assert assist.truth() == json.loads(json.dumps(simulator.truth()))
 
 
 def test_the_assist_port_shows_the_axes_of_the_true_tool(assisted):
@@ -64,7 +64,7 @@ def test_the_assist_port_shows_the_axes_of_the_true_tool(assisted):
     aside = [50 * math.cos(u_deg), 50 * math.sin(u_deg), 0]
     assert assist.way_along("z", 50.0, 1) == pytest.approx(aside, abs=1e-9)
     assert assist.way_along("x", 50.0, 1) == pytest.approx([0, 0, -50], abs=1e-9)
-    with pytest.raises(ConfigError, match="no axis 'y'"):
+    with pytest.raises(ConfigError, match=r"way_along needs axis.*x, z"):
         assist.do("way_along", axis="y", length_mm=50)
 
 
@@ -78,7 +78,7 @@ def test_the_assist_port_pushes_buttons(assisted):
         exchange(client, b"$Reset\r\n")
         assist.do("raise_error", number=4002)
         assert exchange(client, b"$GetStatus\r\n") == b"#GetStatus,00100001001,4002\r\n"
-        assist.do("set_input", bit=3, on=True)
+        assist.do("set_input", number=3, on=True)
         assert exchange(client, b"$GetIO,3\r\n") == b"#GetIO,1\r\n"
         assist.do("cut_link")
         assert client.receive(deadline=soon(client)) == b""
@@ -86,7 +86,7 @@ def test_the_assist_port_pushes_buttons(assisted):
 
 def test_the_assist_port_counts_and_changes_the_nozzle(assisted):
     _, assist, simulator = assisted
-    counted = {"exchanges": 0, "moves_started": 0, "flash_writes": 0, "touches": 0}
+    counted = {"exchanges": 0, "moves_started": 0, "tool_writes": 0, "starts": 1, "touches": 0}
     assert assist.do("counters") == counted
     tip = assist.do("change_nozzle")["tip"]
     assert tip["x_mm"] == simulator.world.tips[1].x_mm
@@ -98,7 +98,7 @@ def test_the_assist_port_counts_and_changes_the_nozzle(assisted):
         ("dance", {}, "Known are"),
         ("raise_error", {}, "whole number"),
         ("raise_error", {"number": "4002"}, "whole number"),
-        ("set_input", {"bit": 9000}, "no bit"),
+        ("set_input", {"number": 9000}, "no bit"),
     ],
 )
 def test_what_the_assist_port_cannot_do_is_said(assisted, act, parameters, words):
@@ -116,17 +116,15 @@ HOSTILE = [HUGE, -HUGE, 1e308, -1e308, math.nan, math.inf, "x" * 900, [[]], {}, 
 @pytest.mark.parametrize("simulated", [EpsonSimulator, SoftMotionSimulator])
 def test_no_value_of_any_act_stops_the_assist_port(simulated):
     simulator, clock = simulated(seed=3), ScaledClock(50)
-    buttons = ("number", "bit", "tool", "mark", "u_deg", "x_mm", "y_mm", "z_mm", "length_mm")
-    places = ("heading_deg", "noise_mm", "radius_mm", "tilt_deg", "axis", "on", "touch")
-    parameters = [*buttons, *places]
-    usual = dict.fromkeys(parameters, 1) | {"axis": "z"}
-    acts = ["look", *_acts_at(simulator)]
+    acts = {name: act for name, act in ACTS[simulator.kind].items() if name != "set_world"}
+    usual = {"axis": "z", "text": "a", "name": "a", "action": "delay", "order": "low_first"}
     with serve_assist(simulator, clock=clock) as port, AssistClient(port.url) as assist:
         for value in HOSTILE:
-            for act in acts:
-                for name in parameters:
+            for act in acts.values():
+                given = {taken.name: usual.get(taken.name, 1) for taken in act.takes}
+                for name in (*given, "unknown"):
                     with suppress(ConfigError):
-                        assist.do(act, **{**usual, name: value})
+                        assist.do(act.name, **{**given, name: value})
             for name in parameter_names():
                 with suppress(ConfigError):
                     assist.do("set_world", **{name: value})

@@ -152,8 +152,8 @@ def test_two_touches_half_a_turn_apart_are_refused_before_the_tool_turns(at):
     stand(at, FAR_OUT, LEANING)
     done = at.calibrate("two-pose", "--station", "PIN-07")
     assert done.code == 2
-    assert "turn in the air: The robot cannot reach" in json.loads(done.out)["error"]["what"]
-    assert "turn in the air" not in done.err
+    assert "Turning in the air. The robot cannot reach" in json.loads(done.out)["error"]["what"]
+    assert "Turning in the air." not in done.err
 
 
 @pytest.mark.parametrize("at", [TABLE], indirect=True)

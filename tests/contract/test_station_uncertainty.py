@@ -28,9 +28,11 @@ def arm(tmp_path, monkeypatch):
         yield cell
 
 
-def test_beams_that_were_learnt_carry_their_uncertainty_into_the_tip(arm):
+@pytest.mark.parametrize("shaft_mm", ["0", pytest.param("3", marks=pytest.mark.soak)])
+def test_beams_that_were_learnt_carry_their_uncertainty_into_the_tip(arm, shaft_mm):
     arm.mount()
-    before = arm.calibrate("beams", "--station", "BEAMS-02", "--sigma", "0.002", "--no-verify")
+    words = ("beams", "--station", "BEAMS-02", "--sigma", "0.002", "--shaft", shaft_mm)
+    before = arm.calibrate(*words, "--no-verify")
     assert before.code == 0, before.err
     learn = ("station", "learn", "BEAMS-02", "--tool", "1", "--assist", arm.cell.url, "--yes")
     assert arm.run(*learn, "--json").code == 0
@@ -39,7 +41,7 @@ def test_beams_that_were_learnt_carry_their_uncertainty_into_the_tip(arm):
         assert line["sigma_mm"] > 0
         assert line["direction_sigma_deg"] > 0
         assert line["dof"] > 0
-    after = arm.calibrate("beams", "--station", "BEAMS-02", "--sigma", "0.002", "--no-verify")
+    after = arm.calibrate(*words, "--no-verify")
     assert after.code == 0, after.err
     halves = [done.document["fit"]["half_width95"]["x_mm"] for done in (before, after)]
     assert halves[1] > halves[0]

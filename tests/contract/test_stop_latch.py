@@ -147,7 +147,7 @@ def test_an_answer_that_a_stop_overtakes_counts_no_more(backend, asked):
         before = on.requests()
         with pytest.raises(StoppedError):
             if asked == "place":
-                runner.run(ask_for_pose("Bring the tip onto the pin."))
+                runner.run(ask_for_pose("Jog the tip onto the pin."))
             elif asked == "text":
                 runner.ask_text("Which lot?")
             else:

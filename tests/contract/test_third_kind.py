@@ -75,6 +75,8 @@ class Fitter:
             return "y"
         tip = self.machine.tip(TRUE)
         away = [at - there for at, there in zip(PIN_MM, tip.coordinates(), strict=False)]
+        if max(map(abs, away)) > 0.1:
+            away[2] += 0.05  # the last step is a fine one
         steps = [round(max(-4.0, min(4.0, step)), 3) for step in away]
         return " ".join(
             f"{axis}{step:+.3f}" for axis, step in zip("xyz", steps, strict=True) if step

@@ -66,7 +66,9 @@ def test_what_was_typed_before_a_question_or_during_a_jog_answers_nothing(start,
     terminal.wait_for(r"done: moved 0\.[45]\d\d mm")
     assert arm.flange().x_mm - before.x_mm == pytest.approx(0.5, abs=0.2)
     terminal.press(b"x0.1\n")
-    terminal.wait_for("is not a jog step. Type an axis x, y, z or u, a sign and a number")
+    terminal.wait_for(
+        "is no step. A step is .*: axis, sign, number, with a point. Axes are x, y, z"
+    )
     terminal.press(b"\n")
     assert terminal.end() == 0
     assert arm.moves_started == 1

@@ -5,7 +5,6 @@ import io
 import re
 import sys
 from abc import ABC, abstractmethod
-from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
@@ -13,6 +12,7 @@ from typing import ClassVar
 
 import pytest
 from robolink_cli import main
+from robolink_simulators.device.wire_record import WireRecord
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
@@ -59,7 +59,7 @@ class RecipeCell(ABC):
         self.clock = WatchedClock()
         self.name = f"recipes-{next(_names)}"
         self._hosted = simulator
-        simulator.log = deque()  # all of it, however long a run is
+        simulator.log = WireRecord(most=None)  # all of it, however long a run is
         self.url = self._register()
         self.journal: Journal = memory_journal(self.url)
         self.outputs_before = self.outputs()

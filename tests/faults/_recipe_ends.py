@@ -43,12 +43,12 @@ def check_interrupted(cell: RecipeCell, ended: Ended, disturbance: Disturbance) 
     check_writes(cell)
     if whole:
         numbers = ", ".join(map(str, cell.recipe_tools))
-        said = f"Tool {numbers} keeps the new value|Tool 1 was written and read back"
+        said = f"Tool {numbers} keeps the new value|Tool 1 is written and read back"
         assert re.search(said, ended.err + ended.out), ended.err
     else:
         assert cell.changed() == set(), ended.err
         for tool in set(cell.writes()):
-            assert f"The old value of tool {tool} was written back" in ended.err
+            assert f"The old value of tool {tool} is back" in ended.err
     check_outputs_are_named(cell, ended)
 
 

@@ -218,7 +218,7 @@ def test_f65_a_computer_that_slept_in_a_movement_calls_it_unproved_and_moves_not
         assert arm.moves_started == 1
         simulator.condition.reset()
         with robolink.connect(host.url) as controller:
-            with pytest.raises(robolink.errors.OutcomeUnknownError, match="not settled"):
+            with pytest.raises(robolink.errors.OutcomeUnknownError, match="did not finish"):
                 controller.require_settled("a movement")
 
 

@@ -92,6 +92,14 @@ def test_what_is_reported_done_is_done(cell, robolink_state):
 
 @pytest.mark.soak
 @pytest.mark.parametrize("cell", CELLS)
+def test_what_is_reported_done_is_done_with_each_kind_of_fault(cell, robolink_state):
+    done, fired = run(cell, range(25))
+    assert done > 20
+    assert len(fired) > 10
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("cell", CELLS)
 def test_what_is_reported_done_is_done_with_thousands_of_plans(cell, robolink_state):
     done, fired = run(cell, range(1000, 4000))
     assert done > 2000

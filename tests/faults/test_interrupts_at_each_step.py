@@ -61,12 +61,12 @@ def check(cell: NozzleCell, step: Step, *, verified: bool) -> None:
     assert cell.open_markers() == (), client.err
     if verified:
         assert cell.tool_1 != OLD_TIP
-        kept = ("Tool 1 keeps the new value", "Tool 1 was written and read back")
+        kept = ("Tool 1 keeps the new value", "Tool 1 is written and read back")
         assert any(sentence in client.err for sentence in kept), client.err
     else:
         assert cell.tool_1 == OLD_TIP, client.err
     if cell.simulator.machine.flash_writes == 2:
-        assert "The old value of tool 1 was written back" in client.err
+        assert "The old value of tool 1 is back" in client.err
 
 
 def check_last_line(cell: NozzleCell, line: str) -> None:

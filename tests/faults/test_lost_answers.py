@@ -66,7 +66,7 @@ def test_a_lost_answer_to_a_write_is_unknown_blocks_motion_and_is_settled_by_rea
             with pytest.raises(TransportClosedError):
                 controller.status()
         with robolink.connect(url) as controller:
-            with pytest.raises(OutcomeUnknownError, match="not settled"):
+            with pytest.raises(OutcomeUnknownError, match="did not finish"):
                 lift(controller)
             (marker,) = controller.outcomes.open_markers()
             finding = controller.resolver.examine(marker)
@@ -249,8 +249,8 @@ def test_a_write_whose_acknowledgement_was_garbled_is_told_as_that(serve, unclea
             change_tools(controller, [Wanted(1, NEW, old)], tell=told.append)
         assert simulator.machine.tools.get(1) == old
         assert controller.outcomes.open_markers() == ()
-    assert "did run. The old value of tool 1 was written back." in str(caught.value)
-    assert told == ["The old value of tool 1 was written back."]
+    assert "did run. The old value of tool 1 is back." in str(caught.value)
+    assert told == ["The old value of tool 1 is back."]
     assert len([text for _, _, text in simulator.log if WRITE in text]) == 2
 
 

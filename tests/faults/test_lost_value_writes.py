@@ -31,7 +31,7 @@ def test_a_lost_answer_is_unknown_blocks_motion_and_is_settled_by_reading(serve,
             with pytest.raises(OutcomeUnknownError, match="may or may not have run"):
                 WRITES[name](controller)
         with robolink.connect(url) as controller:
-            with pytest.raises(OutcomeUnknownError, match="not settled"):
+            with pytest.raises(OutcomeUnknownError, match="did not finish"):
                 controller.require_settled("Go")
             (marker,) = controller.outcomes.open_markers()
             assert marker.request.startswith(f"${name}")

@@ -25,9 +25,9 @@ from robolink.errors import (
     ToolChangedError,
 )
 from robolink.journal import memory_journal
-from robolink.model import Controller, MotionProfile, Path, ToolOffset, WorkBox
+from robolink.model import Controller, MotionProfile, Path, ToolOffset, Verdict, WorkBox
 from robolink.protocols.mailbox import to_frame
-from robolink.transaction import Wanted, change_tools
+from robolink.transaction import Wanted, change_tools, recover
 from tests.contract._softmotion_cell import served
 
 THREADS = 100
@@ -103,6 +103,11 @@ def test_f48_of_many_that_begin_at_the_same_moment_one_is_admitted_on_epson(epso
 
 @pytest.mark.fault("F48")
 def test_f48_of_many_that_connect_and_change_one_tool_of_a_plc_one_does(tmp_path):
+    """Or none, and who may have is told that it is not proved.
+
+    Of a mailbox only the answer to its last command shows, whoever gave it. So on a busy computer
+    the refusal of one may hide the answer to the write of another, or overwrite its block.
+    """
     with served("modbus-tcp") as cell:
         journal = memory_journal(tmp_path.name)
         with cell.connect() as controller:
@@ -116,14 +121,22 @@ def test_f48_of_many_that_connect_and_change_one_tool_of_a_plc_one_does(tmp_path
 
         slots = cell.slot_changes(1)
         ends = together([partial(job, number) for number in range(6)])
-        (done,) = [end for end in ends if isinstance(end, str)]
-        assert cell.slot_changes(1) == slots + 1
-        with cell.connect() as controller:
-            now = controller.tools.read(1)
-            assert controller.tools.same(now, tool(int(str(done).split()[1])))
-        # Of a mailbox only the answer to its last command shows, whoever gave it.
+        done = [end for end in ends if isinstance(end, str)]
+        changes, doubted = cell.slot_changes(1) - slots, ends.count(OutcomeUnknownError)
+        assert len(done) <= changes <= 1
+        assert changes == len(done) or doubted
+        assert done or doubted  # somebody came as far as that
         overtaken = {OutcomeUnknownError, RemoteProtocolError}
-        assert {end for end in ends if end is not done} <= {*REFUSALS, *overtaken}
+        assert {end for end in ends if not isinstance(end, str)} <= {*REFUSALS, *overtaken}
+        with robolink.connect(cell.url, outcomes=journal.log(cell.url)) as later:
+            recovery = recover(later)
+            now = later.tools.read(1)
+        found = [finding.verdict for finding in (*recovery.settled, *recovery.left)]
+        assert bool(found) == bool(doubted)
+        assert found.count(Verdict.DONE) == changes - len(done)
+        held = {end: tool(number) for number, end in enumerate(ends)}
+        for end in done:
+            assert controller.tools.same(now, held[end])
 
 
 @pytest.mark.fault("F49")

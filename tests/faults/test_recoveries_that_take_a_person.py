@@ -85,7 +85,7 @@ def test_f59_a_third_value_is_a_conflict_that_blocks_motion_until_a_person_decid
                 (finding,) = recover(controller).left
                 assert finding.verdict is Verdict.CONFLICT
                 group = controller.groups[0]
-                with pytest.raises(OutcomeUnknownError, match="not settled"):
+                with pytest.raises(OutcomeUnknownError, match="did not finish"):
                     group.move_to(group.pose(), MotionProfile(), box=WorkBox())
             assert controller.tools.same(controller.tools.read(1), THIRD)
             assert (lossy.writes(), lossy.moves()) == (1, 0)

@@ -222,7 +222,7 @@ def test_f75_a_write_that_is_reset_in_flight_is_unproved_and_not_sent_again(far_
             assert firewall.opened <= 2
         firewall.reset_at = lambda _data: False
         with robolink.connect(there) as controller:
-            with pytest.raises(OutcomeUnknownError, match="not settled"):
+            with pytest.raises(OutcomeUnknownError, match="did not finish"):
                 controller.require_settled("a movement")
             (settled,) = recover(controller).settled
             assert settled.verdict is Verdict.DONE

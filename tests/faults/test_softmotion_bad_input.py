@@ -220,7 +220,7 @@ def test_an_owner_that_died_is_named_and_displaced_after_its_silence(cell):
     with cell.connect() as dead, pytest.raises(OutcomeUnknownError):
         dead.tools.write(SCRATCH, NEW, expected=None)
     with cell.connect() as next_one:
-        with pytest.raises(LeaseHeldError, match="owns the mailbox") as refusal:
+        with pytest.raises(LeaseHeldError, match="commands the PLC") as refusal:
             next_one.tools.write(3, NEW, expected=None)
         assert f"{cell.owner:08X}" in refusal.value.what
         assert "10 s after its last sign" in refusal.value.remedy
@@ -244,7 +244,9 @@ def test_f23_an_owner_that_falls_silent_while_it_moves_is_halted_and_not_displac
 def test_a_second_client_is_told_who_owns_the_mailbox_and_may_insist(cell):
     with cell.connect() as first, cell.connect() as second:
         first.take()
-        with pytest.raises(LeaseHeldError, match=f"Client {cell.owner:08X} owns the mailbox"):
+        with pytest.raises(
+            LeaseHeldError, match=rf"Another program \(client {cell.owner:08X}\) commands the PLC"
+        ):
             second.tools.select(0)
         second.take(insist=True)
         with pytest.raises(RejectedError) as refusal:

@@ -73,7 +73,7 @@ def test_who_shares_no_journal_is_told_which_client_owns_the_mailbox(cell, other
     ann = about_to(cell, "journal write")
     refused = bob(cell, other_pc)
     assert refused.how == "LeaseHeldError"
-    assert f"Client {cell.owner:08X} owns the mailbox" in refused.said
+    assert f"(client {cell.owner:08X}) commands the PLC" in refused.said
     assert "10 s after its last sign the mailbox is free" in refused.said
     assert ann.end().how == "done"
     assert cell.values_written() == [ANNS]
@@ -104,7 +104,7 @@ def test_of_two_that_ask_for_the_mailbox_in_the_same_instant_one_gets_it(cell, o
     ann.step()
     refused = bob(cell, other_pc)
     assert refused.how == "LeaseHeldError"
-    assert f"Client {cell.owner:08X} owns the mailbox" in refused.said
+    assert f"(client {cell.owner:08X}) commands the PLC" in refused.said
     # His is the answer that she finds; it says that the mailbox is hers.
     assert ann.end().how == "done"
     assert cell.values_written() == [ANNS]

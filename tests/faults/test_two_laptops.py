@@ -182,7 +182,7 @@ def test_a_plc_shows_everything_to_both_and_is_written_by_its_owner(plc):
             assert second.tools.read(1) == before
         code, document = other.types_meanwhile("tool", "set", "1", "--x", "12.4", "--yes")
         assert code == 5, document
-        assert "owns the mailbox" in document["error"]["what"]
+        assert "commands the PLC" in document["error"]["what"]
         assert mine.tools.read(1) == before
 
 

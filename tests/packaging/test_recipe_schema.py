@@ -10,10 +10,11 @@ import pytest
 from robolink.methods import all_methods
 from robolink.methods.page import method_page
 from robolink.recipe import json_schema, method_table
+from robolink.recipe.page import recipe_page
 
 ROOT = Path(__file__).parents[2]
 SHIPPED = ROOT / "docs" / "recipe.schema.json"
-PAGE = ROOT / "docs" / "recipes.md"
+PAGE = ROOT / "docs" / "recipe-keys.md"
 AGAIN = (
     'run: python -c "import json, robolink.recipe as r; print(json.dumps(r.json_schema(), '
     'indent=2))" > docs/recipe.schema.json'
@@ -24,7 +25,7 @@ HEADINGS = {
     "BeamLine": "`[[source.beams]]`",
     "StationTable": "`[station]`",
     "Poses": "`[poses]`",
-    "FlangePose": "`[poses]`",
+    "FlangePose": "A pose",
     "Tool": "`[[tools]]`",
     "PoseFile": "`[tools.poses]`",
     "Speeds": "`[speeds]`",
@@ -89,7 +90,7 @@ def test_no_key_allows_null_which_toml_does_not_have():
 
 @pytest.mark.parametrize("table", HEADINGS)
 def test_the_page_explains_every_key_with_its_default_and_limits(table):
-    _, heading, rest = PAGE.read_text(encoding="utf-8").partition(f"\n### {HEADINGS[table]}\n")
+    _, heading, rest = PAGE.read_text(encoding="utf-8").partition(f"\n## {HEADINGS[table]}\n")
     assert heading
     rows = dict(re.findall(r"^\| `(\w+)` \| (.*)$", rest.partition("\n#")[0], re.M))
     schema = tables(json_schema())[table]
@@ -97,6 +98,11 @@ def test_the_page_explains_every_key_with_its_default_and_limits(table):
     for key, value in schema["properties"].items():
         for words in spelled(value, required=key in schema.get("required", ())):
             assert re.search(rf"(?<![\w.]){re.escape(words)}(?![\w.])", rows[key]), (key, words)
+
+
+def test_the_page_of_the_keys_is_not_stale():
+    again = "run: python -m robolink.recipe.page > docs/recipe-keys.md"
+    assert PAGE.read_text(encoding="utf-8") == recipe_page(), again
 
 
 def test_every_table_has_its_place_on_the_page():

@@ -84,6 +84,23 @@ def test_the_wheel_brings_the_programs_for_controllers_and_their_licence(wheel, 
     assert "robolink_cli/companions/LICENSE" in names
 
 
+def test_the_wheel_brings_the_pages_and_the_recipes_to_begin_with(wheel, names):
+    shipped = {
+        f"robolink_cli/docs/{path.relative_to(ROOT / 'docs').as_posix()}": path
+        for pattern in ("*.md", "reference/*.md", "pictures/*.svg")
+        for path in (ROOT / "docs").glob(pattern)
+    }
+    shipped |= {
+        f"robolink_cli/recipes/{path.name}": path
+        for path in (ROOT / "examples" / "recipes").glob("*.toml")
+    }
+    assert len(shipped) > 60
+    assert {
+        name for name, path in shipped.items() if wheel.read(name) != path.read_bytes()
+    } == set()
+    assert not [name for name in names if name.startswith("robolink_cli/docs/site")]
+
+
 def test_the_wheel_installs_the_command_and_the_simulator(wheel, names):
     (path,) = (name for name in names if name.endswith(".dist-info/entry_points.txt"))
     entries = configparser.ConfigParser(delimiters=("=",))

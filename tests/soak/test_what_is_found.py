@@ -20,6 +20,14 @@ HISTORY = History(
         Hour(1, Deed.CHANGE_NOZZLE, Habit(impatient=True), (DROPPED,)),
     ),
 )
+LONGER = History(
+    3, CellKind.EPSON, (*HISTORY.hours, Hour(2, Deed.SELECT_TOOL, Habit(person="ben"), ()))
+)
+"""With an hour behind the one that counts, which has to be left out too."""
+
+HISTORIES = pytest.mark.parametrize(
+    "history", [HISTORY, pytest.param(LONGER, marks=pytest.mark.soak)], ids=["two hours", "three"]
+)
 FORGETFUL = {
     "robolink.controllers.markers.MarkerStore.require_settled": lambda _store, _request: None
 }
@@ -31,15 +39,17 @@ def with_a_defect(history):
     return live_through(history, FORGETFUL)
 
 
-def test_a_sound_driver_breaks_no_rule_in_it():
-    story = live_through(HISTORY)
+@HISTORIES
+def test_a_sound_driver_breaks_no_rule_in_it(history):
+    story = live_through(history)
     assert story.broken == [], story.told()
 
 
-def test_a_defect_is_found_told_and_cut_to_what_it_takes():
-    (found, *_) = with_a_defect(HISTORY).broken
+@HISTORIES
+def test_a_defect_is_found_told_and_cut_to_what_it_takes(history):
+    (found, *_) = with_a_defect(history).broken
     assert found.rule == "NoMotionInDoubt"
-    short = shrink(HISTORY, found.rule, run=with_a_defect)
+    short = shrink(history, found.rule, run=with_a_defect)
     assert [hour.number for hour in short.hours] == [1]
     assert short.hours[0].disturbances == (DROPPED,)
     told = with_a_defect(short).told()

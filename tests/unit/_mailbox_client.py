@@ -78,20 +78,29 @@ class MailboxClient:
 
     def done(self, opcode, *operands, **fields) -> Response:
         """Send a command and return the snapshot that shows it done."""
-        now = self.tell(opcode, *operands, **fields)
-        for _ in range(2000):
-            if CommandState(now.state).final:
-                break
-            self.wait(0.01)
-            now = self.now()
+        now = self.settled(self.tell(opcode, *operands, **fields))
         assert (now.state, now.error_class) == (CommandState.DONE, 0), now
         return now
 
     def refused(self, opcode, *operands, **fields) -> int:
         """Send a command that ends in error and return the class of it."""
-        now = self.tell(opcode, *operands, **fields)
+        now = self.settled(self.tell(opcode, *operands, **fields))
         assert now.state == CommandState.ERROR, now
         return now.error_class
+
+    def settled(self, now: Response) -> Response:
+        """Return the snapshot that shows the end of the command that ``now`` acknowledges."""
+        for _ in range(2000):
+            if CommandState(now.state).final:
+                break
+            self.wait(0.01)
+            now = self.now()
+        return now
+
+    def after_a_cycle(self) -> Response:
+        """Return what the mailbox shows once its program has looked at the machine again."""
+        self.wait(0.01)
+        return self.now()
 
     def take(self, *, insist=0) -> Response:
         """Take the mailbox."""

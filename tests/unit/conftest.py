@@ -5,6 +5,9 @@ from collections.abc import Callable
 import pytest
 from robolink_simulators.epson import EpsonSimulator
 
+from tests.unit._mailbox_programs import mailbox_program as mailbox_program
+from tests.unit._mailbox_programs import offer_programs
+
 S = 1_000_000_000
 
 
@@ -40,6 +43,11 @@ class Client:
     def code(self) -> int:
         """Return the error number of GetStatus."""
         return int(self.ask("$GetStatus").split(",")[2])
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Parametrize what more than one module does."""
+    offer_programs(metafunc)
 
 
 @pytest.fixture

@@ -18,7 +18,7 @@ from robolink_simulators.epson.memory.variables import Variables
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.epson.spel.programs.loading import load_project
 from robolink_simulators.epson.spel.session import Session
-from robolink_simulators.epson.spel.tasks.ports import Ports
+from robolink_simulators.epson.spel.tasks.channels.ports import Ports
 from robolink_simulators.epson.spel.tasks.runner import ProgramRunner
 
 from robolink.model import ToolOffset

@@ -21,6 +21,8 @@ from robolink.protocols.mailbox import (
 from tests.unit._mailbox_client import linked
 from tests.unit.softmotion_driver._cell import Cell
 
+pytestmark = pytest.mark.usefixtures("mailbox_program")
+
 
 @pytest.fixture
 def cell():

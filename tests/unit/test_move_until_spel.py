@@ -162,7 +162,7 @@ def test_one_motion_takes_one_of_till_and_find(cell):
 
 def test_an_input_that_does_not_exist_is_an_error_and_nothing_moves(cell):
     moved = cell.machine.arm.moves_started
-    assert cell.error("Move Here :Z(-60) Till Sw(9999) = On") == NUMBERS.value_out_of_range
+    assert cell.error("Move Here :Z(-60) Till Sw(9999) = On") == NUMBERS.io_bit
     assert cell.machine.arm.moves_started == moved
 
 

@@ -145,7 +145,7 @@ def test_a_plc_that_does_not_answer_leaves_the_outcome_unknown_and_no_request(co
         with pytest.raises(OutcomeUnknownError, match="did not answer the request within 2 s"):
             controller.tools.write(1, NEW, expected=ANY)
         assert len(controller.outcomes.open_markers()) == 1
-        with pytest.raises(OutcomeUnknownError, match="not settled"):
+        with pytest.raises(OutcomeUnknownError, match="did not finish"):
             controller.require_settled("a move")
     assert commit_bit.program.memory.read(RegisterTable.COIL, range(2000, 2001)) == [0]
 

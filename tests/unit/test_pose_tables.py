@@ -82,8 +82,18 @@ def test_a_table_is_read_whatever_its_layout(read, layout):
 ENCODINGS = ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "utf-32", "cp1252"]
 
 
-@pytest.mark.parametrize("newline", ["\n", "\r\n", "\r"])
-@pytest.mark.parametrize("encoding", ENCODINGS)
+NEWLINES = ["\n", "\r\n", "\r"]
+
+
+@pytest.mark.parametrize(
+    ("encoding", "newline"),
+    [
+        # Each encoding with one of them, in turn.
+        pytest.param(encoding, newline, marks=() if number % 3 == place else pytest.mark.soak)
+        for number, encoding in enumerate(ENCODINGS)
+        for place, newline in enumerate(NEWLINES)
+    ],
+)
 def test_a_table_is_read_in_whatever_encoding(read, encoding, newline):
     text = "Name;X [mm];Y [mm];Z [mm];U [°]\nNädel;287,5;103,25;-50;90\nb;-12,25;87,5;-50;-45\n"
     found = read(text.replace("\n", newline).encode(encoding))

@@ -69,7 +69,7 @@ def test_two_touches_have_no_ellipse_and_the_page_says_why():
     result = solve_two_pose(*touches(0, 180))
     assert interval_ellipse(result) is None
     assert drawn(fit_drawings(result)) == ""
-    assert "nothing here tells how large the errors are" in render(report(result))
+    assert "How sure it is cannot be said" in render(report(result))
 
 
 def test_a_stated_sigma_gives_two_touches_an_ellipse():

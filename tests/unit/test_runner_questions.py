@@ -118,7 +118,10 @@ def test_a_step_is_understood_however_it_is_spaced_and_signed(text, deltas):
     ["x0.1", "x+0.1\u00b2", "x+0,1234", "x+0.1.2", "x+1,  5", "+x1", "x+", "x+1 x+2", "x+-1", "y"],
 )
 def test_what_could_be_meant_otherwise_is_not_guessed(text):
-    with pytest.raises(ConfigError, match=r"is not a jog step\. Type an axis x, y, z or u, a sign"):
+    with pytest.raises(
+        ConfigError,
+        match=r"is no step\. A step is x\+0\.1: axis, sign, number, with a point\. Axes are",
+    ):
         parse_steps(text)
 
 
@@ -201,7 +204,7 @@ def shown_to(controller, *thinks_s):
 
 def touched():
     """Ask for a place on which something rests."""
-    return (yield Ask("Bring the tip onto the pin."))
+    return (yield Ask("Jog the tip onto the pin."))
 
 
 def test_an_answer_that_nobody_can_have_read_the_question_for_is_asked_again(controller):

@@ -51,8 +51,8 @@ def test_an_undefined_tool_cannot_be_selected(machine):
     ("tool", "kind"),
     [
         (0, RefusalKind.TOOL_ZERO_FIXED),
-        (16, RefusalKind.VALUE_OUT_OF_RANGE),
-        (-1, RefusalKind.VALUE_OUT_OF_RANGE),
+        (16, RefusalKind.TOOL_NUMBER),
+        (-1, RefusalKind.TOOL_NUMBER),
     ],
 )
 def test_only_tools_1_to_15_can_be_written(machine, tool, kind):
@@ -71,10 +71,14 @@ def test_every_write_and_clear_wears_the_flash(machine):
     assert machine.flash_writes == 3
 
 
-def test_clearing_the_tool_in_force_selects_the_flange(machine):
+def test_clearing_the_tool_in_force_is_an_error_or_selects_the_flange(machine):
     machine.tools.set(1, NOZZLE)
     machine.tools.select(1)
-    machine.tools.clear(1)
+    with pytest.raises(SpelRefusal) as refused:
+        machine.tools.clear(1)
+    assert refused.value.kind is RefusalKind.TOOL_IN_FORCE
+    assert (machine.tools.selected, machine.tools.get(1)) == (1, NOZZLE)
+    machine.tools.clear(1, in_force="selects_zero")
     assert machine.tools.selected == 0
 
 

@@ -227,8 +227,8 @@ def test_older_firmware_lacks_the_extended_queries_only(login):
 def test_the_extended_queries(simulator, client):
     assert client.ask("$GetRobotInfo") == "#GetRobotInfo,1,3,T6-602S"
     assert client.ask("$GetMotor,0") == "#GetMotor,1,1,0"
-    assert client.ask("$GetErrMsg,4015,0") == "#GetErrMsg,Tool undefined"
-    assert client.ask("$GetErrFunc,4015") == "#GetErrFunc,0"
+    assert client.ask("$GetErrMsg,2230,0") == "#GetErrMsg,Tool undefined"
+    assert client.ask("$GetErrFunc,2230") == "#GetErrFunc,0"
     assert client.ask("$GetHealthRB,1,0,1") == "#GetHealthRB,-1"
     assert client.ask("$GetRobotName,2") == "!GetRobotName,12"
     for name in ("GetContName", "GetContType", "GetContMacAdd", "GetContSettings"):

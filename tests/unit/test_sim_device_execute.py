@@ -34,7 +34,7 @@ def test_lines_end_as_the_setup_says(login):
 def test_a_failed_statement_puts_the_controller_into_error_until_reset(login):
     client = login(EpsonSimulator())
     assert client.ask('$Execute,"Tool 9"') == "!Execute,99"
-    assert client.ask("$GetStatus") == "#GetStatus,00100001001,4015"
+    assert client.ask("$GetStatus") == "#GetStatus,00100001001,2230"
     assert client.ask('$Execute,"Print 1"') == "!Execute,20"
     client.ask("$Reset")
     assert client.ask('$Execute,"Print Tool"').startswith('#Execute,"')
@@ -42,8 +42,8 @@ def test_a_failed_statement_puts_the_controller_into_error_until_reset(login):
 
 def test_a_failure_may_be_told_in_words(login):
     client = login(simulator_with(execute_failure="text"))
-    assert client.ask('$Execute,"Tool 9"').startswith('#Execute,"Error 4015: ')
-    assert client.code() == 4015
+    assert client.ask('$Execute,"Tool 9"').startswith('#Execute,"Error 2230: ')
+    assert client.code() == 2230
 
 
 def test_a_result_over_4060_bytes_is_refused_and_ends_nothing(login):

@@ -12,6 +12,8 @@ from robolink_simulators.softmotion.mailbox import (
 from robolink.protocols.mailbox import Bits, CommandState, ErrorClass, GroupState, Opcode
 from tests.unit._mailbox_client import MCS, another, linked, owning, shifted
 
+pytestmark = pytest.mark.usefixtures("mailbox_program")
+
 SPEED_MM_S, BRAKES_MM_S2 = 200.0, 2000.0
 FAST = (SPEED_MM_S, BRAKES_MM_S2, BRAKES_MM_S2, 20000.0)
 BRAKING_MM = SPEED_MM_S**2 / (2 * BRAKES_MM_S2)

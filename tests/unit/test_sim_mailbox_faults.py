@@ -20,6 +20,8 @@ from robolink.protocols.mailbox import (
 )
 from tests.unit._mailbox_client import owning
 
+pytestmark = pytest.mark.usefixtures("mailbox_program")
+
 SLOW = (20.0, 200.0, 200.0, 2000.0)
 
 
@@ -74,7 +76,7 @@ def test_a_write_may_arrive_damaged_and_be_written_again():
     client.wait(0.1)
     assert client.now().rejected == 1
     client.write(command)
-    assert client.acknowledged(command).state == CommandState.DONE
+    assert client.settled(client.acknowledged(command)).state == CommandState.DONE
 
 
 @pytest.mark.parametrize(
@@ -117,7 +119,7 @@ def test_a_frozen_program_stands_still_while_the_robot_goes_on():
     assert client.now() == frozen
     assert simulator.plc.group.values != axes
     simulator.panel.thaw()
-    client.link.clock.sleep(0.05)
+    client.link.clock.sleep(0.1)
     assert client.now().finished[0][1:] == (CommandState.ABORTED, ErrorClass.NONE)
     assert client.now().plc_heartbeat != frozen.plc_heartbeat
 

@@ -13,6 +13,8 @@ from robolink.protocols.mailbox import (
 )
 from tests.unit._mailbox_client import FACTORS, LINE, MCS, owning, shifted
 
+pytestmark = pytest.mark.usefixtures("mailbox_program")
+
 BUFFERED = 1
 SLOW = (20.0, 200.0, 200.0, 2000.0)
 
@@ -131,7 +133,7 @@ def test_an_axis_error_ends_everything_with_its_class():
     sequence = client.move(z=-20.0).ack_head
     client.wait(0.1)
     simulator.panel.fail_axis(1, 16)
-    now = client.now()
+    now = client.after_a_cycle()
     assert now.finished[0] == (sequence, CommandState.ABORTED, ErrorClass.AXIS)
     assert (now.group_state, now.raw_error) == (GroupState.ERRORSTOP, 16)
     client.done(Opcode.RESET)
@@ -142,7 +144,7 @@ def test_the_error_of_the_group_is_not_that_of_a_block_that_it_refuses():
     """Two channels: a block in error whose number nobody knows shows none, not the group's."""
     client, simulator = owning()
     simulator.panel.fail_axis(1, 16)
-    now = client.now()
+    now = client.after_a_cycle()
     assert (now.error_class, now.raw_error) == (ErrorClass.NONE, 16)
     assert client.refused(Opcode.CLEAR_TOOL, 1) == ErrorClass.WRONG_STATE
     assert client.now().raw_error == 0
@@ -159,7 +161,7 @@ def test_the_emergency_stop_takes_the_power_and_a_reset_does_not_give_it_back():
     sequence = client.move(z=-20.0).ack_head
     client.wait(0.1)
     simulator.panel.press_estop()
-    now = client.now()
+    now = client.after_a_cycle()
     assert not now.bits & Bits.POWERED
     assert now.finished[0] == (sequence, CommandState.ABORTED, ErrorClass.AXIS)
     client.done(Opcode.RESET)
@@ -178,7 +180,7 @@ def probing(client, z, run_on=0, number=5):
 
 
 @pytest.mark.parametrize("run_on", [0, 1])
-def test_a_movement_until_an_input_latches_the_tcp_at_the_edge(run_on):
+def test_a_movement_until_an_input_latches_the_tcp_at_the_edge(run_on, mailbox_program):
     client, simulator = owning()
     plate_mm = simulator.world.tip_mm()[2] - 3.0
     simulator.world.connect(5, TouchPlate(plate_mm))
@@ -189,7 +191,8 @@ def test_a_movement_until_an_input_latches_the_tcp_at_the_edge(run_on):
     now = client.now()
     assert now.opcode_echo == Opcode.MOVE_UNTIL_INPUT
     assert before[2] - now.answer.pose[2] == pytest.approx(3.0, abs=0.1)
-    assert before[2] - now.tcp[2] == pytest.approx(10.0 if run_on else 4.0, abs=0.15)
+    braked = {"modelled": 4.0, "executed": 3.3}[mailbox_program]  # MC_GroupHalt brakes harder
+    assert before[2] - now.tcp[2] == pytest.approx(10.0 if run_on else braked, abs=0.15)
 
 
 def test_without_an_edge_the_movement_ends_in_error():

@@ -6,6 +6,8 @@ from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 from robolink.protocols.mailbox import Bits, CommandState, ErrorClass, GroupState, Opcode
 from tests.unit._mailbox_client import FACTORS, another, linked, owning
 
+pytestmark = pytest.mark.usefixtures("mailbox_program")
+
 
 def test_nobody_owns_it_at_first_and_reads_need_no_owner():
     client = linked(SoftMotionSimulator())

@@ -23,6 +23,8 @@ from robolink.protocols.mailbox import (
 )
 from tests.unit._mailbox_client import LINE, MCS, NO_TOOL, linked, owning, shifted
 
+pytestmark = pytest.mark.usefixtures("mailbox_program")
+
 TOOL = (1.0, -2.0, 30.5, 10.0, 20.0, 30.0)
 SIDEWAYS = (5.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -114,7 +116,7 @@ def test_the_three_tools_that_can_be_read():
 def test_a_tool_that_the_machine_sets_by_itself_is_not_known():
     client, simulator = owning()
     simulator.panel.set_tool(CoordRef(z_mm=77.0))
-    assert not client.now().bits & Bits.TOOL_KNOWN
+    assert not client.after_a_cycle().bits & Bits.TOOL_KNOWN
     assert client.done(Opcode.READ_TOOL).answer.pose[2] == 77.0
     client.done(Opcode.SELECT_TOOL, 1)
     assert client.now().bits & Bits.TOOL_KNOWN

@@ -206,7 +206,7 @@ def asked_touch(simulator, controller, said=None):
         eyes, (said if said is not None else []).append, clock=controller.clock
     )
     runner = Runner(controller, controller.groups[0], operator, RunSettings(box=ANYWHERE))
-    runner.run(ask_for_pose("Bring the tip onto the pin."))
+    runner.run(ask_for_pose("Jog the tip onto the pin."))
     return (controller.clock.now_ns() - before_ns) / 1e9
 
 

@@ -315,7 +315,7 @@ def test_a_held_workpiece_is_led_past_an_external_control_point(robot, name, end
     assert run("Motor On; Tool 0; TLSet 1, XY(12, 5, 0, 20); Tool 1") == "0"
     assert run(f"P1 = Here; P2 = {end}; P3 = {mid}") == "0"
     assert run("Move P2 ECP") == "!Execute,99"
-    assert run.client.code() == 4013
+    assert run.client.code() == 2232
     run.client.ask("$Reset")
     run("Motor On; ECPSet 1, Here +X(60) +Z(-40); ECP 1; SpeedS 50")
     start, last, half = (parse_point(run(f"Print P{n}")).coordinates for n in (1, 2, 3))

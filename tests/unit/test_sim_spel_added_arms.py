@@ -33,21 +33,21 @@ def test_a_cleared_arm_is_gone(cell):
     assert cell.run("Print ArmDef(0), ArmDef(2), ArmDef(3)") == "-1 -1 0\r\n"
     cell.run("ArmClr 2; ArmClr 2")
     assert cell.run("Print ArmDef(2)") == "0\r\n"
-    assert cell.error("ArmSet 2") == 4012
+    assert cell.error("ArmSet 2") == 2227
 
 
 @pytest.mark.parametrize(
     ("statement", "number"),
     [
-        ("ArmSet 0, 1, 2, 3", 4002),
-        ("ArmClr 0", 4002),
-        ("ArmSet 16, 1, 2, 3", 4002),
+        ("ArmSet 0, 1, 2, 3", 2205),
+        ("ArmClr 0", 2205),
+        ("ArmSet 16, 1, 2, 3", 2226),
         ("ArmSet 1, 2, 3", 2100),
         ("ArmSet 1, 1, 2, 3, 4, 5, 6", 2100),
         ("Print ArmSet(0, 6)", 4002),
-        ("Print ArmSet(4, 1)", 4012),
-        ("Arm 4", 4012),
-        ("Arm 16", 4002),
+        ("Print ArmSet(4, 1)", 2227),
+        ("Arm 4", 2227),
+        ("Arm 16", 2226),
     ],
 )
 def test_what_cannot_be_is_refused_by_its_number(cell, statement, number):

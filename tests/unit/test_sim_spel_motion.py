@@ -200,7 +200,7 @@ def test_a_line_ends_at_its_first_error_and_keeps_what_it_printed(cell):
 def test_wait_takes_the_time_it_says(cell):
     execution = cell.start("Wait 2.5")
     assert execution.next_change() == 2_500_000_000
-    assert cell.error("Wait -1") == NUMBERS.value_out_of_range
+    assert cell.error("Wait -1") == NUMBERS.wait_time
 
 
 def test_an_abort_stops_the_arm_where_it_is_and_the_rest_of_the_line(cell):

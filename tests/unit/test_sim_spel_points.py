@@ -97,7 +97,7 @@ def test_deleted_points_are_undefined(window):  # 19
         ("Here XY(1, 2, 3, 4)", NUMBERS.syntax),
         ("Here P1 +X(1)", NUMBERS.syntax),
         ("Print JA(0, 0, 5, 0)", NUMBERS.out_of_reach),
-        ("Local 0, XY(1, 2, 3, 4)", NUMBERS.value_out_of_range),
+        ("Local 0, XY(1, 2, 3, 4)", NUMBERS.local_number),
         ("Local 1, XY(1, 2, 3, 4, 5, 0)", NUMBERS.value_out_of_range),
         ("Local 2", NUMBERS.local_undefined),
     ],
@@ -212,7 +212,7 @@ def test_a_cleared_tool_is_undefined_and_tool_0_is_fixed(window):  # 21
     assert window("Print TLDef(3)") == "0\r\n"
     assert window.error("TLClr 0") == NUMBERS.tool_zero_fixed
     assert window.error("TLSet 0, XY(1,2,3,4)") == NUMBERS.tool_zero_fixed
-    assert window.error("TLSet 16, XY(1,2,3,4)") == NUMBERS.value_out_of_range
+    assert window.error("TLSet 16, XY(1,2,3,4)") == NUMBERS.tool_number
 
 
 def test_an_undefined_tool_reads_as_zeros_or_is_refused(window):
@@ -245,8 +245,11 @@ def test_bits_are_switched_and_read(window):
     assert window("Print MemSw(1023), MemSw(0); MemOff 1023; Print MemSw(1023)") == "1 0\r\n0\r\n"
     window.machine.inputs.set(9, True)
     assert window("Print Sw(9), Sw(8), In(1)") == "1 0 2\r\n"
-    assert window.error("On 512") == NUMBERS.value_out_of_range
-    assert window.error("On 1, 11") == NUMBERS.value_out_of_range
+    assert window.error("On 512") == NUMBERS.io_bit
+    assert window.error("MemOn 1024") == NUMBERS.memory_bit
+    assert window.error("Print In(64)") == NUMBERS.io_byte
+    assert window.error("MemOut 128, 1") == NUMBERS.memory_byte
+    assert window.error("On 1, 11") == NUMBERS.output_time
     assert window.error("MemOn 1, 5") == NUMBERS.syntax
 
 

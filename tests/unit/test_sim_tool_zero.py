@@ -110,4 +110,4 @@ def test_fifteen_tools_and_tool_zero_that_cannot_be_set(robot):
     assert run("TLSet 15") == "Tool 15: 15.000, -15.000, 100.000, 10.000, 20.000, 30.000"
     assert run("Print TLDef(15)") == "-1"
     assert run("TLSet 0, XY(1, 2, 3, 4)") == "!Execute,99"
-    assert run.client.code() == 4016
+    assert run.client.code() == 2207

@@ -121,7 +121,7 @@ def test_scatter_of_an_input_is_drawn_anew_for_each_movement():
     )
     shown = []
     for _ in range(40):
-        group.movements_started += 1
+        group.motions.add(0)
         assert read_input(simulator, 5) is read_input(simulator, 5)
         shown.append(read_input(simulator, 5))
     assert 8 < sum(shown) < 32

@@ -82,7 +82,7 @@ def test_an_assigned_variable_is_read_over_the_wire_and_back(login):
     assert client.ask("$GetVariable,g_Long,Long") == "#GetVariable,6"
     assert answer(client, "Print g_Long + 1") == "`7`"
     refusing = login(EpsonSimulator(options=EpsonOptions(variable_assignment="refused")))
-    assert answer(refusing, "g_Long = 1") == "2119"
+    assert answer(refusing, "g_Long = 1") == "2353"
 
 
 def refused_words():

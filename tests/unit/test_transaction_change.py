@@ -93,7 +93,7 @@ def test_what_is_not_kept_is_put_back(cell, controller):
         assert cell.tools == NEW
     assert cell.tools == OLD
     assert cell.writes == 4
-    assert told == [f"The old value of tool {tool} was written back." for tool in (2, 1)]
+    assert told == [f"The old value of tool {tool} is back." for tool in (2, 1)]
     assert cell.story(1)[-1] == cell.story(2)[-1] == "rolled back"
     assert "done" not in cell.story()
     assert cell.journal.open_markers() == ()
@@ -116,7 +116,7 @@ def test_an_error_says_that_the_old_value_is_back(cell, controller):
         with ToolChange(controller, wanted(1), verify=True) as change:
             change.write()
             raise VerifyError("It drifts.", remedy="Measure again.")
-    assert failed.value.remedy == "Measure again. The old value of tool 1 was written back."
+    assert failed.value.remedy == "Measure again. The old value of tool 1 is back."
     assert cell.tools == OLD
 
 
@@ -133,7 +133,7 @@ def test_a_write_that_did_not_take_takes_the_others_back(cell, controller):
     cell.simulator.faults.add(Fault(FaultAction.IGNORE_WRITE, match="TLSet 2"))
     with pytest.raises(ReadBackError) as failed:
         change_tools(controller, wanted(1, 2))
-    assert "Tool 2 holds its old value. The old value of tool 1 was" in failed.value.remedy
+    assert "Tool 2 holds its old value. The old value of tool 1 is" in failed.value.remedy
     assert cell.tools == OLD
     assert cell.writes == 2
     assert cell.journal.open_markers() == ()
@@ -155,12 +155,12 @@ def test_what_somebody_else_wrote_is_left_alone_and_stays_open(cell, controller)
             change.write()
             cell.put(1, OTHER)
             raise VerifyError("It drifts.")
-    assert "Somebody else wrote it, so it was left alone." in failed.value.remedy
+    assert "It was left as it is." in failed.value.remedy
     assert cell.tools == {1: OTHER, 2: OLD[2]}
     assert cell.story(1)[-1] == "conflict"
     ((_, marker),) = cell.journal.open_markers()
     assert marker.kind is MarkerKind.CHANGE
-    with pytest.raises(OutcomeUnknownError, match="not settled"):
+    with pytest.raises(OutcomeUnknownError, match="did not finish"):
         change_tools(controller, [Wanted(1, NEW[1], OTHER)])
 
 
@@ -169,7 +169,7 @@ def test_a_controller_in_error_keeps_the_change_open(cell, controller):
     cell.simulator.faults.add(fault)
     with pytest.raises(ControllerFaultError) as failed:
         change_tools(controller, wanted(1, 2))
-    assert failed.value.remedy.count("could NOT be written back") == 2
+    assert failed.value.remedy.count("could not be written back") == 2
     assert cell.tools == {1: NEW[1], 2: OLD[2]}
     controller.reset_fault()
     assert recover(controller).left == ()

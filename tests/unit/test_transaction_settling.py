@@ -127,7 +127,7 @@ def test_a_value_that_cannot_be_put_back_stays_open_and_recover_may_run_again(ce
     leave_open(cell)
     cell.put(1, NEW[1])
     cell.simulator.faults.add(Fault(FaultAction.IGNORE_WRITE, match="TLSet 1"))
-    with pytest.raises(RobolinkError, match="could NOT be written back") as failed:
+    with pytest.raises(RobolinkError, match="could not be written back") as failed:
         recover(controller)
     assert failed.value.remedy.endswith("'robolink recover' may be run again.")
     assert {marker.kind for _, marker in cell.journal.open_markers()} == {MarkerKind.CHANGE}

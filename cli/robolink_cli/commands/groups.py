@@ -15,6 +15,7 @@ _CONTROLLER: Final = "robolink_cli.commands.controller"
 _COMPUTER: Final = "robolink_cli.commands.computer"
 _COMPANIONS: Final = "robolink_cli.commands.companions"
 _MEASURE: Final = "robolink_cli.commands.measure"
+_SHIPPED: Final = "robolink_cli.commands.shipped"
 
 _ROBOT: Final = {
     "where": (
@@ -42,6 +43,12 @@ _ROBOT: Final = {
 _CELL: Final = {
     "list": (f"{_COMPUTER}.config:list_cells", declared("The cells that have a name here.")),
     "show": (f"{_COMPUTER}.config:show", declared("All that is in force for one cell.")),
+    "check": (
+        f"{_COMPUTER}.cell_check:check",
+        declared(
+            "Whether cells are in order and nothing is due; for a nightly job, moves nothing."
+        ),
+    ),
     "files": (f"{_COMPUTER}.config:path", declared("Which cell files are looked at.")),
     "validate": (f"{_COMPUTER}.config:check", declared("Whether the cell files are right.")),
     "doctor": (
@@ -74,6 +81,10 @@ _EXPERT: Final = {
         f"{_CONTROLLER}.verify_controller:verify_controller",
         declared("Find out, reading only, what this controller really does."),
     ),
+    "check-contract": (
+        f"{_CONTROLLER}.check_contract:check_contract",
+        declared("Hold a controller, reading only, to what every kind promises."),
+    ),
     "execute-raw": (
         f"{_CONTROLLER}.operate:execute_raw",
         declared("Run one SPEL+ statement as typed; for engineers."),
@@ -85,6 +96,11 @@ _EXPERT: Final = {
     "poses": (
         f"{_MEASURE}.poses:poses",
         declared("What robolink understands of a file of poses."),
+    ),
+    "docs": (f"{_SHIPPED}.docs:docs", declared("Read the pages of the documentation.")),
+    "recipe": (
+        f"{_SHIPPED}.recipe:recipe",
+        declared("Copy a recipe to begin with; check your own."),
     ),
     "completion": (
         f"{_COMPUTER}.completion:completion",

@@ -35,7 +35,8 @@ MEANINGS: Final[dict[int, str]] = {
     DONE: "done",
     DIFFERENT: (
         "`tool compare` found a difference; `journal verify` found a damaged record; something "
-        "stands out in `journal drift`; `cell doctor` or `cell ports` found something in the way"
+        "stands out in `journal drift`; `cell doctor`, `cell ports` or `cell check` found "
+        "something to see to"
     ),
     USAGE: "the command, a file, a setting or the journal is wrong",
     3: "the controller is not reached, or the link broke",
@@ -156,7 +157,7 @@ def _ending_in_words(by: EndedBy) -> str:
         return tr("The window was closed, or the line to it is gone (SIGHUP).")
     if by is EndedBy.OUTPUT_CLOSED:
         return tr("Nobody reads the output any more, so the command was ended.")
-    return tr("Interrupted.")
+    return tr("You stopped it (Ctrl-C).")
 
 
 def _sentences(error: BaseException) -> tuple[str, str]:
@@ -167,7 +168,7 @@ def _sentences(error: BaseException) -> tuple[str, str]:
     if isinstance(error, KeyboardInterrupt):
         return _ending_in_words(_ending(error)), ""
     if isinstance(error, (EOFError, click.Abort)):
-        return tr("Interrupted."), ""
+        return tr("You stopped it (Ctrl-C)."), ""
     return (
         tr(
             "A defect in robolink: {kind}: {error}",

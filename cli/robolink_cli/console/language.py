@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from typing import Final
 
 from robolink.locale.languages import CLICK, ENGLISH, FOLDER, TERRITORY, language_named, translator
-from robolink.messages import install, tr
+from robolink.messages import install, spoken, tr
 
 OPTION: Final = "--lang"
 VARIABLE: Final = "ROBOLINK_LANG"
@@ -23,6 +23,16 @@ _FOR_MACHINES: Final = ("--json", "--jsonl")
 _SYSTEM: Final = ("LC_ALL", "LC_MESSAGES", "LANG")
 _KEY: Final = "language"
 _SAMPLE: Final = {"zh": "\u673a\u5668\u4eba"}
+
+
+_now: Final[list[str]] = []
+"""The language of the command line that is carried out, where it is not English."""
+
+
+def language_now() -> str:
+    """Return the language in which the command line that is carried out speaks."""
+    spoken(" ")  # it is found with the first text, whichever that is
+    return _now[-1] if _now else ENGLISH
 
 
 @contextmanager
@@ -65,6 +75,7 @@ class _Listener:
             _remark(tr("The Chinese sentences are not compiled here: make messages does it."))
         else:
             self._let_click_speak(language)
+            _now.append(language)
         return translate
 
     def _let_click_speak(self, language: str) -> None:
@@ -81,6 +92,7 @@ class _Listener:
         """Leave the process as it was found."""
         if self._before is None:
             return
+        _now.clear()
         import gettext
 
         gettext.textdomain(self._of_click)

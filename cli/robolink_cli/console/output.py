@@ -16,7 +16,7 @@ import io
 import os
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from typing import TYPE_CHECKING, Final
 
@@ -44,6 +44,28 @@ def visible(text: str) -> str:
     return _OBEYED.sub(lambda found: found[0].encode("unicode_escape").decode("ascii"), lines)
 
 
+ShownBy = Callable[[str, bool], None]
+"""Takes a text, and whether it stands beside the result."""
+
+_shown_by: ShownBy | None = None
+
+
+@contextmanager
+def shown_by(shower: ShownBy) -> Iterator[None]:
+    """Hand what is to be shown on a terminal to whoever draws on it, for the block."""
+    global _shown_by  # noqa: PLW0603 - a process has one terminal
+    before, _shown_by = _shown_by, shower
+    try:
+        yield
+    finally:
+        _shown_by = before
+
+
+def drawn_elsewhere() -> bool:
+    """Tell whether somebody else draws on the terminal now."""
+    return _shown_by is not None and sys.stdout.isatty()
+
+
 def show(text: str, *, beside: bool = False) -> None:
     """Show a person a text.
 
@@ -51,6 +73,9 @@ def show(text: str, *, beside: bool = False) -> None:
         text: One line or several.
         beside: On stderr, beside the result.
     """
+    if _shown_by is not None and (sys.stderr if beside else sys.stdout).isatty():
+        _shown_by(visible(text), beside)
+        return
     # The stream is named, because click takes an ASCII console for a misunderstanding and
     # would send it UTF-8.
     click.echo(visible(text), file=sys.stderr if beside else sys.stdout)

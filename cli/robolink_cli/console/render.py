@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import click
 
-from robolink_cli.console.output import hand_over, show, visible
+from robolink_cli.console.output import drawn_elsewhere, hand_over, show, visible
 
 _JSON = "robolink.json"
 _DOCUMENT = "robolink.document"
@@ -53,7 +53,12 @@ def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[object]]) 
             shown.add_column(Text(visible(column)), overflow="fold")
     for row in cells:
         shown.add_row(*(Text(cell) for cell in row))
-    console = Console(stderr=json_is_on(), highlight=False)
+    console = Console(stderr=json_is_on(), highlight=False, no_color=drawn_elsewhere() or None)
+    if drawn_elsewhere():
+        with console.capture() as captured:
+            console.print(shown, crop=False)
+        say(captured.get().rstrip("\n"))
+        return
     if not console.is_terminal:
         console.width = 1000  # nothing may be folded to an assumed width of 80
     console.print(shown, crop=False)

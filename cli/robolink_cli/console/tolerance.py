@@ -9,6 +9,9 @@ from typing import Final
 PLAINLY: Final = "robolink.plainly"
 """Name of what stands in for characters that an encoding lacks: signs in letters, else escapes."""
 
+PLAIN: Final = "robolink.plain"
+"""Where a command finds that lines are wanted in place of screens."""
+
 _IN_ASCII: Final = {"\u00b1": "+-", "\u221e": "inf", "\u00b0": " deg", "\u2192": "->"}
 
 
@@ -53,3 +56,11 @@ def help_width() -> int:
     except (OSError, ValueError):
         columns = 80
     return max(min(columns, 80) - 2, 50)
+
+
+def may_be_guided() -> bool:
+    """Tell whether a person sits at both ends of this process's terminal."""
+    try:
+        return os.isatty(sys.stdin.fileno()) and os.isatty(sys.stderr.fileno())
+    except (OSError, ValueError, AttributeError):  # closed, or a stream inside a program
+        return False

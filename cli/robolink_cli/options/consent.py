@@ -6,6 +6,7 @@ from typing import Any, TypeVar
 import click
 
 from robolink.messages import declared
+from robolink_cli.console.tolerance import PLAIN
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -22,6 +23,22 @@ def dry_run_option(function: F) -> F:
 def yes_option(function: F) -> F:
     """Add ``--yes``."""
     return click.option("--yes", is_flag=True, help="Answer yes to the question asked.")(function)
+
+
+def plain_option(function: F) -> F:
+    """Add ``--plain``."""
+
+    def keep(context: click.Context, _parameter: click.Parameter, wanted: bool) -> None:
+        if wanted:
+            context.meta[PLAIN] = True
+
+    return click.option(
+        "--plain",
+        is_flag=True,
+        expose_value=False,
+        callback=keep,
+        help=declared("Lines instead of a screen; for screen readers. Also ROBOLINK_PLAIN=1."),
+    )(function)
 
 
 def then_select_option(function: F) -> F:

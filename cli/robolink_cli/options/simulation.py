@@ -1,8 +1,10 @@
 """The options that every command has that serves a simulated controller."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Any, Final, TypeVar, cast
 
 import click
 
@@ -53,6 +55,54 @@ def simulation_options(function: F) -> F:
     return function
 
 
+@dataclass(frozen=True, slots=True)
+class ServedLife:
+    """How a served simulator is controlled, and when it ends by itself.
+
+    Attributes:
+        control: Where its control API listens, HOST:PORT.
+        with_parent: Whether it ends when the process that started it has ended.
+        idle_exit_s: After how many seconds without a request it ends; ``None`` for never.
+    """
+
+    control: str
+    with_parent: bool
+    idle_exit_s: float | None
+
+
+def life_options(function: F) -> F:
+    """Add ``--control``, ``--with-parent``, ``--idle-exit`` and hand them over as ``life``."""
+
+    @wraps(function)
+    def packed(*, control: str, with_parent: bool, idle_exit: float | None, **given: Any) -> Any:  # noqa: ANN401 - whatever the command takes
+        return function(life=ServedLife(control, with_parent, idle_exit), **given)
+
+    options = (
+        click.option(
+            "--control",
+            metavar="HOST:PORT",
+            default="127.0.0.1:0",
+            show_default=True,
+            help="Where the control API listens (docs/control-api.md); port 0 takes a free one.",
+        ),
+        click.option(
+            "--with-parent",
+            is_flag=True,
+            help="End when the process that started this one has ended.",
+        ),
+        click.option(
+            "--idle-exit",
+            type=click.FloatRange(min=0.1),
+            metavar="SECONDS",
+            help="End when nobody has asked for anything for so long.",
+        ),
+    )
+    command: Any = packed
+    for option in reversed(options):
+        command = option(command)
+    return cast("F", command)
+
+
 def modbus_options(function: F) -> F:
     """Add ``--modbus-tcp`` and ``--modbus-rtu``."""
     function = click.option(
@@ -93,3 +143,36 @@ def faults_option(function: F) -> F:
         type=click.Path(exists=True, dir_okay=False, path_type=Path),
         help="What is planned to go wrong: a file, as docs/fault-plans.md explains.",
     )(function)
+
+
+_PROJECT_OPTIONS: tuple[Callable[[Any], Any], ...] = (
+    click.option(
+        "--vision",
+        type=click.Path(exists=True, dir_okay=False, path_type=Path),
+        metavar="FILE",
+        help="Vision project of the programs, for VRun; docs/spel-programs.md shows one.",
+    ),
+    click.option(
+        "--com",
+        "lines",
+        multiple=True,
+        metavar="NUMBER=DEVICE",
+        help="Serial line of a port of OpenCom, as 1=/dev/pts/3; no other is reached. "
+        "May be repeated.",
+    ),
+    click.option(
+        "--files",
+        "folder",
+        type=click.Path(exists=True, file_okay=False, path_type=Path),
+        metavar="DIR",
+        help="Folder for the files that programs write and read; no other is reached. "
+        "Without it they are gone at the end.",
+    ),
+)
+
+
+def project_options(function: Any) -> Any:  # noqa: ANN401 - a decorator of click
+    """Add ``--vision``, ``--com`` and ``--files``: ``vision``, ``lines`` and ``folder``."""
+    for option in reversed(_PROJECT_OPTIONS):
+        function = option(function)
+    return function

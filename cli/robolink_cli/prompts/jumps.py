@@ -129,7 +129,7 @@ def _ask(tool: int, jump: "Jump", allowed: Allowed) -> None:
             ),
         )
     if not asked(tr("{figure} Are sign and unit right, and is it to be written?", figure=figure)):
-        raise DeclinedError(tr("You said no."), remedy=tr("Nothing was written."))
+        raise DeclinedError(tr("That was not y."), remedy=tr("Nothing was written."))
 
 
 def _figure(tool: int, jump: "Jump", allowed: Allowed) -> str:

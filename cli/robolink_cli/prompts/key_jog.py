@@ -52,7 +52,7 @@ def agree_by_key(question: str, keys: Keyboard, *, watch: Callable[[], object]) 
             return
         if Key.NO in pressed:
             break
-    raise DeclinedError(tr("You said no."), remedy=tr("Nothing was sent."))
+    raise DeclinedError(tr("That was not y."), remedy=tr("Nothing was sent."))
 
 
 class KeyOperator:

@@ -42,7 +42,7 @@ def keyboard() -> Iterator[Keyboard]:
     console = None if termios else _module("msvcrt")
     if not sys.stdin.isatty() or (termios is None and console is None):
         raise ConfigError(
-            tr("Single keys cannot be read here."),
+            tr("This window cannot read single keys. Type steps instead."),
             remedy=tr("Run it on a terminal, or type steps: robolink robot jog x+0.1"),
         )
     if termios is None:

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Final
 
 from robolink.errors import DeclinedError
 from robolink.messages import tr
-from robolink.runner import Operator, Question
+from robolink.runner import FINEST_STEP, Operator, Question, parse_steps
 from robolink_cli.console.render import note
 from robolink_cli.prompts.lines import QUIET_S, Lines, open_lines
+from robolink_cli.prompts.present import present_desk
 
 if TYPE_CHECKING:
     from robolink_simulators.assist.port import AssistClient, InProcessEyes
@@ -62,7 +63,7 @@ class TerminalOperator:
             return self._lines.next(wait_s)
         except EOFError as error:
             raise DeclinedError(
-                tr("The input ended before the question was answered."),
+                tr("The keyboard is gone. Nothing was answered for you."),
                 remedy=tr("Run it on a terminal, or with --assist on a simulator."),
             ) from error
 
@@ -76,17 +77,24 @@ class TerminalOperator:
 def _how(kind: Question) -> str:
     """Return how a question is answered."""
     if kind is Question.PLACE:
-        return tr("steps like x+0.1 z-0.5; ENTER when it is on the pin; q ends")
+        return tr("Steps: x+0.1 z-0.5. ENTER when it is on the pin. To end: q.")
     if kind is Question.TEXT:
-        return tr("type it, then ENTER; q ends")
+        return tr("Type or scan it, then ENTER. To end: q.")
     if kind is Question.YES_NO:
         return tr("y or n")
-    return tr("steps like x+5 z-0.5; ENTER when it is there; q ends")
+    return tr("Steps: x+5 z-0.5. ENTER when it is there. To end: q.")
+
+
+def terminal() -> Operator:
+    """Return the one operator of this process's terminal: two would share the input badly.
+
+    While a wizard shows it, that is the one whom the wizard asks.
+    """
+    return present_desk() or _plain_terminal()
 
 
 @cache
-def terminal() -> TerminalOperator:
-    """Return the one operator of this process's terminal: two would share the input badly."""
+def _plain_terminal() -> TerminalOperator:
     return TerminalOperator(note)
 
 
@@ -132,6 +140,7 @@ class AssistedOperator:
         self._ahead: list[str] = []
         self._answers = 0
         self._stays = False
+        self._coarse = False
         self._thinking_s = 0.0
 
     @classmethod
@@ -175,6 +184,7 @@ class AssistedOperator:
         self._kind = kind
         self._answers = 0
         self._stays, self._thinking_s, turns = False, 0.0, list[str]()
+        self._coarse = False
         if self._manner is not None:
             manner = self._manner(kind is Question.PLACE)
             self._stays, self._thinking_s = manner.stays, manner.thinks_s
@@ -210,6 +220,8 @@ class AssistedOperator:
         if self._kind is Question.PLACE:
             steps, arrived = steps or self._steps_to_pin(), tr("on the pin")
         self._show(tr("  operator: {answer}", answer=steps or arrived))
+        deltas = parse_steps(steps).values() if steps else ()
+        self._coarse = any(abs(by) > FINEST_STEP for by in deltas)
         return steps or "done"
 
     def _thinks(self, wait_s: float) -> bool:
@@ -222,9 +234,15 @@ class AssistedOperator:
         return self._thinking_s > 0
 
     def _steps_to_pin(self) -> str:
-        # Sideways first, down last, as one does with a needle.
+        # The last bit goes straight down in a fine step, as one does with a needle.
         dx_mm, dy_mm, dz_mm = self._look()
-        return self._steps({"x": dx_mm, "y": dy_mm}) or self._steps({"z": dz_mm})
+        far = abs(dz_mm) > FINEST_STEP
+        first_mm = (dz_mm + FINEST_STEP if dz_mm < 0.0 else dz_mm) if far else 0.0
+        steps = self._steps({"x": dx_mm, "y": dy_mm, "z": first_mm}) or self._steps(
+            {"z": max(-FINEST_STEP, min(FINEST_STEP, dz_mm))}
+        )
+        # Who came in a long step takes a fine one back, and comes again.
+        return steps or (f"z{FINEST_STEP:+.3f}" if self._coarse else "")
 
     def _steps_along(self, kind: Question) -> Iterator[str]:
         """Yield the steps of a way along an axis, or up to where both ways have room."""

@@ -75,4 +75,4 @@ def require_yes(question: str) -> None:
         DeclinedError: The answer was no.
     """
     if not asked(question):
-        raise DeclinedError(tr("You said no."), remedy=tr("Nothing was sent."))
+        raise DeclinedError(tr("That was not y."), remedy=tr("Nothing was sent."))

@@ -47,14 +47,15 @@ def complete_recipe(
     """Return the recipes of the folder that is typed; where it has none, files in general."""
     folder, typed = os.path.split(start)
     try:
-        found = sorted(path.name for path in Path(folder or ".").iterdir() if _is_recipe(path))
+        found = sorted(path.name for path in Path(folder or ".").iterdir() if is_recipe(path))
     except OSError:
         found = []
     names = [os.path.join(folder, name) for name in found if name.startswith(typed)]
     return [CompletionItem(name) for name in names] or [CompletionItem(start, type="file")]
 
 
-def _is_recipe(path: Path) -> bool:
+def is_recipe(path: Path) -> bool:
+    """Tell whether a file is a recipe, by the line that every recipe has."""
     if path.suffix != ".toml" or not path.is_file():
         return False
     with path.open("rb") as file:

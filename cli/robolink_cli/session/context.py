@@ -167,6 +167,19 @@ def looking_options(command: Callable[..., int | None]) -> Callable[..., int | N
     return shared_options(with_context)
 
 
+def context_of_cell(name: str) -> CliContext:
+    """Return what a command was told, for another cell than the one that ``-c`` names.
+
+    Args:
+        name: A cell of the cell files, or a URL.
+
+    Raises:
+        ConfigError: There is no such cell, or a cell file is wrong.
+    """
+    given = click.get_current_context().meta.get(GIVEN, {})
+    return _context_from({**given, "url": name})
+
+
 def _context_from(given: Mapping[str, Any]) -> CliContext:
     name = given.get("url")
     if name is None or not is_cell_name(name):

@@ -34,19 +34,28 @@ def agree_to_motion(question: str, *, yes: bool, in_tool: bool = True) -> None:
         DeclinedError: The answer was no, or nobody could be asked; or the selected tool may be
             a wrong one.
     """
+    heed_what_was_left(yes=yes, in_tool=in_tool)
+    if yes:
+        return
+    if not questions.on_terminal():
+        raise DeclinedError(
+            tr("The robot would move, but there is nobody to ask."),
+            remedy=tr("Add --yes when the cell is clear, or run it on a terminal."),
+        )
+    questions.require_yes(question)
+
+
+def heed_what_was_left(*, yes: bool, in_tool: bool = True) -> None:
+    """Ask about what others left on the controller, before the robot moves.
+
+    Raises:
+        StoppedError, DeclinedError: As :func:`agree_to_motion`.
+    """
     meta = click.get_current_context().meta
     if REACHED in meta:
         heed_stop(meta[REACHED], meta[WATCHED], yes=yes)
     if in_tool and WATCHED in meta:
         heed_selection(meta[WATCHED], meta.get(CELL), yes=yes)
-    if yes:
-        return
-    if not questions.on_terminal():
-        raise DeclinedError(
-            tr("The robot would move, and nobody can be asked here."),
-            remedy=tr("Run it on a terminal, or give --yes when the cell is clear."),
-        )
-    questions.require_yes(question)
 
 
 def motion_question(
@@ -62,8 +71,8 @@ def motion_question(
     group.require_able(purpose)
     terms = group.terms()
     return tr(
-        "{who} will move at most {speed:g} mm/s fast, within {box:g} mm, {purpose}. {watch} "
-        "Is the cell clear?",
+        "{who} will move by itself {purpose}: up to {speed:g} mm/s, at most {box:g} mm from "
+        "here. {watch} Is everybody out of the cell?",
         who=terms.who,
         speed=speed_mm_s,
         box=box_mm,

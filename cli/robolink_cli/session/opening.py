@@ -23,6 +23,7 @@ from robolink_cli.options.shared import json_option as json_option
 from robolink_cli.options.shared import origin_of as origin_of
 from robolink_cli.prompts.questions import WATCHED, asked, on_terminal
 from robolink_cli.session.context import CliContext
+from robolink_cli.session.desk_watch import watched_at_desk
 from robolink_cli.session.motion_consent import CELL, REACHED
 from robolink_cli.session.operator_identity import signature_of
 from robolink_cli.session.stop_listening import listening_for_stop, remember_address
@@ -89,6 +90,7 @@ def open_controller(
         )
         remember_address(context)
         with (
+            watched_at_desk(controller),
             listening_for_stop(controller, context, looks=unhindered),
             _saying_what_is_left(controller, context, quiet=quiet, looks=looks, calms=calms),
         ):

@@ -44,7 +44,7 @@ def heed_stop(url: str, controller: "Controller", *, yes: bool) -> None:
         )
     note(found.sentence)
     if not asked(tr("Has that been looked into, and may the robot move again?")):
-        raise DeclinedError(tr("You said no."), remedy=tr("Nothing was sent."))
+        raise DeclinedError(tr("That was not y."), remedy=tr("Nothing was sent."))
     _clear(keys, name)
 
 

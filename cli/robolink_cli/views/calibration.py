@@ -58,7 +58,7 @@ def show_report(report: ToolReport) -> None:
     if receipt.skipped:
         say(tr("Tool {tool} held this value already; nothing was written.", tool=tool))
     else:
-        say(tr("Tool {tool} was written and read back.", tool=tool))
+        say(tr("Tool {tool} is written and read back.", tool=tool))
     if report.verification is None:
         say(tr("It was not verified."))
         return
@@ -77,11 +77,9 @@ def _proof(verification: VerifyResult) -> str:
     """Return how the verification ended, in one sentence."""
     found = {"drift": verification.max_drift_mm, "limit": verification.tolerance_mm}
     if verification.heights_only:
-        return tr(
-            "Touched again it is {drift:.3f} mm off at most ({limit:.3f} mm allowed).", **found
-        )
+        return tr("Touched again: {drift:.3f} mm off at most, limit {limit:.3f} mm.", **found)
     return tr(
-        "Turned about the new tip it drifts {drift:.3f} mm at most ({limit:.3f} mm allowed).",
+        "Turn test passed: {drift:.3f} mm off at most, limit {limit:.3f} mm.",
         **found,
     )
 
@@ -116,21 +114,21 @@ def show_course(steps: Sequence[PlannedStep]) -> None:
     ways = sum(step.shown in (TeachPrompt.ALONG_X, TeachPrompt.ALONG_Z) for step in steps)
     if ways:
         plan = tr(
-            "The plan: touches by a person: {asks}; ways along the tool's axes shown by "
-            "a person: {ways}; movements of the robot between them: {moves}.",
+            "Touches of the pin by you: {asks}. Ways along the tool's axes shown by you: "
+            "{ways}. Moves of the robot by itself: {moves}.",
             asks=asks,
             ways=ways,
             moves=moves,
         )
     elif asks:
         plan = tr(
-            "The plan: touches by a person: {asks}; movements of the robot between them: {moves}.",
+            "Touches of the pin by you: {asks}. Moves of the robot by itself: {moves}.",
             asks=asks,
             moves=moves,
         )
     else:
-        plan = tr("The plan: {moves} movements of the robot; nobody touches anything.", moves=moves)
-    note(tr("{plan} All targets lie inside the box; --dry-run lists them.", plan=plan))
+        plan = tr("Moves of the robot by itself: {moves}. Nobody touches anything.", moves=moves)
+    note(tr("{plan} All moves stay in the allowed area.", plan=plan))
 
 
 def show_plan(payload: Mapping[str, object]) -> None:

@@ -140,7 +140,12 @@ def show_cell(payload: Mapping[str, Any]) -> None:
     for name, text in texts.items():
         say(f"  {name:{names}}  {text:{width}}  {origins.get(name, '')}".rstrip())
     if not values["remote_timeout_s"]:
-        say(tr("Nothing moves: no remote time-out is confirmed for this cell."))
+        say(
+            tr(
+                "The robot stays still: nobody has confirmed the controller's time-out for this "
+                "cell."
+            )
+        )
 
 
 def _add_refusals(files: Sequence[Mapping[str, Any]], alone: Path | None) -> None:

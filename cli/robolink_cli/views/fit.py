@@ -26,15 +26,15 @@ def _fit(result: CalibrationResult) -> str:
     """Return how well the poses agree, in one sentence; empty where a sensor measured once."""
     if result.rms_mm is None:
         if result.method == "one-touch":
-            return tr("one touch leaves no residual")
+            return tr("One touch cannot be checked.")
         if result.method == "two-pose":
             return tr(
-                "two poses leave no residual: each placement error counts {gain:.2f} times",
+                "Two touches cannot check each other: each error counts {gain:.2f} times.",
                 gain=result.sigma_gain,
             )
-        return tr("nothing is left over that could tell how well it agrees with itself")
+        return tr("Nothing is left over that could check it.")
     return tr(
-        "{count} poses agree within {rms:.3f} mm rms, {largest:.3f} mm at most",
+        "The {count} touches agree within {rms:.3f} mm; the worst is {largest:.3f} mm off.",
         count=len(result.residuals_mm) - len(result.rejected),
         rms=result.rms_mm,
         largest=result.max_residual_mm,
@@ -52,7 +52,7 @@ def _interval(result: CalibrationResult) -> str:
     if not result.half_width95:
         return ""
     parts = (
-        f"{name[0].upper()} ±{half:.3f}"
+        f"{name[0].upper()} +-{half:.3f}"
         for name, half in zip(result.measured, result.half_width95, strict=True)
     )
     if result.interval_from == "resolution":

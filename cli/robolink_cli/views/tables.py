@@ -127,7 +127,7 @@ def show_change(
         if after is not None and name[0] in "xyzu":
             say(
                 tr(
-                    "  {axis} kept at {value}: not measured",
+                    "  {axis} {value}: not measured, stays.",
                     axis=name[0].upper(),
                     value=number(after[name]),
                 )

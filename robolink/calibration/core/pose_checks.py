@@ -338,8 +338,8 @@ def _require_rotation(poses: Sequence[Pose], spread_deg: float, minimum_deg: flo
         raise CalibrationError(
             "insufficient_rotation",
             tr(
-                "The poses spread over {spread:.2f} degrees in U only; every placement error "
-                "would count {gain:.1f} times.",
+                "U turned only {spread:.0f} degrees between the touches: every error would "
+                "count {gain:.1f} times.",
                 spread=spread_deg,
                 gain=planar_sigma_gain(poses),
             ),

@@ -250,7 +250,7 @@ def _too_many(rejected: int, count: int) -> CalibrationError:
     return CalibrationError(
         "too_many_outliers",
         tr(
-            "{rejected} of {count} poses do not fit the others; a third may be rejected.",
+            "{rejected} of {count} touches do not fit the others; a third may be left out.",
             rejected=rejected,
             count=count,
         ),

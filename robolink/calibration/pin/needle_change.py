@@ -154,7 +154,8 @@ def _require_plausible(shift_mm: float, limit_mm: float) -> None:
         raise CalibrationError(
             "implausible_change",
             tr(
-                "The tip moved by {shift:.3f} mm; {limit:.3f} mm is plausible for a new needle.",
+                "This needle is {shift:.3f} mm away from the last one; up to {limit:.3f} mm "
+                "is usual.",
                 shift=shift_mm,
                 limit=limit_mm,
             ),

@@ -52,7 +52,7 @@ _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
     "small_rotation": lambda: tr("The poses differ little in U; half a turn would be best."),
     "few_poses": lambda: tr("Few poses: four or more tell errors of placement from each other."),
     "large_rms": lambda: tr("The residuals are large for this method."),
-    "large_residual": lambda: tr("One pose is far off; take it again."),
+    "large_residual": lambda: tr("One touch is far off. Touch it again."),
     "camera_moved": lambda: tr(
         "The camera sees things beside where they are: it was moved, or its calibration is old."
     ),
@@ -68,7 +68,7 @@ _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
         "sure than its interval says."
     ),
     "full_calibration_due": lambda: tr(
-        "A full calibration is due: the differences since the last one add up."
+        "A full calibration is due: the errors of the needle changes since then add up."
     ),
     "duplicate_poses": lambda: tr(
         "Some poses are copies of others; a copy tells nothing new and counts once."

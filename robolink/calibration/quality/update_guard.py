@@ -88,11 +88,12 @@ def update_guard(
         raise CalibrationError(
             "implausible_change",
             tr(
-                "The offset would change by {change:.3f} mm; {limit:.3f} mm is plausible.",
+                "The tip would move {change:.3f} mm; {limit:.3f} mm is allowed. Nothing was "
+                "written.",
                 change=length,
                 limit=max_change_mm,
             ),
-            remedy=tr("Look at how the tip is seated, and measure again."),
+            remedy=tr("Is the right needle mounted, and tight? Then measure again."),
         )
     before = earlier_mm[-1] if earlier_mm else None
     return Correction(*changes, ratio=length / before if before else None)

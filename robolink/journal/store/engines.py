@@ -11,14 +11,19 @@ from urllib.parse import quote
 from sqlalchemy import Engine, create_engine, event, text
 from sqlalchemy.pool import NullPool, Pool, StaticPool
 
+from robolink import ambient
 from robolink.errors import JournalError
 from robolink.files.durable import make_folder, sync_folder
 from robolink.journal._places import JournalPlace
 from robolink.journal.store.prepared import Prepared
 from robolink.messages import tr
+from robolink.timing import Deadline, SystemClock
 
 BUSY_S: Final = 3.0
 """How long a write waits for another program that writes."""
+
+_AGAIN_S: Final = 0.01
+"""Pause before a new file is asked again for its write-ahead log."""
 
 _PAGE_BYTES: Final = 2048
 """Of a new file. A commit writes whole pages, six or seven of them for two or three short rows:
@@ -128,9 +133,28 @@ def _memory() -> sqlite3.Connection:
 def _prepare(connection: sqlite3.Connection) -> None:
     if connection.execute("PRAGMA journal_mode").fetchone() != ("wal",):
         connection.execute(f"PRAGMA page_size={_PAGE_BYTES}")  # of no effect in a file with tables
-        connection.execute("PRAGMA journal_mode=WAL")
+        _begin_wal(connection)
     connection.execute("PRAGMA synchronous=FULL")
     connection.execute("PRAGMA foreign_keys=ON")
+
+
+def _begin_wal(connection: sqlite3.Connection) -> None:
+    """Give a new file its write-ahead log, while others may be about to.
+
+    Each of them reads the file before it wants it alone. SQLite does not let the second one wait
+    for that, which would wait for the first for ever, but refuses it at once, whatever its
+    timeout (https://www.sqlite.org/c3ref/busy_handler.html); a moment later it is done.
+    """
+    deadline = Deadline.after(SystemClock(), BUSY_S)
+    while True:
+        try:
+            connection.execute("PRAGMA journal_mode=WAL")
+        except sqlite3.OperationalError as error:
+            if error.sqlite_errorcode != sqlite3.SQLITE_BUSY or deadline.expired:
+                raise
+            ambient.sleep(_AGAIN_S)
+        else:
+            return
 
 
 def _uri(path: Path, options: str) -> str:

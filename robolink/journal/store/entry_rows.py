@@ -5,7 +5,7 @@ from dataclasses import fields
 from functools import lru_cache
 from typing import Any, Final, TypeAlias, TypeVar
 
-from sqlalchemy import Connection, Select, bindparam, func, insert, select, update
+from sqlalchemy import BindParameter, Integer, Text, bindparam, func, insert, select, update
 
 from robolink.journal._records import Filter
 from robolink.journal.store.chain import canonical, digest, storable
@@ -24,9 +24,16 @@ _LOOKS: Final = 100
 
 # The kinds whose value was read on the controller.
 # What is recorded of a controller without anything being changed on it.
-_NO_HISTORY: Final = (EntryKind.IDENTITY, EntryKind.RECONNECT, EntryKind.LEASE)
+_NO_HISTORY: Final = (
+    EntryKind.IDENTITY,
+    EntryKind.RECONNECT,
+    EntryKind.LEASE,
+    EntryKind.CHECK,
+)
 
-_SELECT_HEAD: Final = select(HEAD.c.number, HEAD.c.hash)
+_HEAD_OF: Final = select(HEAD.c.number, HEAD.c.hash)
+_SELECT_HEAD: Final = Prepared(_HEAD_OF)
+_LOCK_HEAD: Final = Prepared(_HEAD_OF.with_for_update())
 _MOVE_HEAD: Final = Prepared(
     update(HEAD)
     .where(HEAD.c.number == bindparam("of_number"), HEAD.c.hash == bindparam("of_hash"))
@@ -35,14 +42,18 @@ _MOVE_HEAD: Final = Prepared(
 _INSERT: Final = Prepared(insert(ENTRIES))
 _SIGNATURE: Final = tuple(field.name for field in fields(Signature))
 _PLACES: Final = dict.fromkeys(sorted(column.name for column in ENTRIES.c if column.name != "hash"))
-_COUNT: Final = select(func.count()).select_from(ENTRIES)
+_COLUMNS: Final = tuple(ENTRIES.c.keys())
+_COUNT: Final = Prepared(select(func.count()).select_from(ENTRIES))
+_LAST: Final = Prepared(select(func.max(ENTRIES.c.number)))
+
+_NAME, _KIND = "name_", "kind_"
+"""How the places of several names and kinds begin."""
 
 
 class EntryRows:
     """The append-only record over one connection."""
 
-    def __init__(self, connection: Connection, runner: StatementRunner) -> None:
-        self._connection = connection
+    def __init__(self, runner: StatementRunner) -> None:
         self._runner = runner
         self._head: _Head | None = None  # a guess: others add entries too
 
@@ -76,36 +87,33 @@ class EntryRows:
         self, wanted: Filter, *, before: int | None, after: int | None, limit: int
     ) -> list[Mapping[str, Any]]:
         """Return up to ``limit`` of the entries between two numbers, both left out."""
-        statement = _listing(wanted).limit(limit)
+        values = {**_values(wanted), "limit": limit}
         if before is not None:
-            statement = statement.where(ENTRIES.c.number < before)
+            values["before"] = before
         if after is not None:
-            statement = statement.where(ENTRIES.c.number > after)
-        return [dict(row) for row in self._connection.execute(statement).mappings()]
+            values["after"] = after
+        outside = wanted.change == ""
+        listing = _listing(tuple(values), newest_first=wanted.newest_first, outside=outside)
+        return [dict(zip(_COLUMNS, row, strict=True)) for row in self._runner.rows(listing, values)]
 
     def history(self, names: Sequence[str]) -> bool:
         """Whether anything was changed, or decided, on the controller with these names."""
-        wanted = [storable(name) for name in names]
-        about = [str(kind) for kind in _NO_HISTORY]
-        columns = ENTRIES.c
-        statement = select(columns.number).where(
-            columns.controller.in_(wanted), columns.kind.not_in(about)
-        )
-        return self._connection.execute(statement.limit(1)).first() is not None
+        values = {f"{_NAME}{place}": storable(name) for place, name in enumerate(names)}
+        return bool(values) and bool(self._runner.rows(_history(tuple(values)), values))
 
     def count(self) -> int:
         """Return how many there are."""
-        return int(self._connection.execute(_COUNT).scalar_one())
+        return int(self._runner.rows(_COUNT)[0][0])
 
     def last_number(self) -> int:
         """Return the highest number, 0 when there is none."""
-        highest = self._connection.execute(select(func.max(ENTRIES.c.number))).scalar_one()
+        highest = self._runner.rows(_LAST)[0][0]
         return 0 if highest is None else int(highest)
 
     def head(self) -> tuple[int, str] | None:
         """Return number and hash of the entry that was stored last."""
-        row = self._connection.execute(_SELECT_HEAD).one_or_none()
-        return None if row is None else (row.number, row.hash)
+        row = next(iter(self._runner.rows(_SELECT_HEAD)), None)
+        return None if row is None else (row[0], row[1])
 
     def settled(self, read: Callable[[], T]) -> tuple[T, _Head | None]:
         """Read something together with the head, as both were at one instant.
@@ -126,7 +134,7 @@ class EntryRows:
         return found, head
 
     def _locked_head(self) -> _Head:
-        number, last_hash = self._connection.execute(_SELECT_HEAD.with_for_update()).one()
+        ((number, last_hash),) = self._runner.rows(_LOCK_HEAD)
         return number, last_hash
 
     def _move_head(self, head: _Head, last: Mapping[str, Any]) -> bool:
@@ -154,28 +162,68 @@ def _chained(
     return rows
 
 
-def _listing(wanted: Filter) -> Select[Any]:
+def _values(wanted: Filter) -> dict[str, object]:
+    """Return what is looked for, by the names of the places in :func:`_listing`."""
+    values: dict[str, object] = {}
+    for place, name in enumerate(wanted.controllers):
+        values[f"{_NAME}{place}"] = storable(name)
+    for place, kind in enumerate(wanted.kinds):
+        values[f"{_KIND}{place}"] = str(kind)
+    if wanted.change:
+        values["change"] = storable(wanted.change)
+    if wanted.tool is not None:
+        values["tool"] = wanted.tool
+    if wanted.proved_tool is not None:
+        values["proved_tool"] = wanted.proved_tool
+    return values
+
+
+@lru_cache(maxsize=256)
+def _listing(places: tuple[str, ...], *, newest_first: bool, outside: bool) -> Prepared:
+    """Return the statement that has these places.
+
+    Args:
+        places: Names of its parameters.
+        newest_first: In which order.
+        outside: Whether only entries outside of changes are meant.
+    """
     columns = ENTRIES.c
-    order = columns.number.desc() if wanted.newest_first else columns.number
-    listing = select(ENTRIES).order_by(order)
-    if wanted.controllers:
+    order = columns.number.desc() if newest_first else columns.number
+    listing = select(ENTRIES).order_by(order).limit(bindparam("limit", type_=Integer))
+    if names := _texts(places, _NAME):
         # A change has few entries and an index of its own. SQLite prefers the index that gives
         # the order, and would walk through all that the controller has on record.
-        controller = func.coalesce(columns.controller, "") if wanted.change else columns.controller
-        names = [storable(name) for name in wanted.controllers]
+        inside = "change" in places
+        controller = func.coalesce(columns.controller, "") if inside else columns.controller
         one = len(names) == 1
         listing = listing.where(controller == names[0] if one else controller.in_(names))
-    if wanted.tool is not None:
-        listing = listing.where(columns.tool == wanted.tool)
-    if wanted.proved_tool is not None:
-        listing = listing.where(columns.proved_tool == wanted.proved_tool)
-    if wanted.change:
-        listing = listing.where(columns.change == storable(wanted.change), IN_A_CHANGE)
-    elif wanted.change is not None:
+    for name in ("tool", "proved_tool"):
+        if name in places:
+            listing = listing.where(columns[name] == bindparam(name))
+    if "change" in places:
+        listing = listing.where(columns.change == bindparam("change"), IN_A_CHANGE)
+    elif outside:
         listing = listing.where(columns.change == "")
-    if wanted.kinds:
-        listing = listing.where(columns.kind.in_([str(kind) for kind in wanted.kinds]))
-    return listing
+    if kinds := _texts(places, _KIND):
+        listing = listing.where(columns.kind.in_(kinds))
+    if "before" in places:
+        listing = listing.where(columns.number < bindparam("before"))
+    if "after" in places:
+        listing = listing.where(columns.number > bindparam("after"))
+    return Prepared(listing)
+
+
+@lru_cache(maxsize=64)
+def _history(places: tuple[str, ...]) -> Prepared:
+    """Return the statement that looks for a change under names in these places."""
+    columns = ENTRIES.c
+    ours = columns.controller.in_(_texts(places, _NAME))
+    changed = [columns.kind != str(kind) for kind in _NO_HISTORY]
+    return Prepared(select(columns.number).where(ours, *changed).limit(1))
+
+
+def _texts(places: tuple[str, ...], beginning: str) -> list[BindParameter[str]]:
+    return [bindparam(name, type_=Text) for name in places if name.startswith(beginning)]
 
 
 @lru_cache(maxsize=64)

@@ -53,7 +53,7 @@ class Tables:
     ) -> None:
         self.connection = connection
         self.runner = StatementRunner(connection)
-        self.entries = EntryRows(connection, self.runner)
+        self.entries = EntryRows(self.runner)
         self.markers = MarkerRows(self.runner)
         self.leases = LeaseRows(self.runner)
         self.names = NameRows(

@@ -41,7 +41,7 @@ class CrossingSampler:
     @property
     def known(self) -> str:
         """Which lengths become known."""
-        return tr("X and Y are known")
+        return tr("X and Y")
 
     def counted(self, count: int) -> str:
         """Say how many were taken."""

@@ -92,13 +92,13 @@ class BeamScan:
         """
         entry = yield from self._seek(self.start, broken=True)
         leaving = yield from self._seek(entry, broken=False)
-        yield Move(self.end, Path.STRAIGHT, tr("go beside the beam"))
+        yield Move(self.end, Path.STRAIGHT, tr("Moving beside the beam."))
         return Crossing(self.beam, entry, leaving)
 
     def _seek(self, here: Pose, *, broken: bool) -> Procedure[Pose]:
         number = self.beam + 1
         purpose = (
-            tr("seek beam {number}", number=number)
+            tr("Looking for beam {number}.", number=number)
             if broken
             else tr("leave beam {number}", number=number)
         )
@@ -142,9 +142,11 @@ class BeamTravel:
             start = scan.start
             if self._last is None:
                 above = replace(start, z_mm=scan.drive.safe_z_mm)
-                yield from approach_path(above, here=self._here, purpose=tr("go above the beams"))
+                yield from approach_path(
+                    above, here=self._here, purpose=tr("Moving above the beams.")
+                )
             if self._last is None or self._last.end != start:
-                yield Move(start, Path.STRAIGHT, tr("go beside the beam"))
+                yield Move(start, Path.STRAIGHT, tr("Moving beside the beam."))
             found.append((yield from scan.cross()))
             self._last = scan
         return found
@@ -154,5 +156,5 @@ class BeamTravel:
         if self._last is None:
             return
         above = replace(self._last.end, z_mm=self._last.drive.safe_z_mm)
-        self._here = yield Move(above, Path.STRAIGHT, tr("lift out of the beams"))
+        self._here = yield Move(above, Path.STRAIGHT, tr("Lifting out of the beams."))
         self._last = None

@@ -191,6 +191,11 @@ class Needs:
     motion: bool = True
     place: tuple[str, str] | None = None
 
+    @property
+    def by_sensor(self) -> bool:
+        """Whether beams, a switch or a camera measure and no person touches anything."""
+        return self.motion and self.named and self.station is not StationKind.PIN
+
 
 @dataclass(frozen=True, slots=True)
 class PoseHelp:

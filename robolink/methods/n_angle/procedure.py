@@ -55,7 +55,7 @@ def measure_n_angle(
             ``touch_not_proven``, ``large_residual``, and as :func:`solve_n_angle`.
         LimitError: The arm cannot turn so over this pin, nor to the other side, nor half as far.
     """
-    touches = PinTouches(plan, comes_down=stored is not None)
+    touches = PinTouches(plan, comes_down=stored is not None, total=1 + len(turns_deg))
     first = yield from touches.first()
     # Refused before anything turns, not when all touches are made.
     solvable_planes([first], height_of(stored))
@@ -95,7 +95,7 @@ class _NAngleSampler:
 
     @property
     def known(self) -> str:
-        return tr("X and Y are known")
+        return tr("X and Y")
 
     def counted(self, count: int) -> str:
         return tr("{count} touches", count=count)

@@ -91,7 +91,8 @@ def find_last_touch(controller: Controller, tool: int, station: str) -> LastTouc
                 value=describe_offset(newest.value),
             ),
             remedy=tr(
-                "Somebody changed the tool since. Put that value back, or make a full calibration."
+                "The tool is not what its last calibration left. Put that value back, or "
+                "make a full calibration."
             ),
         )
     return newest

@@ -36,15 +36,15 @@ def measure_one_touch(
     """
     guess = require_known_length(stored)
     contact = carrying(replace(here, u_deg=u_deg), guess, pin_mm)
-    touches = PinTouches(plan)
+    touches = PinTouches(plan, total=1)
     yield from approach_path(
-        offset_z(contact, plan.lift_mm), here=here, purpose=tr("go above the pin")
+        offset_z(contact, plan.lift_mm), here=here, purpose=tr("Moving above the pin.")
     )
     touch = yield from touches.again(
         contact,
         key=0,
-        turning=tr("go beside the pin"),
-        instruction=tr("Bring the tip onto the pin."),
+        turning=tr("Moving beside the pin."),
+        instruction=tr("Jog the tip onto the pin."),
     )
     return solve(touch)
 

@@ -129,7 +129,7 @@ def verify_by_tilting(
 def _shown(swing: "_Swing", proof: DriftProof, tilt: Tilt) -> Procedure[None]:
     found = yield from swing.touch(
         tilt,
-        tr("Bring the tip back onto the pin; what you jog shows the drift."),
+        tr("Jog the tip onto the pin again: that shows how far it was off."),
         key=len(proof.touches),
     )
     proof.add(swing.over.pose(tilt, 0.0), found, in_space=True)
@@ -166,7 +166,7 @@ class _Swing:
             yield from self._touches.again(
                 self.over.pose(tilt, 0.0),
                 key=key,
-                turning=tr("go beside the pin"),
+                turning=tr("Moving beside the pin."),
                 instruction=instruction,
             )
         )
@@ -182,14 +182,14 @@ class _PivotSampler:
 
     @property
     def known(self) -> str:
-        return tr("X, Y and Z are known")
+        return tr("X, Y and Z")
 
     def counted(self, count: int) -> str:
         return tr("{count} touches", count=count)
 
     def take(self, place: Tilt) -> Procedure[Pose]:
         return self.swing.touch(
-            place, tr("Bring the tip onto the pin again, with the tool tilted."), key=place
+            place, tr("Jog the tip onto the pin again; the tool is tilted now."), key=place
         )
 
     def away(self) -> Procedure[None]:

@@ -27,7 +27,7 @@ def tilt_in_air(over: OverPin, stands: Tilt, goal: Tilt, lift_mm: float) -> Proc
     """
     for tilt in tilt_path(stands, goal):
         target = over.pose(tilt, lift_mm)
-        reached: Pose = yield Move(target, Path.JOINT, tr("tilt and turn in the air"))
+        reached: Pose = yield Move(target, Path.JOINT, tr("Tilting and turning in the air."))
         amiss_deg = apart_deg(target, reached)
         if amiss_deg > MOST_DEVIATION_DEG:
             raise CalibrationError(

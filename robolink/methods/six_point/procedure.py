@@ -20,7 +20,7 @@ from robolink.calibration import (
     solve_six_point,
 )
 from robolink.errors import CalibrationError
-from robolink.messages import tr
+from robolink.messages import joined, tr
 from robolink.methods.pivot.procedure import pivot_then_lift
 from robolink.methods.pivot.tilts import Tilt
 from robolink.model import Path, Pose, ToolOffset
@@ -103,7 +103,7 @@ def measure_six_point(
         askew = "ways_askew" in result.warnings
         if not left or not askew or not (yield Confirm(tr("Show both ways again?"))):
             break
-    yield from approach_path(lifted, here=start, purpose=tr("go back above the pin"))
+    yield from approach_path(lifted, here=start, purpose=tr("Moving back above the pin."))
     return result
 
 
@@ -148,7 +148,7 @@ class _AxisTeaching:
             end = yield from _shown(
                 ask, lambda pose: axis_displacement(start, pose, wanted_mm=self.ways.length_mm)
             )
-            yield Move(start, Path.STRAIGHT, tr("go back to where the way began"))
+            yield Move(start, Path.STRAIGHT, tr("Moving back to where the way began."))
             if not left or not (yield from self._doubted(start, end, way)):
                 break
         return end
@@ -230,6 +230,6 @@ def _uncertainty(result: SixPointResult) -> str:
         return said
     if "ways_askew" in result.warnings:
         doubted = tr("That is more than the touches scatter: a way was not quite along its axis.")
-        return f"{said} {doubted}"
-    known = tr("U, V and W are known to ±{half:.3f} degrees.", half=half_deg)
-    return f"{said} {known}"
+        return joined(" ", (said, doubted))
+    known = tr("U, V and W are sure to +-{half:.3f} degrees.", half=half_deg)
+    return joined(" ", (said, known))

@@ -33,7 +33,7 @@ def measure_two_pose(
             :func:`solve_two_pose`.
         LimitError: The arm cannot turn so over this pin, to neither side.
     """
-    touches = PinTouches(plan, comes_down=stored is not None)
+    touches = PinTouches(plan, comes_down=stored is not None, total=2)
     first = yield from touches.first()
     # Refused before anything turns, not when both touches are made.
     solvable_planes([first], height_of(stored))

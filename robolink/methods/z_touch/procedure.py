@@ -127,27 +127,31 @@ class _ZTouchSampler:
 
     @property
     def known(self) -> str:
-        return tr("Z is known")
+        return tr("Z")
 
     def counted(self, count: int) -> str:
         return tr("{count} touches", count=count)
 
     def take(self, place: float) -> Procedure[Touch]:
         if not self.near:
-            yield from approach_path(self._safe, here=self.here, purpose=tr("go above the surface"))
-            self.here = yield Move(self._above, Path.STRAIGHT, tr("come down to the clearance"))
+            yield from approach_path(
+                self._safe, here=self.here, purpose=tr("Moving above the surface.")
+            )
+            self.here = yield Move(
+                self._above, Path.STRAIGHT, tr("Lowering to just above the place.")
+            )
             self.near = True
         end = offset_z(self._above, -self.plan.clearance_mm - self.plan.beyond_mm)
-        step = Seek(end, self.station.edge, place, tr("seek the surface"))
+        step = Seek(end, self.station.edge, place, tr("Looking for the surface."))
         touch = yield from seek_or_retract(step, here=self.here, safe_z_mm=self._safe.z_mm)
         self.here = yield Move(
-            offset_z(touch, self.plan.back_off_mm), Path.STRAIGHT, tr("back off")
+            offset_z(touch, self.plan.back_off_mm), Path.STRAIGHT, tr("Backing off.")
         )
         return Touch(touch.z_mm, place)
 
     def away(self) -> Procedure[None]:
         if self.near:
-            self.here = yield Move(self._safe, Path.STRAIGHT, tr("lift off the surface"))
+            self.here = yield Move(self._safe, Path.STRAIGHT, tr("Lifting off the surface."))
             self.near = False
 
     def solve(self, touches: Sequence[Touch]) -> ZTouchResult:

@@ -103,14 +103,14 @@ class WorkBox:
             if not low <= value <= high:
                 raise LimitError(
                     tr(
-                        "The target {axis} = {value:.3f} mm lies outside the work box "
-                        "({low:.3f} to {high:.3f} mm); nothing was sent.",
+                        "{axis} {value:.3f} would leave the allowed area ({low:.3f} to "
+                        "{high:.3f} mm). Nothing moved.",
                         axis=axis.upper(),
                         value=value,
                         low=low,
                         high=high,
                     ),
-                    remedy=tr("Start nearer to the reference point, or widen the box."),
+                    remedy=tr("Jog closer to the pin and start again, or widen the allowed area."),
                 )
 
 

@@ -149,20 +149,22 @@ def projected(wanted: RotationMatrix, v_u: Direction3, v_rot: Direction3) -> Rot
 
 def turned_vector(rotation: RotationMatrix, vector: Direction3) -> Direction3:
     """Return a vector after a rotation."""
-    x, y, z = (_dot(row, vector) for row in rotation)
-    return (x, y, z)
+    # Written out, here and below: every cycle of a simulated movement does it several times.
+    (a, b, c), (d, e, f), (g, h, i) = rotation
+    x, y, z = vector
+    return (a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z)
 
 
 def inverse_rotation(rotation: RotationMatrix) -> RotationMatrix:
     """Return the rotation that undoes one."""
-    x, y, z = zip(*rotation, strict=True)
-    return (x, y, z)
+    (a, b, c), (d, e, f), (g, h, i) = rotation
+    return ((a, d, g), (b, e, h), (c, f, i))
 
 
 def matrix_product(a: RotationMatrix, b: RotationMatrix) -> RotationMatrix:
     """Return ``a b``: first ``b``, then ``a``, both about fixed axes."""
-    x, y, z = zip(*(turned_vector(a, column) for column in inverse_rotation(b)), strict=True)
-    return (x, y, z)
+    x, y, z = inverse_rotation(b)
+    return inverse_rotation((turned_vector(a, x), turned_vector(a, y), turned_vector(a, z)))
 
 
 def _dot(a: Direction3, b: Direction3) -> float:
@@ -175,6 +177,9 @@ def _cross(a: Direction3, b: Direction3) -> Direction3:
 
 def _is_rotation(rotation: RotationMatrix) -> bool:
     x, y, z = rotation
-    return math.dist(_cross(x, y), z) <= _UNIT and all(
-        abs(math.hypot(*row) - 1) <= _UNIT for row in rotation
+    return (
+        math.dist(_cross(x, y), z) <= _UNIT
+        and abs(math.hypot(*x) - 1) <= _UNIT
+        and abs(math.hypot(*y) - 1) <= _UNIT
+        and abs(math.hypot(*z) - 1) <= _UNIT
     )

@@ -28,6 +28,7 @@ class EntryKind(StrEnum):
     STATION = "station"
     IDENTITY = "identity"
     BACKUP = "backup"
+    CHECK = "check"
 
 
 PROOFS: Final = (

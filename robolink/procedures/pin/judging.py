@@ -11,7 +11,17 @@ from robolink.runner import TouchedAt
 if TYPE_CHECKING:
     from robolink.calibration import WitnessedTouch  # numpy, which a look does without
 
-TOUCH_CODES: Final = ("not_touched", "typed_ahead", "touch_heights_differ", "touch_not_proven")
+TOUCH_CODES: Final = (
+    "not_touched",
+    "typed_ahead",
+    "touch_heights_differ",
+    "touch_not_proven",
+    "coarse_step",
+    "still_moving",
+    "old_reading",
+    "turned_too_little",
+    "mixed_tool",
+)
 """Why touches do not count, in a measurement and in a proof."""
 
 

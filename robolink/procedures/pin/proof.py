@@ -97,7 +97,7 @@ class _Turning:
     ) -> None:
         self._plan, self._contact = plan, contact
         self._written, self._tip = written, tip
-        self._touches = PinTouches(plan)
+        self._touches = PinTouches(plan, proof=True)
         self._count = 0
 
     def shown(self, angle_deg: float) -> Procedure[tuple[Pose, TouchedAt]]:
@@ -106,8 +106,8 @@ class _Turning:
         found = yield from self._touches.again(
             place,
             key=self._count,
-            turning=tr("turn about the new tip"),
-            instruction=tr("Bring the tip back onto the pin; what you jog shows the drift."),
+            turning=tr("Turning about the new tip."),
+            instruction=tr("Jog the tip onto the pin again: that shows how far it was off."),
         )
         self._count += 1
         return place, found

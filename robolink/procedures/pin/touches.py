@@ -7,19 +7,23 @@ that a touch that was not made shows (docs/reference/evidence.md 1).
 
 from collections.abc import Hashable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from robolink.calibration import FARTHEST_MM, HIGHEST_MM, FlangePlane
 from robolink.messages import tr
-from robolink.model import Path, Pose, ToolOffset
+from robolink.model import Path, Pose, ToolOffset, angle_difference_deg
 from robolink.procedures.approach import offset_z
-from robolink.procedures.pin.judging import require_touches
+from robolink.procedures.pin.judging import heights_agree, require_touches
 from robolink.procedures.pin.touch_plan import TouchPlan, fresh_seed, plain_pose
 from robolink.procedures.pin.witnessed import WitnessedTouches
-from robolink.runner import Move, Procedure, TouchedAt
+from robolink.runner import Move, NotYet, Procedure, TouchedAt
 
 if TYPE_CHECKING:
     from robolink.calibration import StandoffSeries  # numpy, which a look does without
+
+
+LEAST_TURN_DEG: Final = 10.0
+"""Nearer in U two touches of a plan never lie that puts them further apart than twice as much."""
 
 
 class PinTouches(WitnessedTouches):
@@ -30,10 +34,20 @@ class PinTouches(WitnessedTouches):
         planar: Whether the tool stands upright in all of them.
         comes_down: Whether the tip is known well enough to come down to the clearance; else it
             stops at the lift, and the person jogs the whole approach.
+        total: How many touches are planned, ``None`` where nobody knows.
+        proof: Whether they are those of a proof.
     """
 
-    def __init__(self, plan: TouchPlan, *, planar: bool = True, comes_down: bool = True) -> None:
-        super().__init__(plan)
+    def __init__(
+        self,
+        plan: TouchPlan,
+        *,
+        planar: bool = True,
+        comes_down: bool = True,
+        total: int | None = None,
+        proof: bool = False,
+    ) -> None:
+        super().__init__(plan, total=total, proof=proof)
         self._planar = planar
         self._low_mm = plan.clearance_mm if comes_down else plan.lift_mm
         self._comes_down = comes_down
@@ -45,7 +59,7 @@ class PinTouches(WitnessedTouches):
         Args:
             key: By which a later touch takes the place of this one; ``None`` for its U.
         """
-        return (yield from self.shown(tr("Bring the tip onto the pin."), key=key))
+        return (yield from self.shown(tr("Jog the tip onto the pin."), key=key))
 
     def again(
         self, expected: Pose, *, key: Hashable, turning: str, instruction: str
@@ -79,9 +93,7 @@ class PinTouches(WitnessedTouches):
 
     def come_down(self, target: Pose) -> Procedure[Pose]:
         """Go straight down to a standoff; returns the pose on arrival."""
-        arrival: Pose = yield self._move(
-            target, Path.STRAIGHT, tr("come down beside the pin, to the clearance")
-        )
+        arrival: Pose = yield self._move(target, Path.STRAIGHT, tr("Lowering beside the pin."))
         return arrival
 
     def require_made(self) -> None:
@@ -119,6 +131,51 @@ class PinTouches(WitnessedTouches):
         return lift_off(self._plan, touch)
 
     @property
+    def _compares_heights(self) -> bool:
+        return self._planar
+
+    def _not_yet(self, touch: TouchedAt, arrival: Pose) -> NotYet | None:
+        made = replace(touch, arrival=arrival)
+        if not self._made(made):
+            return None  # told by whoever asks for it once more
+        return super()._not_yet(touch, arrival) or self._in_the_air(touch) or self._unturned(made)
+
+    def _in_the_air(self, touch: Pose) -> NotYet | None:
+        heights = [one.z_mm for one in self._taken.values()]
+        if not (self._planar and heights):
+            return None
+        if heights_agree([*heights, touch.z_mm], self._plan.sigma_in_height_mm):
+            return None
+        apart_mm = touch.z_mm - heights[0]
+        return NotYet(
+            "touch_heights_differ",
+            tr("{mm} mm higher than touch 1. Is the tip really on the pin?", mm=f"{apart_mm:.2f}")
+            if apart_mm > 0.0
+            else tr("{mm} mm lower than touch 1. Was touch 1 on the pin?", mm=f"{-apart_mm:.2f}"),
+        )
+
+    def _unturned(self, touch: TouchedAt) -> NotYet | None:
+        """Refuse a touch whose U was jogged back to that of another one."""
+        arrival = touch.arrival
+        if not self._planar or arrival is None:
+            return None
+        for number, other in enumerate(self._taken.values(), start=1):
+            planned_deg = abs(angle_difference_deg(arrival.u_deg, other.u_deg))
+            least_deg = min(LEAST_TURN_DEG, planned_deg / 2)
+            found_deg = abs(angle_difference_deg(touch.u_deg, other.u_deg))
+            if found_deg < least_deg:
+                return NotYet(
+                    "turned_too_little",
+                    tr(
+                        "U differs by only {deg} deg from touch {k}; {min} deg are needed.",
+                        deg=f"{found_deg:.1f}",
+                        k=number,
+                        min=f"{least_deg:.0f}",
+                    ),
+                )
+        return None
+
+    @property
     def _seed(self) -> int | None:
         return self._drawing.seed if self._drawing else None
 
@@ -136,7 +193,9 @@ class PinTouches(WitnessedTouches):
 
 def lift_off(plan: TouchPlan, touch: Pose) -> Move:
     """Return the step that takes the tip off the pin, after which it may turn."""
-    return Move(offset_z(plain_pose(touch), plan.lift_mm), Path.STRAIGHT, tr("lift off the pin"))
+    return Move(
+        offset_z(plain_pose(touch), plan.lift_mm), Path.STRAIGHT, tr("Lifting off the pin.")
+    )
 
 
 def touch_again(
@@ -157,8 +216,8 @@ def touch_again(
         yield from touches.again(
             _turned(last, u_deg, guess),
             key=u_deg,
-            turning=tr("turn in the air"),
-            instruction=tr("Bring the tip onto the pin again, with the tool turned."),
+            turning=tr("Turning in the air."),
+            instruction=tr("Jog the tip onto the pin again; the tool is turned now."),
         )
     )
 

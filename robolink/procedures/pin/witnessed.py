@@ -15,7 +15,7 @@ from robolink.messages import tr
 from robolink.model import Pose
 from robolink.procedures.pin.judging import was_jogged
 from robolink.procedures.pin.touch_plan import TouchPlan
-from robolink.runner import Ask, Move, Notify, Procedure, TouchedAt
+from robolink.runner import Ask, Move, Notify, NotYet, Procedure, TouchedAt, TouchSubject
 
 MOST_ASKED: Final = 3
 """How often a person is asked for a touch before the refusal ends the measurement."""
@@ -26,10 +26,14 @@ class WitnessedTouches(ABC):
 
     Args:
         plan: Lift, clearance, contact input.
+        total: How many touches are planned, ``None`` where nobody knows.
+        proof: Whether they are those of a proof.
     """
 
-    def __init__(self, plan: TouchPlan) -> None:
+    def __init__(self, plan: TouchPlan, *, total: int | None = None, proof: bool = False) -> None:
         self._plan = plan
+        self._total = total
+        self._proof = proof
         self._taken: dict[Hashable, TouchedAt] = {}
         self._count = 0
 
@@ -43,7 +47,9 @@ class WitnessedTouches(ABC):
             key: By which a later touch takes the place of this one; ``None`` for its U.
         """
         self._count += 1
-        answer: Pose = yield Ask(instruction, contact=self._plan.contact)
+        answer: Pose = yield Ask(
+            instruction, contact=self._plan.contact, subject=self._subject(None)
+        )
         touch = TouchedAt.of(answer)
         yield self.off(touch)
         self._taken[touch.u_deg if key is None else key] = touch
@@ -71,7 +77,13 @@ class WitnessedTouches(ABC):
             CalibrationError: ``not_touched`` or ``typed_ahead``, with the tip drawn back.
         """
         self._count += 1
-        ask = Ask(instruction, foreseen=expected, contact=self._plan.contact)
+        ask = Ask(
+            instruction,
+            foreseen=expected,
+            contact=self._plan.contact,
+            subject=self._subject(arrival),
+            judge=None if self._plan.nominal else lambda touch: self._not_yet(touch, arrival),
+        )
         for left in reversed(range(MOST_ASKED)):
             touch = yield from self._answered(ask, arrival, standoff_mm)
             if self._plan.nominal or self._made(touch):
@@ -85,6 +97,36 @@ class WitnessedTouches(ABC):
             "not_touched",
             told,
             remedy=self._how_to_make(),
+        )
+
+    def _subject(self, arrival: Pose | None) -> TouchSubject:
+        """Return what a screen shows of the touch that is asked for."""
+        first = next(iter(self._taken.values()), None)
+        return TouchSubject(
+            number=self._count,
+            total=self._total,
+            arrival=arrival,
+            first_z_mm=first.z_mm if first is not None and self._compares_heights else None,
+            contact=self._plan.contact,
+            proof=self._proof,
+        )
+
+    @property
+    def _compares_heights(self) -> bool:
+        """Whether the heights of the touches say something by themselves."""
+        return False
+
+    def _not_yet(self, touch: TouchedAt, arrival: Pose) -> NotYet | None:
+        """Return why a touch does not count yet, while the tip is still there."""
+        if arrival.tool is None or touch.tool == arrival.tool:
+            return None
+        return NotYet(
+            "mixed_tool",
+            tr(
+                "Somebody selected tool {n}. Touch 1 was made with tool {tool}.",
+                n=touch.tool,
+                tool=arrival.tool,
+            ),
         )
 
     @abstractmethod

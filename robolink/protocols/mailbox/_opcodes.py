@@ -111,7 +111,7 @@ OPCODES: Final[Mapping[Opcode, OpcodeFacts]] = MappingProxyType(
         Opcode.READ_TOOL: OpcodeFacts(
             "read the tool (SMC_GroupReadTool)",
             _TOOLS,
-            "i0 mode: 0 set, 1 active movement, 2 last commanded; 206 without such a movement",
+            "i0 mode: 0 set, 1 active or interrupted movement, 2 last commanded; 206 without one",
             "tool",
             needs_permit=False,
         ),

@@ -50,7 +50,8 @@ class FlangePose(Table):
     u_deg: float
     """U of the flange, degrees."""
     v_deg: Angle = 0.0
-    """V of the flange, degrees; "pivot" and "six-point" only, whose robots can tilt it."""
+    """V of the flange, degrees; "pivot", "plane-touch", "sphere-touch" and "six-point" only, whose
+    robots can tilt it."""
     w_deg: Angle = 0.0
     """W of the flange, degrees; likewise."""
 
@@ -67,12 +68,14 @@ class StationTable(Table):
     """Name of the pin or gauge; it goes on record with every measurement. What this table does not
     say about its place comes from the station of that name in the cell file and the journal."""
     x_mm: float | None = None
-    """X of the pin's end, for the record, or of where the surface is touched; base, mm."""
+    """X of the pin's end, for the record, of where the surface is touched, or of where a camera
+    looks; base, mm; together with y_mm."""
     y_mm: float | None = None
-    """Y of the pin's end, for the record, or of where the surface is touched; base, mm."""
+    """Y of the same; base, mm; together with x_mm."""
     z_mm: float | None = None
-    """Z of the pin's end or of the surface, base, mm; z = "measured" needs it, from here or from
-    the station's record, when basis is "absolute", and source "z-touch" always."""
+    """Z of the pin's end, of the surface, or of the height in focus; base, mm. z = "measured" needs
+    it, from here or from the station's record, when basis is "absolute", and source "z-touch"
+    always."""
     sigma_mm: Length | None = None
     """Standard deviation of each of them, mm, where it is known; one touch with basis "absolute"
     needs it to say how sure it is."""
@@ -117,11 +120,13 @@ class Tool(Table):
     name: Line | None = None
     """What people call it."""
     approach: FlangePose | None = None
-    """Flange pose from which it is measured: tip some mm beside the pin and above it."""
+    """Flange pose from which it is measured: tip some mm beside the pin and above it. Without it,
+    it is measured from where the robot is."""
     retreat: FlangePose | None = None
     """Flange pose to which the robot goes after the measurement."""
     points: Annotated[tuple[PointNumber, ...], Field(strict=False, min_length=2)] | None = None
-    """Numbers of the taught points that touch the pin with this tool; source "points" only."""
+    """Numbers, 0 to 999, of the taught points that touch the pin with this tool, 2 for "two-pose",
+    3 and more for "n-angle"; source "points" only, which needs them or a file of poses."""
     poses: PoseFile | None = None
     """File with the poses that touch the pin with this tool, in place of points."""
 
@@ -157,14 +162,16 @@ class Tolerances(Table):
     rms_mm: Length | None = None
     """Largest rms of the residuals, mm; not for "two-pose", which leaves no residual."""
     max_mm: Length | None = None
-    """Largest single residual, mm; not for "two-pose"."""
+    """Largest single residual, mm, at least rms_mm; not for "two-pose"."""
     interval_mm: Length | None = None
-    """Largest half width of the 95 % interval of any measured length, mm; "two-pose" needs sigma_mm
-    for it."""
+    """Largest distance within which the tip lies in 95 %, mm, all lengths that are measured
+    together; half the interval of an axis where only that is known. "two-pose" needs sigma_mm for
+    it."""
     sigma_mm: Length | None = None
     """Standard deviation of one coordinate of one touch, or of one crossing, mm, where known."""
     jump_mm: Length = 2.0
-    """Largest change against the stored offset that a nozzle change explains, mm."""
+    """Largest change against the stored offset that a nozzle change explains, mm, over the lengths
+    that were measured; more is refused. A Z that is typed is not judged."""
     drift_mm: Length = 0.2
     """Largest drift about the new tip that passes the verification, mm."""
 

@@ -10,7 +10,7 @@ from robolink.model import Pose
 def interval_sentences(fit: CalibrationResult) -> tuple[str, ...]:
     """Return which interval it is, what it rests on, or why there is none."""
     if not fit.half_width95:
-        return (tr("No interval: nothing here tells how large the errors are."),)
+        return (tr("How sure it is cannot be said: too few touches."),)
     said = [_what_it_rests_on(fit)]
     lengths = [name[0].upper() for name in fit.measured if name.endswith("_mm")]
     if len(lengths) > 1:
@@ -39,9 +39,10 @@ def _what_it_rests_on(fit: CalibrationResult) -> str:
             sigma=fit.sigma_mm,
         )
     if fit.dof is None:
-        return tr("The interval rests on the scatter of the poses.")
+        return tr("The interval comes from how well the poses agree.")
     return tr(
-        "The interval rests on the scatter of the poses: Student's t, degrees of freedom: {dof}.",
+        "The interval comes from how well the poses agree (Student's t, degrees of freedom: "
+        "{dof}).",
         dof=fit.dof,
     )
 

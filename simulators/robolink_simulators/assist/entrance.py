@@ -6,8 +6,6 @@ the pin and presses the emergency stop. So its URL is ``assist+tcp://TOKEN@127.0
 anew for each port and shown by ``robolink sim`` alone.
 """
 
-import hmac
-import secrets
 from dataclasses import dataclass
 from typing import Final
 from urllib.parse import urlsplit
@@ -17,22 +15,9 @@ from robolink.messages import tr
 
 SCHEME: Final = "assist+tcp"
 
-_TOKEN_BYTES: Final = 16
 _TOKEN_CHARACTERS: Final = frozenset(
     "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_"
 )
-
-
-def drawn_token() -> str:
-    """Return a token that nobody guesses: 128 bits, in characters that a URL carries."""
-    return secrets.token_urlsafe(_TOKEN_BYTES)
-
-
-def is_token(shown: object, token: str) -> bool:
-    """Whether ``shown`` is the token; takes as long for a near miss as for a far one."""
-    return isinstance(shown, str) and hmac.compare_digest(
-        shown.encode("utf-8", "surrogatepass"), token.encode()
-    )
 
 
 @dataclass(frozen=True, slots=True)

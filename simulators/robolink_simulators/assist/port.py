@@ -19,21 +19,20 @@ from urllib.parse import urlsplit
 from robolink.closing import ClosedAtExit
 from robolink.errors import ConfigError, ConnectError, RobolinkError, TransportBrokenError
 from robolink.messages import tr
-from robolink_simulators.assist.acts import Assisted, perform
-from robolink_simulators.assist.entrance import (
-    SCHEME,
-    assist_address,
-    drawn_token,
-    is_token,
-)
+from robolink_simulators.assist.acts import perform
+from robolink_simulators.assist.entrance import SCHEME, assist_address
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.cell.habits import PersonManner
 from robolink_simulators.cell.person import PersonLook
 from robolink_simulators.cell.places import Axis, XyzMm
+from robolink_simulators.control.cell import ControlledCell
+from robolink_simulators.control.tokens import drawn_token, is_token
+from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.refusals import SpelRefusal
 from robolink_simulators.hosting.in_process import epson as in_process
 from robolink_simulators.hosting.in_process import softmotion as plc_in_process
 from robolink_simulators.hosting.streams.tcp_host import TcpHost
+from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 from robolink_simulators.softmotion.smc_errors import BlockRefused
 
 LEAST_THINKING_S: Final = 0.35
@@ -44,6 +43,9 @@ LONGEST_LINE: Final = 4096
 """Bytes; the longest request there is, a whole world set up, takes some 1500."""
 
 MOST_CLIENTS: Final = 16
+
+Assisted = EpsonSimulator | SoftMotionSimulator
+"""A simulator with a person beside it."""
 
 _LONGEST_ANSWER: Final = 1 << 20
 _IN_PROCESS: Final[Mapping[str, Callable[[str], Assisted]]] = {
@@ -93,12 +95,13 @@ class _AssistDevice:
 
     def __init__(self, simulator: Assisted, clock: ScaledClock, token: str) -> None:
         self._simulator = simulator
+        self._cell = ControlledCell(simulator, clock)
         self._clock = clock
         self._token = token
         self._links: list[_AssistLink] = []
 
     def connect(self, now_ns: int) -> "_AssistLink":  # noqa: ARG002 - time plays no part
-        link = _AssistLink(self._simulator, self._clock, self._token)
+        link = _AssistLink(self._cell, self._clock, self._token)
         self._links = [other for other in self._links if not other.closed]
         if len(self._links) >= MOST_CLIENTS:
             waiting = (other for other in self._links if not other.let_in)
@@ -116,8 +119,8 @@ class _AssistDevice:
 class _AssistLink:
     """Implements :class:`~robolink_simulators.hosting.seam.DeviceLink`."""
 
-    def __init__(self, simulator: Assisted, clock: ScaledClock, token: str) -> None:
-        self._simulator = simulator
+    def __init__(self, cell: ControlledCell, clock: ScaledClock, token: str) -> None:
+        self._cell = cell
         self._clock = clock
         self._token = token
         self._held = b""
@@ -131,7 +134,7 @@ class _AssistLink:
         *lines, self._held = (self._held + data).split(b"\n")
         for line in lines:
             if not self.closed:
-                self._simulator.advance(now_ns)
+                self._cell.simulator.advance(now_ns)
                 self._out += self._answered(line)
         if len(self._held) > LONGEST_LINE:
             self.closed = True
@@ -162,7 +165,7 @@ class _AssistLink:
         return {"ok": False, "error": tr("That is not the token of this simulator.")}
 
     def _performed(self, request: dict[str, Any]) -> dict[str, Any]:
-        answer: dict[str, Any] = {"ok": True, **perform(self._simulator, request)}
+        answer: dict[str, Any] = {"ok": True, **perform(self._cell, request)}
         if "thinks_s" in answer:
             answer["thinks_s"] = self._real_thinking_s(answer["thinks_s"])
         return answer

@@ -1,10 +1,16 @@
 """Clocks for simulated time: one that a test steps, and one that runs at a factor of real time."""
 
 import threading
+from typing import Final
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.timing import NS_PER_S, Clock, SystemClock
+
+_LOOK_S: Final = 0.05
+"""How long a sleeper takes to see that the pace is another one."""
+
+_PAUSED_S: Final = 86_400.0
 
 
 class ManualClock:
@@ -21,6 +27,9 @@ class ManualClock:
     def now_ns(self) -> int:
         """Return the simulated time in nanoseconds."""
         return self._now_ns
+
+    def exchanged(self) -> None:
+        """Be told that a request has come in; time passes where somebody waits for it."""
 
     def sleep(self, seconds: float) -> None:
         """Let ``seconds`` pass at once."""
@@ -67,6 +76,9 @@ class ScaledClock:
         self._base = base or SystemClock()
         self._origin_ns = self._base.now_ns()
 
+    def exchanged(self) -> None:
+        """Be told that a request has come in; time goes on all the same."""
+
     def now_ns(self) -> int:
         """Return the simulated time in nanoseconds."""
         passed_ns = self._base.now_ns() - self._origin_ns
@@ -83,3 +95,86 @@ class ScaledClock:
     def really_takes_s(self, seconds: float) -> float:
         """Return how many seconds of the base clock so many simulated ones are."""
         return seconds / self._factor
+
+
+class SteeredClock(ScaledClock):
+    """Simulated time whose pace is changed while it runs, or that is paused and stepped.
+
+    Args:
+        factor: Simulated seconds per second of ``base``; 0 pauses.
+        base: The clock that really passes.
+        exchange_s: Simulated seconds that pass with each request besides: a client that looks
+            how far a movement is then waits for it no longer than it looks. With a factor of 0
+            time passes with requests alone.
+
+    Raises:
+        ConfigError: A number is negative, or not finite.
+    """
+
+    def __init__(
+        self, factor: float = 1.0, base: Clock | None = None, *, exchange_s: float = 0.0
+    ) -> None:
+        super().__init__(1.0, base)
+        if not 0 <= exchange_s < float("inf"):
+            raise ConfigError(
+                tr("An exchange cannot take {seconds} simulated seconds.", seconds=exchange_s),
+                remedy=tr("Give 0 or more."),
+            )
+        self._exchange_s = exchange_s
+        self._lock = threading.Lock()
+        self._since_ns = self._held_ns = self._origin_ns
+        self.run(factor)
+
+    @property
+    def factor(self) -> float:
+        """Simulated seconds per real one; 0 in a pause."""
+        return self._factor
+
+    def run(self, factor: float) -> None:
+        """Go on at another factor; 0 pauses.
+
+        Raises:
+            ConfigError: It is negative, or not finite.
+        """
+        if not 0 <= factor < float("inf"):
+            raise ConfigError(
+                tr("Simulated time cannot run at a factor of {factor}.", factor=factor),
+                remedy=tr("Give a number above zero, for example 1 or 10."),
+            )
+        with self._lock:
+            base_ns = self._base.now_ns()
+            self._held_ns, self._since_ns = self._at(base_ns), base_ns
+            self._factor = factor
+
+    def advance(self, seconds: float) -> None:
+        """Let so many simulated seconds pass at once."""
+        with self._lock:
+            self._held_ns += round(max(0.0, seconds) * NS_PER_S)
+
+    def exchanged(self) -> None:
+        """Let pass what a request takes."""
+        if self._exchange_s:
+            self.advance(self._exchange_s)
+
+    def now_ns(self) -> int:
+        """Return the simulated time in nanoseconds."""
+        with self._lock:
+            return self._at(self._base.now_ns())
+
+    def sleep(self, seconds: float) -> None:
+        """Block until ``seconds`` of simulated time have passed, at whatever pace."""
+        until_ns = self.now_ns() + round(seconds * NS_PER_S)
+        while (left_s := self.real_seconds(until_ns)) > 0:
+            self._base.sleep(min(left_s, _LOOK_S))
+
+    def real_seconds(self, until_ns: int) -> float:
+        """Return how long it really takes until an instant, as things are; a day in a pause."""
+        left_s = max(0, until_ns - self.now_ns()) / NS_PER_S
+        return left_s / self._factor if self._factor else left_s and _PAUSED_S
+
+    def really_takes_s(self, seconds: float) -> float:
+        """Return how many seconds of the base clock so many simulated ones are, as things are."""
+        return seconds / self._factor if self._factor else seconds and _PAUSED_S
+
+    def _at(self, base_ns: int) -> int:
+        return self._held_ns + int((base_ns - self._since_ns) * self._factor)

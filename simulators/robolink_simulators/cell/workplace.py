@@ -6,7 +6,7 @@ Ground truth. The controller knows none of it; only what it stores.
 import math
 import random
 from abc import ABC, abstractmethod
-from collections.abc import Hashable
+from collections.abc import Hashable, Mapping
 from dataclasses import asdict, replace
 from typing import Any, ClassVar, Final, Protocol
 
@@ -249,6 +249,25 @@ class Workplace(ABC):
             "board": self._held(),
             "parameters": asdict(self.parameters),
         }
+
+    def moment(self) -> dict[str, Any]:
+        """Return copies of what makes this place what it is now, but for what chance is next."""
+        return {
+            "tips": dict(self.tips),
+            "pin_mm": self.pin_mm,
+            "leans": dict(self.leans),
+            "middle_mm": self.camera.middle_mm,
+            "parameters": self.parameters,
+            "nozzles": self._random.getstate(),
+        }
+
+    def put_back(self, moment: Mapping[str, Any]) -> None:
+        """Take over what :meth:`moment` gave; the eye's errors are drawn as at first."""
+        self.set_up(moment["parameters"])
+        self.tips, self.pin_mm = dict(moment["tips"]), moment["pin_mm"]
+        self.leans = dict(moment["leans"])
+        self.camera.middle_mm = moment["middle_mm"]
+        self._random.setstate(moment["nozzles"])
 
     def _held(self) -> dict[str, Any] | None:
         if self.board is None:

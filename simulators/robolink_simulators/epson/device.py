@@ -7,23 +7,24 @@ the time, and asks when to call again.
 """
 
 import random
-import threading
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Any
 
+from robolink.errors import ConfigError
+from robolink.messages import tr
 from robolink.model import Secret
 from robolink.protocols.epson_binary import Dialect
 from robolink.protocols.epson_text import BadRequest, ErrorCode, Request, StatusFlags
 from robolink_simulators.cell.world_parameters import WorldParameters
+from robolink_simulators.device.hosted import HostedDevice
+from robolink_simulators.device.motion_log import StartedMotion
 from robolink_simulators.epson.arm.robots import find_robot
 from robolink_simulators.epson.card import ControllerCard
 from robolink_simulators.epson.companion import Companion
 from robolink_simulators.epson.condition import Condition, Mode, Task
-from robolink_simulators.epson.flash import Flash
+from robolink_simulators.epson.flash import Flash, moment_of, put_back
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.variables import project_variables
 from robolink_simulators.epson.mishaps import EpsonMishaps
@@ -40,20 +41,15 @@ from robolink_simulators.epson.remote.service import Service
 from robolink_simulators.epson.remote.wire_text import shown_reply, shown_request
 from robolink_simulators.epson.spel import Interpreter
 from robolink_simulators.epson.spel.programs.loading import load_project
-from robolink_simulators.epson.spel.tasks.ports import Ports
+from robolink_simulators.epson.spel.tasks.channels.ports import Ports
 from robolink_simulators.epson.spel.tasks.runner import ProgramRunner
 from robolink_simulators.epson.world import World
 from robolink_simulators.faults import Departure, Fault, FaultAction, FaultPlan, LinkKind
 from robolink_simulators.faults.links import EPSON_LINKS
 from robolink_simulators.serial_numbers import drawn_serial
 
-_LOG_LINES: Final = 2000
 
-RequestHook = Callable[[int, str], None]
-"""Called with the running number of a request and a text, passwords hidden."""
-
-
-class EpsonSimulator:
+class EpsonSimulator(HostedDevice):
     """Implements ``hosting.seam.WireDevice``.
 
     Args:
@@ -71,10 +67,6 @@ class EpsonSimulator:
     The motors are on at first, as in a cell that stands ready; after a restart they are off.
 
     Attributes:
-        lock: Held by whoever touches the simulator while a host serves it.
-        url: Where a host serves it, empty when none does.
-        seed: What decides the world and every scatter.
-        durable: Whether its tools outlive the process.
         options: The controller's habits.
         machine: The robot and its memory.
         condition: What GetStatus shows.
@@ -84,17 +76,14 @@ class EpsonSimulator:
         variables: The Global Preserve variables.
         worlds: The truth around each robot, and the person there.
         faults: What is planned to go wrong.
-        exchanges: Requests answered.
-        log: The last (now_ns, ">" or "<", text), with passwords hidden.
-        on_request: Called with a request; it is carried out all the same, whatever this raises.
-        on_reply: Called with the answer before it leaves; it leaves all the same.
-        watchers: Called after each act at the panel, so that a host looks for what leaves now.
+        starts: How often it was switched on.
         program: The program that is loaded, if any; without one Start shows a running task only.
-        present_ns: Tells such acts the time, in place of the instant given last; a host sets it.
 
     Raises:
         ConfigError: No such robot, or a state file that does not fit.
     """
+
+    kind = "epson"
 
     def __init__(
         self,
@@ -108,45 +97,43 @@ class EpsonSimulator:
         faults: Iterable[Fault] = (),
         world: WorldParameters | None = None,
     ) -> None:
-        self.lock = threading.RLock()
-        self.watchers: list[Callable[[], None]] = []
-        self.present_ns: Callable[[], int] | None = None
-        self._now_ns = 0
+        super().__init__(seed)
         # Until when all is done: a transport asks for one and the same instant several times.
         self._settled_ns = -1
-        self._stepping = False
-        self.url, self.seed = "", seed
         self.options = options or EpsonOptions()
         self.faults = FaultPlan(faults, seed, links=EPSON_LINKS)
-        self.exchanges = 0
-        self.log: deque[tuple[int, str, str]] = deque(maxlen=_LOG_LINES)
-        self.on_request: RequestHook | None = None
-        self.on_reply: RequestHook | None = None
-        self._requests = 0
+        self.durable = state_path is not None
+        self._models = tuple(map(find_robot, robot.split(",")))
+        self._password = password.reveal() if password else ""
+        self._state_path = state_path
+        self._parameters = world
         self._links: list[EpsonServerLink] = []
-        model, *others = map(find_robot, robot.split(","))
-        self.machine = Machine(model, serial=serial or drawn_serial(), others=others)
+        self._make(serial or drawn_serial())
+
+    def _make(self, serial: str) -> None:
+        """Make the controller and its world, as they are at first."""
+        model, *others = self._models
+        self.machine = Machine(model, serial=serial, others=others)
         self.machine.switch_all_motors(True)
         self.worlds = tuple(
             World.seeded(
                 self.machine.inputs,
                 one,
-                seed,
+                self.seed,
                 pendant_live=lambda: self.condition.mode is Mode.TEACH,
                 now_ns=lambda: self._now_ns,
-                parameters=world,
+                parameters=self._parameters,
             )
             for one in self.machine.robots
         )
-        self._flash = Flash(state_path, self.machine)
+        self._flash = Flash(self._state_path, self.machine)
         self._flash.restore()
-        self.durable = state_path is not None
+        self.starts = 1
         self.variables = project_variables(str(self.options.true_value))
         self._companion = (
             Companion(self.machine, self.variables) if self.options.companion else None
         )
-        self.alarms = Alarms()
-        self.card = ControllerCard()
+        self.alarms, self.card = Alarms(), ControllerCard()
         self.condition = Condition(monitoring_only=self.options.monitoring_only)
         interpreter = Interpreter(
             self.machine,
@@ -156,46 +143,24 @@ class EpsonSimulator:
             variables=self.variables,
             messages=self.card.messages,
         )
-        self._window = SpelWindow(interpreter, self.condition, self.options)
-        self._slot = ClientSlot(self.options.remote_timeout_s)
-        self._desk = CommandDesk(
-            self.machine,
-            self.condition,
-            self.variables,
-            self.alarms,
-            self.card,
-            options=self.options,
-        )
-        self._service = Service(
-            self._desk,
-            self._window,
-            self._slot,
-            self.condition,
-            options=self.options,
-            password=password.reveal() if password else "",
-        )
-        self.panel = EpsonPanel(
-            self.machine,
-            self.condition,
-            self._window,
-            self._slot,
-            self.alarms,
-            options=self.options,
-            acting=self.acting,
-        )
-        self._mishaps = EpsonMishaps(self.panel, self.restart)
         self._session = interpreter.session
         self.program: ProgramRunner | None = None
+        self._window = SpelWindow(interpreter, self.condition, self.options)
+        self._slot = ClientSlot(self.options.remote_timeout_s)
+        options, condition, window, slot = self.options, self.condition, self._window, self._slot
+        held = (self.variables, self.alarms, self.card)
+        self._desk = CommandDesk(self.machine, condition, *held, options=options)
+        self._service = Service(
+            self._desk, window, slot, condition, options=options, password=self._password
+        )
+        parts = (self.machine, condition, window, slot, self.alarms)
+        self.panel = EpsonPanel(*parts, options=options, acting=self.acting)
+        self._mishaps = EpsonMishaps(self.panel, self.restart)
 
     @property
     def world(self) -> World:
         """The truth around the robot in force, and the person at the cell."""
         return self.worlds[self.machine.robot_number - 1]
-
-    @property
-    def now_ns(self) -> int:
-        """The instant last given."""
-        return self._now_ns
 
     def load(
         self,
@@ -229,20 +194,6 @@ class EpsonSimulator:
     def status_flags(self) -> StatusFlags:
         """Return the flags as they are, whatever the client may be shown."""
         return self.condition.flags(executing=self._window.busy)
-
-    @contextmanager
-    def acting(self) -> Iterator[int]:
-        """Surround an act that comes past the wire; gives the present time."""
-        with self.lock:
-            # A planned act happens at its own instant, in the middle of an advance.
-            if self.present_ns is not None and not self._stepping:
-                self.advance(self.present_ns())
-            try:
-                yield self._now_ns
-            finally:
-                self._settled_ns = -1
-        for watcher in tuple(self.watchers):
-            watcher()
 
     def connect(self, now_ns: int) -> EpsonServerLink:
         """Accept one client; see ``EpsonOptions.second_client``."""
@@ -280,9 +231,29 @@ class EpsonSimulator:
         )
         return min((time_ns for time_ns in times if time_ns is not None), default=None)
 
+    @property
+    def machine_name(self) -> str:
+        """See :attr:`HostedDevice.machine_name`."""
+        return " ".join((self.kind, *(model.name for model in self._models)))
+
+    def counters(self) -> dict[str, int]:
+        """See :meth:`HostedDevice.counters`."""
+        return {
+            "exchanges": self.exchanges,
+            "moves_started": sum(robot.arm.moves_started for robot in self.machine.robots),
+            "tool_writes": self.machine.flash_writes,
+            "starts": self.starts,
+            "touches": self.world.operator.touches,
+        }
+
+    def motions(self, after: int = 0) -> Iterator[StartedMotion]:
+        """See :meth:`HostedDevice.motions`; those of the robot in force."""
+        return self.machine.arm.motions.motions(after)
+
     def restart(self) -> None:
         """Switch off and on: links are cut, all but the flash and the variables is forgotten."""
         with self.acting():
+            self.starts += 1
             for link in self._links:
                 link.cut()
             self._window.interrupt(self._now_ns)
@@ -367,6 +338,29 @@ class EpsonSimulator:
             self._slot.lost(unfinished=own)
             if self.options.execute_on_disconnect == "stops":
                 self._window.interrupt(self._now_ns)
+
+    def _truth(self) -> dict[str, Any]:
+        return self.world.truth()
+
+    def _renew(self) -> None:
+        if self.program is not None:
+            raise ConfigError(
+                tr("A simulator that executes a program is not made anew."),
+                remedy=tr("Restart it in place of that."),
+            )
+        for link in self._links:
+            link.cut()
+        self.faults.forget()
+        self._make(drawn_serial())
+
+    def _moment(self) -> dict[str, Any]:
+        return moment_of(self.machine, self.variables, self.worlds)
+
+    def _restore(self, held: Mapping[str, Any]) -> None:
+        put_back(held, self.machine, self.variables, self.worlds, now_ns=self._now_ns)
+
+    def _after_act(self) -> None:
+        self._settled_ns = -1
 
     def _step(self, now_ns: int) -> None:
         self._now_ns = now_ns

@@ -1,13 +1,17 @@
-"""What a controller keeps over a power cycle, as one small file."""
+"""What a controller keeps over a power cycle, as one small file; and a whole moment of it."""
 
 import json
+from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from robolink.errors import ConfigError
 from robolink.files.named import read_named
 from robolink.messages import tr
+from robolink_simulators.cell.workplace import Workplace
 from robolink_simulators.epson.machine import Machine
+from robolink_simulators.epson.memory.variables import Variables
 from robolink_simulators.state_files import save_state
 
 SCHEMA: Final = "robolink/sim-state/1"
@@ -48,6 +52,7 @@ class Flash:
                 other.tools.restore(tools)
             for one, kept in zip(self._machine.robots, state.get("kept", ()), strict=False):
                 one.kept.restore(kept)
+                one.hold_to_ranges()
             serial = state.get("serial")
         except (OSError, KeyError, RecursionError, TypeError, ValueError) as error:
             raise ConfigError(
@@ -87,3 +92,45 @@ class Flash:
     def _mark(self) -> list[object]:
         robots = self._machine.robots
         return [(one.tools.flash_writes, one.tools.selected, one.kept.changes) for one in robots]
+
+
+def moment_of(
+    machine: Machine, variables: Variables, worlds: Sequence[Workplace]
+) -> dict[str, Any]:
+    """Return copies of tools, points, what is kept, variables, places and worlds."""
+    robots = machine.robots
+    return {
+        "serials": [robot.serial for robot in robots],
+        "tools": [robot.tools.to_state() for robot in robots],
+        "kept": [deepcopy(robot.kept.to_state()) for robot in robots],
+        "points": [deepcopy(robot.points) for robot in robots],
+        "locals": [deepcopy(robot.locals) for robot in robots],
+        "motors": [robot.motors_on for robot in robots],
+        "joints": [robot.arm.joints for robot in robots],
+        "robot": machine.robot_number,
+        "variables": variables.values(),
+        "worlds": [world.moment() for world in worlds],
+    }
+
+
+def put_back(
+    held: Mapping[str, Any],
+    machine: Machine,
+    variables: Variables,
+    worlds: Sequence[Workplace],
+    *,
+    now_ns: int,
+) -> None:
+    """Put back what :func:`moment_of` gave."""
+    for number, robot in enumerate(machine.robots):
+        robot.serial = held["serials"][number]
+        robot.tools.restore(held["tools"][number])
+        robot.kept.restore(deepcopy(held["kept"][number]))
+        robot.points = deepcopy(held["points"][number])
+        robot.locals = deepcopy(held["locals"][number])
+        robot.switch_motors(held["motors"][number])
+        robot.arm.place(held["joints"][number], now_ns)
+    machine.robot_number = held["robot"]
+    variables.put_back(held["variables"])
+    for world, moment in zip(worlds, held["worlds"], strict=True):
+        world.put_back(moment)

@@ -106,7 +106,9 @@ class Machine:
         self.robot_number = 1
         self.inputs = InputBits(IO_BITS)
         self.outputs = BitBank(IO_BITS)
-        self.memory = BitBank(MEMORY_BITS)
+        self.memory = BitBank(
+            MEMORY_BITS, no_bit=RefusalKind.MEMORY_BIT, no_byte=RefusalKind.MEMORY_BYTE
+        )
         self.timed_bits = TimedBits()
         self.io_labels: dict[str, IOLabel] = {}
         self.image_calibrations = ImageCalibrations()

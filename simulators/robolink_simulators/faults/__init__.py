@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from robolink_simulators.faults.plan import FaultPlan as FaultPlan
     from robolink_simulators.faults.plan_file import FaultFile as FaultFile
     from robolink_simulators.faults.plan_file import fault_as_keys as fault_as_keys
+    from robolink_simulators.faults.plan_file import faults_of_table as faults_of_table
     from robolink_simulators.faults.plan_file import read_fault_file as read_fault_file
     from robolink_simulators.faults.stream import Fault as Fault
     from robolink_simulators.faults.stream import FaultAction as FaultAction
@@ -36,7 +37,7 @@ _HOMES: Final = {
     "fieldbus": "PlcFault PlcFaultAction",
     "links": "FaultNotPossibleError LinkKind links_of require_possible",
     "plan": "Departure FaultPlan",
-    "plan_file": "FaultFile fault_as_keys read_fault_file",
+    "plan_file": "FaultFile fault_as_keys faults_of_table read_fault_file",
     "stream": "Fault FaultAction",
 }
 

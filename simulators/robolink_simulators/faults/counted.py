@@ -98,6 +98,11 @@ class CountedFaults(Generic[AnyFault]):
         """Plan nothing any more; what fired stays told."""
         self._groups.clear()
 
+    def forget(self) -> None:
+        """Plan nothing, and tell of nothing that fired."""
+        self.clear()
+        self.fired.clear()
+
     def require_possible(self, served: Collection[LinkKind]) -> None:
         """Refuse what waits and can happen on none of the links that are served.
 

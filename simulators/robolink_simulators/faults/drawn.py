@@ -17,7 +17,7 @@ _DELAYS_S: Final = (0.0, 0.0, 0.004, 0.05, 0.3, 1.0, 2.9, 3.1, 12.0)
 silence after which a mailbox may be taken."""
 _FRAME_BYTES: Final = 240
 """No usual answer is longer; a place past its end counts from the front again."""
-_CODES: Final = (4001, 4025, 4242, 2119)
+_CODES: Final = (4001, 4025, 4242, 2353)
 _AXIS_ERRORS: Final = (16, 1, 25)
 
 _EXCHANGES_A_WRITE: Final = 5

@@ -4,11 +4,12 @@ docs/fault-plans.md, "The file" explains the keys.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Final, get_args
 
+from robolink.errors import ConfigError
 from robolink.files.key_problems import at_least, at_most, is_not_known, one_of
 from robolink.files.toml import FileKind, Problem
 from robolink.messages import tr
@@ -82,6 +83,35 @@ def read_fault_file(path: Path) -> FaultFile:
     if plan is None:
         raise FAULT_FILE.refusal(path, reader.problems)
     return plan
+
+
+def faults_of_table(
+    tables: Sequence[Mapping[str, object]], link: LinkKind
+) -> tuple[Fault, ...] | tuple[PlcFault, ...]:
+    """Return faults that were given as a file has them, one table each.
+
+    Raises:
+        FaultNotPossibleError: One of them cannot happen on this link.
+        ConfigError: Something else is wrong with one; tells all of it.
+    """
+    for table in tables:
+        _require_possible(table.get("action"), link)
+    reader = _Reader({"schema": SCHEMA, "link": link, "fault": [*tables]}, "")
+    plan = reader.plan()
+    if plan is None:
+        raise ConfigError(
+            tr("The fault is wrong: {why}.", why="; ".join(map(str, reader.problems[:3]))),
+            remedy=tr("docs/fault-plans.md explains every key."),
+        )
+    return plan.faults
+
+
+def _require_possible(name: object, link: LinkKind) -> None:
+    own, other = FaultAction.__members__, PlcFaultAction.__members__
+    first, second = (other, own) if link in MAILBOX_LINKS else (own, other)
+    action = first.get(str(name).upper()) or second.get(str(name).upper())
+    if action is not None:
+        require_possible(action, {link})
 
 
 def fault_as_keys(fault: Fault | PlcFault) -> dict[str, object]:

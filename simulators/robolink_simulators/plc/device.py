@@ -1,8 +1,13 @@
 """The simulated PLC: a program behind a Modbus server."""
 
-import threading
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict
+from typing import Any
 
+from robolink.model import ToolOffset
 from robolink.register_maps import RegisterMap
+from robolink_simulators.device.hosted import HostedDevice
+from robolink_simulators.device.motion_log import StartedMotion
 from robolink_simulators.faults import Departure, FaultAction, FaultPlan
 from robolink_simulators.faults.links import PLC_LINKS
 from robolink_simulators.plc.frames import (
@@ -15,10 +20,11 @@ from robolink_simulators.plc.frames import (
 )
 from robolink_simulators.plc.link import PlcLink
 from robolink_simulators.plc.memory import OutsideError
+from robolink_simulators.plc.panel import MappedPlcPanel
 from robolink_simulators.plc.program import PlcProgram
 
 
-class PlcSimulator:
+class PlcSimulator(HostedDevice):
     """Serves the tables of a map, and runs the program behind them.
 
     Attributes:
@@ -27,8 +33,8 @@ class PlcSimulator:
         program: Tools, handshake and signals.
         faults: What is to go wrong. Requests read ``fc16 100``: function and address.
         writes: The writing requests that were carried out, in the same words.
-        lock: Held while it is touched.
-        now_ns: The simulated time.
+        panel: What a person, or the machine's own program, can do.
+        starts: How often it was switched on.
 
     Args:
         register_map: The map to serve.
@@ -37,15 +43,52 @@ class PlcSimulator:
         seed: Other tools.
     """
 
+    kind = "plc"
+
     def __init__(self, register_map: RegisterMap, *, unit: int = 1, seed: int = 1) -> None:
+        super().__init__(seed)
         self.register_map = register_map
         self.unit = unit
-        self.program = PlcProgram(register_map, seed)
         self.faults = FaultPlan(seed=seed, links=PLC_LINKS)
-        self.writes: list[str] = []
-        self.lock = threading.RLock()
-        self.now_ns = 0
+        self.panel = MappedPlcPanel(self)
         self._links: list[PlcLink] = []
+        self._make()
+
+    def _make(self) -> None:
+        self.program = PlcProgram(self.register_map, self.seed)
+        self.writes: list[str] = []
+        self.starts = 1
+
+    @property
+    def machine_name(self) -> str:
+        """See :attr:`HostedDevice.machine_name`."""
+        return f"{self.kind} {self.register_map.name}"
+
+    def counters(self) -> dict[str, int]:
+        """See :meth:`HostedDevice.counters`; it moves nothing."""
+        return {
+            "exchanges": self.exchanges,
+            "moves_started": 0,
+            "tool_writes": self.program.taken,
+            "starts": self.starts,
+            "touches": 0,
+        }
+
+    def motions(self, after: int = 0) -> Iterator[StartedMotion]:  # noqa: ARG002 - it moves nothing
+        """See :meth:`HostedDevice.motions`."""
+        return iter(())
+
+    def restart(self) -> None:
+        """Switch off and on: links are cut, what the PLC retains stays."""
+        with self.acting():
+            self.starts += 1
+            self.program.start_anew()
+            self.cut_links()
+
+    def cut_links(self) -> None:
+        """End every connection; whoever calls it is acting."""
+        for link in self._links:
+            link.cut()
 
     def connect(self, now_ns: int, frames: Frames | None = None) -> PlcLink:
         """Accept one client, over TCP unless its frames are named."""
@@ -56,8 +99,8 @@ class PlcSimulator:
 
     def advance(self, now_ns: int) -> None:
         """Let simulated time reach ``now_ns``."""
-        self.now_ns = max(self.now_ns, now_ns)
-        self.program.advance(self.now_ns)
+        self._now_ns = max(self._now_ns, now_ns)
+        self.program.advance(self._now_ns)
         for link in self._links:
             link.catch_up()
 
@@ -72,6 +115,7 @@ class PlcSimulator:
         """Carry a request out and return what leaves for it, when."""
         if frames.shared and request.unit != self.unit:
             return []
+        self.log.append((self._now_ns, ">", request.words))
         met = () if counted else self.faults.take(request.words)
         actions = {fault.action: fault for fault in met}
         if FaultAction.DISCONNECT_BEFORE in actions:
@@ -83,6 +127,8 @@ class PlcSimulator:
             return []
         ignored = FaultAction.IGNORE_WRITE in actions
         reply = self._answer(request, frames, ignored=ignored)
+        self.exchanges += 1
+        self.log.append((self._now_ns, "<", request.words))
         leaving = self.faults.departures(reply, met)
         if (again := actions.get(FaultAction.DUPLICATE_REQUEST)) is not None:
             leaving.append((again.seconds, self._answer(request, frames, ignored=ignored)))
@@ -103,3 +149,31 @@ class PlcSimulator:
             self.writes.append(request.words)
             self.program.written(self.now_ns)
         return frames.answer(request, found)
+
+    def _truth(self) -> dict[str, Any]:
+        selected = self.register_map.selected
+        return {
+            "stored": {
+                str(tool): asdict(_offset(held)) for tool, held in self.program.in_force.items()
+            },
+            "selected_tool": selected
+            and self.program.memory.read(
+                selected.table, range(selected.address, selected.address + 1)
+            )[0],
+        }
+
+    def _renew(self) -> None:
+        self.cut_links()
+        self.faults.forget()
+        self._make()
+
+    def _moment(self) -> dict[str, Any]:
+        return {"program": self.program.moment()}
+
+    def _restore(self, held: Mapping[str, Any]) -> None:
+        self.program.put_back(held["program"])
+
+
+def _offset(components: Mapping[str, float]) -> ToolOffset:
+    angles = (components.get(name, 0.0) for name in ("u", "v", "w"))
+    return ToolOffset(*(components.get(name, 0.0) for name in ("x", "y", "z")), *angles)

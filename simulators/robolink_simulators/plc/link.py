@@ -19,7 +19,9 @@ of them, and no busy computer cuts a frame in two.
 class ServedFrame(Protocol):
     """The PLC, as its connections see it."""
 
-    now_ns: int
+    @property
+    def now_ns(self) -> int:
+        """The simulated time."""
 
     def advance(self, now_ns: int) -> None:
         """Let simulated time reach ``now_ns``."""
@@ -88,6 +90,11 @@ class PlcLink:
     def next_change(self) -> int | None:
         """Return when something leaves, or the link carries again."""
         return self._outbox.next_change(self._plc.now_ns)
+
+    def cut(self) -> None:
+        """End this connection, after what leaves now."""
+        self._outbox.post(None, self._plc.now_ns)
+        self._over = True
 
     def stall(self, request: PlcRequest, seconds: float) -> None:
         """Carry nothing for a while; then a request arrives, and what was sent behind it."""

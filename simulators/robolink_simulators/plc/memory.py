@@ -1,6 +1,6 @@
 """The four tables of a Modbus server, as large as a map needs them."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Final
 
 from robolink.register_maps import RegisterTable, Signal
@@ -40,6 +40,14 @@ class Memory:
         self._require(table, range(address, address + len(values)))
         for offset, value in enumerate(values):
             self._values[table, address + offset] = value
+
+    def copied(self) -> dict[tuple[RegisterTable, int], int]:
+        """Return a copy of all that stands in them."""
+        return dict(self._values)
+
+    def put_back(self, values: Mapping[tuple[RegisterTable, int], int]) -> None:
+        """Take over what :meth:`copied` gave."""
+        self._values = dict(values)
 
     def is_on(self, signal: Signal | None) -> bool:
         """Tell whether a signal is on; none is off."""

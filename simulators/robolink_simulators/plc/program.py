@@ -2,6 +2,8 @@
 
 import random
 from collections.abc import Iterator, Mapping
+from copy import deepcopy
+from typing import Any
 
 from robolink.register_maps import ANGLES, CommitKind, MapSlot, Number, RegisterMap, RegisterTable
 from robolink.timing import NS_PER_S
@@ -19,6 +21,7 @@ class PlcProgram:
     Attributes:
         in_force: What the machine works with, by tool.
         takeovers: How often values were taken over on a request.
+        taken: How often they were taken over at all.
         answer_s: How long the program takes to answer a request, simulated seconds.
         refuse_with: Error number with which it refuses the next request, ``None`` for none.
         device_id: What tells this machine from every other one, kept over a restart.
@@ -33,7 +36,7 @@ class PlcProgram:
         self._map = register_map
         self.memory = Memory(_used(register_map))
         self.in_force: dict[int, Components] = {}
-        self.takeovers = 0
+        self.takeovers = self.taken = 0
         self.answer_s = 0.005
         self.refuse_with: int | None = None
         self.silent = False
@@ -98,6 +101,20 @@ class PlcProgram:
         """Return when it will answer, if a request is in work."""
         return self._answer_at_ns
 
+    def moment(self) -> dict[str, Any]:
+        """Return copies of its number, its tables, and what it works with."""
+        return {
+            "device_id": self.device_id,
+            "memory": self.memory.copied(),
+            "in_force": deepcopy(self.in_force),
+        }
+
+    def put_back(self, moment: Mapping[str, Any]) -> None:
+        """Take over what :meth:`moment` gave; a request that was in work is forgotten."""
+        self.device_id, self._answer_at_ns = moment["device_id"], None
+        self.memory.put_back(moment["memory"])
+        self.in_force = deepcopy(moment["in_force"])
+
     @property
     def _idle(self) -> bool:
         commit = self._map.commit
@@ -129,6 +146,7 @@ class PlcProgram:
         self.place_flange({"x": 300.0, "y": 100.0, "z": -20.0, "u": 0.0})
 
     def _take_over(self) -> None:
+        self.taken += 1
         self.in_force = {slot.tool: self._stored(slot) for slot in self._map.slots.values()}
 
     def _tell_error(self, code: int) -> None:

@@ -95,6 +95,16 @@ def test_an_empty_database_is_made_a_journal_once_however_many_open_it(location,
     assert open_anew(location).verify() == ChainVerification(5, ())
 
 
+@pytest.mark.soak
+def test_many_new_files_are_made_journals_once_however_many_open_them(tmp_path, open_anew):
+    """SQLite lets nobody wait for the log of a new file: of 150 files one was refused at 3."""
+    for number in range(50):
+        name = str(tmp_path / f"{number}.db")
+        _together(
+            [lambda name=name: open_anew(name).log("cell").append(NewEntry(EntryKind.RAW))] * 5
+        )
+
+
 def _together(acts):
     failures = []
 

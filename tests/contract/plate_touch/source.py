@@ -69,7 +69,7 @@ class PlateTouchSource:
         yield from approach_path(safe, here=here, purpose=tr("go above the plate"))
         touches = []
         for speed_mm_s in (2 * said.slow_mm_s, said.slow_mm_s):
-            yield Move(above, Path.STRAIGHT, tr("come down to the clearance"))
+            yield Move(above, Path.STRAIGHT, tr("Lowering to just above the place."))
             step = Seek(offset_z(contact, -BEYOND_MM), place.edge, speed_mm_s, tr("seek the plate"))
             found = yield from seek_or_retract(step, here=above, safe_z_mm=safe.z_mm)
             touches.append(Touch(found.z_mm, speed_mm_s))

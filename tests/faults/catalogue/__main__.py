@@ -5,6 +5,7 @@ row failed or the run broke off. A row that could not be shown here is told as s
 reason, and never as passed.
 """
 
+import platform
 import sys
 from collections import Counter
 
@@ -33,6 +34,7 @@ def main(wanted: list[str]) -> int:
     words = ("passed", "in part", "FAILED", "not run")
     print(f"{len(verdicts)} faults: " + ", ".join(f"{count[word]} {word}" for word in words))
     hardware = sum(end.on_hardware for of_row in listener.ends.values() for end in of_row.values())
+    print(f"All of it on {platform.system()}; what holds on another system, no row shows.")
     print(f"Not run, for want of a real controller: {hardware} tests, of rows shown on simulators.")
     return 1 if count["FAILED"] or ended else 0
 

@@ -19,9 +19,10 @@ made from the catalogue in `tests/faults/catalogue/rows` and the marks of the te
 `make faults` runs the tests of all rows and prints the table with pass marks,
 `make faults ROWS="F01 F25"` those of some. A row that cannot be shown on the machine at hand is
 printed as *not run*, with the reason. All of it is checked against the simulators, not against a
-robot or a PLC. *Unproved* means exit code 6: it may or may not have happened, and nothing moves on
-that controller until somebody has looked ([records](records.md)). Tests marked *soak* take long;
-they run with `make faults` and `make soak`, not with `make test`.
+robot or a PLC, and on Linux: what of it holds on another system, no row shows. *Unproved* means
+exit code 6: it may or may not have happened, and nothing moves on that controller until somebody
+has looked ([records](records.md)). Tests marked *soak* take long; they run with `make faults` and
+`make soak`, not with `make test`.
 """
 _HEAD: Final = (
     "| | fault | what you see | what never happens | how it is brought about | shown by |",

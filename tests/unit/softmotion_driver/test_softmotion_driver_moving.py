@@ -237,7 +237,7 @@ def test_a_movement_without_an_answer_is_unknown_and_blocks_the_next(cell, plc, 
     with pytest.raises(OutcomeUnknownError, match="may or may not"):
         move(group)
     later = cell.connect()
-    with pytest.raises(OutcomeUnknownError, match="not settled"):
+    with pytest.raises(OutcomeUnknownError, match="did not finish"):
         move(later.groups[0])
     plc.clock.sleep(1.0)  # what may be under way is not looked into before it stands
     (marker,) = cell.outcomes.open_markers()

@@ -72,7 +72,7 @@ def test_a_change_cut_off_in_the_middle_is_recovered(cell, controller):
     with pytest.raises(OutcomeUnknownError):
         change_tools(controller, [Wanted(3, NEW, OLD), Wanted(4, NEW, None)])
     controller.close()
-    with pytest.raises(RobolinkError, match="owns the mailbox"), cell.connect() as soon:
+    with pytest.raises(RobolinkError, match="commands the PLC"), cell.connect() as soon:
         recover(soon)
     cell.plc.clock.sleep(10.0)
     later = cell.connect()

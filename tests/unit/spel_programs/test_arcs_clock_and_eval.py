@@ -124,7 +124,7 @@ def test_a_counter_ends_a_wait_and_there_are_sixteen(cell, failure):
     made.simulator.advance(NS)
     assert list(made.runner.console) == ["0\r\n"]
     told = failure("Integer i", "For i = 0 To 16", "CTReset i", "Next")
-    assert told.number == 4002
+    assert told.number == 2507
 
 
 def test_the_clock_goes_with_simulated_time(printed):
@@ -155,7 +155,7 @@ def test_eval_runs_a_line_of_the_command_window_and_never_fails(printed):
         "05",
         "7007",
         "!Error: 7007",
-        "2119",
+        "2353",
         "0 -1",
         "07 -1",
         "30",

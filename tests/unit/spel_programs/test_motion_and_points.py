@@ -217,4 +217,4 @@ def test_virtual_inputs_are_set_where_they_are_virtual(printed, failure):
     """P. 723 to 727."""
     lines = ("SetSw 3, 1", "SetIn 1, &H25", "Print Sw(3), InBCD(1)", "OpBCD 0, 47", "Print Out(0)")
     assert printed(*lines, virtual_io=True) == ["1 25", "71"]
-    assert failure("SetSw 3, 1").number == 2119
+    assert failure("SetSw 3, 1").number == 2350

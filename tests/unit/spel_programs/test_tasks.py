@@ -99,7 +99,7 @@ def test_waiting_for_a_task_and_its_number(cell):
         "Fend\nFunction f(n As Integer)\nWait 0.5\nFend\n"
     )
     assert made.run() == ["-1"]
-    assert made.runner.failure.number == 2260
+    assert made.runner.failure.number == 2503
 
 
 def test_a_wait_for_a_condition_tells_by_tw_how_it_ended(printed):
@@ -210,7 +210,7 @@ def test_a_task_that_stops_do_not_touch_may_not_move(cell):
         "Function main\nXqt f, NoEmgAbort\nWait 1\nFend\nFunction f\nOnErr GoTo h\n"
         'TLSet 1, XY(1, 2, 3, 4)\nPrint "set"\nh:\nPrint Err\nFend\n'
     )
-    assert made.run() == ["2123"]
+    assert made.run() == ["2295"]
 
 
 def test_an_emergency_stop_ends_tasks_but_not_those_it_must_not_end(cell):
@@ -246,3 +246,67 @@ def test_a_pause_holds_motion_and_time_and_continue_ends_both(cell):
     made.simulator.advance(5 * 10**9)
     assert made.simulator.machine.tip().x_mm == pytest.approx(start.x_mm - 40)
     assert len(made.runner.console) == 2
+
+
+@pytest.mark.parametrize(
+    ("line", "number"), [("WaitSig 3", 2281), ("SyncLock 5", 2281), ("WaitNet #201", 2282)]
+)
+def test_tmout_bounds_what_has_no_time_of_its_own(cell, line, number):
+    """Help, 2281 and 2282; a time of its own is told by TW, and is no error."""
+    made = cell(
+        'Function main\nSetNet #201, "127.0.0.1", 1, CRLF, NONE, 0\nOpenNet #201 As Client\n'
+        f"Xqt holder\nWait 0.1\nTMOut 2\n{line}, 1\nPrint TW\nTmReset 1\nOnErr GoTo late\n"
+        f"{line}\nlate:\nPrint Err, Int(Tmr(1))\nFend\nFunction holder\nSyncLock 5\nWait 20\nFend"
+    )
+    made.simulator.program.ports.dial = lambda address: NoAnswer()
+    assert made.run() == ["-1", f"{number} 2"]
+
+
+class NoAnswer:
+    """A link whose other end never answers."""
+
+    def getsockopt(self, level, name):
+        return 0
+
+    def getpeername(self):
+        raise OSError
+
+    def close(self):
+        pass
+
+
+ABORTING = """
+Function main
+Xqt mover
+Wait 0.2
+{first}
+Wait 0.5
+{second}
+Fend
+Function mover
+OnErr GoTo caught
+Go XY(0, 492, -100, 0)
+Wait 5
+Exit Function
+caught:
+Print Err, InPos
+EResume onward
+onward:
+Wait 5
+Fend
+"""
+
+
+def test_abortmotion_stops_the_motion_of_another_task_and_raises_its_errors(cell):
+    made = cell(ABORTING.format(first="AbortMotion 1", second="AbortMotion All"))
+    assert made.run() == ["2999 -1", "2998 -1"]
+    assert made.simulator.machine.tip().x_mm > 1
+
+
+@pytest.mark.parametrize(
+    ("line", "number"), [("AbortMotion All\nAbortMotion 1", 2191), ("AbortMotion 3", 2262)]
+)
+def test_abortmotion_needs_a_robot_that_a_task_has_moved(cell, line, number):
+    made = cell(f"Function main\n{line}\nFend\n")
+    made.run()
+    assert made.runner.failure.number == number

@@ -97,7 +97,7 @@ def test_a_robot_is_moved_by_one_task_at_a_time(loaded):
     simulator, runner = loaded(IN_TURN)
     run(simulator, runner)
     assert runner.failure is not None
-    assert (runner.failure.number, runner.failure.function) == (2125, "other")
+    assert (runner.failure.number, runner.failure.function) == (2200, "other")
     assert "".join(runner.console).split() == ["2"]
 
 

@@ -280,11 +280,11 @@ def test_a_miss_is_a_miss(cell, option, kept):
 @pytest.mark.parametrize(
     ("lines", "number"),
     [
-        (["VRun nosuch"], 7801),
-        (["VRun findTip ; VGet findTip.other.Found, found"], 7802),
+        (["VRun nosuch"], 2543),
+        (["VRun findTip ; VGet findTip.other.Found, found"], 2544),
         (["VRun findTip ; VGet findTip.tip.Sharpness, x"], 7803),
         (["VRun bare ; VGet bare.tip.RobotXYU, found, x, y, u"], 7804),
-        (['VSet bare.Calibration, "nosuch"', "VRun bare ; VGet bare.tip.RobotX, x"], 7805),
+        (['VSet bare.Calibration, "nosuch"', "VRun bare ; VGet bare.tip.RobotX, x"], 2545),
         (["VSet findTip.Camera, 2", "VRun findTip"], 7806),
         (["VSet findTip.Camera, s$"], 2130),
         (["VSet bare.RuntimeAcquire, 0", "VRun bare"], 7806),
@@ -351,7 +351,7 @@ def test_tool_results_need_a_whole_calibration_that_looks_up(vision_cell, calibr
         "VRun findTip ; VGet findTip.tip.RobotToolXYU, found, x, y, u",
         calibration=other,
     )
-    assert vision_cell.made.runner.failure.number == 7805
+    assert vision_cell.made.runner.failure.number == 2545
 
 
 def test_no_vision_in_tasks_that_stops_do_not_touch(vision_cell):
@@ -359,7 +359,7 @@ def test_no_vision_in_tasks_that_stops_do_not_touch(vision_cell):
         "Function main\n Xqt 2, look, NoEmgAbort\nFend\nFunction look\n VRun findTip\nFend"
     )
     vision_cell.made.run()
-    assert vision_cell.made.runner.failure.number == 2123
+    assert vision_cell.made.runner.failure.number == 2295
 
 
 def test_vget_into_too_few_variables_is_told_at_the_build(faults):
@@ -368,4 +368,4 @@ def test_vget_into_too_few_variables_is_told_at_the_build(faults):
 
 
 def test_without_a_vision_project_there_is_no_sequence(failure):
-    assert failure("VRun findTip").number == 7801
+    assert failure("VRun findTip").number == 2543

@@ -192,6 +192,33 @@ def b08_set_kinematics(bench):
     bench.read_tool()
 
 
+def reads_of_no_movement(bench):
+    """Not one of the sixteen: what is read that is not there, before and after what is."""
+    bench.enable()
+    for mode in (1, 0, 2, 0, 1):
+        assert bench.tell(Opcode.READ_TOOL, mode) == ([15, 206] if mode else [10, 0])
+    bench.client.end_of(bench.client.move(z=-2.0).ack_head)
+    for mode in (1, 2, 0):
+        bench.tell(Opcode.READ_TOOL, mode)
+
+
+def read_of_what_was_interrupted(bench):
+    """Not one of the sixteen: what is interrupted goes on with the tool of before."""
+    bench.enable()
+    bench.set_tool(0.0, 0.0, 20.0)
+    bench.client.move(z=-40.0, dynamics=LINE)
+    bench.client.wait(0.1)
+    bench.tell(Opcode.INTERRUPT, seconds=0.3)
+    bench.client.done(Opcode.WRITE_TOOL, 3, pose=(1.0, 2.0, 3.0, 0.0, 0.0, 0.0))
+    bench.client.done(Opcode.SELECT_TOOL, 3)
+    read = [bench.client.done(Opcode.READ_TOOL, mode).answer.pose[2] for mode in (1, 0, 1)]
+    assert read == [20.0, 3.0, 20.0]
+    bench.tell(Opcode.STOP, 0, seconds=0.2)
+    bench.tell(Opcode.STOP, 1)
+    assert bench.tell(Opcode.READ_TOOL, 1) == [15, 206]
+    bench.taken = [words[:12] + words[88:] for words in bench.taken[3:]]  # where it is apart
+
+
 def refused_kinematics(bench):
     """Not one of the sixteen: codes that nothing has, and those of another machine."""
     for codes, error_class in ((18, 0), 111), ((2, 300), 111), ((-1, 0), 111), ((0, 0), 303):
@@ -353,6 +380,8 @@ RUNS = [
     (b14_an_axis_alone, "Kin_Scara3_Z"),
     (b15_jog_about_x, "Kin_ArticulatedRobot_6DOF"),
     (block_of_before, "Kin_Scara3_Z"),
+    (reads_of_no_movement, "Kin_Scara3_Z"),
+    (read_of_what_was_interrupted, "Kin_Scara3_Z"),
     (refused_kinematics, "Kin_Gantry3+Kin_CAxis"),
 ]
 """Each behaviour with each kinematics that it names; the sixteenth is of its own kind."""

@@ -1,9 +1,12 @@
 """Model and program answer with the same words (docs/reference/softmotion.md 5)."""
 
+from itertools import count
+
 import pytest
 from robolink_simulators.softmotion.mailbox.plc import Plc
 
 from robolink.protocols.mailbox import Opcode
+from tests.unit._mailbox_client import LINE
 from tests.unit.structured_text import _behaviours as b
 
 SAMPLE = {
@@ -61,3 +64,31 @@ def test_a_program_that_was_exported_for_no_kinematics_sets_none(tmp_path):
     with b.Bench(tmp_path, b.of_program(texts), "Kin_Scara3_Z") as bench:
         assert bench.tell(Opcode.SET_KINEMATICS, 2, 0) == [15, 303]
         assert bench.tell(Opcode.SET_KINEMATICS, 0, 0) == [15, 303]
+
+
+def cycles_in(bench, seconds):
+    """Let time pass on the link and return how many cycles of the program were executed."""
+    before = bench.plc.plc._executed.cycles
+    bench.client.link.clock.sleep(seconds)
+    bench.plc.advance(bench.client.link.clock.now_ns())
+    return bench.plc.plc._executed.cycles - before
+
+
+def test_a_stop_that_is_held_costs_no_cycles(tmp_path):
+    with b.Bench(tmp_path, b.of_program()) as bench:
+        bench.enable()
+        bench.client.move(z=-2.0)
+        bench.tell(Opcode.STOP, 0, seconds=0.4)
+        assert cycles_in(bench, 4.0) < 20
+        assert bench.tell(Opcode.STOP, 1) == [10, 0]
+        assert bench.taken[-1][7] == 1
+
+
+@pytest.mark.parametrize(("took_ms", "most", "least"), [(0, 26, 24), (5, 13, 7), (30, 3, 1)])
+def test_a_slow_computer_executes_fewer_cycles_and_keeps_up(tmp_path, took_ms, most, least):
+    with b.Bench(tmp_path, b.of_program()) as bench:
+        bench.enable()
+        bench.client.move(z=-40.0, dynamics=LINE)
+        presently = count(bench.plc.now_ns, took_ms * 1_000_000)
+        bench.plc.present_ns = lambda: next(presently)
+        assert least <= cycles_in(bench, 0.1) <= most

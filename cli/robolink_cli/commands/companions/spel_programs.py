@@ -1,6 +1,6 @@
 """spel check and spel run: a person's own SPEL+ programs, without a controller."""
 
-from collections.abc import Sequence
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -9,6 +9,7 @@ import click
 from robolink.errors import ControllerFaultError
 from robolink.messages import tr
 from robolink_cli.console.render import emit_json, json_is_on, note, say
+from robolink_cli.options.simulation import project_options
 from robolink_cli.session.context import json_option
 
 if TYPE_CHECKING:
@@ -73,19 +74,7 @@ def check(files: tuple[Path, ...], points: tuple[Path, ...]) -> None:
     show_default=True,
     help="The function to start; it takes no arguments.",
 )
-@click.option(
-    "--vision",
-    type=_FILE,
-    metavar="FILE",
-    help="Vision project for VRun, as docs/spel-programs.md shows one.",
-)
-@click.option(
-    "--com",
-    "lines",
-    multiple=True,
-    metavar="NUMBER=DEVICE",
-    help="Serial line of a port of OpenCom, as 1=/dev/pts/3; no other is reached. May be repeated.",
-)
+@project_options
 @click.option("--trace", is_flag=True, help="Show each statement before it is carried out.")
 @click.option("--robot", default="T6-602S", show_default=True, help="Model of the robot.")
 @click.option(
@@ -112,6 +101,7 @@ def run(
     function: str,
     vision: Path | None,
     lines: tuple[str, ...],
+    folder: Path | None,
     trace: bool,
     robot: str,
     options: tuple[str, ...],
@@ -119,16 +109,17 @@ def run(
 ) -> None:
     """Run SPEL+ programs on a simulated controller and show what they print.
 
-    Simulated time does not wait, unless a TCP/IP port is open. Nothing but this machine is
-    reached, and no robot moves.
+    Simulated time does not wait, unless a TCP/IP port is open or Input waits for a line, which is
+    taken from here. Nothing but this machine is reached, and no robot moves.
     """
     from robolink_simulators.epson import EpsonSimulator
 
-    from robolink_cli.commands.simulate.serving_epson import habits
+    from robolink_cli.commands.simulate.serving_epson import ProjectSurroundings, habits
 
     simulator = EpsonSimulator(robot, options=habits(options, None))
     printed = list[str]()
-    _load(simulator, (files, points), vision, lines)
+    simulator.load(files, points)
+    ProjectSurroundings(vision, lines, folder).install(simulator)
     ended = _run(simulator, function, most_s, trace=trace, printed=printed)
     program = simulator.program
     if program is not None and program.failure is not None:
@@ -139,35 +130,6 @@ def run(
         emit_json("robolink/spel-run/1", document)
     elif not ended:
         note(tr("It still ran after {seconds:g} s of simulated time.", seconds=most_s))
-
-
-def _lines(texts: Sequence[str]) -> dict[int, str]:
-    """Return the serial line of each port that ``--com`` names."""
-    from robolink_simulators.epson.spel.tasks.serial_link import COM_NUMBERS
-
-    named = dict[int, str]()
-    for text in texts:
-        number, _, device = text.partition("=")
-        if not device or number not in map(str, COM_NUMBERS):
-            raise click.UsageError(
-                tr("--com takes 1 to 4 or 1001 to 1008, and a device: 1=/dev/pts/3.")
-            )
-        named[int(number)] = device
-    return named
-
-
-def _load(
-    simulator: "EpsonSimulator",
-    project: tuple[Sequence[Path], Sequence[Path]],
-    vision: Path | None,
-    lines: Sequence[str],
-) -> None:
-    runner = simulator.load(*project)
-    runner.ports.devices |= _lines(lines)
-    if vision is not None:
-        from robolink_simulators.epson.vision.vision_file import install_vision
-
-        install_vision(simulator, vision)
 
 
 def _run(
@@ -190,6 +152,7 @@ def _run(
         say(text.rstrip("\r\n"))
 
     runner.on_print = show
+    runner.channels.window.ask = _typed_line
     if trace:
         runner.on_statement = lambda task, file, line, text: note(
             f"{task.now_ns / 1e9:12.6f} {task.task_number:3} {file}:{line}: {text}"
@@ -204,6 +167,12 @@ def _run(
         return run_to_end(runner, simulator.advance, simulator.next_change, most_s=most_s)
     finally:
         runner.forget()
+
+
+def _typed_line() -> str | None:
+    """Return what is typed for Input, ``None`` at the end of what there is."""
+    line = sys.stdin.readline()
+    return line.rstrip("\r\n") if line else None
 
 
 def _failed(failure: "TaskFailure") -> ControllerFaultError:

@@ -141,6 +141,9 @@ def restore(
             return
         if not (context.json or plan.empty):
             restoration.show()
-            agree(tr("Write this to the controller?"), yes=yes)
+            agree(
+                tr("Write these values to the controller? 'robolink undo' takes them back."),
+                yes=yes,
+            )
         payload = restoration.run()
     context.emit("restore", {"file": str(file), **payload}, restoration.show_end)

@@ -137,7 +137,7 @@ def _effect_of_reset(controller: "Controller") -> tuple[str, bool]:
 
     told = preferences_of(controller)
     if told is None:
-        return tr("Reset may switch outputs off (vacuum, gripper)."), False
+        return tr("Reset can switch outputs off: a part may drop."), False
     if Preference.RESET_OUTPUTS_OFF in told:
         return tr("Reset SWITCHES THE OUTPUTS OFF (vacuum, gripper): a part may drop."), True
     return tr("Reset clears the error; the outputs stay as they are."), True
@@ -156,7 +156,7 @@ def motors(context: CliContext, switch: str, dry_run: bool, yes: bool) -> None:
             context.show_requests(controller.preview(Act.MOTORS_ON if on else Act.MOTORS_OFF))
             return
         if on:
-            agree(tr("Is the cell clear? The motors go on."), yes=yes)
+            agree(tr("Switch the motors on? Nobody may be in the cell."), yes=yes)
         controller.motors(on)
     payload: dict[str, object] = {"motors_on": on}
     context.emit("motors", payload, lambda: say(tr("The motors are {switch}.", switch=switch)))

@@ -1,21 +1,26 @@
 """recalibrate RECIPE.toml: the scripted nozzle change."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from robolink.messages import declared
-from robolink_cli.options.consent import dry_run_option, yes_option
+from robolink.messages import declared, tr
+from robolink_cli.options.consent import dry_run_option, plain_option, yes_option
 from robolink_cli.options.recipe_answers import answer_options
 from robolink_cli.options.sensor import sensor_option
 from robolink_cli.session.completing import complete_recipe
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.operator_identity import nozzle_options
 
+if TYPE_CHECKING:
+    from robolink.recipe import LoadedRecipe
+
 
 @click.command()
 @click.argument(
     "recipe",
+    required=False,
     metavar="RECIPE.toml",
     type=click.Path(dir_okay=False, path_type=Path),
     shell_complete=complete_recipe,
@@ -48,9 +53,10 @@ from robolink_cli.session.operator_identity import nozzle_options
 @controller_options
 @dry_run_option
 @yes_option
+@plain_option
 def recalibrate(
     context: CliContext,
-    recipe: Path,
+    recipe: Path | None,
     *,
     reference: bool,
     accepted_change_mm: float | None,
@@ -68,23 +74,30 @@ def recalibrate(
 
     All tools of the recipe are measured before one is written; all are written or none. A
     refusal, Ctrl-C or an emergency stop leaves the old values, and the tool that was selected.
+    Without RECIPE, on a terminal, cell and recipe are chosen from lists.
     """
     from robolink.recipe import load_recipe
+    from robolink_cli.commands.measure.choosing import nobody_to_ask
     from robolink_cli.commands.measure.recalibration import Recalibration
     from robolink_cli.commands.measure.recipe_events import EventStream
     from robolink_cli.console.render import note
+    from robolink_cli.console.tolerance import may_be_guided
     from robolink_cli.options.recipe_answers import answers_from
+    from robolink_cli.session.guidance import guided_if_alone
 
+    if recipe is None and not may_be_guided():
+        raise nobody_to_ask()
     events = EventStream(click.get_current_context(), on=jsonl)
-    with events.closing():
-        loaded = load_recipe(recipe)
+
+    def change() -> None:
+        at, loaded = _chosen(context) if recipe is None else (context, load_recipe(recipe))
         for sentence in loaded.notes:
             note(sentence)
         prepared = answers_from(
             loaded.recipe, texts=answers, z_mm=z_mm, nozzle=nozzle, lot=lot, yes=yes
         )
         Recalibration(
-            context,
+            at,
             loaded,
             prepared,
             events=events,
@@ -93,3 +106,21 @@ def recalibrate(
             accepted_change_mm=accepted_change_mm,
             sensor=sensor,
         ).run(dry_run=dry_run)
+
+    with events.closing():
+        alone = recipe is None or (assist is None and not dry_run)
+        guided_if_alone(context, change, job=tr("Change needle"), alone=alone)
+
+
+def _chosen(context: CliContext) -> "tuple[CliContext, LoadedRecipe]":
+    """Have cell and recipe chosen, as far as the line does not name them."""
+    from robolink_cli.commands.measure.choosing import choose_cell, choose_recipe
+    from robolink_cli.prompts.present import present_desk
+    from robolink_cli.session.context import context_of_cell
+    from robolink_cli.session.guidance import header_of
+
+    desk = present_desk()
+    assert desk is not None  # noqa: S101 - looked at by whoever calls
+    at = context if context.url is not None else context_of_cell(choose_cell(desk).name)
+    desk.regard(header_of(at, tr("Change needle")))
+    return at, choose_recipe(desk, at.cell)

@@ -12,7 +12,9 @@ from robolink_cli.access.capabilities import io_of
 from robolink_cli.commands.measure.recipe_events import EventStream, Progress
 from robolink_cli.console.render import note, say
 from robolink_cli.prompts.operator import operator_at
+from robolink_cli.prompts.present import present_desk
 from robolink_cli.prompts.questions import asked, on_terminal
+from robolink_cli.session.check_before_start import check_before_start
 from robolink_cli.session.context import CliContext
 from robolink_cli.session.motion_consent import agree_to_motion, motion_question
 from robolink_cli.session.opening import open_controller
@@ -113,26 +115,44 @@ class Recalibration:
             NotReadyError: Nothing can move now; nobody was asked anything.
             DeclinedError: The answer was no, or nobody could be asked.
         """
-        question = self._question(controller, run) if run.plan.moves else None
+        moves = run.plan.moves
+        question = None if not moves or self._at_desk else self._question(controller, run)
         if run.takes_reference and not self._take_reference:
             self._explain_reference()
         keep_first_backup(controller, tell=note)
-        if question is None:
+        if not moves:
             self._require_writer(run)
             return
-        agree_to_motion(question, yes=self._answers.yes)
+        if question is not None:
+            agree_to_motion(question, yes=self._answers.yes)
+            return
+        steps = preview(controller, run.plan)
+        check_before_start(
+            controller,
+            self._purpose(run),
+            moves=sum(step.target is not None for step in steps),
+            speed_mm_s=run.plan.limits.speed_mm_s,
+            box_mm=run.plan.limits.box.x_max_mm,
+        )
 
     def _question(self, controller: Controller, run: RecipeRun) -> str:
         limits = run.plan.limits
         return motion_question(
             controller,
-            tr(
-                "as {recipe!r} says for tool {tools}",
-                recipe=self._loaded.name,
-                tools=", ".join(str(plan.tool) for plan in run.plan.tools),
-            ),
+            self._purpose(run),
             speed_mm_s=limits.speed_mm_s,
             box_mm=limits.box.x_max_mm,
+        )
+
+    @property
+    def _at_desk(self) -> bool:
+        return present_desk() is not None and not self._answers.yes
+
+    def _purpose(self, run: RecipeRun) -> str:
+        return tr(
+            "as {recipe!r} says for tool {tools}",
+            recipe=self._loaded.name,
+            tools=", ".join(str(plan.tool) for plan in run.plan.tools),
         )
 
     def _explain_reference(self) -> None:
@@ -188,7 +208,10 @@ class Recalibration:
     def _carry_out(self, controller: Controller, run: RecipeRun) -> dict[str, object]:
         report = run.run()
         # Now, because Ctrl-C may come before the logout is answered.
-        for one in report.tools:
+        desk = present_desk()
+        if desk is not None:
+            desk.regard(report)
+        for one in report.tools if desk is None else ():
             show_report(one)
         if run.takes_reference:
             say(tr("The reference was recorded; nothing was written."))

@@ -52,6 +52,16 @@ class Guide:
         note(tr("Nothing was done.") if findings else spoken(_NOTHING))
         return Recovery((), findings)
 
+    def left_blocked(self, *, declined: bool) -> Recovery:
+        """Do nothing about what is open.
+
+        Args:
+            declined: Whether a person at the terminal said so.
+        """
+        findings = look(self._controller, keep=self._keep)
+        self.declined = declined
+        return Recovery((), findings)
+
     def forget(self, *, yes: bool, dry_run: bool) -> int:
         """Forget everything that is open on a person's word; return how much that was.
 
@@ -59,7 +69,13 @@ class Guide:
             DeclinedError: The answer was no.
         """
         markers = self._controller.outcomes.open_markers()
-        agree(tr("Forget {count} open entries without looking?", count=len(markers)), yes=yes)
+        agree(
+            tr(
+                "Unblock the robot WITHOUT a check? Unfinished jobs that are dropped: {count}.",
+                count=len(markers),
+            ),
+            yes=yes,
+        )
         if not dry_run:
             settler = Settler(self._controller)
             for marker in markers:

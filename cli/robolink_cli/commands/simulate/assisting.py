@@ -3,9 +3,11 @@
 from collections.abc import Sequence
 
 from robolink_simulators.assist.port import AssistClient
+from robolink_simulators.control.client import ControlClient
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink_cli.commands.simulate.serving import named_values
 from robolink_cli.console.render import emit_json, json_is_on, say
 
 
@@ -25,6 +27,38 @@ def do_act(url: str, act: str, values: Sequence[str]) -> None:
     say(tr("{act}: done", act=act))
     for name, value in answer.items():
         say(f"  {name}: {_shown(value)}")
+
+
+def do_controlled(url: str, act: str, values: Sequence[str]) -> None:
+    """Have ``act`` done by the control API behind ``url`` and show what it gives.
+
+    Raises:
+        ConfigError: A value is not NAME=VALUE, or the simulator cannot do it and says why.
+        ConnectError: No simulator is there.
+    """
+    given = {
+        name: _typed(text)
+        for name, text in named_values(values, "add_fault action=drop_reply").items()
+    }
+    with ControlClient(url) as client:
+        answer = client.do(act, **given)
+    if json_is_on():
+        emit_json("robolink/control/1", {"act": act, **answer})
+        return
+    say(tr("{act}: done", act=act))
+    for name, value in answer.items():
+        say(f"  {name}: {_shown(value)}")
+
+
+def _typed(text: str) -> bool | int | float | str:
+    """Return what a value on the command line means: a number, true or false, else a text."""
+    if text in ("true", "false"):
+        return text == "true"
+    try:
+        number = float(text)
+    except ValueError:
+        return text
+    return int(number) if number.is_integer() and "." not in text else number
 
 
 def _shown(value: object) -> str:

@@ -1,33 +1,77 @@
 """What every served simulator needs: an address, options, and an orderly end."""
 
 import json
+import os
 import signal
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from tempfile import TemporaryDirectory
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli.console.output import hand_over, show
 from robolink_cli.console.render import json_is_on
+from robolink_cli.options.simulation import ServedLife
 
 if TYPE_CHECKING:
     from robolink_simulators.cell.world_parameters import WorldParameters
+    from robolink_simulators.control.cell import ControlledCell
+    from robolink_simulators.control.server import ControlServer
 
 
 class Termination:
-    """Makes SIGTERM an orderly end; Ctrl-C stays what it is."""
+    """Makes SIGTERM an orderly end; Ctrl-C stays what it is.
 
-    def __init__(self) -> None:
+    Args:
+        life: When it ends by itself; never where that is left out.
+
+    Attributes:
+        state_dir: A folder for what clients of this simulator keep on record, gone at its end.
+
+    Raises:
+        ConfigError: This system does not tell a process that its parent has ended.
+    """
+
+    def __init__(self, life: ServedLife | None = None) -> None:
+        self._life = life
+        self._parent = os.getppid()
+        if life is not None and life.with_parent and os.name == "nt":
+            raise ConfigError(
+                tr("On Windows a simulator does not see that its parent has ended."),
+                remedy=tr("Use --idle-exit there."),
+            )
         self._stopped = threading.Event()
         self._before: Any = None
+        self._folder = TemporaryDirectory(prefix="robolink-sim-", ignore_cleanup_errors=True)
+        self.state_dir = self._folder.name
 
-    def wait(self) -> None:
-        """Block until SIGTERM."""
+    def wait(self, requests: Callable[[], int] = int) -> None:
+        """Block until SIGTERM, or until life ends otherwise.
+
+        Args:
+            requests: Tells how many requests there were so far.
+        """
+        seen, since_s = -1, monotonic()
         # In slices, because Windows delivers Ctrl-C only between waits.
-        while not self._stopped.wait(0.5):
-            pass
+        while not self._stopped.wait(self._slice_s()):
+            if (now := requests()) != seen:
+                seen, since_s = now, monotonic()
+            if self._is_over(monotonic() - since_s):
+                return
+
+    def _slice_s(self) -> float:
+        idle_s = self._life and self._life.idle_exit_s
+        return min(0.5, idle_s / 4) if idle_s else 0.5
+
+    def _is_over(self, idle_s: float) -> bool:
+        if self._life is None:
+            return False
+        if self._life.with_parent and os.getppid() != self._parent:
+            return True
+        return self._life.idle_exit_s is not None and idle_s >= self._life.idle_exit_s
 
     @property
     def came(self) -> bool:
@@ -40,18 +84,42 @@ class Termination:
 
     def __exit__(self, *_details: object) -> None:
         signal.signal(signal.SIGTERM, self._before)
+        self._folder.cleanup()
 
 
-def announce(document: dict[str, object], lines: Sequence[str]) -> None:
+def announce(document: dict[str, object], lines: Sequence[str], state_dir: str) -> None:
     """Print the first output: one line of JSON, or ``lines`` for a person.
+
+    Scripts give ``state_dir`` to their clients as ROBOLINK_STATE_DIR, so that nothing of a run is
+    left in a journal of somebody's own.
 
     click flushes it, because whoever started us waits for it.
     """
     if json_is_on():
-        document = {"schema": "robolink/sim/1", **document, "simulated": True}
+        document = {
+            "schema": "robolink/sim/1",
+            **document,
+            "state_dir": state_dir,
+            "simulated": True,
+        }
         hand_over(json.dumps(document))
     else:
         show("\n".join(lines))
+
+
+def controlled(
+    cells: Mapping[str, "ControlledCell"], life: ServedLife, *, allow_remote: bool
+) -> "ControlServer":
+    """Serve the control API of simulators.
+
+    Raises:
+        ConfigError: Its address is none, or other machines could reach it and may not.
+        ConnectError: The port is taken.
+    """
+    from robolink_simulators.control.server import ControlServer
+
+    address = host_and_port(life.control, "--control")
+    return ControlServer(cells, address, allow_remote=allow_remote)
 
 
 def host_and_port(address: str, option: str) -> tuple[str, int]:

@@ -6,14 +6,20 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from robolink_simulators.assist.port import serve_assist
-from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.cell.clock import ScaledClock, SteeredClock
+from robolink_simulators.control.cell import ControlledCell
 from robolink_simulators.faults import LinkKind
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink_cli.commands.simulate.serving import Termination, announce, host_and_port
-from robolink_cli.options.simulation import DEFAULT_ADDRESS
+from robolink_cli.commands.simulate.serving import (
+    Termination,
+    announce,
+    controlled,
+    host_and_port,
+)
+from robolink_cli.options.simulation import DEFAULT_ADDRESS, ServedLife
 
 if TYPE_CHECKING:
     from robolink_simulators.hosting.fieldbus.canopen_node import CanPlace
@@ -54,15 +60,20 @@ class Buses:
         return named or frozenset({LinkKind.MODBUS_TCP})
 
 
-def serve_plc(simulator: SoftMotionSimulator, buses: Buses, *, speed: float) -> None:
-    """Serve a simulator and its assist port until SIGTERM or Ctrl-C."""
-    clock = ScaledClock(speed)
+def serve_plc(
+    simulator: SoftMotionSimulator, buses: Buses, *, speed: float, life: ServedLife
+) -> None:
+    """Serve a simulator, its assist port and its control API until SIGTERM or Ctrl-C."""
+    clock = SteeredClock(speed)
     with ExitStack() as stack:
-        stopped = stack.enter_context(Termination())
+        stopped = stack.enter_context(Termination(life))
         urls = _served(stack, simulator, buses, clock)
         assist = stack.enter_context(serve_assist(simulator, clock=clock))
-        _announce(simulator, urls, assist.url)
-        stopped.wait()
+        cells = {"cell": ControlledCell(simulator, clock, urls)}
+        control = stack.enter_context(controlled(cells, life, allow_remote=buses.allow_remote))
+        beside = {"assist": assist.url, "control": control.url_of("cell")}
+        _announce(simulator, urls, beside, stopped.state_dir)
+        stopped.wait(lambda: simulator.log.added + control.requests)
 
 
 def _served(
@@ -114,12 +125,17 @@ def _can_place(text: str, node: int) -> "CanPlace":
     return CanPlace(interface, channel, int(port), node)
 
 
-def _announce(simulator: SoftMotionSimulator, urls: Mapping[str, str], assist_url: str) -> None:
+def _announce(
+    simulator: SoftMotionSimulator,
+    urls: Mapping[str, str],
+    beside: Mapping[str, str],
+    state_dir: str,
+) -> None:
     kinematics = simulator.plc.group.kinematics.name
     document: dict[str, object] = {
         "url": simulator.url,
         "urls": dict(urls),
-        "assist": assist_url,
+        **beside,
         "kinematics": kinematics,
         "seed": simulator.seed,
     }
@@ -130,8 +146,9 @@ def _announce(simulator: SoftMotionSimulator, urls: Mapping[str, str], assist_ur
             seed=simulator.seed,
         ),
         *(tr("  {bus}  {url}", bus=bus.ljust(10), url=url) for bus, url in urls.items()),
-        tr("  assist      {url}", url=assist_url),
+        tr("  assist      {url}", url=beside["assist"]),
+        tr("  control     {url}", url=beside["control"]),
         tr('Try: robolink -c "{url}" status', url=simulator.url),
         tr("Ctrl-C ends it."),
     )
-    announce(document, lines)
+    announce(document, lines, state_dir)

@@ -6,7 +6,12 @@ import click
 
 from robolink_cli.commands.simulate.sim_plc import sim_plc
 from robolink_cli.commands.simulate.sim_softmotion import softmotion
-from robolink_cli.options.simulation import simulation_options
+from robolink_cli.options.simulation import (
+    ServedLife,
+    life_options,
+    project_options,
+    simulation_options,
+)
 from robolink_cli.session.context import json_option
 
 
@@ -87,13 +92,9 @@ sim.add_command(softmotion)
     metavar="FILE",
     help="Point file (.pts) of the programs. May be repeated.",
 )
-@click.option(
-    "--vision",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    metavar="FILE",
-    help="Vision project of the programs, for VRun; docs/spel-programs.md shows one.",
-)
+@project_options
 @simulation_options
+@life_options
 @json_option
 def epson(
     *,
@@ -113,7 +114,10 @@ def epson(
     programs: tuple[Path, ...],
     points: tuple[Path, ...],
     vision: Path | None,
+    lines: tuple[str, ...],
+    folder: Path | None,
     allow_remote: bool,
+    life: ServedLife,
 ) -> None:
     """Serve a simulated EPSON controller with Remote Ethernet, or RS232, until Ctrl-C.
 
@@ -135,10 +139,10 @@ def epson(
     from robolink_cli.commands.simulate.planned_faults import plan_faults
     from robolink_cli.commands.simulate.serving import world_from
     from robolink_cli.commands.simulate.serving_epson import (
+        ProjectSurroundings,
         habits,
         load_programs,
         password_in,
-        serial_of,
         serve_epson,
     )
 
@@ -147,14 +151,14 @@ def epson(
         seed=seed,
         password=password_in(password_env),
         options=habits(options, profile),
-        serial=serial_of(seed),
         state_path=state,
         world=world_from(world),
     )
-    load_programs(simulator, programs, points, vision)
+    surroundings = ProjectSurroundings(vision, lines, folder)
+    load_programs(simulator, programs, points, surroundings)
     plan_faults(simulator, faults, {LinkKind.EPSON_SERIAL if serial else LinkKind.EPSON_TCP})
     place = None if serial else listen
-    serve_epson(simulator, place, speed=speed, allow_remote=allow_remote, baud=baud)
+    serve_epson(simulator, place, speed=speed, allow_remote=allow_remote, life=life, baud=baud)
 
 
 @sim.command()
@@ -172,3 +176,28 @@ def assist(url: str, act: str, values: tuple[str, ...]) -> None:
     from robolink_cli.commands.simulate.assisting import do_act
 
     do_act(url, act, values)
+
+
+@sim.command()
+@click.argument("act")
+@click.argument("values", nargs=-1, metavar="[NAME=VALUE]...")
+@click.option(
+    "--at",
+    "url",
+    metavar="URL",
+    envvar="ROBOLINK_CONTROL",
+    show_envvar=True,
+    required=True,
+    help="The control URL that 'robolink sim' prints.",
+)
+@json_option
+def ctl(act: str, values: tuple[str, ...], url: str) -> None:
+    """Do something to a simulated controller and its cell past the wire.
+
+    ACT is for example truth, press_estop, add_fault action=drop_reply match=TLSet, log, reset,
+    set_clock factor=0, step seconds=2. An unknown one lists them all, and docs/control-api.md
+    explains each.
+    """
+    from robolink_cli.commands.simulate.assisting import do_controlled
+
+    do_controlled(url, act, values)

@@ -6,7 +6,12 @@ from typing import TYPE_CHECKING
 
 import click
 
-from robolink_cli.options.simulation import modbus_options, simulation_options
+from robolink_cli.options.simulation import (
+    ServedLife,
+    life_options,
+    modbus_options,
+    simulation_options,
+)
 from robolink_cli.session.context import json_option
 
 if TYPE_CHECKING:
@@ -56,6 +61,7 @@ def _complete_kinematics(_: click.Context, __: click.Parameter, start: str) -> l
     help="Execute the program in this folder, as 'plc export' writes it, changed or not.",
 )
 @simulation_options
+@life_options
 @json_option
 def softmotion(
     *,
@@ -74,6 +80,7 @@ def softmotion(
     world: tuple[str, ...],
     faults: Path | None,
     allow_remote: bool,
+    life: ServedLife,
 ) -> None:
     """Serve a simulated SoftMotion PLC with a mailbox until Ctrl-C.
 
@@ -101,7 +108,7 @@ def softmotion(
     )
     buses = Buses(modbus_tcp, modbus_rtu, can, unit=unit, node=node, allow_remote=allow_remote)
     plan_faults(simulator, faults, buses.kinds)
-    serve_plc(simulator, buses, speed=speed)
+    serve_plc(simulator, buses, speed=speed, life=life)
 
 
 def _plc_with(program: Path | None) -> "PlcMaker":

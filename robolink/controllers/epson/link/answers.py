@@ -89,8 +89,8 @@ def _obstacle(status: ControllerStatus) -> tuple[NotReadyReason, str, str] | Non
     if status.teach:
         return (
             NotReadyReason.TEACH,
-            tr("The controller is in Teach mode; a PC commands nothing there."),
-            tr("Turn the mode selector to AUTO, or use poses taught on the pendant."),
+            tr("The controller is in TEACH: a PC cannot move it."),
+            tr("Turn the key to AUTO, or teach the points on the pendant."),
         )
     if status.test:
         return (
@@ -101,7 +101,7 @@ def _obstacle(status: ControllerStatus) -> tuple[NotReadyReason, str, str] | Non
     if not status.remote:
         return (
             NotReadyReason.NOT_REMOTE,
-            tr("The controller does not accept remote commands (the Auto flag is off)."),
+            tr("The controller does not listen to this PC (the Auto flag is off)."),
             tr(
                 "Set Control Device = Remote Ethernet, switch to AUTO and leave program mode in "
                 "RC+; with 'use only for monitoring' ticked, only reading is possible."
@@ -114,20 +114,20 @@ def _stopped(status: ControllerStatus) -> tuple[NotReadyReason, str, str] | None
     if status.serious_fault:
         return (
             NotReadyReason.SERIOUS_FAULT,
-            tr("The controller reports a serious error (code {code:04d}).", code=status.code),
+            tr("The controller reports a serious error ({code:04d}).", code=status.code),
             tr("A reset does not clear it: switch the controller off and on."),
         )
     if status.emergency_stop:
         return (
             NotReadyReason.EMERGENCY_STOP,
             tr("The emergency stop is pressed."),
-            tr("Clear the danger, release it, then run 'robolink robot reset'."),
+            tr("Remove the danger, release it, then run 'robolink robot reset'."),
         )
     if status.fault:
         return (
             NotReadyReason.FAULT,
-            tr("The controller is in error (code {code:04d}).", code=status.code),
-            tr("Find the cause, then run 'robolink robot reset' (it may switch outputs off)."),
+            tr("The controller reports an error ({code:04d}).", code=status.code),
+            tr("Remove the cause, then run 'robolink robot reset'. It can switch outputs off."),
         )
     if status.guard_open:
         return (

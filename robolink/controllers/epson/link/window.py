@@ -195,7 +195,7 @@ class CommandWindow:
             text = self.error_text(status.code)
             cause = f"{cause} ({text})" if text else cause
             remedy = tr(
-                "Find the cause, then run 'robolink robot reset' (it may switch outputs off)."
+                "Remove the cause, then run 'robolink robot reset'. It can switch outputs off."
             )
         return ControllerFaultError(
             tr(

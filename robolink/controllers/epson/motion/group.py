@@ -118,7 +118,7 @@ class EpsonGroup(MotionGroupCore):
         return MotionTerms(
             tr("Robot {number}, in Power Low,", number=spel.parse_integer(number)),
             tr(
-                "The remote time-out set in the controller is taken to be {timeout:g} s.",
+                "The controller stops when this PC is silent for {timeout:g} s.",
                 timeout=self._remote_timeout_s,
             ),
         )

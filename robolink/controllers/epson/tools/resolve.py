@@ -32,7 +32,8 @@ class EpsonResolver(MarkerResolver):
     def _examine_more(self, marker: Marker) -> Finding | None:
         if "raw" in marker.details:
             sentence = tr(
-                "Nobody but you can tell what {statement!r} did. Look at the controller.",
+                "This PC cannot see whether {statement!r} ran. Look at the controller, then "
+                "choose.",
                 statement=marker.request,
             )
             return Finding(marker, Verdict.LOOK, sentence)

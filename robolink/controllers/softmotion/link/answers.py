@@ -123,7 +123,7 @@ def _remedy(error_class: int, raw_error: int = 0) -> str:
             "The machine's program gives the permit (xPermit); bring it to its service state."
         ),
         ErrorClass.DISABLED: tr("Run 'robolink robot motors on' when the cell is clear."),
-        ErrorClass.ERRORSTOP: tr("Find the cause, then run 'robolink robot reset'."),
+        ErrorClass.ERRORSTOP: tr("Remove the cause, then run 'robolink robot reset'."),
         ErrorClass.STOPPING: tr(
             "Run 'robolink robot reset' to release the stop when the cell is clear."
         ),

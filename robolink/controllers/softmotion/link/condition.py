@@ -175,7 +175,7 @@ def _obstacle(now: Response) -> tuple[NotReadyReason, str, str] | None:
         return (
             NotReadyReason.FAULT,
             tr("The axis group is in its error state."),
-            tr("Find the cause, then run 'robolink robot reset'."),
+            tr("Remove the cause, then run 'robolink robot reset'."),
         )
     if now.group_state == GroupState.STOPPING:
         return (

@@ -74,7 +74,7 @@ class Ownership:
         if end.state != CommandState.DONE or answer.holder != self._wire.owner:
             error = LeaseHeldError(
                 tr(
-                    "Client {holder:08X} owns the mailbox of {identity}.",
+                    "Another program (client {holder:08X}) commands the PLC {identity}.",
                     holder=answer.holder,
                     identity=self._wire.identity,
                 ),

@@ -56,7 +56,8 @@ class SoftMotionToolTable(ToolTableCore):
         """Read a tool of the axis group itself (SMC_GroupReadTool); needs the ownership.
 
         Args:
-            mode: The tool set now, of the movement that runs, or of the one commanded last.
+            mode: The tool set now, of the movement that runs or was interrupted, or of the one
+                commanded last.
 
         Returns:
             ``None`` when there is no such movement.

@@ -12,6 +12,7 @@ from itertools import accumulate
 from typing import Final
 
 from robolink.model import Hand, Pose, Posture, ToolOffset
+from robolink_simulators.device.motion_log import MotionLog, Place
 from robolink_simulators.epson.arm.joints import Joints, check_ranges
 from robolink_simulators.epson.arm.kinematics import forward, hand_of, posture_of, tip_of
 from robolink_simulators.epson.arm.robots import Mechanism, RobotModel
@@ -101,7 +102,7 @@ class Arm:
             commanded one by half of it, against the way it last turned (assumed model).
 
     Attributes:
-        moves_started: Motions begun since the arm was made; a repeated command shows here.
+        motions: Those begun since the arm was made.
         backlash_mm: Play of a SCARA's joint 3, likewise; none at first.
     """
 
@@ -111,7 +112,7 @@ class Arm:
         joints = rest_of(model) if joints is None else joints
         check_ranges(model, joints)
         self.model = model
-        self.moves_started = 0
+        self.motions = MotionLog()
         self.backlash_deg = backlash_deg
         self.backlash_mm = 0.0
         self._joints = joints
@@ -129,6 +130,11 @@ class Arm:
     def now_ns(self) -> int:
         """The instant last given."""
         return self._now_ns
+
+    @property
+    def moves_started(self) -> int:
+        """Motions begun since the arm was made; a repeated command shows here."""
+        return self.motions.added
 
     @property
     def moving(self) -> bool:
@@ -200,7 +206,8 @@ class Arm:
     def start(self, legs: Sequence[Leg], now_ns: int) -> int:
         """Begin one motion made of ``legs`` and return the instant at which it ends."""
         self.halt(now_ns)
-        self.moves_started += 1
+        last = legs[-1]
+        self.motions.add(self._now_ns, lambda: _place(last.flange_at(last.duration_ns)))
         self._travel = _Travel(self._now_ns, tuple(legs))
         return self._travel.end_ns
 
@@ -259,6 +266,10 @@ class Arm:
             plays[number - 1] = self.backlash_mm / 2
         trails = zip(joints, plays, ways, strict=True)
         return Joints(*(value - play * way for value, play, way in trails))
+
+
+def _place(flange: Pose) -> Place:
+    return flange.x_mm, flange.y_mm, flange.z_mm
 
 
 def _sign(value: float) -> float:

@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Final
 
 from robolink.model import Hand, Pose, Posture, ToolOffset, rotate_xy
-from robolink_simulators.cell.frames import ORIGIN, Frame, printed_angles, zyx
+from robolink_simulators.cell.frames import ORIGIN, Frame, Vector, printed_angles, zyx
 from robolink_simulators.epson.arm import scara, six_axes
 from robolink_simulators.epson.arm.joints import Joints, check_depth, check_ranges, nearest_turn
 from robolink_simulators.epson.arm.robots import RobotModel
@@ -139,10 +139,18 @@ def tip_of(model: RobotModel, flange: Pose, offset: ToolOffset | None, *, tool: 
         return _carried(flange, flange.coordinates(), tool=tool)
     if model.six_axes:
         return pose_of_frame(frame_of(flange) @ tool_frame(offset), flange, tool=tool)
+    angles = (flange.u_deg + offset.u_deg, flange.v_deg, flange.w_deg)
+    return _carried(flange, (*tip_place(model, flange, offset), *angles), tool=tool)
+
+
+def tip_place(model: RobotModel, flange: Pose, offset: ToolOffset | None) -> Vector:
+    """Return where a tool's tip is, in mm: all that a search asks in each millisecond."""
+    if offset is None:
+        return (flange.x_mm, flange.y_mm, flange.z_mm)
+    if model.six_axes:
+        return frame_of(flange).point((offset.x_mm, offset.y_mm, offset.z_mm))
     dx_mm, dy_mm = rotate_xy(offset.x_mm, offset.y_mm, flange.u_deg)
-    x, y, z, u, v, w = flange.coordinates()
-    at = (x + dx_mm, y + dy_mm, z + offset.z_mm, u + offset.u_deg, v, w)
-    return _carried(flange, at, tool=tool)
+    return (flange.x_mm + dx_mm, flange.y_mm + dy_mm, flange.z_mm + offset.z_mm)
 
 
 def flange_of(model: RobotModel, tip: Pose, offset: ToolOffset | None) -> Pose:
@@ -152,9 +160,17 @@ def flange_of(model: RobotModel, tip: Pose, offset: ToolOffset | None) -> Pose:
     if model.six_axes:
         return pose_of_frame(frame_of(tip) @ tool_frame(offset).inverse(), tip, tool=0)
     x, y, z, u, v, w = tip.coordinates()
-    u -= offset.u_deg
+    return _carried(tip, (*scara_flange((x, y, z), u, offset), v, w), tool=0)
+
+
+def scara_flange(
+    tip_mm: Vector, u_deg: float, offset: ToolOffset
+) -> tuple[float, float, float, float]:
+    """Return x, y, z in mm and u in degrees of a SCARA's flange, from those of a tool's tip."""
+    x, y, z = tip_mm
+    u = u_deg - offset.u_deg
     dx_mm, dy_mm = rotate_xy(offset.x_mm, offset.y_mm, u)
-    return _carried(tip, (x - dx_mm, y - dy_mm, z - offset.z_mm, u, v, w), tool=0)
+    return (x - dx_mm, y - dy_mm, z - offset.z_mm, u)
 
 
 def _carried(pose: Pose, at: tuple[float, ...], *, tool: int) -> Pose:

@@ -12,7 +12,14 @@ from typing import Final, Protocol
 from robolink.model import Hand, Pose, Posture, ToolOffset
 from robolink.timing import NS_PER_S
 from robolink_simulators.epson.arm.joints import Joints, check_depth, check_ranges
-from robolink_simulators.epson.arm.kinematics import flange_of, forward, hand_of, posture_of, solve
+from robolink_simulators.epson.arm.kinematics import (
+    flange_of,
+    forward,
+    hand_of,
+    posture_of,
+    scara_flange,
+    solve,
+)
 from robolink_simulators.epson.arm.ramps import BrakedRamp, Ramp, TimeLaw
 from robolink_simulators.epson.arm.robots import RobotModel
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
@@ -20,6 +27,7 @@ from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 FULL_SPEED_AFTER_S: Final = 0.2
 """Assumed: time to a joint's top speed at Accel 100."""
 
+_NO_TOOL: Final = ToolOffset()
 _STILL = 1e-9
 _CHECK_EVERY_MM = 2.0
 _CHECK_EVERY_DEG = 2.0
@@ -109,7 +117,7 @@ class JointLeg:
 
 @dataclass(frozen=True, slots=True)
 class LineLeg:
-    """The tool's tip on a straight line, U turning evenly along it."""
+    """The tool's tip on a straight line, U turning evenly along it, of a SCARA."""
 
     model: RobotModel
     start: Pose
@@ -144,13 +152,14 @@ class LineLeg:
         a, b = self.start, self.end
         if share >= 1:
             return flange_of(self.model, b, self.offset)
-        tip = Pose(
+        tip_mm = (
             a.x_mm + (b.x_mm - a.x_mm) * share,
             a.y_mm + (b.y_mm - a.y_mm) * share,
             a.z_mm + (b.z_mm - a.z_mm) * share,
-            a.u_deg + (b.u_deg - a.u_deg) * share,
         )
-        return flange_of(self.model, tip, self.offset)
+        u_deg = a.u_deg + (b.u_deg - a.u_deg) * share
+        offset = self.offset or _NO_TOOL
+        return Pose(*scara_flange(tip_mm, u_deg, offset), tool=0)
 
 
 def plan_go(

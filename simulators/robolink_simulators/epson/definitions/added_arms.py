@@ -30,7 +30,7 @@ class AddedArms:
             Refusal: There is no such number.
         """
         if not 0 <= number <= HIGHEST_ARM:
-            raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"There is no arm {number}")
+            raise SpelRefusal(RefusalKind.ARM_NUMBER, f"There is no arm {number}")
         return number == 0 or number in self._added
 
     def values(self, number: int) -> tuple[float, ...]:
@@ -89,4 +89,4 @@ class AddedArms:
     def _require_added(self, number: int) -> None:
         self.is_defined(number)
         if number == 0:
-            raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, "Arm 0 is fixed")
+            raise SpelRefusal(RefusalKind.ARM_ZERO, "Arm 0 is fixed")

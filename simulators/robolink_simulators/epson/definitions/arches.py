@@ -73,4 +73,4 @@ class ArchTable:
 
     def _require(self, number: int) -> None:
         if not 0 <= number < GATE:
-            raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"There is no arch {number}")
+            raise SpelRefusal(RefusalKind.ARCH_NUMBER, f"There is no arch {number}")

@@ -1,5 +1,6 @@
 """A row of input, output or memory bits, read by bit or by byte."""
 
+import struct
 from typing import Final
 
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
@@ -11,12 +12,28 @@ MEMORY_BITS: Final = 1024
 """Memory bits (docs/reference/spel.md 8: the reference gives 256, 512 and 1024; the largest is
 used)."""
 
+_REAL: Final = struct.Struct("<f")
+
 
 class BitBank:
-    """Bits numbered from 0, ports of eight numbered from 0, lowest bit first."""
+    """Bits numbered from 0, ports of eight numbered from 0, lowest bit first.
 
-    def __init__(self, size: int) -> None:
+    Args:
+        size: How many.
+        no_bit: The refusal of a bit that there is not.
+        no_byte: The same of a port.
+    """
+
+    def __init__(
+        self,
+        size: int,
+        *,
+        no_bit: RefusalKind = RefusalKind.IO_BIT,
+        no_byte: RefusalKind = RefusalKind.IO_BYTE,
+    ) -> None:
         self._bits = [False] * size
+        self._no_bit = no_bit
+        self._no_byte = no_byte
 
     def get(self, number: int) -> bool:
         """Return one bit.
@@ -42,6 +59,7 @@ class BitBank:
         Raises:
             Refusal: There is no such port.
         """
+        self._check_byte(port)
         return sum(self.get(port * 8 + i) << i for i in range(8))
 
     def set_byte(self, port: int, value: int) -> None:
@@ -50,10 +68,33 @@ class BitBank:
         Raises:
             Refusal: There is no such port, or the value is not 0 to 255.
         """
-        self._check(port * 8)
+        self._check_byte(port)
         if not 0 <= value <= 0xFF:
             raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"Not a byte: {value}")
         self._bits[port * 8 : port * 8 + 8] = [bool(value >> i & 1) for i in range(8)]
+
+    def get_real(self, word: int) -> float:
+        """Return the 32 bits from a word port on as a number, the low word first (assumed).
+
+        Raises:
+            Refusal: There are no such ports.
+        """
+        return float(_REAL.unpack(bytes(self.get_byte(2 * word + i) for i in range(4)))[0])
+
+    def set_real(self, word: int, value: float) -> None:
+        """Switch the 32 bits from a word port on.
+
+        Raises:
+            Refusal: There are no such ports, or 32 bits do not hold the number.
+        """
+        self._check_byte(2 * word)
+        self._check_byte(2 * word + 3)
+        try:
+            packed = _REAL.pack(value)
+        except OverflowError:
+            raise SpelRefusal(RefusalKind.OVERFLOW, f"Not a real of 32 bits: {value}") from None
+        for i, byte in enumerate(packed):
+            self.set_byte(2 * word + i, byte)
 
     def clear(self) -> None:
         """Switch every bit off."""
@@ -61,4 +102,8 @@ class BitBank:
 
     def _check(self, number: int) -> None:
         if not 0 <= number < len(self._bits):
-            raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"There is no bit {number}")
+            raise SpelRefusal(self._no_bit, f"There is no bit {number}")
+
+    def _check_byte(self, port: int) -> None:
+        if not 0 <= port < len(self._bits) // 8:
+            raise SpelRefusal(self._no_byte, f"There is no byte {port}")

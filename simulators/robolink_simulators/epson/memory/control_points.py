@@ -29,7 +29,7 @@ class ControlPoints:
             Refusal: There is no such number.
         """
         if not 0 <= number <= HIGHEST_CONTROL_POINT:
-            raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"There is no control point {number}")
+            raise SpelRefusal(RefusalKind.ECP_NUMBER, f"There is no control point {number}")
         return number in self._places
 
     def numbers(self) -> list[int]:
@@ -56,15 +56,15 @@ class ControlPoints:
         self._places[number] = place
 
     def clear(self, number: int) -> None:
-        """Forget one; where it is in force, none is then (assumed).
+        """Forget one.
 
         Raises:
-            Refusal: Number 0, or no such number.
+            Refusal: Number 0, no such number, or the one in force (documented).
         """
         self._require_own(number)
-        self._places.pop(number, None)
         if self.selected == number:
-            self.selected = 0
+            raise SpelRefusal(RefusalKind.ECP_IN_FORCE, f"ECP {number} is in force")
+        self._places.pop(number, None)
 
     def select(self, number: int) -> None:
         """Put one in force, 0 for none.
@@ -79,4 +79,4 @@ class ControlPoints:
     def _require_own(self, number: int) -> None:
         self.defined(number)
         if number == 0:
-            raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, "ECP 0 stands for none")
+            raise SpelRefusal(RefusalKind.ECP_ZERO, "ECP 0 stands for none")

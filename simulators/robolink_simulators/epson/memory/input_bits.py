@@ -67,6 +67,7 @@ class InputBits(BitBank):
         """Switch eight bits by hand."""
         if not 0 <= value <= 0xFF:
             raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"Not a byte: {value}")
+        self._check_byte(port)
         for bit in range(8):
             self.set(8 * port + bit, bool(value >> bit & 1))
 
@@ -81,7 +82,7 @@ class InputBits(BitBank):
         if number in self._senses:
             raise SpelRefusal(RefusalKind.NOT_SIMULATED, "A counter of a sensor at the tip")
         if number not in self._counts and len(self._counts) >= _COUNTERS:
-            raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"There are {_COUNTERS} counters")
+            raise SpelRefusal(RefusalKind.COUNTERS_USED, f"There are {_COUNTERS} counters")
         self._counts[number] = 0
 
     def counted(self, number: int) -> int:

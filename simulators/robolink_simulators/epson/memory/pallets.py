@@ -94,7 +94,9 @@ class PalletTable:
         Raises:
             Refusal: There is no such number, or no such size.
         """
-        if not 0 <= number <= HIGHEST_PALLET or columns < 1 or rows < 1:
+        if not 0 <= number <= HIGHEST_PALLET:
+            raise SpelRefusal(RefusalKind.PALLET_NUMBER, f"There is no pallet {number}")
+        if columns < 1 or rows < 1:
             raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"Pallet {number}, {columns}, {rows}")
         if columns * rows > _MOST_PLACES:
             raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"{columns * rows} places")

@@ -54,7 +54,7 @@ class Point:
         """
         if what == "LOCAL":
             if not 0 <= value <= HIGHEST_LOCAL:
-                raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"There is no local {value:g}")
+                raise SpelRefusal(RefusalKind.LOCAL_NUMBER, f"There is no local {value:g}")
             return replace(self, local=int(value))
         if what not in AXES:
             raise SpelRefusal(RefusalKind.OTHER_ROBOT, f"This robot has no axis {what}")
@@ -150,9 +150,7 @@ class LocalTable:
             Refusal: There is no such local to define.
         """
         if not 1 <= number <= HIGHEST_LOCAL:
-            raise SpelRefusal(
-                RefusalKind.VALUE_OUT_OF_RANGE, f"There is no local {number} to define"
-            )
+            raise SpelRefusal(RefusalKind.LOCAL_NUMBER, f"There is no local {number} to define")
         self._locals[number] = local
 
     def clear(self, number: int) -> None:
@@ -161,10 +159,10 @@ class LocalTable:
         Raises:
             Refusal: There is no such local to forget.
         """
+        if number == 0:
+            raise SpelRefusal(RefusalKind.LOCAL_ZERO, "Local 0 is the base")
         if not 1 <= number <= HIGHEST_LOCAL:
-            raise SpelRefusal(
-                RefusalKind.VALUE_OUT_OF_RANGE, f"There is no local {number} to clear"
-            )
+            raise SpelRefusal(RefusalKind.LOCAL_NUMBER, f"There is no local {number} to clear")
         self._locals.pop(number, None)
 
     def to_base(self, point: Point) -> Point:

@@ -10,7 +10,7 @@ from robolink_simulators.cell.frames import turned
 from robolink_simulators.cell.places import Direction, axis_of
 from robolink_simulators.cell.tip_switches import Lean, Shake, TipSwitch
 from robolink_simulators.epson.arm.arm import Arm
-from robolink_simulators.epson.arm.kinematics import frame_of, tip_of
+from robolink_simulators.epson.arm.kinematics import frame_of, tip_place
 from robolink_simulators.epson.arm.robots import RobotModel
 
 
@@ -63,9 +63,9 @@ class TipInput:
             flange = arm.true_flange()
         else:
             flange = arm.true_flange_at(instant_ns - self._latency_ns)
-        tip = tip_of(arm.model, flange, nozzle.tip)
+        x_mm, y_mm, z_mm = tip_place(arm.model, flange, nozzle.tip)
         dx_mm, dy_mm, dz_mm = self._shake.of(arm.moves_started)
-        place = (tip.x_mm + dx_mm, tip.y_mm + dy_mm, tip.z_mm + dz_mm)
+        place = (x_mm + dx_mm, y_mm + dy_mm, z_mm + dz_mm)
         return self._switch.trips(place, _shaft(arm.model, flange, nozzle))
 
 

@@ -36,7 +36,7 @@ class ToolMemory:
             Refusal: There is no such tool number.
         """
         if not 0 <= tool <= HIGHEST_TOOL:
-            raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"There is no tool {tool}")
+            raise SpelRefusal(RefusalKind.TOOL_NUMBER, f"There is no tool {tool}")
         return self._offsets.get(tool)
 
     def defined(self) -> dict[int, ToolOffset]:
@@ -53,14 +53,14 @@ class ToolMemory:
         self._offsets[tool] = offset
         self.flash_writes += 1
 
-    def clear(self, tool: int, *, in_force: ClearInForce = "selects_zero") -> None:
+    def clear(self, tool: int, *, in_force: ClearInForce = "error") -> None:
         """Forget a definition.
 
         Args:
             tool: Number of the tool.
-            in_force: What happens when it is the tool in force. Neither the language reference
-                nor a transcript says (docs/reference/spel.md 6.1): Tool 0 is selected; or the
-                number stays selected, and targets are the flange's; or nothing is cleared.
+            in_force: What happens when it is the tool in force. That it is an error is documented
+                for RC+ 8 (docs/reference/spel.md 10); what older firmware does is not: Tool 0
+                may be selected, or the number stays selected, and targets are the flange's.
 
         Raises:
             Refusal: Tool 0, no such tool number, or the tool in force where that is an error.

@@ -5,7 +5,7 @@ Source: docs/reference/epson.md 1.2 note 4.
 
 import math
 import re
-from collections.abc import MutableSequence, Sequence
+from collections.abc import Mapping, MutableSequence, Sequence
 from typing import Any, Final
 
 from robolink.errors import ConfigError
@@ -61,6 +61,14 @@ class _Variable:
     def share(self, values: MutableSequence[Any]) -> None:
         """Hold what a program's variable holds."""
         self._values = values
+
+    def copied(self) -> list[Value]:
+        """Return a copy of every element."""
+        return list(self._values)
+
+    def take(self, values: Sequence[Value]) -> None:
+        """Take over what :meth:`copied` gave."""
+        self._values[:] = values
 
     def row(self, subscripts: Sequence[int], count: int) -> list[Value]:
         """Return ``count`` elements; the last subscript runs and must not pass its bound."""
@@ -151,6 +159,15 @@ class Variables:
             raise RequestRefused(ErrorCode.BAD_COUNT)
         variable.set(subscripts, _parsed(variable.kind, text))
         return ()
+
+    def values(self) -> dict[str, list[Value]]:
+        """Return a copy of what each variable holds, element by element."""
+        return {name: it.copied() for name, it in self._variables.items()}
+
+    def put_back(self, values: Mapping[str, Sequence[Value]]) -> None:
+        """Take over what :meth:`values` gave."""
+        for name, held in values.items():
+            self._variables[name].take(held)
 
     def holds(self, name: str) -> bool:
         """Tell whether the project declares a variable."""

@@ -6,9 +6,14 @@ from dataclasses import dataclass, field
 
 from robolink_simulators.epson.condition import Condition
 from robolink_simulators.epson.machine import Machine
+from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.memory.variables import Variables
 from robolink_simulators.epson.options import EpsonOptions
+from robolink_simulators.epson.spel.file_folder import FileFolder
 from robolink_simulators.epson.spel.tree import Binary, Expression, Literal, Name
+
+PointFile = tuple[dict[int, Point], dict[str, int]]
+"""Points by their numbers, and the numbers of labels."""
 
 
 def _at_power_on() -> Expression:
@@ -52,6 +57,8 @@ class Session:
         variables: The project's Global Preserve variables.
         messages: Texts of error numbers.
         memory: What earlier statements have set.
+        files: The folder that file statements reach.
+        point_files: The point files of the project, by their names in lower case.
     """
 
     machine: Machine
@@ -61,3 +68,5 @@ class Session:
     variables: Variables
     messages: Mapping[int, str]
     memory: WindowMemory = field(default_factory=WindowMemory)
+    files: FileFolder = field(default_factory=FileFolder)
+    point_files: dict[str, PointFile] = field(default_factory=dict)

@@ -324,7 +324,7 @@ class StatementExecution:
     def _wait_for_distance(self, percent: float) -> StatementOutcome:
         """Wait until a part of the way is behind: ``D50`` inside ``!...!``."""
         if not 0 <= percent <= HIGHEST_PERCENT:
-            raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"D{percent:g}")
+            raise SpelRefusal(RefusalKind.DISTANCE, f"D{percent:g}")
         at_ns = self._began_ns + round(self._travel_ns * percent / HIGHEST_PERCENT)
         return StatementOutcome(duration_ns=max(0, at_ns - self._busy_until_ns))
 

@@ -7,7 +7,7 @@ from typing import Any, Final
 import canopen
 
 from robolink.protocols.mailbox import COMMAND
-from robolink.timing import Clock
+from robolink_simulators.cell.clock import ManualClock, ScaledClock
 from robolink_simulators.faults import LinkKind
 from robolink_simulators.hosting.fieldbus.canopen_objects import (
     MailboxObjects,
@@ -45,7 +45,7 @@ class CanopenFace:
         self,
         simulator: SoftMotionSimulator,
         number: int,
-        clock: Clock,
+        clock: ScaledClock | ManualClock,
         network: canopen.Network,
         *,
         real_seconds: Callable[[float], float],
@@ -59,7 +59,7 @@ class CanopenFace:
         # canopen declares no types for what is used of it here.
         node: Any = canopen.LocalNode(number, object_dictionary(number))
         node.sdo = server = PlcSdoServer(node, real_seconds=real_seconds)
-        objects = MailboxObjects(simulator, clock.now_ns, server)
+        objects = MailboxObjects(simulator, self._asked, server)
         if not simulator.options.mailbox.snapshot_latched:
             server.refresh_from(objects.fresh)
         node.add_read_callback(objects.read)
@@ -67,6 +67,11 @@ class CanopenFace:
         network.add_node(node)
         self._node = node
         network.subscribe(_RPDO1 + number, self._beaten)
+
+    def _asked(self) -> int:
+        """Return the time at which a request is served."""
+        self._clock.exchanged()
+        return self._clock.now_ns()
 
     def boot(self) -> None:
         """Announce a start; the client then has to start the node."""

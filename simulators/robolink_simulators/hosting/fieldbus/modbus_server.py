@@ -165,6 +165,7 @@ class ModbusServerThread:
         registers: list[int],
         values: list[int] | list[bool] | None,
     ) -> ExcCodes | None:
+        self._clock.exchanged()
         coils = function in _COIL_FUNCTIONS
         first = address // _WORD_BITS if coils else address
         if values is None and function not in _READS:

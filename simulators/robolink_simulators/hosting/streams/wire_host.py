@@ -70,6 +70,8 @@ class WireHost(ClosedAtExit):
         try:
             while not self._stopping:
                 ready = self.selector.select(self._patience_s())
+                if any(key.fileobj is not self._alarm for key, _ in ready):
+                    self._clock.exchanged()
                 with self._lock:
                     now_ns = self._clock.now_ns()
                     for key, events in ready:
@@ -86,7 +88,9 @@ class WireHost(ClosedAtExit):
     def _patience_s(self) -> float:
         with self._lock:
             change = self._device.next_change()
-        return _LONGEST_SLEEP_S if change is None else self._clock.real_seconds(change)
+        if change is None:
+            return _LONGEST_SLEEP_S
+        return min(_LONGEST_SLEEP_S, self._clock.real_seconds(change))
 
     def _drain_alarm(self, _events: int, _now_ns: int) -> None:
         with contextlib.suppress(BlockingIOError):

@@ -5,6 +5,7 @@ from functools import wraps
 from typing import Concatenate, ParamSpec, TypeVar
 
 from robolink_simulators.cell.frames import Frame
+from robolink_simulators.device.motion_log import MotionLog
 from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.group.condition import GroupStatus, SmcGroupState
 from robolink_simulators.softmotion.group.state_machine import StateMachine
@@ -58,7 +59,7 @@ class GroupCore:
         inputs: Digital inputs.
         outputs: Digital outputs.
         tool: The tool in force for movements to come.
-        movements_started: Movements and jogs accepted; a repeated command shows here.
+        motions: Movements and jogs accepted.
         motion: What moves the drives.
         machine: State and time.
     """
@@ -79,9 +80,14 @@ class GroupCore:
         self.inputs = DigitalInputs()
         self.outputs = DigitalOutputs()
         self.tool = ToolInForce()
-        self.movements_started = 0
+        self.motions = MotionLog()
         self.motion = GroupMotion(lambda: self.axes, self.inputs, self.options)
         self.machine = StateMachine(lambda: self.axes, self.motion, self.options)
+
+    @property
+    def movements_started(self) -> int:
+        """Movements and jogs accepted so far; a repeated command shows here."""
+        return self.motions.added
 
     @property
     def axes(self) -> tuple[Axis, ...]:

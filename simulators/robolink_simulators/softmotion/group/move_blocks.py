@@ -85,7 +85,7 @@ class MoveBlocks(GroupCore):
         )
         self.machine.begin_motion()
         self.motion.queue.take_over(self.now_ns)
-        self.movements_started += 1
+        self.motions.add(self.now_ns)
         self.motion.jog = jog
 
     @block
@@ -143,7 +143,8 @@ class MoveBlocks(GroupCore):
         if mode is SmcBufferMode.ABORTING:
             self.motion.queue.take_over(self.now_ns)
             execution.activate()
-        self.movements_started += 1
+        kinematics = self.kinematics
+        self.motions.add(self.now_ns, lambda: kinematics.flange(path.end).shift_mm)
         execution.movement_number = self.movements_started
         self.motion.queue.append(
             Movement(

@@ -169,6 +169,10 @@ class Plc:
             return look_ns if change is None else change
         return min(change, look_ns)
 
+    def keep_pace(self, took_ns: int) -> None:
+        """Take note how much simulated time went by while this computer worked out one step."""
+        del took_ns  # a program that is worked out cycle by cycle has use for it
+
     def output(self, now_ns: int) -> Words:
         """Return response, slots and device block, one behind the other."""
         return self._frozen or self._outbox.words(self._modelled, self._heartbeat(now_ns))

@@ -6,15 +6,18 @@ what clients read and write, and the time. Several hosts may serve one PLC; they
 words that clients write.
 """
 
-import threading
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from copy import deepcopy
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
-from robolink.protocols.mailbox import COMMAND, Opcode, Words
+from robolink.model import ToolOffset
+from robolink.protocols.mailbox import COMMAND, Opcode, Six, Words
+from robolink_simulators.cell.frames import zyx_angles
 from robolink_simulators.cell.world_parameters import WorldParameters
+from robolink_simulators.device.hosted import HostedDevice
+from robolink_simulators.device.motion_log import StartedMotion
 from robolink_simulators.faults import LinkKind, PlcFault, PlcFaultAction
 from robolink_simulators.softmotion.catalogue import MachineModel, machine_named
 from robolink_simulators.softmotion.kinematics.coordinates import CoordRef
@@ -34,17 +37,13 @@ from robolink_simulators.softmotion.world import SoftMotionWorld
 
 DEFAULT_KINEMATICS: Final = "Kin_Scara3_Z"
 
-_LOG_LINES: Final = 2000
 _TORN_S: Final = 0.02
 """Between the halves of a torn write for which no other time is given."""
 
 PlcMaker = Callable[[MachineModel, Mapping[str, float], PlcOptions], Plc]
 
-RequestHook = Callable[[int, str], None]
-"""Called with the running number of a request and a text."""
 
-
-class SoftMotionSimulator:
+class SoftMotionSimulator(HostedDevice):
     """One PLC, its mailbox, and the world around its robot.
 
     Args:
@@ -62,26 +61,17 @@ class SoftMotionSimulator:
     ``full``, disabled.
 
     Attributes:
-        lock: Held by whoever touches the simulator while a host serves it.
-        url: Where the first host serves it, empty when none does.
-        seed: What decides the world and every scatter.
-        durable: Whether its slots outlive the process.
         options: The PLC's habits.
         plc: The controller.
         panel: What a person, or the machine's own program, can do.
         world: The truth, and the person at the machine.
         faults: What is planned to go wrong.
-        exchanges: Requests answered.
-        log: The last (now_ns, ">" or "<", text).
-        on_request: Called with a request before it is carried out. What it raises goes to
-            the host; the request is carried out all the same.
-        on_reply: Called before the answer leaves.
-        watchers: Called after each act at the panel, so that a host looks.
-        present_ns: Tells the present time to such acts; a host sets it.
 
     Raises:
         ConfigError: No such kinematics or parameter, or a state file that does not fit.
     """
+
+    kind = "softmotion"
 
     def __init__(
         self,
@@ -95,67 +85,66 @@ class SoftMotionSimulator:
         world: WorldParameters | None = None,
         make_plc: PlcMaker = Plc,
     ) -> None:
-        self.lock = threading.RLock()
-        self.url = ""
-        self.seed = seed
+        super().__init__(seed)
         self.durable = state_path is not None
         self.options = options or PlcOptions()
-        self._watchdog = FieldbusWatchdog(self.options.mailbox.watchdog_ms)
-        self.exchanges = 0
-        self.log: deque[tuple[int, str, str]] = deque(maxlen=_LOG_LINES)
-        self.on_request: RequestHook | None = None
-        self.on_reply: RequestHook | None = None
-        self.watchers: list[Callable[[], None]] = []
-        self.present_ns: Callable[[], int] | None = None
-        self._now_ns = 0
-        self._stepping = False
-        self._requests = 0
-        self._overtaken: list[tuple[int, Words]] = []
         self.faults = WireFaults(faults, seed)
-        given = dict(parameters or {})
-        self.plc = make_plc(machine_named(kinematics, given), given, self.options)
-        self.world = SoftMotionWorld.seeded(self.plc.group, seed, world)
+        self._kinematics, self._given = kinematics, dict(parameters or {})
+        self._parameters, self._state_path, self._make_plc = world, state_path, make_plc
+        self._make()
+
+    def _make(self) -> None:
+        """Make the controller and its world, as they are at first."""
+        self._watchdog = FieldbusWatchdog(self.options.mailbox.watchdog_ms)
+        self._overtaken: list[tuple[int, Words]] = []
+        given = dict(self._given)
+        model = machine_named(self._kinematics, given)
+        self.plc = self._make_plc(model, given, self.options)
+        self.world = SoftMotionWorld.seeded(self.plc.group, self.seed, self._parameters)
         self.panel = PlcPanel(self.plc, self.acting)
         self._mishaps = PlcMishaps(self.panel)
-        self._file = RetainedFile(state_path, self.plc.memory, kinematics)
+        self._file = RetainedFile(self._state_path, self.plc.memory, self._kinematics)
         switched_on = self._file.restore()
-        self.plc.start(0)
+        self.plc.start(self._now_ns)
         if not switched_on:
             self._make_ready()
         self._file.save_changes()
 
     @property
-    def now_ns(self) -> int:
-        """The instant last given."""
-        return self._now_ns
+    def machine_name(self) -> str:
+        """See :attr:`HostedDevice.machine_name`."""
+        return f"{self.kind} {self._kinematics}"
 
-    def truth(self) -> dict[str, Any]:
-        """Return where the tips and the pin really are, and what the PLC holds."""
-        stored = self.plc.memory.defined()
+    def counters(self) -> dict[str, int]:
+        """See :meth:`HostedDevice.counters`."""
         return {
-            **self.world.truth(),
-            "stored": {str(number): list(slot.tool) for number, slot in stored.items()},
-            "selected_tool": self.plc.tools.selected,
+            "exchanges": self.exchanges,
+            "moves_started": self.plc.group.movements_started,
+            "tool_writes": sum(slot.counter for slot in self.plc.memory.defined().values()),
+            "starts": self.plc.starts,
+            "touches": self.world.operator.touches,
         }
 
-    @contextmanager
-    def acting(self) -> Iterator[int]:
-        """Surround an act that comes past the wire; gives the present time."""
-        with self.lock:
-            # A planned act happens at its own instant, in the middle of an advance.
-            if self.present_ns is not None and not self._stepping:
-                self.advance(self.present_ns())
-            yield self._now_ns
-            self._file.save_changes()
-        for watcher in tuple(self.watchers):
-            watcher()
+    def motions(self, after: int = 0) -> Iterator[StartedMotion]:
+        """See :meth:`HostedDevice.motions`."""
+        return self.plc.group.motions.motions(after)
+
+    def restart(self) -> None:
+        """Start the PLC anew; what is retained stays."""
+        self.panel.restart()
 
     def advance(self, now_ns: int) -> None:
         """Let simulated time reach ``now_ns``, stopping wherever something changes."""
         # Most calls come at the instant of the last one: then nothing lies in between.
         while now_ns > self._now_ns < (change := self.next_change() or now_ns) < now_ns:
+            before_ns = self._presently_ns()
             self._step(change)
+            self.plc.keep_pace(self._presently_ns() - before_ns)
         self._step(max(now_ns, self._now_ns))
+
+    def _presently_ns(self) -> int:
+        """The host's own time, which goes on while this computer works."""
+        return self._now_ns if self.present_ns is None else self.present_ns()
 
     def next_change(self) -> int | None:
         """Return when :meth:`advance` will next do something by itself, if ever."""
@@ -199,6 +188,48 @@ class SoftMotionSimulator:
         """Note a valid request, for the fieldbus's watchdog."""
         self.advance(now_ns)
         self._watchdog.hear(self._now_ns)
+
+    def _truth(self) -> dict[str, Any]:
+        stored = self.plc.memory.defined()
+        return {
+            **self.world.truth(),
+            "stored": {
+                str(number): asdict(self._offset(slot.tool)) for number, slot in stored.items()
+            },
+            "selected_tool": self.plc.tools.selected,
+        }
+
+    def _offset(self, tool: Six) -> ToolOffset:
+        """Return what a slot means in mm and U, V, W, however the driver converts it."""
+        mm = self.options.mailbox.unit_um / 1000
+        frame = CoordRef(*tool).frame()
+        x, y, z = frame.shift_mm
+        angles = (round(angle, 9) + 0.0 for angle in zyx_angles(frame.rotation))
+        return ToolOffset(x * mm, y * mm, z * mm, *angles)
+
+    def _renew(self) -> None:
+        self.faults.forget()
+        starts = self.plc.starts
+        self._make()
+        self.plc.starts += starts  # hosts cut their links when they see another number
+
+    def _moment(self) -> dict[str, Any]:
+        return {
+            "memory": deepcopy(self.plc.memory.to_state()),
+            "selected": self.plc.tools.selected,
+            "axes": self.plc.group.values,
+            "world": self.world.moment(),
+        }
+
+    def _restore(self, held: Mapping[str, Any]) -> None:
+        self.plc.memory.restore(held["memory"])
+        self.plc.group.place(held["axes"])
+        self.plc.tools.preselect(held["selected"])
+        self.world.put_back(held["world"])
+        self._file.save_changes()
+
+    def _after_act(self) -> None:
+        self._file.save_changes()
 
     def _make_ready(self) -> None:
         x_mm, y_mm, z_mm, *_ = self.world.stored.components()

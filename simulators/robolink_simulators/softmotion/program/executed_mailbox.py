@@ -3,8 +3,9 @@
 import re
 import struct
 from collections.abc import Mapping, Sequence
-from typing import Final
+from typing import Any, Final
 
+from robolink import ambient
 from robolink.protocols.mailbox import Capability, Command, Opcode, WordOrder, Words, encode_command
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
 from robolink_simulators.softmotion.group.condition import SmcGroupState
@@ -33,6 +34,8 @@ FIRST_LEFT_OUT: Final = 25
 _GOING: Final = 1
 _REPLY: Final = 9
 """Members of RL_Call: whether it is under way, and the state that the adapter replied."""
+_ENDED: Final = 10
+"""The lowest state of a command that has ended."""
 _HEARTBEAT: Final = 9
 _TOOL_SLOT: Final = 11
 _CAPABILITIES: Final = 90
@@ -56,6 +59,7 @@ class ExecutedMailbox:
         structured: The program.
         inbox: What clients have written.
         cycles: Cycles executed since the program was loaded.
+        stands: Whether none is executed, as in a PLC that was stopped.
 
     Raises:
         StructuredTextError: A text is not in the subset.
@@ -71,6 +75,11 @@ class ExecutedMailbox:
     ) -> None:
         self.inbox = Inbox(WordOrder.LOW_FIRST)
         self.cycles = 0
+        self.stands = False
+        self._overrun = self._paced = 0
+        # The clock of a PLC began when it was switched on, nobody knows when; from it the program
+        # draws its number, where none is given.
+        self._began_us = 0 if options.mailbox.device_id else _US * ambient.random_number(31)
         self._group = group
         self._units = units
         self._kinematics = kinematics
@@ -82,7 +91,7 @@ class ExecutedMailbox:
         self._permitted = True
         self._tool = group.tool
         self.structured = StructuredProgram(sources, MAIN, foreign=self._foreign(sources))
-        self._seen: Words = ()
+        self._seen: object = ()
 
     @property
     def permitted(self) -> bool:
@@ -153,8 +162,7 @@ class ExecutedMailbox:
 
     def run(self, now_ns: int) -> None:
         """Do what is due now."""
-        due_ns = self.next_change(now_ns)
-        if due_ns is not None and now_ns >= due_ns:
+        if now_ns >= self._due_ns:
             self._catch_up(now_ns)
 
     def refresh(self, now_ns: int) -> None:
@@ -164,15 +172,28 @@ class ExecutedMailbox:
 
     def _catch_up(self, now_ns: int) -> None:
         began_ns = now_ns // self._cycle_ns * self._cycle_ns
-        if began_ns > self._scanned_ns:
+        if began_ns > self._scanned_ns and not self.stands:
             self._scan(began_ns)
+
+    def keep_pace(self, took_ns: int) -> None:
+        """Leave out cycles when one was worked out in more than half of the period.
+
+        Args:
+            took_ns: The simulated time that went by meanwhile.
+        """
+        if self.cycles != self._paced:
+            self._paced = self.cycles
+            self._overrun = 2 * took_ns // self._cycle_ns
 
     def next_change(self, now_ns: int) -> int | None:
         """Return when the next cycle is due that is not left out."""
+        return max(self._due_ns, (now_ns // self._cycle_ns + 1) * self._cycle_ns)
+
+    @property
+    def _due_ns(self) -> int:
+        """When the next cycle begins that is not left out; past when the program stood still."""
         waits = 1 if self._restless else self._left_out
-        return max(
-            self._scanned_ns + waits * self._cycle_ns, now_ns // self._cycle_ns * self._cycle_ns
-        )
+        return self._scanned_ns + max(waits, 1 + self._overrun) * self._cycle_ns
 
     def _scan(self, began_ns: int) -> None:
         self._scanned_ns = began_ns
@@ -187,7 +208,7 @@ class ExecutedMailbox:
             program.put("RL_Machine.xForeignTool", True)
         inputs = [group.inputs.read(number, group.values) for number in range(SIGNALS)]
         program.put("RL_Machine.inputs", inputs)
-        program.cycle(began_ns // _US)
+        program.cycle(began_ns // _US + self._began_us)
         self._tool = group.tool
         self._switch_outputs()
         self._judge_rest()
@@ -201,18 +222,19 @@ class ExecutedMailbox:
         """A cycle may be left out when this one was like the one before and nothing goes on."""
         words = tuple(self.structured.value("outbox"))
         still = (*words[:_HEARTBEAT], *words[_HEARTBEAT + 1 : _CRC])
-        going = any(call[_GOING] or call[_REPLY] for call in self._calls())
-        moving = self._group.state in (SmcGroupState.MOVING, SmcGroupState.STOPPING)
-        self._restless = still != self._seen or going or moving
+        calls, seen = self._calls(), self._seen
+        going = any((going or reply) and not (going and reply >= _ENDED) for going, reply in calls)
+        moving = self._group.state is SmcGroupState.MOVING or not self._group.motion.resting
+        self._seen = (still, calls)  # a stop that is held goes on with its end replied
+        self._restless = self._seen != seen or going or moving
         self._left_out = FIRST_LEFT_OUT if self._restless else 2 * self._left_out
-        self._seen = still
 
-    def _calls(self) -> Sequence[Sequence[object]]:
+    def _calls(self) -> Sequence[tuple[bool, int]]:
         try:
-            calls: Sequence[Sequence[object]] = self.structured.value("calls")
+            calls: Sequence[Sequence[Any]] = self.structured.value("calls")
         except KeyError:  # a program of another make
             return ()
-        return calls
+        return [(call[_GOING], call[_REPLY]) for call in calls]
 
     def _imaged(self) -> bool:
         rotation = self._group.flange().rotation

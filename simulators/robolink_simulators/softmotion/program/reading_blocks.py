@@ -13,6 +13,7 @@ from robolink_simulators.softmotion.mailbox.words.units import UserUnits
 from robolink_simulators.softmotion.program.error_numbers import ErrorNumbers
 from robolink_simulators.softmotion.program.foreign_types import (
     AXIS_GROUP,
+    CONTINUE_DATA,
     COORD_REF,
     COORD_SYSTEM,
     ERROR_ID,
@@ -20,7 +21,7 @@ from robolink_simulators.softmotion.program.foreign_types import (
     READ_MODE,
 )
 from robolink_simulators.softmotion.program.motion_blocks import Pins, members_named
-from robolink_simulators.softmotion.smc_errors import BlockRefused
+from robolink_simulators.softmotion.smc_errors import BlockRefused, SmcError
 from robolink_simulators.structured_text.data_types import BOOL, BlockType, Frame
 
 _ENABLE: Final[Pins] = (
@@ -50,6 +51,7 @@ def reading_blocks(units: UserUnits, numbers: ErrorNumbers) -> Mapping[str, Bloc
         "MC_GROUPREADERROR": _error(numbers),
         "MC_GROUPREADACTUALPOSITION": _position(units),
         "SMC_GROUPREADTOOL": _tool(units),
+        "SMC_GROUPGETCONTINUETOOLOFFSET": _continue_tool(units, numbers),
     }
 
 
@@ -67,6 +69,39 @@ def _tool(units: UserUnits) -> BlockType:
 
     pins: Pins = (("readmode", READ_MODE, "var_input"), ("tooloffset", COORD_REF, "var_output"))
     return _reading("SMC_GroupReadTool", pins, read)
+
+
+def _continue_tool(units: UserUnits, numbers: ErrorNumbers) -> BlockType:
+    """SMC_GroupGetContinueToolOffset: at the rising edge, the tool of what was interrupted."""
+    pins: Pins = (
+        ("axisgroup", AXIS_GROUP, "var_in_out"),
+        ("continuedata", CONTINUE_DATA, "var_in_out"),
+        ("execute", BOOL, "var_input"),
+        ("done", BOOL, "var_output"),
+        ("busy", BOOL, "var_output"),
+        ("error", BOOL, "var_output"),
+        ("errorid", ERROR_ID, "var_output"),
+        ("tooloffset", COORD_REF, "var_output"),
+    )
+    members = members_named(pins)
+    slot = {pin: member.slot for pin, member in members.items()}
+
+    def run(frame: Frame) -> None:
+        ended = frame[slot["done"]] or frame[slot["error"]]
+        if ended and frame[slot["execute"]]:
+            return
+        done, number, group = False, 0, frame[0]
+        if frame[slot["execute"]]:
+            try:
+                tool = group.continue_tool_offset()
+                frame[slot["tooloffset"]][:] = units.given(CoordRef.of(tool.frame))
+                done = True
+            except BlockRefused as refused:
+                number = numbers.number(SmcError(refused.kind))
+        frame[slot["done"]], frame[slot["error"]] = done, number != 0
+        frame[slot["errorid"]] = number
+
+    return BlockType("SMC_GroupGetContinueToolOffset", members, run)
 
 
 def _reading(name: str, outputs: Pins, read: Callable[[Frame, dict[str, int]], None]) -> BlockType:

@@ -4,6 +4,8 @@ Theory of operation. The task runs at multiples of its period. At each, the inpu
 are put where the project wires them, the program is executed once, and its outputs are taken. A
 cycle in which nothing was written or read, nothing is under way and nothing has moved may be left
 out: at first 25 in a row, then twice as many each time. Heartbeat and timers go on in such steps.
+On a computer that needs more than half of the period for a cycle, as many are left out as it
+takes to keep up with the time.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -86,6 +88,7 @@ class StructuredPlc(Plc):
             self.group.enable()
         x, y, z, a, b, c = self._units.given(tool)
         self.memory.define(_FIRST_SLOT, (x, y, z, a, b, c), "nozzle")
+        epoch_before = self.memory.epoch
         sequence, epoch = 1, 0
         wanted = ((Opcode.OWNERSHIP, 1), (Opcode.SELECT_TOOL, _FIRST_SLOT), (Opcode.OWNERSHIP, 0))
         for opcode, operand in wanted:
@@ -95,6 +98,7 @@ class StructuredPlc(Plc):
             self._executed.tell_before(encode_command(command))
             sequence, epoch = next_number(sequence), self.memory.epoch
         self.memory.tool_changed = False  # the machine's program has seen that
+        self.memory.epoch = epoch_before
         self._take_over()
 
     def lay_words(self, order: WordOrder) -> None:
@@ -106,6 +110,20 @@ class StructuredPlc(Plc):
         """Refuse: the heartbeat is the program's own."""
         del now_ns
         raise _not_in_a_program()
+
+    def freeze(self, now_ns: int) -> None:
+        """Stop the mailbox program; what moves goes on."""
+        super().freeze(now_ns)
+        self._executed.stands = True
+
+    def thaw(self) -> None:
+        """Let the mailbox program go on."""
+        super().thaw()
+        self._executed.stands = False
+
+    def keep_pace(self, took_ns: int) -> None:
+        """Let the program leave out cycles on a computer that is too slow for all of them."""
+        self._executed.keep_pace(took_ns)
 
     def output(self, now_ns: int) -> Words:
         """Return response, slots and device block, one behind the other."""

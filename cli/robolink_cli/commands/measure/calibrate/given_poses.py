@@ -230,7 +230,7 @@ def _show_end(report: ToolReport) -> None:
     if report.receipt is not None and report.receipt.skipped:
         say(tr("Tool {tool} held this value already; nothing was written.", tool=tool))
     else:
-        say(tr("Tool {tool} was written and read back.", tool=tool))
+        say(tr("Tool {tool} is written and read back.", tool=tool))
     say(
         tr(
             "Nothing moved, so it was not proved by turning about the new tip. To prove it, turn "

@@ -26,7 +26,9 @@ from robolink_cli.console.render import note
 from robolink_cli.options.impact import ImpactRequest, impact_payload, show_impact
 from robolink_cli.options.report import ReportDraft, reporting
 from robolink_cli.prompts.operator import operator_at
-from robolink_cli.session.motion_consent import agree_to_motion, motion_question
+from robolink_cli.prompts.present import present_desk
+from robolink_cli.session.check_before_start import agree_to_procedure
+from robolink_cli.session.guidance import guided_if_alone
 from robolink_cli.session.opening import open_controller
 from robolink_cli.views.calibration import (
     report_payload,
@@ -93,8 +95,10 @@ class LiveCalibration:
         steps = steps_payload(self._controller, preview(self._controller, self._plan))
         return {"dry_run": True, "tool": self.tool, "steps": steps}
 
-    def check_limits(self) -> None:
+    def check_limits(self) -> int:
         """Show how it will go, and refuse a course that leads outside the limits; reads only.
+
+        Returns how many movements are foreseen.
 
         Raises:
             LimitError: Names the step.
@@ -102,6 +106,7 @@ class LiveCalibration:
         steps = preview(self._controller, self._plan)
         require_inside(self._controller, steps)
         show_course(steps)
+        return sum(step.target is not None for step in steps)
 
     def run(self) -> dict[str, object]:
         """Measure, propose, write, verify; return the document of the whole."""
@@ -114,7 +119,11 @@ class LiveCalibration:
                 listener=self._listener,
                 earlier=partial(earlier_corrections, self._controller),
             )
-            (self._report,) = change.run().tools
+            whole = change.run()
+            (self._report,) = whole.tools
+        desk = present_desk()
+        if desk is not None:
+            desk.regard(whole)
         impact = self._listener.impact
         return {
             **report_payload(self._report),
@@ -124,7 +133,7 @@ class LiveCalibration:
 
     def show_end(self) -> None:
         """Say how it ended."""
-        if self._report is not None:
+        if self._report is not None and present_desk() is None:
             show_report(self._report)
 
 
@@ -137,6 +146,16 @@ def calibrate_live(frame: CalibrationRequest, source: Callable[[Controller], Tip
         LimitError: The foreseen course leads outside the limits; nothing was moved.
         VerifyError: The tip drifts too far; the old value was put back.
     """
+    alone = frame.assist is None and not frame.dry_run
+    guided_if_alone(
+        frame.context,
+        lambda: _calibrate(frame, source),
+        job=tr("Measure tool {tool}", tool=frame.tool),
+        alone=alone,
+    )
+
+
+def _calibrate(frame: CalibrationRequest, source: Callable[[Controller], TipSource]) -> None:
     context = frame.context
     with (
         open_controller(context, changes=not frame.dry_run) as controller,
@@ -155,14 +174,13 @@ def calibrate_live(frame: CalibrationRequest, source: Callable[[Controller], Tip
             context.emit("dry-run", payload, lambda: show_plan(payload))
             return
         live.require_writable()
-        live.check_limits()
-        agree_to_motion(
-            motion_question(
-                controller,
-                tr("to measure tool {tool}", tool=live.tool),
-                speed_mm_s=frame.limits.speed_mm_s,
-                box_mm=frame.limits.box.x_max_mm,
-            ),
+        moves = live.check_limits()
+        agree_to_procedure(
+            controller,
+            tr("to measure tool {tool}", tool=live.tool),
+            moves=moves,
+            speed_mm_s=frame.limits.speed_mm_s,
+            box_mm=frame.limits.box.x_max_mm,
             yes=frame.yes,
         )
         payload = live.run()

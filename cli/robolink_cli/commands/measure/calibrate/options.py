@@ -9,7 +9,7 @@ import click
 from robolink.messages import declared
 from robolink_cli.access.cell import with_cell_limits
 from robolink_cli.commands.measure.calibrate.request import request_from
-from robolink_cli.options.consent import dry_run_option, yes_option
+from robolink_cli.options.consent import dry_run_option, plain_option, yes_option
 from robolink_cli.options.impact import impact_options
 from robolink_cli.options.motion import motion_option
 from robolink_cli.options.report import report_options
@@ -49,7 +49,7 @@ def calibration_options(function: Callable[..., None]) -> Callable[..., int | No
         function(frame, **options)
 
     command: Callable[..., Any] = framed
-    command = yes_option(dry_run_option(controller_options(command)))
+    command = plain_option(yes_option(dry_run_option(controller_options(command))))
     command = impact_options(report_options(nozzle_options(command)))
     for option in reversed(_own_options()):
         command = option(command)

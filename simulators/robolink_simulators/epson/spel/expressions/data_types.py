@@ -13,7 +13,6 @@ from robolink_simulators.epson.spel.expressions.values import (
     as_number,
     as_text,
     checked,
-    out_of_range,
 )
 
 Store = Callable[[Value], Value]
@@ -54,7 +53,8 @@ def _whole(low: int, high: int, name: str) -> Store:
         # Cut, not rounded: EPSON's own code halves a CRC so (docs/reference/spel.md 2.1).
         number = int(as_number(value))
         if not low <= number <= high:
-            raise out_of_range(f"{number} is no {name}")
+            kind = RefusalKind.OVERFLOW if number > high else RefusalKind.UNDERFLOW
+            raise SpelRefusal(kind, f"{number} is no {name}")
         return number
 
     return store

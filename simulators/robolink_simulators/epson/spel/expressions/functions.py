@@ -5,6 +5,7 @@ import re
 from collections.abc import Callable
 from typing import Final
 
+from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.printing import formatted, number_text
 from robolink_simulators.epson.spel.expressions.text_functions import TEXT_FUNCTIONS
 from robolink_simulators.epson.spel.expressions.values import (
@@ -26,12 +27,14 @@ _LEADING_NUMBER = re.compile(
 )
 
 
-def _real(function: Callable[[float], float]) -> Function:
+def _real(
+    function: Callable[[float], float], kind: RefusalKind = RefusalKind.VALUE_OUT_OF_RANGE
+) -> Function:
     def apply(arguments: Arguments) -> Value:
         try:
             return checked(function(float(as_number(arguments[0]))))
         except (ValueError, OverflowError) as error:
-            raise out_of_range(f"No result for {arguments[0]}") from error
+            raise SpelRefusal(kind, f"No result for {arguments[0]}") from error
 
     return apply
 
@@ -127,12 +130,12 @@ PLAIN_FUNCTIONS: Final[dict[str, tuple[range, Function]]] = {
     "sgn": (range(1, 2), _sign),
     "int": (range(1, 2), _floor),
     "fix": (range(1, 2), _cut),
-    "sqr": (range(1, 2), _real(math.sqrt)),
+    "sqr": (range(1, 2), _real(math.sqrt, RefusalKind.SQUARE_ROOT)),
     "sin": (range(1, 2), _real(math.sin)),
     "cos": (range(1, 2), _real(math.cos)),
     "tan": (range(1, 2), _real(math.tan)),
-    "asin": (range(1, 2), _real(math.asin)),
-    "acos": (range(1, 2), _real(math.acos)),
+    "asin": (range(1, 2), _real(math.asin, RefusalKind.ARC_SINE)),
+    "acos": (range(1, 2), _real(math.acos, RefusalKind.ARC_COSINE)),
     "atan": (range(1, 2), _real(math.atan)),
     "atan2": (range(2, 3), _atan2),
     "degtorad": (range(1, 2), _real(math.radians)),

@@ -91,10 +91,14 @@ def _arithmetic(sign: str, left: Number, right: Number) -> Number:
                 return left / right
             case "mod":
                 # A whole number with the sign of the dividend (sign left open).
+                if not int(right):
+                    raise ZeroDivisionError
                 return int(math.fmod(int(left), int(right)))
             case _:
                 return _power(left, right)
-    except (ZeroDivisionError, ValueError, OverflowError) as error:
+    except ZeroDivisionError as error:
+        raise SpelRefusal(RefusalKind.DIVISION, f"{left} {sign} {right}") from error
+    except (ValueError, OverflowError) as error:
         raise out_of_range(f"{left} {sign} {right} has no value") from error
 
 

@@ -124,7 +124,7 @@ def formatted(value: Number, layout: str) -> str:
     """
     marks = _MARKS.fullmatch(layout)
     if marks is None:
-        raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"Unknown format {layout!r}")
+        raise SpelRefusal(RefusalKind.FORMAT, f"Unknown format {layout!r}")
     before, after = marks[1], marks[2]
     places = len(after or "")
     whole, _, fraction = f"{abs(value):.{places}f}".partition(".")

@@ -10,7 +10,12 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 from robolink_simulators.epson.condition import Mode, Task
-from robolink_simulators.epson.spel.expressions.values import Value, as_integer, out_of_range
+from robolink_simulators.epson.spel.expressions.values import (
+    Value,
+    as_integer,
+    as_text,
+    out_of_range,
+)
 from robolink_simulators.epson.spel.session import Session
 
 Arguments = Sequence[Value]
@@ -137,6 +142,10 @@ STATE_FUNCTIONS: Final[dict[str, tuple[range, StateFunction]]] = {
     "robotinfo": (range(1, 2), _robot),
     "robotinfo$": (range(1, 2), _robot_text),
     "robotname$": (range(1), lambda s, _: _robot_text(s, (0,))),
+    "fileexists": (range(1, 2), lambda s, a: s.files.exists(as_text(a[0]), folder=False)),
+    "folderexists": (range(1, 2), lambda s, a: s.files.exists(as_text(a[0]), folder=True)),
+    "curdir$": (range(1), lambda s, _: s.files.present),
+    "curdrive$": (range(1), lambda s, _: s.files.drive.upper()),
     "tw": (range(1), lambda s, _: s.memory.timed_out),
 }
 """Name to the numbers of arguments allowed and the function."""

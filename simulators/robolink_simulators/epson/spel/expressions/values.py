@@ -86,11 +86,11 @@ def checked(value: Value) -> Value:
         Refusal: Beyond Int64 and UInt64, not finite, or a string of more than 255 characters.
     """
     if isinstance(value, float) and not math.isfinite(value):
-        raise out_of_range("Overflow")
+        raise SpelRefusal(RefusalKind.OVERFLOW, "Overflow")
     if isinstance(value, int) and not -LARGEST_INT <= value <= _LARGEST_UNSIGNED:
-        raise out_of_range("Overflow")
+        raise SpelRefusal(RefusalKind.OVERFLOW, "Overflow")
     if isinstance(value, str) and len(value) > LONGEST_STRING:
-        raise out_of_range("String longer than 255 characters")
+        raise SpelRefusal(RefusalKind.TEXT_LENGTH, "String longer than 255 characters")
     return value
 
 

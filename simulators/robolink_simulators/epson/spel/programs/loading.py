@@ -8,9 +8,10 @@ from typing import Final
 from robolink_simulators.epson.memory.io_labels import IOLabel
 from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.options import EpsonOptions
+from robolink_simulators.epson.spel.programs.io_label_file import read_io_labels
 from robolink_simulators.epson.spel.programs.project import build_project
-from robolink_simulators.epson.spel.programs.project_files import read_io_labels, read_points
-from robolink_simulators.epson.spel.session import Session
+from robolink_simulators.epson.spel.session import PointFile, Session
+from robolink_simulators.epson.spel.source.point_file import read_points
 from robolink_simulators.epson.spel.source.source_text import encoding_of
 from robolink_simulators.epson.spel.tasks.compiled import SpelProject
 
@@ -33,7 +34,7 @@ class ProjectData:
     points: dict[int, Point] = field(default_factory=dict)
     point_labels: dict[str, int] = field(default_factory=dict)
     io_labels: dict[str, IOLabel] = field(default_factory=dict)
-    files: dict[str, tuple[dict[int, Point], dict[str, int]]] = field(default_factory=dict)
+    files: dict[str, PointFile] = field(default_factory=dict)
     known: bool = False
     encoding: str | None = None
 
@@ -88,7 +89,9 @@ def load_project(
     """
     data = project_data(programs, points)
     project = build_project(programs, session.options, labels=data.labels, encoding=data.encoding)
-    project.point_files |= data.files
+    session.point_files.clear()
+    session.point_files.update(data.files)
+    session.files.encoding = (data.encoding or "utf-8").removesuffix("-sig")
     machine = session.machine
     for number, point in data.points.items():
         machine.points.store(number, point)

@@ -208,7 +208,7 @@ def error_resume(target: JumpTarget | None, *, following: bool) -> Operation:
     def go(t: SpelTask) -> None:
         failed, t.frame.failed_pc = t.frame.failed_pc, None
         if failed is None:
-            raise SpelRefusal(RefusalKind.NOT_ALLOWED_HERE, "EResume without an error")
+            raise SpelRefusal(RefusalKind.RESUME_WITHOUT_ERROR, "EResume without an error")
         function = t.frame.function
         if target is not None:
             t.pc = target.pc

@@ -11,7 +11,7 @@ from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.printing import number_text
-from robolink_simulators.epson.spel.expressions.values import out_of_range, truth
+from robolink_simulators.epson.spel.expressions.values import truth
 from robolink_simulators.epson.spel.tree import (
     Binary,
     Expression,
@@ -176,7 +176,7 @@ def seconds_of(evaluator: Evaluator, expression: Expression) -> float:
     """
     seconds = float(evaluator.number(expression))
     if not 0 <= seconds <= LONGEST_WAIT_S:
-        raise out_of_range(f"Wait of {seconds} s")
+        raise SpelRefusal(RefusalKind.WAIT_TIME, f"Wait of {seconds} s")
     return seconds
 
 

@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.spel.expressions.closures import Scope
 from robolink_simulators.epson.spel.expressions.data_types import DataType, Variable
 from robolink_simulators.epson.spel.source.faults import SourcePlace
@@ -84,15 +83,12 @@ class SpelProject:
             ``preserve``.
         modules: Variables of each file.
         sources: The lines of each file, for those who follow a run.
-        point_files: What point files of the project hold, by their names in lower case: points
-            by their numbers, and the numbers of labels.
     """
 
     functions: dict[str, CompiledFunction] = field(default_factory=dict)
     shared: dict[str, tuple[Variable, str]] = field(default_factory=dict)
     modules: dict[str, dict[str, Variable]] = field(default_factory=dict)
     sources: dict[SourcePlace, str] = field(default_factory=dict)
-    point_files: dict[str, tuple[dict[int, Point], dict[str, int]]] = field(default_factory=dict)
 
     def clear_globals(self) -> None:
         """Forget what is not preserved, as the start of a function does."""

@@ -104,6 +104,11 @@ def _elapsed(t: SpelTask, _: Sequence[Value]) -> Value:
     return round((t.present_ns - _runner(t).sharing.elapsed_since_ns) / NS_PER_S, 3)
 
 
+def _lines_left(t: SpelTask, arguments: Sequence[Value]) -> Value:
+    number = as_integer(arguments[0])
+    return _runner(t).channels.of(number).lines(number, t)
+
+
 TASK_FUNCTIONS: Final[dict[str, tuple[range, TaskFunction]]] = {
     "mytask": (range(1), lambda t, _: t.task_number),
     "taskstate": (range(1, 2), _state),
@@ -124,7 +129,9 @@ TASK_FUNCTIONS: Final[dict[str, tuple[range, TaskFunction]]] = {
     "chknet": (range(1, 2), lambda t, a: _runner(t).ports.waiting_bytes(as_integer(a[0]), t)),
     "chkcom": (range(1, 2), lambda t, a: _runner(t).ports.waiting_bytes(as_integer(a[0]), t)),
     "opencom": (range(1, 2), lambda t, a: _runner(t).ports.owner_number(as_integer(a[0]))),
-    "lof": (range(1, 2), lambda t, a: _runner(t).ports.lines(as_integer(a[0]), t)),
+    "lof": (range(1, 2), _lines_left),
+    "eof": (range(1, 2), lambda t, a: _runner(t).channels.files.at_end(as_integer(a[0]), t)),
+    "freefile": (range(1), lambda t, _: _runner(t).channels.files.free_number()),
     "opennet": (range(1, 2), lambda t, a: _runner(t).ports.owner_number(as_integer(a[0]))),
 }
 """Name to the numbers of arguments allowed and the function."""

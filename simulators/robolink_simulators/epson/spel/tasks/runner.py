@@ -11,9 +11,10 @@ from robolink_simulators.epson.spel.expressions.data_types import Variable
 from robolink_simulators.epson.spel.session import Session
 from robolink_simulators.epson.spel.statement_execution import StatementExecution
 from robolink_simulators.epson.spel.statements.waiting import NEVER_NS
+from robolink_simulators.epson.spel.tasks.channels.numbered import NumberedChannels
+from robolink_simulators.epson.spel.tasks.channels.ports import Ports
 from robolink_simulators.epson.spel.tasks.compiled import CompiledFunction, SpelProject
 from robolink_simulators.epson.spel.tasks.permissions import forbidden_in
-from robolink_simulators.epson.spel.tasks.ports import Ports
 from robolink_simulators.epson.spel.tasks.shared import TaskSharing
 from robolink_simulators.epson.spel.tasks.task import (
     SpelTask,
@@ -47,7 +48,10 @@ class ProgramRunner:
         ports: The TCP/IP ports of the controller.
 
     Attributes:
+        ports: The TCP/IP and serial ports.
+        channels: Ports, files and the window of a person, by their numbers.
         tasks: Those that are not over, by their numbers.
+        movers: The task that moved each robot last, by the robot's number.
         console: What Print has shown, the last lines of it.
         on_print: Called with what is printed.
         on_statement: Called before each statement, if anybody follows the run.
@@ -63,6 +67,8 @@ class ProgramRunner:
         self.session = session
         self.project = project
         self.ports = ports
+        keeps_ports = session.options.ports_of_ended_task == "open"
+        self.channels = NumberedChannels(ports, session.files, self.show, keeps_ports=keeps_ports)
         self.tasks: dict[int, SpelTask] = {}
         self.console: deque[str] = deque(maxlen=_CONSOLE_LINES)
         self.on_print: Callable[[str], None] | None = None
@@ -73,9 +79,8 @@ class ProgramRunner:
         self.vision: VisionSystem | None = None
         self._condition = condition
         self._step_ns = session.options.statement_us * 1000
-        self._seen_ns = 0
-        self._paused = False
-        self._movers: dict[int, SpelTask] = {}
+        self._seen_ns, self._paused = 0, False
+        self.movers: dict[int, SpelTask] = {}
 
     @property
     def now_ns(self) -> int:
@@ -128,9 +133,13 @@ class ProgramRunner:
         """
         numbers = {TaskKind.BACKGROUND: _BACKGROUND, TaskKind.TRAP: _TRAPS}.get(kind, _NORMAL)
         if wanted is None:
-            wanted = next((n for n in numbers if n not in self.tasks), 0)
-        if wanted not in numbers or wanted in self.tasks:
-            raise SpelRefusal(RefusalKind.TASK_NUMBER, f"Task {wanted} is not free")
+            wanted = next((n for n in numbers if n not in self.tasks), None)
+        if wanted is None:
+            raise SpelRefusal(RefusalKind.TASKS_FULL, "Too many tasks")
+        if wanted not in numbers:
+            raise SpelRefusal(RefusalKind.TASK_NUMBER, f"There is no task {wanted}")
+        if wanted in self.tasks:
+            raise SpelRefusal(RefusalKind.TASK_BUSY, f"Task {wanted} is not free")
         return wanted
 
     def advance(self, now_ns: int) -> None:
@@ -251,9 +260,9 @@ class ProgramRunner:
             raise SpelRefusal(RefusalKind.NOT_IN_THIS_TASK, "Not allowed in this kind of task")
         if isinstance(statement, MotionStatement):
             number = machine.robot_number
-            if machine.arm.moving and self._movers.get(number) is not task:
+            if machine.arm.moving and self.movers.get(number) is not task:
                 raise SpelRefusal(RefusalKind.ROBOT_IN_USE, "Another task moves the robot")
-            self._movers[number] = task
+            self.movers[number] = task
         return StatementExecution(task, (statement,), task.now_ns)
 
     def _look(self, task: SpelTask, waiting: TaskWaiting, now_ns: int) -> None:
@@ -307,7 +316,7 @@ class ProgramRunner:
 
     def end(self, task: SpelTask) -> None:
         """End a task, and stop what it moves (Quit)."""
-        for number, mover in self._movers.items():
+        for number, mover in self.movers.items():
             if mover is task:
                 self.session.machine.robots[number - 1].arm.halt(self._seen_ns)
         task.ended = True
@@ -376,8 +385,7 @@ class ProgramRunner:
             del self.tasks[task.task_number]
             self.sharing.release(task)
             self.traps.forget(task)
-            if self.session.options.ports_of_ended_task == "closed":
-                self.ports.close_of(task)
+            self.channels.close_of(task)
         normal = any(task.kind is not TaskKind.BACKGROUND for task in self.tasks.values())
         if over and not normal and self._condition.task is Task.RUNNING:
             self._condition.task = Task.NONE
@@ -388,5 +396,5 @@ class ProgramRunner:
         self.tasks.clear()
         self.sharing = TaskSharing()
         self.traps.clear()
-        self.ports.close_all()
+        self.channels.close_all()
         self._paused = False

@@ -39,7 +39,7 @@ class TaskSharing:
         """
         holder = self._locks.get(checked_number(number))
         if holder is task:
-            raise SpelRefusal(RefusalKind.LOCK_MISUSED, f"Lock {number} is held by this task")
+            raise SpelRefusal(RefusalKind.LOCK_TAKEN, f"Lock {number} is held by this task")
         return holder is None
 
     def lock(self, number: int, task: SpelTask) -> None:
@@ -53,7 +53,7 @@ class TaskSharing:
             Refusal: Another task holds it, or none (documented that only its owner can).
         """
         if self._locks.get(checked_number(number)) is not task:
-            raise SpelRefusal(RefusalKind.LOCK_MISUSED, f"Lock {number} is not held by this task")
+            raise SpelRefusal(RefusalKind.LOCK_NOT_HELD, f"Lock {number} is not held by this task")
         del self._locks[number]
 
     def reserve_lock(self) -> int:

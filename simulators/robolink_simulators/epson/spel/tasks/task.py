@@ -188,12 +188,12 @@ class SpelTask(Evaluator):
         return Blocking(lambda: True, lambda: None)
 
     def write_to(self, channel: int, text: str, *, ends: bool) -> None:
-        """Print to a port.
+        """Print to a port or a file.
 
         Raises:
             Refusal: It is not open, or not this task's.
         """
-        self.runner.ports.write(channel, text, self, ends=ends)
+        self.runner.channels.of(channel).write(channel, text, self, ends=ends)
 
     def unwind(self, depth: int, pc: int) -> None:
         """Go on at an operation of a function that is under way, leaving those it called."""

@@ -101,6 +101,14 @@ class ToolDesk:
         self._memory.define(number, self._units.given(tool), "nozzle")
         self._apply(number, self._memory.slot(number).tool, "nozzle")
 
+    def preselect(self, number: int) -> None:
+        """Put the tool of a slot in force past the mailbox; 0 for none."""
+        if number:
+            slot = self._memory.slot(number)
+            self._apply(number, slot.tool, slot.name)
+        else:
+            self.forget()
+
     def set_tool(self) -> Answer:
         """Return the tool in force for movements to come."""
         return self._answer(self._group.tool)
@@ -108,15 +116,17 @@ class ToolDesk:
     def _write(self, command: Command) -> Told:
         number = require_slot(command.operands[0])
         require_finite(command.pose)
-        lengths_mm = self._units.pose(command.pose)[:3]
+        x, y, z, a, b, c = (part + 0.0 for part in command.pose)  # a minus zero is a zero
+        pose: Six = (x, y, z, a, b, c)
+        lengths_mm = self._units.pose(pose)[:3]
         named = command.name.isascii() and command.name.isprintable()
         if not named or max(map(abs, lengths_mm)) > _LONGEST_MM:
             raise Rejected(ErrorClass.OPERAND)
         told = done()
         if number == self.selected:
-            told = self._apply(number, command.pose, command.name)
+            told = self._apply(number, pose, command.name)
         if told.execution.outputs.done:
-            self._memory.define(number, command.pose, command.name)
+            self._memory.define(number, pose, command.name)
         return told
 
     def _select(self, command: Command) -> Told:
@@ -131,9 +141,11 @@ class ToolDesk:
         return Told(told.execution, self.set_tool())
 
     def _read(self, command: Command) -> Told:
-        mode = require_operand(command.operands[0], range(len(ReadToolMode)))
+        mode = ReadToolMode(require_operand(command.operands[0], range(len(ReadToolMode))))
+        # What was interrupted is the active movement of the mailbox.
+        waits = mode is ReadToolMode.ACTIVE_MOVEMENT and self._group.motion.interrupted
         try:
-            tool = self._group.read_tool(ReadToolMode(mode))
+            tool = self._group.continue_tool_offset() if waits else self._group.read_tool(mode)
         except BlockRefused as refused:
             error_class = class_of(refused.kind, self._group.state)
             number = self._group.options.numbers.error(refused.kind).number

@@ -1,4 +1,7 @@
-"""Network and serial statements (docs/reference/spel.md 17); files are not simulated."""
+"""Network and serial statements; reading and writing of ports and files.
+
+Source: docs/reference/spel.md 17, 18.
+"""
 
 import re
 from collections.abc import Callable
@@ -19,9 +22,10 @@ from robolink_simulators.epson.spel.expressions.values import (
 from robolink_simulators.epson.spel.line_tree import ChannelStatement
 from robolink_simulators.epson.spel.programs.emitter import Emitter
 from robolink_simulators.epson.spel.programs.scope import Reference
+from robolink_simulators.epson.spel.tasks.channels.operator_window import USUAL_WINDOW
+from robolink_simulators.epson.spel.tasks.channels.ports import PortSettings
+from robolink_simulators.epson.spel.tasks.channels.serial_link import SerialFormat
 from robolink_simulators.epson.spel.tasks.compiled import Operation
-from robolink_simulators.epson.spel.tasks.ports import PortSettings
-from robolink_simulators.epson.spel.tasks.serial_link import SerialFormat
 from robolink_simulators.epson.spel.tasks.task import SpelTask
 from robolink_simulators.epson.spel.tasks.waits import Blocking
 from robolink_simulators.epson.spel.tree import ByReference, Expression, Name
@@ -34,7 +38,12 @@ _SEPARATORS: Final = re.compile(r"\s*,\s*|\s+")
 _BYTE: Final = 0xFF
 
 
-def _channel(emitter: Emitter, node: ChannelStatement) -> Callable[[SpelTask], int]:
+def channel_number(emitter: Emitter, node: ChannelStatement) -> Callable[[SpelTask], int]:
+    """Return what gives the number of a port or a file.
+
+    Raises:
+        ProgramFault: None stands there.
+    """
     if node.channel is None:
         raise emitter.fault(tr("{word} needs a port", word=node.word), expected=("#201",))
     run = emitter.run(node.channel)
@@ -43,7 +52,7 @@ def _channel(emitter: Emitter, node: ChannelStatement) -> Callable[[SpelTask], i
 
 def _set(emitter: Emitter, node: ChannelStatement) -> Operation:
     """SetNet #n, host, port, terminator, flow, time [, protocol ...]."""
-    number = _channel(emitter, node)
+    number = channel_number(emitter, node)
     host, port, end, *rest = node.items if len(node.items) > 2 else (*node.items, None, None, None)
     if host is None or port is None:
         raise emitter.fault(tr("SetNet needs a host and a port"))
@@ -66,7 +75,7 @@ def _set(emitter: Emitter, node: ChannelStatement) -> Operation:
 
 def _set_line(emitter: Emitter, node: ChannelStatement) -> Operation:
     """SetCom #n, baud, data bits, stop bits, parity, end, RTS or NONE, XON or NONE, time."""
-    number = _channel(emitter, node)
+    number = channel_number(emitter, node)
     runs = [None if isinstance(item, Name) else emitter.run(item) for item in node.items[:8]]
     words = [item.name if isinstance(item, Name) else "" for item in node.items[:8]]
     words += [""] * (8 - len(words))
@@ -97,12 +106,12 @@ def _set_line(emitter: Emitter, node: ChannelStatement) -> Operation:
 
 
 def _open_line(emitter: Emitter, node: ChannelStatement) -> Operation:
-    number = _channel(emitter, node)
+    number = channel_number(emitter, node)
     return lambda t: t.runner.ports.open_line(number(t), t)
 
 
 def _open(emitter: Emitter, node: ChannelStatement) -> Operation:
-    number = _channel(emitter, node)
+    number = channel_number(emitter, node)
     if node.role not in ("client", "server"):
         raise emitter.fault(tr("OpenNet needs a role"), expected=("As Client", "As Server"))
     server = node.role == "server"
@@ -112,7 +121,7 @@ def _open(emitter: Emitter, node: ChannelStatement) -> Operation:
 def _close(emitter: Emitter, node: ChannelStatement) -> Operation:
     if node.items == (Name("all"),):
         return lambda t: t.runner.ports.close_all()
-    number = _channel(emitter, node)
+    number = channel_number(emitter, node)
     return lambda t: t.runner.ports.close(number(t))
 
 
@@ -122,19 +131,24 @@ def _timed(t: SpelTask, out: bool) -> None:
 
 def _await(emitter: Emitter, node: ChannelStatement) -> Operation:
     """WaitNet: how it ended is told by TW (docs/reference/spel.md 4.6)."""
-    number = _channel(emitter, node)
+    number = channel_number(emitter, node)
     limit = emitter.run(node.items[0]) if node.items else None
 
     def go(t: SpelTask) -> Blocking:
         at = number(t)
-        end_ns = None
-        if limit is not None:
-            end_ns = t.now_ns + round(float(as_number(limit(t))) * NS_PER_S)
+        seconds = t.session.memory.wait_limit_s if limit is None else as_number(limit(t))
+        unlimited = limit is None and not seconds
+
+        def late() -> None:
+            if limit is None:
+                raise SpelRefusal(RefusalKind.NET_WAIT_TIMED_OUT, "The time of TMOut ran out")
+            _timed(t, True)
+
         return Blocking(
             lambda: t.runner.ports.connected(at),
             lambda: _timed(t, False),
-            end_ns=end_ns,
-            out_of_time=lambda: _timed(t, True),
+            end_ns=None if unlimited else t.now_ns + round(float(seconds) * NS_PER_S),
+            out_of_time=late,
             polled=True,
         )
 
@@ -143,7 +157,7 @@ def _await(emitter: Emitter, node: ChannelStatement) -> Operation:
 
 def _reading(t: SpelTask, at: int, ready: Callable[[], bool], take: Callable[[], None]) -> Blocking:
     """Return a read that waits for what it needs, for the port's time, or for the link's end."""
-    seconds = t.runner.ports.timeout_s(at)
+    seconds = t.runner.channels.of(at).timeout_s(at)
 
     def late() -> None:
         raise SpelRefusal(RefusalKind.PORT_TIMED_OUT, f"Port {at}: nothing came in time")
@@ -153,10 +167,10 @@ def _reading(t: SpelTask, at: int, ready: Callable[[], bool], take: Callable[[],
 
 
 def _line(t: SpelTask, at: int, take: Callable[[str], None]) -> Blocking:
-    ports = t.runner.ports
+    ports = t.runner.channels.of(at)
 
     def ready() -> bool:
-        return ports.lines(at, t) > 0 or not ports.connected(at) or _foreign(t, at)
+        return ports.lines(at, t) > 0 or not ports.connected(at) or ports.foreign(at, t)
 
     def taken() -> None:
         line = ports.line(at, t)
@@ -166,8 +180,10 @@ def _line(t: SpelTask, at: int, take: Callable[[str], None]) -> Blocking:
     return _reading(t, at, ready, taken)
 
 
-def _foreign(t: SpelTask, at: int) -> bool:
-    return bool(t.runner.ports.owner_number(at) != t.task_number)
+def _window_or(emitter: Emitter, node: ChannelStatement) -> Callable[[SpelTask], int]:
+    if node.channel is None:
+        return lambda _: USUAL_WINDOW
+    return channel_number(emitter, node)
 
 
 def _into(emitter: Emitter, item: Expression) -> Reference:
@@ -184,11 +200,9 @@ def _store(variable: Variable, value: str | int) -> None:
 def _input(emitter: Emitter, node: ChannelStatement) -> Operation:
     """Input #n, variables: texts and numbers between commas or blanks.
 
-    Without a port a person at a window would be asked, and there is none.
+    Without a port a person at the window is asked, as with the number of the window.
     """
-    if node.channel is None and node.items:
-        return _refusing("Input from a window")
-    number = _channel(emitter, node)
+    number = _window_or(emitter, node)
     references = [_into(emitter, item) for item in node.items]
 
     def go(t: SpelTask) -> Blocking:
@@ -214,9 +228,7 @@ def _value(text: str) -> int | float:
 def _line_input(emitter: Emitter, node: ChannelStatement) -> Operation:
     if len(node.items) != 1:
         raise emitter.fault(tr("Line Input takes one variable"))
-    if node.channel is None:
-        return _refusing("Line Input from a window")
-    number = _channel(emitter, node)
+    number = _window_or(emitter, node)
     reference = _into(emitter, node.items[0])
 
     def go(t: SpelTask) -> Blocking:
@@ -227,7 +239,7 @@ def _line_input(emitter: Emitter, node: ChannelStatement) -> Operation:
 
 
 def _bytes(t: SpelTask, at: int, count: int, take: Callable[[bytes], None]) -> Blocking:
-    ports = t.runner.ports
+    ports = t.runner.channels.of(at)
 
     def ready() -> bool:
         waiting = ports.waiting_bytes(at, t)
@@ -243,7 +255,7 @@ def _bytes(t: SpelTask, at: int, count: int, take: Callable[[bytes], None]) -> B
 
 def _read(emitter: Emitter, node: ChannelStatement) -> Operation:
     """Read #n, s$, count."""
-    number, (item, amount) = _channel(emitter, node), _two(emitter, node)
+    number, (item, amount) = channel_number(emitter, node), _two(emitter, node)
     reference, count = _into(emitter, item), emitter.run(amount)
 
     def go(t: SpelTask) -> Blocking:
@@ -268,12 +280,13 @@ def _holder(emitter: Emitter, item: Expression) -> Reference:
 
 def _read_binary(emitter: Emitter, node: ChannelStatement) -> Operation:
     """ReadBin #n, variable, or ReadBin #n, array(), count."""
-    number = _channel(emitter, node)
+    number = channel_number(emitter, node)
     reference = _holder(emitter, node.items[0])
     count = emitter.run(node.items[1]) if len(node.items) > 1 else None
 
     def go(t: SpelTask) -> Blocking:
         variable = reference(t)
+        t.runner.channels.of(number(t)).require_binary(number(t), t)
         wanted = 1 if count is None else as_integer(count(t))
         if not 0 <= wanted <= len(variable.values):
             raise SpelRefusal(RefusalKind.SUBSCRIPT, f"{wanted} bytes do not fit")
@@ -289,22 +302,20 @@ def _read_binary(emitter: Emitter, node: ChannelStatement) -> Operation:
 
 def _write(emitter: Emitter, node: ChannelStatement) -> Operation:
     """Write #n, text: nothing is added to it."""
-    number = _channel(emitter, node)
+    number = channel_number(emitter, node)
     if len(node.items) != 1:
         raise emitter.fault(tr("Write takes one text"))
     text = emitter.run(node.items[0])
-    return lambda t: t.runner.ports.write(number(t), as_text(text(t)), t, ends=False)
+    return lambda t: t.write_to(number(t), as_text(text(t)), ends=False)
 
 
 def _write_binary(emitter: Emitter, node: ChannelStatement) -> Operation:
-    number = _channel(emitter, node)
+    number = channel_number(emitter, node)
     item, count = node.items[0], node.items[1:]
     run: Run | None = emitter.run(count[0]) if count else None
     if run is None:
         value = emitter.run(item)
-        return lambda t: t.runner.ports.write_bytes(
-            number(t), bytes([as_integer(value(t)) & _BYTE]), t
-        )
+        return lambda t: _send(t, number(t), bytes([as_integer(value(t)) & _BYTE]))
     reference = _holder(emitter, item)
 
     def go(t: SpelTask) -> None:
@@ -312,9 +323,16 @@ def _write_binary(emitter: Emitter, node: ChannelStatement) -> Operation:
         if not 0 <= wanted <= len(values):
             raise SpelRefusal(RefusalKind.SUBSCRIPT, f"There are no {wanted} bytes")
         data = bytes(as_integer(value) & _BYTE for value in map(values.__getitem__, range(wanted)))
-        t.runner.ports.write_bytes(number(t), data, t)
+        _send(t, number(t), data)
 
     return go
+
+
+def _send(t: SpelTask, at: int, data: bytes) -> None:
+    """Write bytes to a port, or to a file that BOpen has opened."""
+    channel = t.runner.channels.of(at)
+    channel.require_binary(at, t)
+    channel.write_bytes(at, data, t)
 
 
 def _refusing(word: str) -> Operation:
@@ -322,10 +340,6 @@ def _refusing(word: str) -> Operation:
         raise SpelRefusal(RefusalKind.NOT_SIMULATED, f"{word} is not simulated")
 
     return go
-
-
-def _other(emitter: Emitter, node: ChannelStatement) -> Operation:  # noqa: ARG001
-    return _refusing(node.word)
 
 
 CHANNEL_STATEMENTS: Final[dict[str, Callable[[Emitter, ChannelStatement], Operation]]] = {
@@ -342,6 +356,5 @@ CHANNEL_STATEMENTS: Final[dict[str, Callable[[Emitter, ChannelStatement], Operat
     "readbin": _read_binary,
     "write": _write,
     "writebin": _write_binary,
-    "*": _other,
 }
-"""Keyword to what compiles it; ``*`` for those that are refused when they are come to."""
+"""Keyword to what compiles it."""

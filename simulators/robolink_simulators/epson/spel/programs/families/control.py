@@ -94,6 +94,38 @@ def _quit(emitter: Emitter, node: TaskStatement) -> Operation:
     return go
 
 
+def _abort_motion(emitter: Emitter, node: TaskStatement) -> Operation:
+    """AbortMotion robot or All: the task that moves a robot meets an error and stops it.
+
+    Which error depends on whether the robot moves (documented, docs/reference/spel.md 10); that
+    All passes over robots that no task drives is assumed.
+    """
+    item = _one(emitter, node)
+    number = None if item == Name("all") else emitter.run(item)
+
+    def go(t: SpelTask) -> object:
+        robots = t.runner.session.machine.robots
+        wanted = None if number is None else as_integer(number(t))
+        if wanted is not None and not 1 <= wanted <= len(robots):
+            raise SpelRefusal(RefusalKind.ROBOT_NUMBER, f"There is no robot {wanted}")
+        movers = dict(t.runner.movers)
+        for at in range(1, len(robots) + 1) if wanted is None else (wanted,):
+            mover = movers.get(at)
+            if mover is None or mover.ended:
+                if wanted is None:
+                    continue
+                missing = RefusalKind.NO_MOVER if mover is None else RefusalKind.MOVER_ENDED
+                raise SpelRefusal(missing, f"No task moves robot {at}")
+            arm = robots[at - 1].arm
+            kind = RefusalKind.MOTION_ABORTED if arm.moving else RefusalKind.ABORTED_AT_REST
+            arm.halt(t.now_ns)
+            mover.now_ns = max(mover.now_ns, t.now_ns)
+            t.runner.fail(mover, SpelRefusal(kind, f"AbortMotion of robot {at}"))
+        return t.turn() if t.ended else None
+
+    return go
+
+
 def _halt(emitter: Emitter, node: TaskStatement) -> Operation:
     which = _which(emitter, _one(emitter, node))
 
@@ -140,8 +172,16 @@ def _numbers(emitter: Emitter, node: TaskStatement, most: int) -> list[Run]:
 
 
 def _until(t: SpelTask, runs: list[Run]) -> int | None:
-    """Return when the time that a statement names is up."""
-    return t.now_ns + round(float(as_number(runs[1](t))) * NS_PER_S) if len(runs) > 1 else None
+    """Return when the time is up that a statement names, or TMOut's."""
+    seconds = as_number(runs[1](t)) if len(runs) > 1 else t.session.memory.wait_limit_s or None
+    return None if seconds is None else t.now_ns + round(float(seconds) * NS_PER_S)
+
+
+def _late(t: SpelTask, runs: list[Run]) -> None:
+    """Note for TW that its own time ran out; TMOut's is an error (documented: 2281)."""
+    if len(runs) < 2:
+        raise SpelRefusal(RefusalKind.SHARED_WAIT_TIMED_OUT, "The time of TMOut ran out")
+    _timed(t, True)
 
 
 def _timed(t: SpelTask, out: bool) -> None:
@@ -163,7 +203,7 @@ def _lock(emitter: Emitter, node: TaskStatement) -> Operation:
             lambda: sharing.may_lock(number, t),
             take,
             end_ns=_until(t, runs),
-            out_of_time=lambda: _timed(t, True),
+            out_of_time=lambda: _late(t, runs),
         )
 
     return go
@@ -188,7 +228,7 @@ def _await_signal(emitter: Emitter, node: TaskStatement) -> Operation:
 
         def out() -> None:
             sharing.cease(number, t)
-            _timed(t, True)
+            _late(t, runs)
 
         return Blocking(
             lambda: sharing.signalled(number, t),
@@ -239,6 +279,7 @@ def _unsimulated(emitter: Emitter, node: TaskStatement) -> Operation:  # noqa: A
 TASK_STATEMENTS: Final[dict[str, Callable[[Emitter, TaskStatement], Operation]]] = {
     "xqt": _start,
     "quit": _quit,
+    "abortmotion": _abort_motion,
     "halt": _halt,
     "resume": _resume,
     "taskwait": _await_task,

@@ -17,9 +17,10 @@ from robolink_simulators.epson.spel.line_tree import (
 from robolink_simulators.epson.spel.programs.emitter import Emitter
 from robolink_simulators.epson.spel.programs.families.channels import CHANNEL_STATEMENTS
 from robolink_simulators.epson.spel.programs.families.control import TASK_STATEMENTS
+from robolink_simulators.epson.spel.programs.families.files import FILE_STATEMENTS
 from robolink_simulators.epson.spel.programs.families.interrupts import compile_trap
 from robolink_simulators.epson.spel.programs.families.texts import PROCEDURES
-from robolink_simulators.epson.spel.programs.families.timers_and_files import TIMERS_AND_FILES
+from robolink_simulators.epson.spel.programs.families.timers import TIMERS
 from robolink_simulators.epson.spel.programs.families.vision import compile_access, compile_run
 from robolink_simulators.epson.spel.programs.families.vision_calibrating import (
     VISION_STATEMENTS,
@@ -37,7 +38,7 @@ FamilyStatement = (
     | VisionStatement
 )
 
-PROCEDURE_TABLES: Final = (PROCEDURES, TIMERS_AND_FILES)
+PROCEDURE_TABLES: Final = (PROCEDURES, TIMERS)
 """Statements written as a call; the first table that knows a name compiles it."""
 
 _Compiler = Callable[[Emitter, Call], Operation]
@@ -63,13 +64,12 @@ def compile_family(
         case TaskStatement(word):
             return TASK_STATEMENTS[word](emitter, node)
         case ChannelStatement(word):
-            if word not in CHANNEL_STATEMENTS:
-                return CHANNEL_STATEMENTS["*"](emitter, node)
-            return CHANNEL_STATEMENTS[word](emitter, node)
+            table = FILE_STATEMENTS if word in FILE_STATEMENTS else CHANNEL_STATEMENTS
+            return table[word](emitter, node)
         case Call(name):
-            for table in PROCEDURE_TABLES:
-                if name in table:
-                    return table[name](emitter, node)
+            for procedures in PROCEDURE_TABLES:
+                if name in procedures:
+                    return procedures[name](emitter, node)
             raise emitter.fault(tr("there is no statement and no function {name}", name=name))
         case AssignElement(name):
             raise emitter.fault(tr("nothing is called {name}", name=name))

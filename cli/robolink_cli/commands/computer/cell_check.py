@@ -1,0 +1,248 @@
+"""cell check: whether cells are as they were left, and whether anything is due. Moves nothing."""
+
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import click
+
+from robolink.errors import ConfigError, NotReadyError, RobolinkError
+from robolink.messages import declared, tr
+from robolink_cli.access.cell import complete_cell
+from robolink_cli.console.exit_codes import DIFFERENT, exit_code
+from robolink_cli.console.render import note, say
+from robolink_cli.options.consent import published_option
+from robolink_cli.session.completing import complete_recipe
+from robolink_cli.session.context import CliContext, context_of_cell, controller_options
+from robolink_cli.session.opening import open_controller
+
+if TYPE_CHECKING:
+    from robolink.backup import ToolState
+    from robolink.inspection import Inspection
+    from robolink.model import NewEntry
+    from robolink_cli.commands.measure.sensor_check import SensorCheck
+
+
+class CheckScope(NamedTuple):
+    """What is looked at, and how.
+
+    Attributes:
+        published: Whether the tools are those that the companion program published.
+        since: Changes before this day are left out of the charts; empty for none.
+        sensor: What measures besides, ``None`` for nothing: then nothing moves.
+    """
+
+    published: bool
+    since: str
+    sensor: "SensorCheck | None"
+
+
+class CheckedCell(NamedTuple):
+    """One cell that was looked at, or could not be.
+
+    Attributes:
+        name: Its name, or its URL where it has none.
+        inspection: What was found; ``None`` where it could not be looked at.
+        error: Why not, or not further.
+    """
+
+    name: str
+    inspection: "Inspection | None"
+    error: RobolinkError | None = None
+
+    @property
+    def well(self) -> bool:
+        """Whether it was looked at and nobody has to see to anything."""
+        found = self.inspection
+        return self.error is None and found is not None and not found.findings
+
+
+@click.command()
+@click.argument("cells", metavar="[CELL]...", nargs=-1, shell_complete=complete_cell)
+@click.option(
+    "--since",
+    type=click.DateTime(["%Y-%m-%d"]),
+    help=declared("Begin the charts anew at this day, after a repair (UTC)."),
+)
+@click.option(
+    "--measure",
+    "recipe",
+    metavar="RECIPE.toml",
+    type=click.Path(dir_okay=False, path_type=Path),
+    shell_complete=complete_recipe,
+    help=declared(
+        "Also measure the tips as this recipe says, by its sensor; the robot moves after a yes on "
+        "a terminal. Nothing is written."
+    ),
+)
+@published_option
+@controller_options
+def check(
+    context: CliContext,
+    cells: tuple[str, ...],
+    *,
+    since: datetime | None,
+    recipe: Path | None,
+    published: bool,
+) -> int:
+    """Look whether cells are in order, for a job that runs every night. Nothing moves.
+
+    Without a CELL that of -c is meant, or else all cells of the cell files. Compared are the tools
+    with what was last proved to be in them, stations with their due days, and the course of the
+    changes with its limits; each look goes on record as one entry of the journal. Exit code 1 when
+    somebody should see to something; when a cell could not be looked at, the code of why not.
+    """
+    from robolink_cli.commands.measure.sensor_check import SensorCheck
+
+    contexts = _contexts(context, cells)
+    sensor = None if recipe is None else SensorCheck.of(recipe, cells=len(contexts))
+    scope = CheckScope(published, f"{since:%Y-%m-%d}" if since else "", sensor)
+    checked = [_checked(one, scope) for one in contexts]
+    payload = {"ok": all(one.well for one in checked), "cells": [_payload(one) for one in checked]}
+    context.emit("check", payload, lambda: _show(checked))
+    for one in checked:
+        if one.error is not None:
+            return exit_code(one.error)
+    return 0 if payload["ok"] else DIFFERENT
+
+
+def _contexts(context: CliContext, names: Sequence[str]) -> list[CliContext]:
+    """Return each cell that is meant.
+
+    Raises:
+        ConfigError: There is none of that name, or none at all.
+    """
+    if not names:
+        if context.url is not None:
+            return [context]
+        from robolink.config import cell_names
+
+        names = cell_names()
+        if not names:
+            context.require_url()
+    return [context_of_cell(name) for name in names]
+
+
+def _checked(context: CliContext, scope: CheckScope) -> CheckedCell:
+    """Look at one cell; what keeps it from being looked at stands in the result."""
+    name = context.cell.name if context.cell else context.require_url()
+    seen: list[Inspection] = []
+    try:
+        _inspect(context, scope, seen)
+    except RobolinkError as error:
+        if not (seen or isinstance(error, ConfigError)):
+            _record_that_nobody_looked(context, error)
+        return CheckedCell(name, seen[-1] if seen else None, error)
+    return CheckedCell(name, seen[-1])
+
+
+def _inspect(context: CliContext, scope: CheckScope, seen: "list[Inspection]") -> None:
+    """Look at one cell and put on record what was found.
+
+    Args:
+        context: The cell.
+        scope: What is looked at, and how.
+        seen: Takes what was found; by reading, then with what was measured.
+
+    Raises:
+        RobolinkError: What keeps it from being looked at, or from being looked at further.
+    """
+    from robolink.inspection import inspect
+    from robolink_cli.session.tool_source import find_tools
+
+    with open_controller(context, quiet=True, changes=scope.sensor is not None) as controller:
+        tools: ToolState | NotReadyError
+        try:
+            tools = find_tools(controller, published=scope.published)
+        except NotReadyError as error:
+            tools = error
+        seen.append(inspect(controller, tools, cell=context.cell, since=scope.since))
+        try:
+            if scope.sensor is not None:
+                measured = scope.sensor.findings(controller, context.cell)
+                seen.append(seen[-1].with_findings(measured))
+        finally:
+            controller.outcomes.append(seen[-1].entry)
+
+
+def _record_that_nobody_looked(context: CliContext, error: RobolinkError) -> None:
+    """Put on record that a cell could not be looked at; say it where that cannot be recorded."""
+    from robolink import __version__
+    from robolink.journal import open_log, signature_here
+    from robolink.transport import parse_url
+
+    try:
+        log = open_log(
+            parse_url(context.require_url()).address,
+            durable=True,
+            signature=signature_here(__version__),
+        )
+        try:
+            log.append(_not_looked(error))
+        finally:
+            log.close()
+    except ConfigError as broken:
+        note(broken.what)
+
+
+def _not_looked(error: RobolinkError) -> "NewEntry":
+    from robolink.model import EntryKind, NewEntry
+
+    verdict = tr("The cell could not be looked at: {what}", what=error.what)
+    return NewEntry(EntryKind.CHECK, verdict=verdict, details={"error": type(error).__name__})
+
+
+def _payload(one: CheckedCell) -> Mapping[str, object]:
+    from robolink_cli.views.documents import offset_payload
+
+    error = one.error and {
+        "kind": type(one.error).__name__,
+        "what": one.error.what,
+        "remedy": one.error.remedy,
+    }
+    if one.inspection is None:
+        return {"cell": one.name, "ok": False, "error": error}
+    found = one.inspection
+    return {
+        "cell": one.name,
+        "ok": one.well,
+        "error": error,
+        "controller": found.controller,
+        "tools": {str(number): offset_payload(value) for number, value in found.tools.items()},
+        "selected_tool": found.selected,
+        "stations": list(found.stations),
+        "changes": found.changes,
+        "findings": [
+            {"code": f.code, "subject": f.subject, "sentence": f.sentence, "remedy": f.remedy}
+            for f in found.findings
+        ],
+    }
+
+
+def _show(checked: Sequence[CheckedCell]) -> None:
+    """Print one line a cell, what is to be seen to below it; cells with something first."""
+    for one in sorted(checked, key=lambda one: one.well):
+        if one.inspection is None:
+            say(tr("{cell}: could not be looked at.", cell=one.name))
+            say(f"  {one.error}")
+            continue
+        if one.well:
+            say(
+                tr(
+                    "{cell}: in order (tools read: {tools}, stations: {stations}, measured "
+                    "changes on record: {changes}).",
+                    cell=one.name,
+                    tools=len(one.inspection.tools),
+                    stations=len(one.inspection.stations),
+                    changes=one.inspection.changes,
+                )
+            )
+            continue
+        say(tr("{cell}: somebody should see to this.", cell=one.name))
+        for found in one.inspection.findings:
+            say(f"  {found.sentence}")
+            if found.remedy:
+                say(f"    {found.remedy}")
+        if one.error is not None:
+            say(f"  {one.error}")

@@ -1,0 +1,99 @@
+"""Which cell and which job: what is asked of whoever typed neither."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from robolink.errors import ConfigError, DeclinedError
+from robolink.messages import tr
+from robolink_cli.prompts.present import AskingDesk
+from robolink_cli.wizard.choices import ChoiceSubject, choose
+
+if TYPE_CHECKING:
+    from robolink.config import Cell
+    from robolink.recipe import LoadedRecipe
+
+_FOLDERS: Final = ("", "recipes")
+"""Where recipes are looked for, beside the cell file and in the working folder."""
+
+
+def nobody_to_ask() -> DeclinedError:
+    """Return the end of a command that would have to ask, where nobody is."""
+    return DeclinedError(
+        tr("There is nobody to ask here. Add --yes, or run it on a terminal."),
+        remedy=tr("Nothing was sent."),
+    )
+
+
+def choose_cell(desk: AskingDesk) -> "Cell":
+    """Have one of the cells of this computer chosen; the only one is taken.
+
+    Raises:
+        ConfigError: There is none.
+        DeclinedError: The person leaves.
+    """
+    from robolink.config import load_cells
+
+    cells = list(load_cells().values())
+    if not cells:
+        raise ConfigError(
+            tr("No cell is set up on this computer."),
+            remedy=tr(
+                "'robolink cell where' shows which file describes cells. To try it on a simulated "
+                "robot: robolink demo"
+            ),
+        )
+    if len(cells) == 1:
+        return cells[0]
+    rows = tuple(f"{cell.name}   {cell.settings.robot or cell.url}" for cell in cells)
+    subject = ChoiceSubject(tr("Choose"), (), rows)
+    return cells[choose(desk, tr("Which cell?"), subject, _nothing)]
+
+
+def choose_recipe(desk: AskingDesk, cell: "Cell | None") -> "LoadedRecipe":
+    """Have one of the recipes chosen that stand beside the cell file or here.
+
+    Raises:
+        ConfigError: There is none, or it is wrong.
+        DeclinedError: The person leaves.
+    """
+    from robolink.recipe import load_recipe
+
+    paths = _recipes(cell)
+    loaded = []
+    for path in paths:
+        try:
+            loaded.append(load_recipe(path))
+        except ConfigError as error:
+            desk.tell(f"{path}: {error.what}")
+    if not loaded:
+        raise ConfigError(
+            tr("No recipe stands beside the cell file, nor in this folder."),
+            remedy=tr(
+                "Write one (docs/recipes.md), or measure one tool: robolink calibrate two-pose "
+                "--tool N"
+            ),
+        )
+    rows = tuple(f"{one.name}   ({one.path.name})" for one in loaded)
+    subject = ChoiceSubject(tr("Choose"), (), rows)
+    return loaded[choose(desk, tr("Which job?"), subject, _nothing)]
+
+
+def _recipes(cell: "Cell | None") -> list[Path]:
+    from robolink_cli.session.completing import is_recipe
+
+    roots = [Path.cwd()]
+    if cell is not None and "url" in cell.origins:
+        roots.insert(0, cell.origins["url"].parent)
+    found: dict[Path, None] = {}
+    for root in roots:
+        for folder in _FOLDERS:
+            place = root / folder
+            if place.is_dir():
+                for path in sorted(place.iterdir()):
+                    if is_recipe(path):
+                        found[path.resolve()] = None
+    return list(found)
+
+
+def _nothing() -> None:
+    """No controller is connected yet."""

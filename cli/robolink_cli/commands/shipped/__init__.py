@@ -1,0 +1,1 @@
+"""What comes with robolink to be read and copied: pages and recipes."""

@@ -1,0 +1,89 @@
+"""docs: the pages that come with robolink, read without a network."""
+
+import sys
+from pathlib import Path
+
+import click
+
+from robolink.messages import tr
+from robolink_cli.console.render import emit_json, json_is_on, say
+from robolink_cli.session.context import json_option
+
+
+def _complete_page(_: click.Context, __: click.Parameter, start: str) -> list[str]:
+    """Return the pages whose names begin so, for TAB."""
+    return [name for name in _pages() if name.startswith(start)]
+
+
+@click.command()
+@click.argument("page", required=False, shell_complete=_complete_page)
+@click.option("--path", "only_path", is_flag=True, help="Show where the page is, not the page.")
+@json_option
+def docs(page: str | None, *, only_path: bool) -> None:
+    """Read a PAGE of the documentation; without one, list them.
+
+    The pages come with the program, so they are of its version and need no network. Where a page
+    is there in the language of --lang, that one is shown.
+    """
+    pages = _pages()
+    if page is None:
+        titles = {name: _title(path) for name, path in pages.items()}
+        _list(titles)
+        return
+    name = page.removesuffix(".md").removeprefix("docs/")
+    from robolink_cli.commands.shipped.shipped_files import require_one_of
+
+    require_one_of(name, list(pages), remedy=tr("'robolink docs' lists the pages."))
+    path = _in_language(pages[name])
+    if json_is_on():
+        text = path.read_text(encoding="utf-8")
+        emit_json("robolink/page/1", {"name": name, "path": str(path), "text": text})
+    elif only_path:
+        say(str(path))
+    else:
+        _show(path.read_text(encoding="utf-8"))
+
+
+def _pages() -> dict[str, Path]:
+    """Return the pages by name: those of the top folder, then the reference."""
+    from robolink_cli.commands.shipped.shipped_files import pages_folder
+
+    folder = pages_folder()
+    found = [*sorted(folder.glob("*.md")), *sorted(folder.glob("reference/*.md"))]
+    return {
+        path.relative_to(folder).as_posix().removesuffix(".md"): path
+        for path in found
+        if not path.stem.endswith(".zh")
+    }
+
+
+def _title(path: Path) -> str:
+    with path.open(encoding="utf-8") as lines:
+        return next((line.strip("# \n") for line in lines if line.startswith("# ")), "")
+
+
+def _in_language(path: Path) -> Path:
+    """Return the page in the language of the process, where there is one."""
+    from robolink_cli.console.language import language_now
+
+    other = path.with_suffix(f".{language_now()}.md")
+    return other if other.is_file() else path
+
+
+def _list(titles: dict[str, str]) -> None:
+    if json_is_on():
+        pages = [{"name": name, "title": title} for name, title in titles.items()]
+        emit_json("robolink/pages/1", {"pages": pages})
+        return
+    width = max(map(len, titles), default=0)
+    for name, title in titles.items():
+        say(f"{name:{width}}  {title}")
+    say(tr("To read one: robolink docs PAGE"))
+
+
+def _show(text: str) -> None:
+    """Show a page: through the pager on a terminal, as it stands to a program."""
+    if sys.stdout.isatty() and sys.stdin.isatty():
+        click.echo_via_pager(text)
+    else:
+        say(text.rstrip("\n"))

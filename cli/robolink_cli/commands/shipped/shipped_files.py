@@ -1,0 +1,50 @@
+"""Where the pages and recipes are that come with robolink."""
+
+from collections.abc import Sequence
+from difflib import get_close_matches
+from importlib.resources import files
+from pathlib import Path
+from typing import Final
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+
+_CHECKOUT: Final = Path(__file__).parents[4]
+SCHEMA: Final = "recipe.schema.json"
+
+
+def pages_folder() -> Path:
+    """Return the folder of the pages."""
+    return _folder("docs", "docs")
+
+
+def recipes_folder() -> Path:
+    """Return the folder of the recipes to begin with."""
+    return _folder("recipes", "examples/recipes")
+
+
+def recipe_schema() -> Path:
+    """Return the JSON Schema of a recipe, for editors."""
+    packaged = Path(str(files("robolink.recipe").joinpath(SCHEMA)))
+    return packaged if packaged.is_file() else _CHECKOUT / "docs" / SCHEMA
+
+
+def require_one_of(name: str, names: Sequence[str], *, remedy: str) -> None:
+    """Refuse a name that is none of these, with those that look like it.
+
+    Raises:
+        ConfigError: It is none.
+    """
+    if name in names:
+        return
+    near = get_close_matches(name, names, n=3) or [one for one in names if name in one][:3]
+    hint = tr("Is one of these meant: {names}?", names=", ".join(near)) if near else ""
+    raise ConfigError(
+        tr("There is no {name!r} here.", name=name), remedy=" ".join(filter(None, (hint, remedy)))
+    )
+
+
+def _folder(packaged: str, in_checkout: str) -> Path:
+    """Return a folder of the wheel; a source checkout has it at its top."""
+    folder = Path(str(files("robolink_cli").joinpath(packaged)))
+    return folder if folder.is_dir() else _CHECKOUT / in_checkout

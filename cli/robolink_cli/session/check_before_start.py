@@ -1,0 +1,122 @@
+"""Before a procedure moves the robot: one question, or the check list of a wizard."""
+
+from typing import TYPE_CHECKING
+
+from robolink.errors import DeclinedError, NotReadyError, NotReadyReason
+from robolink.messages import tr
+from robolink_cli.prompts.present import present_desk
+from robolink_cli.session.motion_consent import (
+    agree_to_motion,
+    heed_what_was_left,
+    motion_question,
+)
+
+if TYPE_CHECKING:
+    from robolink.model import Controller
+    from robolink_cli.prompts.present import AskingDesk
+    from robolink_cli.wizard.check_list import CheckPoint
+
+
+def agree_to_procedure(
+    controller: "Controller",
+    purpose: str,
+    *,
+    moves: int,
+    speed_mm_s: float,
+    box_mm: float,
+    yes: bool,
+) -> None:
+    """Have a person agree to a procedure in which the robot moves by itself.
+
+    Args:
+        controller: The controller, connected.
+        purpose: What it moves for, in words.
+        moves: How many movements are foreseen.
+        speed_mm_s: How fast at most.
+        box_mm: How far at most.
+        yes: Whether the answer was given beforehand.
+
+    Raises:
+        NotReadyError: Nothing can move now.
+        StoppedError, DeclinedError: As :func:`agree_to_motion`.
+    """
+    if yes or present_desk() is None:
+        question = motion_question(controller, purpose, speed_mm_s=speed_mm_s, box_mm=box_mm)
+        agree_to_motion(question, yes=yes)
+        return
+    check_before_start(controller, purpose, moves=moves, speed_mm_s=speed_mm_s, box_mm=box_mm)
+
+
+def check_before_start(
+    controller: "Controller", purpose: str, *, moves: int, speed_mm_s: float, box_mm: float
+) -> None:
+    """Have the person at the desk go through the list; arguments as above.
+
+    Raises:
+        NotReadyError: Nothing can move now, and no key of the list changes that.
+        StoppedError, DeclinedError: As :func:`agree_to_motion`.
+    """
+    desk = present_desk()
+    assert desk is not None  # noqa: S101 - looked at by whoever calls
+    heed_what_was_left(yes=False)
+    plan = tr(
+        "The robot will move by itself {n} times: power LOW, up to {v} mm/s, at most {d} mm from "
+        "here.",
+        n=moves,
+        v=f"{speed_mm_s:g}",
+        d=f"{box_mm:g}",
+    )
+    while _answer_to_list(desk, controller, purpose, plan) != "y":
+        controller.motors(True)
+
+
+def _answer_to_list(desk: "AskingDesk", controller: "Controller", purpose: str, plan: str) -> str:
+    """Show the list; return ``y``, or that the motors are to be switched on.
+
+    Raises:
+        DeclinedError: The person leaves.
+    """
+    from robolink.runner import POLL_S, Question
+    from robolink_cli.wizard.check_list import SWITCH_ON, CheckSubject
+
+    points = tuple(_points(controller, purpose))
+    desk.regard(CheckSubject(points, plan))
+    desk.ask(tr("Start moving"), Question.YES_NO)
+    while (answer := desk.poll(POLL_S)) is None:
+        controller.status()
+    if answer in ("y", SWITCH_ON):
+        return answer
+    raise DeclinedError(tr("You did not start it."), remedy=tr("Nothing moved."))
+
+
+def _points(controller: "Controller", purpose: str) -> "list[CheckPoint]":
+    from robolink_cli.wizard.check_list import CheckPoint, Mark
+
+    motors_off = False
+    try:
+        controller.groups[0].require_able(purpose)
+    except NotReadyError as error:
+        motors_off = error.reason is NotReadyReason.MOTORS_OFF and controller.capabilities.motors
+        if not motors_off:
+            raise
+    terms = controller.groups[0].terms()
+    points = [
+        CheckPoint(Mark.OK, tr("Controller answers: {name}", name=_name(controller))),
+        CheckPoint(Mark.OK, tr("Emergency stop released, guard closed, no program running")),
+        CheckPoint(Mark.OK, terms.watch),
+    ]
+    if motors_off:
+        points.append(CheckPoint(Mark.TO_DO, tr("Motors are off"), "7", tr("Switch them on")))
+    else:
+        points.append(CheckPoint(Mark.OK, tr("Motors are on")))
+    new = tr("The new nozzle is mounted and tight; tip and pin are clean")
+    clear = tr("Nobody in the cell, hoses free")
+    points.append(CheckPoint(Mark.YOU, new, "1", tr("Yes")))
+    points.append(CheckPoint(Mark.YOU, clear, "3", tr("Yes")))
+    return points
+
+
+def _name(controller: "Controller") -> str:
+    facts = controller.facts()
+    said = (*facts.robot_models, facts.controller_serial, facts.firmware)
+    return ", ".join(one for one in said if one) or controller.identity

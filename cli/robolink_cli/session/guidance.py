@@ -1,0 +1,40 @@
+"""Whether a command is shown as a wizard, and what stands in its first row."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, TypeVar
+
+from robolink_cli.console.tolerance import may_be_guided
+from robolink_cli.session.context import CliContext
+
+if TYPE_CHECKING:
+    from robolink_cli.wizard.state import Header
+
+T = TypeVar("T")
+
+
+def guided_if_alone(context: CliContext, do: Callable[[], T], *, job: str, alone: bool = True) -> T:
+    """Do the work of a command; as a wizard where a person sits at the terminal.
+
+    Args:
+        context: What the command was told.
+        do: The work.
+        job: What it is called in the first row.
+        alone: Whether it is a person who is asked, and not a simulator's stand-in for one.
+
+    Raises:
+        BaseException: Whatever ended the work.
+    """
+    if not alone or not may_be_guided():
+        return do()
+    from robolink_cli.wizard.host import guided
+
+    return guided(header_of(context, job), do)
+
+
+def header_of(context: CliContext, job: str) -> "Header":
+    """Return the first row of a command's screens."""
+    from robolink_cli.wizard.state import Header
+
+    url = context.url or ""
+    name = context.cell.name if context.cell is not None else url.partition("?")[0]
+    return Header(name, job, simulated="+sim://" in url)

@@ -1,0 +1,53 @@
+"""Something to be chosen from a list."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from robolink.errors import DeclinedError
+from robolink.messages import tr
+from robolink.runner import POLL_S, Question
+from robolink_cli.prompts.present import AskingDesk
+
+
+@dataclass(frozen=True, slots=True)
+class ChoiceSubject:
+    """A list of which one is chosen.
+
+    Attributes:
+        step: What stands at the right of the first row.
+        above: What is to be read before.
+        options: What there is to choose from.
+        marked: Index of the one that is marked first; ``None`` where nothing says which.
+        does: What the main key is called.
+        leaves: What the stop key is called.
+    """
+
+    step: str
+    above: tuple[str, ...]
+    options: tuple[str, ...]
+    marked: int | None = 0
+    does: str = ""
+    leaves: str = ""
+
+
+def choose(
+    desk: AskingDesk, question: str, subject: ChoiceSubject, watch: Callable[[], object]
+) -> int:
+    """Have one chosen; return its index.
+
+    Args:
+        desk: Where.
+        question: What is asked.
+        subject: The list.
+        watch: Called while nobody answers.
+
+    Raises:
+        DeclinedError: The person leaves.
+    """
+    desk.regard(subject)
+    desk.ask(question, Question.TEXT)
+    while (answer := desk.poll(POLL_S)) is None:
+        watch()
+    if answer.isdigit() and 1 <= int(answer) <= len(subject.options):
+        return int(answer) - 1
+    raise DeclinedError(tr("You left without choosing."), remedy=tr("Nothing was sent."))

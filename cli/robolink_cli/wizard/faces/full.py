@@ -1,0 +1,144 @@
+"""The wizard as a full screen, drawn by prompt_toolkit.
+
+Only here is that package imported. A screen is a text of 24 rows; what differs is drawn anew.
+"""
+
+import asyncio
+import sys
+import time
+from contextlib import suppress
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final
+
+from prompt_toolkit.application import Application
+from prompt_toolkit.input import Input, create_input
+from prompt_toolkit.input.typeahead import clear_typeahead
+from prompt_toolkit.key_binding import KeyBindings, KeyPressEvent
+from prompt_toolkit.layout import FormattedTextControl, Layout, Window
+from prompt_toolkit.output import Output, create_output
+
+from robolink_cli.console.output import visible
+from robolink_cli.wizard.desk import Desk
+from robolink_cli.wizard.faces.effects import carry_out
+from robolink_cli.wizard.faces.lines import LineFace
+from robolink_cli.wizard.flow import advance
+from robolink_cli.wizard.happenings import Happening, KeyPressed, TooFast
+from robolink_cli.wizard.key_gate import KeyGate, name_of
+from robolink_cli.wizard.screens.drawing import screen_of
+from robolink_cli.wizard.screens.layout import HEIGHT, WIDTH
+from robolink_cli.wizard.state import WizardState
+
+if TYPE_CHECKING:
+    from robolink_cli.wizard.work import Work
+
+_TURN_S: Final = 0.03
+_REPAINT_S: Final = 0.4
+"""So often the age of the reading is drawn anew while nothing happens."""
+
+
+class FullFace:
+    """Shows a desk on the whole terminal; goes on as lines where the window becomes too small.
+
+    Args:
+        source: Where keys come from, ``None`` for this process's terminal.
+        output: Where it is drawn, ``None`` for stderr.
+    """
+
+    def __init__(self, source: Input | None = None, output: Output | None = None) -> None:
+        self._input = create_input(sys.stdin) if source is None else source
+        self._output = create_output(stdout=sys.stderr) if output is None else output
+        self._gate = KeyGate()
+        self._painted_s = 0.0
+
+    def run(self, desk: Desk, state: WizardState, work: "Work[Any]") -> WizardState:
+        """Show it until the work has ended; return the last state."""
+        self._desk, self._state, self._work = desk, state, work
+        application: Application[bool] = Application(
+            layout=Layout(Window(FormattedTextControl(self._text, show_cursor=False))),
+            key_bindings=self._bindings(),
+            full_screen=True,
+            input=self._input,
+            output=self._output,
+        )
+        application.ttimeoutlen = 0.05
+
+        def begin() -> None:
+            application.create_background_task(self._turn(application))
+
+        # The handlers of the command stay: they reach the work, which ends in order.
+        narrow = application.run(pre_run=begin, handle_sigint=False)
+        self._forget_keys()
+        return LineFace().run(desk, self._state, work) if narrow else self._state
+
+    async def _turn(self, application: "Application[bool]") -> None:
+        """Take what happens, until the work has ended or the window is too small."""
+        while True:
+            ended, now_s = self._work.ended, time.monotonic()
+            happened: list[Happening] = [*self._desk.happened()]
+            happened += [self._pressed(key, now_s) for key in self._gate.due(now_s)]
+            if self._gate.burst_ended(now_s):
+                happened.append(TooFast())
+            for one in happened:
+                self._happens(one)
+            if happened or now_s - self._painted_s > _REPAINT_S:
+                self._painted_s = now_s
+                application.invalidate()
+            size = self._output.get_size()
+            if ended or size.columns < WIDTH or size.rows < HEIGHT:
+                application.exit(result=not ended)
+                return
+            await asyncio.sleep(_TURN_S)
+
+    def _bindings(self) -> KeyBindings:
+        bindings = KeyBindings()
+
+        def pressed(event: KeyPressEvent) -> None:
+            press = event.key_sequence[0]
+            key = getattr(press.key, "value", press.key)
+            self._press(str(key), press.data)
+
+        bindings.add("<any>", eager=True)(pressed)
+        bindings.add("escape", eager=True)(pressed)
+        bindings.add("<bracketed-paste>", eager=True)(lambda _event: self._happens(TooFast()))
+        return bindings
+
+    def _press(self, key: str, data: str) -> None:
+        now_s = time.monotonic()
+        if self._state.has_field and _writes(key):
+            # A field takes bursts: scanners fill it in.
+            text = data if data.isprintable() and name_of(key) not in ("enter", "backspace") else ""
+            if self._fills(key, text):
+                self._happens(KeyPressed(name_of(key), text, now_s))
+                return
+        for one in self._gate.press(key, now_s):
+            self._happens(self._pressed(one, now_s))
+
+    def _fills(self, key: str, text: str) -> bool:
+        """Tell whether a key goes into the field at once; what writes goes through the gate."""
+        if self._state.writing is None:
+            return True
+        return text.isdigit() or name_of(key) == "backspace"
+
+    def _pressed(self, key: str, at_s: float) -> KeyPressed:
+        return KeyPressed(name_of(key), key if len(key) == 1 else "", at_s)
+
+    def _happens(self, happening: Happening) -> None:
+        self._state, effects = advance(self._state, happening)
+        carry_out(self._desk, effects)
+
+    def _text(self) -> str:
+        rows = screen_of(self._state, time.monotonic()).rows()
+        return "\n".join(visible(row) for row in rows)
+
+    def _forget_keys(self) -> None:
+        """Drop what is still held down: it is not for the shell."""
+        clear_typeahead(self._input)
+        with suppress(ImportError, OSError, ValueError, AttributeError):
+            termios: Any = import_module("termios")
+            with suppress(termios.error):
+                termios.tcflush(self._input.fileno(), termios.TCIFLUSH)
+
+
+def _writes(key: str) -> bool:
+    """Tell whether a key is a character, or ends or shortens what is in a field."""
+    return len(key) == 1 or name_of(key) in ("enter", "backspace")

@@ -1,0 +1,114 @@
+"""The wizard as a dialogue of lines: for a dumb terminal, a narrow one, a screen reader."""
+
+import sys
+import time
+from typing import TYPE_CHECKING, Any, Final
+
+from robolink.messages import tr
+from robolink.runner import Question
+from robolink_cli.console.output import visible
+from robolink_cli.prompts.lines import QUIET_S, Lines, open_lines
+from robolink_cli.wizard.desk import Desk
+from robolink_cli.wizard.faces.effects import carry_out
+from robolink_cli.wizard.flow import advance
+from robolink_cli.wizard.happenings import (
+    Happening,
+    LineTyped,
+    WaitsForAnswer,
+    WasAsked,
+    WasRegarded,
+    WasTold,
+)
+from robolink_cli.wizard.screens.told import told_after_jog, told_before, told_question
+from robolink_cli.wizard.state import WizardState
+
+if TYPE_CHECKING:
+    from robolink_cli.wizard.work import Work
+
+_TURN_S: Final = 0.05
+
+
+class LineFace:
+    """Shows a desk line after line, on stderr."""
+
+    def __init__(self) -> None:
+        self._lines: Lines | None = None
+        self._shown = 0
+
+    def run(self, desk: Desk, state: WizardState, work: "Work[Any]") -> WizardState:
+        """Show it until the work has ended; return the last state."""
+        if state.question is not None and state.waits:
+            # Taken over from a screen that has become too small.
+            self._begin_question(state, state.question.kind)
+            self._shown = state.question.number
+            _put(visible(told_question(state)))
+        while True:
+            ended = work.ended
+            for happening in desk.happened():
+                state, effects = advance(state, happening)
+                self._tell(happening, state)
+                carry_out(desk, effects)
+            if ended:
+                return state
+            if state.question is None or not state.waits:
+                work.wait(_TURN_S)
+                continue
+            state = self._listen(desk, state)
+
+    def _listen(self, desk: Desk, state: WizardState) -> WizardState:
+        assert self._lines is not None  # noqa: S101 - opened with the first question
+        try:
+            line = self._lines.next(_TURN_S)
+        except EOFError:
+            desk.leave()
+            return state
+        if line is None:
+            return state
+        typed = LineTyped(line, time.monotonic())
+        state, effects = advance(state, typed)
+        carry_out(desk, effects)
+        if not effects:
+            if state.at_place and not line.strip():
+                _put(told_after_jog(state))
+            elif state.message:
+                _put(state.message)
+        return state
+
+    def _tell(self, happening: Happening, state: WizardState) -> None:
+        """Say what a happening is to a person who sees no screen."""
+        match happening:
+            case WasTold(text=text):
+                self._forget(0.0)
+                _put(visible(text))
+            case WasAsked(kind=kind):
+                self._begin_question(state, kind)
+            case WaitsForAnswer(number=number) if number != self._shown:
+                self._shown = number
+                _put(visible(told_question(state)))
+            case WaitsForAnswer() if state.at_place:
+                _put(told_after_jog(state))
+            case WasRegarded():
+                pass
+            case _:
+                pass
+
+    def _begin_question(self, state: WizardState, kind: Question) -> None:
+        if self._lines is None:
+            self._lines = open_lines()
+        self._forget(QUIET_S)
+        if kind in (Question.YES_NO, Question.TEXT):
+            for row in told_before(state):
+                _put(visible(row))
+
+    def _forget(self, quiet_s: float) -> None:
+        if self._lines is None:
+            return
+        for line in self._lines.forget(quiet_s):
+            if line.strip():
+                _put(tr("Typed too early, so it was not taken: {line!r}", line=line))
+
+
+def _put(text: str) -> None:
+    if text:
+        sys.stderr.write(f"{text}\n")
+        sys.stderr.flush()

@@ -1,0 +1,258 @@
+"""The flow: a state and what happened give the next state, and what is to be done. Pure.
+
+Nothing here decides whether a touch counts: the runner does, for every face and every script. What
+is refused here is what the runner would refuse too, said before it is sent.
+"""
+
+import math
+from dataclasses import replace
+
+from robolink.messages import tr
+from robolink.nozzle_change import ChangeReport
+from robolink.runner import SETTLING_S, FitSubject, JogSubject, MoveSubject, Question
+from robolink_cli.wizard.check_list import CheckSubject
+from robolink_cli.wizard.choices import ChoiceSubject
+from robolink_cli.wizard.happenings import (
+    Effect,
+    Happening,
+    KeyPressed,
+    LineTyped,
+    SendAnswer,
+    TooFast,
+    WaitsForAnswer,
+    WasAsked,
+    WasRead,
+    WasRegarded,
+    WasTold,
+    WizardCommand,
+)
+from robolink_cli.wizard.keys import folded, meaning_of, step_of, with_point
+from robolink_cli.wizard.questions_flow import answered_by_key, answered_by_line
+from robolink_cli.wizard.state import (
+    ARMED_AFTER_S,
+    LEAST_WAY_MM,
+    STEP_SIZES,
+    Header,
+    Jogging,
+    WizardState,
+)
+
+Advanced = tuple[WizardState, list[Effect]]
+
+_MOST_REMARKS = 40
+
+
+def advance(state: WizardState, happening: Happening) -> Advanced:
+    """Return the next state, and what is to be done."""
+    match happening:
+        case WasTold(text=text):
+            remarks = (*state.remarks, text)[-_MOST_REMARKS:]
+            return replace(state, remarks=remarks, message=text), []
+        case WasRead(reading=reading):
+            return replace(state, reading=reading), []
+        case WasRegarded(subject=subject):
+            return _regarding(state, subject), []
+        case WasAsked():
+            return _asked(state, happening), []
+        case WaitsForAnswer():
+            return _waiting(state, happening.at_s), []
+        case TooFast():
+            return state.says(tr("Too fast for a hand. Ignored.")), []
+        case LineTyped():
+            return _line(state, happening)
+        case KeyPressed():
+            return _key(state, happening)
+
+
+def not_yet(state: WizardState, at_s: float) -> str:
+    """Return why the place is not taken yet, as far as it shows here; empty for nothing."""
+    touch, jogging = state.touch, state.jogging
+    if touch is None:
+        return ""
+    if at_s - jogging.ended_s < SETTLING_S:
+        return tr("Wait: the robot is still moving.")
+    if touch.contact is None and touch.arrival is not None and not _brought(state):
+        return tr("Not yet: the tip still stands where the robot put it. Jog it onto the pin.")
+    if touch.contact is None and jogging.coarse:
+        return tr(
+            "Not yet: the last step was {mm} mm. Finish with 0.10 mm or less.",
+            mm=f"{jogging.longest:.2f}",
+        )
+    reading = state.reading
+    if reading is not None and at_s - reading.at_s > 1.0:
+        return tr("No reading from the controller for {s} s.", s=round(at_s - reading.at_s))
+    return ""
+
+
+def _brought(state: WizardState) -> bool:
+    """Tell whether the tip was brought away from where the robot stopped."""
+    way = state.way_mm()
+    if way is None:
+        return state.jogging.steps > 0
+    return max(map(abs, way)) >= LEAST_WAY_MM / 2 and state.jogging.steps > 0
+
+
+def _regarding(state: WizardState, subject: object) -> WizardState:
+    if isinstance(subject, JogSubject):
+        jogging = replace(
+            state.jogging,
+            steps=state.jogging.steps + 1,
+            longest=subject.longest,
+        )
+        reading = state.reading
+        if reading is not None:
+            reading = replace(reading, pose=subject.after)
+        return replace(state, jogging=jogging, reading=reading, message="")
+    if isinstance(subject, MoveSubject):
+        return replace(state, subject=subject, question=None, waits=False, message="")
+    if isinstance(subject, Header):
+        return replace(state, header=subject)
+    if isinstance(subject, ChangeReport):
+        return replace(state, report=subject)
+    if isinstance(subject, FitSubject):
+        return replace(state, subject=subject, fit=subject)
+    return replace(state, subject=subject)
+
+
+def _waiting(state: WizardState, at_s: float) -> WizardState:
+    jogging = state.jogging
+    if jogging.ended_s > -math.inf:
+        jogging = replace(jogging, ended_s=at_s)
+    return replace(state, waits=True, jogging=jogging)
+
+
+def _asked(state: WizardState, asked: WasAsked) -> WizardState:
+    size = state.jogging.size
+    return replace(
+        state,
+        question=asked,
+        waits=False,
+        typed="",
+        marked=state.subject.marked if isinstance(state.subject, ChoiceSubject) else None,
+        message="",
+        ending=False,
+        jogging=Jogging(size=size, quarters=state.jogging.quarters),
+    )
+
+
+def _answer(state: WizardState, text: str) -> Advanced:
+    """Send an answer; until the work waits again nothing else is taken."""
+    assert state.question is not None  # noqa: S101 - looked at by whoever calls
+    sent = replace(state, waits=False, message="")
+    return sent, [SendAnswer(state.question.number, text)]
+
+
+def _stop(state: WizardState) -> Advanced:
+    """End: by the answer that ends, where there is one, else as Ctrl-C does."""
+    if state.ending:
+        return state, []
+    ending = replace(state, ending=True, message=tr("Stopping."))
+    question = state.question
+    if question is None or not state.waits:
+        return ending, [WizardCommand.END_WORK]
+    if question.kind is not Question.YES_NO:
+        return ending, [SendAnswer(question.number, "q")]
+    if state.writing is not None or confirms(state) is not None:
+        return ending, [SendAnswer(question.number, "n")]
+    return ending, [WizardCommand.END_WORK]  # a no would go on
+
+
+def _armed(state: WizardState, at_s: float) -> bool:
+    return state.question is not None and at_s - state.question.at_s >= ARMED_AFTER_S
+
+
+def _key(state: WizardState, key: KeyPressed) -> Advanced:
+    if key.name == "stop" or (key.name == "0" and not (state.has_field and key.text)):
+        return _stop(state)
+    if state.question is None or not state.waits or not _armed(state, key.at_s):
+        if state.at_place and key.name == "main" and not state.waits:
+            return state.says(tr("Wait: the robot is still moving.")), []
+        return state, []  # busy: drop
+    if state.at_place:
+        return _key_at_place(state, key)
+    return _taken(state, answered_by_key(state, key))
+
+
+def _key_at_place(state: WizardState, key: KeyPressed) -> Advanced:
+    jogging = state.jogging
+    if key.name in ("+", "-"):
+        size = jogging.size + (1 if key.name == "+" else -1)
+        size = min(max(size, 0), len(STEP_SIZES) - 1)
+        return replace(state, jogging=replace(jogging, size=size), message=""), []
+    if key.name == "*":
+        turned = replace(jogging, quarters=(jogging.quarters + 1) % 4)
+        return replace(state, jogging=turned, message=""), []
+    if key.name in ("main", "5", "t"):
+        return _take(state, key.at_s)
+    if key.name == "/":
+        return _again(state)
+    if key.name == "q":
+        return _stop(state)
+    step = step_of(key.name, jogging.step, jogging.quarters)
+    return (state, []) if step is None else _jog(state, step, key.at_s)
+
+
+def _jog(state: WizardState, step: str, at_s: float) -> Advanced:
+    jogging = replace(state.jogging, ended_s=at_s)
+    return _answer(replace(state, jogging=jogging), step)
+
+
+def _take(state: WizardState, at_s: float) -> Advanced:
+    why = not_yet(state, at_s)
+    return (state.says(why), []) if why else _answer(state, "done")
+
+
+def _again(state: WizardState) -> Advanced:
+    touch = state.touch
+    if touch is None or touch.number < 2 or touch.proof:
+        return state.says(tr("There is no earlier touch to begin with.")), []
+    return _answer(state, "again")
+
+
+def _line(state: WizardState, line: LineTyped) -> Advanced:
+    meaning = meaning_of(line.text)
+    question = state.question
+    typed = question is not None and question.kind is Question.TEXT
+    if meaning == "stop" and not (typed and folded(line.text) not in ("q", "stop", "停止")):
+        return _stop(state)
+    if question is None or not state.waits:
+        return state, []
+    if state.at_place:
+        return _line_at_place(state, line, meaning)
+    return _taken(state, answered_by_line(state, line.text))
+
+
+def _line_at_place(state: WizardState, line: LineTyped, meaning: str) -> Advanced:
+    if not folded(line.text):
+        return state.says(""), []  # the position is shown again
+    if meaning == "take":
+        return _take(state, line.at_s)
+    if meaning == "again":
+        return _again(state)
+    if meaning == "help":
+        return state.says(help_at_place()), []
+    pointed = with_point(line.text)
+    if pointed is not None:
+        said = tr("Write the decimal point as '.': {step}. Nothing moved.", step=pointed)
+        return state.says(said), []
+    return _jog(state, folded(line.text), line.at_s)
+
+
+def help_at_place() -> str:
+    """Return what can be typed at a place."""
+    return tr(
+        "Steps: x+0.1 moves 0.1 mm to +X; x y z in mm, u in degrees; several at once: x+0.1 z-0.5. "
+        "take records, again 1 begins at touch 1, stop ends."
+    )
+
+
+def _taken(state: WizardState, said: "WizardState | str") -> Advanced:
+    """Send what a question was answered with, or only show what became of it."""
+    return _answer(state, said) if isinstance(said, str) else (said, [])
+
+
+def confirms(state: WizardState) -> CheckSubject | None:
+    """Return the check list that is asked about, ``None`` for none."""
+    subject = state.subject
+    asks = state.question is not None and state.question.kind is Question.YES_NO
+    return subject if asks and isinstance(subject, CheckSubject) else None

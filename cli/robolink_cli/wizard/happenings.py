@@ -1,0 +1,129 @@
+"""What happens in a wizard, and what it has done about it: plain values, no terminal."""
+
+from dataclasses import dataclass
+from enum import Enum
+
+from robolink.model import Pose
+from robolink.runner import Question
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """What the controller said of itself a moment ago.
+
+    Attributes:
+        at_s: When it was read, by the monotonic clock of this computer.
+        state: The one word for what it is doing.
+        halted: Whether an emergency stop, an open guard or an error shows.
+        pose: Where the frame in force is, ``None`` where it was not read.
+        axes: Joint angles, in degrees, where they were read.
+    """
+
+    at_s: float
+    state: str
+    halted: bool = False
+    pose: Pose | None = None
+    axes: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class WasTold:
+    """The work said something."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class WasRegarded:
+    """What comes next is about this."""
+
+    subject: object
+
+
+@dataclass(frozen=True, slots=True)
+class WasAsked:
+    """The work asks; answers to an earlier question count for nothing from now on.
+
+    Attributes:
+        number: Of the question; it grows.
+        text: The question.
+        kind: What kind of answer is wanted.
+        at_s: When.
+    """
+
+    number: int
+    text: str
+    kind: Question
+    at_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class WaitsForAnswer:
+    """The work has taken the last answer and waits for the next one.
+
+    Attributes:
+        number: Of the question.
+        at_s: Since when.
+    """
+
+    number: int
+    at_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class WasRead:
+    """The controller was looked at."""
+
+    reading: Reading
+
+
+@dataclass(frozen=True, slots=True)
+class KeyPressed:
+    """One key, alone: what came in a burst is no key.
+
+    Attributes:
+        name: ``0`` to ``9`` for the keypad with and without NumLock, ``main``, ``stop``, ``+``,
+            ``-``, ``*``, ``/``, ``enter``, ``backspace``, or a letter.
+        text: What it writes into a field, empty for nothing.
+        at_s: When.
+    """
+
+    name: str
+    text: str
+    at_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class LineTyped:
+    """A whole line."""
+
+    text: str
+    at_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class TooFast:
+    """A burst of characters, as from a scanner or a paste, was dropped."""
+
+
+Happening = (
+    WasTold | WasRegarded | WasAsked | WaitsForAnswer | WasRead | KeyPressed | LineTyped | TooFast
+)
+
+
+@dataclass(frozen=True, slots=True)
+class SendAnswer:
+    """Answer a question."""
+
+    number: int
+    text: str
+
+
+class WizardCommand(Enum):
+    """What the flow wants besides an answer."""
+
+    END_WORK = "end"
+    """End what is under way, as Ctrl-C would."""
+
+
+Effect = SendAnswer | WizardCommand

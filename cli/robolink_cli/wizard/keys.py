@@ -1,0 +1,81 @@
+"""What keys and words mean: the keypad with and without NumLock, and two languages of words."""
+
+import re
+import unicodedata
+from typing import Final
+
+KEYPAD: Final = {
+    "left": "4",
+    "right": "6",
+    "up": "8",
+    "down": "2",
+    "pageup": "9",
+    "pagedown": "3",
+    "end": "1",
+    "home": "7",
+    "insert": "0",
+}
+"""Names of keys without NumLock: the same places of the keypad, and keys of a notebook."""
+
+AXES: Final = {
+    "6": "x+",
+    "4": "x-",
+    "8": "y+",
+    "2": "y-",
+    "9": "z+",
+    "3": "z-",
+    "7": "u+",
+    "1": "u-",
+}
+"""Which way a key jogs."""
+
+_ARROWS: Final = ("6", "8", "4", "2")
+"""Counter-clockwise, seen from above."""
+
+_WORDS: Final = {
+    "take": "take done record t 记录",
+    "stop": "stop q quit abort end 停止",
+    "again": "again redo 重做",
+    "help": "help ? h 帮助",
+    "yes": "y yes j ja 是",
+    "no": "n no nein 否",
+}
+_MEANINGS: Final = {word: meaning for meaning, words in _WORDS.items() for word in words.split()}
+
+_COMMA: Final = re.compile(r"([xyzu]\s*[+-]\s*\d+),(\d)")
+
+
+def folded(text: str) -> str:
+    """Return typed text in narrow letters: a Chinese input method sends wide ones."""
+    return unicodedata.normalize("NFKC", text).strip().casefold()
+
+
+def meaning_of(text: str) -> str:
+    """Return which command a typed line is: ``take``, ``stop`` ..; empty for none.
+
+    The number after ``again 1`` says nothing: it always begins at the first.
+    """
+    words = folded(text).split()
+    if not words or len(words) > 2 or (len(words) == 2 and words[0] not in ("again", "重做")):
+        return ""
+    return _MEANINGS.get(words[0], "")
+
+
+def with_point(text: str) -> str | None:
+    """Return a step with its decimal comma written as a point; ``None`` where it has none."""
+    plain = folded(text)
+    return _COMMA.sub(r"\1.\2", plain) if _COMMA.search(plain) else None
+
+
+def step_of(key: str, size: float, quarters: int) -> str | None:
+    """Return the jog step of a key, ``None`` where it is none.
+
+    Args:
+        key: Its name.
+        size: Step size, mm or degrees.
+        quarters: By how many quarter turns the arrows are turned.
+    """
+    if key in _ARROWS:
+        key = _ARROWS[(_ARROWS.index(key) + quarters) % 4]
+    axis = AXES.get(key)
+    return None if axis is None else f"{axis}{size:g}"

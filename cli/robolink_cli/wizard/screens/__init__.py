@@ -1,0 +1,1 @@
+"""What a state of the wizard looks like: pure functions from a state to lines of text."""

@@ -1,0 +1,37 @@
+"""Screen (b): what is looked at before the robot starts."""
+
+from robolink.messages import tr
+from robolink_cli.console.columns import padded
+from robolink_cli.wizard.check_list import CheckPoint, CheckSubject, Mark
+from robolink_cli.wizard.screens.layout import Screen, broken
+from robolink_cli.wizard.screens.rows import status_row, title_row
+from robolink_cli.wizard.state import WizardState
+
+
+def check_screen(state: WizardState, subject: CheckSubject, now_s: float) -> Screen:
+    """Return the screen of the check list."""
+    left = subject.open_points(state.checked)
+    rows = [row for point in subject.points for row in point_rows(point, state.checked)]
+    start = tr("Start moving ({n} points open)", n=left) if left else tr("Start moving")
+    return Screen(
+        title_row(state, tr("Check")),
+        (*rows, "", *broken(subject.plan), tr("Keep a hand near the emergency stop.")),
+        (("5", start), ("0", tr("Leave"))),
+        status=status_row(state, now_s),
+        message=state.message,
+    )
+
+
+def mark_of(point: CheckPoint, checked: frozenset[str]) -> str:
+    """Return the word for how a point stands."""
+    if point.mark is Mark.OK or point.key in checked:
+        return tr("OK")
+    return tr("TO DO") if point.mark is Mark.TO_DO else tr("YOU")
+
+
+def point_rows(point: CheckPoint, checked: frozenset[str]) -> list[str]:
+    """Return a point, broken to two rows where it is long."""
+    key = f"[{point.key}] {point.does}" if point.key else ""
+    first, *rest = broken(point.text, 71 - (len(key) + 2 if key else 0))
+    row = padded(f" {padded(mark_of(point, checked), 7)}{first}", 79 - len(key)) + key
+    return [row, *(f"         {more}" for more in rest)]

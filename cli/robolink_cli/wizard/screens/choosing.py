@@ -1,0 +1,31 @@
+"""Screens (a) and (j): a list of which one is chosen."""
+
+from robolink.messages import tr
+from robolink_cli.wizard.choices import ChoiceSubject
+from robolink_cli.wizard.screens.layout import BODY, Screen, broken
+from robolink_cli.wizard.screens.rows import status_row, title_row
+from robolink_cli.wizard.state import WizardState
+
+
+def choice_screen(state: WizardState, subject: ChoiceSubject, now_s: float) -> Screen:
+    """Return the screen of a list; where it is longer than the screen, the part about the mark."""
+    assert state.question is not None  # noqa: S101 - looked at by whoever calls
+    above = [row for line in subject.above for row in broken(line)]
+    room = max(3, BODY - len(above) - 2)
+    first = max(0, min((state.marked or 0) - room // 2, len(subject.options) - room))
+    rows = []
+    for index, option in enumerate(subject.options[first : first + room], start=first):
+        sign = ">" if index == state.marked else " "
+        rows.append(f"{sign} {option}")
+    keys = (
+        ("5", subject.does or tr("Next")),
+        (tr("arrows"), tr("choose")),
+        ("0", subject.leaves or tr("Leave")),
+    )
+    return Screen(
+        title_row(state, subject.step),
+        (*above, "", state.question.text, *rows),
+        keys,
+        status=status_row(state, now_s) if state.reading is not None else "",
+        message=state.message,
+    )

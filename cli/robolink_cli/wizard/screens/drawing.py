@@ -1,0 +1,64 @@
+"""Which screen a state shows."""
+
+from robolink.messages import tr
+from robolink.nozzle_change import WriteSubject
+from robolink.runner import FitSubject, Question
+from robolink_cli.wizard.check_list import CheckSubject
+from robolink_cli.wizard.choices import ChoiceSubject
+from robolink_cli.wizard.screens.checking import check_screen
+from robolink_cli.wizard.screens.choosing import choice_screen
+from robolink_cli.wizard.screens.fitting import fit_screen
+from robolink_cli.wizard.screens.layout import BODY, Screen, broken
+from robolink_cli.wizard.screens.moving import moving_screen
+from robolink_cli.wizard.screens.rows import status_row, title_row
+from robolink_cli.wizard.screens.touching import touch_screen
+from robolink_cli.wizard.screens.values import values_screen
+from robolink_cli.wizard.state import WizardState
+
+
+def screen_of(state: WizardState, now_s: float) -> Screen:
+    """Return the screen of a state.
+
+    Args:
+        state: The state.
+        now_s: The time, by the clock of its readings.
+    """
+    subject, question = state.subject, state.question
+    if question is None:
+        return moving_screen(state, now_s)
+    if state.at_place:
+        return touch_screen(state, now_s)
+    if isinstance(subject, ChoiceSubject):
+        return choice_screen(state, subject, now_s)
+    if question.kind is Question.YES_NO:
+        match subject:
+            case WriteSubject():
+                return values_screen(state, subject)
+            case CheckSubject():
+                return check_screen(state, subject, now_s)
+            case FitSubject():
+                return fit_screen(state, subject)
+            case _:
+                pass
+    return _question_screen(state, now_s)
+
+
+def _question_screen(state: WizardState, now_s: float) -> Screen:
+    """Return the screen of a question that has none of its own."""
+    assert state.question is not None  # noqa: S101 - looked at by whoever calls
+    asked = ["", *broken(state.question.text), ""]
+    if state.question.kind is Question.TEXT:
+        asked.append(f"> {state.typed}_")
+        keys: tuple[tuple[str, str], ...] = (("Enter", tr("Done")), ("Esc", tr("STOP")))
+    else:
+        keys = (("1", tr("Yes")), ("3", tr("No")), ("0", tr("STOP")))
+    # What was told before often says why it is asked.
+    before = [row for remark in state.remarks[-6:] for row in broken(remark)]
+    room = max(0, BODY - len(asked) - 1)
+    return Screen(
+        title_row(state, tr("Question")),
+        (*before[-room:], *asked),
+        keys,
+        status=status_row(state, now_s),
+        message=state.message if state.message not in before else "",
+    )

@@ -1,0 +1,33 @@
+"""The two rows that stand above every screen."""
+
+from robolink.messages import tr
+from robolink_cli.wizard.state import WizardState
+
+
+def title_row(state: WizardState, step: str) -> tuple[str, str]:
+    """Return the first row: cell and job at the left, the step at the right."""
+    header = state.header
+    simulated = "  " + tr("SIMULATED") if header.simulated else ""
+    return f"{header.cell}   {header.job}", f"{step}{simulated}"
+
+
+def status_row(state: WizardState, now_s: float) -> str:
+    """Return the second row: the state of the machine, and how old the reading is."""
+    reading = state.reading
+    if reading is None:
+        return tr("No reading from the controller yet.")
+    tool = ""
+    if reading.pose is not None and reading.pose.tool is not None:
+        tool = "   " + tr("tool {n} selected", n=reading.pose.tool)
+    age = tr("reading {s} s", s=f"{max(0.0, now_s - reading.at_s):.1f}")
+    return f"{reading.state.upper()}   {tr('power LOW')}{tool}   {age}"
+
+
+def mm(value: float) -> str:
+    """Return a length with three decimals, no negative zero."""
+    return f"{round(value, 3) + 0.0:.3f}"
+
+
+def signed(value: float, digits: int = 3) -> str:
+    """Return a difference with its sign."""
+    return f"{round(value, digits) + 0.0:+.{digits}f}"

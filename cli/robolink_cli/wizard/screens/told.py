@@ -1,0 +1,88 @@
+"""The same questions in sentences, for a face that draws nothing."""
+
+import math
+
+from robolink.messages import tr
+from robolink.nozzle_change import WriteSubject
+from robolink.runner import FitSubject, Question
+from robolink_cli.wizard.check_list import CheckSubject
+from robolink_cli.wizard.choices import ChoiceSubject
+from robolink_cli.wizard.screens.checking import mark_of
+from robolink_cli.wizard.screens.fitting import fit_lines
+from robolink_cli.wizard.screens.rows import mm
+from robolink_cli.wizard.screens.touching import instruction, touch_title
+from robolink_cli.wizard.state import WizardState
+
+
+def told_before(state: WizardState) -> list[str]:
+    """Return what is to be read before a yes-or-no question."""
+    match state.subject:
+        case FitSubject() as fit:
+            return fit_lines(fit)
+        case ChoiceSubject() as subject:
+            rows = [f"  {number} {one}" for number, one in enumerate(subject.options, start=1)]
+            return [*subject.above, *rows]
+        case CheckSubject() as subject:
+            points = [
+                f"  {mark_of(point, state.checked)}: {point.text}"
+                + (f"  [{point.key}] {point.does}" if point.key else "")
+                for point in subject.points
+            ]
+            return [*points, subject.plan, tr("Keep a hand near the emergency stop.")]
+        case _:
+            return []
+
+
+def told_question(state: WizardState) -> str:
+    """Return a question, and how it is answered."""
+    question, subject = state.question, state.subject
+    if question is None:
+        return ""
+    if state.at_place:
+        return _place(state)
+    if isinstance(subject, ChoiceSubject):
+        return tr("{question} [Type the number of a row. To leave: stop.]", question=question.text)
+    if question.kind is Question.TEXT:
+        return tr("{question} [Type or scan it, then Enter. To end: stop.]", question=question.text)
+    if isinstance(subject, WriteSubject):
+        numbers = ", ".join(map(str, subject.tools))
+        return tr("To write, type the tool number ({numbers}). n = do not write.", numbers=numbers)
+    if isinstance(subject, CheckSubject):
+        return tr("Type the number of a point, then y to start; n = leave.")
+    return tr("{question} [y or n]", question=question.text)
+
+
+def _place(state: WizardState) -> str:
+    title = touch_title(state.touch)
+    head = f"{title}. {instruction(state)}" if state.touch is not None else instruction(state)
+    touch, here = state.touch, told_where(state)
+    if touch is not None and touch.number > 1 and not touch.proof:
+        how = tr("Type steps (x+0.1 z-0.5), take, again 1, stop, or help.")
+    else:
+        how = tr("Type steps (x+0.1 z-0.5), take, stop, or help.")
+    return "\n".join(part for part in (head, here, how) if part)
+
+
+def told_where(state: WizardState) -> str:
+    """Return where the frame in force is."""
+    pose = state.pose
+    if pose is None:
+        return ""
+    values = {
+        "x": mm(pose.x_mm),
+        "y": mm(pose.y_mm),
+        "z": mm(pose.z_mm),
+        "u": f"{pose.u_deg:.2f}",
+    }
+    if pose.tool:
+        return tr("Tip X {x} Y {y} Z {z} U {u}.", **values)
+    return tr("Flange X {x} Y {y} Z {z} U {u}.", **values)
+
+
+def told_after_jog(state: WizardState) -> str:
+    """Return where it is, and how far it came since the robot arrived."""
+    way, where = state.way_mm(), told_where(state)
+    if way is None:
+        return where
+    since = tr("Since arrival {mm} mm.", mm=mm(math.hypot(*way)))
+    return f"{where} {since}"

@@ -1,0 +1,122 @@
+"""Screens (d) and (g): bring the tip onto the pin."""
+
+import math
+
+from robolink.messages import tr
+from robolink.runner import Question, TouchSubject
+from robolink_cli.console.columns import padded
+from robolink_cli.wizard.screens.layout import Screen, row_of
+from robolink_cli.wizard.screens.rows import mm, signed, status_row, title_row
+from robolink_cli.wizard.state import STEP_SIZES, WizardState
+
+_HEAD = 14
+
+
+def touch_screen(state: WizardState, now_s: float) -> Screen:
+    """Return the screen on which a person jogs the tip to a place."""
+    touch = state.touch
+    lines = [*_what(state, touch), "", *_where(state), *_since(state), *_contact(touch), ""]
+    lines += _keypad(state)
+    return Screen(
+        title_row(state, touch_title(touch)),
+        tuple(lines),
+        _actions(touch),
+        status=status_row(state, now_s),
+        message=state.message,
+    )
+
+
+def touch_title(touch: TouchSubject | None) -> str:
+    """Return which touch it is."""
+    if touch is None or not touch.number:
+        return tr("Jog")
+    if touch.proof:
+        return tr("Turn test")
+    if touch.total is None:
+        return tr("Touch {k}", k=touch.number)
+    return tr("Touch {k} of {n}", k=touch.number, n=touch.total)
+
+
+def instruction(state: WizardState) -> str:
+    """Return what the person is to do."""
+    touch, question = state.touch, state.question
+    if touch is not None and touch.number and touch.proof:
+        return tr("Jog the tip onto the pin again. We measure how far it was off.")
+    asks = question is not None and question.kind is Question.PLACE
+    if touch is not None and touch.number and asks:
+        return tr("Jog the tip onto the pin.")
+    return question.text if question is not None else ""
+
+
+def _what(state: WizardState, touch: TouchSubject | None) -> list[str]:
+    lines = [instruction(state)]
+    if touch is not None and touch.proof:
+        lines.append(tr("If it is off by more than the limit, the old value comes back by itself."))
+    return lines
+
+
+def _where(state: WizardState) -> list[str]:
+    pose = state.pose
+    if pose is None:
+        return [tr("No position from the controller yet.")]
+    head = padded("", _HEAD) + row_of(("X", "Y", "Z", "U"))
+    where = (mm(pose.x_mm), mm(pose.y_mm), mm(pose.z_mm), f"{pose.u_deg:.2f}")
+    # A touch is measured with the flange; elsewhere it is the tool that is selected.
+    name = tr("Flange now") if not pose.tool else tr("Tip now")
+    return [head, padded(f" {name}", _HEAD) + row_of(where)]
+
+
+def _since(state: WizardState) -> list[str]:
+    way, touch, pose = state.way_mm(), state.touch, state.pose
+    if way is None or pose is None or touch is None or touch.arrival is None:
+        return []
+    turned = signed(pose.u_deg - touch.arrival.u_deg, 2)
+    total = tr("{mm} mm, {n} steps", mm=f"{math.hypot(*way):.2f}", n=state.jogging.steps)
+    parts = row_of((*map(signed, way), turned))
+    lines = [padded(" " + tr("Since arrival"), _HEAD) + parts + f"   {total}"]
+    if touch.first_z_mm is not None:
+        apart = signed(pose.z_mm - touch.first_z_mm)
+        lines.append(" " + tr("Height against touch 1") + f"   {apart} mm")
+    return lines
+
+
+def _contact(touch: TouchSubject | None) -> list[str]:
+    if touch is None or not touch.number:
+        return []
+    shown = (
+        tr("no sensor: paper or magnifier")
+        if touch.contact is None
+        else tr("input {n}", n=touch.contact.number)
+    )
+    return [padded(" " + tr("Contact"), _HEAD) + f"   {shown}"]
+
+
+def _keypad(state: WizardState) -> list[str]:
+    jogging = state.jogging
+    right, up, left, down = _turned(("X+", "Y+", "X-", "Y-"), jogging.quarters)
+    sizes = " ".join(
+        f"({size:.2f})" if size == jogging.step else f" {size:.2f} " for size in STEP_SIZES
+    )
+    step = tr("Step   {mm} mm", mm=f"{jogging.step:.2f}")
+    return [
+        f"     [8] {up}         [9] {tr('Z+ up')}".ljust(40) + f"{step}    [+] [-]",
+        f" [4] {left}   [6] {right}".ljust(40) + sizes,
+        f"     [2] {down}         [3] {tr('Z- down')}".ljust(40)
+        + f"[1] U-   [7] U+   [*] {tr('Turn keys')}",
+    ]
+
+
+def _turned(names: tuple[str, ...], quarters: int) -> tuple[str, ...]:
+    """Return the names of the axes that the arrows right, up, left and down move along."""
+    return tuple(names[(index + quarters) % 4] for index in range(4))
+
+
+def _actions(touch: TouchSubject | None) -> tuple[tuple[str, str], ...]:
+    if touch is None or not touch.number:
+        return (("5", tr("It is there")), ("0", tr("STOP")))
+    if touch.proof:
+        return (("5", tr("Record")), ("0", tr("Stop: the old value comes back")))
+    take, stop = ("5", tr("Record this touch")), ("0", tr("STOP"))
+    if touch.number < 2:
+        return take, stop
+    return take, ("/", tr("Begin at touch 1 again")), stop

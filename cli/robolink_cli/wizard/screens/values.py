@@ -1,0 +1,96 @@
+"""Screen (f): the new values, and the question before they are written."""
+
+import math
+
+from robolink.messages import tr
+from robolink.model import ToolOffset
+from robolink.nozzle_change import LimitVerdict, Proposal, WriteSubject
+from robolink_cli.console.columns import padded
+from robolink_cli.wizard.screens.layout import Screen, broken, row_of
+from robolink_cli.wizard.screens.rows import mm, signed, title_row
+from robolink_cli.wizard.state import WizardState
+
+_HEAD = 18
+
+
+def values_screen(state: WizardState, subject: WriteSubject) -> Screen:
+    """Return the screen of a proposal; several tools in a short form."""
+    typed = tr(
+        "To write, type the tool number, then [*] or Space.   Tool: {typed}_", typed=state.typed
+    )
+    return Screen(
+        title_row(state, tr("New values")),
+        (*value_lines(subject), "", typed),
+        (("*", tr("Write")), ("Esc", tr("Do not write"))),
+        message=state.message,
+    )
+
+
+def value_lines(subject: WriteSubject) -> list[str]:
+    """Return the table of old and new values, and what limits and doubts say of them."""
+    several = len(subject.proposals) > 1
+    lines: list[str] = []
+    for proposal, verdicts in zip(subject.proposals, subject.verdicts, strict=True):
+        lines += _table(proposal, short=several)
+        if not several:
+            lines += ["", *judgement(proposal, verdicts)]
+    return lines
+
+
+def judgement(proposal: Proposal, verdicts: tuple[LimitVerdict, ...]) -> list[str]:
+    """Return what limits, notes and doubts say about a proposal."""
+    from robolink.calibration import known_doubts
+
+    lines = []
+    for verdict in verdicts:
+        mark = tr("OK") if verdict.passed else tr("LOOK")
+        lines.append(
+            f" {padded(mark, 5)}"
+            + tr(
+                "{name}: {mm} mm. Limit: {limit} mm.",
+                name=verdict.name,
+                mm=mm(verdict.found_mm),
+                limit=mm(verdict.limit_mm),
+            )
+        )
+    doubts = [*proposal.notes, *known_doubts(proposal.result.warnings)]
+    lines += [
+        f" {padded(tr('LOOK'), 5)}{row}" if first else f"      {row}"
+        for doubt in doubts
+        for first, row in ((at == 0, row) for at, row in enumerate(broken(doubt, 73)))
+    ]
+    if "z_mm" in proposal.kept:
+        z = mm((proposal.before or ToolOffset()).z_mm)
+        lines.append(f" {padded(tr('LOOK'), 5)}" + tr("Z {z} is not measured, stays.", z=z))
+    return lines
+
+
+def _table(proposal: Proposal, *, short: bool) -> list[str]:
+    old, new = proposal.before, proposal.offset
+    head = padded(" " + tr("Tool {n}", n=proposal.tool), _HEAD) + row_of(("X", "Y", "Z", "U"))
+    lines = [head]
+    if old is not None:
+        lines.append(padded(" " + tr("now"), _HEAD) + row_of(_four(old)))
+    lines.append(padded(" " + tr("new"), _HEAD) + row_of(_four(new)))
+    if old is not None:
+        changes = [
+            signed(b - a) for a, b in zip(old.components()[:4], new.components()[:4], strict=True)
+        ]
+        shown = [tr("stays") if float(one) == 0.0 else one for one in changes]
+        lines.append(padded(" " + tr("change"), _HEAD) + row_of(shown))
+    intervals = proposal.result.interval95
+    if intervals and not short:
+        halves = [_half(intervals.get(name)) for name in ("x_mm", "y_mm", "z_mm")]
+        lines.append(padded(" " + tr("sure to (95 %)"), _HEAD) + row_of(halves))
+    if proposal.change_mm is not None and not short:
+        tip = math.dist((old or new).components()[:3], new.components()[:3])
+        lines += ["", tr("The tip moves {d} mm.", d=mm(tip))]
+    return lines
+
+
+def _four(offset: ToolOffset) -> tuple[str, ...]:
+    return tuple(mm(value) for value in offset.components()[:4])
+
+
+def _half(interval: tuple[float, float] | None) -> str:
+    return "" if interval is None else mm((interval[1] - interval[0]) / 2)

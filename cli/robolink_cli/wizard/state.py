@@ -1,0 +1,148 @@
+"""The state of a wizard."""
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Final
+
+from robolink.model import Pose
+from robolink.nozzle_change import ChangeReport, WriteSubject
+from robolink.runner import FINEST_STEP, FitSubject, Question, TouchSubject
+from robolink_cli.wizard.choices import ChoiceSubject
+from robolink_cli.wizard.happenings import Reading, WasAsked
+
+STEP_SIZES: Final = (0.01, 0.1, 0.5, 1.0, 5.0)
+"""In mm, and in degrees for U; the largest is the runner's own limit."""
+
+USUAL_SIZE: Final = 1
+
+ARMED_AFTER_S: Final = 0.3
+"""So long after a question appeared no key answers it: it was meant for what was there before."""
+
+LEAST_WAY_MM: Final = 0.02
+"""Less is what a position reads besides (docs/reference/evidence.md 1)."""
+
+_PLACES: Final = frozenset({Question.PLACE, Question.ROOM, Question.ALONG_X, Question.ALONG_Z})
+
+
+@dataclass(frozen=True, slots=True)
+class Jogging:
+    """The steps of a person at one place.
+
+    Attributes:
+        size: Index of the step size.
+        quarters: By how many quarter turns the arrows are turned.
+        steps: Steps made since the question.
+        longest: The longest part of the last one, mm or degrees.
+        ended_s: When it ended.
+    """
+
+    size: int = USUAL_SIZE
+    quarters: int = 0
+    steps: int = 0
+    longest: float = 0.0
+    ended_s: float = -math.inf
+
+    @property
+    def step(self) -> float:
+        """The step size."""
+        return STEP_SIZES[self.size]
+
+    @property
+    def coarse(self) -> bool:
+        """Whether the last step was too long to take the place."""
+        return self.longest > FINEST_STEP + 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Header:
+    """What stands in the first row of every screen.
+
+    Attributes:
+        cell: Name of the cell, or how the controller is reached.
+        job: What is done.
+        simulated: Whether nothing real moves.
+    """
+
+    cell: str
+    job: str
+    simulated: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class WizardState:
+    """All that a screen is drawn from.
+
+    Attributes:
+        header: The first row.
+        reading: The controller, as it was read last.
+        question: What is asked, ``None`` while the work goes on by itself.
+        waits: Whether the work waits for an answer; what is pressed meanwhile is dropped.
+        subject: What the question, or the movement under way, is about.
+        fit: How well the samples agree, as it was told last.
+        checked: Which points of a check list the person has confirmed.
+        jogging: The steps made.
+        typed: What stands in the field.
+        marked: Index of the marked row of a list.
+        remarks: What was told last, oldest first.
+        message: The row above the keys.
+        ending: Whether the work was told to end.
+        report: What was reached, ``None`` before the end.
+    """
+
+    header: Header
+    reading: Reading | None = None
+    question: WasAsked | None = None
+    waits: bool = False
+    subject: object = None
+    fit: FitSubject | None = None
+    checked: frozenset[str] = frozenset()
+    jogging: Jogging = field(default_factory=Jogging)
+    typed: str = ""
+    marked: int | None = None
+    remarks: tuple[str, ...] = ()
+    message: str = ""
+    ending: bool = False
+    report: ChangeReport | None = None
+
+    def says(self, message: str) -> "WizardState":
+        """Return the same with another message."""
+        return replace(self, message=message)
+
+    @property
+    def at_place(self) -> bool:
+        """Whether a person brings the tip somewhere."""
+        return self.question is not None and self.question.kind in _PLACES
+
+    @property
+    def touch(self) -> TouchSubject | None:
+        """The touch that is asked for."""
+        subject = self.subject
+        return subject if self.at_place and isinstance(subject, TouchSubject) else None
+
+    @property
+    def writing(self) -> WriteSubject | None:
+        """The write that is asked about."""
+        subject, question = self.subject, self.question
+        asks = question is not None and question.kind is Question.YES_NO
+        return subject if asks and isinstance(subject, WriteSubject) else None
+
+    @property
+    def has_field(self) -> bool:
+        """Whether characters are written into a field."""
+        question = self.question
+        if isinstance(self.subject, ChoiceSubject):
+            return False
+        return self.writing is not None or (question is not None and question.kind is Question.TEXT)
+
+    @property
+    def pose(self) -> Pose | None:
+        """Where the frame in force is."""
+        return None if self.reading is None else self.reading.pose
+
+    def way_mm(self) -> tuple[float, float, float] | None:
+        """Return how far the tip was brought since the robot arrived, base axes."""
+        touch, pose = self.touch, self.pose
+        if touch is None or touch.arrival is None or pose is None:
+            return None
+        here, there = pose.coordinates()[:3], touch.arrival.coordinates()[:3]
+        return here[0] - there[0], here[1] - there[1], here[2] - there[2]

@@ -1,0 +1,128 @@
+"""Looks at a cell and at its record, and compares them.
+
+What it reads is legal at any time but the tool table of an EPSON controller, which wants the
+controller at rest or a project that publishes it (docs/monitor-only.md).
+"""
+
+from collections.abc import Iterator, Mapping
+
+from robolink.backup import ToolState
+from robolink.config import Cell
+from robolink.drift import KINDS, drift_of
+from robolink.errors import NotReadyError
+from robolink.inspection._findings import Inspection, InspectionCode, InspectionFinding
+from robolink.messages import tr
+from robolink.methods import all_methods
+from robolink.model import (
+    Controller,
+    ControllerStatus,
+    EntryKind,
+    ToolOffset,
+)
+from robolink.stations import find_stations
+from robolink.transaction import changed_since
+
+
+def inspect(
+    controller: Controller,
+    tools: ToolState | NotReadyError,
+    *,
+    cell: Cell | None = None,
+    since: str = "",
+) -> Inspection:
+    """Compare a cell with its record. Nothing is written or moved, and nothing recorded.
+
+    Args:
+        controller: The controller, connected.
+        tools: Its tools and the selected one as they were read just now, or why they could not be:
+            while production runs, an EPSON controller is asked for no tool.
+        cell: The cell, whose file may declare stations.
+        since: Changes with an earlier label (ISO 8601) are left out of the charts.
+
+    Raises:
+        JournalError: The record cannot be read.
+        RobolinkError: The controller cannot be asked how it is.
+    """
+    outcomes = controller.outcomes
+    stations = find_stations(cell, outcomes.recorded(kinds=(EntryKind.STATION,)))
+    newest_first = list(outcomes.recorded(kinds=KINDS))
+    finding = {method.name for method in all_methods() if method.needs.finds_pin}
+    course = drift_of(
+        controller.identity, reversed(newest_first), finds_pin=finding.__contains__, since=since
+    )
+    read = {} if isinstance(tools, NotReadyError) else dict(tools.tools)
+    selected = None if isinstance(tools, NotReadyError) else tools.selected
+    findings = (
+        *_in_error(controller.status()),
+        *_unsettled(controller),
+        *(_not_read(tools) if isinstance(tools, NotReadyError) else ()),
+        *_changed(controller, read),
+        *(
+            InspectionFinding(InspectionCode.STATION_DUE, name, station.remark())
+            for name, station in stations.items()
+            if station.remark()
+        ),
+        *(
+            InspectionFinding(one.code, ", ".join(map(str, one.subject)), one.sentence, one.remedy)
+            for one in course.findings
+        ),
+    )
+    return Inspection(
+        controller.identity, read, selected, tuple(stations), len(course.changes), findings
+    )
+
+
+def _in_error(status: ControllerStatus) -> Iterator[InspectionFinding]:
+    if status.fault or status.serious_fault or status.emergency_stop:
+        yield InspectionFinding(
+            InspectionCode.CONTROLLER_IN_ERROR,
+            "",
+            tr(
+                "The controller is not ready: {state} ({code:04d}).",
+                state=status.state,
+                code=status.code,
+            ),
+            tr("Remove the cause, then: robolink robot reset"),
+        )
+
+
+def _not_read(error: NotReadyError) -> Iterator[InspectionFinding]:
+    yield InspectionFinding(
+        InspectionCode.TOOLS_NOT_READ,
+        "",
+        tr("The tools could not be compared: {what}", what=error.what),
+        error.remedy,
+    )
+
+
+def _unsettled(controller: Controller) -> Iterator[InspectionFinding]:
+    for marker in controller.outcomes.open_markers():
+        yield InspectionFinding(
+            InspectionCode.UNSETTLED,
+            marker.operation[:8],
+            tr(
+                "Begun on {when} and not proved finished: {request}.",
+                when=marker.begun_at,
+                request=marker.request,
+            ),
+            tr("Next: robolink recover"),
+        )
+
+
+def _changed(
+    controller: Controller, tools: Mapping[int, ToolOffset | None]
+) -> Iterator[InspectionFinding]:
+    for number, value in tools.items():
+        change = changed_since(controller, number, value)
+        if change is not None:
+            yield InspectionFinding(
+                InspectionCode.TOOL_CHANGED, str(number), change.sentence, _put_back(number)
+            )
+
+
+def _put_back(tool: int) -> str:
+    return tr(
+        "If nobody meant it, write the recorded value back with 'robolink tool set {tool}'; else "
+        "measure the tool again.",
+        tool=tool,
+    )

@@ -1,0 +1,116 @@
+"""The page of all keys of a recipe, made from what its tables declare: docs/recipe-keys.md.
+
+``python -m robolink.recipe.page`` prints it.
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+from robolink.recipe.file.schema import json_schema
+
+_OPENING: Final = """\
+# Every key of a recipe
+
+This page is made from the code: `python -m robolink.recipe.page > docs/recipe-keys.md`.
+[Recipes](recipes.md) says how one is written, and which decisions have no default.
+
+Limits are inclusive. Lengths are mm, angles degrees. Poses are of the flange (Tool 0), in base
+coordinates. The keys at the top stand above the first line with a `[table]`; what a `[source]` may
+say besides its `kind` is the method's own: [methods](methods.md).
+"""
+
+_TABLES: Final = {
+    "Recipe": "The top of the file",
+    "BeamLine": "`[[source.beams]]`",
+    "StationTable": "`[station]`",
+    "Poses": "`[poses]`",
+    "FlangePose": "A pose",
+    "Tool": "`[[tools]]`",
+    "PoseFile": "`[tools.poses]`",
+    "Speeds": "`[speeds]`",
+    "Box": "`[box]`",
+    "Tolerances": "`[tolerances]`",
+    "RefusalTable": "`[refusal]`",
+    "Prompt": "`[[prompts]]`",
+    "Output": "`[[outputs]]`",
+}
+"""The tables in the order of the page, with their headings."""
+
+_UNITS: Final = {"_mm": "mm", "_deg": "degrees", "mm_s": "mm/s", "percent": "%"}
+
+Schema = Mapping[str, Any]
+
+
+def recipe_page() -> str:
+    """Return the page."""
+    schema = json_schema()
+    tables = {"Recipe": schema, **schema["definitions"]}
+    return "\n".join([_OPENING, *(line for name in _TABLES for line in _table(name, tables))])
+
+
+def _table(name: str, tables: Mapping[str, Schema]) -> Iterator[str]:
+    table = tables[name]
+    required = table.get("required", ())
+    yield f"## {_TABLES[name]}\n"
+    yield f"{_one_line(table['description'])}\n"
+    yield "| key | unit | default | limits | meaning |"
+    yield "|---|---|---|---|---|"
+    for key, value in table["properties"].items():
+        cells = (
+            f"`{key}`",
+            next((unit for end, unit in _UNITS.items() if key.endswith(end)), ""),
+            "required" if key in required else _written(value.get("default")),
+            _limits(value),
+            _meaning(value, tables),
+        )
+        yield "| " + " | ".join(cells) + " |"
+    yield ""
+
+
+def _meaning(value: Schema, tables: Mapping[str, Schema]) -> str:
+    told = value.get("description") or tables[_pointed_at(value)]["description"]
+    return _one_line(told).replace("|", "\\|")
+
+
+def _limits(value: Schema) -> str:
+    """Return what a value may be, in words."""
+    if "enum" in value:
+        return ", ".join(f'`"{word}"`' for word in value["enum"])
+    if value.get("type") == "boolean":
+        return "`true`, `false`"
+    low, high = value.get("minimum"), value.get("maximum")
+    if low is not None and high is not None:
+        return f"{low:g} to {high:g}"
+    if low is not None:
+        return f"from {low:g}"
+    if "maxLength" in value:
+        return f"{value.get('minLength', 0)} to {value['maxLength']} characters"
+    if value.get("type") == "array":
+        return _of_array(value)
+    return "a table" if _pointed_at(value) else ""
+
+
+def _of_array(value: Schema) -> str:
+    inner = _limits(value.get("items", {}))
+    count = f"{value['minItems']} and more" if "minItems" in value else "any number"
+    return f"{count}; each {inner}" if inner else count
+
+
+def _pointed_at(value: Schema) -> str:
+    """Return the name of the table that a key holds, empty for none."""
+    return str(value.get("$ref", "")).rpartition("/")[2]
+
+
+def _written(default: object) -> str:
+    """Return a default as it would be typed; empty where nothing stands for it."""
+    if isinstance(default, str) and default:
+        return f'`"{default}"`'
+    return f"{default:g}" if isinstance(default, (int, float)) else ""
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())
+
+
+if __name__ == "__main__":
+    print(recipe_page(), end="")  # noqa: T201 - it is what the page is made with

@@ -1,0 +1,121 @@
+"""What a question, a movement or a remark is about, for an operator who is shown more than text.
+
+A terminal that shows one line after the other needs the sentence alone. A screen draws: where the
+touches lie, how far each is off, where the arm goes. Both are asked the same questions and answer
+with the same lines; what is drawn decides nothing.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+from robolink.model import InputEdge, Path, Pose
+from robolink.runner._operator import Operator
+
+
+@dataclass(frozen=True, slots=True)
+class TouchSubject:
+    """A place to which a person brings the tip.
+
+    Attributes:
+        number: Which touch it is, from 1; 0 for a place that is no touch.
+        total: How many are planned, ``None`` where nobody knows.
+        arrival: Where the robot had stopped before, ``None`` where the person brings the tip from
+            wherever it is.
+        first_z_mm: Height of the first touch of an upright tool, ``None`` where nothing is
+            compared with it.
+        contact: The input that shows contact.
+        proof: Whether it is a touch of the turn test.
+    """
+
+    number: int = 0
+    total: int | None = None
+    arrival: Pose | None = None
+    first_z_mm: float | None = None
+    contact: InputEdge | None = None
+    proof: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class FitRow:
+    """One sample of a fit.
+
+    Attributes:
+        number: Which one, from 1.
+        where: What it is called, for a person: "Pose 3, at U 120.0".
+        off_mm: How far it is off, along each axis of the base.
+    """
+
+    number: int
+    where: str
+    off_mm: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class FitSubject:
+    """How well the samples so far agree.
+
+    Attributes:
+        rows: Each sample.
+        rms_mm: Root mean square of how far they are off, ``None`` without a degree of freedom.
+        half95_mm: Half of the 95 % interval of a measured length, ``None`` where nobody knows.
+        next_mm: What that becomes with one more.
+        worst: Index of the one that fits worst, where it is offered to be taken again.
+        limit_mm: The largest that is believed, ``None`` where nobody stated one.
+    """
+
+    rows: tuple[FitRow, ...]
+    rms_mm: float | None
+    half95_mm: float | None = None
+    next_mm: float | None = None
+    worst: int | None = None
+    limit_mm: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class MoveSubject:
+    """A movement that begins.
+
+    Attributes:
+        target: Where to.
+        path: How.
+        speed_mm_s: Fastest that a straight one goes.
+        purpose: What for.
+    """
+
+    target: Pose
+    path: Path
+    speed_mm_s: float
+    purpose: str
+
+
+@dataclass(frozen=True, slots=True)
+class JogSubject:
+    """A step that a person made.
+
+    Attributes:
+        before, after: Where the tip was and is, as it was read.
+        longest: The longest part of the step, mm or degrees.
+    """
+
+    before: Pose
+    after: Pose
+    longest: float
+
+
+@runtime_checkable
+class GuidedOperator(Operator, Protocol):
+    """An operator who is shown what it is about, before it is said or asked.
+
+    A person sits at it: what a hand cannot do is not taken from it.
+    """
+
+    def regard(self, subject: object) -> None:
+        """Take what comes next to be about ``subject``; one that is not known is left out."""
+
+
+def regard(operator: Operator, subjects: Sequence[object]) -> None:
+    """Show an operator what comes next is about, where the operator is shown such things."""
+    if isinstance(operator, GuidedOperator):
+        for subject in subjects:
+            operator.regard(subject)

@@ -1,0 +1,1 @@
+"""The control API: what tests and pipelines in any language do to a simulated cell."""

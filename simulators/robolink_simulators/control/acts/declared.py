@@ -1,0 +1,174 @@
+"""An act is declared once: its name, what it takes, and what it does."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink.model import Pose
+from robolink_simulators.control.cell import ControlledCell
+
+Answer = dict[str, object]
+"""What an act gives, ready for JSON."""
+
+Given = Mapping[str, Any]
+"""What an act is given by name, as it came in."""
+
+MOST: Final = 9999
+_FAR: Final = 1_000_000
+LONGEST_TEXT: Final = 200
+
+Form = Literal["whole", "number", "flag", "text", "any"]
+
+
+@dataclass(frozen=True, slots=True)
+class Taken:
+    """One thing that an act takes.
+
+    Attributes:
+        name: Its name, with the unit in it.
+        form: A whole number, a number, true or false, a text, or any of these.
+        needed: Whether it must be given.
+        choices: The texts that there are, where not any will do.
+        most: The highest number; of ``whole`` the lowest is 0.
+        least: The lowest number.
+        default: What it is where it is not given; ``None`` for not given.
+    """
+
+    name: str
+    form: Form = "number"
+    needed: bool = True
+    choices: tuple[str, ...] = ()
+    most: float = _FAR
+    least: float = -_FAR
+    default: object = None
+
+    def checked(self, act: str, value: object) -> object:
+        """Return the value, if it is one of these.
+
+        Raises:
+            ConfigError: It is something else.
+        """
+        match self.form:
+            case "whole":
+                fits = type(value) is int and 0 <= value <= min(self.most, MOST)
+            case "number":
+                # An integer of JSON may have hundreds of digits: compared before it is a float.
+                number = isinstance(value, (int, float)) and not isinstance(value, bool)
+                fits = number and self.least <= value <= self.most  # type: ignore[operator]
+            case "flag":
+                fits = isinstance(value, bool) or (type(value) is int and value in (0, 1))
+            case "text":
+                short = isinstance(value, str) and len(value) <= LONGEST_TEXT
+                fits = short and (not self.choices or value in self.choices)
+            case _:
+                fits = (
+                    isinstance(value, (bool, int, float, str)) and len(str(value)) <= LONGEST_TEXT
+                )
+        if not fits:
+            raise ConfigError(self._needs(act), remedy=self._example())
+        return float(value) if self.form == "number" else value  # type: ignore[arg-type]
+
+    def _needs(self, act: str) -> str:
+        match self.form:
+            case "whole":
+                most = int(min(self.most, MOST))
+                return tr(
+                    "{act} needs {name}, a whole number from 0 to {most}.",
+                    act=act,
+                    name=self.name,
+                    most=most,
+                )
+            case "number":
+                return tr(
+                    "{act} needs {name}, a number from {least:g} to {most:g}.",
+                    act=act,
+                    name=self.name,
+                    least=self.least,
+                    most=self.most,
+                )
+            case "flag":
+                return tr("{act} needs {name}, true or false.", act=act, name=self.name)
+            case _:
+                return tr("{act} needs {name}, a text.", act=act, name=self.name)
+
+    def _example(self) -> str:
+        if self.choices:
+            return tr("Known are: {choices}.", choices=", ".join(self.choices))
+        examples = {"whole": "1", "number": "1.5", "flag": "true", "text": '"a"'}
+        return tr("Give it as {example}.", example=f'"{self.name}": {examples[self.form]}')
+
+
+@dataclass(frozen=True, slots=True)
+class ControlAct:
+    """Something that can be done to a simulated cell, or looked at.
+
+    Attributes:
+        name: Its name.
+        carry_out: Does it; the first line of its docstring says what it does.
+        takes: What it takes.
+        reads: Whether it changes nothing.
+    """
+
+    name: str
+    carry_out: Callable[[ControlledCell, Given], Answer]
+    takes: tuple[Taken, ...] = ()
+    reads: bool = False
+
+    @property
+    def says(self) -> str:
+        """What it does, in a sentence."""
+        lines = (self.carry_out.__doc__ or "").partition("\n\n")[0].split()
+        return " ".join(lines)
+
+    def checked(self, given: Given) -> dict[str, Any]:
+        """Return what was given, if it is what this act takes.
+
+        Raises:
+            ConfigError: Something is missing, wrong or unknown.
+        """
+        known = {taken.name: taken for taken in self.takes}
+        for name in given:
+            if name not in known:
+                remedy = tr("It takes nothing.")
+                if known:
+                    remedy = tr("It takes: {names}.", names=", ".join(known))
+                raise ConfigError(
+                    tr("{act} takes no {name!r}.", act=self.name, name=str(name)[:80]),
+                    remedy=remedy,
+                )
+        return {
+            name: taken.checked(self.name, given.get(name, taken.default))
+            for name, taken in known.items()
+            if taken.needed or name in given
+        }
+
+
+ON: Final = Taken("on", "flag", default=True)
+WHOLE_TOOL: Final = Taken("tool", "whole", needed=False)
+NUMBER: Final = Taken("number", "whole")
+
+
+def shown_flange(flange: Pose) -> dict[str, float]:
+    """Return a flange pose as acts give it."""
+    x_mm, y_mm, z_mm, u_deg, _, _ = flange.coordinates()
+    return {"x_mm": x_mm, "y_mm": y_mm, "z_mm": z_mm, "u_deg": u_deg}
+
+
+def panel_act(panel: type, name: str, *takes: Taken, method: str = "") -> ControlAct:
+    """Return the act that does what the panel of the simulator has a method for.
+
+    Args:
+        panel: The class of the panel.
+        name: Its name.
+        takes: What the method takes, in its order.
+        method: The method's name, where it is another one.
+    """
+
+    def act(cell: ControlledCell, given: Given) -> Answer:
+        getattr(cell.simulator.panel, method or name)(*given.values())
+        return {}
+
+    act.__doc__ = getattr(panel, method or name).__doc__
+    return ControlAct(name, act, takes)

@@ -1,0 +1,64 @@
+"""Every act by name, for each kind of simulated controller."""
+
+from collections.abc import Mapping
+from typing import Final
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink_simulators.control.acts.declared import Answer, ControlAct, Given
+from robolink_simulators.control.acts.epson import EPSON_ACTS
+from robolink_simulators.control.acts.keeping import KEEPING_ACTS
+from robolink_simulators.control.acts.plc import MAPPED_ACTS, PLC_ACTS
+from robolink_simulators.control.acts.wire import WIRE_ACTS
+from robolink_simulators.control.acts.world import WORLD_ACTS
+from robolink_simulators.control.cell import ControlledCell
+
+
+class UnknownActError(ConfigError):
+    """There is no act of that name at this kind of controller."""
+
+
+def _by_name(*families: tuple[ControlAct, ...]) -> dict[str, ControlAct]:
+    return {act.name: act for family in families for act in family}
+
+
+ACTS: Final[Mapping[str, Mapping[str, ControlAct]]] = {
+    "epson": _by_name(WORLD_ACTS, KEEPING_ACTS, WIRE_ACTS, EPSON_ACTS),
+    "softmotion": _by_name(WORLD_ACTS, KEEPING_ACTS, WIRE_ACTS, PLC_ACTS),
+    "plc": _by_name(KEEPING_ACTS, WIRE_ACTS, MAPPED_ACTS),
+}
+"""Kind of controller, name of the act."""
+
+
+def act_named(cell: ControlledCell, name: object) -> ControlAct:
+    """Return an act of a cell.
+
+    Raises:
+        UnknownActError: There is none of that name.
+    """
+    acts = ACTS[cell.simulator.kind]
+    act = acts.get(str(name))
+    if act is None:
+        raise UnknownActError(
+            tr("The simulator cannot do {act!r}.", act=name),
+            remedy=tr("Known are: {acts}.", acts=", ".join(acts)),
+        )
+    return act
+
+
+def perform(cell: ControlledCell, name: object, given: Given) -> Answer:
+    """Do what an act says, at the present time, and return what it gives.
+
+    Args:
+        cell: Where.
+        name: Of the act.
+        given: What it takes, by name.
+
+    Raises:
+        ConfigError: There is no such act, or a value is missing, wrong or unknown.
+        SpelRefusal, BlockRefused: The simulated robot cannot do it.
+    """
+    act = act_named(cell, name)
+    checked = act.checked(given)
+    with cell.simulator.acting():
+        return act.carry_out(cell, checked)

@@ -1,0 +1,94 @@
+"""What is seen and done on the wire: its log, motions that were commanded, faults."""
+
+from dataclasses import asdict
+from typing import Any, Final
+
+from robolink_simulators.control.acts.declared import Answer, ControlAct, Given, Taken
+from robolink_simulators.control.cell import ControlledCell
+from robolink_simulators.faults import (
+    FaultAction,
+    FaultNotPossibleError,
+    PlcFaultAction,
+    fault_as_keys,
+    faults_of_table,
+)
+from robolink_simulators.faults.links import LinkKind
+
+_AFTER: Final = Taken("after", needed=False, least=0, most=1e15)
+_ACTIONS: Final = tuple(sorted({action.name.lower() for action in (*FaultAction, *PlcFaultAction)}))
+
+
+def _log(cell: ControlledCell, given: Given) -> Answer:
+    """Tell what crossed the wire, passwords hidden; after a number only what came behind it."""
+    log = cell.simulator.log
+    return {"lines": [asdict(line) for line in log.lines(_number(given))], "last": log.added}
+
+
+def _motions(cell: ControlledCell, given: Given) -> Answer:
+    """Tell the motions that began, whoever commanded them, and where the flange was to end."""
+    motions = [asdict(motion) for motion in cell.simulator.motions(_number(given))]
+    return {"motions": motions, "moves_started": cell.simulator.counters()["moves_started"]}
+
+
+def _number(given: Given) -> int:
+    return int(given.get("after", 0))
+
+
+def _faults(cell: ControlledCell, _given: Given) -> Answer:
+    """Tell the planned faults that have happened, and those that wait."""
+    faults = cell.simulator.faults
+    return {
+        "fired": [fault_as_keys(fault) for fault in faults.fired],
+        "pending": [fault_as_keys(fault) for fault in faults.pending],
+    }
+
+
+def _add_fault(cell: ControlledCell, given: Given) -> Answer:
+    """Plan a fault for requests that match, as docs/fault-plans.md explains; times in a row."""
+    table: dict[str, Any] = dict(given)
+    times, first = table.pop("times", 1), table.get("on_exchange", 0)
+    tables = [{**table, "on_exchange": first + further} for further in range(max(1, times))]
+    planned: Any = cell.simulator.faults
+    for fault in _possible(tables, cell.links):
+        planned.add(fault)
+    return _faults(cell, {})
+
+
+def _possible(tables: list[dict[str, Any]], links: tuple[LinkKind, ...]) -> tuple[Any, ...]:
+    """Return the faults for the first of the links on which they can happen."""
+    for link in links[:-1]:
+        try:
+            return faults_of_table(tables, link)
+        except FaultNotPossibleError:
+            continue
+    return faults_of_table(tables, links[-1])
+
+
+def _clear_faults(cell: ControlledCell, _given: Given) -> Answer:
+    """Plan no faults any more; what has happened stays told."""
+    cell.simulator.faults.clear()
+    return _faults(cell, {})
+
+
+WIRE_ACTS: Final = (
+    ControlAct("log", _log, (_AFTER,), reads=True),
+    ControlAct("motions", _motions, (_AFTER,), reads=True),
+    ControlAct("faults", _faults, reads=True),
+    ControlAct(
+        "add_fault",
+        _add_fault,
+        (
+            Taken("action", "text", choices=_ACTIONS),
+            Taken("match", "text", needed=False),
+            Taken("on_exchange", "whole", needed=False),
+            Taken("times", "whole", needed=False, most=1000),
+            Taken("seconds", needed=False, least=0, most=86_400),
+            Taken("position", "whole", needed=False),
+            Taken("bit", "whole", needed=False, most=15),
+            Taken("code", "whole", needed=False),
+            Taken("order", "text", needed=False),
+        ),
+    ),
+    ControlAct("clear_faults", _clear_faults),
+)
+"""Acts upon the wire."""

@@ -1,0 +1,46 @@
+"""One simulated controller with all that acts upon it past the wire."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+from robolink_simulators.cell.clock import ManualClock, ScaledClock
+from robolink_simulators.device.hosted import KeptMoment
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.faults import LinkKind
+from robolink_simulators.plc import PlcSimulator
+from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
+
+AnySimulator = EpsonSimulator | SoftMotionSimulator | PlcSimulator
+"""A simulated controller of any kind."""
+
+_NOT_SERVED: Final = {
+    "epson": (LinkKind.EPSON_SIM,),
+    "softmotion": (LinkKind.MAILBOX_SIM,),
+    "plc": (LinkKind.PLC_TCP,),
+}
+"""What counts for one whose host has not said where it is."""
+
+
+@dataclass(slots=True)
+class ControlledCell:
+    """A simulator that is served, or lives in this process.
+
+    Attributes:
+        simulator: The controller and its world.
+        clock: Its time; ``None`` where nobody but its host knows it.
+        urls: Where clients of the controller connect to, by link.
+        moments: The snapshots that were taken, by name.
+    """
+
+    simulator: AnySimulator
+    clock: ScaledClock | ManualClock | None = None
+    urls: Mapping[str, str] = field(default_factory=dict)
+    moments: dict[str, KeptMoment] = field(default_factory=dict)
+
+    @property
+    def links(self) -> tuple[LinkKind, ...]:
+        """The kinds of links that it is served on, at least one."""
+        urls = tuple(self.urls.values()) or (self.simulator.url,)
+        served = tuple(LinkKind(url.partition("://")[0]) for url in urls if "://" in url)
+        return served or _NOT_SERVED[self.simulator.kind]

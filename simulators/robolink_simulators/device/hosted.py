@@ -1,0 +1,186 @@
+"""What a simulated controller of any kind shows to hosts, to panels and to tests."""
+
+import threading
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Final
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink_simulators.device.motion_log import StartedMotion
+from robolink_simulators.device.wire_record import WireRecord
+
+RequestHook = Callable[[int, str], None]
+"""Called with the running number of a request and a text, passwords hidden."""
+
+SCHEMA: Final = "robolink/sim-truth/1"
+
+
+@dataclass(frozen=True)
+class KeptMoment:
+    """What a simulated controller and its world were at an instant, to go back to.
+
+    Attributes:
+        machine: Which kind and model; only such a one can go back to it.
+        held: What is put back, by name.
+    """
+
+    machine: str
+    held: Mapping[str, Any] = field(repr=False)
+
+
+class HostedDevice(ABC):
+    """The face that all simulated controllers have. Time is given, never taken.
+
+    Args:
+        seed: Decides the world and every scatter.
+
+    Attributes:
+        lock: Held by whoever touches it while a host serves it.
+        url: Where the first host serves it, empty when none does.
+        seed: See above.
+        exchanges: Requests answered.
+        log: What crossed the wire.
+        on_request: Called with a request before it is carried out; what it raises goes to the
+            host, and the request is carried out all the same.
+        on_reply: Called with the answer before it leaves; it leaves all the same.
+        watchers: Called after each act past the wire, so that a host looks for what leaves now.
+        present_ns: Tells such acts the time, in place of the instant given last; a host sets it.
+        durable: Whether what it keeps outlives the process.
+        kind: ``epson``, ``softmotion`` or ``plc``.
+    """
+
+    kind: ClassVar[str]
+
+    def __init__(self, seed: int) -> None:
+        self.lock = threading.RLock()
+        self.url, self.seed = "", seed
+        self.watchers: list[Callable[[], None]] = []
+        self.present_ns: Callable[[], int] | None = None
+        self.exchanges = 0
+        self.log = WireRecord()
+        self.on_request: RequestHook | None = None
+        self.on_reply: RequestHook | None = None
+        self.durable = False
+        self._now_ns = 0
+        self._stepping = False
+        self._requests = 0
+
+    @property
+    def now_ns(self) -> int:
+        """The instant last given."""
+        return self._now_ns
+
+    @contextmanager
+    def acting(self) -> Iterator[int]:
+        """Surround an act that comes past the wire; gives the present time."""
+        with self.lock:
+            # A planned act happens at its own instant, in the middle of an advance.
+            if self.present_ns is not None and not self._stepping:
+                self.advance(self.present_ns())
+            try:
+                yield self._now_ns
+            finally:
+                self._after_act()
+        for watcher in tuple(self.watchers):
+            watcher()
+
+    def truth(self) -> dict[str, Any]:
+        """Return what is really so, ready for JSON, with the same keys for every kind.
+
+        ``stored`` are the tools that the controller holds, by number, ``selected_tool`` is the
+        one in force; where it has a world, all of that too (``Workplace.truth``). Lengths are
+        in mm, angles U, V, W in degrees as in an EPSON controller (R = Rz(U) Ry(V) Rx(W)).
+        """
+        with self.lock:
+            return {"schema": SCHEMA, "kind": self.kind, **self._truth()}
+
+    def reset(self) -> None:
+        """Make it anew, as it was made at first, and as another controller than before.
+
+        Its serial number is drawn anew, so that nothing on record hangs on it; links are cut,
+        planned faults, the log and the counters are forgotten. Time goes on.
+
+        Raises:
+            ConfigError: It keeps its state in a file, or executes a program that was loaded:
+                neither can be taken for new.
+        """
+        self._require_renewable()
+        with self.acting():
+            self._renew()
+            self.exchanges = self._requests = 0
+            self.log.clear()
+
+    def kept_moment(self) -> KeptMoment:
+        """Return what is to be gone back to: tools, world, place of the robot, identity."""
+        with self.acting():
+            return KeptMoment(self.machine_name, self._moment())
+
+    def go_back(self, moment: KeptMoment) -> None:
+        """Be again what it was then, at rest, with nobody connected; faults are forgotten.
+
+        Raises:
+            ConfigError: That was another kind of machine; or as for :meth:`reset`.
+        """
+        if moment.machine != self.machine_name:
+            raise ConfigError(
+                tr(
+                    "A snapshot of {one} cannot be put into {other}.",
+                    one=moment.machine,
+                    other=self.machine_name,
+                ),
+                remedy=tr("Take one of this simulator."),
+            )
+        self._require_renewable()
+        with self.acting():
+            self._renew()
+            self._restore(moment.held)
+
+    @property
+    @abstractmethod
+    def machine_name(self) -> str:
+        """Kind and model."""
+
+    @abstractmethod
+    def advance(self, now_ns: int) -> None:
+        """Let simulated time reach ``now_ns``, stopping wherever something changes."""
+
+    @abstractmethod
+    def restart(self) -> None:
+        """Switch off and on; what is kept over that stays."""
+
+    @abstractmethod
+    def counters(self) -> dict[str, int]:
+        """Return what was counted: exchanges, moves_started, tool_writes, starts, touches."""
+
+    @abstractmethod
+    def motions(self, after: int = 0) -> Iterator[StartedMotion]:
+        """Yield the motions that began, but for the first ``after`` ones."""
+
+    @abstractmethod
+    def _truth(self) -> dict[str, Any]:
+        """Return what is really so."""
+
+    @abstractmethod
+    def _renew(self) -> None:
+        """Cut the links and make everything anew."""
+
+    @abstractmethod
+    def _moment(self) -> dict[str, Any]:
+        """Return copies of what is to be gone back to."""
+
+    @abstractmethod
+    def _restore(self, held: Mapping[str, Any]) -> None:
+        """Put back what :meth:`_moment` gave."""
+
+    def _after_act(self) -> None:  # noqa: B027 - most have nothing to do
+        """Do what is due after an act past the wire."""
+
+    def _require_renewable(self) -> None:
+        if self.durable:
+            raise ConfigError(
+                tr("A simulator that keeps its state in a file is not made anew."),
+                remedy=tr("Restart it, or start another one without a file."),
+            )

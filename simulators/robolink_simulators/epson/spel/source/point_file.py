@@ -1,0 +1,137 @@
+"""The point files of a project, as RC+ writes them (docs/reference/spel.md 16)."""
+
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Final
+
+from robolink.errors import ConfigError
+from robolink.files.named import read_named
+from robolink.messages import tr
+from robolink.model import Elbow, Hand, Posture, Wrist
+from robolink_simulators.epson.memory.points import HIGHEST_LOCAL, HIGHEST_POINT, Point
+from robolink_simulators.epson.spel.source.source_text import decoded
+
+_BLOCK: Final = re.compile(r"([A-Za-z]+?)(\d*)\s*\{$")
+_PAIR: Final = re.compile(r"([A-Za-z0-9]+)=(.*)$")
+_AXES: Final = "XYZUVW"
+_UNDEFINED_AXES: Final = 0b111111
+
+Pairs = dict[str, str]
+
+
+def project_text(path: Path, encoding: str | None) -> str:
+    """Return the text of a file of a project.
+
+    Raises:
+        ConfigError: It cannot be read.
+    """
+    try:
+        return decoded(read_named(path), encoding)
+    except OSError as error:
+        raise ConfigError(
+            tr("{path} cannot be read: {why}.", path=path, why=error.strerror or error),
+            remedy=tr("Give a file of the project, as RC+ has saved it."),
+        ) from error
+
+
+def blocks(text: str) -> Iterator[tuple[tuple[str, ...], Pairs]]:
+    """Yield each innermost block: the names of what it stands in, and its own pairs."""
+    names, pairs = list[str](), Pairs()
+    for line in map(str.strip, text.splitlines()):
+        opened, pair = _BLOCK.match(line), _PAIR.match(line)
+        if opened is not None:
+            names.append(opened[1])
+            pairs = {}
+        elif line == "}" and names:
+            if pairs:
+                yield tuple(names), pairs
+            names.pop()
+            pairs = {}
+        elif pair is not None:
+            pairs[pair[1]] = pair[2].strip().strip('"')
+
+
+def read_points(path: Path, encoding: str | None = None) -> tuple[dict[int, Point], dict[str, int]]:
+    """Return the points of a file by their numbers, and the numbers of their labels.
+
+    A point is left out where one of its first six coordinates is marked undefined.
+
+    Raises:
+        ConfigError: It cannot be read, or a point makes no sense.
+    """
+    points, labels = dict[int, Point](), dict[str, int]()
+    for names, pairs in blocks(project_text(path, encoding)):
+        if names[-1] != "Point":
+            continue
+        try:
+            number = int(pairs["nNumber"])
+            point = _point(pairs)
+        except (KeyError, ValueError) as error:
+            raise _not_understood(path, str(pairs.get("nNumber", "?"))) from error
+        if not 0 <= number <= HIGHEST_POINT or not 0 <= point.local <= HIGHEST_LOCAL:
+            raise _not_understood(path, str(number))
+        if int(pairs.get("nUndefined", "0")) & _UNDEFINED_AXES:
+            continue
+        points[number] = point
+        if pairs.get("sLabel"):
+            labels[pairs["sLabel"]] = number
+    return points, labels
+
+
+def _not_understood(path: Path, number: str) -> ConfigError:
+    return ConfigError(
+        tr("Point {number} of {path} makes no sense.", number=number, path=path),
+        remedy=tr("Save the points again in RC+."),
+    )
+
+
+def _point(pairs: Pairs) -> Point:
+    x, y, z, u, v, w = (float(pairs.get(f"r{axis}", "0")) for axis in _AXES)
+    flags = {name: int(pairs.get(key, "0")) for name, key in _FLAGS.items()}
+    posture = Posture(
+        Elbow.BELOW if pairs.get("nElbow") == "2" else Elbow.ABOVE,
+        Wrist.FLIP if pairs.get("nWrist") == "2" else Wrist.NO_FLIP,
+        **flags,
+        j1_angle_deg=float(pairs.get("rJ1Angle", "0")) or None,
+        j4_angle_deg=float(pairs.get("rJ4Angle", "0")) or None,
+    )
+    hand = Hand.LEFT if pairs.get("nHand") == "2" else Hand.RIGHT
+    return Point((x, y, z, u, v, w), hand, int(pairs.get("nLocal", "0")), posture=posture)
+
+
+_FLAGS: Final = {
+    "j1_flag": "nJ1Flag",
+    "j2_flag": "nJ2Flag",
+    "j4_flag": "nJ4Flag",
+    "j6_flag": "nJ6Flag",
+}
+
+
+def points_text(points: Mapping[int, Point], labels: Mapping[str, int]) -> str:
+    """Return a point file of some points, which :func:`read_points` reads as the same points.
+
+    Its first line is not known beyond its beginning (docs/reference/spel.md 16).
+    """
+    names = {number: label for label, number in labels.items()}
+    lines = ["ENVT0100", 'sVersion="2.0.0"', f"nNumberOfPoints={len(points)}"]
+    for at, (number, point) in enumerate(sorted(points.items()), start=1):
+        lines += [f"Point{at} {{", f"\tnNumber={number}", f'\tsLabel="{names.get(number, "")}"']
+        lines += [f"\t{key}={value}" for key, value in _pairs(point).items()]
+        lines.append("}")
+    return "".join(line + "\r\n" for line in lines)
+
+
+def _pairs(point: Point) -> dict[str, float]:
+    posture = point.posture or Posture()
+    return {
+        "nUndefined": 0,
+        **{f"r{axis}": at for axis, at in zip(_AXES, point.coordinates, strict=True)},
+        "nLocal": point.local,
+        "nHand": 2 if point.hand is Hand.LEFT else 1,
+        "nElbow": 2 if posture.elbow is Elbow.BELOW else 1,
+        "nWrist": 2 if posture.wrist is Wrist.FLIP else 1,
+        **{key: getattr(posture, name) for name, key in _FLAGS.items()},
+        "rJ1Angle": posture.j1_angle_deg or 0,
+        "rJ4Angle": posture.j4_angle_deg or 0,
+    }

@@ -1,0 +1,1 @@
+"""What the pytest fixtures bring; usable without pytest as well."""

@@ -1,0 +1,241 @@
+"""Makes simulated controllers of each kind and serves them, as a test asks for."""
+
+import itertools
+import os
+from pathlib import Path
+from typing import Any, Final
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+from robolink.model import Secret
+from robolink_simulators.cell.clock import ManualClock, SteeredClock
+from robolink_simulators.cell.workplace import MOUNTED_TOOL
+from robolink_simulators.cell.world_parameters import WorldParameters, parameters_from_text
+from robolink_simulators.epson.options import EpsonOptions
+from robolink_simulators.faults import LinkKind, faults_of_table, read_fault_file
+from robolink_simulators.testkit.asked import CellRequest
+from robolink_simulators.testkit.recipes import written_map, written_recipe
+from robolink_simulators.testkit.served import OwnFolder, SimulatedCell
+
+SERVED_SPEED: Final = 20.0
+"""Simulated seconds per real one, on a port."""
+
+PLC_SPEED: Final = 1.0
+"""The same of a PLC with a mailbox: it counts 500 ms between two heartbeats of a client, who
+must not have to be faster than a real one because the build machine is busy."""
+
+EXCHANGE_S: Final = 0.05
+"""What each request takes besides: who asks how far a movement is need not wait for it."""
+
+PLC_EXCHANGE_S: Final = 0.005
+"""The same of a PLC with a mailbox, a hundredth of its patience with a heartbeat."""
+
+_count = itertools.count(1)
+
+
+def make_epson(
+    own: OwnFolder,
+    request: CellRequest,
+    medium: str,
+    clock: ManualClock | None,
+    *,
+    person: bool = False,
+) -> SimulatedCell:
+    """Make an EPSON controller and serve it.
+
+    Args:
+        own: Where.
+        request: How it is to be.
+        medium: ``sim`` in the process, ``tcp``, or ``serial`` (not on Windows).
+        clock: Its time in the process; of its own where that is left out.
+        person: Whether there is a person, and a recipe.
+
+    Raises:
+        ConfigError: What is asked for does not exist.
+    """
+    from robolink_simulators.epson.device import EpsonSimulator
+    from robolink_simulators.epson.options import options_from_text
+
+    simulator = EpsonSimulator(
+        request.robot,
+        seed=_seed(own, request),
+        password=Secret(request.password) if request.password else None,
+        options=options_from_text({**_patience(request, medium), **request.texts("options")}),
+        world=_world(request),
+    )
+    time: Any
+    if medium == "sim":
+        from robolink_simulators.hosting.in_process.epson import register, unregister
+
+        name, time = _name(), clock or ManualClock()
+        url = register(name, simulator, clock=time)
+        own.stack.callback(unregister, name)
+    else:
+        time = _served_clock(request, SERVED_SPEED)
+        if medium == "tcp":
+            from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+
+            url = own.stack.enter_context(serve_tcp(simulator, clock=time)).url
+        elif medium == "serial":
+            from robolink_simulators.hosting.streams.epson_serial import serve_serial
+
+            url = own.stack.enter_context(serve_serial(simulator, clock=time)).url
+        else:
+            raise _no_medium(medium, ("sim", "tcp", "serial"))
+    return _furnished(own, simulator, time, {medium: url}, request, person=person)
+
+
+def make_softmotion(
+    own: OwnFolder,
+    request: CellRequest,
+    medium: str,
+    clock: ManualClock | None,
+    *,
+    person: bool = False,
+) -> SimulatedCell:
+    """Make a PLC with a mailbox and serve it; as :func:`make_epson`.
+
+    Args:
+        own: Where.
+        request: How it is to be.
+        medium: ``sim``, ``modbus-tcp``, ``modbus-rtu`` (not on Windows) or ``can``.
+        clock: Its time in the process; of its own where that is left out.
+        person: Whether there is a person, and a recipe.
+
+    Raises:
+        ConfigError: What is asked for does not exist.
+    """
+    from robolink_simulators.softmotion.mailbox.option_text import options_from_text
+    from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
+
+    simulator = SoftMotionSimulator(
+        request.kinematics,
+        seed=_seed(own, request),
+        options=options_from_text(request.texts("options")),
+        world=_world(request),
+    )
+    time: Any
+    if medium == "sim":
+        from robolink_simulators.hosting.in_process.softmotion import register, unregister
+
+        name, time = _name(), clock or ManualClock()
+        url = register(name, simulator, clock=time)
+        own.stack.callback(unregister, name)
+    else:
+        time = _served_clock(request, PLC_SPEED, PLC_EXCHANGE_S)
+        url = _on_bus(own, simulator, medium, time)
+    return _furnished(own, simulator, time, {medium: url}, request, person=person)
+
+
+def _on_bus(own: OwnFolder, simulator: Any, medium: str, clock: SteeredClock) -> str:  # noqa: ANN401 - imported where it is made
+    host: Any
+    if medium == "can":
+        from robolink_simulators.hosting.fieldbus.canopen_node import CanPlace, serve_canopen
+
+        host = serve_canopen(simulator, CanPlace("virtual", _name()), clock=clock)
+    elif medium in ("modbus-tcp", "modbus-rtu"):
+        from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_rtu, serve_modbus_tcp
+
+        serve = serve_modbus_tcp if medium == "modbus-tcp" else serve_modbus_rtu
+        host = serve(simulator, clock=clock)
+    else:
+        raise _no_medium(medium, ("sim", "modbus-tcp", "modbus-rtu", "can"))
+    url: str = own.stack.enter_context(host).url
+    return url
+
+
+def make_plc(own: OwnFolder, request: CellRequest, medium: str) -> SimulatedCell:
+    """Make a PLC with a register map and serve it; as :func:`make_epson`.
+
+    Args:
+        own: Where.
+        request: How it is to be; without a map it has two tools, with a commit bit.
+        medium: ``modbus-tcp`` or ``modbus-rtu`` (not on Windows).
+
+    Raises:
+        ConfigError: What is asked for does not exist.
+    """
+    from robolink.register_maps import load_map
+    from robolink_simulators.plc import PlcSimulator, serve_plc, serve_plc_line
+
+    path = written_map(own.folder) if request.map is None else Path(request.map)
+    simulator = PlcSimulator(load_map(path), seed=_seed(own, request))
+    time = _served_clock(request, SERVED_SPEED)
+    host: Any
+    if medium == "modbus-tcp":
+        host = serve_plc(simulator, path, clock=time)
+    elif medium == "modbus-rtu":
+        host = serve_plc_line(simulator, path, clock=time)
+    else:
+        raise _no_medium(medium, ("modbus-tcp", "modbus-rtu"))
+    url = own.stack.enter_context(host).url
+    return _furnished(own, simulator, time, {medium: url}, request, person=False)
+
+
+def _furnished(
+    own: OwnFolder,
+    simulator: Any,  # noqa: ANN401 - of any kind
+    clock: Any,  # noqa: ANN401 - stepped or steered
+    urls: dict[str, str],
+    request: CellRequest,
+    *,
+    person: bool,
+) -> SimulatedCell:
+    if request.tip is not None:
+        simulator.world.tips[MOUNTED_TOOL] = request.tip
+    (url,) = urls.values()
+    _plan(simulator, request, LinkKind(url.partition("://")[0]))
+    if not person:
+        return own.keep(simulator, clock, urls)
+    assist = url
+    if isinstance(clock, SteeredClock):
+        from robolink_simulators.assist.port import serve_assist
+
+        assist = own.stack.enter_context(serve_assist(simulator, clock=clock)).url
+    return own.keep(simulator, clock, urls, assist=assist, recipe=written_recipe(own.folder))
+
+
+def _plan(simulator: Any, request: CellRequest, link: LinkKind) -> None:  # noqa: ANN401 - of any kind
+    if isinstance(request.faults, (str, Path)):
+        plan = read_fault_file(Path(request.faults))
+        simulator.faults.plan(plan.faults, plan.seed, {link})
+    elif request.faults:
+        simulator.faults.plan(faults_of_table(request.faults, link), simulator.seed, {link})
+
+
+def _served_clock(
+    request: CellRequest, speed: float, exchange_s: float = EXCHANGE_S
+) -> SteeredClock:
+    """Return the time on a port; in real time, which a test asked for, requests take none."""
+    factor = speed if request.speed is None else request.speed
+    return SteeredClock(factor, exchange_s=0.0 if request.speed == 1 else exchange_s)
+
+
+def _patience(request: CellRequest, medium: str) -> dict[str, str]:
+    """Return what lets silence count in real seconds, however fast simulated time runs."""
+    if medium == "sim":
+        return {}
+    factor = max(1.0, SERVED_SPEED if request.speed is None else request.speed)
+    usual = EpsonOptions()
+    names = ("remote_timeout_s", "login_timeout_s")
+    return {name: str(getattr(usual, name) * factor) for name in names}
+
+
+def _world(request: CellRequest) -> WorldParameters:
+    return WorldParameters(**parameters_from_text(request.texts("world")))  # type: ignore[arg-type]
+
+
+def _seed(own: OwnFolder, request: CellRequest) -> int:
+    return own.seed if request.seed is None else request.seed
+
+
+def _name() -> str:
+    """Return a name that no other cell of this machine has."""
+    return f"pytest-{os.getpid()}-{next(_count)}"
+
+
+def _no_medium(medium: str, known: tuple[str, ...]) -> ConfigError:
+    return ConfigError(
+        tr("A simulator is not served by {medium!r}.", medium=medium),
+        remedy=tr("Known are: {known}.", known=", ".join(known)),
+    )

@@ -1,0 +1,82 @@
+"""A person at a simulated cell who does what a script says, when it is time."""
+
+from dataclasses import dataclass, field
+
+from robolink_simulators.control.acts.registry import act_named, perform
+from robolink_simulators.control.cell import ControlledCell
+
+
+@dataclass(slots=True)
+class _Cue:
+    match: str
+    left: int
+    act: str
+    given: dict[str, object]
+
+
+@dataclass(slots=True)
+class ScriptedOperator:
+    """Does acts of the control API (docs/control-api.md), at once or on a cue of the wire.
+
+    Args:
+        cell: Where.
+
+    Attributes:
+        done: What was done on a cue, in order: the request that was the cue, and the act.
+        failed: What the person could not do on a cue, and why.
+    """
+
+    cell: ControlledCell
+    done: list[tuple[str, str]] = field(default_factory=list)
+    failed: list[tuple[str, str]] = field(default_factory=list)
+    _cues: list[_Cue] = field(default_factory=list)
+
+    def do(self, act: str, **given: object) -> dict[str, object]:
+        """Do something now, and return what it gives.
+
+        Raises:
+            ConfigError: There is no such act, or a value is missing, wrong or unknown.
+        """
+        return perform(self.cell, act, given)
+
+    def when(self, match: str, act: str, *, skip: int = 0, **given: object) -> None:
+        """Do something just before a request that contains a text is carried out, once.
+
+        Args:
+            match: Any part of the request, as the wire log shows it.
+            act: Of the control API.
+            skip: How many such requests are let pass first.
+            given: What the act takes.
+
+        Raises:
+            ConfigError: There is no such act, or a value is missing, wrong or unknown.
+        """
+        act_named(self.cell, act).checked(given)
+        self._cues.append(_Cue(match, skip, act, dict(given)))
+        self.cell.simulator.on_request = self._heard
+
+    @property
+    def waiting(self) -> int:
+        """How many cues have not come yet."""
+        return len(self._cues)
+
+    def forget(self) -> None:
+        """Drop the script."""
+        self._cues.clear()
+        self.done.clear()
+        self.failed.clear()
+
+    def _heard(self, _number: int, request: str) -> None:
+        for cue in tuple(self._cues):
+            if cue.match not in request:
+                continue
+            if cue.left:
+                cue.left -= 1
+                continue
+            self._cues.remove(cue)
+            try:
+                perform(self.cell, cue.act, cue.given)
+            except Exception as error:
+                self.failed.append((cue.act, str(error)))
+            else:
+                self.done.append((request, cue.act))

@@ -1,0 +1,88 @@
+"""docs and recipe: the pages and recipes that come with robolink."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+from robolink_cli import main
+
+ROOT = Path(__file__).parents[2]
+RECIPES = sorted(path.stem for path in (ROOT / "examples" / "recipes").glob("*.toml"))
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+
+    def ran(*arguments):
+        code = main.run(arguments)
+        shown = capsys.readouterr()
+        return code, shown.out, shown.err
+
+    return ran
+
+
+def test_every_page_is_listed_with_its_title_once(run):
+    code, out, _ = run("docs", "--json")
+    pages = {page["name"]: page["title"] for page in json.loads(out)["pages"]}
+    here = {path.stem for path in (ROOT / "docs").glob("*.md")}
+    assert code == 0
+    assert {name for name in here if not name.endswith(".zh")} <= set(pages)
+    assert not [name for name in pages if name.endswith(".zh")]
+    assert "reference/epson" in pages
+    assert all(pages.values())
+
+
+@pytest.mark.parametrize("name", ["drift", "drift.md", "docs/drift.md"])
+def test_a_page_is_shown_as_it_stands(run, name):
+    code, out, _ = run("docs", name)
+    assert (code, out) == (0, (ROOT / "docs" / "drift.md").read_text(encoding="utf-8"))
+    assert json.loads(run("docs", name, "--json")[1])["text"] == out
+    assert Path(run("docs", name, "--path")[1].strip()) == ROOT / "docs" / "drift.md"
+
+
+def test_a_page_that_is_there_in_chinese_is_shown_so(run):
+    code, out, _ = run("docs", "technician", "--lang", "zh")
+    assert (code, out) == (0, (ROOT / "docs" / "technician.zh.md").read_text(encoding="utf-8"))
+    assert run("docs", "technician")[1] != out
+    assert run("docs", "drift", "--lang", "zh")[1].startswith("# What a tool's changes")
+
+
+def test_a_page_that_is_nearly_called_so_is_proposed(run):
+    code, _, err = run("docs", "recipies")
+    assert code == 2
+    assert "Is one of these meant: recipes" in err
+
+
+def test_recipes_are_listed_with_what_they_are_for(run):
+    listed = {
+        one["name"]: one["purpose"]
+        for one in json.loads(run("recipe", "list", "--json")[1])["recipes"]
+    }
+    assert sorted(listed) == RECIPES
+    assert all(listed.values())
+
+
+@pytest.mark.parametrize("name", RECIPES)
+def test_a_copy_of_each_recipe_is_right_and_knows_its_schema(run, tmp_path, name):
+    assert run("recipe", "new", name)[0] == 0
+    first, rest = (tmp_path / f"{name}.toml").read_text(encoding="utf-8").split("\n", 1)
+    schema = re.fullmatch(r"#:schema file://(/.*)", first)
+    assert schema is not None
+    assert json.loads(Path(schema[1]).read_text(encoding="utf-8"))["title"]
+    model = (ROOT / "examples" / "recipes" / f"{name}.toml").read_text(encoding="utf-8")
+    assert rest == model.split("\n", 1)[1]
+    assert run("recipe", "check", f"{name}.toml")[0] == 0
+
+
+def test_a_copy_writes_over_nothing(run, tmp_path):
+    own = tmp_path / "own.toml"
+    own.write_text("name = 1\n")
+    assert run("recipe", "new", "scara-pin", "own.toml")[0] == 2
+    assert own.read_text() == "name = 1\n"
+    code, out, _ = run("recipe", "check", "own.toml")
+    assert code == 2
+    assert "schema" in out
+    assert run("recipe", "new", "scara-pin", "own.toml", "--force")[0] == 0
+    assert json.loads(run("recipe", "check", "own.toml", "--json")[1])["ok"]

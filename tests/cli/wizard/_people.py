@@ -1,0 +1,115 @@
+"""States, subjects and a hand for the tests of the wizard."""
+
+import time
+from dataclasses import replace
+
+from robolink_cli.wizard.check_list import CheckPoint, CheckSubject, Mark
+from robolink_cli.wizard.flow import advance
+from robolink_cli.wizard.happenings import (
+    KeyPressed,
+    LineTyped,
+    Reading,
+    SendAnswer,
+    WaitsForAnswer,
+    WasAsked,
+    WasRead,
+    WasRegarded,
+)
+from robolink_cli.wizard.state import Header, WizardState
+
+from robolink.calibration import solve_two_pose
+from robolink.model import Pose, ToolOffset
+from robolink.nozzle_change import LimitVerdict, Proposal, WriteSubject
+from robolink.runner import FitRow, FitSubject, JogSubject, Question, TouchSubject
+
+ARRIVAL = Pose(249.992, 200.004, -81.563, 90.0, tool=0)
+HEADER = Header("line3", "Needle 22G")
+
+
+def touch_subject(**more):
+    return TouchSubject(**{"number": 2, "total": 4, "arrival": ARRIVAL, **more})
+
+
+def fit_subject(*off_mm, worst=None):
+    rows = tuple(
+        FitRow(number, f"Pose {number}, at U {90.0 * number:.1f}", (off, 0.0))
+        for number, off in enumerate(off_mm, start=1)
+    )
+    return FitSubject(rows, 0.016, half95_mm=0.021, next_mm=0.015, worst=worst, limit_mm=0.15)
+
+
+def write_subject(*tools):
+    first, second = Pose(250.0, 200.0, -83.0, 0.0), Pose(274.6, 192.5, -83.0, 180.0)
+    old = ToolOffset(11.998, -3.502, -20.0)
+    result = solve_two_pose(first, second, stored=old)
+    proposals = tuple(Proposal(tool, old, result) for tool in tools)
+    verdict = LimitVerdict("implausible_change", "The change", 0.65, 2.0)
+    return WriteSubject(proposals, ((verdict,),) * len(tools))
+
+
+CHECK = CheckSubject(
+    (
+        CheckPoint(Mark.OK, "Controller answers: T6-602S, serial T6S0012345"),
+        CheckPoint(Mark.TO_DO, "Motors are off", "7", "Switch them on"),
+        CheckPoint(Mark.YOU, "New needle mounted and tight, pin PIN-07 clean", "1", "Yes"),
+        CheckPoint(Mark.YOU, "Nobody in the cell, hoses free", "3", "Yes"),
+    ),
+    "The robot will move by itself 6 times: power LOW, up to 20 mm/s, at most 150 mm from here.",
+)
+
+
+class Sitting:
+    """A state, and what was sent from it; time passes by hand."""
+
+    def __init__(self, state=None):
+        self.state = state or WizardState(HEADER)
+        self.sent, self.now, self.number = [], 10.0, 0
+
+    def happens(self, happening):
+        self.state, effects = advance(self.state, happening)
+        self.sent += [one.text if isinstance(one, SendAnswer) else one for one in effects]
+        return self
+
+    def asked(self, subject, kind=Question.PLACE, text="?"):
+        self.number += 1
+        if subject is not None:
+            self.happens(WasRegarded(subject))
+        self.happens(WasAsked(self.number, text, kind, self.now))
+        self.reads(ARRIVAL)
+        self.waits()
+        self.now += 1.0
+        return self.reads(ARRIVAL)
+
+    def waits(self):
+        return self.happens(WaitsForAnswer(self.number, self.now))
+
+    def reads(self, pose):
+        return self.happens(WasRead(Reading(self.now, "ready", pose=pose)))
+
+    def key(self, name, text=""):
+        return self.happens(KeyPressed(name, text, self.now))
+
+    def keys(self, *names):
+        for name in names:
+            self.key(name, name if len(name) == 1 else "")
+        return self
+
+    def line(self, text):
+        return self.happens(LineTyped(text, self.now))
+
+    def jogs(self, step):
+        """The runner makes the step that was sent last."""
+        axis, by = step[0], float(step[1:])
+        here = self.state.pose or ARRIVAL
+        there = replace(here, **{f"{axis}_mm": getattr(here, f"{axis}_mm") + by})
+        self.happens(WasRegarded(JogSubject(here, there, abs(by)))).waits()
+        self.now += 1.0
+        return self.reads(there)
+
+
+def until(true, seconds=10.0):
+    """Wait until something is so."""
+    end_s = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end_s
+        time.sleep(0.01)

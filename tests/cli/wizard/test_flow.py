@@ -1,0 +1,282 @@
+"""The flow of the wizard: what a key or a line does, and what it never does."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from robolink_cli.wizard.happenings import (
+    KeyPressed,
+    LineTyped,
+    Reading,
+    TooFast,
+    WaitsForAnswer,
+    WasAsked,
+    WasRead,
+    WasRegarded,
+    WasTold,
+    WizardCommand,
+)
+from robolink_cli.wizard.state import STEP_SIZES
+
+from robolink.model import Pose
+from robolink.runner import JogSubject, Question
+from tests.cli.wizard._people import (
+    ARRIVAL,
+    CHECK,
+    Sitting,
+    fit_subject,
+    touch_subject,
+    write_subject,
+)
+
+
+def at_touch(**more):
+    return Sitting().asked(touch_subject(**more))
+
+
+def test_a_touch_is_jogged_in_coarse_steps_and_taken_after_a_fine_one():
+    hand = at_touch()
+    hand.key("main")
+    assert "still stands where the robot put it" in hand.state.message
+    hand.keys("+", "+", "3")
+    assert hand.sent == ["z-1"]
+    hand.jogs("z-1.0").keys("5")
+    assert "the last step was 1.00 mm" in hand.state.message
+    hand.keys("-", "-", "3")
+    assert hand.sent == ["z-1", "z-0.1"]
+    hand.jogs("z-0.1").keys("5")
+    assert hand.sent == ["z-1", "z-0.1", "done"]
+
+
+def test_what_is_pressed_while_the_robot_moves_is_dropped():
+    hand = at_touch().keys("6", "6", "6", "8", "5")
+    assert hand.sent == ["x+0.1"]
+    hand.jogs("x+0.1")
+    assert hand.sent == ["x+0.1"]
+
+
+def test_a_take_right_after_a_step_is_not_meant_for_it():
+    hand = at_touch().keys("6")
+    hand.now += 0.5
+    hand.waits()
+    hand.now += 0.1
+    hand.keys("5")
+    assert hand.state.message == "Wait: the robot is still moving."
+    assert hand.sent == ["x+0.1"]
+
+
+@pytest.mark.parametrize("quarters", range(4))
+def test_turned_keys_still_name_what_they_do(quarters):
+    from robolink_cli.wizard.screens.touching import touch_screen
+
+    hand = at_touch()
+    for _ in range(quarters):
+        hand.key("*")
+    rows = "\n".join(touch_screen(hand.state, hand.now).lines)
+    for key in "6842":
+        axis = rows[rows.index(f"[{key}] ") + 4 :][:2]
+        other = at_touch()
+        for _ in range(quarters):
+            other.key("*")
+        other.keys(key)
+        assert other.sent == [f"{axis.lower()}0.1"], (key, rows)
+
+
+def test_enter_takes_writes_and_starts_nothing():
+    assert at_touch(arrival=None).key("enter").sent == []
+    assert at_touch(arrival=None).line("").sent == []
+    hand = Sitting().asked(write_subject(1), Question.YES_NO).keys("1")
+    assert hand.key("enter").sent == []
+    hand = Sitting().asked(CHECK, Question.YES_NO).keys("1", "3")
+    assert hand.key("enter").sent == []
+
+
+def test_no_key_answers_before_its_question_could_be_seen():
+    hand = Sitting()
+    hand.happens(WasRegarded(touch_subject(arrival=None)))
+    hand.happens(WasAsked(1, "?", Question.PLACE, 10.0)).happens(WaitsForAnswer(1, 10.0))
+    hand.now = 10.2
+    assert hand.keys("6", "5").sent == []
+    hand.now = 10.4
+    assert hand.keys("6").sent == ["x+0.1"]
+
+
+@pytest.mark.parametrize(
+    ("typed", "sent"),
+    [
+        ("1*", "y"),
+        ("12*", None),
+        ("*", None),
+        ("2*", None),
+        ("n", "n"),
+    ],
+)
+def test_a_write_takes_the_number_of_the_tool(typed, sent):
+    hand = Sitting().asked(write_subject(1), Question.YES_NO).keys(*typed)
+    assert hand.sent == ([sent] if sent else [])
+    assert sent or "Nothing was written" in hand.state.message
+
+
+def test_the_numbers_of_several_tools_are_typed_all():
+    assert Sitting().asked(write_subject(1, 12), Question.YES_NO).keys(*"1*").sent == []
+    assert Sitting().asked(write_subject(1, 12), Question.YES_NO).keys(*"112*").sent == ["y"]
+    assert Sitting().asked(write_subject(1, 12), Question.YES_NO).line("1, 12").sent == ["y"]
+
+
+def test_a_start_waits_for_every_point_of_the_list():
+    hand = Sitting().asked(CHECK, Question.YES_NO).keys("5")
+    assert hand.sent == []
+    assert "3 points are open" in hand.state.message
+    assert hand.keys("1", "3", "5").sent == []
+    assert hand.keys("7").sent == ["motors"]
+    done = CHECK.__class__(tuple(p for p in CHECK.points if p.key != "7"), CHECK.plan)
+    hand = Sitting().asked(done, Question.YES_NO).keys("1", "3", "5")
+    assert hand.sent == ["y"]
+
+
+def test_the_worst_touch_is_offered_first_only_where_it_stands_out():
+    far, near = fit_subject(0.006, 0.08, 0.004, worst=1), fit_subject(0.02, 0.03, 0.02, worst=1)
+    assert Sitting().asked(far, Question.YES_NO).keys("5").sent == ["y"]
+    assert Sitting().asked(far, Question.YES_NO).keys("3").sent == ["n"]
+    assert Sitting().asked(near, Question.YES_NO).keys("5").sent == ["n"]
+    assert Sitting().asked(near, Question.YES_NO).keys("1").sent == ["y"]
+
+
+@pytest.mark.parametrize(
+    ("subject", "kind", "sent"),
+    [
+        (touch_subject(), Question.PLACE, "q"),
+        (None, Question.TEXT, "q"),
+        (write_subject(1), Question.YES_NO, "n"),
+        (CHECK, Question.YES_NO, "n"),
+        (None, Question.YES_NO, WizardCommand.END_WORK),
+        (fit_subject(0.1, 0.01, 0.01, worst=0), Question.YES_NO, WizardCommand.END_WORK),
+    ],
+)
+def test_stop_ends_without_a_question_wherever_it_is_pressed(subject, kind, sent):
+    assert Sitting().asked(subject, kind).key("stop").key("stop").sent == [sent]
+    hand = Sitting().asked(subject, kind)
+    hand.key("main" if kind is Question.PLACE else "enter")
+    busy = Sitting()
+    assert busy.key("stop").sent == [WizardCommand.END_WORK]
+
+
+def test_a_text_takes_digits_and_ends_with_enter():
+    hand = Sitting().asked(None, Question.TEXT).keys(*"N-0418")
+    hand.key("backspace").keys("9").key("enter")
+    assert hand.sent == ["N-0419"]
+    assert Sitting().asked(None, Question.TEXT).key("enter").sent == []
+
+
+@pytest.mark.parametrize("word", ["take", "记录", " TAKE ", "\uff54\uff41\uff4b\uff45"])
+def test_words_of_both_languages_take(word):
+    assert at_touch(arrival=None).line(word).sent == ["done"]
+
+
+@pytest.mark.parametrize(
+    ("line", "sent", "message"),
+    [
+        ("again 1", "again", ""),
+        ("重做", "again", ""),
+        ("停止", "q", "Stopping."),
+        ("x+0,1", None, "Write the decimal point as '.': x+0.1. Nothing moved."),
+        ("x+0.1 z-0.5", "x+0.1 z-0.5", ""),
+        ("\uff58\uff0b\uff10\uff0e\uff11", "x+0.1", ""),
+    ],
+)
+def test_lines_at_a_touch(line, sent, message):
+    hand = at_touch().line(line)
+    assert hand.sent == ([sent] if sent else [])
+    assert hand.state.message == message
+    assert "take records" in at_touch().line("帮助").state.message
+
+
+def test_the_first_touch_and_the_turn_test_are_not_begun_again():
+    assert at_touch(number=1, arrival=None).keys("/").sent == []
+    assert at_touch(proof=True).keys("/").sent == []
+    assert at_touch().keys("/").sent == ["again"]
+
+
+def test_a_reading_that_is_old_takes_no_touch():
+    hand = at_touch().keys("6")
+    hand.jogs("x+0.1")
+    hand.now += 2.0
+    hand.keys("5")
+    assert hand.state.message == "No reading from the controller for 2 s."
+
+
+NAMES = [*"0123456789+-*/nyqt", "main", "stop", "enter", "backspace"]
+WORDS = ["take", "done", "again", "y", "n", "1", "", "x+0.1", "z-2", "stop", "记录", "12"]
+SUBJECTS = [
+    (touch_subject(), Question.PLACE),
+    (touch_subject(arrival=None, number=1), Question.PLACE),
+    (write_subject(1), Question.YES_NO),
+    (write_subject(3), Question.YES_NO),
+    (CHECK, Question.YES_NO),
+    (fit_subject(0.1, 0.01, worst=0), Question.YES_NO),
+    (None, Question.YES_NO),
+    (None, Question.TEXT),
+]
+HAPPENINGS = st.one_of(
+    st.builds(lambda name: ("key", name), st.sampled_from(NAMES)),
+    st.builds(lambda word: ("line", word), st.sampled_from(WORDS)),
+    st.builds(lambda index: ("ask", index), st.integers(0, len(SUBJECTS) - 1)),
+    st.builds(lambda by: ("jogged", by), st.sampled_from([0.0, 0.01, 0.1, 1.0])),
+    st.sampled_from([("waits", 0), ("told", 0), ("fast", 0), ("time", 0.01), ("time", 0.5)]),
+)
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.lists(HAPPENINGS, max_size=40), st.sampled_from([0, 0, 2, 3]))
+def test_no_order_of_keys_lines_and_readings_takes_an_unjogged_touch_or_writes_untyped(
+    history, first
+):
+    hand, pose, moved, digits, lined = Sitting(), ARRIVAL, 0.0, "", ""
+    hand.asked(*SUBJECTS[first])
+    for what, of in history:
+        before = len(hand.sent)
+        state = hand.state
+        if what == "key":
+            digits = digits + of if of.isdigit() else digits
+            digits = "" if of == "backspace" else digits
+            hand.key(of, of if len(of) == 1 else "")
+        elif what == "line":
+            lined = of
+            hand.line(of)
+        elif what == "ask":
+            pose, moved, digits, lined = ARRIVAL, 0.0, "", ""
+            hand.asked(*SUBJECTS[of])
+        elif what == "jogged":
+            there = Pose(pose.x_mm, pose.y_mm, pose.z_mm - of, 90.0, tool=0)
+            hand.happens(WasRegarded(JogSubject(pose, there, of))) if state.at_place else None
+            pose, moved = (there, moved + of) if state.at_place else (pose, moved)
+            hand.reads(pose)
+        elif what == "waits":
+            hand.waits()
+        elif what == "told":
+            hand.happens(WasTold("refused"))
+        elif what == "fast":
+            hand.happens(TooFast())
+        else:
+            hand.now += of
+        for text in hand.sent[before:]:
+            if text == "done" and state.touch is not None and state.touch.arrival is not None:
+                assert moved > 0.0
+            if text == "y" and state.writing is not None:
+                number = str(state.writing.tools[0])
+                assert number in digits or lined == number
+
+
+def test_the_sizes_of_steps_stay_within_what_the_runner_takes():
+    hand = at_touch()
+    for _ in range(9):
+        hand.keys("+")
+    assert hand.state.jogging.step == STEP_SIZES[-1] == 5.0
+    for _ in range(9):
+        hand.keys("-")
+    assert hand.state.jogging.step == STEP_SIZES[0] == 0.01
+
+
+def test_a_reading_without_a_position_changes_nothing_of_the_steps():
+    hand = at_touch().happens(WasRead(Reading(11.0, "fault", halted=True)))
+    assert hand.keys("5").sent == []
+    assert hand.happens(KeyPressed("escape", "", 12.0)).happens(LineTyped("", 12.0)).sent == []

@@ -1,0 +1,217 @@
+"""The full screen: its keys by a pipe, and the real command on a pseudo terminal."""
+
+import os
+import signal
+import termios
+import threading
+import time
+from io import StringIO
+
+import click
+import pyte
+import pytest
+from prompt_toolkit.data_structures import Size
+from prompt_toolkit.input import create_pipe_input
+from prompt_toolkit.output.vt100 import Vt100_Output
+from robolink_cli.wizard.faces.full import FullFace
+from robolink_cli.wizard.happenings import Reading
+from robolink_cli.wizard.state import WizardState
+from robolink_cli.wizard.work import Work
+from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+
+from robolink.model import Pose
+from robolink.runner import JogSubject, Question
+from tests.cli.wizard._people import ARRIVAL, HEADER, touch_subject, until, write_subject
+from tests.cli.wizard._screen import ScreenHand
+
+pytestmark = pytest.mark.simulator_only
+
+
+class Drawn:
+    """A face in a thread of the test, keys by a pipe, drawn by pyte."""
+
+    def __init__(self, desk, work, source):
+        self.screen, self.paper = pyte.Screen(80, 24), StringIO()
+        self.source, self.done = source, None
+        output = Vt100_Output(self.paper, lambda: Size(rows=24, columns=80), term="xterm")
+        face = FullFace(source, output)
+        self.thread = threading.Thread(target=lambda: face.run(desk, WizardState(HEADER), work))
+        self.thread.start()
+
+    @property
+    def text(self):
+        screen = pyte.Screen(80, 24)
+        pyte.Stream(screen).feed(self.paper.getvalue())
+        return "\n".join(screen.display)
+
+
+def test_keys_of_a_pipe_jog_take_and_write():
+    """One face, one work: touch, burst, write."""
+    from robolink_cli.wizard.desk import Desk
+
+    desk, answers, pose = Desk(), [], [ARRIVAL]
+    desk.glance = lambda: Reading(time.monotonic(), "ready", pose=pose[0])
+
+    def said(subject, kind, last):
+        desk.regard(subject)
+        desk.ask("?", kind)
+        while True:
+            while (answer := desk.poll(0.2)) is None:
+                pass
+            answers.append(answer)
+            if answer == last:
+                return
+            there = Pose(249.992, 200.004, pose[0].z_mm + float(answer[1:]), 90.0, tool=0)
+            desk.regard(JogSubject(pose[0], there, abs(float(answer[1:]))))
+            pose[0] = there
+
+    def do():
+        said(touch_subject(), Question.PLACE, "done")
+        said(write_subject(1), Question.YES_NO, "y")
+
+    with click.Context(click.Command("x")), create_pipe_input() as source:
+        work = Work(do)
+        face = Drawn(desk, work, source)
+        try:
+            source.send_text("66")  # before anything was asked
+            work.start()
+            until(lambda: "Touch 2 of 4" in face.text)
+            time.sleep(0.35)
+            source.send_text("4006381333931\r\n")
+            time.sleep(0.3)
+            assert "Too fast for a hand. Ignored." in face.text
+            source.send_text("\x1b[6~")  # PgDn: Z down
+            until(lambda: answers == ["z-0.1"])
+            time.sleep(0.4)
+            source.send_text("\r")
+            time.sleep(0.1)
+            assert answers == ["z-0.1"]
+            source.send_text("5")
+            until(lambda: "To write" in face.text)
+            time.sleep(0.35)
+            source.send_text(" ")
+            until(lambda: "Type the number of the tool first" in face.text)
+            source.send_text("1")
+            time.sleep(0.1)
+            source.send_text("*")
+            until(lambda: work.ended)
+        finally:
+            desk.leave()
+            work.wait(5.0)
+            face.thread.join(5.0)
+    assert work.error is None, work.error
+    assert answers == ["z-0.1", "done", "y"]
+
+
+@pytest.fixture
+def simulator():
+    return EpsonSimulator(seed=7)
+
+
+@pytest.fixture
+def hand(simulator, tmp_path, monkeypatch):
+    with serve_tcp(simulator, clock=ScaledClock(10.0)) as host:
+        words = ["calibrate", "two-pose", "--tool", "1", "-c", host.url]
+        hand = ScreenHand(words, simulator)
+        hand.host = host
+        yield hand
+        hand.close()
+
+
+def check_terminal_is_restored(hand):
+    assert termios.tcgetattr(hand.master)[3] & termios.ECHO
+    assert b"\x1b[?1049h" in hand.raw
+    assert b"\x1b[?1049l" in hand.raw
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(240)
+def test_a_needle_on_the_full_screen(hand, simulator):
+    before = simulator.machine.tools.get(1)
+    hand.start()
+    hand.see("Touch 1 of 2")
+    hand.touch()
+    hand.see("Touch 2 of 2")
+    hand.touch()
+    hand.see("To write, type the tool number")
+    hand.rest(0.4)
+    hand.press(["1", "*"])
+    for _ in range(2):
+        hand.see("Turn test")
+        hand.touch()
+        hand.see("moving|DONE")
+    assert hand.end() == 0, hand.text
+    assert "Tool 1 is measured, written and tested." in hand.text
+    assert simulator.machine.tools.get(1) != before
+    check_terminal_is_restored(hand)
+
+
+@pytest.mark.soak
+def test_a_held_key_stops_with_the_hand(hand, simulator):
+    hand.start()
+    hand.see("Touch 1 of 2")
+    hand.rest(0.4)
+    began = simulator.machine.arm.moves_started
+    end_s = time.monotonic() + 1.5
+    while time.monotonic() < end_s:
+        os.write(hand.master, b"6")
+        hand.rest(0.033)
+    hand.rest(1.0)
+    made = simulator.machine.arm.moves_started
+    assert 1 <= made - began < 45
+    hand.rest(1.0)
+    assert simulator.machine.arm.moves_started == made
+    hand.press(["\x1b"])
+    assert hand.end() == 9
+    check_terminal_is_restored(hand)
+
+
+@pytest.mark.soak
+def test_a_scanner_and_keys_typed_during_the_start_do_nothing(hand, simulator):
+    os.write(hand.master, b"135555\r\n")
+    hand.see(r"Start moving \(2 points open\)")
+    hand.rest(0.5)
+    os.write(hand.master, b"4006381333931\r\n")
+    hand.see("Too fast for a hand. Ignored.")
+    assert "2 points open" in hand.text
+    hand.press(["1", "3", "5"])
+    hand.see("Touch 1 of 2")
+    hand.rest(0.4)
+    os.write(hand.master, b"4006381333931\r\n")
+    hand.see("Too fast for a hand. Ignored.")
+    assert simulator.machine.arm.moves_started == 0
+    hand.press(["0"])
+    assert hand.end() == 9
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("how", ["SIGTERM", "SIGHUP", "ctrl-c", "estop", "link"])
+def test_each_end_restores_terminal_and_tool(hand, simulator, how):
+    codes = {"SIGTERM": 143, "SIGHUP": 129, "ctrl-c": 9, "estop": 5, "link": 3}
+    hand.start()
+    hand.see("Touch 1 of 2")
+    hand.rest(0.4)
+    if how == "estop":
+        simulator.panel.press_estop()
+    elif how == "ctrl-c":
+        hand.press(["\x03"])
+    elif how == "link":
+        hand.host.close()
+    else:
+        hand.command.send_signal(getattr(signal, how))
+    assert hand.end() == codes[how], hand.text
+    assert simulator.machine.tools.selected == (0 if how in ("estop", "link") else 1)
+    check_terminal_is_restored(hand)
+
+
+@pytest.mark.soak
+def test_a_window_that_becomes_too_small_goes_on_as_lines(hand):
+    hand.start()
+    hand.see("Touch 1 of 2")
+    hand.size(79, 23)
+    hand.see(r"Type steps \(x\+0\.1 z-0\.5\)")
+    hand.rest(0.5)
+    os.write(hand.master, b"stop\n")
+    assert hand.end() == 9

@@ -1,0 +1,117 @@
+"""Screens are compared with stored text, in two languages and one that is 40 % longer."""
+
+import gettext
+import unicodedata
+from pathlib import Path
+
+import pytest
+from robolink_cli.wizard.choices import ChoiceSubject
+from robolink_cli.wizard.happenings import Reading, WasRead, WasRegarded
+from robolink_cli.wizard.screens.drawing import screen_of
+from robolink_cli.wizard.screens.told import told_before, told_question
+from wcwidth import wcswidth
+
+from robolink import messages
+from robolink.model import Path as Way
+from robolink.model import Pose
+from robolink.runner import MoveSubject, Question
+from tests.cli.wizard._people import (
+    ARRIVAL,
+    CHECK,
+    Sitting,
+    fit_subject,
+    touch_subject,
+    write_subject,
+)
+
+STORED = Path(__file__).with_name("screens")
+LANGUAGES = ("en", "zh", "pseudo")
+SCARA = (70.0, -40.0, 0.0, 0.0)
+"""Joint angles that go with the pose below, links of 325 and 275 mm."""
+
+
+def moving():
+    here = Pose(349.3, 442.9, -60.0, 43.2, tool=0)
+    hand = Sitting().happens(WasRead(Reading(10.0, "ready", pose=here, axes=SCARA)))
+    going = MoveSubject(
+        Pose(300.0, 400.0, -60.0, 90.0, tool=0), Way.JOINT, 20.0, "Turning to U 90.0."
+    )
+    return hand.happens(WasRegarded(going))
+
+
+def touching():
+    hand = Sitting().asked(touch_subject(first_z_mm=-83.577))
+    hand.keys("+", "+", "3")
+    hand.jogs("z-1.0").keys("5")
+    return hand
+
+
+def choosing():
+    rows = ("line3   EPSON T6-602S", "line4   EPSON T6-602S", "mixer   SoftMotion")
+    return Sitting().asked(ChoiceSubject("Choose", (), rows), Question.TEXT, "Which cell?")
+
+
+SCREENS = {
+    "choose": choosing,
+    "check": lambda: Sitting().asked(CHECK, Question.YES_NO).keys("1"),
+    "moving": moving,
+    "touch": touching,
+    "first touch": lambda: Sitting().asked(touch_subject(number=1, arrival=None)),
+    "turn test": lambda: Sitting().asked(touch_subject(proof=True, total=None)),
+    "fit": lambda: Sitting().asked(
+        fit_subject(0.006, 0.004, 0.131, 0.007, worst=2), Question.YES_NO
+    ),
+    "values": lambda: Sitting().asked(write_subject(1), Question.YES_NO).keys("1"),
+    "two tools": lambda: Sitting().asked(write_subject(1, 2), Question.YES_NO),
+    "question": lambda: Sitting().asked(None, Question.YES_NO, "Is the valve shut?"),
+    "text": lambda: Sitting().asked(None, Question.TEXT, "Id of the new needle?").keys(*"N-0418"),
+    "working": Sitting,
+}
+
+
+@pytest.fixture(params=LANGUAGES)
+def language(request):
+    speak = {
+        "en": None,
+        "zh": gettext.translation(
+            "robolink", Path(messages.__file__).with_name("locale"), ["zh_CN"], fallback=True
+        ).gettext,
+        "pseudo": lambda text: f"[{text}{'~' * (2 * len(text) // 5)}]",
+    }[request.param]
+    before = messages._translate
+    messages.install(speak)
+    yield request.param
+    messages.install(before)
+
+
+@pytest.mark.parametrize("name", SCREENS)
+def test_a_screen_fits_a_terminal_and_its_layout_is_ascii(name, language):
+    hand = SCREENS[name]()
+    rows = screen_of(hand.state, hand.now).rows()
+    assert len(rows) <= 24
+    assert max(map(wcswidth, rows)) <= 80
+    for character in "".join(rows):
+        assert character.isascii() or unicodedata.east_asian_width(character) != "A", character
+    told = [*told_before(hand.state), told_question(hand.state)]
+    assert all(character.isascii() for character in "".join(told)) or language != "en"
+
+
+@pytest.mark.parametrize("name", SCREENS)
+def test_a_screen_is_the_stored_one(name, request):
+    hand = SCREENS[name]()
+    drawn = "\n".join(screen_of(hand.state, hand.now).rows()) + "\n"
+    path = STORED / f"{name.replace(' ', '-')}.txt"
+    if not path.exists():
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(drawn, encoding="ascii")
+        pytest.fail(f"{path.name} was stored; look at it")
+    assert drawn == path.read_text(encoding="ascii")
+
+
+def test_the_picture_finds_the_elbow_by_angles_alone():
+    from robolink_cli.wizard.screens.picture import elbow_of
+
+    assert elbow_of(Pose(349.3, 442.9, -60.0, 0.0), SCARA) == pytest.approx((111.2, 305.4), abs=1.0)
+    assert elbow_of(ARRIVAL, ()) is None
+    assert elbow_of(ARRIVAL, (0.0, 0.5, 0.0)) is None
+    assert elbow_of(ARRIVAL, (170.0, 120.0)) is None

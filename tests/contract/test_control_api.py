@@ -1,0 +1,253 @@
+"""The control API: what a client in any language does to a simulated cell."""
+
+import http.client
+import json
+import socket
+from contextlib import ExitStack
+from importlib.resources import files
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import pytest
+from robolink_simulators.cell.clock import SteeredClock
+from robolink_simulators.control import server as served_api
+from robolink_simulators.control.acts.registry import ACTS
+from robolink_simulators.control.cell import ControlledCell
+from robolink_simulators.control.client import ControlClient
+from robolink_simulators.control.openapi import openapi
+from robolink_simulators.control.server import LONGEST_REQUEST, MOST_CLIENTS, ControlServer
+from robolink_simulators.epson import EpsonSimulator
+from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
+from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.plc import PlcSimulator
+from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
+
+import robolink
+from robolink import ToolOffset
+from robolink.errors import ConfigError, ConnectError, OutcomeUnknownError, TransportBrokenError
+from robolink.register_maps import load_map
+
+ROOT = Path(__file__).parents[2]
+MAP = ROOT / "examples/plc-maps/commit-bit.toml"
+
+
+@pytest.fixture(scope="module")
+def cells():
+    """An EPSON on a port, a PLC with a mailbox on a bus, and one with a map, behind one port."""
+    epson, plc = EpsonSimulator(seed=3), SoftMotionSimulator(seed=3)
+    mapped = PlcSimulator(load_map(MAP))
+    clocks = [SteeredClock(20) for _ in range(3)]
+    with ExitStack() as stack:
+        tcp = stack.enter_context(serve_tcp(epson, clock=clocks[0])).url
+        bus = stack.enter_context(serve_modbus_tcp(plc, clock=clocks[1])).url
+        served = {
+            "a": ControlledCell(epson, clocks[0], {"tcp": tcp}),
+            "b": ControlledCell(plc, clocks[1], {"modbus-tcp": bus}),
+            "c": ControlledCell(mapped, clocks[2]),
+        }
+        yield stack.enter_context(ControlServer(served, token="the-token"))
+
+
+@pytest.fixture
+def at(cells):
+    """A maker of clients, each cell as at first."""
+    with ExitStack() as stack:
+
+        def client(name):
+            simulator = cells.cells[name].simulator
+            simulator.reset()
+            return stack.enter_context(ControlClient(cells.url_of(name))), simulator
+
+        yield client
+    for cell in cells.cells.values():
+        cell.clock.run(20)
+
+
+def raw(cells, method, path, body=b"", headers=()):
+    """Send a request as any client may, and return status and document."""
+    parts = urlsplit(cells.url)
+    connection = http.client.HTTPConnection(parts.hostname, parts.port, timeout=10)
+    try:
+        connection.request(method, path, body, dict(headers))
+        reply = connection.getresponse()
+        return reply.status, json.loads(reply.read())
+    finally:
+        connection.close()
+
+
+@pytest.mark.parametrize("name", ["a", "b"])
+def test_both_kinds_are_looked_at_and_pushed_alike(at, name):
+    control, simulator = at(name)
+    assert {"kind", "machine", "seed", "urls", "acts", "version"} == set(control.about())
+    assert control.do("truth")["tips"] == json.loads(json.dumps(simulator.truth()["tips"]))
+    assert set(control.do("look")) == {"dx_mm", "dy_mm", "dz_mm"}
+    tip = control.do("change_nozzle")["tip"]
+    assert control.do("truth")["tips"]["1"] == tip
+    assert control.do("set_input", number=3) == {}
+    assert control.do("press_estop") == {}
+    assert control.do("release_estop") == {}
+    assert control.do("set_world", eye_sigma_mm=0.5)["parameters"]["eye_sigma_mm"] == 0.5
+    control.do("snapshot", name="before")
+    control.do("change_nozzle")
+    control.do("restore", name="before")
+    assert control.do("truth")["tips"]["1"] == tip
+    control.do("reset")
+    assert control.do("truth")["tips"]["1"] != tip
+    assert control.do("counters")["starts"] >= 1
+
+
+def test_an_answer_is_lost_as_often_as_was_asked_for(at, cells, monkeypatch, tmp_path):
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path))
+    control, simulator = at("a")
+    added = control.do("add_fault", action="drop_reply", match="TLSet 2, XY", times=2)
+    assert [fault.get("on_exchange", 0) for fault in added["pending"]] == [0, 1]
+    with robolink.connect(cells.cells["a"].urls["tcp"], timeout_s=3.0) as controller:
+        with pytest.raises(OutcomeUnknownError):
+            controller.tools.write(2, ToolOffset(1, 2, 3), expected=None)
+    told = control.do("faults")
+    assert [len(told["fired"]), len(told["pending"])] == [1, 1]
+    assert control.do("truth")["stored"]["2"]["y_mm"] == 2
+    lines = control.do("log")["lines"]
+    asked = [line for line in lines if line["direction"] == ">" and "TLSet 2, XY" in line["text"]]
+    assert len(asked) == 1
+    assert control.do("log", after=asked[0]["number"])["lines"][0]["number"] > asked[0]["number"]
+    assert control.do("clear_faults")["pending"] == []
+    assert simulator.faults.pending == ()
+
+
+def test_time_is_paused_stepped_and_hastened(at):
+    control, simulator = at("a")
+    control.do("set_clock", factor=0)
+    then = control.do("clock")["simulated_s"]
+    assert control.do("clock") == {"simulated_s": then, "factor": 0}
+    assert control.do("step", seconds=2.5)["simulated_s"] == pytest.approx(then + 2.5)
+    assert simulator.now_ns == pytest.approx((then + 2.5) * 1e9)
+    control.do("set_clock", factor=1000)
+    assert control.do("clock")["factor"] == 1000
+
+
+@pytest.mark.parametrize(
+    ("name", "act", "given", "words"),
+    [
+        ("a", "dance", {}, "Known are: look"),
+        ("a", "truth", {"tool": 1}, "takes no 'tool'"),
+        ("a", "press_estop", {"hard": True}, "takes no 'hard'"),
+        ("a", "raise_error", {}, "raise_error needs number"),
+        ("a", "raise_error", {"number": "4002"}, "whole number from 0 to 9999"),
+        ("a", "set_input", {"number": 9000}, "no bit"),
+        ("a", "set_input", {"number": 1, "on": 7}, "true or false"),
+        ("a", "freeze", {}, "cannot do 'freeze'"),
+        ("a", "restore", {"name": "nothing"}, "no snapshot"),
+        ("a", "step", {"seconds": -1}, "from 0 to"),
+        ("a", "set_clock", {"factor": 1e9}, "from 0 to 1000"),
+        ("a", "add_fault", {"action": "explode"}, "Known are"),
+        ("a", "add_fault", {"action": "echo"}, "cannot happen on epson"),
+        ("a", "add_fault", {"action": "garble_reply", "bit": 9}, "fault 1, bit"),
+        ("b", "add_fault", {"action": "lose_login"}, "cannot happen on softmotion"),
+        ("b", "teach", {}, "cannot do 'teach'"),
+        ("c", "look", {}, "cannot do 'look'"),
+        ("a", "set_world", {"gravity": 1}, "no parameter 'gravity'"),
+        ("a", "push", {"text": "two\nlines"}, "printable"),
+    ],
+)
+def test_what_is_unknown_or_wrong_is_refused_by_name(at, name, act, given, words):
+    control, simulator = at(name)
+    with pytest.raises(ConfigError, match=words):
+        control.do(act, **given)
+    assert not simulator.faults.pending
+    assert simulator.counters()["exchanges"] == 0
+
+
+def test_a_client_in_any_language_is_told_what_went_wrong(cells):
+    base = urlsplit(cells.url).path
+    post = f"{base}/cells/a"
+    assert raw(cells, "GET", f"{base}/cells/a/truth")[0] == 200
+    assert raw(cells, "POST", f"{post}/truth")[0] == 200
+    assert raw(cells, "GET", f"{base}/cells/a/log?after=0")[0] == 200
+    assert raw(cells, "GET", f"{base}/cells/a/press_estop")[0] == 405
+    assert raw(cells, "POST", f"{post}/dance")[0] == 404
+    assert raw(cells, "POST", f"{base}/cells/z/truth")[0] == 404
+    assert raw(cells, "GET", "/the-token/v2")[0] == 404
+    assert raw(cells, "POST", f"{post}/truth", b"[]")[0] == 400
+    assert raw(cells, "POST", f"{post}/truth", b"{")[0] == 400
+    assert raw(cells, "POST", f"{post}/truth", b'{"a":' * 5000)[0] == 400
+    assert raw(cells, "POST", f"{post}/look", b'{"tool": 1e999}')[0] == 400
+    assert raw(cells, "POST", f"{post}/jog_onto_pin")[0] == 400  # not in Teach mode
+    too_long = b" " * (LONGEST_REQUEST + 1)
+    assert raw(cells, "POST", f"{post}/truth", too_long)[0] == 413
+    assert raw(cells, "POST", f"{post}/truth", headers=[("Content-Length", "x")])[0] == 411
+    status, told = raw(cells, "POST", f"{post}/raise_error")
+    assert (status, told["ok"], told["schema"]) == (400, False, "robolink/control/1")
+    assert told["error"]
+    assert told["remedy"]
+
+
+def test_who_does_not_show_the_token_learns_nothing(cells):
+    answers = {
+        json.dumps(raw(cells, method, path))
+        for method in ("GET", "POST")
+        for path in ("/", "/v1", "/x/v1", "/the-toke/v1/cells/a/truth", "/the-token2/v1")
+    }
+    assert len(answers) == 1
+    assert json.loads(answers.pop())[0] == 403
+    with (
+        pytest.raises(ConfigError, match="token"),
+        ControlClient(cells.url_of("a").replace("the-token", "another")) as client,
+    ):
+        client.do("truth")
+    assert "the-token" not in repr(cells.answered("GET", "/", b""))
+
+
+def test_silent_clients_are_bounded_and_keep_nobody_out_for_good(cells, monkeypatch):
+    monkeypatch.setattr(served_api, "MOST_CLIENTS", 4)
+    parts = urlsplit(cells.url)
+    silent = [socket.create_connection((parts.hostname, parts.port), 5) for _ in range(3)]
+    with ExitStack() as stack:
+        for connection in silent:
+            stack.callback(connection.close)
+        with ControlClient(cells.url_of("a")) as client:
+            assert client.do("counters")
+            with socket.create_connection((parts.hostname, parts.port), 5) as one_too_many:
+                assert one_too_many.recv(1) == b""
+    with ControlClient(cells.url_of("a")) as client:
+        assert client.do("counters")
+    assert MOST_CLIENTS >= 16
+
+
+def test_it_listens_where_only_this_machine_reaches_it():
+    cell = {"a": ControlledCell(EpsonSimulator())}
+    with pytest.raises(ConfigError, match="other machines"):
+        ControlServer(cell, ("0.0.0.0", 0))
+    with ControlServer(cell) as control, pytest.raises(ConnectError, match="cannot listen"):
+        ControlServer(cell, ("127.0.0.1", urlsplit(control.url).port or 0))
+    with ControlClient(control.url_of("a")) as gone, pytest.raises(ConnectError, match="No sim"):
+        gone.do("truth")
+    with pytest.raises(ConfigError, match="not the control URL") as told:
+        ControlClient("https://secret@127.0.0.1:1/v1")
+    assert "secret" not in str(told.value)
+
+
+def test_a_simulator_that_ends_cuts_those_who_ask():
+    control = ControlServer({"a": ControlledCell(EpsonSimulator())})
+    with control, ControlClient(control.url_of("a")) as client:
+        client.do("truth")
+        control.close()
+        with pytest.raises(TransportBrokenError, match="is gone"):
+            client.do("truth")
+
+
+def test_the_openapi_document_of_the_wheel_is_the_one_of_the_acts(cells):
+    held = json.loads(files("robolink_simulators.control").joinpath("openapi.json").read_bytes())
+    # Made anew: python -m robolink_simulators.control.openapi > .../control/openapi.json
+    assert held == json.loads(json.dumps(openapi()))
+    status, served = raw(cells, "GET", f"{urlsplit(cells.url).path}/openapi.json")
+    assert (status, served) == (200, held)
+    acts = {name for kind in ACTS.values() for name in kind}
+    assert acts <= {path.rpartition("/")[2] for path in held["paths"]}
+    assert all(act.says.endswith(".") for kind in ACTS.values() for act in kind.values())
+
+
+def test_the_page_names_every_act():
+    page = (ROOT / "docs/control-api.md").read_text()
+    acts = {name for kind in ACTS.values() for name in kind}
+    assert {name for name in acts if f"`{name}`" not in page} == set()

@@ -1,0 +1,102 @@
+"""Of a served simulator nothing is left for the next one, seen from outside."""
+
+import json
+import os
+import socket
+import subprocess
+import sys
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+import robolink
+from robolink import ToolOffset
+from robolink.errors import OutcomeUnknownError
+
+LOST = 'schema = "robolink/faults/1"\nlink = "{link}"\n[[fault]]\naction = "drop_reply"\n'
+
+
+def free_port():
+    with socket.socket() as held:
+        held.bind(("127.0.0.1", 0))
+        return held.getsockname()[1]
+
+
+@contextmanager
+def served(*arguments):
+    paths = os.pathsep.join(path for path in sys.path if path)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "robolink_cli", "--json", "sim", *arguments],
+        env={**os.environ, "PYTHONPATH": paths},
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    with process, process.stdout:
+        try:
+            yield json.loads(process.stdout.readline())
+        finally:
+            process.terminate()
+
+
+def lose_an_answer(document):
+    """Write a tool whose answer is lost, and return who was written to."""
+    with robolink.connect(document["url"], timeout_s=3.0) as controller:
+        with pytest.raises(OutcomeUnknownError):
+            controller.tools.write(2, ToolOffset(1, 2, 3), expected=robolink.ANY)
+        assert controller.outcomes.open_markers()
+        return controller.outcomes.identity
+
+
+def starts_clean(document):
+    with robolink.connect(document["url"]) as controller:
+        assert not controller.outcomes.open_markers()
+        controller.tools.write(2, ToolOffset(1, 2, 3), expected=robolink.ANY)
+        return controller.outcomes.identity
+
+
+# On the same port, with the same seed, one after the other.
+KINDS = [
+    pytest.param("epson", "epson+tcp", "TLSet 2, XY", "--tcp", id="epson"),
+    pytest.param(
+        *("softmotion", "softmotion+modbus-tcp", "WRITE_TOOL", "--modbus-tcp"),
+        marks=pytest.mark.soak,
+        id="softmotion",
+    ),
+]
+
+
+@pytest.mark.parametrize(("kind", "link", "match", "at"), KINDS)
+def test_the_next_simulator_on_the_port_starts_clean(kind, link, match, at, tmp_path, monkeypatch):
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "own"))
+    plan = tmp_path / "lost.toml"
+    plan.write_text(f'{LOST.format(link=link)}match = "{match}"\n')
+    common = (kind, at, f"127.0.0.1:{free_port()}", "--seed", "7")
+    with served(*common, "--faults", str(plan)) as first:
+        one = lose_an_answer(first)
+        assert Path(first["state_dir"]).is_dir()
+    with served(*common) as second:
+        assert first["url"] == second["url"]
+        assert starts_clean(second) != one
+    assert not Path(first["state_dir"]).exists()
+
+
+@pytest.mark.soak
+def test_a_machine_without_a_number_is_told_apart_by_the_folder(tmp_path, monkeypatch):
+    """A PLC with a map is known by its address: the folder of each run keeps them apart."""
+    own = tmp_path / "own"
+    own.mkdir()
+    (own / "journal.db").write_bytes(b"precious")
+    plan = tmp_path / "lost.toml"
+    plan.write_text(f'{LOST.format(link="plc+modbus-tcp")}match = "fc5 2000"\n')
+    example = Path(__file__).parents[2] / "examples/plc-maps/commit-bit.toml"
+    common = ("plc", "--map", str(example), "--modbus-tcp", f"127.0.0.1:{free_port()}")
+    with served(*common, "--faults", str(plan)) as first:
+        monkeypatch.setenv("ROBOLINK_STATE_DIR", first["state_dir"])
+        one = lose_an_answer(first)
+    with served(*common) as second:
+        monkeypatch.setenv("ROBOLINK_STATE_DIR", second["state_dir"])
+        assert starts_clean(second) == one
+    assert [path.name for path in own.iterdir()] == ["journal.db"]
+    assert (own / "journal.db").read_bytes() == b"precious"

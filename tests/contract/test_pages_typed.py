@@ -1,0 +1,86 @@
+"""Pages of commands, typed as they stand from top to bottom, against one simulated cell.
+
+Every ``$ robolink`` line of a page runs in this process; a line ``(exit code N)`` below it says how
+it ends. The cells of the page's own TOML are written to ``robolink.toml``, with the simulator in
+place of every address.
+"""
+
+import re
+import shlex
+import sys
+from pathlib import Path
+
+import pytest
+from robolink_cli import main
+from robolink_simulators.cell.tip_switches import LightBeam
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.hosting.in_process.epson import register, unregister
+
+pytestmark = pytest.mark.simulator_only
+
+ROOT = Path(__file__).parents[2]
+TOML = re.compile(r"^```toml\n(.*?)^```", re.M | re.S)
+CONSOLE = re.compile(r"^```console\n(.*?)^```", re.M | re.S)
+CELL = '[cells.line3]\nurl = "epson+tcp://192.168.0.1:5000"\n'
+RECIPES = {"line-computer": "needle-beams", "ci": "needle-beams"}
+"""The recipe that a page calls needle.toml without saying where it is from."""
+
+
+@pytest.fixture
+def cell(tmp_path, monkeypatch):
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
+    monkeypatch.setitem(sys.modules, "keyring", None)
+    monkeypatch.chdir(tmp_path)
+    simulator = EpsonSimulator(seed=3, serial="SIM00001", state_path=tmp_path / "flash.json")
+    for number, heading_deg in ((3, 2.0), (4, 91.0)):
+        beam = LightBeam((175.0, 488.0, -106.0), heading_deg, radius_mm=0.1)
+        simulator.world.connect(number, beam, latency_s=0.002, noise_mm=0.003)
+    register("pages", simulator)
+    yield simulator
+    unregister("pages")
+
+
+def typed(page):
+    """Return the commands of a page, with the exit code that it says for each."""
+    lines = [line for block in CONSOLE.findall(page) for line in block.splitlines()]
+    ends = [re.fullmatch(r"\(exit code (\d+)\)", line) for line in (*lines[1:], "")]
+    return [
+        (line.removeprefix("$ robolink "), int(end[1]) if end else 0)
+        for line, end in zip(lines, ends, strict=True)
+        if line.startswith("$ robolink ")
+    ]
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "tutorial",
+        "after-a-crash",
+        "people",
+        "nightly-check",
+        "epson-controller",
+        pytest.param("first-hardware", marks=pytest.mark.soak),
+        pytest.param("line-computer", marks=pytest.mark.soak),
+        "ci",
+    ],
+)
+def test_a_page_can_be_typed_from_top_to_bottom(cell, name, tmp_path, capsys):
+    page = (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8")
+    cells = "".join(block for block in TOML.findall(page) if "[cells." in block) or CELL
+    cells = re.sub(r'^url = ".*"', f'url = "{cell.url}"', cells, flags=re.M)
+    if "confirmed_by" not in cells:
+        confirmed = "remote_timeout_s = 60\nremote_timeout_confirmed_by = 'me'\n"
+        cells = cells.replace("url = ", f"{confirmed}url = ")
+    (tmp_path / "robolink.toml").write_text(cells, encoding="utf-8")
+    if recipe := RECIPES.get(name):
+        example = ROOT / "examples" / "recipes" / f"{recipe}.toml"
+        (tmp_path / "needle.toml").write_bytes(example.read_bytes())
+        cell.machine.motors_on = True
+        cell.world.change_nozzle(1)
+    commands = typed(page)
+    assert len(commands) >= 2
+    for line, expected in commands:
+        words = shlex.split(line.partition("  #")[0].replace("ASSIST", cell.url))
+        code = main.run(words)
+        shown = capsys.readouterr()
+        assert code == expected, f"robolink {line}\n{shown.out}{shown.err}"

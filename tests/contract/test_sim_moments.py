@@ -1,0 +1,131 @@
+"""Every simulated controller is made anew, and goes back to a moment, while it is served."""
+
+import json
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import pytest
+from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.epson import EpsonSimulator
+from robolink_simulators.faults import Fault, FaultAction, PlcFault, PlcFaultAction
+from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
+from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.plc import PlcSimulator, serve_plc
+from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
+
+import robolink
+from robolink import ToolOffset
+from robolink.errors import ConfigError, RobolinkError
+from robolink.register_maps import load_map
+
+MAP = Path(__file__).parents[2] / "examples/plc-maps/commit-bit.toml"
+
+
+class Served:
+    """A simulator of one kind on a port."""
+
+    def __init__(self, kind, stack, folder):
+        clock = ScaledClock(20)
+        self.kind = kind
+        self.simulator: Any
+        host: Any
+        if kind == "epson":
+            self.simulator = EpsonSimulator(seed=4)
+            host = serve_tcp(self.simulator, clock=clock)
+        elif kind == "softmotion":
+            self.simulator = SoftMotionSimulator(seed=4)
+            host = serve_modbus_tcp(self.simulator, clock=clock)
+        else:
+            numbered = folder / "numbered.toml"
+            place = '[device_id]\ntable = "input"\naddress = 50\n'
+            numbered.write_text(f"{MAP.read_text()}\n{place}")
+            self.simulator = PlcSimulator(load_map(numbered), seed=4)
+            host = serve_plc(self.simulator, numbered, clock=clock)
+        self.url = stack.enter_context(host).url
+
+    def one_fault(self):
+        if self.kind == "softmotion":
+            return PlcFault(PlcFaultAction.DROP_REPLY)
+        return Fault(FaultAction.DROP_REPLY)
+
+
+@pytest.fixture(params=["epson", "softmotion", "plc"])
+def served(request, tmp_path, monkeypatch):
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
+    with ExitStack() as stack:
+        yield Served(request.param, stack, tmp_path)
+
+
+def write(served, z_mm):
+    with robolink.connect(served.url) as controller:
+        tool = 2
+        controller.tools.write(tool, ToolOffset(1, 2, z_mm), expected=robolink.ANY)
+        return controller.outcomes.identity
+
+
+def test_it_is_made_anew_as_another_controller(served):
+    at_first = served.simulator.truth()
+    who = write(served, -31.0)
+    assert served.simulator.truth() != at_first
+    assert served.simulator.counters()["tool_writes"]
+    with robolink.connect(served.url) as left_open:
+        served.simulator.faults.add(served.one_fault())
+        served.simulator.reset()
+        with pytest.raises(RobolinkError):
+            left_open.status()
+    assert not served.simulator.faults.pending
+    assert served.simulator.truth() == at_first
+    assert write(served, -32.0) != who
+
+
+def test_it_goes_back_to_a_moment_as_the_same_controller(served):
+    who = write(served, -31.0)
+    moment, then = served.simulator.kept_moment(), served.simulator.truth()
+    if served.kind != "plc":
+        served.simulator.world.change_nozzle()
+        place = served.simulator.world.robot.flange()
+        served.simulator.world.robot.turn(20.0)
+        assert served.simulator.world.robot.flange() != place
+    write(served, -32.0)
+    served.simulator.faults.add(served.one_fault())
+    served.simulator.go_back(moment)
+    assert served.simulator.truth() == then
+    assert not served.simulator.faults.pending
+    if served.kind != "plc":
+        there = served.simulator.world.robot.flange()
+        assert there.coordinates() == pytest.approx(place.coordinates(), abs=1e-9)
+    assert write(served, -31.0) == who
+    # What came later has not crept into what was kept.
+    served.simulator.go_back(moment)
+    assert served.simulator.truth() == then
+
+
+def test_the_truth_has_the_same_shape_for_every_kind(served):
+    truth = json.loads(json.dumps(served.simulator.truth()))
+    assert truth["schema"] == "robolink/sim-truth/1"
+    assert truth["kind"] == served.kind
+    assert truth["selected_tool"] == 1
+    components = {"x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg"}
+    assert {frozenset(offset) for offset in truth["stored"].values()} == {frozenset(components)}
+    names = {"exchanges", "moves_started", "tool_writes", "starts", "touches"}
+    assert set(served.simulator.counters()) == names
+    assert list(served.simulator.motions()) == []
+
+
+def test_what_keeps_its_state_in_a_file_is_not_made_anew(tmp_path):
+    for simulator in (
+        EpsonSimulator(state_path=tmp_path / "epson.json"),
+        SoftMotionSimulator(state_path=tmp_path / "plc.json"),
+    ):
+        before = simulator.truth()
+        with pytest.raises(ConfigError, match="keeps its state"):
+            simulator.reset()
+        with pytest.raises(ConfigError, match="keeps its state"):
+            simulator.go_back(simulator.kept_moment())
+        assert simulator.truth() == before
+
+
+def test_a_moment_fits_the_same_kind_of_machine_only():
+    with pytest.raises(ConfigError, match="softmotion Kin_Scara3_Z cannot be put into epson"):
+        EpsonSimulator().go_back(SoftMotionSimulator().kept_moment())

@@ -1,0 +1,115 @@
+"""Every command of README and of the pages is one of today, and takes what is typed after it.
+
+Nothing is carried out here: names, options and numbers of arguments are those of the command.
+``tests/cli/test_pages_typed.py`` types whole pages.
+"""
+
+import re
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+import pytest
+from babel.messages.pofile import read_po
+from robolink_cli import main
+from robolink_cli.command_map import RENAMED
+
+ROOT = Path(__file__).parents[2]
+PAGES = [
+    *(ROOT / name for name in ("README.md", "README.zh.md", "SECURITY.md")),
+    *sorted((ROOT / "docs").glob("*.md")),
+    *sorted((ROOT / "docs" / "reference").glob("*.md")),
+    ROOT / "simulators" / "README.md",
+]
+CODE = re.compile(r"`(robolink [^`]+)`")
+LINE = re.compile(r"^(?: {4,}|\$ | *)\$? ?(robolink .+)$")
+FENCE = re.compile(r"^ *```")
+CUT = re.compile(r"\s+(?:[#|>&;]|2>).*$|\s{3,}\S.*$|\s+\.\.\.?$")
+LEAST = 300
+"""So many commands there are at least; fewer, and this reads the pages wrongly."""
+
+
+def blocks(text: str) -> Iterator[str]:
+    """Yield the lines of fenced and indented blocks, with those that go on joined."""
+    inside = False
+    for line in text.replace("\\\n", " ").splitlines():
+        if FENCE.match(line):
+            inside = not inside
+        elif inside or line.startswith("    "):
+            yield line
+
+
+def commands(page: Path) -> list[str]:
+    """Return what a page tells to type, as it is typed, without what the shell does with it."""
+    text = page.read_text(encoding="utf-8")
+    found = [match[1] for line in blocks(text) if (match := LINE.match(line))]
+    fenced = re.sub(r"^ *```.*?^ *```", "", text, flags=re.M | re.S)
+    found += [" ".join(code.split()) for code in CODE.findall(fenced)]
+    return [CUT.sub("", one) for one in found]
+
+
+def problem(line: str) -> str | None:
+    """Return what is wrong with a command, ``None`` when the command line would take it."""
+    words = shlex.split(line.replace("[", "").replace("]", ""))[1:]
+    command: click.Command = main.cli
+    context = click.Context(command, info_name="robolink")
+    while True:
+        try:
+            parser = command.make_parser(context)
+            _values, rest, _ = parser.parse_args(list(words))
+        except click.UsageError as error:
+            return error.format_message()
+        if not isinstance(command, click.Group):
+            return None
+        if not rest:
+            return None
+        if rest[0].isupper():  # COMMAND, NAME: any of them
+            return None
+        if command is main.cli and rest[0] in RENAMED:
+            return f"{rest[0]} is now called {RENAMED[rest[0]][1]}"
+        found = command.get_command(context, rest[0])
+        if found is None:
+            return f"there is no {rest[0]!r} in {context.command_path}"
+        command, words = found, rest[1:]
+        context = click.Context(found, parent=context, info_name=rest[0])
+
+
+@pytest.fixture(scope="module")
+def told():
+    return {page: commands(page) for page in PAGES}
+
+
+def test_every_command_of_the_pages_can_be_typed(told):
+    wrong = [
+        f"{page.relative_to(ROOT)}: {line}: {why}"
+        for page, lines in told.items()
+        for line in dict.fromkeys(lines)
+        if (why := problem(line))
+    ]
+    assert not wrong, "\n".join(wrong)
+    assert sum(map(len, told.values())) > LEAST
+
+
+@pytest.mark.parametrize(
+    ("line", "why"),
+    [
+        ("robolink recalibrate x.toml", "now called change"),
+        ("robolink tool lost", "no 'lost'"),
+        ("robolink status --slow", "--slow"),
+        ("robolink tool get 1 --mode", "requires an argument"),
+    ],
+)
+def test_a_command_that_cannot_be_typed_is_told(line, why):
+    assert why in str(problem(line))
+
+
+def test_the_sentences_of_troubleshooting_are_those_of_the_screen():
+    """Each quoted sentence stands in the catalogue; ``...`` stands for what is filled in."""
+    page = (ROOT / "docs" / "troubleshooting.md").read_text(encoding="utf-8")
+    quoted = re.findall(r'^\| "(.+?)" \|', page, re.M)
+    with (ROOT / "robolink" / "locale" / "robolink.pot").open("rb") as file:
+        sentences = [re.sub(r"\s+", " ", str(one.id)) for one in read_po(file) if one.id]
+    shown = {re.sub(r"\{[^}]*\}", "...", sentence) for sentence in sentences}
+    assert len(quoted) > 20
+    assert [one for one in quoted if not any(one in sentence for sentence in shown)] == []

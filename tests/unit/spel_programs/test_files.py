@@ -1,0 +1,173 @@
+"""Files of a program, in a folder that nothing leads out of (docs/reference/spel.md 18)."""
+
+import pytest
+from robolink_simulators.epson.spel.file_folder import FileFolder
+from robolink_simulators.epson.spel.source.point_file import read_points
+
+
+@pytest.fixture
+def folder(tmp_path):
+    made = tmp_path / "files"
+    made.mkdir()
+    (tmp_path / "secret.txt").write_text("not yours\n")
+    return made
+
+
+@pytest.fixture
+def run(cell, folder):
+    """Return what a main with a String a$ and an Integer n prints, its files lying in a folder."""
+
+    def ran(*lines, **options):
+        text = ["Function main", "String a$", "Integer n", "Byte z(3)", *lines, "Fend"]
+        made = cell("\n".join(text), **options)
+        made.runner.session.files.root = folder
+        shown = made.run()
+        if made.runner.failure is not None:
+            return made.runner.failure.number
+        return shown
+
+    return ran
+
+
+def test_what_is_written_is_read_line_by_line(run, folder):
+    shown = run(
+        'WOpen "log.txt" As #30; Print #30, "one", 2; Print #30, "a,", 3; Close #30',
+        'AOpen "log.txt" As #31; Write #31, "last"; Close #31',
+        'ROpen "log.txt" As #FreeFile; Print Lof(30), Eof(30)',
+        "Line Input #30, a$; Print a$; Input #30, a$, n; Print a$, n",
+        "Read #30, a$, 3; Print a$, Eof(30); Read #30, a$, 9; Print a$, Eof(30)",
+        "Seek #30, 4; Line Input #30, a$; Print a$",
+        "Close #30",
+    )
+    assert shown == ["3 0", "one 2", "a 3", "las 0", "t -1", "2"]
+    assert (folder / "c" / "log.txt").read_bytes() == b"one 2\r\na, 3\r\nlast"
+
+
+def test_bytes_go_to_and_fro_in_a_binary_file_alone(run, folder):
+    shown = run(
+        'BOpen "b" As #30; z(0) = 1; z(1) = 2; z(2) = 99; WriteBin #30, z(), 3; WriteBin #30, 255',
+        "Seek #30, 2; ReadBin #30, n; Print n; ReadBin #30, n; Print n",
+    )
+    assert shown == ["99", "255"]
+    assert (folder / "c" / "b").read_bytes() == b"\x01\x02\x63\xff"
+    assert run('UOpen "b" As #30; ReadBin #30, n') == 2449
+    assert run('WOpen "b" As #30; WriteBin #30, 1') == 2449
+
+
+def test_what_is_kept_back_is_written_by_flush(cell, folder):
+    made = cell('Function main\nWOpen "x" As #30\nPrint #30, 1\nWait 1\nFlush #30\nWait 1\nFend')
+    made.runner.session.files.root = folder
+    made.runner.start("main", 0)
+    made.simulator.advance(500_000_000)
+    assert (folder / "c" / "x").read_bytes() == b""
+    made.simulator.advance(1_500_000_000)
+    assert (folder / "c" / "x").read_bytes() == b"1\r\n"
+
+
+def test_folders_and_drives_are_gone_into(run, folder):
+    shown = run(
+        'MkDir "d"; WOpen "d\\e.txt" As #30; Close #30; Copy "d/e.txt", "f.txt"; Print CurDir$',
+        'ChDir "d"; Print CurDir$, FileExists("e.txt"), FileExists("\\f.txt"), FileExists("f.txt")',
+        'Rename "e.txt", "g.txt"; Print FileExists("e.txt"), FileExists("C:\\d\\g.txt")',
+        'Del "g.txt"; ChDir ".."; RmDir "d"; Print FolderExists("d")',
+        'ChDrive "E"; Print CurDrive$, FileExists("f.txt"), FileExists("c:/f.txt")',
+    )
+    assert shown == ["C:\\", "C:\\d -1 -1 0", "0 -1", "0", "E 0 -1"]
+    assert sorted(p.name for p in (folder / "c").iterdir()) == ["f.txt"]
+
+
+@pytest.mark.parametrize(
+    "name", ["..\\secret.txt", "d\\..\\..\\secret.txt", "C:\\..\\secret.txt", "/../../secret.txt"]
+)
+def test_no_name_leads_out_of_the_folder(run, folder, name):
+    for statement in (
+        f'ROpen "{name}" As #30',
+        f'WOpen "{name}" As #30',
+        f'Del "{name}"',
+        f'Copy "{name}", "mine"',
+        f'ImportPoints "{name}", "p.pts"',
+        f'Print FileExists("{name}")',
+    ):
+        assert run(statement) == 7203
+    assert (folder.parent / "secret.txt").read_text() == "not yours\n"
+
+
+def test_no_link_leads_out_of_the_folder(run, folder):
+    (folder / "c").mkdir()
+    (folder / "c" / "link").symlink_to(folder.parent)
+    assert run('ROpen "link\\secret.txt" As #30') == 7203
+    assert run('ChDir "link"') == 7203
+    (folder / "d").symlink_to(folder.parent, target_is_directory=True)
+    assert run('ROpen "d:\\secret.txt" As #30') == 7203
+    assert run('WOpen "d:\\new.txt" As #30') == 7203
+    assert not (folder.parent / "new.txt").exists()
+
+
+@pytest.mark.parametrize(
+    ("line", "number"),
+    [
+        ('WOpen "a" As #30; WOpen "b" As #30', 2440),
+        ('ROpen "none" As #30', 2441),
+        ("Print #30, 1", 2442),
+        ("Close #30", 2442),
+        ('WOpen "a" As #29', 4002),
+        ('WOpen "a" As #30; Seek #30, -1', 2445),
+        ('WOpen "a" As #30; Line Input #30, a$', 2447),
+        ('WOpen "a" As #30; Close #30; ROpen "a" As #30; Print #30, 1', 2448),
+        ('WOpen "a" As #30; Close #30; ROpen "a" As #30; Line Input #30, a$', 2452),
+        ('WOpen "a*" As #30', 2450),
+        ('ChDrive "12"', 2455),
+        ('ChDir "none"', 2456),
+        ('Del "none"', 7213),
+        ('Copy "none", "a"', 7213),
+        ('MkDir "a"; MkDir "a"', 7203),
+        ('WOpen "a" As #30; Print #30, "x,y"; Close #30; ROpen "a" As #30; Input #30, a$', 2505),
+        ('LoadPoints "none.pts"', 7213),
+        ('LoadPoints "a b.pts"', 2522),
+        ('SavePoints "c:\\a.pts"', 2522),
+        ('SavePoints "a234567890123456789012345678901234.pts"', 2520),
+        ('ImportPoints "none.pts", "a.pts"', 7213),
+        ('WOpen "a" As #30; Print #30, 1; Close #30; ImportPoints "a", "a.pts", 2', 2262),
+    ],
+)
+def test_what_cannot_be_has_its_own_number(run, line, number):
+    assert run(line) == number
+
+
+def test_numbers_of_files_come_to_an_end(run):
+    opened = "For n = 30 To 63; WOpen Str$(n) As #n; Next"
+    assert run(opened.replace("; ", "\n"), "Print FreeFile") == 2446
+
+
+def test_a_file_belongs_to_its_task_and_is_closed_with_it(cell, folder):
+    made = cell(
+        "Function main\nXqt 2, writer\nWait 0.1\nOnErr GoTo other\nPrint #30, 2\nother:\n"
+        'Print Err\nTaskWait 2\nWOpen "a" As #30\nFend\n'
+        'Function writer\nWOpen "a" As #30\nPrint #30, 1\nWait 1\nFend'
+    )
+    made.runner.session.files.root = folder
+    assert made.run() == ["2443"]
+    assert made.runner.failure is None
+
+
+def test_points_come_in_and_go_out_as_files(run, folder, tmp_path):
+    shown = run(
+        'P1 = XY(1, 2, 3, 4) /L /2; P7 = XY(1.5, 0, 0, 0); PLabel 7, "pin"',
+        'SavePoints "mine"; ExportPoints "mine.pts", "out.pts"; ClearPoints',
+        'ImportPoints "out.pts", "back.pts"; Print PDef(1); LoadPoints "back.pts"',
+        "Print CX(pin), CY(P1), Hand(P1), PLocal(P1)",
+        'ClearPoints; P2 = Here; LoadPoints "back", Merge; Print PDef(1), PDef(2)',
+        'LoadPoints "back"; Print PDef(1), PDef(2)',
+    )
+    assert shown == ["0", "1.5 2 2 2", "-1 -1", "-1 0"]
+    points, labels = read_points(folder / "c" / "out.pts")
+    assert sorted(points) == [1, 7]
+    assert labels == {"pin": 7}
+
+
+def test_a_folder_of_its_own_is_gone_at_the_end():
+    files = FileFolder()
+    root = files.root
+    (root / "kept").write_text("x")
+    del files
+    assert not root.exists()

@@ -276,6 +276,14 @@ def test_the_sizes_of_steps_stay_within_what_the_runner_takes():
     assert hand.state.jogging.step == STEP_SIZES[0] == 0.01
 
 
+def test_a_position_from_before_the_robot_moved_is_not_shown_as_that_of_now():
+    hand = Sitting().reads(ARRIVAL)
+    hand.now += 5.0
+    hand.happens(WasRegarded(touch_subject()))
+    hand.happens(WasAsked(1, "?", Question.PLACE, hand.now))
+    assert hand.state.pose is None
+
+
 def test_a_reading_without_a_position_changes_nothing_of_the_steps():
     hand = at_touch().happens(WasRead(Reading(11.0, "fault", halted=True)))
     assert hand.keys("5").sent == []

@@ -106,7 +106,8 @@ def by_lines(words, simulator):
 
 
 def by_screen(words, simulator, pictures):
-    hand, shots = ScreenHand(words, simulator), {}
+    hand = ScreenHand(words, simulator)
+    shots: dict[str, str] = {}
     began = time.monotonic()
     hand.start()
     touched = 0

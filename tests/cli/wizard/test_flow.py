@@ -225,11 +225,8 @@ HAPPENINGS = st.one_of(
 )
 
 
-@settings(max_examples=150, deadline=None)
-@given(st.lists(HAPPENINGS, max_size=40), st.sampled_from([0, 0, 2, 3]))
-def test_no_order_of_keys_lines_and_readings_takes_an_unjogged_touch_or_writes_untyped(
-    history, first
-):
+def check_history(history, first):
+    """Nothing is taken unjogged and nothing written untyped, whatever comes in which order."""
     hand, pose, moved, digits, lined = Sitting(), ARRIVAL, 0.0, "", ""
     hand.asked(*SUBJECTS[first])
     for what, of in history:
@@ -264,6 +261,24 @@ def test_no_order_of_keys_lines_and_readings_takes_an_unjogged_touch_or_writes_u
             if text == "y" and state.writing is not None:
                 number = str(state.writing.tools[0])
                 assert number in digits or lined == number
+
+
+HISTORIES = (st.lists(HAPPENINGS, max_size=40), st.sampled_from([0, 0, 2, 3]))
+
+
+@settings(max_examples=80, deadline=None)
+@given(*HISTORIES)
+def test_no_order_of_keys_lines_and_readings_takes_an_unjogged_touch_or_writes_untyped(
+    history, first
+):
+    check_history(history, first)
+
+
+@pytest.mark.soak
+@settings(max_examples=3000, deadline=None)
+@given(*HISTORIES)
+def test_no_order_of_many_does(history, first):
+    check_history(history, first)
 
 
 def test_the_sizes_of_steps_stay_within_what_the_runner_takes():

@@ -58,6 +58,8 @@ def faults(english, chinese):
         != chinese[: len(chinese) - len(chinese.lstrip())]
     ):
         yield "other blanks in front"
+    if english.count("\\b\n") != chinese.count("\\b\n"):
+        yield "another part keeps its lines"
     yield from (f"{word}: write {other}" for word, other in OTHER_WORDS.items() if word in chinese)
     strange = {sign for sign in AMBIGUOUS if sign in chinese} - set(english)  # a page may have it
     yield from (f"{sign!r} is two columns wide somewhere" for sign in sorted(strange))

@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     from robolink.testing.subject import Check as Check
     from robolink.testing.subject import ContractBrokenError as ContractBrokenError
     from robolink.testing.subject import Subject as Subject
+    from robolink.testing.suite import CheckOutcome as CheckOutcome
     from robolink.testing.suite import check_controller as check_controller
+    from robolink.testing.suite import outcomes as outcomes
     from robolink.testing.tool_checks import WRITING_CHECKS as WRITING_CHECKS
 else:
     __getattr__ = lazy_exports(
@@ -26,7 +28,7 @@ else:
             "motion_checks": "MOVING_CHECKS",
             "reading_checks": "READING_CHECKS",
             "subject": "Check ContractBrokenError Subject",
-            "suite": "check_controller",
+            "suite": "CheckOutcome check_controller outcomes",
             "tool_checks": "WRITING_CHECKS",
         },
     )

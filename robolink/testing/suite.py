@@ -1,10 +1,50 @@
 """All checks that apply to a controller, one after the other."""
 
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
 from robolink.errors import RobolinkError
 from robolink.testing.motion_checks import MOVING_CHECKS
 from robolink.testing.reading_checks import READING_CHECKS
 from robolink.testing.subject import Check, ContractBrokenError, Subject
 from robolink.testing.tool_checks import WRITING_CHECKS
+
+
+@dataclass(frozen=True, slots=True)
+class CheckOutcome:
+    """How one promise was found.
+
+    Attributes:
+        name: Of the check.
+        promise: What is promised, in a sentence.
+        broken: What was found in place of it; empty where it is kept.
+        error: The error that kept the check from being made, ``None`` for none: the controller
+            may just be in a state in which it refuses.
+    """
+
+    name: str
+    promise: str
+    broken: str = ""
+    error: RobolinkError | None = None
+
+
+def outcomes(subject: Subject, checks: Iterable[Check] = READING_CHECKS) -> Iterator[CheckOutcome]:
+    """Hold a controller to some promises, one after the other, and tell how each was found.
+
+    Args:
+        subject: The controller.
+        checks: Which; by default those that only read.
+    """
+    for check in checks:
+        broken, kept_from = "", None
+        try:
+            check(subject)
+        except ContractBrokenError as error:
+            broken = str(error)
+        except RobolinkError as error:
+            broken, kept_from = str(error), error
+        promise = " ".join((check.__doc__ or "").split())
+        yield CheckOutcome(check.__name__, promise, broken, kept_from)
 
 
 def check_controller(subject: Subject, *, writes: bool = True, moves: bool = True) -> None:
@@ -25,11 +65,6 @@ def check_controller(subject: Subject, *, writes: bool = True, moves: bool = Tru
         checks += WRITING_CHECKS
     if moves and able.motion:
         checks += MOVING_CHECKS
-    broken = []
-    for check in checks:
-        try:
-            check(subject)
-        except (ContractBrokenError, RobolinkError) as error:
-            broken.append(f"{check.__name__}: {error}")
+    broken = [f"{it.name}: {it.broken}" for it in outcomes(subject, checks) if it.broken]
     if broken:
         raise ContractBrokenError("\n".join(broken))

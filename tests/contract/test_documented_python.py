@@ -330,6 +330,8 @@ def test_every_block_is_run_and_no_python_stands_outside_of_a_fence():
         "README.md 3",
         "README.md 4",
         "structured-text.md 2",
+        "testing.md 1",
+        "testing.md 2",
         "verify-controller.md 1",
     } == TESTS
     for page in PAGES:
@@ -362,9 +364,10 @@ def test_the_test_of_an_integrator_s_program_passes(tmp_path):
 
 
 def test_the_tests_of_readme_pass_in_somebody_else_s_run(pytester):
-    pytester.makepyfile(BLOCKS["README.md 3"] + BLOCKS["README.md 4"])
-    result = pytester.runpytest_subprocess("-p", "no:cacheprovider")
-    result.assert_outcomes(passed=4)
+    blocks = ("README.md 3", "README.md 4", "testing.md 1", "testing.md 2")
+    pytester.makepyfile("".join(BLOCKS[name] for name in blocks))
+    result = pytester.runpytest_subprocess("-p", "no:cacheprovider", "--strict-markers")
+    result.assert_outcomes(passed=6)
 
 
 def test_the_test_of_a_recording_passes_and_sees_a_difference(pytester):

@@ -50,17 +50,3 @@ def test_its_fixtures_serve_simulators_with_the_seed_of_the_command_line(tmp_pat
     assert done.returncode == 0, done.stdout + done.stderr
     assert "3 passed" in done.stdout
     assert not own.exists()
-
-
-def test_the_header_names_the_seed(tmp_path):
-    (tmp_path / "test_theirs.py").write_text("def test_nothing(): pass\n")
-    done = run(tmp_path, "-v")
-    assert "robolink: simulated controllers, seed 1" in done.stdout
-
-
-def test_the_plugin_itself_loads_no_simulator(tmp_path):
-    (tmp_path / "test_theirs.py").write_text(
-        "import sys\n"
-        "def test_light(): assert 'robolink_simulators.epson.device' not in sys.modules\n"
-    )
-    assert run(tmp_path).returncode == 0

@@ -8,6 +8,7 @@ from robolink.protocols.mailbox import ExportProfile, program_texts
 from tests.peers._compiled_plc import CompiledCore, compiled_plc
 from tests.peers._iec_compilers import COMPILERS, IecCompiler
 from tests.unit.structured_text import _behaviours as b
+from tests.unit.structured_text._drawn import drawn_commands
 
 CORE = "robolink_core.st"
 ANY = "Kin_Scara3_Z"
@@ -50,6 +51,13 @@ def test_the_compiled_core_gives_the_words_of_the_interpreted_one(
 ):
     ours, theirs = compared(bench_program, tmp_path, behaviour, kinematics)
     assert len(ours) > 1
+    assert theirs == ours
+
+
+@pytest.mark.timeout(300)
+@pytest.mark.parametrize("seed", range(100, 104))
+def test_it_gives_the_same_words_for_drawn_commands(bench_program, tmp_path, seed):
+    ours, theirs = compared(bench_program, tmp_path, drawn_commands(seed, 40), ANY)
     assert theirs == ours
 
 

@@ -82,6 +82,10 @@ _EXPERT: Final = {
         f"{_CONTROLLER}.verify_controller:verify_controller",
         declared("Find out, reading only, what this controller really does."),
     ),
+    "check-contract": (
+        f"{_CONTROLLER}.check_contract:check_contract",
+        declared("Hold a controller, reading only, to what every kind promises."),
+    ),
     "execute-raw": (
         f"{_CONTROLLER}.operate:execute_raw",
         declared("Run one SPEL+ statement as typed; for engineers."),

@@ -116,15 +116,17 @@ class ToolDesk:
     def _write(self, command: Command) -> Told:
         number = require_slot(command.operands[0])
         require_finite(command.pose)
-        lengths_mm = self._units.pose(command.pose)[:3]
+        x, y, z, a, b, c = (part + 0.0 for part in command.pose)  # a minus zero is a zero
+        pose: Six = (x, y, z, a, b, c)
+        lengths_mm = self._units.pose(pose)[:3]
         named = command.name.isascii() and command.name.isprintable()
         if not named or max(map(abs, lengths_mm)) > _LONGEST_MM:
             raise Rejected(ErrorClass.OPERAND)
         told = done()
         if number == self.selected:
-            told = self._apply(number, command.pose, command.name)
+            told = self._apply(number, pose, command.name)
         if told.execution.outputs.done:
-            self._memory.define(number, command.pose, command.name)
+            self._memory.define(number, pose, command.name)
         return told
 
     def _select(self, command: Command) -> Told:

@@ -1,0 +1,231 @@
+"""What the fixtures of the pytest plugin bring, as an integrator's tests use it."""
+
+import subprocess
+import sys
+
+import pytest
+from robolink_simulators.testkit.asked import CellRequest
+
+import robolink
+from robolink import ToolOffset
+from robolink.errors import ConfigError, OutcomeUnknownError, RobolinkError
+from robolink.journal import EntryKind
+from robolink.transaction import Wanted, change_tools
+
+WANTED = ToolOffset(1.0, 2.0, -30.0)
+
+
+def write(cell, tool=2, wanted=WANTED):
+    with robolink.connect(cell.url) as controller:
+        controller.tools.write(tool, wanted, expected=robolink.ANY)
+
+
+@pytest.mark.parametrize("medium", ["tcp", "serial"])
+def test_an_epson_is_served_on_each_medium(epson_factory, medium):
+    cell = epson_factory(medium=medium)
+    write(cell)
+    assert cell.truth()["stored"]["2"]["z_mm"] == WANTED.z_mm
+    cell.wire.assert_sent("TLSet 2, XY", times=1)
+    cell.motions.assert_none()
+
+
+@pytest.mark.parametrize(
+    "softmotion_sim", ["sim", "modbus-tcp", "modbus-rtu", "can"], indirect=True
+)
+def test_a_plc_is_served_on_each_bus(softmotion_sim):
+    write(softmotion_sim)
+    assert softmotion_sim.truth()["stored"]["2"]["z_mm"] == pytest.approx(WANTED.z_mm)
+    softmotion_sim.wire.assert_sent("WRITE_TOOL", times=1)
+    softmotion_sim.motions.assert_none()
+
+
+@pytest.mark.parametrize("plc_sim", ["modbus-tcp", "modbus-rtu"], indirect=True)
+def test_a_plc_with_a_map_is_served_on_both_buses(plc_sim):
+    write(plc_sim)
+    assert plc_sim.truth()["stored"]["2"]["z_mm"] == WANTED.z_mm
+    plc_sim.do("withdraw_permit")
+    with pytest.raises(RobolinkError, match="permit"):
+        write(plc_sim, wanted=ToolOffset(9, 9, 9))
+    plc_sim.put_back()
+    assert plc_sim.truth()["stored"]["2"]["z_mm"] != WANTED.z_mm
+
+
+@pytest.mark.robolink(robot="C8-C901S", seed=9, options={"status_flags": 10}, true_tool=(1, 2, 130))
+@pytest.mark.robolink(seed=5, world={"eye_sigma_mm": 0.25})
+def test_the_marker_says_how_the_cell_is(epson_sim, epson_factory):
+    simulator = epson_sim.simulator
+    # The marker that stands nearest to the test wins.
+    assert (simulator.machine.model.name, simulator.seed) == ("C8-C901S", 5)
+    assert simulator.options.status_flags == 10
+    assert simulator.world.parameters.eye_sigma_mm == 0.25
+    assert epson_sim.truth()["tips"]["1"]["z_mm"] == 130
+    other = epson_factory(robot="GX4-C351S", seed=2)
+    assert other.simulator.machine.model.name == "GX4-C351S"
+    assert other.url != epson_sim.url
+
+
+@pytest.mark.robolink(kinematics="Kin_Gantry3", faults=[{"action": "drop_reply", "match": "WRITE"}])
+def test_the_marker_says_what_goes_wrong(softmotion_sim, fault_plan):
+    with pytest.raises(OutcomeUnknownError):
+        write(softmotion_sim)
+    told = fault_plan(softmotion_sim)
+    assert [fault["action"] for fault in told["fired"]] == ["drop_reply"]
+    assert told["pending"] == []
+    assert softmotion_sim.truth()["stored"]["2"]["z_mm"] == pytest.approx(WANTED.z_mm)
+
+
+@pytest.mark.robolink(password="s3cret-word")
+def test_a_password_is_needed_and_shown_nowhere(epson_sim):
+    with pytest.raises(RobolinkError), robolink.connect(epson_sim.url):
+        pass
+    assert "s3cret-word" not in epson_sim.wire.shown()
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [({"robots": "C8"}, "not asked for by 'robots'"), ({"true_tool": (1, 2)}, "three lengths")],
+)
+def test_what_cannot_be_asked_for_is_refused(given, words, epson_factory):
+    with pytest.raises(ConfigError, match=words):
+        CellRequest.of(given)
+    with pytest.raises(ConfigError, match=words):
+        epson_factory(**given)
+    with pytest.raises(ConfigError, match="not served by 'carrier pigeon'"):
+        epson_factory(medium="carrier pigeon")
+
+
+def test_time_stands_still_until_somebody_steps_it(virtual_clock, epson_sim, softmotion_sim):
+    assert virtual_clock.now_ns() == 0
+    virtual_clock.advance(3.0)
+    for passed_s, cell in ((3.0, epson_sim), (4.0, softmotion_sim)):
+        assert cell.do("clock")["simulated_s"] == pytest.approx(passed_s)
+        cell.do("step", seconds=1.0)
+    assert virtual_clock.now_ns() == 5_000_000_000
+
+
+def test_a_person_does_what_the_script_says_when_the_wire_gives_the_cue(epson_sim):
+    epson_sim.operator.when("GetStatus", "press_estop", skip=1)
+    with robolink.connect(epson_sim.url) as controller:
+        first, second = controller.status(), controller.status()
+    assert (first.emergency_stop, second.emergency_stop) == (False, True)
+    assert [act for _, act in epson_sim.operator.done] == ["press_estop"]
+    assert epson_sim.operator.waiting == 0
+    with pytest.raises(ConfigError, match="cannot do 'dance'"):
+        epson_sim.operator.when("GetStatus", "dance")
+    with pytest.raises(ConfigError, match="needs number"):
+        epson_sim.operator.when("GetStatus", "raise_error")
+    epson_sim.operator.when("GetStatus", "restore", name="nothing")
+    with robolink.connect(epson_sim.url) as controller:
+        controller.status()
+    assert [act for act, _ in epson_sim.operator.failed] == ["restore"]
+
+
+def test_what_crossed_the_wire_and_what_moved_is_asserted(epson_sim):
+    write(epson_sim)
+    epson_sim.wire.assert_not_sent("TLSet 3,")
+    with pytest.raises(AssertionError, match="'TLSet 3,' was sent 0 times"):
+        epson_sim.wire.assert_sent("TLSet 3,")
+    with pytest.raises(AssertionError, match="1 times, not 2 times") as told:
+        epson_sim.wire.assert_sent("TLSet 2, XY", times=2)
+    assert '$Execute,"TLSet 2, XY(1.000' in str(told.value)
+    with pytest.raises(AssertionError, match="was sent 1 times"):
+        epson_sim.wire.assert_not_sent("TLSet 2, XY")
+    epson_sim.motions.assert_none()
+    simulator = epson_sim.simulator
+    simulator.machine.arm.motions.add(0, lambda: (1.0, 2.0, 3.0))
+    with pytest.raises(AssertionError, match=r"(?s)1 motions began.*to 1\.000 2\.000 3\.000"):
+        epson_sim.motions.assert_none()
+
+
+def test_a_cell_is_put_back_between_two_looks(epson_sim, softmotion_sim, fault_plan):
+    for cell in (epson_sim, softmotion_sim):
+        at_first = cell.truth()
+        write(cell)
+        cell.snapshot("written")
+        cell.do("change_nozzle")
+        fault_plan(cell, "drop_reply")
+        cell.put_back()
+        assert cell.truth() == at_first
+        assert not cell.wire.lines
+        assert fault_plan(cell)["pending"] == []
+        cell.restore("written")
+        assert cell.truth()["stored"]["2"]["z_mm"] == pytest.approx(WANTED.z_mm)
+
+
+def test_the_journal_of_the_test_tells_what_was_done(epson_factory, robolink_journal):
+    """On a port: what happens in the process is kept in the process."""
+    cell = epson_factory(medium="tcp")
+    with robolink.connect(cell.url) as controller:
+        change_tools(controller, [Wanted(2, WANTED, robolink.ANY)])
+        who = controller.outcomes.identity
+    assert who.startswith("epson:C-SIM")
+    (entry,) = robolink_journal.entries(controller=who, kinds=[EntryKind.DONE])
+    assert entry.tool == 2
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("kind", ["epson", "softmotion"])
+def test_a_nozzle_is_changed_in_a_cell_with_its_recipe(kind, request):
+    cell = request.getfixturevalue(f"{kind}_cell")
+    done = cell.run("change", str(cell.recipe), *cell.by_hand)
+    assert done.exit_code == 0, done.messages + done.out
+    truth = cell.truth()
+    for name in ("x_mm", "y_mm"):
+        assert truth["stored"]["1"][name] == pytest.approx(truth["tips"]["1"][name], abs=0.06)
+    assert cell.motions.count
+
+
+FAILING = """
+import sys
+import pytest
+
+def test_the_plugin_is_light():
+    heavy = {"numpy", "lark", "pymodbus", "can", "canopen", "sqlalchemy", "pydantic", "click"}
+    assert not heavy & set(sys.modules)
+    ours = [name for name in sys.modules if name.startswith("robolink")]
+    assert ours == ["robolink_simulators", "robolink_simulators.pytest_plugin"]
+
+def test_fails(epson_sim, softmotion_sim):
+    import robolink
+    with robolink.connect(epson_sim.url) as controller:
+        controller.status()
+    epson_sim.wire.assert_sent("nothing of the kind")
+
+def test_passes(epson_sim):
+    pass
+
+@pytest.mark.robolink(colour="red")
+def test_asks_for_what_there_is_not(epson_sim):
+    pass
+"""
+
+
+def test_a_test_that_fails_shows_wire_seed_and_state(tmp_path):
+    (tmp_path / "test_theirs.py").write_text(FAILING)
+    done = subprocess.run(
+        [
+            sys.executable,
+            "-m",
+            "pytest",
+            "-p",
+            "no:cacheprovider",
+            "--robolink-seed",
+            "7",
+            "--strict-markers",
+        ],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+    shown = done.stdout
+    assert "1 failed, 2 passed, 1 error" in shown
+    assert "robolink: " not in shown  # no header
+    assert "robolink wire: epson T6-602S, seed 7, epson+sim://pytest-" in shown
+    assert "robolink state: softmotion Kin_Scara3_Z, seed 7" in shown
+    assert "> $GetStatus" in shown
+    assert '"pin_mm"' in shown
+    assert shown.count("robolink wire: epson") == 1
+    assert "not asked for by 'colour'" in shown
+    assert "(nothing moved)" in shown

@@ -1,0 +1,102 @@
+"""Commands drawn at random, right, wrong and damaged, and what a mailbox makes of them."""
+
+import random
+from typing import Any
+
+from robolink.protocols.mailbox import (
+    COMMAND_WORDS,
+    Bits,
+    GroupState,
+    Opcode,
+    crc16,
+    encode_command,
+    heartbeat_word,
+)
+from tests.unit._mailbox_client import FACTORS, LINE, shifted
+
+STATE, BITS, RAW, CRC = 7, 8, 4, 61
+NUMBERS = (0, 0, 1, 1, 2, 3, 15, 16, -1, 31, 32, 255)
+LENGTHS = (0.0, 1.5, -20.0, 9999.0, 10001.0, 1e300, float("inf"), float("nan"), 5e-324, -0.0)
+TELLING = (2, 3, 4, 5, 11, 15, 19, 48, 49, 56, 57, 58, 59, 60)
+"""Words that decide: group, version, operands, the highest of a length, name, owner to reserve."""
+WEIGHTED = [*Opcode, Opcode.WRITE_TOOL, Opcode.SELECT_TOOL, Opcode.READ_TOOL, Opcode.CLEAR_TOOL]
+
+
+def drawn_words(draw: random.Random, client, now):
+    """Return one block: mostly a command that the mailbox might carry out."""
+    opcode = draw.choice(WEIGHTED)
+    operands = [draw.choice(NUMBERS) for _ in range(draw.choice((0, 1, 1, 2, 4)))]
+    pose = list(shifted(now.tcp, z=draw.choice((-1.0, -2.0, 1.0))))
+    if draw.random() < 0.5:
+        pose = [draw.choice((0.0, 1.0, 12.5)) for _ in range(6)]
+    if draw.random() < (0.5 if opcode is Opcode.WRITE_TOOL else 0.2):
+        pose[draw.randrange(6)] = draw.choice(LENGTHS)
+    if opcode in (Opcode.MOVE_LINEAR, Opcode.MOVE_DIRECT, Opcode.MOVE_UNTIL_INPUT):
+        operands = [draw.choice((0, 3, 40)), 0, draw.choice((1, 1, 0, 6)), draw.choice((0, 1, 6))]
+    if opcode is Opcode.SET_KINEMATICS:  # no other: the model takes all that its drives fit
+        operands = list(draw.choice(((2, 0), (2, 32), (2, 255), (0, 0), (200, 0), (-1, 0))))
+    if opcode is Opcode.JOG:
+        operands = [draw.choice((0, 64, -1)), 0, draw.choice((1, 6))]  # presses no button
+    fields: dict[str, Any] = {
+        "pose": tuple(pose),
+        "dynamics": FACTORS if opcode is Opcode.MOVE_DIRECT else LINE,
+        "name": draw.choice(("", "tip", "a nozzle of 16 c")),
+    }
+    if draw.random() < 0.1:
+        fields["owner"] = draw.choice((0, 7))
+    if draw.random() < 0.05:
+        fields["boot_id"] = draw.choice((1, 3, 9))
+    words = list(encode_command(client.command(opcode, *operands, **fields)))
+    if draw.random() < 0.4:
+        place = draw.choice((*TELLING, draw.randrange(6, CRC)))
+        if opcode is Opcode.JOG and place in (4, 5):
+            place = 3  # no button: how far a jog gets is another matter
+        words[place] = draw.choice((0, 1, 0x7F41, 0x417F, 0x7FF0, 0x40C3, draw.randrange(0x10000)))
+        if draw.random() < 0.7:
+            words[CRC] = crc16(words[:CRC])
+    client.beats += 1
+    words[CRC + 1] = heartbeat_word(client.epoch, client.beats)
+    assert len(words) == COMMAND_WORDS
+    return words
+
+
+def drawn_commands(seed: int, commands: int):
+    """Return a behaviour: each command of a seed, and all words once nothing goes on."""
+
+    def behaviour(bench):
+        draw = random.Random(seed)
+        bench.enable()
+        client = bench.client
+        for _ in range(commands):
+            permitted = draw.random() < 0.9
+            if not permitted:
+                bench.plc.panel.withdraw_permit()
+            now = client.after_a_cycle()
+            client.link.write_command(drawn_words(draw, client, now))
+            client.wait(0.1)
+            for _ in range(40):
+                if client.now().group_state != GroupState.MOVING:
+                    break
+                client.wait(0.5)
+            bench.note(0.4)
+            bench.plc.panel.give_permit()
+            words = bench.taken[-1]
+            if words[RAW + 1] == 0xFFFF:
+                words[RAW : RAW + 2] = 0, 0  # a number that nobody knows (error_numbers.py)
+            bench.taken.append(bench.plc.panel.tool_changed)
+            bench.plc.panel.take_change_back()
+            bench.taken.append([list(client.link.read_slot(n)) for n in (1, 2, 3, 15)])
+            if words[STATE] != GroupState.STANDBY or not words[BITS] & Bits.OWNED:
+                _bring_back(bench)
+
+    return behaviour
+
+
+def _bring_back(bench):
+    """Have the group in Standby again, and the mailbox owned, for what comes next."""
+    bench.client.after_a_cycle()
+    bench.client.take(insist=1)
+    if bench.client.now().group_state == GroupState.STANDBY:
+        return
+    for opcode in (Opcode.STOP, Opcode.RESET, Opcode.ENABLE):
+        bench.tell(opcode, *([1] if opcode is Opcode.STOP else []))

@@ -111,6 +111,7 @@ def test_every_command_takes_a_language(marked):
         if isinstance(command, click.Group):
             for child in command.list_commands(context):
                 found = command.get_command(context, child)
+                assert found is not None
                 inner = click.Context(found, parent=context, info_name=child)
                 yield from without(found, inner, f"{name} {child}")
         elif "--lang" not in names:

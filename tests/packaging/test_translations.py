@@ -1,5 +1,6 @@
 """Every translation fills in the same values, in a form that a terminal shows straight."""
 
+import io
 import re
 from string import Formatter
 
@@ -8,6 +9,7 @@ from babel.messages.pofile import read_po
 from robolink_cli.console.columns import columns
 
 from tests.packaging.test_catalogue import CATALOGUE
+from tools.sentences import collect
 
 CHINESE = CATALOGUE.parent / "zh_CN" / "LC_MESSAGES"
 
@@ -71,6 +73,18 @@ def test_every_sentence_has_a_translation(translated):
     said = dict(translated)
     assert sorted(said) == sorted(one.id for one in entries(CATALOGUE)), "run: make messages"
     assert [english for english, chinese in translated if not chinese] == []
+
+
+@pytest.mark.parametrize("widest", [["Touch", 12], ["off by", 12], ["now", 14], ["change", 14]])
+def test_heads_of_tables_keep_to_their_columns(translated, widest):
+    english, most = widest
+    assert columns(dict(translated)[english]) <= most
+
+
+def test_sentences_inside_of_f_strings_are_collected():
+    source = b"""shown = f"{tr('Z+ up')} {declared('Turn keys')}"\n"""
+    found = collect(io.BytesIO(source), {"tr": None, "declared": None}, [], {})
+    assert [sentence for _, _, sentence, _ in found] == ["Z+ up", "Turn keys"]
 
 
 def test_a_translation_says_what_the_sentence_says(translated):

@@ -99,9 +99,9 @@ def _keypad(state: WizardState) -> list[str]:
     )
     step = tr("Step   {mm} mm", mm=f"{jogging.step:.2f}")
     return [
-        f"     [8] {up}         [9] {tr('Z+ up')}".ljust(40) + f"{step}    [+] [-]",
-        f" [4] {left}   [6] {right}".ljust(40) + sizes,
-        f"     [2] {down}         [3] {tr('Z- down')}".ljust(40)
+        padded(f"     [8] {up}         [9] {tr('Z+ up')}", 40) + f"{step}    [+] [-]",
+        padded(f" [4] {left}   [6] {right}", 40) + sizes,
+        padded(f"     [2] {down}         [3] {tr('Z- down')}", 40)
         + f"[1] U-   [7] U+   [*] {tr('Turn keys')}",
     ]
 

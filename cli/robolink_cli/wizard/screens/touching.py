@@ -101,7 +101,7 @@ def _keypad(state: WizardState) -> list[str]:
     above, below, turns = tr("Z+ up"), tr("Z- down"), tr("Turn keys")
     return [
         padded(f"     [8] {up}         [9] {above}", 40) + f"{step}    [+] [-]",
-        f" [4] {left}   [6] {right}".ljust(40) + sizes,
+        padded(f" [4] {left}   [6] {right}", 40) + sizes,
         padded(f"     [2] {down}         [3] {below}", 40) + f"[1] U-   [7] U+   [*] {turns}",
     ]
 

@@ -97,6 +97,7 @@ def test_one_golden_file_is_compared_with_many_cells(golden, capsys):
         name = f"backup-{next(_numbers)}"
         url = register(name, other)
         if seed == 2:
+            other.machine.tools.select(0)
             other.machine.tools.clear(1)
         codes.append(main.run(["compare", golden, "-c", url]))
         unregister(name)

@@ -154,3 +154,29 @@ def test_an_unknown_cell_is_a_usage_error_that_lists_the_known(cells, capsys, ar
     assert code == 2
     assert document["error"]["what"] == "There is no cell 'c'."
     assert "a, b" in document["error"]["remedy"]
+
+
+def test_list_names_each_cell_with_its_address(cells, capsys):
+    code, document = run(capsys, "cell", "list")
+    assert (code, document["schema"]) == (0, "robolink/cells/1")
+    assert {name: cell["url"] for name, cell in document["cells"].items()} == {
+        "a": URL,
+        "b": f"{URL}1",
+    }
+
+
+def test_people_are_listed_with_their_roles_and_where_nobody_is_named(cells, capsys):
+    file = cells / "robolink.toml"
+    people = '[cells.b.people]\n"0417" = "operator"\nChen = "engineer"\n'
+    file.write_text(file.read_text(encoding="utf-8") + people, encoding="utf-8")
+    named = {"0417": "operator", "Chen": "engineer"}
+    assert run(capsys, "cell", "people")[1]["cells"] == {"a": None, "b": named}
+    assert run(capsys, "cell", "people", "b")[1]["cells"] == {"b": named}
+    assert main.run(["cell", "people"]) == 0
+    shown = capsys.readouterr().out.splitlines()
+    assert shown == [
+        "a: nobody is named, so everybody may do everything.",
+        "b:",
+        "  0417  operator",
+        "  Chen  engineer",
+    ]

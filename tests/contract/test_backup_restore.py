@@ -59,6 +59,7 @@ def test_a_backup_holds_every_tool_and_which_controller_it_was(serve, simulator)
 
 def test_a_controller_without_any_tool_has_fifteen_undefined_ones(serve):
     simulator = EpsonSimulator(seed=2)
+    simulator.machine.tools.select(0)
     simulator.machine.tools.clear(1)
     with serve(simulator) as cell, cell.connect() as controller:
         assert take_backup(controller).state.tools == dict.fromkeys(range(1, 16))

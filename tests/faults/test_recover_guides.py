@@ -4,6 +4,7 @@ import json
 import re
 
 import pytest
+from robolink_cli.prompts.present import sitting_at
 
 from robolink.model import Marker, MarkerKind
 from tests.faults import _recipe_instants
@@ -164,3 +165,52 @@ def test_what_nobody_can_read_takes_a_word_too(cell):
     assert {marker.request for marker in cell.open_markers()} >= {"something newer"}
     assert cell.run("recover", "--yes").code == 0
     assert cell.open_markers() == ()
+
+
+@pytest.mark.parametrize(
+    ("word", "code", "changed", "left"),
+    [("old", 0, set(), 0), ("new", 0, {1}, 0), ("blocked", 6, {1}, 3)],
+)
+def test_one_word_says_which_needle_is_mounted(cell, word, code, changed, left):
+    ended = cell.run("recover", "--choose", word)
+    assert ended.code == code, ended.err
+    assert cell.changed() == changed
+    assert len(cell.open_markers()) == left
+    assert cell.run("recover", "--choose", word, "--yes").code == 2
+
+
+class Sits:
+    """A desk at which a person takes a row, or leaves."""
+
+    def __init__(self, answer):
+        self.answer, self.subject, self.asked = answer, None, []
+        self.glance = lambda: None
+
+    def tell(self, text):
+        pass
+
+    def regard(self, subject):
+        self.subject = subject
+
+    def ask(self, question, kind):
+        self.asked.append(question)
+
+    def poll(self, wait_s):
+        return self.answer
+
+
+@pytest.mark.parametrize(
+    ("answer", "code", "changed"), [("1", 0, set()), ("2", 0, {1}), ("3", 9, {1}), ("q", 9, {1})]
+)
+def test_at_a_desk_the_page_shows_what_is_read_and_marks_nothing(cell, answer, code, changed):
+    desk = Sits(answer)
+    with sitting_at(desk):
+        ended = cell.run("recover")
+    assert ended.code == code, ended.err
+    assert cell.changed() == changed
+    assert desk.asked == ["Look at the robot: which needle is mounted?"]
+    page = desk.subject
+    assert page is not None
+    assert page.marked is None
+    assert any("Written, but nobody verified it." in row for row in page.above)
+    assert len(page.options) == 3

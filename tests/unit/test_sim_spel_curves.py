@@ -88,7 +88,7 @@ def test_axes_that_a_curve_does_not_rule_stay(cell):
         ('Curve "c", O, 0, 4, P1, P2', 4002),
         ('Curve "c", O, 0, 5, P1, P2, P3', 4002),
         ('Curve "c", O, 0, 6, P1, P2, P3', 4002),
-        ('Curve "c", O, 2, 4, P1, P2, P3', 2199),
+        ('Curve "c", O, 16, 4, P1, P2, P3', 2199),
         ('Curve "c", X, 0, 4, P1, P2, P3', 2100),
         ('Curve "c", O, 0, 4, P1, P1, P3', 4002),
         ('Curve "c", O, 0, 4, P1, P2, P3 /L', 4001),
@@ -131,3 +131,22 @@ def test_a_curve_outlives_a_power_cycle(tmp_path):
     first.machine.kept.curves.store("My", curve)
     first.advance(1)
     assert EpsonSimulator(state_path=kept).machine.kept.curves.get("mY") == curve
+
+
+@pytest.mark.parametrize(("kind", "turns_deg"), [("C", 360), ("O", 270)])
+def test_the_tool_follows_the_direction_of_a_curve_of_mode_2(cell, kind, turns_deg):
+    for number in range(8):
+        angle = math.tau * number / 8
+        x, y = 240 + 20 * math.cos(angle), 380 + 20 * math.sin(angle)
+        cell.run(f"P{number} = XY({x}, {y}, -40, {50 * number})")
+    cell.run(f'Go P0; Curve "edge", {kind}, 2, 4, P(0:7)')
+    tips = way(cell, 'CVMove "edge"')
+    assert tips[0][3] == pytest.approx(0)
+    # An open one ends one eighth earlier, and its first and last direction are those of chords.
+    assert cell.tip()[3] == pytest.approx(turns_deg, abs=25)
+    headings = [math.degrees(math.atan2(b[1] - a[1], b[0] - a[0])) for a, b in pairwise(tips)]
+    middle = range(len(tips) // 4, 3 * len(tips) // 4)
+    off = [
+        (headings[i] - headings[20] - tips[i][3] + tips[20][3] + 180) % 360 - 180 for i in middle
+    ]
+    assert max(map(abs, off)) < 8

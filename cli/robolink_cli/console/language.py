@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from typing import Final
 
 from robolink.locale.languages import CLICK, ENGLISH, FOLDER, TERRITORY, language_named, translator
-from robolink.messages import install, tr
+from robolink.messages import install, spoken, tr
 
 OPTION: Final = "--lang"
 VARIABLE: Final = "ROBOLINK_LANG"
@@ -31,7 +31,7 @@ _now: Final[list[str]] = []
 
 def language_now() -> str:
     """Return the language in which the command line that is carried out speaks."""
-    tr("")  # it is found with the first sentence, whichever that is
+    spoken(" ")  # it is found with the first text, whichever that is
     return _now[-1] if _now else ENGLISH
 
 

@@ -60,4 +60,7 @@ def help_width() -> int:
 
 def may_be_guided() -> bool:
     """Tell whether a person sits at both ends of this process's terminal."""
-    return sys.stdin is not None and sys.stdin.isatty() and sys.stderr.isatty()
+    try:
+        return os.isatty(sys.stdin.fileno()) and os.isatty(sys.stderr.fileno())
+    except (OSError, ValueError, AttributeError):  # closed, or a stream inside a program
+        return False

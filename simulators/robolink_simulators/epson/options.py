@@ -66,6 +66,10 @@ class SpelNumbers:
     excessive_loop: int = 2556  # docs/reference/spel.md 10
     no_such_function: int = 2122
     task_number: int = 2260  # docs/reference/spel.md 17
+    no_mover: int = 2191  # docs/reference/spel.md 10
+    mover_ended: int = 2192
+    aborted_at_rest: int = 2998  # docs/reference/spel.md 10
+    motion_aborted: int = 2999  # docs/reference/spel.md 10
     not_in_this_task: int = 2295  # docs/reference/spel.md 10
     robot_in_use: int = 2200  # docs/reference/spel.md 10
     port_not_open: int = 2909

@@ -78,7 +78,7 @@ def test_a_touch_is_begun_again_a_jump_refused_and_a_stop_leaves_all_as_it_was(h
     hand.terminal.wait_for(r"take, again 1, stop, or help\.")
     time.sleep(0.35)
     hand.type("x+99")
-    hand.terminal.wait_for(r"too large for one step[^\n]*\n[^\n]*Since arrival")
+    hand.terminal.wait_for(r"is more than one step may be[^\n]*\n[^\n]*Since arrival")
     hand.type("again 1")
     hand.terminal.wait_for(r"Touch 1 of 2\.")
     hand.terminal.wait_for(r"stop, or help\.")

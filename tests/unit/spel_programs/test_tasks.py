@@ -273,3 +273,40 @@ class NoAnswer:
 
     def close(self):
         pass
+
+
+ABORTING = """
+Function main
+Xqt mover
+Wait 0.2
+{first}
+Wait 0.5
+{second}
+Fend
+Function mover
+OnErr GoTo caught
+Go XY(0, 492, -100, 0)
+Wait 5
+Exit Function
+caught:
+Print Err, InPos
+EResume onward
+onward:
+Wait 5
+Fend
+"""
+
+
+def test_abortmotion_stops_the_motion_of_another_task_and_raises_its_errors(cell):
+    made = cell(ABORTING.format(first="AbortMotion 1", second="AbortMotion All"))
+    assert made.run() == ["2999 -1", "2998 -1"]
+    assert made.simulator.machine.tip().x_mm > 1
+
+
+@pytest.mark.parametrize(
+    ("line", "number"), [("AbortMotion All\nAbortMotion 1", 2191), ("AbortMotion 3", 2262)]
+)
+def test_abortmotion_needs_a_robot_that_a_task_has_moved(cell, line, number):
+    made = cell(f"Function main\n{line}\nFend\n")
+    made.run()
+    assert made.runner.failure.number == number

@@ -2,11 +2,15 @@
 
 import click
 
+from robolink.errors import ConfigError
+from robolink.messages import declared, tr
 from robolink.transaction import Recovery
+from robolink_cli.commands.record.recovery_choice import BLOCKED, NEW, OLD, chosen_at_desk
 from robolink_cli.commands.record.recovery_guide import Guide, show_end
-from robolink_cli.options.consent import dry_run_option, yes_option
+from robolink_cli.options.consent import dry_run_option, plain_option, yes_option
 from robolink_cli.prompts.questions import on_terminal
 from robolink_cli.session.context import CliContext, controller_options, emit
+from robolink_cli.session.guidance import guided_if_alone
 from robolink_cli.session.opening import open_controller
 from robolink_cli.views.documents import finding_payload
 
@@ -14,10 +18,18 @@ from robolink_cli.views.documents import finding_payload
 @click.command("recover")
 @controller_options
 @dry_run_option
+@plain_option
 @click.option(
     "--keep",
     is_flag=True,
     help="Keep new values that nobody verified; without it the old ones are written back.",
+)
+@click.option(
+    "--choose",
+    type=click.Choice(["old", "new", "blocked"]),
+    help=declared(
+        "Your word in one: old values back, new values kept, or everything left blocked as it is."
+    ),
 )
 @click.option(
     "--yes",
@@ -38,6 +50,7 @@ def recover(
     context: CliContext,
     dry_run: bool,
     keep: bool,
+    choose: str | None,
     yes: bool,
     forget: bool,
     take_over: str | None,
@@ -49,14 +62,28 @@ def recover(
     can judge is asked on a terminal; elsewhere it is left open, with exit code 6, unless --yes
     gives your word. It may be run again at any time.
     """
-    with open_controller(context, quiet=True, changes=not dry_run) as controller:
-        guide = Guide(controller, keep=keep, word=yes)
-        if take_over is not None and not dry_run:
-            controller.outcomes.take_over(take_over)
-        done, forgotten = _gone_through(guide, forget=forget, yes=yes, dry_run=dry_run)
-        payload = guide.payload(done) | {"forgotten": forgotten}
+    if choose is not None and (keep or yes or forget):
+        raise ConfigError(
+            tr("--choose says it all; it goes with none of --keep, --yes and --forget."),
+            remedy=tr("Nothing was sent."),
+        )
+
+    def settle() -> tuple[int, dict[str, object]]:
+        with open_controller(context, quiet=True, changes=not dry_run) as controller:
+            if take_over is not None and not dry_run:
+                controller.outcomes.take_over(take_over)
+            word = choose or (None if forget else chosen_at_desk(controller))
+            guide = Guide(controller, keep=keep or word == NEW, word=yes or word in (OLD, NEW))
+            if word == BLOCKED:
+                done, forgotten = guide.left_blocked(declined=choose is None), 0
+            else:
+                done, forgotten = _gone_through(guide, forget=forget, yes=yes, dry_run=dry_run)
+            return guide.exit_code(done), guide.payload(done) | {"forgotten": forgotten}
+
+    alone = not (dry_run or keep or yes or forget or choose)
+    code, payload = guided_if_alone(context, settle, job=tr("Recover"), alone=alone)
     emit("recover", payload, lambda: None if dry_run else show_end(payload))
-    return guide.exit_code(done)
+    return code
 
 
 @click.command(hidden=True)

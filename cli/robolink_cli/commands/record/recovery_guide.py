@@ -52,6 +52,16 @@ class Guide:
         note(tr("Nothing was done.") if findings else spoken(_NOTHING))
         return Recovery((), findings)
 
+    def left_blocked(self, *, declined: bool) -> Recovery:
+        """Do nothing about what is open.
+
+        Args:
+            declined: Whether a person at the terminal said so.
+        """
+        findings = look(self._controller, keep=self._keep)
+        self.declined = declined
+        return Recovery((), findings)
+
     def forget(self, *, yes: bool, dry_run: bool) -> int:
         """Forget everything that is open on a person's word; return how much that was.
 

@@ -10,9 +10,6 @@ LOW_POWER_TIP_MM_S: Final = 250.0
 """In low power the tip stays below this (docs/reference/spel.md 7.2,
 docs/reference/epson.md 3.4)."""
 
-LIMZ_MARGIN_MM: Final = 0.02
-"""Default of LimZMargin (docs/reference/spel.md 6.3)."""
-
 
 class MotionPhase(IntEnum):
     """Which part of a Jump a leg belongs to; everything else is travel."""

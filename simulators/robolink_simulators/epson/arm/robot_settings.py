@@ -9,6 +9,9 @@ from typing import Final
 FINE_PULSES: Final = 10
 """Default of Fine; per model in the reference, 10 in its sample (docs/reference/spel.md 7.3)."""
 
+UP_FIRST: Final = (0b0100, 0b1011, 0, 0)
+"""Default of Hordr on four axes (docs/reference/spel.md 7.2); six move all at once (assumed)."""
+
 
 @dataclass(frozen=True, slots=True)
 class SingularSurroundings:
@@ -42,11 +45,13 @@ class RobotSettings:
         speed_factor: SpeedFactor in percent; it scales speeds and accelerations.
         free_joints: Joints that SFree has released.
         home_pulses: HomeSet of each joint, ``None`` before one was given.
+        home_order: Hordr: the joints of each step of Home as bits.
         avoid_singularity: AvoidSingularity, 0 to 4.
         surroundings: Of singular places; AvoidSingularity sets them back.
     """
 
     fine_pulses: tuple[int, ...]
+    home_order: tuple[int, ...]
     weight_kg: float = 2.0
     weight_at_mm: float = 200.0
     inertia_kg_m2: float = 0.01
@@ -66,7 +71,8 @@ class RobotSettings:
     @classmethod
     def of(cls, axes: int) -> "RobotSettings":
         """Return the settings of a new robot with so many joints."""
-        return cls((FINE_PULSES,) * axes)
+        order = UP_FIRST if axes == len(UP_FIRST) else ((1 << axes) - 1, *(0,) * (axes - 1))
+        return cls((FINE_PULSES,) * axes, order)
 
     def reset(self) -> None:
         """Set what start-up, Motor On, SFree, SLock and Reset set back."""

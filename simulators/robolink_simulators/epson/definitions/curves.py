@@ -11,6 +11,9 @@ Place = tuple[float, float, float, float]
 AXES_OF_CURVES: Final = (2, 3, 4)
 """How many of X, Y, Z, U a curve rules; the others stay (assumed)."""
 
+TANGENTIAL: Final = 2
+"""The mode of a curve that turns U with its direction in the plane (documented)."""
+
 
 class CurveSwitch(NamedTuple):
     """A bit that switches as the tip passes a point; ``word`` is On, Off, MemOn or MemOff."""
@@ -21,11 +24,15 @@ class CurveSwitch(NamedTuple):
 
 
 class FreeCurve(NamedTuple):
-    """What one Curve stored; ``places`` of a closed one end where they begin."""
+    """What one Curve stored; ``places`` of a closed one end where they begin.
+
+    ``tangential``: U follows the direction of the way instead of the points.
+    """
 
     axes: int
     places: tuple[Place, ...]
     switches: tuple[CurveSwitch, ...] = ()
+    tangential: bool = False
 
 
 class CurveFiles:
@@ -70,7 +77,12 @@ class CurveFiles:
         self._files = {str(name): _restored(*parts) for name, parts in state.items()}
 
 
-def _restored(axes: int, places: list[list[float]], switches: list[list[object]]) -> FreeCurve:
+def _restored(
+    axes: int,
+    places: list[list[float]],
+    switches: list[list[object]],
+    tangential: object = False,  # a file of before there were any has none
+) -> FreeCurve:
     read = tuple((float(x), float(y), float(z), float(u)) for x, y, z, u in places)
     bits = tuple(CurveSwitch(int(str(at)), str(word), int(str(n))) for at, word, n in switches)
-    return FreeCurve(int(axes), read, bits)
+    return FreeCurve(int(axes), read, bits, tangential=bool(tangential))

@@ -6,6 +6,7 @@ from robolink_simulators.epson.definitions.added_arms import AddedArms
 from robolink_simulators.epson.definitions.arches import ArchTable
 from robolink_simulators.epson.definitions.areas import CheckedAreas
 from robolink_simulators.epson.definitions.curves import CurveFiles
+from robolink_simulators.epson.definitions.joint_ranges import JointRanges
 from robolink_simulators.epson.definitions.xy_limits import XYLimits
 
 
@@ -14,6 +15,7 @@ class KeptDefinitions:
 
     Args:
         own_arm: The values of arm 0, as ArmSet lists them.
+        ranges: Those of the joints.
 
     Attributes:
         arches: Those of Jump.
@@ -21,19 +23,21 @@ class KeptDefinitions:
         areas: Boxes and planes that are checked.
         curves: The files of Curve.
         limits: Those of XYLim; that they are kept is assumed, their mode is not (documented).
+        ranges: Those of the joints.
     """
 
-    def __init__(self, own_arm: Sequence[float]) -> None:
+    def __init__(self, own_arm: Sequence[float], ranges: JointRanges) -> None:
         self.arches = ArchTable()
         self.arms = AddedArms(own_arm)
         self.areas = CheckedAreas()
         self.curves = CurveFiles()
         self.limits = XYLimits()
+        self.ranges = ranges
 
     @property
     def changes(self) -> int:
         """How often something of it was changed."""
-        parts = (self.arches, self.arms, self.areas, self.curves, self.limits)
+        parts = (self.arches, self.arms, self.areas, self.curves, self.limits, self.ranges)
         return sum(part.changes for part in parts)
 
     def to_state(self) -> dict[str, object]:
@@ -44,6 +48,7 @@ class KeptDefinitions:
             "areas": self.areas.to_state(),
             "curves": self.curves.to_state(),
             "limits": self.limits.to_state(),
+            "ranges": self.ranges.to_state(),
         }
 
     def restore(self, state: Mapping[str, object]) -> None:
@@ -58,3 +63,5 @@ class KeptDefinitions:
             self.areas.restore(state["areas"])
         self.curves.restore(state["curves"])
         self.limits.restore(state["limits"])
+        if "ranges" in state:
+            self.ranges.restore(state["ranges"])

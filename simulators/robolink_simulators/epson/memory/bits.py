@@ -1,5 +1,6 @@
 """A row of input, output or memory bits, read by bit or by byte."""
 
+import struct
 from typing import Final
 
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
@@ -10,6 +11,8 @@ IO_BITS: Final = 512
 MEMORY_BITS: Final = 1024
 """Memory bits (docs/reference/spel.md 8: the reference gives 256, 512 and 1024; the largest is
 used)."""
+
+_REAL: Final = struct.Struct("<f")
 
 
 class BitBank:
@@ -69,6 +72,29 @@ class BitBank:
         if not 0 <= value <= 0xFF:
             raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"Not a byte: {value}")
         self._bits[port * 8 : port * 8 + 8] = [bool(value >> i & 1) for i in range(8)]
+
+    def get_real(self, word: int) -> float:
+        """Return the 32 bits from a word port on as a number, the low word first (assumed).
+
+        Raises:
+            Refusal: There are no such ports.
+        """
+        return float(_REAL.unpack(bytes(self.get_byte(2 * word + i) for i in range(4)))[0])
+
+    def set_real(self, word: int, value: float) -> None:
+        """Switch the 32 bits from a word port on.
+
+        Raises:
+            Refusal: There are no such ports, or 32 bits do not hold the number.
+        """
+        self._check_byte(2 * word)
+        self._check_byte(2 * word + 3)
+        try:
+            packed = _REAL.pack(value)
+        except OverflowError:
+            raise SpelRefusal(RefusalKind.OVERFLOW, f"Not a real of 32 bits: {value}") from None
+        for i, byte in enumerate(packed):
+            self.set_byte(2 * word + i, byte)
 
     def clear(self) -> None:
         """Switch every bit off."""

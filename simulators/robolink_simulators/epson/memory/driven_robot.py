@@ -16,7 +16,9 @@ from robolink_simulators.epson.arm.kinematics import (
 )
 from robolink_simulators.epson.arm.motion_parameters import MotionParameters
 from robolink_simulators.epson.arm.robot_settings import RobotSettings
-from robolink_simulators.epson.arm.robots import RobotModel
+from robolink_simulators.epson.arm.robots import Range, RobotModel
+from robolink_simulators.epson.definitions.drive_settings import DriveSettings, PutBack
+from robolink_simulators.epson.definitions.joint_ranges import JointRanges
 from robolink_simulators.epson.definitions.kept import KeptDefinitions
 from robolink_simulators.epson.memory.control_points import ControlPoints
 from robolink_simulators.epson.memory.pallets import PalletTable
@@ -43,6 +45,7 @@ class DrivenRobot:
         pallets: Pallets 0 to 15.
         control_points: External control points 1 to 15.
         kept: What it was told once and keeps, but for tools.
+        drives: Settings of its drives.
         sensed: Whether the last Jump was stopped by its Sense.
         till_met: Whether the last motion was stopped by its Till.
         found: Where the last Find met its condition, the selected tool's tip.
@@ -58,7 +61,6 @@ class DrivenRobot:
         backlash_deg: float = 0.0,
         serial: str,
     ) -> None:
-        self.model = model
         self.serial = serial
         self.arm = Arm(model, joints, backlash_deg=backlash_deg)
         self.tools = ToolMemory()
@@ -68,12 +70,24 @@ class DrivenRobot:
         self.settings = RobotSettings.of(model.axes)
         self.pallets = PalletTable()
         self.control_points = ControlPoints()
-        self.kept = KeptDefinitions(model.arm_values)
+        ranges = JointRanges(model.ranges, model.pulses_per_unit)
+        self.kept = KeptDefinitions(model.arm_values, ranges)
+        self.drives = DriveSettings(model.axes)
         self.sensed = False
         self.till_met = False
         self.found: Point | None = None
         self.motors_on = False
         self.power_high = False
+
+    @property
+    def model(self) -> RobotModel:
+        """Which robot it is, with the ranges that its joints are held to."""
+        return self.arm.model
+
+    def hold_to_ranges(self) -> None:
+        """Heed the ranges of the joints that were given."""
+        ranges = tuple(Range(*ends) for ends in self.kept.ranges.ends)
+        self.arm.model = replace(self.model, ranges=ranges)
 
     @property
     def offset(self) -> ToolOffset | None:
@@ -143,6 +157,7 @@ class DrivenRobot:
         """Switch the motors; on also resets the motion parameters (docs/reference/spel.md 6.3)."""
         self.motors_on = on
         if on:
+            self.drives.put_back(PutBack.DRIVES)
             self.reset_motion_parameters()
 
     def reset_motion_parameters(self) -> None:
@@ -153,17 +168,19 @@ class DrivenRobot:
         self.parameters = MotionParameters()
         self.power_high = False
         self.settings.reset()
+        self.drives.put_back(PutBack.FIVE)
 
     def forget_volatile(self, now_ns: int) -> None:
         """Forget what a power cycle takes: all but tools, HomeSet and its place."""
         self.arm.halt(now_ns)
         self.switch_motors(False)
         self.reset_motion_parameters()
-        home = self.settings.home_pulses
+        home, order = self.settings.home_pulses, self.settings.home_order
         self.settings = RobotSettings.of(self.model.axes)
-        self.settings.home_pulses = home
+        self.settings.home_pulses, self.settings.home_order = home, order
         self.points = PointTable()
         self.locals = LocalTable(tilting=self.model.six_axes)
+        self.drives = DriveSettings(self.model.axes)
         self.control_points.selected = 0
         self.kept.limits.strict = False
 

@@ -33,15 +33,13 @@ OF_OTHER_ROBOTS: Final = frozenset(_WORDS_OF_OTHER_ROBOTS.split())
 """Statements that the reference allows, for arms that this simulator has none of."""
 
 _WORDS_NOT_SIMULATED = """
-    atrq autoljm dispdev enctemper finedist hofs hordr hour jrange limittorque limittorquelp
-    limittorquestop limzmargin mcordr msgbox olaccel olrate opencom opennet outreal parsestr
-    performmode ptpboost ptrq qpdecelr qpdecels shutdown softcp speedrlimitation syncrobots
-    taskstate tclim tcspeed diffpoint atclr calib closecom closenet close cls eresume error
-    flush fmtstr homeclr hofsjointaccuracy input inputbox latchenable line mcal ptclr ptran qp
-    randomize read redim resetelapsedtime setcom setinreal setlatch setnet signal simset
-    taskwait tc tmreset toff ton vcal vcalpoints waitnet waitsig write writebin abortmotion cont
-    restart recover vdefgetmotionrange vdefsetmotionrange vshowmodel vtrain sysconfig
-    workque_list cnv_quelist history clearhistory
+    areacorrectionclr areacorrectionset avgspeedclear chdisk collisiondetect peakspeedclear atrq
+    dispdev enctemper hofs mcordr msgbox olrate opencom opennet parsestr ptrq shutdown
+    syncrobots taskstate atclr calib closecom closenet close cls eresume error flush fmtstr
+    homeclr hofsjointaccuracy input inputbox latchenable line mcal ptclr randomize read redim
+    resetelapsedtime setcom setlatch setnet signal simset taskwait tmreset toff ton vcal
+    vcalpoints waitnet waitsig write writebin cont restart recover vdefgetmotionrange
+    vdefsetmotionrange vshowmodel vtrain sysconfig workque_list cnv_quelist history clearhistory
 """
 
 NOT_SIMULATED: Final = frozenset(_WORDS_NOT_SIMULATED.split())
@@ -52,14 +50,14 @@ _FUNCTION_WORDS = """
     abs accelmax acos agl agltopls align armdef asc asin atan atan2 athome bclr bset btst chr$
     cos ctr ctrldev ctrlinfo curpos date$ degtorad dist ecpdef elapsedtime era erf$ erl err
     errmsg$ erroron ert estopon eval findpos fix fmtstr$ hex$ homedef in inbcd inpos inreal
-    insidebox insideplane boxdef planedef getrobotinsidebox getrobotinsideplane instr int inw
-    iodef iolabel$ ionumber ja js jt latchpos latchstate lcase$ left$ len ljm localdef lof lset$
-    lshift ltrim$ memin meminw memsw mhour mid$ mytask oport pagl pauseon pdef pdescription$
-    plabel$ pls pnumber posfound ppls ptptime radtodeg realpls realpos realtorque right$ rnd
-    robotinfo robotinfo$ robotmodel$ robotname$ robotserial$ robottype rset$ rshift rtrim$
-    safetyon sgn sin space$ sqr stat str$ sw syserr tab$ tan targetok taskdone taskinfo
-    taskinfo$ tcpspeed teachon tillon time$ tldef tmr trim$ tw ubound ucase$ val vxtrans xy
-    xylimdef
+    diffpoint difftoolorientation insidebox insideplane boxdef planedef getrobotinsidebox
+    getrobotinsideplane instr int inw iodef iolabel$ ionumber ja js jt latchpos latchstate
+    lcase$ left$ len ljm localdef lof lset$ lshift ltrim$ memin meminw memsw mhour mid$ mytask
+    oport pagl pauseon pdef pdescription$ plabel$ pls pnumber posfound ppls ptptime radtodeg
+    realpls realpos realtorque right$ rnd robotinfo robotinfo$ robotmodel$ robotname$
+    robotserial$ robottype rset$ rshift rtrim$ safetyon sgn sin space$ sqr stat str$ sw syserr
+    tab$ tan targetok taskdone taskinfo taskinfo$ tcpspeed teachon tillon time$ tldef tmr trim$
+    tw ubound ucase$ val vxtrans xy xylimdef
 """
 
 FUNCTION_ONLY: Final = frozenset(_FUNCTION_WORDS.split())
@@ -74,9 +72,10 @@ _OF_PROGRAMS_ALONE = """
 
 _UNSIMULATED_FUNCTIONS = """
     opencom chkcom currobot ptrq atrq avgspeed peakspeed olrate sense till vxcalinfo vxcalpoints
-    hand_on hand_off aio_in aio_inw aio_out aio_outw recover latchpos recoverpos lookup
-    diffpoint difftoolorientation windowsstatus loadtype projectname$ robotname hour joint
-    restart setcom here eval
+    hand_on hand_off aio_in aio_inw aio_out aio_outw recover latchpos recoverpos lookup alignecp
+    areacorrection areacorrectiondef brake calpls collisiondetect hofs mcalcomplete mcordr
+    ptpboostok rotok syncrobots taskstate tmout vsd dispdev windowsstatus loadtype projectname$
+    robotname joint restart setcom here eval
 """
 
 _WITH_A_FORM_OF_THEIR_OWN = """

@@ -14,7 +14,7 @@ from typing import Final
 
 from robolink.model import Pose, ToolOffset
 from robolink_simulators.epson.arm.arc import WayLeg, plan_level_way
-from robolink_simulators.epson.arm.joints import Joints, check_depth, check_ranges
+from robolink_simulators.epson.arm.joints import Joints, check_depth, check_ranges, nearest_turn
 from robolink_simulators.epson.arm.kinematics import flange_of
 from robolink_simulators.epson.arm.robots import RobotModel
 from robolink_simulators.epson.arm.trajectory import LinePace
@@ -48,6 +48,23 @@ class SmoothWay:
             for a, b in zip(self.places[index - 1], self.places[index], strict=True)
         )
         return (x, y, z, u)
+
+    def along_itself(self) -> "SmoothWay":
+        """Return the same way with U turning as its direction in the plane does.
+
+        U begins at that of the first place (documented). Where the way stands still in the plane
+        its direction stays (assumed).
+        """
+        turned, last = [self.places[0]], None
+        for a, b in pairwise(self.places):
+            x, y, z, _ = b
+            u = turned[-1][3]
+            if math.hypot(x - a[0], y - a[1]) > _SAME:
+                heading = math.degrees(math.atan2(y - a[1], x - a[0]))
+                u += 0.0 if last is None else nearest_turn(heading - last, 0.0)
+                last = heading
+            turned.append((x, y, z, u))
+        return replace(self, places=tuple(turned))
 
     def share_of(self, point: int) -> float:
         """Return the share of the length at one of the points, counted from 0."""

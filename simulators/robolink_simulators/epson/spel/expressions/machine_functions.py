@@ -7,8 +7,10 @@ from datetime import datetime, timedelta
 from typing import Final
 
 from robolink.model import ToolOffset
+from robolink.timing import NS_PER_S
 from robolink_simulators.epson.arm.kinematics import forward
 from robolink_simulators.epson.memory.bits import BitBank
+from robolink_simulators.epson.memory.driven_robot import DrivenRobot
 from robolink_simulators.epson.memory.points import AXES, Point, PointTable
 from robolink_simulators.epson.refusals import OutOfReach, RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.defined.added_arms import ARM_FUNCTIONS
@@ -18,6 +20,11 @@ from robolink_simulators.epson.spel.expressions.defined.areas import (
     corner_of_box,
     plane_as_point,
 )
+from robolink_simulators.epson.spel.expressions.defined.differences import (
+    point_seen_from,
+    turned_tool,
+)
+from robolink_simulators.epson.spel.expressions.defined.drive_settings import DRIVE_FUNCTIONS
 from robolink_simulators.epson.spel.expressions.defined.xy_limits import (
     LIMIT_FUNCTIONS,
     corner_of_limits,
@@ -43,6 +50,8 @@ from robolink_simulators.epson.spel.expressions.values import (
 )
 from robolink_simulators.epson.spel.session import Session
 
+NS_PER_HOUR: Final = 3600 * NS_PER_S
+_PER_HOUR: Final = (1, 60, 3600)
 _CLOCK_AT_START: Final = datetime(2026, 1, 1, 8)  # noqa: DTZ001 - a controller has no zone
 
 Arguments = Sequence[Value]
@@ -152,6 +161,19 @@ def _of_another_robot(axis: str) -> MachineFunction:
     return refuse
 
 
+def _operating_time(session: Session, arguments: Arguments) -> Value:
+    """Return Time(0), (1) or (2): the whole hours, minutes or seconds of operation (assumed)."""
+    unit = as_integer(arguments[0])
+    if not 0 <= unit <= len(_PER_HOUR) - 1:
+        raise out_of_range(f"Time has no unit {unit}")
+    return session.machine.arm.now_ns * _PER_HOUR[unit] // NS_PER_HOUR
+
+
+def _robot(session: Session, arguments: Arguments) -> DrivenRobot:
+    machine = session.machine
+    return machine.numbered(as_integer(arguments[0])) if arguments else machine.robot
+
+
 def _calibration_information(session: Session, arguments: Arguments) -> Value:
     number, which = (as_integer(argument) for argument in arguments)
     return session.machine.image_calibrations.information(number, which)
@@ -165,6 +187,7 @@ MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     **ARM_FUNCTIONS,
     **LIMIT_FUNCTIONS,
     **AREA_FUNCTIONS,
+    **DRIVE_FUNCTIONS,
     "pagl": (range(2, 3), joint_of_point),
     "ppls": (range(2, 3), pulses_of_point),
     "avoidsingularity": (range(1), lambda s, _: s.machine.settings.avoid_singularity),
@@ -204,8 +227,8 @@ MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     "pls": (range(1, 2), _pulses),
     "tillon": (range(1), lambda s, _: s.machine.till_met),
     "posfound": (range(1), lambda s, _: s.machine.found is not None),
-    "motor": (range(1), lambda s, _: int(s.machine.motors_on)),
-    "power": (range(1), lambda s, _: int(s.machine.power_high)),
+    "motor": (range(2), lambda s, a: int(_robot(s, a).motors_on)),
+    "power": (range(2), lambda s, a: int(_robot(s, a).power_high)),
     "speed": (range(2), lambda s, a: _item(s.machine.parameters.speed, a)),
     "speeds": (range(2), lambda s, a: _item(s.machine.parameters.speed_s, a)),
     "speedr": (range(1), lambda s, _: s.machine.parameters.speed_r),
@@ -220,6 +243,13 @@ MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     "ctr": (range(1, 2), lambda s, a: s.machine.inputs.counted(as_integer(a[0]))),
     "date$": (range(1), lambda s, _: clock_of(s).strftime("%Y/%m/%d")),
     "time$": (range(1), lambda s, _: clock_of(s).strftime("%H:%M:%S")),
+    "time": (range(1, 2), _operating_time),
+    "hour": (range(1), lambda s, _: hours_of(s)),
+    "inreal": (range(1, 2), lambda s, a: s.machine.inputs.get_real(as_integer(a[0]))),
+    "outreal": (range(1, 2), lambda s, a: s.machine.outputs.get_real(as_integer(a[0]))),
+    "inpos": (range(1), lambda s, _: not s.machine.arm.moving),
+    "hordr": (range(1, 2), lambda s, a: _item(s.machine.settings.home_order, a)),
+    "difftoolorientation": (range(3, 4), turned_tool),
     "inbcd": (range(1, 2), _decimal),
     "iolabel$": (range(3, 4), _label_of),
     "ionumber": (range(1, 2), _number_of),
@@ -241,6 +271,11 @@ OF_POINT_NUMBERS: Final[dict[str, Callable[[PointTable, int], Value]]] = {
 def clock_of(session: Session) -> datetime:
     """Return what the controller's clock shows: it starts alike in every run (assumed)."""
     return _CLOCK_AT_START + timedelta(microseconds=session.machine.arm.now_ns // 1000)
+
+
+def hours_of(session: Session) -> float:
+    """Return the hours of operation, from the start of the simulation (assumed)."""
+    return session.machine.arm.now_ns / NS_PER_HOUR
 
 
 def load_of(session: Session) -> tuple[float, float]:
@@ -331,6 +366,7 @@ POINT_FUNCTIONS: Final[dict[str, tuple[range, PointFunction]]] = {
     "xylim": (range(1, 2), corner_of_limits),
     "box": (range(2, 4), corner_of_box),
     "plane": (range(1, 3), plane_as_point),
+    "diffpoint": (range(2, 3), point_seen_from),
     "vxtrans": (range(2, 4), _place_of_pixel),
     "ecpset": (range(1, 2), lambda s, a: Point(s.machine.control_points.get(as_integer(a[0])))),
 }

@@ -3,7 +3,7 @@
 from robolink.model import Pose
 from robolink_simulators.epson.arm.joints import Joints
 from robolink_simulators.epson.arm.kinematics import flange_of, solve
-from robolink_simulators.epson.arm.motion_parameters import LIMZ_MARGIN_MM, MotionPhase
+from robolink_simulators.epson.arm.motion_parameters import MotionPhase
 from robolink_simulators.epson.arm.trajectory import Leg
 from robolink_simulators.epson.arm.ways.arch import arched
 from robolink_simulators.epson.definitions.arches import Arch
@@ -40,7 +40,7 @@ def jump(
         height_mm = limz_mm + machine.locals.get(point.local).z_mm
     start, end = machine.arm.joints, machine.joints_for(point)
     for joints, what in ((start, "The motion starts"), (end, "The target lies")):
-        if joints.j3_mm > height_mm + LIMZ_MARGIN_MM:
+        if joints.j3_mm > height_mm + machine.robot.drives.get("limzmargin")[0]:
             raise SpelRefusal(RefusalKind.ABOVE_LIMZ, f"{what} above LimZ")
     up = start.at_height(max(start.j3_mm, height_mm))
     across = end.at_height(max(end.j3_mm, height_mm))

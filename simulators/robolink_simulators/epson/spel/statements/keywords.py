@@ -21,7 +21,7 @@ from robolink_simulators.epson.spel.expressions.joint_functions import (
     joints_at_pulses,
     pulses_of,
 )
-from robolink_simulators.epson.spel.expressions.machine_functions import clock_of
+from robolink_simulators.epson.spel.expressions.machine_functions import clock_of, hours_of
 from robolink_simulators.epson.spel.expressions.printing import CRLF, number_text
 from robolink_simulators.epson.spel.expressions.values import out_of_range
 from robolink_simulators.epson.spel.file_commands import FILE_COMMANDS
@@ -227,25 +227,40 @@ def _pulse(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
 
 
 def _home(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
-    """Go to the home position, all joints at once (documented: in the order of Hordr)."""
+    """Go to the home position, the joints in the order of Hordr."""
     _expect(command, 0)
     machine = evaluator.session.machine
     home = machine.settings.home_pulses
     if home is None:
         raise SpelRefusal(RefusalKind.HOME_UNDEFINED, "No home position is set")
     require_drives(machine)
-    return StatementOutcome(legs=[_leg_to_pulses(evaluator, home)])
+    start, end = machine.arm.joints, joints_at_pulses(machine, home)
+    moved, legs = 0, []
+    for step in machine.settings.home_order:
+        if step & ~moved:
+            before, moved = _partly(start, end, moved), moved | step
+            legs.append(go_leg(machine, before, _partly(start, end, moved)))
+    require_within_limits(evaluator.session, legs, targets=())
+    return StatementOutcome(legs=legs)
+
+
+def _partly(start: Joints, end: Joints, moved: int) -> Joints:
+    ends = enumerate(zip(start, end, strict=True))
+    return Joints(*(there if moved >> i & 1 else here for i, (here, there) in ends))
 
 
 def _turn_joint(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
-    """Move one joint by some degrees or mm (JTran)."""
+    """Move one joint by some degrees or mm (JTran), or by some pulses (PTran)."""
     joint, by = _expect(command, 2)
     machine, number = evaluator.session.machine, evaluator.integer(joint)
     if not 1 <= number <= machine.model.axes:
         raise out_of_range(f"There is no joint {number}")
     require_drives(machine)
+    distance = float(evaluator.number(by))
+    if command.name == "ptran":
+        distance /= machine.model.pulses_per_unit[number - 1]
     values = list(machine.arm.joints)
-    values[number - 1] += float(evaluator.number(by))
+    values[number - 1] += distance
     return StatementOutcome(legs=[_leg_of_joints(evaluator, Joints(*values))])
 
 
@@ -254,6 +269,12 @@ def _clock(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
     _expect(command, 0)
     layout = "%Y/%m/%d" if command.name == "date" else "%H:%M:%S"
     return StatementOutcome(clock_of(evaluator.session).strftime(layout) + CRLF)
+
+
+def _hours(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
+    """Show the hours of operation (documented); they begin with the simulation (assumed)."""
+    _expect(command, 0)
+    return StatementOutcome(number_text(hours_of(evaluator.session)) + CRLF)
 
 
 def _await_position(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
@@ -329,6 +350,8 @@ _HANDLERS: Final[dict[str, Callable[[Evaluator, KeywordStatement], StatementOutc
     "pulse": _pulse,
     "home": _home,
     "jtran": _turn_joint,
+    "ptran": _turn_joint,
+    "hour": _hours,
     "date": _clock,
     "time": _clock,
     "waitpos": _await_position,

@@ -77,6 +77,8 @@ def plan(evaluator: Evaluator, motion: MotionStatement) -> list[Leg]:
 
 def _planned(evaluator: Evaluator, motion: MotionStatement) -> list[Leg]:
     machine = evaluator.session.machine
+    if "sync" in motion.options.words:
+        raise SpelRefusal(RefusalKind.NOT_SIMULATED, "Robots that start together with SYNC")
     wrong = motion.options.words - _WORDS[motion.verb]
     if wrong:
         raise SpelRefusal(RefusalKind.SYNTAX, f"{motion.verb} knows no {', '.join(sorted(wrong))}")
@@ -109,7 +111,8 @@ def _planned(evaluator: Evaluator, motion: MotionStatement) -> list[Leg]:
                 return [held_leg(machine, machine.pose_of(target))]
             if verb.endswith("move"):
                 return [_line(machine, target, rot="rot" in motion.options.words)]
-            least = machine.model.six_axes and (verb != "go" or "ljm" in motion.options.words)
+            ljm_holds = "ljm" in motion.options.words or machine.robot.drives.is_on("autoljm")
+            least = machine.model.six_axes and (verb != "go" or ljm_holds)
             if not least:
                 return [go_leg(machine, machine.arm.joints, machine.joints_for(target))]
             ljm = motion.options.ljm

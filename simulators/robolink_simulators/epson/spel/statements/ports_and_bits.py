@@ -53,6 +53,19 @@ def _set_word(evaluator: Evaluator, command: KeywordStatement) -> str:
     return ""
 
 
+def _set_real(evaluator: Evaluator, command: KeywordStatement) -> str:
+    """OutReal and SetInReal: a word port and the next take a number of 32 bits."""
+    machine = evaluator.session.machine
+    if command.name == "setinreal":
+        _virtual(evaluator)
+    if len(command.arguments) != 2:
+        raise SpelRefusal(RefusalKind.SYNTAX, f"{command.name} takes a number and a value")
+    port, value = command.arguments
+    bank = machine.inputs if command.name == "setinreal" else machine.outputs
+    bank.set_real(evaluator.integer(port), float(evaluator.number(value)))
+    return ""
+
+
 def _decimal(evaluator: Evaluator, command: KeywordStatement) -> str:
     port, value = _two(evaluator, command)
     if not 0 <= value <= _HIGHEST_DECIMAL:
@@ -72,6 +85,8 @@ BIT_STATEMENTS: Final[dict[str, Callable[[Evaluator, KeywordStatement], str]]] =
     "setsw": _set_switch,
     "setin": _set_byte,
     "setinw": _set_word,
+    "setinreal": _set_real,
+    "outreal": _set_real,
     "opbcd": _decimal,
     "ctreset": _reset_counter,
 }

@@ -9,6 +9,7 @@ from typing import Final
 
 from robolink_simulators.epson.arm.robot_settings import SingularSurroundings
 from robolink_simulators.epson.arm.robots import Mechanism
+from robolink_simulators.epson.definitions.drive_settings import PutBack
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.joint_functions import JOINT_COUNTS, another_robot
@@ -16,6 +17,8 @@ from robolink_simulators.epson.spel.expressions.printing import CRLF, number_tex
 from robolink_simulators.epson.spel.expressions.values import Number, out_of_range
 from robolink_simulators.epson.spel.statements.defined.added_arms import ARM_SETTINGS
 from robolink_simulators.epson.spel.statements.defined.arches import ARCH_SETTINGS
+from robolink_simulators.epson.spel.statements.defined.drive_settings import DRIVE_STATEMENTS
+from robolink_simulators.epson.spel.statements.defined.joint_ranges import RANGE_STATEMENTS
 from robolink_simulators.epson.spel.statements.defined.xy_limits import LIMIT_SETTINGS
 
 Numbers = Sequence[Number]
@@ -93,6 +96,7 @@ def _free(machine: Machine, values: Numbers) -> str:
     if not values:
         raise SpelRefusal(RefusalKind.SYNTAX, "SFree needs a joint")
     machine.settings.free_joints |= _joints(machine, values)
+    machine.robot.drives.put_back(PutBack.DRIVES)
     machine.reset_motion_parameters()
     return ""
 
@@ -102,6 +106,7 @@ def _lock(machine: Machine, values: Numbers) -> str:
     if not machine.motors_on:
         raise SpelRefusal(RefusalKind.MOTORS_OFF, "Motors are off")
     machine.settings.free_joints -= joints
+    machine.robot.drives.put_back(PutBack.DRIVES)
     machine.reset_motion_parameters()
     return ""
 
@@ -156,18 +161,12 @@ def _surroundings(name: str, most: float) -> Setting:
     return choose
 
 
-def _range(machine: Machine, values: Numbers) -> str:
-    if values:
-        raise SpelRefusal(RefusalKind.NOT_SIMULATED, "The range is the model's own here")
-    limits = zip(machine.model.ranges, machine.model.pulses_per_unit, strict=True)
-    pulses = [round(end * scale) for travel, scale in limits for end in (travel.low, travel.high)]
-    return ", ".join(map(str, pulses)) + CRLF
-
-
 ROBOT_SETTINGS: Final[dict[str, Setting]] = {
     **ARCH_SETTINGS,
     **ARM_SETTINGS,
     **LIMIT_SETTINGS,
+    **DRIVE_STATEMENTS,
+    **RANGE_STATEMENTS,
     "weight": _weight,
     "inertia": _inertia,
     "fine": _fine,
@@ -177,7 +176,6 @@ ROBOT_SETTINGS: Final[dict[str, Setting]] = {
     "sfree": _free,
     "slock": _lock,
     "homeset": _home_set,
-    "range": _range,
     "avoidsingularity": _avoid_singularity,
     "singularityangle": _surroundings("angle_deg", 180),
     "singularityspeed": _surroundings("speed_percent", 100),

@@ -11,7 +11,9 @@ from robolink_simulators.epson.spel.tree import KeywordStatement, MotionStatemen
 _WORDS = """
     accel accels accelr arm armset base box boxclr plane planeclr cp ecp ecpset ecpclr fine home
     homeset inertia limz local motor power pulse range sfree slock speed speeds speedr tlset
-    tlclr tool weight till find sense jtran arch armclr xylim xylimclr xylimmode
+    tlclr tool weight till find sense jtran arch armclr xylim xylimclr xylimmode limzmargin
+    finedist performmode ptpboost qpdecelr qpdecels tclim tcspeed limittorque qp olaccel softcp
+    speedrlimitation tc jrange ptran hordr finedist
 """
 FORBIDDEN: Final = frozenset(_WORDS.split())
 _BOUND: Final = frozenset({TaskKind.NO_ABORT, TaskKind.BACKGROUND})

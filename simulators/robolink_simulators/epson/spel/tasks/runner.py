@@ -51,6 +51,7 @@ class ProgramRunner:
         ports: The TCP/IP and serial ports.
         channels: Ports, files and the window of a person, by their numbers.
         tasks: Those that are not over, by their numbers.
+        movers: The task that moved each robot last, by the robot's number.
         console: What Print has shown, the last lines of it.
         on_print: Called with what is printed.
         on_statement: Called before each statement, if anybody follows the run.
@@ -78,9 +79,8 @@ class ProgramRunner:
         self.vision: VisionSystem | None = None
         self._condition = condition
         self._step_ns = session.options.statement_us * 1000
-        self._seen_ns = 0
-        self._paused = False
-        self._movers: dict[int, SpelTask] = {}
+        self._seen_ns, self._paused = 0, False
+        self.movers: dict[int, SpelTask] = {}
 
     @property
     def now_ns(self) -> int:
@@ -260,9 +260,9 @@ class ProgramRunner:
             raise SpelRefusal(RefusalKind.NOT_IN_THIS_TASK, "Not allowed in this kind of task")
         if isinstance(statement, MotionStatement):
             number = machine.robot_number
-            if machine.arm.moving and self._movers.get(number) is not task:
+            if machine.arm.moving and self.movers.get(number) is not task:
                 raise SpelRefusal(RefusalKind.ROBOT_IN_USE, "Another task moves the robot")
-            self._movers[number] = task
+            self.movers[number] = task
         return StatementExecution(task, (statement,), task.now_ns)
 
     def _look(self, task: SpelTask, waiting: TaskWaiting, now_ns: int) -> None:
@@ -316,7 +316,7 @@ class ProgramRunner:
 
     def end(self, task: SpelTask) -> None:
         """End a task, and stop what it moves (Quit)."""
-        for number, mover in self._movers.items():
+        for number, mover in self.movers.items():
             if mover is task:
                 self.session.machine.robots[number - 1].arm.halt(self._seen_ns)
         task.ended = True

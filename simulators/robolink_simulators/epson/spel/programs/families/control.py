@@ -94,6 +94,38 @@ def _quit(emitter: Emitter, node: TaskStatement) -> Operation:
     return go
 
 
+def _abort_motion(emitter: Emitter, node: TaskStatement) -> Operation:
+    """AbortMotion robot or All: the task that moves a robot meets an error and stops it.
+
+    Which error depends on whether the robot moves (documented, docs/reference/spel.md 10); that
+    All passes over robots that no task drives is assumed.
+    """
+    item = _one(emitter, node)
+    number = None if item == Name("all") else emitter.run(item)
+
+    def go(t: SpelTask) -> object:
+        robots = t.runner.session.machine.robots
+        wanted = None if number is None else as_integer(number(t))
+        if wanted is not None and not 1 <= wanted <= len(robots):
+            raise SpelRefusal(RefusalKind.ROBOT_NUMBER, f"There is no robot {wanted}")
+        movers = dict(t.runner.movers)
+        for at in range(1, len(robots) + 1) if wanted is None else (wanted,):
+            mover = movers.get(at)
+            if mover is None or mover.ended:
+                if wanted is None:
+                    continue
+                missing = RefusalKind.NO_MOVER if mover is None else RefusalKind.MOVER_ENDED
+                raise SpelRefusal(missing, f"No task moves robot {at}")
+            arm = robots[at - 1].arm
+            kind = RefusalKind.MOTION_ABORTED if arm.moving else RefusalKind.ABORTED_AT_REST
+            arm.halt(t.now_ns)
+            mover.now_ns = max(mover.now_ns, t.now_ns)
+            t.runner.fail(mover, SpelRefusal(kind, f"AbortMotion of robot {at}"))
+        return t.turn() if t.ended else None
+
+    return go
+
+
 def _halt(emitter: Emitter, node: TaskStatement) -> Operation:
     which = _which(emitter, _one(emitter, node))
 
@@ -247,6 +279,7 @@ def _unsimulated(emitter: Emitter, node: TaskStatement) -> Operation:  # noqa: A
 TASK_STATEMENTS: Final[dict[str, Callable[[Emitter, TaskStatement], Operation]]] = {
     "xqt": _start,
     "quit": _quit,
+    "abortmotion": _abort_motion,
     "halt": _halt,
     "resume": _resume,
     "taskwait": _await_task,

@@ -1,7 +1,7 @@
 """Curve and CVMove: a free curve is stored, and travelled (docs/reference/spel.md 7.1).
 
-``Curve "name", O | C, mode, axes, points``: open or closed; mode 0 alone is carried out, what the
-others do is not described here.
+``Curve "name", O | C, mode, axes, points``: open or closed; mode 2 keeps the tool along the curve.
+Modes with an external control point are refused.
 """
 
 import math
@@ -10,6 +10,7 @@ from typing import Final
 from robolink_simulators.epson.arm.ways.curve import CurveLeg, plan_curve, through
 from robolink_simulators.epson.definitions.curves import (
     AXES_OF_CURVES,
+    TANGENTIAL,
     CurveSwitch,
     FreeCurve,
     Place,
@@ -53,8 +54,9 @@ def store_curve(evaluator: Evaluator, motion: MotionStatement) -> None:
         raise SpelRefusal(RefusalKind.SYNTAX, "Curve takes a file, O or C, a mode, axes and points")
     name, kind, mode, axes, *rest = motion.targets
     closed = _is_closed(kind)
-    if worth_of(evaluator, mode) != 0:
-        raise SpelRefusal(RefusalKind.NOT_SIMULATED, "A curve of another mode than 0")
+    chosen = worth_of(evaluator, mode)
+    if chosen not in (0, TANGENTIAL):
+        raise SpelRefusal(RefusalKind.NOT_SIMULATED, "A curve of another mode than 0 and 2")
     count = worth_of(evaluator, axes)
     if count not in AXES_OF_CURVES:
         raise out_of_range(f"A curve of {count} axes")
@@ -65,7 +67,8 @@ def store_curve(evaluator: Evaluator, motion: MotionStatement) -> None:
     if closed:
         places.append(places[0])
     through(places, closed=closed)
-    curve = FreeCurve(int(count), tuple(places), switches)
+    tangential = chosen == TANGENTIAL
+    curve = FreeCurve(int(count), tuple(places), switches, tangential=tangential)
     machine.kept.curves.store(_name(evaluator, name), curve)
 
 
@@ -80,7 +83,9 @@ def curve_leg(evaluator: Evaluator, motion: MotionStatement) -> CurveLeg:
     machine = session.machine
     if len(motion.targets) != 1:
         raise SpelRefusal(RefusalKind.SYNTAX, "CVMove takes one file")
-    axes, stored, switches = machine.kept.curves.get(_name(evaluator, motion.targets[0]))
+    axes, stored, switches, tangential = machine.kept.curves.get(
+        _name(evaluator, motion.targets[0])
+    )
     x, y, z, u, *_ = machine.tip().coordinates()
     here: Place = (x, y, z, u)
     closed = stored[0] == stored[-1]
@@ -88,6 +93,8 @@ def curve_leg(evaluator: Evaluator, motion: MotionStatement) -> CurveLeg:
     if math.dist(places[0], here) > _SAME:
         raise SpelRefusal(RefusalKind.NOT_SIMULATED, "CVMove from elsewhere than its first point")
     curve = through(places, closed=closed)
+    if tangential:
+        curve = curve.along_itself()
     pace = line_pace(machine)
     leg = plan_curve(
         machine.model, machine.tip(), curve, pace, offset=machine.offset, near=machine.arm.joints

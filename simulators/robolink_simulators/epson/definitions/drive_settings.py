@@ -1,0 +1,103 @@
+"""Settings of a robot's drives: what each may be, and what puts it back.
+
+Source: docs/reference/spel.md 6.3, 7.2. LimZMargin, QP and AutoLJM rule how a robot moves here; the
+others act on torques, vibration and times that are not simulated: they are kept, told and put back.
+"""
+
+from enum import Enum
+from typing import Final, NamedTuple
+
+
+class PutBack(Enum):
+    """What puts a setting back; start-up puts each back."""
+
+    FIVE = "Motor On, SFree, SLock, Reset, the end of tasks"
+    DRIVES = "Motor On, SFree, SLock"
+    START = "start-up alone"
+
+
+class DriveSetting(NamedTuple):
+    """What one statement sets.
+
+    Attributes:
+        counts: How many values it takes; -1 for one of each joint.
+        low: The lowest that a value may be.
+        high: The highest.
+        usual: What each value is at first.
+        put_back: What puts it back.
+        switched: Whether it takes On and Off.
+        listing: How its statement lists it, ``{}`` standing for the value.
+    """
+
+    counts: tuple[int, ...]
+    low: float
+    high: float
+    usual: float
+    put_back: PutBack
+    switched: bool = False
+    listing: str = "{}"
+
+
+def _switch(put_back: PutBack, listing: str = "{}", *, on: bool = False) -> DriveSetting:
+    return DriveSetting((1,), 0, 1, float(on), put_back, switched=True, listing=listing)
+
+
+OF_EACH_JOINT: Final = -1
+
+DRIVE_SETTINGS: Final[dict[str, DriveSetting]] = {
+    "limzmargin": DriveSetting((1,), 0, 1000, 0.02, PutBack.DRIVES),
+    "finedist": DriveSetting((1,), 0.001, 10, 0, PutBack.DRIVES),
+    "performmode": DriveSetting((1,), 0, 2, 0, PutBack.DRIVES),
+    "ptpboost": DriveSetting((3, 1), 0, 100, 0, PutBack.FIVE),
+    "qpdecelr": DriveSetting((1,), 0.1, 5000, 5000, PutBack.FIVE),
+    "qpdecels": DriveSetting((1,), 0.1, 25000, 25000, PutBack.FIVE),
+    "tclim": DriveSetting((OF_EACH_JOINT,), -1, 100, -1, PutBack.FIVE),
+    "tcspeed": DriveSetting((1,), 1, 100, 100, PutBack.FIVE),
+    "limittorque": DriveSetting((OF_EACH_JOINT, 1), 0, 100, 100, PutBack.FIVE),
+    "limittorquelp": DriveSetting((OF_EACH_JOINT, 1), 0, 100, 100, PutBack.START),
+    "limittorquestop": _switch(PutBack.START),
+    "qp": _switch(PutBack.START, "QP {}", on=True),
+    "olaccel": _switch(PutBack.FIVE, "OLACCEL is {}"),
+    "softcp": _switch(PutBack.FIVE),
+    "autoljm": _switch(PutBack.FIVE),
+    "speedrlimitation": _switch(PutBack.FIVE),
+    "cp_offset": _switch(PutBack.FIVE),
+    "tc": _switch(PutBack.FIVE),
+}
+"""By their statements. Where the reference gives no limit, value or listing, those are assumed."""
+
+
+class DriveSettings:
+    """The settings of one robot.
+
+    Args:
+        axes: How many joints it has.
+    """
+
+    def __init__(self, axes: int) -> None:
+        self._axes = axes
+        self._values: dict[str, tuple[float, ...]] = {}
+        self.put_back(PutBack.FIVE, PutBack.DRIVES, PutBack.START)
+
+    def get(self, word: str) -> tuple[float, ...]:
+        """Return the values of a setting."""
+        return self._values[word]
+
+    def is_on(self, word: str) -> bool:
+        """Tell whether a switch is on."""
+        return bool(self._values[word][0])
+
+    def takes(self, word: str) -> tuple[int, ...]:
+        """Return how many values a setting may be given."""
+        return tuple(self._axes if n == OF_EACH_JOINT else n for n in DRIVE_SETTINGS[word].counts)
+
+    def set(self, word: str, values: tuple[float, ...]) -> None:
+        """Keep the values of a setting; one stands for all that there are."""
+        count = self.takes(word)[0]
+        self._values[word] = values if len(values) == count else values * count
+
+    def put_back(self, *occasions: PutBack) -> None:
+        """Put back what some occasions put back."""
+        for word, setting in DRIVE_SETTINGS.items():
+            if setting.put_back in occasions:
+                self.set(word, (setting.usual,))

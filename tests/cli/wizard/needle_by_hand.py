@@ -1,0 +1,165 @@
+"""Keys and seconds for a needle by hand: ``python -m tests.cli.wizard.needle_by_hand``.
+
+A simulated controller in real time; its needle is another one than the stored offset says. A
+scripted hand brings the tip to within 0.02 mm by what it sees, at a touch and at each touch of the proof. A
+key that is held down counts once; in a dialogue of lines every character counts, and ENTER.
+``--lines`` is the dialogue that there was before (git worktree of the commit before the wizard, on
+PYTHONPATH); ``--pictures FOLDER`` keeps the screens.
+"""
+
+import argparse
+import os
+import sys
+import tempfile
+import time
+from dataclasses import replace
+from pathlib import Path
+
+from robolink_simulators.assist.port import InProcessEyes, serve_assist
+from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.epson.options import EpsonOptions
+from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+
+from robolink.timing import SystemClock
+from tests.cli.wizard._screen import ScreenHand
+from tests.contract._terminal import Terminal
+
+RECIPE = Path(__file__).parents[3] / "examples" / "recipes" / "needle-one-touch.toml"
+
+LEARN = ["calibrate", "n-angle", "--tool", "1", "--station", "PIN-07", "--yes"]
+
+
+class Ahead(SystemClock):
+    """Real time, from where a faster clock has come to."""
+
+    def __init__(self, reached_ns):
+        self.lead_ns = reached_ns - super().now_ns()
+
+    def now_ns(self):
+        return super().now_ns() + self.lead_ns
+
+
+def prepare(simulator):
+    """Learn the pin with a simulated person, and mount another needle; return the clock now."""
+    from robolink_cli import main
+
+    clock = ScaledClock(30.0)
+    with serve_tcp(simulator, clock=clock) as host, serve_assist(simulator, clock=clock) as eyes:
+        assert main.run(["-c", host.url, *LEARN, "--assist", eyes.url]) == 0
+    tip = simulator.world.tips[1]
+    simulator.world.tips[1] = replace(
+        tip, x_mm=tip.x_mm + 0.31, y_mm=tip.y_mm - 0.22, z_mm=tip.z_mm - 0.4
+    )
+    return Ahead(clock.now_ns())
+
+
+class LineTypist:
+    """The dialogue of before: steps typed, ENTER when it is on the pin."""
+
+    def __init__(self, terminal, simulator):
+        self.terminal, self.eyes, self.keys = terminal, InProcessEyes(simulator), 0
+
+    def type(self, text):
+        self.keys += len(text) + 1
+        self.terminal.press(text.encode() + b"\n")
+
+    def touch(self):
+        self.terminal.wait_for("ENTER when it is on the pin")
+        time.sleep(0.5)
+        for digits in (1, 2):
+            seen = self.eyes.look(1)
+            left = (seen.dx_mm, seen.dy_mm, seen.dz_mm + (0.05 if digits == 1 else 0.0))
+            steps = [
+                f"{a}{round(by, digits):+g}" for a, by in zip("xyz", left) if round(by, digits)
+            ]
+            if steps:
+                self.type(" ".join(steps))
+                self.terminal.wait_for("done: moved")
+                time.sleep(0.5)
+        self.type("")
+
+
+def by_lines(words, simulator):
+    hand = LineTypist(Terminal(*words), simulator)
+    began = time.monotonic()
+    hand.terminal.wait_for(r"cell clear\? \[y or n\]")
+    hand.type("y")
+    touched = 0
+    while True:
+        found = hand.terminal.wait_for(
+            r"(ENTER when it is on the pin)|\[y or n\]|(type it, then ENTER)|[Oo]n record as"
+        )
+        if found[0].endswith("as"):
+            break
+        if found[1]:
+            hand.terminal.shown = found[0] + hand.terminal.shown
+            hand.touch()
+            touched += 1
+        elif found[2]:
+            time.sleep(0.5)
+            hand.type("N-0418")
+        else:
+            time.sleep(0.5)
+            hand.type("y")
+    code = hand.terminal.end()
+    return hand.keys, time.monotonic() - began, touched, code
+
+
+def by_screen(words, simulator, pictures):
+    hand, shots = ScreenHand(words, simulator), {}
+    began = time.monotonic()
+    hand.start()
+    touched = 0
+    while True:
+        found = hand.see(
+            r"Jog the tip onto the pin|To write, type|\[1\] Yes +\[3\] No|\[Enter\] Done|DONE"
+        )[0]
+        shots[f"{len(shots)}-{found[:8]}"] = hand.text
+        if found == "DONE":
+            break
+        if found.startswith("Jog"):
+            hand.touch()
+            touched += 1
+            hand.see("moving|Please wait|To write|DONE|New values")
+        elif found.startswith("To write"):
+            hand.rest(0.4)
+            hand.press(["1", "*"])
+            hand.see("Please wait|moving|Turn test|DONE")
+        elif found.startswith("[Enter"):
+            hand.rest(0.4)
+            hand.press([*"N-0418", "\r"])
+            hand.rest(1.0)
+        else:
+            hand.rest(0.4)
+            hand.press(["1"])
+            hand.rest(1.0)
+    code = hand.end()
+    if pictures:
+        for name, text in shots.items():
+            (pictures / f"{name.strip()}.txt").write_text(text, encoding="utf-8")
+    return hand.keys, time.monotonic() - began, touched, code
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--lines", action="store_true")
+    parser.add_argument("--pictures", type=Path)
+    said = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["ROBOLINK_STATE_DIR"] = folder
+        simulator = EpsonSimulator(seed=7, options=EpsonOptions(remote_timeout_s=0.0))
+        clock = ScaledClock(1.0, prepare(simulator))
+        with serve_tcp(simulator, clock=clock) as host:
+            command = "recalibrate" if said.lines else "change"
+            words = [command, str(RECIPE), "-c", host.url]
+            if said.lines:
+                found = by_lines(words, simulator)
+            else:
+                found = by_screen(words, simulator, said.pictures)
+    keys, seconds, touched, code = found
+    sys.stdout.write(f"keys {keys}, seconds {seconds:.0f}, touches {touched}, exit {code}\n")
+
+
+if __name__ == "__main__":
+    main()

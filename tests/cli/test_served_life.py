@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
 from itertools import count
@@ -68,4 +69,5 @@ def test_it_ends_with_the_process_that_started_it():
             return
         # Its own look comes every half of a second; ours need not be finer.
         subprocess.run(["sleep", "0.2"], check=True)
+    os.kill(simulator, signal.SIGTERM)
     pytest.fail("it lives on")

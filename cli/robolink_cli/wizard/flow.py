@@ -105,9 +105,7 @@ def _regarding(state: WizardState, subject: object) -> WizardState:
             reading = replace(reading, pose=subject.after)
         return replace(state, jogging=jogging, reading=reading, message="")
     if isinstance(subject, MoveSubject):
-        return replace(
-            state, subject=subject, question=None, waits=False, message="", carried=True
-        )
+        return replace(state, subject=subject, question=None, waits=False, message="", carried=True)
     if isinstance(subject, Header):
         return replace(state, header=subject)
     if isinstance(subject, ChangeReport):

@@ -36,7 +36,9 @@ def at_touch(**more):
 
 def test_a_first_touch_that_the_robot_went_to_by_itself_is_jogged_too():
     brought = Sitting().asked(touch_subject(number=1, arrival=None)).keys("5")
-    assert brought.sent == ["done"], "a tip that was on the pin before anything moved is taken as it is"
+    assert brought.sent == ["done"], (
+        "a tip that was on the pin before anything moved is taken as it is"
+    )
     going = MoveSubject(ARRIVAL, Way.JOINT, 20.0, "Moving to where tool 1 is measured.")
     carried = Sitting().happens(WasRegarded(going)).asked(touch_subject(number=1, arrival=None))
     carried.keys("5")

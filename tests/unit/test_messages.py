@@ -2,6 +2,7 @@
 
 import ast
 import re
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -17,8 +18,13 @@ def sources():
     return sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
 
 
+@cache
+def tree(path):
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
 def sentences(path):
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(tree(path)):
         if isinstance(node, ast.Call) and getattr(node.func, "id", "") in ("tr", "declared"):
             yield node
 
@@ -96,7 +102,7 @@ def test_nothing_is_translated_before_the_language_is_known():
     wrong = [
         f"{path.relative_to(ROOT)}:{line}: declared(...) here, spoken(...) where it is shown"
         for path in sources()
-        for line in too_early(ast.parse(path.read_text(encoding="utf-8")))
+        for line in too_early(tree(path))
     ]
     assert not wrong
 

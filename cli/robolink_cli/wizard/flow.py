@@ -122,9 +122,13 @@ def _waiting(state: WizardState, at_s: float) -> WizardState:
 
 
 def _asked(state: WizardState, asked: WasAsked) -> WizardState:
-    size = state.jogging.size
+    size, reading = state.jogging.size, state.reading
+    if reading is not None and asked.at_s - reading.at_s > 1.0:
+        # Where it was before the robot moved is not where it is.
+        reading = replace(reading, pose=None)
     return replace(
         state,
+        reading=reading,
         question=asked,
         waits=False,
         typed="",

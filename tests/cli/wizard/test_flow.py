@@ -17,8 +17,9 @@ from robolink_cli.wizard.happenings import (
 )
 from robolink_cli.wizard.state import STEP_SIZES
 
+from robolink.model import Path as Way
 from robolink.model import Pose
-from robolink.runner import JogSubject, Question
+from robolink.runner import JogSubject, MoveSubject, Question
 from tests.cli.wizard._people import (
     ARRIVAL,
     CHECK,
@@ -31,6 +32,18 @@ from tests.cli.wizard._people import (
 
 def at_touch(**more):
     return Sitting().asked(touch_subject(**more))
+
+
+def test_a_first_touch_that_the_robot_went_to_by_itself_is_jogged_too():
+    brought = Sitting().asked(touch_subject(number=1, arrival=None)).keys("5")
+    assert brought.sent == ["done"], "a tip that was on the pin before anything moved is taken as it is"
+    going = MoveSubject(ARRIVAL, Way.JOINT, 20.0, "Moving to where tool 1 is measured.")
+    carried = Sitting().happens(WasRegarded(going)).asked(touch_subject(number=1, arrival=None))
+    carried.keys("5")
+    assert "still stands where the robot put it" in carried.state.message
+    assert not carried.sent
+    carried.keys("3").jogs("z-0.1").keys("5")
+    assert carried.sent == ["z-0.1", "done"]
 
 
 def test_a_touch_is_jogged_in_coarse_steps_and_taken_after_a_fine_one():

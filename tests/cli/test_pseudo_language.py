@@ -4,10 +4,9 @@ In each sentence 【 and 】 stand about the text, which is two fifths longer: a
 catalogue knows shows, and so does what the journal keeps.
 """
 
+import io
 import json
-import os
 import re
-import subprocess
 import sys
 
 import click
@@ -123,16 +122,14 @@ def test_every_command_takes_a_language(marked):
 
 @pytest.mark.parametrize(("encoding", "english"), [("ascii", True), ("gbk", False)])
 def test_a_window_without_chinese_characters_gets_english_and_one_line_why(
-    encoding, english, tmp_path
+    encoding, english, tmp_path, monkeypatch
 ):
-    done = subprocess.run(
-        [sys.executable, "-m", "robolink_cli", "--lang", "zh", "cell", "list"],
-        env={**os.environ, "PYTHONIOENCODING": encoding, "PYTHONPATH": os.pathsep.join(sys.path)},
-        cwd=tmp_path,
-        capture_output=True,
-        timeout=30,
-        check=False,
-    )
-    said = (done.stdout + done.stderr).decode(encoding)
+    monkeypatch.chdir(tmp_path)
+    window = io.BytesIO()
+    for name in ("stdout", "stderr"):
+        stream = io.TextIOWrapper(window, encoding=encoding, write_through=True)
+        monkeypatch.setattr(sys, name, stream)
+    assert main.run(["--lang", "zh", "cell", "list"]) == 0
+    said = window.getvalue().decode(encoding)
     assert ("This window cannot show Chinese" in said) is english
     assert ("There is no cell" in said) is english

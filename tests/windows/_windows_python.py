@@ -144,11 +144,13 @@ def _interpreter(folder: Path) -> None:
         for member in archive.namelist():
             path = Path(member)
             # The C library is wine's own: what is in the wheel only points to it.
-            if path.parent.name == "deploy_libs" and not path.name.startswith("api-ms-"):
-                if path.suffix in {".dll", ".pyd"}:
-                    (folder / path.name).write_bytes(archive.read(member))
+            wanted = path.suffix in {".dll", ".pyd"} and not path.name.startswith("api-ms-")
+            if wanted and path.parent.name == "deploy_libs":
+                (folder / path.name).write_bytes(archive.read(member))
     sources = Path(__file__).parent
-    _said(_COMPILER, "-municode", "-O2", "-o", str(folder / "python.exe"), str(sources / "launcher.c"))
+    _said(
+        _COMPILER, "-municode", "-O2", "-o", str(folder / "python.exe"), str(sources / "launcher.c")
+    )
     _said(
         *(_COMPILER, "-shared", "-O2", "-o", str(folder / "bcryptprimitives.dll")),
         *(str(sources / "process_prng.c"), "-ladvapi32"),

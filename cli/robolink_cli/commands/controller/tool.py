@@ -1,7 +1,5 @@
 """tool list, get, set, clear, select: the tool table."""
 
-from dataclasses import replace
-
 import click
 
 from robolink.errors import ConfigError
@@ -16,11 +14,12 @@ from robolink_cli.options.consent import (
     yes_option,
 )
 from robolink_cli.options.numbers import DECIMAL
-from robolink_cli.prompts.jumps import Allowed, accept_jump, accept_jump_options, allowed_by
+from robolink_cli.prompts.jumps import Allowed, accept_jump_options
 from robolink_cli.prompts.questions import agree
 from robolink_cli.session.completing import complete_tool
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.opening import open_controller
+from robolink_cli.session.ordering import order_option, ordered, require_no_dry_run
 
 _FROM_FILES = "robolink_cli.commands.controller.backup"
 
@@ -120,6 +119,7 @@ def _get_by_mode(context: CliContext, mode: str) -> None:
 @click.option("--v", type=DECIMAL, help="Degrees about Y; six-axis robots only.")
 @click.option("--w", type=DECIMAL, help="Degrees about X; six-axis robots only.")
 @accept_jump_options
+@order_option
 @controller_options
 @dry_run_option
 @yes_option
@@ -129,6 +129,7 @@ def set_tool(
     *,
     accepted_mm: float | None,
     accepted_deg: float | None,
+    order: str | None,
     dry_run: bool,
     yes: bool,
     **given: float | None,
@@ -138,57 +139,29 @@ def set_tool(
     A change beyond the cell's max_change_mm or max_change_deg takes an engineer, who is asked
     with the figure, whatever --yes says.
     """
-    from robolink.backup import keep_first_backup
-    from robolink.model import ToolOffset
-    from robolink.transaction import Jump, Wanted, change_tools
-    from robolink_cli.views.documents import offset_payload, receipt_payload
-    from robolink_cli.views.tables import show_change
+    from robolink_cli.commands.controller.tool_setting import ToolSetting
 
     units = {"x": "x_mm", "y": "y_mm", "z": "z_mm", "u": "u_deg", "v": "v_deg", "w": "w_deg"}
     changes = {units[axis]: value for axis, value in given.items() if value is not None}
+    kept = [name for name in units.values() if name not in changes]
     if not changes:
         raise ConfigError(
             tr("No component was given."), remedy=tr("Give at least one of --x --y --z --u.")
         )
-    # Checks the numbers before a connection is made.
-    ToolOffset(**changes)
+    require_no_dry_run(order, dry_run=dry_run)
+    setting = ToolSetting(
+        context, number, changes, kept=kept, accepted=Allowed(accepted_mm, accepted_deg), yes=yes
+    )
     with open_controller(context, changes=not dry_run) as controller:
-        controller.tools.require_writable(number)
-        before = controller.tools.read(number)
-        note_change(controller, number, before)
-        # Nothing of what no tool has is kept beside what was given.
-        kept_from = ToolOffset() if before is None or before.of_no_tool else before
-        wanted = replace(kept_from, **changes)
-        kept = [name for name in units.values() if name not in changes]
-        shown = offset_payload(before), offset_payload(wanted)
         if dry_run:
-            requests = controller.tools.preview_write(number, wanted)
-            context.show_requests(requests)
+            setting.preview(controller)
             return
-        controller.tools.selected()  # read now: the last line of a failure names it
-        if not context.json:
-            show_change(number, *shown, after_name=tr("new"))
-        # An undefined tool has no place from which its tip could jump.
-        accepted = before is not None and accept_jump(
-            controller,
-            number,
-            Jump.between(before, wanted),
-            allowed=allowed_by(context.cell),
-            accepted=Allowed(accepted_mm, accepted_deg),
-        )
-        if not (accepted or context.json):
-            agree(tr("Write this to tool {number}?", number=number), yes=yes)
-        keep_first_backup(controller, tell=note)
-        (receipt,) = change_tools(controller, [Wanted(number, wanted, before)], tell=note)
-    payload = receipt_payload(receipt) | {"kept": kept}
-    done = (
-        tr("already stored, nothing was written") if receipt.skipped else tr("written, read back")
-    )
-    context.emit(
-        "tool-write",
-        payload,
-        lambda: say(tr("tool {number}: {done}", number=number, done=done)),
-    )
+        with ordered(controller, order, "tool set") as found:
+            if found is not None and found.done is not None:
+                payload = found.done.result
+            else:
+                payload = setting.write(controller, found)
+    setting.show(payload, found)
 
 
 @tool.command("clear")

@@ -69,7 +69,7 @@ SECTIONS: Final = {
 """The first help page: heading, then name, where it is and one line of help."""
 
 SHORT_NAMES: Final = {
-    "check": f"{_RECORD}.cell_check:check",
+    "check": f"{_COMPUTER}.cell_check:check",
     "config": f"{_GROUPS}:config",
     "docs": f"{_SHIPPED}.docs:docs",
     "expert": f"{_GROUPS}:expert",

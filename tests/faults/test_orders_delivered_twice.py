@@ -6,26 +6,35 @@ taken, under the marker ``soak`` all.
 """
 
 import json
+from collections import Counter
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from itertools import count
+from pathlib import Path
+from queue import SimpleQueue
+from typing import NamedTuple
 
 import pytest
 
 import robolink
 from robolink.errors import BusyError, ConfigError, LeaseLostError, OutcomeUnknownError
 from robolink.journal import memory_journal, open_journal
-from robolink.model import ANY, EntryKind
+from robolink.model import ANY, EntryKind, plain_offset
 from robolink.testing import MemoryController, MemoryMachine
 from robolink.transaction import Settler, ToolChange, Wanted, carrying_out, change_tools
-from tests.faults._change_cell import ChangeCell, CommitStep, Step, change_cell
-from tests.faults._change_process import NEW, OLD, ORDER, PROGRAMS
+from tests.faults._change_cell import ChangeCell, Step, change_cell
+from tests.faults._change_process import NEW, OLD, ORDER, PROGRAMS, CommitStep
+from tests.faults._client_process import ClientProcess
 from tests.faults._nozzle_cell import OLD_TIP, NozzleCell, served_cell
 from tests.faults._softmotion_change_cell import plc_change_cell
-from tests.faults._steps import MOMENTS, disturbed
-from tests.faults._steps import Step as ChangeStep
+from tests.faults._steps import MOMENTS, Moment
 
 pytestmark = pytest.mark.timeout(600)
 
-CELLS = {"EPSON": change_cell, "PLC": plc_change_cell}
+CELLS: dict[str, Callable[[Path], AbstractContextManager[ChangeCell]]] = {
+    "EPSON": change_cell,
+    "PLC": plc_change_cell,
+}
 SOAK = pytest.mark.soak
 RECIPE = """
 schema = "robolink/recipe/1"
@@ -75,7 +84,7 @@ def check_killed_order(cell: ChangeCell, program: str, step: Step) -> None:
 
 def sample(steps: list[Step]) -> list[Step]:
     """Return the transaction that keeps the value, just before and just after it counts."""
-    commits = [step for step in steps if isinstance(step, CommitStep)]
+    commits: list[Step] = [step for step in steps if isinstance(step, CommitStep)]
     return commits[-2:]
 
 
@@ -108,6 +117,42 @@ def test_f79_an_order_killed_at_each_step_and_delivered_again_is_carried_out_onc
     print(f"{kind}, {program}: {len(chosen)} kill points of {len(steps)}")  # noqa: T201 - for pytest -s
 
 
+class Instant(NamedTuple):
+    """An exchange of a change, by how often such a one came before: how long it polls varies."""
+
+    request: str
+    nth: int
+    moment: Moment
+
+
+def kind_of(request: str) -> str:
+    return request.partition("XY(")[0]
+
+
+def kill_change(cell: NozzleCell, at: Instant) -> None:
+    """Start an ordered change and kill its process at an instant, if it comes to it."""
+    started: SimpleQueue[ClientProcess] = SimpleQueue()
+    seen: list[int] = []
+
+    def hold(number: int, text: str) -> None:
+        if kind_of(text) == at.request:
+            seen.append(number)
+            if len(seen) == at.nth and at.moment == MOMENTS[0]:
+                started.get(timeout=30).kill()
+
+    def hold_answer(number: int, _text: str) -> None:
+        if seen[at.nth - 1 : at.nth] == [number] and at.moment == MOMENTS[1]:
+            started.get(timeout=30).kill()
+
+    with cell.simulator.lock:
+        cell.simulator.on_request, cell.simulator.on_reply = hold, hold_answer
+    client = cell.calibrate()
+    started.put(client)
+    assert client.exit_code() in (0, -9)
+    with cell.simulator.lock:
+        cell.simulator.on_request = cell.simulator.on_reply = None
+
+
 def ordered_change(cell: NozzleCell) -> list[str]:
     recipe = cell.folder / "touch.toml"
     recipe.write_text(RECIPE)
@@ -115,9 +160,9 @@ def ordered_change(cell: NozzleCell) -> list[str]:
     return ["change", str(recipe), "--order", ORDER, "--yes", *assist]
 
 
-def check_killed_change(cell: NozzleCell, step: ChangeStep) -> None:
+def check_killed_change(cell: NozzleCell, at: Instant) -> None:
     machine = cell.simulator.machine
-    disturbed(cell, step, lambda client: client.kill())
+    kill_change(cell, at)
     cell.wait_at_rest()
     if cell.open_markers():
         moves, writes = machine.arm.moves_started, machine.flash_writes
@@ -140,33 +185,39 @@ def check_killed_change(cell: NozzleCell, step: ChangeStep) -> None:
     cell.check_settings_are_those_of_before()
 
 
-@pytest.mark.parametrize("whole", [False, pytest.param(True, marks=SOAK)])
+def check_killed_at(folder: Path, monkeypatch: pytest.MonkeyPatch, at: Instant) -> None:
+    monkeypatch.setattr(NozzleCell, "calibration", property(ordered_change))
+    with served_cell(folder, monkeypatch) as cell:
+        try:
+            check_killed_change(cell, at)
+        except AssertionError as error:
+            error.add_note(f"killed at {at}")
+            raise
+
+
 @pytest.mark.fault("F79")
-def test_f79_a_change_killed_at_each_step_and_delivered_again_is_made_once(
-    tmp_path, monkeypatch, whole
-):
+def test_f79_a_change_killed_at_its_write_and_delivered_again_is_made_once(tmp_path, monkeypatch):
+    write = Instant('$Execute,"TLSet 1, ', 1, MOMENTS[0])
+    check_killed_at(tmp_path / "cell", monkeypatch, write)
+
+
+@pytest.mark.soak
+@pytest.mark.fault("F79")
+def test_f79_a_change_killed_at_each_step_and_delivered_again_is_made_once(tmp_path, monkeypatch):
     monkeypatch.setattr(NozzleCell, "calibration", property(ordered_change))
     with served_cell(tmp_path / "whole", monkeypatch) as cell:
         client = cell.calibrate()
         assert client.exit_code() == 0, client.err
-        requests = cell.requests
-    steps = [
-        ChangeStep(number, moment, text)
-        for number, text in enumerate(requests, start=1)
+        requests = Counter(map(kind_of, cell.requests))
+    instants = [
+        Instant(request, nth, moment)
+        for request, most in requests.items()
+        for nth in range(1, most + 1)
         for moment in MOMENTS
     ]
-    if not whole:
-        # The value is stored, and nobody was told.
-        stored = [step for step in steps if "TLSet 1, XY" in step.request]
-        steps = [stored[-1]]
-    for step in steps:
-        with served_cell(tmp_path / f"{step.number}-{step.moment[:10]}", monkeypatch) as cell:
-            try:
-                check_killed_change(cell, step)
-            except AssertionError as error:
-                error.add_note(f"killed at {step}")
-                raise
-    print(f"{len(steps)} kill points")  # noqa: T201 - for pytest -s
+    for number, at in enumerate(instants):
+        check_killed_at(tmp_path / str(number), monkeypatch, at)
+    print(f"{len(instants)} kill points")  # noqa: T201 - for pytest -s
 
 
 _desks = count()
@@ -197,7 +248,9 @@ def test_f79_of_two_at_once_one_is_let_in_and_the_other_then_sees_its_result():
             change_tools(one, [Wanted(1, NEW[1], ANY)], order=order)
         with carrying_out(two, ORDER, JOB) as order:
             assert order.done is not None
-            assert order.done.result["tools"][0]["tool"] == 1
+            value = plain_offset(NEW[1])
+            made = {"tool": 1, "before": None, "requested": value, "read_back": value}
+            assert order.done.result == {"tools": [made]}
     for entry in desk.journal.entries(kinds=(EntryKind.INTENT, EntryKind.WRITE, EntryKind.DONE)):
         assert entry.details["order"] == ORDER
 

@@ -104,7 +104,7 @@ def test_a_tool_that_somebody_cleared_is_undefined_even_where_asking_for_it_is_a
     options = EpsonOptions(tlset_of_undefined="error")
     with tool_cell(options) as cell, cell.connected() as controller:
         before = controller.tools.read(1)
-        cell.simulator.machine.tools.clear(1)
+        cell.simulator.machine.tools.clear(1, in_force="selects_zero")
         with pytest.raises(ToolChangedError, match="Tool 1 holds undefined"):
             controller.tools.write(1, NEW[1], expected=before)
         assert cell.writes == 1, "only that of the person who cleared it"

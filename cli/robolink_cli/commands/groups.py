@@ -15,7 +15,6 @@ _CONTROLLER: Final = "robolink_cli.commands.controller"
 _COMPUTER: Final = "robolink_cli.commands.computer"
 _COMPANIONS: Final = "robolink_cli.commands.companions"
 _MEASURE: Final = "robolink_cli.commands.measure"
-_RECORD: Final = "robolink_cli.commands.record"
 _SHIPPED: Final = "robolink_cli.commands.shipped"
 
 _ROBOT: Final = {
@@ -45,7 +44,7 @@ _CELL: Final = {
     "list": (f"{_COMPUTER}.config:list_cells", declared("The cells that have a name here.")),
     "show": (f"{_COMPUTER}.config:show", declared("All that is in force for one cell.")),
     "check": (
-        f"{_RECORD}.cell_check:check",
+        f"{_COMPUTER}.cell_check:check",
         declared(
             "Whether cells are in order and nothing is due; for a nightly job, moves nothing."
         ),

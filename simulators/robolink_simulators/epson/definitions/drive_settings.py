@@ -8,7 +8,7 @@ from enum import Enum
 from typing import Final, NamedTuple
 
 
-class PutBack(Enum):
+class RestoredAt(Enum):
     """What puts a setting back; start-up puts each back."""
 
     FIVE = "Motor On, SFree, SLock, Reset, the end of tasks"
@@ -33,36 +33,36 @@ class DriveSetting(NamedTuple):
     low: float
     high: float
     usual: float
-    put_back: PutBack
+    put_back: RestoredAt
     switched: bool = False
     listing: str = "{}"
 
 
-def _switch(put_back: PutBack, listing: str = "{}", *, on: bool = False) -> DriveSetting:
+def _switch(put_back: RestoredAt, listing: str = "{}", *, on: bool = False) -> DriveSetting:
     return DriveSetting((1,), 0, 1, float(on), put_back, switched=True, listing=listing)
 
 
 OF_EACH_JOINT: Final = -1
 
 DRIVE_SETTINGS: Final[dict[str, DriveSetting]] = {
-    "limzmargin": DriveSetting((1,), 0, 1000, 0.02, PutBack.DRIVES),
-    "finedist": DriveSetting((1,), 0.001, 10, 0, PutBack.DRIVES),
-    "performmode": DriveSetting((1,), 0, 2, 0, PutBack.DRIVES),
-    "ptpboost": DriveSetting((3, 1), 0, 100, 0, PutBack.FIVE),
-    "qpdecelr": DriveSetting((1,), 0.1, 5000, 5000, PutBack.FIVE),
-    "qpdecels": DriveSetting((1,), 0.1, 25000, 25000, PutBack.FIVE),
-    "tclim": DriveSetting((OF_EACH_JOINT,), -1, 100, -1, PutBack.FIVE),
-    "tcspeed": DriveSetting((1,), 1, 100, 100, PutBack.FIVE),
-    "limittorque": DriveSetting((OF_EACH_JOINT, 1), 0, 100, 100, PutBack.FIVE),
-    "limittorquelp": DriveSetting((OF_EACH_JOINT, 1), 0, 100, 100, PutBack.START),
-    "limittorquestop": _switch(PutBack.START),
-    "qp": _switch(PutBack.START, "QP {}", on=True),
-    "olaccel": _switch(PutBack.FIVE, "OLACCEL is {}"),
-    "softcp": _switch(PutBack.FIVE),
-    "autoljm": _switch(PutBack.FIVE),
-    "speedrlimitation": _switch(PutBack.FIVE),
-    "cp_offset": _switch(PutBack.FIVE),
-    "tc": _switch(PutBack.FIVE),
+    "limzmargin": DriveSetting((1,), 0, 1000, 0.02, RestoredAt.DRIVES),
+    "finedist": DriveSetting((1,), 0.001, 10, 0, RestoredAt.DRIVES),
+    "performmode": DriveSetting((1,), 0, 2, 0, RestoredAt.DRIVES),
+    "ptpboost": DriveSetting((3, 1), 0, 100, 0, RestoredAt.FIVE),
+    "qpdecelr": DriveSetting((1,), 0.1, 5000, 5000, RestoredAt.FIVE),
+    "qpdecels": DriveSetting((1,), 0.1, 25000, 25000, RestoredAt.FIVE),
+    "tclim": DriveSetting((OF_EACH_JOINT,), -1, 100, -1, RestoredAt.FIVE),
+    "tcspeed": DriveSetting((1,), 1, 100, 100, RestoredAt.FIVE),
+    "limittorque": DriveSetting((OF_EACH_JOINT, 1), 0, 100, 100, RestoredAt.FIVE),
+    "limittorquelp": DriveSetting((OF_EACH_JOINT, 1), 0, 100, 100, RestoredAt.START),
+    "limittorquestop": _switch(RestoredAt.START),
+    "qp": _switch(RestoredAt.START, "QP {}", on=True),
+    "olaccel": _switch(RestoredAt.FIVE, "OLACCEL is {}"),
+    "softcp": _switch(RestoredAt.FIVE),
+    "autoljm": _switch(RestoredAt.FIVE),
+    "speedrlimitation": _switch(RestoredAt.FIVE),
+    "cp_offset": _switch(RestoredAt.FIVE),
+    "tc": _switch(RestoredAt.FIVE),
 }
 """By their statements. Where the reference gives no limit, value or listing, those are assumed."""
 
@@ -77,7 +77,7 @@ class DriveSettings:
     def __init__(self, axes: int) -> None:
         self._axes = axes
         self._values: dict[str, tuple[float, ...]] = {}
-        self.put_back(PutBack.FIVE, PutBack.DRIVES, PutBack.START)
+        self.put_back(RestoredAt.FIVE, RestoredAt.DRIVES, RestoredAt.START)
 
     def get(self, word: str) -> tuple[float, ...]:
         """Return the values of a setting."""
@@ -96,7 +96,7 @@ class DriveSettings:
         count = self.takes(word)[0]
         self._values[word] = values if len(values) == count else values * count
 
-    def put_back(self, *occasions: PutBack) -> None:
+    def put_back(self, *occasions: RestoredAt) -> None:
         """Put back what some occasions put back."""
         for word, setting in DRIVE_SETTINGS.items():
             if setting.put_back in occasions:

@@ -17,7 +17,7 @@ from robolink_simulators.epson.arm.kinematics import (
 from robolink_simulators.epson.arm.motion_parameters import MotionParameters
 from robolink_simulators.epson.arm.robot_settings import RobotSettings
 from robolink_simulators.epson.arm.robots import Range, RobotModel
-from robolink_simulators.epson.definitions.drive_settings import DriveSettings, PutBack
+from robolink_simulators.epson.definitions.drive_settings import DriveSettings, RestoredAt
 from robolink_simulators.epson.definitions.joint_ranges import JointRanges
 from robolink_simulators.epson.definitions.kept import KeptDefinitions
 from robolink_simulators.epson.memory.control_points import ControlPoints
@@ -157,7 +157,7 @@ class DrivenRobot:
         """Switch the motors; on also resets the motion parameters (docs/reference/spel.md 6.3)."""
         self.motors_on = on
         if on:
-            self.drives.put_back(PutBack.DRIVES)
+            self.drives.put_back(RestoredAt.DRIVES)
             self.reset_motion_parameters()
 
     def reset_motion_parameters(self) -> None:
@@ -168,7 +168,7 @@ class DrivenRobot:
         self.parameters = MotionParameters()
         self.power_high = False
         self.settings.reset()
-        self.drives.put_back(PutBack.FIVE)
+        self.drives.put_back(RestoredAt.FIVE)
 
     def forget_volatile(self, now_ns: int) -> None:
         """Forget what a power cycle takes: all but tools, HomeSet and its place."""

@@ -9,7 +9,7 @@ from typing import Final
 
 from robolink_simulators.epson.arm.robot_settings import SingularSurroundings
 from robolink_simulators.epson.arm.robots import Mechanism
-from robolink_simulators.epson.definitions.drive_settings import PutBack
+from robolink_simulators.epson.definitions.drive_settings import RestoredAt
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.joint_functions import JOINT_COUNTS, another_robot
@@ -96,7 +96,7 @@ def _free(machine: Machine, values: Numbers) -> str:
     if not values:
         raise SpelRefusal(RefusalKind.SYNTAX, "SFree needs a joint")
     machine.settings.free_joints |= _joints(machine, values)
-    machine.robot.drives.put_back(PutBack.DRIVES)
+    machine.robot.drives.put_back(RestoredAt.DRIVES)
     machine.reset_motion_parameters()
     return ""
 
@@ -106,7 +106,7 @@ def _lock(machine: Machine, values: Numbers) -> str:
     if not machine.motors_on:
         raise SpelRefusal(RefusalKind.MOTORS_OFF, "Motors are off")
     machine.settings.free_joints -= joints
-    machine.robot.drives.put_back(PutBack.DRIVES)
+    machine.robot.drives.put_back(RestoredAt.DRIVES)
     machine.reset_motion_parameters()
     return ""
 

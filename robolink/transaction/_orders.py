@@ -82,7 +82,7 @@ class OrderedChange:
         """Return the entry by which the order counts as carried out."""
         tools = {str(receipt.tool): plain_offset(receipt.read_back) for receipt in receipts}
         details = {**self._said(receipts), "tools": tools}
-        return NewEntry(EntryKind.ORDER, verdict=tr("kept"), details=details)
+        return NewEntry(EntryKind.ORDER, verdict=tr("the order was carried out"), details=details)
 
     def marked(self, steps: Sequence[Step]) -> dict[str, object]:
         """Return what the marker of the change says about the order.

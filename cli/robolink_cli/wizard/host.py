@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import TypeVar
 
-from robolink_cli.console.output import shown_by
+from robolink_cli.console.output import sentences, shown_by
 from robolink_cli.console.render import note
 from robolink_cli.prompts.present import sitting_at
 from robolink_cli.wizard.desk import Desk
@@ -32,7 +32,8 @@ def guided(header: Header, do: Callable[[], T]) -> T:
         work.start()
         state = face.run(desk, state, work)
     if work.error is not None:
-        _leave(stopped_lines(state))
+        if state.subject is not None:  # else nothing was begun that could stop
+            _leave(stopped_lines(state))
         raise work.error
     if state.report is not None:
         _leave(done_lines(state, state.report))
@@ -41,4 +42,4 @@ def guided(header: Header, do: Callable[[], T]) -> T:
 
 def _leave(lines: list[str]) -> None:
     """Print what stays when the screen is gone."""
-    note("\n".join(lines))
+    note(sentences("\n".join(lines)))

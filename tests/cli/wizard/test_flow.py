@@ -125,8 +125,9 @@ def test_the_numbers_of_several_tools_are_typed_all():
 def test_a_start_waits_for_every_point_of_the_list():
     hand = Sitting().asked(CHECK, Question.YES_NO).keys("5")
     assert hand.sent == []
-    assert "3 points are open" in hand.state.message
+    assert "First: [7] [1] [3]." in hand.state.message
     assert hand.keys("1", "3", "5").sent == []
+    assert "First: [7]." in hand.state.message
     assert hand.keys("7").sent == ["motors"]
     done = CHECK.__class__(tuple(p for p in CHECK.points if p.key != "7"), CHECK.plan)
     hand = Sitting().asked(done, Question.YES_NO).keys("1", "3", "5")

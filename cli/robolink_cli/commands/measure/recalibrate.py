@@ -114,13 +114,10 @@ def recalibrate(
 
 def _chosen(context: CliContext) -> "tuple[CliContext, LoadedRecipe]":
     """Have cell and recipe chosen, as far as the line does not name them."""
-    from robolink_cli.commands.measure.choosing import choose_cell, choose_recipe
+    from robolink_cli.commands.measure.choosing import choose_recipe, context_at_desk
     from robolink_cli.prompts.present import present_desk
-    from robolink_cli.session.context import context_of_cell
-    from robolink_cli.session.guidance import header_of
 
     desk = present_desk()
     assert desk is not None  # noqa: S101 - looked at by whoever calls
-    at = context if context.url is not None else context_of_cell(choose_cell(desk).name)
-    desk.regard(header_of(at, tr("Change needle")))
+    at = context_at_desk(context, tr("Change needle"))
     return at, choose_recipe(desk, at.cell)

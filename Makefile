@@ -53,10 +53,10 @@ faults: $(VENV)/.installed-dev ## Run the fault catalogue, F01 to F80, and print
 # Their files are called judge_*.py: a plain pytest, which takes test_*.py, leaves them out.
 .PHONY: peers
 peers: $(VENV)/.installed-dev $(JUDGES) ## Let foreign programs judge the field buses and the PLC program.
-	@{ command -v mbpoll && command -v tshark && command -v cc && pkg-config --exists libmodbus; } \
+	@{ command -v mbpoll && command -v tshark && command -v node && command -v cc && pkg-config --exists libmodbus; } \
 		>/dev/null || { \
 		echo "Not all judges are here. On Debian and Ubuntu:" \
-			"apt-get install mbpoll libmodbus-dev pkg-config gcc tshark" >&2; \
+			"apt-get install mbpoll libmodbus-dev pkg-config gcc tshark nodejs" >&2; \
 		exit 1; }
 	PYTHONPATH=$(JUDGES) $(BIN)/python -m pytest -o 'python_files=judge_*.py' tests/peers
 

@@ -16,6 +16,9 @@ for _library in ("OPENBLAS", "OMP", "MKL"):
     os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
 
 
+collect_ignore = ["integrator"]
+"""A project of its own, which ``tests/packaging/test_integrator.py`` runs against the wheel."""
+
 CANARIES = Watch()
 """Every password of the test that runs, and what it made robolink say."""
 

@@ -1,15 +1,14 @@
 """Collects the sentences of the sources, for ``make messages``.
 
-Babel finds ``tr("...")`` and ``declared("...")``. The help of a command is written as click wants
-it, as ``help="..."`` and as the command's docstring, so that is read here.
+``tr("...")`` and ``declared("...")`` are found wherever they stand; Babel's own reader passes by
+those inside of f-strings. The help of a command is written as click wants it, as ``help="..."``
+and as the command's docstring.
 """
 
 import ast
 import inspect
 from collections.abc import Iterator, Mapping, Sequence
 from typing import IO, Any, Final
-
-from babel.messages.extract import extract_python
 
 _HELP: Final = ("help", "short_help")
 _MAKERS: Final = ("command", "group")
@@ -20,22 +19,23 @@ _Found = tuple[Any, ...]
 def collect(
     file: IO[bytes],
     keywords: Mapping[str, Any],
-    comment_tags: Sequence[str],
-    options: Mapping[str, Any],
+    comment_tags: Sequence[str],  # noqa: ARG001 - Babel's form
+    options: Mapping[str, Any],  # noqa: ARG001
 ) -> Iterator[_Found]:
-    """Yield the sentences of a module of the command line; the form is Babel's."""
-    yield from extract_python(file, keywords, comment_tags, dict(options))  # type: ignore[arg-type]
-    file.seek(0)
+    """Yield the sentences of a module; the form is Babel's."""
     for node in ast.walk(ast.parse(file.read())):
         if isinstance(node, ast.Call):
-            yield from _of_call(node)
+            yield from _of_call(node, keywords)
         elif isinstance(node, ast.FunctionDef) and any(map(_makes, node.decorator_list)):
             docstring = ast.get_docstring(node, clean=False)
             if docstring:
                 yield node.lineno, None, _as_click_reads(docstring), []
 
 
-def _of_call(node: ast.Call) -> Iterator[_Found]:
+def _of_call(node: ast.Call, keywords: Mapping[str, Any]) -> Iterator[_Found]:
+    for said in node.args[:1] if getattr(node.func, "id", "") in keywords else ():
+        if isinstance(said, ast.Constant):
+            yield node.lineno, None, str(said.value), []
     for keyword in node.keywords:
         value = keyword.value
         if keyword.arg in _HELP and isinstance(value, ast.Constant) and value.value:

@@ -199,6 +199,7 @@ if TYPE_CHECKING:
     from robolink.calibration.touch.touch_evidence import stand_upright as stand_upright
     from robolink.calibration.touch.touch_limits import FARTHEST_MM as FARTHEST_MM
     from robolink.calibration.touch.touch_limits import HIGHEST_MM as HIGHEST_MM
+    from robolink.calibration.touch.touch_limits import MOST_RESIDUAL_MM as MOST_RESIDUAL_MM
     from robolink.calibration.touch.touch_limits import PERSON_SIGMA_Z_MM as PERSON_SIGMA_Z_MM
     from robolink.calibration.touch.touch_limits import PROBE_SIGMA_Z_MM as PROBE_SIGMA_Z_MM
     from robolink.calibration.z_touch import USUAL_DECELERATION_MM_S2 as USUAL_DECELERATION_MM_S2
@@ -272,7 +273,8 @@ __getattr__ = lazy_exports(
         "touch.surface_standoff": "SurfaceStandoffs",
         "touch.touch_evidence": "TouchEvidence WitnessedTouch "
         "height_limit_mm judge_touches least_jog_mm stand_upright",
-        "touch.touch_limits": "FARTHEST_MM HIGHEST_MM PERSON_SIGMA_Z_MM PROBE_SIGMA_Z_MM",
+        "touch.touch_limits": "FARTHEST_MM HIGHEST_MM MOST_RESIDUAL_MM "
+        "PERSON_SIGMA_Z_MM PROBE_SIGMA_Z_MM",
         "z_touch": "USUAL_DECELERATION_MM_S2 Touch ZTouchResult solve_z_touch touch_sigma_gain",
     },
 )

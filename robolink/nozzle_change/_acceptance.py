@@ -12,7 +12,7 @@ from robolink.calibration import (
     writes_refused_unattended,
 )
 from robolink.errors import CalibrationError, VerifyError
-from robolink.messages import tr
+from robolink.messages import joined, tr
 from robolink.nozzle_change._proposal import LimitVerdict, Proposal
 
 
@@ -107,7 +107,7 @@ class AcceptanceCriteria:
                     change=change,
                     limit=self.limit_mm,
                 ),
-                remedy=" ".join(filter(None, (remedy, self._way_past))),
+                remedy=joined(" ", filter(None, (remedy, self._way_past))),
             )
 
     def verdicts(self, proposal: Proposal) -> tuple[LimitVerdict, ...]:
@@ -134,7 +134,7 @@ class AcceptanceCriteria:
     @property
     def tolerance(self) -> str:
         """The limits in words."""
-        return "; ".join(self._in_words())
+        return joined("; ", self._in_words())
 
     def _in_words(self) -> Iterator[str]:
         yield tr("change up to {limit:g} mm", limit=self.max_change_mm)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final, Protocol, TypeVar
 
-from robolink.calibration import CalibrationResult
+from robolink.calibration import MOST_RESIDUAL_MM, CalibrationResult
 from robolink.errors import CalibrationError
 from robolink.messages import joined, tr
 from robolink.runner import Confirm, FitRow, FitSubject, Notify, Procedure
@@ -148,7 +148,9 @@ def fit_subject(
         FitRow(number, method.which(number, one), off)
         for number, (one, off) in enumerate(zip(taken, fit.residuals_mm, strict=True), start=1)
     )
-    return FitSubject(rows, fit.rms_mm, half95_mm=fit.half95_mm, worst=worst)
+    return FitSubject(
+        rows, fit.rms_mm, half95_mm=fit.half95_mm, worst=worst, limit_mm=MOST_RESIDUAL_MM
+    )
 
 
 LEAST_DOF_TO_STOP: Final = 4

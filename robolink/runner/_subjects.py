@@ -61,7 +61,7 @@ class FitSubject:
         half95_mm: Half of the 95 % interval of a measured length, ``None`` where nobody knows.
         next_mm: What that becomes with one more.
         worst: Index of the one that fits worst, where it is offered to be taken again.
-        limit_mm: The largest that is believed, ``None`` where nobody stated one.
+        limit_mm: The largest that is believed.
     """
 
     rows: tuple[FitRow, ...]
@@ -69,7 +69,7 @@ class FitSubject:
     half95_mm: float | None = None
     next_mm: float | None = None
     worst: int | None = None
-    limit_mm: float | None = None
+    limit_mm: float = 0.15
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,7 +24,7 @@ from robolink.errors import (
     ToolError,
     TransportError,
 )
-from robolink.messages import tr
+from robolink.messages import joined, tr
 from robolink.model import (
     ANY,
     Account,
@@ -283,7 +283,7 @@ class ToolChange:
         self._select_again()
         if isinstance(error, RobolinkError):
             sentences = (result.sentence for result in done)
-            error.remedy = " ".join((error.remedy, *sentences)).strip()
+            error.remedy = joined(" ", filter(None, (error.remedy, *sentences)))
         self._record(done)
 
     def _proved_begun(self) -> Iterator[Step]:

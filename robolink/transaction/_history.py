@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from robolink.messages import tr
+from robolink.messages import joined, tr
 from robolink.model import (
     PROOFS,
     Controller,
@@ -54,7 +54,7 @@ class ChangedSince:
             "The usual causes: a program that runs TLSet at its start, an edit on the pendant, a "
             "restored project."
         )
-        return " ".join(part for part in (changed, by, causes) if part)
+        return joined(" ", (part for part in (changed, by, causes) if part))
 
 
 def last_proof(controller: Controller, tool: int) -> Recorded | None:

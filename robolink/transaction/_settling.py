@@ -1,7 +1,7 @@
 """Settles open markers of every kind: those of the driver, and those of whole changes."""
 
 from robolink.errors import ConfigError, NotReadyError, NotReadyReason, OutcomeUnknownError
-from robolink.messages import tr
+from robolink.messages import joined, tr
 from robolink.model import (
     Controller,
     EntryKind,
@@ -49,9 +49,12 @@ class Settler:
         now = {step.tool: tools.read(step.tool) for step in steps}
         new = [tools.same(now[step.tool], step.requested) for step in steps]
         old = [tools.same(now[step.tool], step.before) for step in steps]
-        sentence = " ".join(
-            tr("Tool {tool} holds {now}.", tool=step.tool, now=describe_offset(now[step.tool]))
-            for step in steps
+        sentence = joined(
+            " ",
+            [
+                tr("Tool {tool} holds {now}.", tool=step.tool, now=describe_offset(now[step.tool]))
+                for step in steps
+            ],
         )
         if not all(n or o for n, o in zip(new, old, strict=True)):
             return self._conflict(marker, steps, now)
@@ -134,7 +137,7 @@ class Settler:
             return
         self._controller.outcomes.append(*entries)
         raise OutcomeUnknownError(
-            " ".join(result.sentence for result in failures),
+            joined(" ", (result.sentence for result in failures)),
             remedy=tr("The change stays open. Look at the controller."),
             controller=self._controller.identity,
         )
@@ -162,19 +165,22 @@ class Settler:
     def _conflict(
         self, marker: Marker, steps: list[Step], now: dict[int, ToolOffset | None]
     ) -> Finding:
-        sentence = " ".join(
-            tr(
-                "Tool {tool} holds {now}; before the change it was {before}, it was to be "
-                "{requested}.",
-                tool=step.tool,
-                now=describe_offset(now[step.tool]),
-                before=describe_offset(step.before),
-                requested=describe_offset(step.requested),
-            )
-            for step in steps
+        sentence = joined(
+            " ",
+            [
+                tr(
+                    "Tool {tool} holds {now}; before the change it was {before}, it was to be "
+                    "{requested}.",
+                    tool=step.tool,
+                    now=describe_offset(now[step.tool]),
+                    before=describe_offset(step.before),
+                    requested=describe_offset(step.requested),
+                )
+                for step in steps
+            ],
         )
         ways = {put_right(offset) for offset in now.values()}
-        sentence = " ".join((sentence, *filter(None, ways)))
+        sentence = joined(" ", (sentence, *filter(None, ways)))
         return _finding(marker, Verdict.CONFLICT, sentence, steps, now)
 
 

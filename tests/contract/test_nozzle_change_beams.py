@@ -110,7 +110,7 @@ def test_moved_beams_fail_the_proof_and_the_old_value_comes_back(cell):
     first, second = cell.beams()
     cell.mount_beams((first, shifted(second, 0.3)))
     before = cell.stored
-    with pytest.raises(VerifyError, match=r"drifts 0\.(59|60)"):
+    with pytest.raises(VerifyError, match=r"Turn test failed: 0\.(59|60)"):
         cell.run(BeamsSource(cell.station))
     assert cell.stored == before
     assert cell.simulator.machine.tools.selected == TOOL

@@ -86,7 +86,7 @@ def test_a_camera_that_was_moved_shifts_nothing_and_is_told(cell):
 def test_a_single_look_believes_a_moved_camera_and_the_proof_does_not(cell):
     moved = moved_station(cell, 0.4, 0.0)
     before = cell.stored
-    with pytest.raises(VerifyError, match=r"drifts 0\.(79|80|81)"):
+    with pytest.raises(VerifyError, match=r"Turn test failed: 0\.(79|80|81)"):
         run_source(cell, CameraSource(cell.url, moved, LookPlan(turns_deg=(0.0,))))
     assert cell.stored == before
 

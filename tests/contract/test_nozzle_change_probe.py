@@ -88,7 +88,7 @@ def test_a_nozzle_that_slips_after_the_write_fails_the_proof(cell):
         def wrote(self, receipt):
             cell.simulator.world.tips[TOOL] = longer
 
-    with pytest.raises(VerifyError, match=r"drifts 0\.(49|50)"):
+    with pytest.raises(VerifyError, match=r"Turn test failed: 0\.(49|50)"):
         cell.run(ZTouchSource(cell.plate), Slips())
     assert cell.stored == before
 

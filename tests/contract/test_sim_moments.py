@@ -81,6 +81,9 @@ def test_it_is_made_anew_as_another_controller(served):
 
 def test_it_goes_back_to_a_moment_as_the_same_controller(served):
     who = write(served, -31.0)
+    if served.kind != "plc":
+        with robolink.connect(served.url) as controller:
+            controller.tools.select(2)
     moment, then = served.simulator.kept_moment(), served.simulator.truth()
     if served.kind != "plc":
         served.simulator.world.change_nozzle()
@@ -91,6 +94,8 @@ def test_it_goes_back_to_a_moment_as_the_same_controller(served):
     served.simulator.faults.add(served.one_fault())
     served.simulator.go_back(moment)
     assert served.simulator.truth() == then
+    if served.kind == "softmotion":
+        assert served.simulator.plc.group.tool.frame.shift_mm == pytest.approx((1.0, 2.0, -31.0))
     assert not served.simulator.faults.pending
     if served.kind != "plc":
         there = served.simulator.world.robot.flange()

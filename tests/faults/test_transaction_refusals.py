@@ -95,7 +95,7 @@ def test_a_pin_that_is_not_reached_is_refused(cell):
                 InProcessEyes(cell.simulator), said.append, clock=cell.controller.clock
             )
         )
-    assert any("box" in sentence for sentence in said), said
+    assert any("allowed area" in sentence for sentence in said), said
     cell.check_the_tool_is(STORED, writes=0)
     (entry,) = cell.recorded(EntryKind.REFUSED)
     assert entry.details == {"code": "DeclinedError", "poses": []}
@@ -114,7 +114,7 @@ class LooseNozzle(Listener):
 
 def test_a_failed_verification_puts_the_old_tool_back(cell):
     cell.mount(dx_mm=0.4)
-    with pytest.raises(VerifyError, match="drifts") as failed:
+    with pytest.raises(VerifyError, match="Turn test failed") as failed:
         cell.change(listener=LooseNozzle(cell))
     assert "The old value of tool 1 is back." in failed.value.remedy
     cell.check_the_tool_is(STORED, writes=2)

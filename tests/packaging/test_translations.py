@@ -1,5 +1,6 @@
 """Every translation fills in the same values, in a form that a terminal shows straight."""
 
+import io
 import re
 from string import Formatter
 
@@ -8,6 +9,7 @@ from babel.messages.pofile import read_po
 from robolink_cli.console.columns import columns
 
 from tests.packaging.test_catalogue import CATALOGUE
+from tools.sentences import collect
 
 CHINESE = CATALOGUE.parent / "zh_CN" / "LC_MESSAGES"
 
@@ -58,9 +60,31 @@ def faults(english, chinese):
         != chinese[: len(chinese) - len(chinese.lstrip())]
     ):
         yield "other blanks in front"
+    if english.count("\\b\n") != chinese.count("\\b\n"):
+        yield "another part keeps its lines"
     yield from (f"{word}: write {other}" for word, other in OTHER_WORDS.items() if word in chinese)
-    yield from (f"{sign!r} is two columns wide somewhere" for sign in AMBIGUOUS if sign in chinese)
+    strange = {sign for sign in AMBIGUOUS if sign in chinese} - set(english)  # a page may have it
+    yield from (f"{sign!r} is two columns wide somewhere" for sign in sorted(strange))
     yield from (f"{name} is missing" for name in NAMED.findall(english) if name not in chinese)
+
+
+def test_every_sentence_has_a_translation(translated):
+    """``python tools/translations.py --missing`` prints those that have none."""
+    said = dict(translated)
+    assert sorted(said) == sorted(one.id for one in entries(CATALOGUE)), "run: make messages"
+    assert [english for english, chinese in translated if not chinese] == []
+
+
+@pytest.mark.parametrize("widest", [["Touch", 12], ["off by", 12], ["now", 14], ["change", 14]])
+def test_heads_of_tables_keep_to_their_columns(translated, widest):
+    english, most = widest
+    assert columns(dict(translated)[english]) <= most
+
+
+def test_sentences_inside_of_f_strings_are_collected():
+    source = b"""shown = f"{tr('Z+ up')} {declared('Turn keys')}"\n"""
+    found = collect(io.BytesIO(source), {"tr": None, "declared": None}, [], {})
+    assert [sentence for _, _, sentence, _ in found] == ["Z+ up", "Turn keys"]
 
 
 def test_a_translation_says_what_the_sentence_says(translated):

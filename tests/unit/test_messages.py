@@ -2,6 +2,7 @@
 
 import ast
 import re
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -17,33 +18,41 @@ def sources():
     return sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
 
 
-def sentences(path):
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+@cache
+def looked_at():
+    """Return each module with its calls and the lines that come too early; trees are large."""
+    found = []
+    for path in sources():
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        found.append((path, list(sentences(tree)), list(too_early(tree))))
+    return found
+
+
+def sentences(tree):
+    for node in ast.walk(tree):
         if isinstance(node, ast.Call) and getattr(node.func, "id", "") in ("tr", "declared"):
             yield node
 
 
-def when_imported(node):
+def when_imported(top):
     """Yield what runs when a module is imported: bodies of functions do not."""
-    for child in ast.iter_child_nodes(node):
-        if isinstance(child, ast.FunctionDef):
-            defaults = [one for one in child.args.kw_defaults if one is not None]
-            for part in (*child.decorator_list, *child.args.defaults, *defaults):
-                yield part
-                yield from when_imported(part)
-        elif not isinstance(child, ast.Lambda):
-            yield child
-            yield from when_imported(child)
+    waiting = [top]
+    while waiting:
+        node = waiting.pop()
+        yield node
+        if isinstance(node, ast.FunctionDef):
+            defaults = [one for one in node.args.kw_defaults if one is not None]
+            waiting += [*node.decorator_list, *node.args.defaults, *defaults]
+        elif not isinstance(node, ast.Lambda):
+            waiting += ast.iter_child_nodes(node)
 
 
 def too_early(tree):
     """Yield the calls of ``tr`` at import, and those whose text click keeps."""
     kept = (
-        keyword.value
+        node.value
         for node in ast.walk(tree)
-        if isinstance(node, ast.Call)
-        for keyword in node.keywords
-        if keyword.arg in ("help", "short_help", "epilog")
+        if isinstance(node, ast.keyword) and node.arg in ("help", "short_help", "epilog")
     )
     for node in (*when_imported(tree), *kept):
         if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "tr":
@@ -76,8 +85,8 @@ def test_a_translation_is_asked_for_the_sentence_before_it_is_filled(shouted):
 
 def test_every_sentence_is_a_literal_that_gets_exactly_its_values():
     wrong, seen = [], 0
-    for path in sources():
-        for call in sentences(path):
+    for path, calls, _ in looked_at():
+        for call in calls:
             seen += 1
             place = f"{path.relative_to(ROOT)}:{call.lineno}"
             (sentence,) = call.args
@@ -95,8 +104,8 @@ def test_every_sentence_is_a_literal_that_gets_exactly_its_values():
 def test_nothing_is_translated_before_the_language_is_known():
     wrong = [
         f"{path.relative_to(ROOT)}:{line}: declared(...) here, spoken(...) where it is shown"
-        for path in sources()
-        for line in too_early(ast.parse(path.read_text(encoding="utf-8")))
+        for path, _, lines in looked_at()
+        for line in lines
     ]
     assert not wrong
 

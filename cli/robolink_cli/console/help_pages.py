@@ -5,6 +5,7 @@ English sentences. They are translated when a command is looked up. A Chinese ch
 columns and has no blank beside it, so click's own way of breaking lines does not do for it.
 """
 
+import inspect
 import re
 from collections.abc import Iterable, Iterator
 from weakref import WeakKeyDictionary
@@ -37,7 +38,13 @@ def in_language(command: click.Command) -> click.Command:
 
 def _said(owner: "click.Command | click.Parameter", now: _Texts) -> list[str | None]:
     english = _english.setdefault(owner, now)
-    return [text and spoken(text) for text in english]
+    # What click keeps the lines of is spelled out: a catalogue holds no control character.
+    return [text and spoken(_as_collected(text)).replace("\\b\n", "\b\n") for text in english]
+
+
+def _as_collected(text: str) -> str:
+    """Return a docstring without its indent, as the catalogue has it (``tools/sentences.py``)."""
+    return inspect.cleandoc(text).partition("\f")[0] if "\n" in text else text
 
 
 def _paragraphs(text: str) -> Iterator[tuple[str, bool]]:

@@ -79,6 +79,16 @@ def show(text: str, *, beside: bool = False) -> None:
     if _shown_by is not None and (sys.stderr if beside else sys.stdout).isatty():
         _shown_by(visible(text), beside)
         return
+    draw(text, beside=beside)
+
+
+def draw(text: str, *, beside: bool = False) -> None:
+    """Write a text on the terminal: :func:`show` for whoever draws there now.
+
+    Args:
+        text: One line or several.
+        beside: On stderr, beside the result.
+    """
     # The stream is named, because click takes an ASCII console for a misunderstanding and
     # would send it UTF-8.
     click.echo(visible(text), file=sys.stderr if beside else sys.stdout)

@@ -71,7 +71,8 @@ def not_yet(state: WizardState, at_s: float) -> str:
         return ""
     if at_s - jogging.ended_s < SETTLING_S:
         return tr("Wait: the robot is still moving.")
-    if touch.contact is None and touch.arrival is not None and not _brought(state):
+    arrived = touch.arrival is not None or state.carried
+    if touch.contact is None and arrived and not _brought(state):
         return tr("Not yet: the tip still stands where the robot put it. Jog it onto the pin.")
     if touch.contact is None and jogging.coarse:
         return tr(
@@ -104,7 +105,7 @@ def _regarding(state: WizardState, subject: object) -> WizardState:
             reading = replace(reading, pose=subject.after)
         return replace(state, jogging=jogging, reading=reading, message="")
     if isinstance(subject, MoveSubject):
-        return replace(state, subject=subject, question=None, waits=False, message="")
+        return replace(state, subject=subject, question=None, waits=False, message="", carried=True)
     if isinstance(subject, Header):
         return replace(state, header=subject)
     if isinstance(subject, ChangeReport):
@@ -122,9 +123,13 @@ def _waiting(state: WizardState, at_s: float) -> WizardState:
 
 
 def _asked(state: WizardState, asked: WasAsked) -> WizardState:
-    size = state.jogging.size
+    size, reading = state.jogging.size, state.reading
+    if reading is not None and asked.at_s - reading.at_s > 1.0:
+        # Where it was before the robot moved is not where it is.
+        reading = replace(reading, pose=None)
     return replace(
         state,
+        reading=reading,
         question=asked,
         waits=False,
         typed="",

@@ -79,8 +79,7 @@ def worst_first(fit: FitSubject) -> bool:
         return False
     away = [sum(part * part for part in row.off_mm) ** 0.5 for row in fit.rows]
     worst = away.pop(fit.worst)
-    limit = fit.limit_mm or 0.05
-    return worst > limit * _LEAST_SHARE and all(worst > _LIKELY_SHARE * one for one in away)
+    return worst > fit.limit_mm * _LEAST_SHARE and all(worst > _LIKELY_SHARE * one for one in away)
 
 
 def _fit_key(state: WizardState, fit: FitSubject, key: KeyPressed) -> Answered:

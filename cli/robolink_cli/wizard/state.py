@@ -80,6 +80,8 @@ class WizardState:
         subject: What the question, or the movement under way, is about.
         fit: How well the samples agree, as it was told last.
         checked: Which points of a check list the person has confirmed.
+        carried: Whether the robot has moved by itself: a tip that was not jogged since then stands
+            where the robot put it.
         jogging: The steps made.
         typed: What stands in the field.
         marked: Index of the marked row of a list.
@@ -96,6 +98,7 @@ class WizardState:
     subject: object = None
     fit: FitSubject | None = None
     checked: frozenset[str] = frozenset()
+    carried: bool = False
     jogging: Jogging = field(default_factory=Jogging)
     typed: str = ""
     marked: int | None = None

@@ -1,6 +1,6 @@
 """What stands on a controller, in the sentences with which a failed change ends."""
 
-from robolink.messages import tr
+from robolink.messages import joined, tr
 from robolink.model._tools import ToolOffset, describe_offset
 from robolink.standing import Components, Standing, ToolStanding
 
@@ -13,7 +13,7 @@ def describe_standing(standing: Standing) -> str:
     parts = [_movement(standing), *_writes(standing), _selection(standing)]
     if standing.left_open:
         parts.append(tr("Next: robolink recover."))
-    return " ".join(parts)
+    return joined(" ", parts)
 
 
 def _movement(standing: Standing) -> str:

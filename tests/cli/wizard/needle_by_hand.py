@@ -1,8 +1,8 @@
 """Keys and seconds for a needle by hand: ``python -m tests.cli.wizard.needle_by_hand``.
 
 A simulated controller in real time; its needle is another one than the stored offset says. A
-scripted hand brings the tip to within 0.02 mm by what it sees, at a touch and at each touch of the proof. A
-key that is held down counts once; in a dialogue of lines every character counts, and ENTER.
+scripted hand brings the tip to within 0.02 mm by what it sees, at a touch and at each touch of the
+proof. A key that is held down counts once; of a line every character counts, and ENTER.
 ``--lines`` is the dialogue that there was before (git worktree of the commit before the wizard, on
 PYTHONPATH); ``--pictures FOLDER`` keeps the screens.
 """
@@ -67,12 +67,11 @@ class LineTypist:
     def touch(self):
         self.terminal.wait_for("ENTER when it is on the pin")
         time.sleep(0.5)
-        for digits in (1, 2):
+        for digits in (1, 1, 2):
             seen = self.eyes.look(1)
             left = (seen.dx_mm, seen.dy_mm, seen.dz_mm + (0.05 if digits == 1 else 0.0))
-            steps = [
-                f"{a}{round(by, digits):+g}" for a, by in zip("xyz", left) if round(by, digits)
-            ]
+            rounded = [max(-5.0, min(5.0, round(by, digits))) for by in left]
+            steps = [f"{a}{by:+g}" for a, by in zip("xyz", rounded, strict=True) if by]
             if steps:
                 self.type(" ".join(steps))
                 self.terminal.wait_for("done: moved")
@@ -107,7 +106,8 @@ def by_lines(words, simulator):
 
 
 def by_screen(words, simulator, pictures):
-    hand, shots = ScreenHand(words, simulator), {}
+    hand = ScreenHand(words, simulator)
+    shots: dict[str, str] = {}
     began = time.monotonic()
     hand.start()
     touched = 0
@@ -115,6 +115,8 @@ def by_screen(words, simulator, pictures):
         found = hand.see(
             r"Jog the tip onto the pin|To write, type|\[1\] Yes +\[3\] No|\[Enter\] Done|DONE"
         )[0]
+        if pictures:
+            hand.rest(0.6)
         shots[f"{len(shots)}-{found[:8]}"] = hand.text
         if found == "DONE":
             break

@@ -17,8 +17,9 @@ from robolink_cli.wizard.happenings import (
 )
 from robolink_cli.wizard.state import STEP_SIZES
 
+from robolink.model import Path as Way
 from robolink.model import Pose
-from robolink.runner import JogSubject, Question
+from robolink.runner import JogSubject, MoveSubject, Question
 from tests.cli.wizard._people import (
     ARRIVAL,
     CHECK,
@@ -31,6 +32,20 @@ from tests.cli.wizard._people import (
 
 def at_touch(**more):
     return Sitting().asked(touch_subject(**more))
+
+
+def test_a_first_touch_that_the_robot_went_to_by_itself_is_jogged_too():
+    brought = Sitting().asked(touch_subject(number=1, arrival=None)).keys("5")
+    assert brought.sent == ["done"], (
+        "a tip that was on the pin before anything moved is taken as it is"
+    )
+    going = MoveSubject(ARRIVAL, Way.JOINT, 20.0, "Moving to where tool 1 is measured.")
+    carried = Sitting().happens(WasRegarded(going)).asked(touch_subject(number=1, arrival=None))
+    carried.keys("5")
+    assert "still stands where the robot put it" in carried.state.message
+    assert not carried.sent
+    carried.keys("3").jogs("z-0.1").keys("5")
+    assert carried.sent == ["z-0.1", "done"]
 
 
 def test_a_touch_is_jogged_in_coarse_steps_and_taken_after_a_fine_one():
@@ -226,11 +241,8 @@ HAPPENINGS = st.one_of(
 )
 
 
-@settings(max_examples=150, deadline=None)
-@given(st.lists(HAPPENINGS, max_size=40), st.sampled_from([0, 0, 2, 3]))
-def test_no_order_of_keys_lines_and_readings_takes_an_unjogged_touch_or_writes_untyped(
-    history, first
-):
+def check_history(history, first):
+    """Nothing is taken unjogged and nothing written untyped, whatever comes in which order."""
     hand, pose, moved, digits, lined = Sitting(), ARRIVAL, 0.0, "", ""
     hand.asked(*SUBJECTS[first])
     for what, of in history:
@@ -267,6 +279,24 @@ def test_no_order_of_keys_lines_and_readings_takes_an_unjogged_touch_or_writes_u
                 assert number in digits or lined == number
 
 
+HISTORIES = (st.lists(HAPPENINGS, max_size=40), st.sampled_from([0, 0, 2, 3]))
+
+
+@settings(max_examples=80, deadline=None)
+@given(*HISTORIES)
+def test_no_order_of_keys_lines_and_readings_takes_an_unjogged_touch_or_writes_untyped(
+    history, first
+):
+    check_history(history, first)
+
+
+@pytest.mark.soak
+@settings(max_examples=3000, deadline=None)
+@given(*HISTORIES)
+def test_no_order_of_many_does(history, first):
+    check_history(history, first)
+
+
 def test_the_sizes_of_steps_stay_within_what_the_runner_takes():
     hand = at_touch()
     for _ in range(9):
@@ -275,6 +305,14 @@ def test_the_sizes_of_steps_stay_within_what_the_runner_takes():
     for _ in range(9):
         hand.keys("-")
     assert hand.state.jogging.step == STEP_SIZES[0] == 0.01
+
+
+def test_a_position_from_before_the_robot_moved_is_not_shown_as_that_of_now():
+    hand = Sitting().reads(ARRIVAL)
+    hand.now += 5.0
+    hand.happens(WasRegarded(touch_subject()))
+    hand.happens(WasAsked(1, "?", Question.PLACE, hand.now))
+    assert hand.state.pose is None
 
 
 def test_a_reading_without_a_position_changes_nothing_of_the_steps():

@@ -108,7 +108,10 @@ def test_each_other_end_leaves_all_as_it_was(hand, simulator, how):
     assert stored(simulator) == before
 
 
-@pytest.mark.parametrize("words", [("change",), ("calibrate", "two-pose", "--tool", "1")])
+@pytest.mark.parametrize(
+    "words",
+    [("change",), pytest.param(("calibrate", "two-pose", "--tool", "1"), marks=pytest.mark.soak)],
+)
 def test_without_a_terminal_it_ends_at_once(url, words):
     began_s = time.monotonic()
     ended = subprocess.run(
@@ -124,6 +127,7 @@ def test_without_a_terminal_it_ends_at_once(url, words):
     assert time.monotonic() - began_s < 20
 
 
+@pytest.mark.soak
 def test_motors_that_are_off_are_switched_on_from_the_list(hand, simulator):
     simulator.machine.motors_on = False
     hand.terminal.wait_for(r"TO DO: Motors are off  \[7\] Switch them on")

@@ -1,6 +1,5 @@
 """Screens are compared with stored text, in two languages and one that is 40 % longer."""
 
-import gettext
 import unicodedata
 from pathlib import Path
 
@@ -12,6 +11,7 @@ from robolink_cli.wizard.screens.told import told_before, told_question
 from wcwidth import wcswidth
 
 from robolink import messages
+from robolink.locale.languages import translator
 from robolink.model import Path as Way
 from robolink.model import Pose
 from robolink.runner import MoveSubject, Question
@@ -73,11 +73,10 @@ SCREENS = {
 def language(request):
     speak = {
         "en": None,
-        "zh": gettext.translation(
-            "robolink", Path(messages.__file__).with_name("locale"), ["zh_CN"], fallback=True
-        ).gettext,
+        "zh": translator("zh"),
         "pseudo": lambda text: f"[{text}{'~' * (2 * len(text) // 5)}]",
     }[request.param]
+    assert speak is not None or request.param == "en"
     before = messages._translate
     messages.install(speak)
     yield request.param

@@ -1,12 +1,11 @@
 """The wizard as a dialogue of lines: for a dumb terminal, a narrow one, a screen reader."""
 
-import sys
 import time
 from typing import TYPE_CHECKING, Any, Final
 
 from robolink.messages import tr
 from robolink.runner import Question
-from robolink_cli.console.output import visible
+from robolink_cli.console.output import draw
 from robolink_cli.prompts.lines import QUIET_S, Lines, open_lines
 from robolink_cli.wizard.desk import Desk
 from robolink_cli.wizard.faces.effects import carry_out
@@ -41,7 +40,7 @@ class LineFace:
             # Taken over from a screen that has become too small.
             self._begin_question(state, state.question.kind)
             self._shown = state.question.number
-            _put(visible(told_question(state)))
+            _put(told_question(state))
         while True:
             ended = work.ended
             for happening in desk.happened():
@@ -79,12 +78,12 @@ class LineFace:
         match happening:
             case WasTold(text=text):
                 self._forget(0.0)
-                _put(visible(text))
+                _put(text)
             case WasAsked(kind=kind):
                 self._begin_question(state, kind)
             case WaitsForAnswer(number=number) if number != self._shown:
                 self._shown = number
-                _put(visible(told_question(state)))
+                _put(told_question(state))
             case WaitsForAnswer() if state.at_place:
                 _put(told_after_jog(state))
             case WasRegarded():
@@ -98,7 +97,7 @@ class LineFace:
         self._forget(QUIET_S)
         if kind in (Question.YES_NO, Question.TEXT):
             for row in told_before(state):
-                _put(visible(row))
+                _put(row)
 
     def _forget(self, quiet_s: float) -> None:
         if self._lines is None:
@@ -110,5 +109,4 @@ class LineFace:
 
 def _put(text: str) -> None:
     if text:
-        sys.stderr.write(f"{text}\n")
-        sys.stderr.flush()
+        draw(text, beside=True)

@@ -10,7 +10,8 @@ from robolink_cli.wizard.state import WizardState
 
 def done_lines(state: WizardState, report: ChangeReport) -> list[str]:
     """Return what was reached."""
-    head = f"{state.header.cell}   {state.header.job}   {tr('DONE')}"
+    ended = tr("DONE")
+    head = f"{state.header.cell}   {state.header.job}   {ended}"
     lines = [head, *(line for one in report.tools for line in _tool_lines(one))]
     lines.append(tr("Record: change {id} in the journal", id=report.change[:8]))
     if any(one.receipt is not None for one in report.tools):
@@ -42,7 +43,8 @@ def _tool_lines(report: ToolReport) -> list[str]:
 
 def stopped_lines(state: WizardState) -> list[str]:
     """Return where it ended early; why, and what stands, says how every command ends."""
-    head = f"{state.header.cell}   {state.header.job}   {tr('STOPPED')}"
+    ended = tr("STOPPED")
+    head = f"{state.header.cell}   {state.header.job}   {ended}"
     touch = state.touch
     if touch is None or not touch.number:
         return [head]

@@ -32,7 +32,7 @@ def fit_screen(state: WizardState, fit: FitSubject) -> Screen:
 def fit_lines(fit: FitSubject) -> list[str]:
     """Return the bars, and what they say in words."""
     away = [math.hypot(*row.off_mm) for row in fit.rows]
-    limit = fit.limit_mm or 0.05
+    limit = fit.limit_mm
     scale = max([limit, *away]) or 1.0
     head = padded(" " + tr("Touch"), 25) + tr("off by")
     lines = [padded(head, 48) + tr("limit {mm} mm", mm=f"{limit:g}")]

@@ -20,7 +20,8 @@ def status_row(state: WizardState, now_s: float) -> str:
     if reading.pose is not None and reading.pose.tool is not None:
         tool = "   " + tr("tool {n} selected", n=reading.pose.tool)
     age = tr("reading {s} s", s=f"{max(0.0, now_s - reading.at_s):.1f}")
-    return f"{reading.state.upper()}   {tr('power LOW')}{tool}   {age}"
+    power = tr("power LOW")
+    return f"{reading.state.upper()}   {power}{tool}   {age}"
 
 
 def mm(value: float) -> str:

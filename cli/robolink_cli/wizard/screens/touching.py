@@ -98,11 +98,11 @@ def _keypad(state: WizardState) -> list[str]:
         f"({size:.2f})" if size == jogging.step else f" {size:.2f} " for size in STEP_SIZES
     )
     step = tr("Step   {mm} mm", mm=f"{jogging.step:.2f}")
+    above, below, turns = tr("Z+ up"), tr("Z- down"), tr("Turn keys")
     return [
-        f"     [8] {up}         [9] {tr('Z+ up')}".ljust(40) + f"{step}    [+] [-]",
-        f" [4] {left}   [6] {right}".ljust(40) + sizes,
-        f"     [2] {down}         [3] {tr('Z- down')}".ljust(40)
-        + f"[1] U-   [7] U+   [*] {tr('Turn keys')}",
+        padded(f"     [8] {up}         [9] {above}", 40) + f"{step}    [+] [-]",
+        padded(f" [4] {left}   [6] {right}", 40) + sizes,
+        padded(f"     [2] {down}         [3] {below}", 40) + f"[1] U-   [7] U+   [*] {turns}",
     ]
 
 

@@ -1,0 +1,73 @@
+"""When a served simulator ends by itself."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from itertools import count
+from time import monotonic
+
+import pytest
+from robolink_cli.commands.simulate.serving import Termination
+from robolink_cli.options.simulation import ServedLife
+
+
+def waited(life, requests=int):
+    """Return how long a simulator lived."""
+    began = monotonic()
+    with Termination(life) as stopped:
+        stopped.wait(requests)
+        assert not stopped.came
+    return monotonic() - began
+
+
+def test_it_ends_when_nobody_has_asked_for_so_long():
+    life = ServedLife("", with_parent=False, idle_exit_s=0.2)
+    assert waited(life) >= 0.2
+    asked = count()
+    looked = []
+
+    def requests():
+        looked.append(min(next(asked), 12))
+        return looked[-1]
+
+    # Somebody asks between the first twelve looks, and nobody afterwards.
+    assert waited(life, requests) >= 0.2 + 11 * 0.2 / 4
+    assert looked.count(12) >= 4
+
+
+SPAWNS = """
+import json, subprocess, sys
+served = subprocess.Popen(
+    [sys.executable, "-m", "robolink_cli", "--json", "sim", "epson", "--tcp", "127.0.0.1:0",
+     "--with-parent"],
+    stdout=subprocess.PIPE, text=True)
+json.loads(served.stdout.readline())
+print(json.dumps({"simulator": served.pid}), flush=True)
+"""
+
+
+@pytest.mark.soak
+@pytest.mark.skipif(os.name == "nt", reason="Windows does not tell that a parent has ended")
+def test_it_ends_with_the_process_that_started_it():
+    paths = os.pathsep.join(path for path in sys.path if path)
+    done = subprocess.run(
+        [sys.executable, "-c", SPAWNS],
+        env={**os.environ, "PYTHONPATH": paths},
+        stdout=subprocess.PIPE,
+        text=True,
+        timeout=60,
+        check=True,
+    )
+    simulator = json.loads(done.stdout)["simulator"]
+    began = monotonic()
+    while monotonic() - began < 30:
+        try:
+            os.kill(simulator, 0)
+        except ProcessLookupError:
+            return
+        # Its own look comes every half of a second; ours need not be finer.
+        subprocess.run(["sleep", "0.2"], check=True)
+    os.kill(simulator, signal.SIGTERM)
+    pytest.fail("it lives on")

@@ -48,9 +48,10 @@ if TYPE_CHECKING:
 @shared_options
 @click.pass_context
 def cli(context: click.Context) -> object:
-    """Root of the commands; whoever names a cell and no command is asked what is wanted."""
+    """Root of the commands."""
     if context.invoked_subcommand is not None:
         return None
+    # Whoever names a cell and no command is asked what is wanted.
     if not may_be_guided() or json_is_on():
         context.fail(gettext("Missing command."))  # in click's own words
     guided = cli.get_command(context, "change")

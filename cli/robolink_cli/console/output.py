@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from robolink.interrupts import Interrupted, output_closed
-from robolink_cli.console.columns import columns, filled
+from robolink_cli.console.columns import within
 from robolink_cli.console.tolerance import PLAINLY
 
 if TYPE_CHECKING:
@@ -97,23 +97,14 @@ def draw(text: str, *, beside: bool = False) -> None:
 def sentences(text: str) -> str:
     """Return a text for people on stderr; no word is cut where that is a terminal.
 
-    Each line is broken at blanks, and goes on as far from the edge as it began. In a file, or
-    for a reader who searches, a sentence stays one line.
+    In a file, or for a reader who searches, a sentence stays one line.
     """
     try:
         width = os.get_terminal_size(sys.stderr.fileno()).columns if sys.stderr.isatty() else 0
     except (OSError, ValueError, AttributeError):
         width = 0
-    if width < _NARROWEST:  # none, or one that was never told its size
-        return text
-    return "\n".join(_within(line, width) for line in text.split("\n"))
-
-
-def _within(line: str, width: int) -> str:
-    if columns(line) <= width:
-        return line
-    indent = line[: len(line) - len(line.lstrip())]
-    return filled(line, width, indent=indent)
+    # One that is not told its size says 0.
+    return text if width < _NARROWEST else within(text, width)
 
 
 def hand_over(document: str) -> None:

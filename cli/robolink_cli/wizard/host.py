@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import TypeVar
 
-from robolink_cli.console.output import sentences, shown_by
+from robolink_cli.console.output import shown_by
 from robolink_cli.console.render import note
 from robolink_cli.prompts.present import sitting_at
 from robolink_cli.wizard.desk import Desk
@@ -37,9 +37,11 @@ def guided(header: Header, do: Callable[[], T]) -> T:
         raise work.error
     if state.report is not None:
         _leave(done_lines(state, state.report))
+    elif state.fresh:
+        _leave(list(state.fresh))
     return work.result  # type: ignore[return-value]
 
 
 def _leave(lines: list[str]) -> None:
     """Print what stays when the screen is gone."""
-    note(sentences("\n".join(lines)))
+    note("\n".join(lines))

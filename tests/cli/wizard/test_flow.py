@@ -319,3 +319,12 @@ def test_a_reading_without_a_position_changes_nothing_of_the_steps():
     hand = at_touch().happens(WasRead(Reading(11.0, "fault", halted=True)))
     assert hand.keys("5").sent == []
     assert hand.happens(KeyPressed("escape", "", 12.0)).happens(LineTyped("", 12.0)).sent == []
+
+
+def test_what_nobody_had_a_screen_to_read_is_kept_for_the_end():
+    going = MoveSubject(ARRIVAL, Way.JOINT, 20.0, "Lifting.")
+    hand = Sitting().happens(WasTold("old")).asked(touch_subject())
+    assert hand.state.fresh == ()
+    for one in (WasTold("Lifting."), WasRegarded(going), WasTold("settled")):
+        hand.happens(one)
+    assert hand.state.fresh == ("settled",)

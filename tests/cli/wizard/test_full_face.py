@@ -215,3 +215,14 @@ def test_a_window_that_becomes_too_small_goes_on_as_lines(hand):
     hand.rest(0.5)
     os.write(hand.master, b"stop\n")
     assert hand.end() == 9
+
+
+@pytest.mark.soak
+def test_what_a_command_says_without_a_question_stays_when_the_screen_is_gone(simulator):
+    with serve_tcp(simulator) as host:
+        hand = ScreenHand(["recover", "-c", host.url])
+        try:
+            assert hand.end() == 0
+            assert "Nothing is unsettled on this controller." in hand.text
+        finally:
+            hand.close()

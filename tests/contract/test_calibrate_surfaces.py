@@ -167,6 +167,7 @@ def test_poses_of_a_file_give_the_tip_of_a_flange_that_points_down_and_leans(plc
     assert found == pytest.approx(tip.components()[:3], abs=0.005)
 
 
+@pytest.mark.soak
 def test_six_axes_find_the_tip_on_a_level_plane_by_its_contact(tmp_path, monkeypatch):
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
     world = WorldParameters(person_touches="plane", contact_input=7)

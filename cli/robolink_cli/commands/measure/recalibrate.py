@@ -79,7 +79,6 @@ def recalibrate(
     refusal, Ctrl-C or an emergency stop leaves the old values, and the tool that was selected.
     Without RECIPE, on a terminal, cell and recipe are chosen from lists.
     """
-    from robolink.recipe import load_recipe
     from robolink_cli.commands.measure.choosing import nobody_to_ask
     from robolink_cli.commands.measure.recalibration import Recalibration
     from robolink_cli.commands.measure.recipe_events import EventStream
@@ -94,7 +93,7 @@ def recalibrate(
     events = EventStream(click.get_current_context(), on=jsonl)
 
     def change() -> None:
-        at, loaded = _chosen(context) if recipe is None else (context, load_recipe(recipe))
+        at, loaded = _chosen(context, recipe)
         for sentence in loaded.notes:
             note(sentence)
         prepared = answers_from(
@@ -118,15 +117,16 @@ def recalibrate(
         guided_if_alone(context, change, job=tr("Change needle"), alone=alone)
 
 
-def _chosen(context: CliContext) -> "tuple[CliContext, LoadedRecipe]":
+def _chosen(context: CliContext, recipe: Path | None) -> "tuple[CliContext, LoadedRecipe]":
     """Have cell and recipe chosen, as far as the line does not name them."""
-    from robolink_cli.commands.measure.choosing import choose_cell, choose_recipe
+    from robolink.recipe import load_recipe
+    from robolink_cli.commands.measure.choosing import choose_recipe, context_at_desk
     from robolink_cli.prompts.present import present_desk
-    from robolink_cli.session.context import context_of_cell
-    from robolink_cli.session.guidance import header_of
 
+    named = None if recipe is None else load_recipe(recipe)
+    at = context_at_desk(context, tr("Change needle"))
+    if named is not None:
+        return at, named
     desk = present_desk()
     assert desk is not None  # noqa: S101 - looked at by whoever calls
-    at = context if context.url is not None else context_of_cell(choose_cell(desk).name)
-    desk.regard(header_of(at, tr("Change needle")))
     return at, choose_recipe(desk, at.cell)

@@ -4,6 +4,7 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from gettext import gettext
 from typing import TYPE_CHECKING, Final, NoReturn
 
 import click
@@ -17,7 +18,7 @@ from robolink_cli.console.exit_codes import exit_code, report
 from robolink_cli.console.help_pages import in_language
 from robolink_cli.console.language import speaking_for
 from robolink_cli.console.output import hand_over, watched_output
-from robolink_cli.console.render import dumps, note, print_document, say
+from robolink_cli.console.render import dumps, json_is_on, note, print_document, say
 from robolink_cli.console.tolerance import (
     colour_wanted,
     help_width,
@@ -39,12 +40,24 @@ if TYPE_CHECKING:
     lazy={},
     unlisted=SHORT_NAMES,
     renamed=RENAMED,
+    invoke_without_command=True,
+    no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 @click.version_option(__version__, prog_name="robolink", message="%(prog)s %(version)s")
 @shared_options
-def cli() -> None:
+@click.pass_context
+def cli(context: click.Context) -> object:
     """Root of the commands."""
+    if context.invoked_subcommand is not None:
+        return None
+    # Whoever names a cell and no command is asked what is wanted.
+    if not may_be_guided() or json_is_on():
+        context.fail(gettext("Missing command."))  # in click's own words
+    guided = cli.get_command(context, "change")
+    assert guided is not None  # noqa: S101 - it stands in the map
+    with guided.make_context("change", [], parent=context) as sub:
+        return guided.invoke(sub)
 
 
 def main() -> NoReturn:

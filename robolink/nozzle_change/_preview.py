@@ -125,7 +125,7 @@ def require_inside(controller: Controller, steps: Sequence[PlannedStep]) -> None
     for step in steps:
         if step.refusal:
             raise LimitError(
-                tr("{step}: {refusal}", step=step.text, refusal=step.refusal),
+                tr("{step} {refusal}", step=step.text, refusal=step.refusal),
                 remedy=tr(
                     "Nothing was moved. The box lies about where the robot stands at the start: "
                     "bring it nearer, or widen the box. Where it is the arm that cannot, put the "

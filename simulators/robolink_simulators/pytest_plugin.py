@@ -51,7 +51,7 @@ def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line(
         "markers",
         "robolink(robot, kinematics, seed, password, options, world, faults, speed, true_tool, "
-        "map): how the simulated cells of this test are to be (docs/testing.md)",
+        "map, program): how the simulated cells of this test are to be (docs/testing.md)",
     )
 
 

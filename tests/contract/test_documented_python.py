@@ -24,7 +24,6 @@ from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 import robolink
 from robolink import ToolOffset
-from robolink.errors import RobolinkError
 from robolink.model import TIP, Hand, Pose, Secret, Spot, SpotUnit, WorkBox, rotate_xy
 from robolink.protocols.epson_text import VariableType
 from robolink.protocols.mailbox import program_texts
@@ -113,6 +112,15 @@ def two_tools(stack: ExitStack) -> dict[str, Any]:
         "look_at_the_parts": lambda: looked.append(simulator.machine.tools.get(2)),
         "then": lambda: looked == [new_2] and simulator.machine.tools.get(1) == new_1,
     }
+
+
+def undelivered(stack: ExitStack) -> dict[str, Any]:
+    simulator = stack.enter_context(epson())
+
+    def written_once() -> bool:
+        return simulator.machine.tools.get(1) == ToolOffset(12.5, -3.5, -20)
+
+    return {"then": written_once}
 
 
 def above_two_beams(stack: ExitStack) -> dict[str, Any]:
@@ -306,6 +314,7 @@ MAKERS = {
     "fault-plans.md 1": a_fault_plan,
     "io-and-variables.md 1": with_variables,
     "journal.md 1": a_journal,
+    "line-computer.md 1": undelivered,
     "plc-maps.md 1": a_map,
     "recipes.md 1": a_recipe,
     "simulated-softmotion.md 1": nothing,
@@ -351,16 +360,17 @@ def test_a_block_runs(name, tmp_path, monkeypatch):
         assert then()
 
 
-def test_the_test_of_an_integrator_s_program_passes(tmp_path):
+def test_the_test_of_an_integrator_s_program_passes_and_sees_a_changed_line(pytester):
+    folder = pytester.mkdir("our-plc")
     for name, text in program_texts().items():
-        (tmp_path / name).write_text(text)
-    given: dict[str, Any] = {}
-    exec(compile(BLOCKS["structured-text.md 2"], "structured-text.md 2", "exec"), given)
-    given["test_our_program_takes_a_tool"](tmp_path)
-    core = tmp_path / "robolink_core.st"
+        (folder / name).write_text(text)
+    pytester.makepyfile(BLOCKS["structured-text.md 2"])
+    pytester.runpytest_inprocess("-p", "no:cacheprovider").assert_outcomes(passed=1)
+    core = folder / "robolink_core.st"
     core.write_text(core.read_text().replace("kept.slots[o0].tool := pose;", "raw := 0;"))
-    with pytest.raises(RobolinkError):
-        given["test_our_program_takes_a_tool"](tmp_path)
+    result = pytester.runpytest_inprocess("-p", "no:cacheprovider")
+    result.assert_outcomes(failed=1)
+    result.stdout.fnmatch_lines(["E *ReadBack*", "*robolink wire: softmotion*", "*WRITE_TOOL*"])
 
 
 def test_the_tests_of_readme_pass_in_somebody_else_s_run(pytester):

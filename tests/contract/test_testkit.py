@@ -10,6 +10,7 @@ import robolink
 from robolink import ToolOffset
 from robolink.errors import ConfigError, OutcomeUnknownError, RobolinkError
 from robolink.journal import EntryKind
+from robolink.protocols.mailbox import program_texts
 from robolink.transaction import Wanted, change_tools
 
 WANTED = ToolOffset(1.0, 2.0, -30.0)
@@ -79,6 +80,36 @@ def test_a_password_is_needed_and_shown_nowhere(epson_sim):
     with pytest.raises(RobolinkError), robolink.connect(epson_sim.url):
         pass
     assert "s3cret-word" not in epson_sim.wire.shown()
+
+
+@pytest.fixture
+def program(tmp_path, request):
+    """A folder with a program as it was exported for an arm, or for any."""
+    kinematics = getattr(request, "param", "Kin_Gantry3")
+    for name, text in program_texts(kinematics=kinematics).items():
+        (tmp_path / name).write_text(text)
+    return tmp_path
+
+
+def test_a_program_is_executed_behind_the_mailbox_and_is_not_put_back(program, softmotion_factory):
+    cell = softmotion_factory(kinematics="Kin_Gantry3", program=program)
+    assert cell.simulator.plc.memory.slot(1).name == "nozzle"  # of the program's own variables
+    assert cell.simulator.executes_program
+    cell.snapshot("now")
+    for back in (cell.put_back, lambda: cell.restore("now"), lambda: cell.do("reset")):
+        with pytest.raises(ConfigError, match="executes a program is not made anew"):
+            back()
+
+
+def test_a_program_that_does_not_fit_is_refused(program, softmotion_factory, request):
+    with pytest.raises(ConfigError, match=r"line \d+.*Kin_Gantry3"):
+        softmotion_factory(program=str(program))  # exported for another arm
+    with pytest.raises(ConfigError, match=r"RL_Kept\.st cannot be read"):
+        (program / "RL_Kept.st").unlink()
+        softmotion_factory(program=program)
+    for kind in ("epson", "plc"):
+        with pytest.raises(ConfigError, match="by a simulated SoftMotion PLC alone"):
+            request.getfixturevalue(f"{kind}_factory")(program=program)
 
 
 @pytest.mark.parametrize(
@@ -163,16 +194,25 @@ def test_the_journal_of_the_test_tells_what_was_done(epson_factory, robolink_jou
     assert entry.tool == 2
 
 
-@pytest.mark.soak
-@pytest.mark.parametrize("kind", ["epson", "softmotion"])
-def test_a_nozzle_is_changed_in_a_cell_with_its_recipe(kind, request):
-    cell = request.getfixturevalue(f"{kind}_cell")
+def change_nozzle(cell):
     done = cell.run("change", str(cell.recipe), *cell.by_hand)
     assert done.exit_code == 0, done.messages + done.out
     truth = cell.truth()
     for name in ("x_mm", "y_mm"):
         assert truth["stored"]["1"][name] == pytest.approx(truth["tips"]["1"][name], abs=0.06)
     assert cell.motions.count
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("kind", ["epson", "softmotion"])
+def test_a_nozzle_is_changed_in_a_cell_with_its_recipe(kind, request):
+    change_nozzle(request.getfixturevalue(f"{kind}_cell"))
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("program", [""], indirect=True)
+def test_a_nozzle_is_changed_in_a_cell_whose_program_is_executed(program, softmotion_factory):
+    change_nozzle(softmotion_factory(medium="modbus-tcp", person=True, program=program))
 
 
 FAILING = """

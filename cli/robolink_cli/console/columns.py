@@ -43,3 +43,16 @@ def filled(text: str, width: int, *, indent: str = "") -> str:
         if piece != " " or line.strip():
             line += piece
     return "\n".join([*lines, line.rstrip()])
+
+
+def within(text: str, width: int) -> str:
+    """Return a text whose long lines are broken at blanks, each as far from the edge as it began.
+
+    Lines that fit keep their blanks.
+    """
+    return "\n".join(
+        line
+        if columns(line) <= width
+        else filled(line, width, indent=line[: len(line) - len(line.lstrip())])
+        for line in text.split("\n")
+    )

@@ -10,7 +10,7 @@ from robolink import errors
 from robolink.interrupts import EndedBy, Interrupted, ended_by
 from robolink.messages import tr
 from robolink.standing import UNTOUCHED, Components, Standing, standing_after
-from robolink_cli.console.output import hand_over, show
+from robolink_cli.console.output import hand_over, sentences, show
 from robolink_cli.console.render import dumps
 
 DONE: Final = 0
@@ -105,12 +105,12 @@ def report(error: BaseException, *, as_json: bool) -> int:
     elif isinstance(error, click.ClickException):
         usage = io.StringIO()
         error.show(file=usage)  # it repeats what was typed
-        show(usage.getvalue().rstrip("\n"), beside=True)
+        show(sentences(usage.getvalue().rstrip("\n")), beside=True)
     else:
         what, remedy = _sentences(error)
-        show(f"robolink: {what}", beside=True)
+        show(sentences(f"robolink: {what}"), beside=True)
         if remedy:
-            show(f"  {remedy}", beside=True)
+            show(sentences(f"  {remedy}"), beside=True)
     if not as_json or isinstance(error, KeyboardInterrupt):
         # Whoever ended it may not be who reads the document.
         tell_standing(standing_after(error))
@@ -187,7 +187,7 @@ def tell_standing(standing: Standing) -> None:
     if standing is not UNTOUCHED:
         from robolink.model import describe_standing  # here, because --help needs none
 
-        show(describe_standing(standing), beside=True)
+        show(sentences(describe_standing(standing)), beside=True)
 
 
 def standing_payload(standing: Standing) -> dict[str, object]:

@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from robolink.interrupts import Interrupted, output_closed
+from robolink_cli.console.columns import within
 from robolink_cli.console.tolerance import PLAINLY
 
 if TYPE_CHECKING:
@@ -33,6 +34,8 @@ _OBEYED: Final = re.compile(
     "[\x00-\x09\x0b-\x1f\x7f-\x9f"  # C0 without LF, DEL, C1
     "\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]"  # line separators, direction of writing
 )
+
+_NARROWEST: Final = 20
 
 
 def visible(text: str) -> str:
@@ -89,6 +92,19 @@ def draw(text: str, *, beside: bool = False) -> None:
     # The stream is named, because click takes an ASCII console for a misunderstanding and
     # would send it UTF-8.
     click.echo(visible(text), file=sys.stderr if beside else sys.stdout)
+
+
+def sentences(text: str) -> str:
+    """Return a text for people on stderr; no word is cut where that is a terminal.
+
+    In a file, or for a reader who searches, a sentence stays one line.
+    """
+    try:
+        width = os.get_terminal_size(sys.stderr.fileno()).columns if sys.stderr.isatty() else 0
+    except (OSError, ValueError, AttributeError):
+        width = 0
+    # One that is not told its size says 0.
+    return text if width < _NARROWEST else within(text, width)
 
 
 def hand_over(document: str) -> None:

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import click
 
-from robolink_cli.console.output import drawn_elsewhere, hand_over, show, visible
+from robolink_cli.console.output import drawn_elsewhere, hand_over, sentences, show, visible
 
 _JSON = "robolink.json"
 _DOCUMENT = "robolink.document"
@@ -33,8 +33,8 @@ def say(text: str = "") -> None:
 
 
 def note(text: str) -> None:
-    """Show a person a remark beside the result; always on stderr."""
-    show(text, beside=True)
+    """Show a person a remark beside the result; always on stderr, and no word of it is cut."""
+    show(text if drawn_elsewhere() else sentences(text), beside=True)
 
 
 def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:

@@ -41,11 +41,12 @@ class CheckSubject:
     points: tuple[CheckPoint, ...]
     plan: str
 
-    def open_points(self, confirmed: frozenset[str]) -> int:
-        """Return how many points are not settled yet."""
-        return sum(
-            point.mark is Mark.TO_DO or (point.mark is Mark.YOU and point.key not in confirmed)
+    def open_keys(self, confirmed: frozenset[str]) -> tuple[str, ...]:
+        """Return the keys of the points that are not settled yet."""
+        return tuple(
+            point.key
             for point in self.points
+            if point.mark is Mark.TO_DO or (point.mark is Mark.YOU and point.key not in confirmed)
         )
 
 

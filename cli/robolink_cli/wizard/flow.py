@@ -47,7 +47,7 @@ def advance(state: WizardState, happening: Happening) -> Advanced:
     match happening:
         case WasTold(text=text):
             remarks = (*state.remarks, text)[-_MOST_REMARKS:]
-            return replace(state, remarks=remarks, message=text), []
+            return replace(state, remarks=remarks, fresh=(*state.fresh, text), message=text), []
         case WasRead(reading=reading):
             return replace(state, reading=reading), []
         case WasRegarded(subject=subject):
@@ -105,7 +105,10 @@ def _regarding(state: WizardState, subject: object) -> WizardState:
             reading = replace(reading, pose=subject.after)
         return replace(state, jogging=jogging, reading=reading, message="")
     if isinstance(subject, MoveSubject):
-        return replace(state, subject=subject, question=None, waits=False, message="", carried=True)
+        # What it is for stands beside its picture.
+        fresh = tuple(text for text in state.fresh if text != subject.purpose)
+        moves = replace(state, subject=subject, question=None, waits=False, fresh=fresh)
+        return replace(moves, carried=True, message="")
     if isinstance(subject, Header):
         return replace(state, header=subject)
     if isinstance(subject, ChangeReport):
@@ -131,6 +134,7 @@ def _asked(state: WizardState, asked: WasAsked) -> WizardState:
         state,
         reading=reading,
         question=asked,
+        fresh=(),
         waits=False,
         typed="",
         marked=state.subject.marked if isinstance(state.subject, ChoiceSubject) else None,

@@ -32,10 +32,13 @@ def guided(header: Header, do: Callable[[], T]) -> T:
         work.start()
         state = face.run(desk, state, work)
     if work.error is not None:
-        _leave(stopped_lines(state))
+        if state.subject is not None:  # else nothing was begun that could stop
+            _leave(stopped_lines(state))
         raise work.error
     if state.report is not None:
         _leave(done_lines(state, state.report))
+    elif state.fresh:
+        _leave(list(state.fresh))
     return work.result  # type: ignore[return-value]
 
 

@@ -151,10 +151,10 @@ def _check(state: WizardState, subject: CheckSubject, word: str) -> Answered:
         return replace(state, checked=checked, message=_left_open(subject, checked))
     if word != "main":
         return state.says(tr("[5] starts when no point is open."))
-    left = subject.open_points(state.checked)
+    left = subject.open_keys(state.checked)
     return state.says(_left_open(subject, state.checked)) if left else "y"
 
 
 def _left_open(subject: CheckSubject, checked: frozenset[str]) -> str:
-    left = subject.open_points(checked)
-    return tr("Not yet: {n} points are open.", n=left) if left else tr("No point is open.")
+    keys = " ".join(f"[{key}]" for key in subject.open_keys(checked))
+    return tr("Not yet. First: {keys}.", keys=keys) if keys else tr("No point is open.")

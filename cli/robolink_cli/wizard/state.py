@@ -86,6 +86,7 @@ class WizardState:
         typed: What stands in the field.
         marked: Index of the marked row of a list.
         remarks: What was told last, oldest first.
+        fresh: What of it was told since the last question, so that nobody had a screen to read it.
         message: The row above the keys.
         ending: Whether the work was told to end.
         report: What was reached, ``None`` before the end.
@@ -103,6 +104,7 @@ class WizardState:
     typed: str = ""
     marked: int | None = None
     remarks: tuple[str, ...] = ()
+    fresh: tuple[str, ...] = ()
     message: str = ""
     ending: bool = False
     report: ChangeReport | None = None

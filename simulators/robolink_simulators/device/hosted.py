@@ -139,6 +139,11 @@ class HostedDevice(ABC):
             self._restore(moment.held)
 
     @property
+    def executes_program(self) -> bool:
+        """Whether it executes a program that was loaded, whose variables no snapshot holds."""
+        return False
+
+    @property
     @abstractmethod
     def machine_name(self) -> str:
         """Kind and model."""
@@ -183,4 +188,9 @@ class HostedDevice(ABC):
             raise ConfigError(
                 tr("A simulator that keeps its state in a file is not made anew."),
                 remedy=tr("Restart it, or start another one without a file."),
+            )
+        if self.executes_program:
+            raise ConfigError(
+                tr("A simulator that executes a program is not made anew."),
+                remedy=tr("Restart it in place of that."),
             )

@@ -12,8 +12,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from robolink.errors import ConfigError
-from robolink.messages import tr
 from robolink.model import Secret
 from robolink.protocols.epson_binary import Dialect
 from robolink.protocols.epson_text import BadRequest, ErrorCode, Request, StatusFlags
@@ -342,12 +340,12 @@ class EpsonSimulator(HostedDevice):
     def _truth(self) -> dict[str, Any]:
         return self.world.truth()
 
+    @property
+    def executes_program(self) -> bool:
+        """See :attr:`HostedDevice.executes_program`."""
+        return self.program is not None
+
     def _renew(self) -> None:
-        if self.program is not None:
-            raise ConfigError(
-                tr("A simulator that executes a program is not made anew."),
-                remedy=tr("Restart it in place of that."),
-            )
         for link in self._links:
             link.cut()
         self.faults.forget()

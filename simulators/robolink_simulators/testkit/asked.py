@@ -3,11 +3,13 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import ToolOffset
+
+_PROGRAM_EXAMPLE: Final = 'softmotion_factory(program="our-plc")'
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +27,8 @@ class CellRequest:
         speed: Simulated seconds per real one, on a port; 0 lets time pass with requests alone.
         true_tool: Where the tip of tool 1 really is: x, y, z in mm, and u, v, w in degrees.
         map: The map of a PLC with registers of its own.
+        program: A folder with the program of a SoftMotion PLC, as ``expert plc export`` writes
+            it, changed or not; ``None`` for the modelled one.
     """
 
     robot: str = "T6-602S"
@@ -37,6 +41,7 @@ class CellRequest:
     speed: float | None = None
     true_tool: tuple[float, ...] | None = None
     map: str | Path | None = None
+    program: str | Path | None = None
 
     @classmethod
     def of(cls, given: Mapping[str, Any]) -> "CellRequest":
@@ -59,6 +64,18 @@ class CellRequest:
                 remedy=tr("Give it as {example}.", example="true_tool=(12.4, -3.2, -20.1)"),
             )
         return request
+
+    def require_no_program(self) -> None:
+        """Refuse a program for a cell that would pay no heed to it.
+
+        Raises:
+            ConfigError: One was asked for.
+        """
+        if self.program is not None:
+            raise ConfigError(
+                tr("A program is executed by a simulated SoftMotion PLC alone."),
+                remedy=tr("Ask for it where that is made: {example}.", example=_PROGRAM_EXAMPLE),
+            )
 
     @property
     def tip(self) -> ToolOffset | None:

@@ -56,6 +56,7 @@ def make_epson(
     from robolink_simulators.epson.device import EpsonSimulator
     from robolink_simulators.epson.options import options_from_text
 
+    request.require_no_program()
     simulator = EpsonSimulator(
         request.robot,
         seed=_seed(own, request),
@@ -107,12 +108,14 @@ def make_softmotion(
     """
     from robolink_simulators.softmotion.mailbox.option_text import options_from_text
     from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
+    from robolink_simulators.softmotion.program.plc_maker import plc_maker
 
     simulator = SoftMotionSimulator(
         request.kinematics,
         seed=_seed(own, request),
         options=options_from_text(request.texts("options")),
         world=_world(request),
+        make_plc=plc_maker(None if request.program is None else Path(request.program)),
     )
     time: Any
     if medium == "sim":
@@ -158,6 +161,7 @@ def make_plc(own: OwnFolder, request: CellRequest, medium: str) -> SimulatedCell
     from robolink.register_maps import load_map
     from robolink_simulators.plc import PlcSimulator, serve_plc, serve_plc_line
 
+    request.require_no_program()
     path = written_map(own.folder) if request.map is None else Path(request.map)
     simulator = PlcSimulator(load_map(path), seed=_seed(own, request))
     time = _served_clock(request, SERVED_SPEED)

@@ -111,7 +111,7 @@ class ScreenHand:
 
     def start(self):
         """Confirm what the list asks, and start."""
-        self.see(r"Start moving \(2 points open\)")
+        self.see(r"Start moving \(2 open\)")
         self.rest(0.4)
         self.press(["1", "3", "5"])
 

@@ -140,8 +140,9 @@ def test_the_numbers_of_several_tools_are_typed_all():
 def test_a_start_waits_for_every_point_of_the_list():
     hand = Sitting().asked(CHECK, Question.YES_NO).keys("5")
     assert hand.sent == []
-    assert "3 points are open" in hand.state.message
+    assert "First: [7] [1] [3]." in hand.state.message
     assert hand.keys("1", "3", "5").sent == []
+    assert "First: [7]." in hand.state.message
     assert hand.keys("7").sent == ["motors"]
     done = CHECK.__class__(tuple(p for p in CHECK.points if p.key != "7"), CHECK.plan)
     hand = Sitting().asked(done, Question.YES_NO).keys("1", "3", "5")
@@ -318,3 +319,12 @@ def test_a_reading_without_a_position_changes_nothing_of_the_steps():
     hand = at_touch().happens(WasRead(Reading(11.0, "fault", halted=True)))
     assert hand.keys("5").sent == []
     assert hand.happens(KeyPressed("escape", "", 12.0)).happens(LineTyped("", 12.0)).sent == []
+
+
+def test_what_nobody_had_a_screen_to_read_is_kept_for_the_end():
+    going = MoveSubject(ARRIVAL, Way.JOINT, 20.0, "Lifting.")
+    hand = Sitting().happens(WasTold("old")).asked(touch_subject())
+    assert hand.state.fresh == ()
+    for one in (WasTold("Lifting."), WasRegarded(going), WasTold("settled")):
+        hand.happens(one)
+    assert hand.state.fresh == ("settled",)

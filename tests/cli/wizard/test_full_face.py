@@ -171,11 +171,11 @@ def test_a_held_key_stops_with_the_hand(hand, simulator):
 @pytest.mark.soak
 def test_a_scanner_and_keys_typed_during_the_start_do_nothing(hand, simulator):
     os.write(hand.master, b"135555\r\n")
-    hand.see(r"Start moving \(2 points open\)")
+    hand.see(r"Start moving \(2 open\)")
     hand.rest(0.5)
     os.write(hand.master, b"4006381333931\r\n")
     hand.see("Too fast for a hand. Ignored.")
-    assert "2 points open" in hand.text
+    assert "2 open" in hand.text
     hand.press(["1", "3", "5"])
     hand.see("Touch 1 of 2")
     hand.rest(0.4)
@@ -215,3 +215,14 @@ def test_a_window_that_becomes_too_small_goes_on_as_lines(hand):
     hand.rest(0.5)
     os.write(hand.master, b"stop\n")
     assert hand.end() == 9
+
+
+@pytest.mark.soak
+def test_what_a_command_says_without_a_question_stays_when_the_screen_is_gone(simulator):
+    with serve_tcp(simulator) as host:
+        hand = ScreenHand(["recover", "-c", host.url])
+        try:
+            assert hand.end() == 0
+            assert "Nothing is unsettled on this controller." in hand.text
+        finally:
+            hand.close()

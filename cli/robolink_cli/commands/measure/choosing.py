@@ -5,12 +5,13 @@ from typing import TYPE_CHECKING, Final
 
 from robolink.errors import ConfigError, DeclinedError
 from robolink.messages import tr
-from robolink_cli.prompts.present import AskingDesk
+from robolink_cli.prompts.present import AskingDesk, present_desk
 from robolink_cli.wizard.choices import ChoiceSubject, choose
 
 if TYPE_CHECKING:
     from robolink.config import Cell
     from robolink.recipe import LoadedRecipe
+    from robolink_cli.session.context import CliContext
 
 _FOLDERS: Final = ("", "recipes")
 """Where recipes are looked for, beside the cell file and in the working folder."""
@@ -22,6 +23,28 @@ def nobody_to_ask() -> DeclinedError:
         tr("There is nobody to ask here. Add --yes, or run it on a terminal."),
         remedy=tr("Nothing was sent."),
     )
+
+
+def context_at_desk(context: "CliContext", job: str) -> "CliContext":
+    """Return what a command was told, with a cell where it names none and somebody is at a desk.
+
+    Args:
+        context: What it was told.
+        job: What it is called in the first row.
+
+    Raises:
+        ConfigError: There is no cell, or a cell file is wrong.
+        DeclinedError: The person leaves.
+    """
+    from robolink_cli.session.context import context_of_cell
+    from robolink_cli.session.guidance import header_of
+
+    desk = present_desk()
+    if context.url is not None or desk is None:
+        return context
+    at = context_of_cell(choose_cell(desk).name)
+    desk.regard(header_of(at, job))
+    return at
 
 
 def choose_cell(desk: AskingDesk) -> "Cell":
@@ -38,7 +61,7 @@ def choose_cell(desk: AskingDesk) -> "Cell":
         raise ConfigError(
             tr("No cell is set up on this computer."),
             remedy=tr(
-                "'robolink cell where' shows which file describes cells. To try it on a simulated "
+                "'robolink cell files' shows which file describes cells. To try it on a simulated "
                 "robot: robolink demo"
             ),
         )
@@ -69,8 +92,8 @@ def choose_recipe(desk: AskingDesk, cell: "Cell | None") -> "LoadedRecipe":
         raise ConfigError(
             tr("No recipe stands beside the cell file, nor in this folder."),
             remedy=tr(
-                "Write one (docs/recipes.md), or measure one tool: robolink calibrate two-pose "
-                "--tool N"
+                "To begin with one that comes along: robolink recipe list. To measure one tool "
+                "without a recipe: robolink calibrate two-pose --tool N"
             ),
         )
     rows = tuple(f"{one.name}   ({one.path.name})" for one in loaded)

@@ -12,6 +12,7 @@ from robolink_cli.options.sensor import sensor_option
 from robolink_cli.session.completing import complete_recipe
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.operator_identity import nozzle_options
+from robolink_cli.session.ordering import order_option, require_no_dry_run
 
 if TYPE_CHECKING:
     from robolink.recipe import LoadedRecipe
@@ -50,6 +51,7 @@ if TYPE_CHECKING:
 )
 @answer_options
 @nozzle_options
+@order_option
 @controller_options
 @dry_run_option
 @yes_option
@@ -67,6 +69,7 @@ def recalibrate(
     lot: str | None,
     answers: tuple[str, ...],
     z_mm: tuple[str, ...],
+    order: str | None,
     dry_run: bool,
     yes: bool,
 ) -> None:
@@ -76,7 +79,6 @@ def recalibrate(
     refusal, Ctrl-C or an emergency stop leaves the old values, and the tool that was selected.
     Without RECIPE, on a terminal, cell and recipe are chosen from lists.
     """
-    from robolink.recipe import load_recipe
     from robolink_cli.commands.measure.choosing import nobody_to_ask
     from robolink_cli.commands.measure.recalibration import Recalibration
     from robolink_cli.commands.measure.recipe_events import EventStream
@@ -87,10 +89,11 @@ def recalibrate(
 
     if recipe is None and not may_be_guided():
         raise nobody_to_ask()
+    require_no_dry_run(order, dry_run=dry_run)
     events = EventStream(click.get_current_context(), on=jsonl)
 
     def change() -> None:
-        at, loaded = _chosen(context) if recipe is None else (context, load_recipe(recipe))
+        at, loaded = _chosen(context, recipe)
         for sentence in loaded.notes:
             note(sentence)
         prepared = answers_from(
@@ -105,22 +108,25 @@ def recalibrate(
             take_reference=reference,
             accepted_change_mm=accepted_change_mm,
             sensor=sensor,
+            order=order,
         ).run(dry_run=dry_run)
 
     with events.closing():
-        alone = recipe is None or (assist is None and not dry_run)
+        # An order comes from a program, also where that has a terminal.
+        alone = recipe is None or (assist is None and not dry_run and order is None)
         guided_if_alone(context, change, job=tr("Change needle"), alone=alone)
 
 
-def _chosen(context: CliContext) -> "tuple[CliContext, LoadedRecipe]":
+def _chosen(context: CliContext, recipe: Path | None) -> "tuple[CliContext, LoadedRecipe]":
     """Have cell and recipe chosen, as far as the line does not name them."""
-    from robolink_cli.commands.measure.choosing import choose_cell, choose_recipe
+    from robolink.recipe import load_recipe
+    from robolink_cli.commands.measure.choosing import choose_recipe, context_at_desk
     from robolink_cli.prompts.present import present_desk
-    from robolink_cli.session.context import context_of_cell
-    from robolink_cli.session.guidance import header_of
 
+    named = None if recipe is None else load_recipe(recipe)
+    at = context_at_desk(context, tr("Change needle"))
+    if named is not None:
+        return at, named
     desk = present_desk()
     assert desk is not None  # noqa: S101 - looked at by whoever calls
-    at = context if context.url is not None else context_of_cell(choose_cell(desk).name)
-    desk.regard(header_of(at, tr("Change needle")))
     return at, choose_recipe(desk, at.cell)

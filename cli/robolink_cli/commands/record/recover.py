@@ -5,6 +5,7 @@ import click
 from robolink.errors import ConfigError
 from robolink.messages import declared, tr
 from robolink.transaction import Recovery
+from robolink_cli.commands.measure.choosing import context_at_desk
 from robolink_cli.commands.record.recovery_choice import BLOCKED, NEW, OLD, chosen_at_desk
 from robolink_cli.commands.record.recovery_guide import Guide, show_end
 from robolink_cli.options.consent import dry_run_option, plain_option, yes_option
@@ -69,7 +70,8 @@ def recover(
         )
 
     def settle() -> tuple[int, dict[str, object]]:
-        with open_controller(context, quiet=True, changes=not dry_run) as controller:
+        at = context_at_desk(context, tr("Recover"))
+        with open_controller(at, quiet=True, changes=not dry_run) as controller:
             if take_over is not None and not dry_run:
                 controller.outcomes.take_over(take_over)
             word = choose or (None if forget else chosen_at_desk(controller))

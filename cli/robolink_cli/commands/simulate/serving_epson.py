@@ -168,6 +168,7 @@ def _announce(
         tr("  assist      {url}", url=beside["assist"]),
         tr("  control     {url}", url=beside["control"]),
         tr('Try: robolink -c "{url}" status', url=url),
+        tr("From the tip to the pin, seen now: robolink sim assist ASSIST look"),
         tr("Ctrl-C ends it."),
     )
     announce(document, lines, state_dir)

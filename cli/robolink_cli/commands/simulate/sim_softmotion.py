@@ -2,7 +2,6 @@
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -13,9 +12,6 @@ from robolink_cli.options.simulation import (
     simulation_options,
 )
 from robolink_cli.session.context import json_option
-
-if TYPE_CHECKING:
-    from robolink_simulators.softmotion.mailbox.simulator import PlcMaker
 
 
 def _complete_kinematics(_: click.Context, __: click.Parameter, start: str) -> list[str]:
@@ -90,6 +86,7 @@ def softmotion(
     from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
     from robolink_simulators.softmotion.mailbox.option_text import options_from_text
     from robolink_simulators.softmotion.mailbox.parameters import parameters_from_text
+    from robolink_simulators.softmotion.program.plc_maker import plc_maker
 
     from robolink_cli.commands.simulate.planned_faults import plan_faults
     from robolink_cli.commands.simulate.serving import named_values, world_from
@@ -104,18 +101,8 @@ def softmotion(
         options=options_from_text(named_values(options, "--option profile=tools")),
         state_path=state,
         world=world_from(world),
-        make_plc=_plc_with(program),
+        make_plc=plc_maker(program),
     )
     buses = Buses(modbus_tcp, modbus_rtu, can, unit=unit, node=node, allow_remote=allow_remote)
     plan_faults(simulator, faults, buses.kinds)
     serve_plc(simulator, buses, speed=speed, life=life)
-
-
-def _plc_with(program: Path | None) -> "PlcMaker":
-    from robolink_simulators.softmotion.mailbox.plc import Plc
-
-    if program is None:
-        return Plc
-    from robolink_simulators.softmotion.program.structured_plc import program_plc, sources_in
-
-    return program_plc(sources_in(program))

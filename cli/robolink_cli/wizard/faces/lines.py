@@ -1,11 +1,12 @@
 """The wizard as a dialogue of lines: for a dumb terminal, a narrow one, a screen reader."""
 
 import time
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 from robolink.messages import tr
 from robolink.runner import Question
-from robolink_cli.console.output import draw
+from robolink_cli.console.output import draw, sentences
 from robolink_cli.prompts.lines import QUIET_S, Lines, open_lines
 from robolink_cli.wizard.desk import Desk
 from robolink_cli.wizard.faces.effects import carry_out
@@ -48,7 +49,7 @@ class LineFace:
                 self._tell(happening, state)
                 carry_out(desk, effects)
             if ended:
-                return state
+                return replace(state, fresh=())  # all of it stands above
             if state.question is None or not state.waits:
                 work.wait(_TURN_S)
                 continue
@@ -109,4 +110,4 @@ class LineFace:
 
 def _put(text: str) -> None:
     if text:
-        draw(text, beside=True)
+        draw(sentences(text), beside=True)

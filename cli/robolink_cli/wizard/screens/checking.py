@@ -10,9 +10,9 @@ from robolink_cli.wizard.state import WizardState
 
 def check_screen(state: WizardState, subject: CheckSubject, now_s: float) -> Screen:
     """Return the screen of the check list."""
-    left = subject.open_points(state.checked)
+    left = len(subject.open_keys(state.checked))
     rows = [row for point in subject.points for row in point_rows(point, state.checked)]
-    start = tr("Start moving ({n} points open)", n=left) if left else tr("Start moving")
+    start = tr("Start moving ({n} open)", n=left) if left else tr("Start moving")
     return Screen(
         title_row(state, tr("Check")),
         (*rows, "", *broken(subject.plan), tr("Keep a hand near the emergency stop.")),

@@ -1,7 +1,7 @@
 """A PLC: the axis group, its retained memory, and the mailbox program from start to start."""
 
 from collections.abc import Mapping
-from typing import Final, Protocol
+from typing import ClassVar, Final, Protocol
 
 from robolink.protocols.mailbox import (
     COMMAND_WORDS,
@@ -78,7 +78,10 @@ class Plc:
         starts: PLC starts so far.
         shift: How many words behind what they mean clients read and write.
         estop_pressed: Whether the drives are kept without power.
+        executes_program: Whether its mailbox program is executed from its own text.
     """
+
+    executes_program: ClassVar[bool] = False
 
     def __init__(
         self, model: MachineModel, parameters: Mapping[str, float], options: PlcOptions

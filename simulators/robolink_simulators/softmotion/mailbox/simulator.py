@@ -111,6 +111,11 @@ class SoftMotionSimulator(HostedDevice):
         self._file.save_changes()
 
     @property
+    def executes_program(self) -> bool:
+        """See :attr:`HostedDevice.executes_program`."""
+        return self.plc.executes_program
+
+    @property
     def machine_name(self) -> str:
         """See :attr:`HostedDevice.machine_name`."""
         return f"{self.kind} {self._kinematics}"

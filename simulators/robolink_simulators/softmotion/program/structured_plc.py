@@ -59,6 +59,8 @@ class StructuredPlc(Plc):
         ConfigError: The program cannot be read, or an option does not go with one.
     """
 
+    executes_program = True
+
     def __init__(
         self,
         model: MachineModel,

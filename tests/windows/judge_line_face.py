@@ -96,7 +96,7 @@ def test_a_person_types_steps_is_refused_an_unjogged_touch_and_stops(console, si
     console.type("take")
     console.wait_for("Not yet: the tip still stands where the robot put it.")
     console.type("z-0.1")
-    console.wait_for("Since arrival")
+    console.wait_for("Z -80.1")
     console.type("stop")
     console.wait_for("STOPPED")
     assert console.exit_code() == 9

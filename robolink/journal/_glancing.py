@@ -61,6 +61,15 @@ class GlancingLog:
         self._log().change = change
 
     @property
+    def order(self) -> str:
+        """Id of the order that is carried out; see the model."""
+        return "" if self._opened is None else self._opened.order
+
+    @order.setter
+    def order(self, order: str) -> None:
+        self._log().order = order
+
+    @property
     def trouble(self) -> ConfigError | None:
         """Why nothing can be recorded, as far as anybody had to know."""
         if self._opened is None and nothing_is_open(self._address):

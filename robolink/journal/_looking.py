@@ -40,6 +40,7 @@ class LookingLog:
         self.trouble = trouble
         self.signature = signature
         self.change = ""
+        self.order = ""
         self._address = address
         try:
             self._reader: JournalOutcomeLog | None = read()

@@ -1,6 +1,6 @@
 """The journal as the driver of one controller uses it."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final
@@ -17,7 +17,7 @@ from robolink.timing import Clock
 
 if TYPE_CHECKING:
     from robolink.journal._journal import Journal
-    from robolink.journal.store.store import Store
+    from robolink.journal.store.store import Store, Tables
 
 _BEGINNINGS: Final = {
     MarkerKind.SET: EntryKind.INTENT,
@@ -34,6 +34,8 @@ class JournalOutcomeLog:
     Attributes:
         signature: Who works here, and with what.
         change: Id of the tool change under way, empty for none; it goes with every entry.
+        order: Id of the order that is carried out, empty for none; it stands in the details of
+            every entry.
         durable: Whether what is recorded outlives this process.
         trouble: ``None``: this record can be kept, as far as is known.
     """
@@ -52,6 +54,7 @@ class JournalOutcomeLog:
     ) -> None:
         self.signature = signature
         self.change = ""
+        self.order = ""
         self.durable = store.durable
         self._journal = journal
         self._store = store
@@ -121,8 +124,7 @@ class JournalOutcomeLog:
                 grip = self._lease.secure(tables.leases, marker.request, self.signature.operator)
                 first = tables.markers.put(name, _of_robot(marker, names.robot))
                 told = _beginning(marker, first=first)
-                entries = (*grip.entries, *told)
-                tables.entries.append(names.record, self.signature, self.change, entries)
+                self._put(tables, names.record, (*grip.entries, *told))
             self._begun.add(marker.operation)
             self._lease.settle(grip)
             if told and self.durable and not self._traced:
@@ -147,7 +149,7 @@ class JournalOutcomeLog:
                 known = tables.markers.remove(names.identity, operation)
                 if operation in self._begun and not known:
                     raise self._settled_by_another()
-                tables.entries.append(names.record, self.signature, self.change, entries)
+                self._put(tables, names.record, entries)
             self._begun.discard(operation)
             if last:
                 self._lease.forget()
@@ -160,7 +162,7 @@ class JournalOutcomeLog:
         """
         name = self._named().record
         with self._store.write() as tables:
-            tables.entries.append(name, self.signature, self.change, entries)
+            self._put(tables, name, entries)
 
     def open_markers(self) -> tuple[Marker, ...]:
         """Return what is unsettled on this controller, oldest first, whoever began it.
@@ -239,7 +241,7 @@ class JournalOutcomeLog:
             self._lease.prepare()
             with self._store.write(_untouched()) as tables:
                 grip = self._lease.secure(tables.leases, purpose, self.signature.operator)
-                tables.entries.append(name, self.signature, self.change, grip.entries)
+                self._put(tables, name, grip.entries)
             self._lease.settle(grip)
             self._holds += 1
         try:
@@ -276,8 +278,15 @@ class JournalOutcomeLog:
             with self._store.write(_untouched()) as tables:
                 ended = self._lease.end(tables.leases, reason)
                 entries = () if ended is None else (ended,)
-                tables.entries.append(name, self.signature, self.change, entries)
+                self._put(tables, name, entries)
             self._lease.look()
+
+    def _put(self, tables: "Tables", name: str, entries: Sequence[NewEntry]) -> None:
+        if self.order:
+            entries = [
+                replace(entry, details={**entry.details, "order": self.order}) for entry in entries
+            ]
+        tables.entries.append(name, self.signature, self.change, entries)
 
     def _named(self) -> Names:
         with self._lock:

@@ -6,6 +6,7 @@ from robolink.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from robolink.nozzle_change._acceptance import AcceptanceCriteria as AcceptanceCriteria
+    from robolink.nozzle_change._change import DescribeReport as DescribeReport
     from robolink.nozzle_change._change import Earlier as Earlier
     from robolink.nozzle_change._change import NozzleChange as NozzleChange
     from robolink.nozzle_change._length import known_height as known_height
@@ -37,7 +38,7 @@ __getattr__ = lazy_exports(
     __name__,
     {
         "_acceptance": "AcceptanceCriteria",
-        "_change": "Earlier NozzleChange",
+        "_change": "DescribeReport Earlier NozzleChange",
         "_length": "known_height",
         "_listener": "Listener Moment",
         "_plan": "ChangePlan Limits ToolPlan clearance_too_small require_contact_input "

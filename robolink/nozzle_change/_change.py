@@ -6,7 +6,7 @@ keep, or write the old values back once. Several tools are all measured before t
 written. Whatever happens, the tool, power mode and speed of before are put back at the end.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 
@@ -36,11 +36,14 @@ from robolink.nozzle_change._records import decision_entry, refusal_entry, verif
 from robolink.nozzle_change._station_check import Proposals, check_stations, stations_found
 from robolink.procedures import TOUCH_CODES, MeasurementContext
 from robolink.runner import Operator, regard
-from robolink.transaction import ToolChange, Wanted
+from robolink.transaction import Order, ToolChange, Wanted, plain_result
 
 Earlier = Callable[[int], Sequence[float]]
 """Returns the lengths, in the plane, of a tool's corrections since its nozzle was mounted, oldest
 first."""
+
+DescribeReport = Callable[[ChangeReport], Mapping[str, object]]
+"""Returns the result of an order, plain JSON, that a second delivery of it is given."""
 
 
 class NozzleChange:
@@ -52,6 +55,8 @@ class NozzleChange:
         operator: Who is asked, and brings the tip onto the pin.
         listener: Told of everything that happens.
         earlier: Where the corrections of before are found, for the refusal of growing ones.
+        order: The order that it carries out (:func:`robolink.transaction.carrying_out`).
+        describe: Makes the result of the order, plain JSON, from what the change did.
     """
 
     def __init__(
@@ -62,12 +67,15 @@ class NozzleChange:
         operator: Operator,
         listener: Listener | None = None,
         earlier: Earlier = lambda _tool: (),
+        order: Order | None = None,
+        describe: DescribeReport | None = None,
     ) -> None:
         self._controller = controller
         self._plan = plan
         self._operator = operator
         self._listener = Listener() if listener is None else listener
         self._earlier = earlier
+        self._order, self._describe = order, describe
         self._written: ToolChange | None = None
 
     def run(self, *, write: bool = True) -> ChangeReport:
@@ -208,23 +216,38 @@ class NozzleChange:
             Wanted(proposal.tool, proposal.offset, proposal.before, plan.details(proposal))
             for plan, proposal in proposals
         ]
-        self._written = ToolChange(self._controller, wanted, verify=verify, tell=self._tell)
+        drifts: dict[int, VerifyResult | None] = {}
+
+        def reports(receipts: Sequence[ToolReceipt]) -> tuple[ToolReport, ...]:
+            return tuple(
+                ToolReport(
+                    proposal, receipt, drifts.get(receipt.tool), plan.criteria.verdicts(proposal)
+                )
+                for (plan, proposal), receipt in zip(proposals, receipts, strict=True)
+            )
+
+        def describe(receipts: Sequence[ToolReceipt]) -> Mapping[str, object]:
+            if self._describe is None:
+                return plain_result(receipts)
+            return self._describe(ChangeReport(self._controller.outcomes.change, reports(receipts)))
+
+        self._written = ToolChange(
+            self._controller,
+            wanted,
+            verify=verify,
+            tell=self._tell,
+            order=self._order,
+            describe=describe,
+        )
         with self._written as change:
             receipts = change.write()
             for receipt in receipts:
                 self._listener.wrote(receipt)
-            reports = tuple(
-                ToolReport(
-                    proposal,
-                    receipt,
-                    self._verify(context, plan, proposal, receipt),
-                    plan.criteria.verdicts(proposal),
-                )
-                for (plan, proposal), receipt in zip(proposals, receipts, strict=True)
-            )
+            for (plan, proposal), receipt in zip(proposals, receipts, strict=True):
+                drifts[receipt.tool] = self._verify(context, plan, proposal, receipt)
             change.keep(tr("verified") if verify else tr("not verified"))
         self._controller.outcomes.append(*stations_found(self._controller, proposals))
-        return reports
+        return reports(receipts)
 
     def _verify(
         self, context: MeasurementContext, plan: ToolPlan, proposal: Proposal, receipt: ToolReceipt

@@ -11,6 +11,7 @@ from robolink.model import Controller, EntryKind, PersonRole, TipSensor
 from robolink.nozzle_change import (
     ChangePlan,
     ChangeReport,
+    DescribeReport,
     Listener,
     NozzleChange,
     preview,
@@ -25,7 +26,7 @@ from robolink.recipe._plans import plan_of
 from robolink.recipe._reference import Reference, find_reference
 from robolink.runner import Operator
 from robolink.stations import Station, find_stations
-from robolink.transaction import ChangedSince, changed_since, earlier_corrections
+from robolink.transaction import ChangedSince, Order, changed_since, earlier_corrections
 from robolink.ways import Way, way
 
 
@@ -53,6 +54,9 @@ class RecipeRun:
         cell: The cell, whose file may say where stations are.
         measure_only: Whether nothing is written, kept or asked about lengths; only for methods
             that measure by a sensor.
+        order: The order that it carries out (:func:`robolink.transaction.carrying_out`); one that
+            only takes a reference carries out none.
+        describe: Makes the result of the order, plain JSON, from what the change did.
 
     Raises:
         CalibrationError: ``rank_deficient``: this robot cannot tilt its tool, and would have to.
@@ -74,11 +78,14 @@ class RecipeRun:
         sensor: str | TipSensor | None = None,
         cell: Cell | None = None,
         measure_only: bool = False,
+        order: Order | None = None,
+        describe: DescribeReport | None = None,
     ) -> None:
         if measure_only:
             _require_sensor(loaded)
         self._controller = controller
         self._measure_only = measure_only
+        self._order, self._describe = order, describe
         self._loaded, station, self._remark = _located(loaded, controller, cell)
         self._operator = operator
         self._answers = answers or Answers()
@@ -136,6 +143,11 @@ class RecipeRun:
                 tr("This recipe has no reference yet: there is nothing to compare with."),
                 remedy=tr("Run it once with 'robolink change', which records it."),
             )
+        if self._order is not None and (self.takes_reference or self._measure_only):
+            raise ConfigError(
+                tr("This run would write no tool: an order is for a change."),
+                remedy=tr("Record the reference first, in a run without an order."),
+            )
         require_ready(controller, self.plan)
         require_inside(controller, preview(controller, self.plan))
 
@@ -172,6 +184,8 @@ class RecipeRun:
             operator=self._operator,
             listener=listener,
             earlier=partial(earlier_corrections, self._controller),
+            order=self._order,
+            describe=self._describe,
         )
         try:
             return change.run(write=not (self.takes_reference or self._measure_only))

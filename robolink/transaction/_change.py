@@ -8,7 +8,7 @@ until :meth:`ToolChange.keep`; whatever ends it earlier puts the old values back
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import TracebackType
 from typing import Self
 
@@ -41,30 +41,12 @@ from robolink.model import (
     tool_changed,
 )
 from robolink.standing import note_standing
+from robolink.transaction._orders import Describe, Order, OrderedChange, plain_result
 from robolink.transaction._put_back import PutBack, Step, put_back
+from robolink.transaction._wanted import Wanted
 
 _OUT_OF_REACH = (OutcomeUnknownError, TransportError, RemoteProtocolError, LeaseLostError)
 """After these nothing can be taken back here: the link is gone, or the right to write."""
-
-
-@dataclass(frozen=True, slots=True)
-class Wanted:
-    """What one tool is to hold.
-
-    Attributes:
-        tool: Its number.
-        offset: The new value; ``None`` clears it.
-        expected: What the caller believes it holds now.
-        details: More for the journal, plain JSON.
-        then_select: The tool to put in force before this one is cleared, should this one be in
-            force; without it that is refused.
-    """
-
-    tool: int
-    offset: ToolOffset | None
-    expected: Expected
-    details: Mapping[str, object] | None = None
-    then_select: int | None = None
 
 
 class ToolChange:
@@ -79,6 +61,8 @@ class ToolChange:
         verify: Whether something is to be verified between the writes and :meth:`keep`.
         marked: More for its durable marker, plain JSON.
         tell: Told, in sentences, what was put back.
+        order: The order that it carries out; with the values it is kept that this is done.
+        describe: Makes the result of the order from what was written.
     """
 
     def __init__(
@@ -89,10 +73,15 @@ class ToolChange:
         verify: bool = False,
         marked: Mapping[str, object] | None = None,
         tell: Callable[[str], None] = lambda _sentence: None,
+        order: Order | None = None,
+        describe: Describe = plain_result,
     ) -> None:
         self._controller = controller
         self._wanted = tuple(wanted)
-        self._several_steps = verify or len(self._wanted) > 1
+        # An order counts as carried out in the transaction that keeps the value: that takes a
+        # change which is open until then.
+        self._several_steps = verify or len(self._wanted) > 1 or order is not None
+        self._ordered = None if order is None else OrderedChange(order, describe)
         self._verify = verify
         self._marked = marked or {}
         self._tell = tell
@@ -156,6 +145,7 @@ class ToolChange:
                 "tools": tools,
                 "verify": self._verify,
                 "change": self._controller.outcomes.change,
+                **(self._ordered.marked(steps) if self._ordered else {}),
                 **self._marked,
             }
             if self._selected is not None:
@@ -179,11 +169,17 @@ class ToolChange:
         self._controller.latch.require_open(self.request)
         if self._marker is None:
             # Each write said itself that it is done; this says what the values rest on.
-            if any(wanted.details for wanted in self._wanted):
-                self._controller.outcomes.append(*self._ends(EntryKind.DECISION, "", verdict))
+            told = any(wanted.details for wanted in self._wanted)
+            ends = self._ends(EntryKind.DECISION, "", verdict) if told else []
+            if self._ordered:
+                ends.append(self._ordered.kept(self._receipts))
+            if ends:
+                self._controller.outcomes.append(*ends)
             self.kept = True
             return
         entries = self._ends(EntryKind.DONE, self._marker.operation, verdict)
+        if self._ordered:
+            entries.append(self._ordered.kept(self._receipts))
         with self._controller.uninterrupted():
             self._controller.finish(self._marker, *entries)
             self.kept = True
@@ -376,6 +372,8 @@ def change_tools(
     wanted: Sequence[Wanted],
     *,
     tell: Callable[[str], None] = lambda _sentence: None,
+    order: Order | None = None,
+    describe: Describe = plain_result,
 ) -> tuple[ToolReceipt, ...]:
     """Write tools that nothing is to verify: all of them, or none.
 
@@ -383,12 +381,14 @@ def change_tools(
         controller: The controller, connected.
         wanted: The tools to change.
         tell: Told what was put back.
+        order: The order that this carries out (:func:`robolink.transaction.carrying_out`).
+        describe: Makes the result of the order from what was written.
 
     Raises:
         RobolinkError: As :meth:`ToolChange.write`; the old values are back, or the error says
             that they are not.
     """
-    change = ToolChange(controller, wanted, tell=tell)
+    change = ToolChange(controller, wanted, tell=tell, order=order, describe=describe)
     with controller.latch.watching(change.request), change:
         receipts = change.write()
         change.keep()

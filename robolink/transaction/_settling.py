@@ -1,5 +1,7 @@
 """Settles open markers of every kind: those of the driver, and those of whole changes."""
 
+from dataclasses import replace
+
 from robolink.errors import ConfigError, NotReadyError, NotReadyReason, OutcomeUnknownError
 from robolink.messages import joined, tr
 from robolink.model import (
@@ -16,6 +18,7 @@ from robolink.model import (
     put_right,
     read_offset,
 )
+from robolink.transaction._orders import forgotten, kept_later, order_of
 from robolink.transaction._put_back import Step, put_back
 from robolink.ways import Way, way
 
@@ -63,7 +66,8 @@ class Settler:
             return _finding(marker, Verdict.NOT_APPLIED, text, steps, now)
         if all(new) and (self._keep or not marker.details.get("verify")):
             text = tr("{holds} The change is complete.", holds=sentence)
-            return _finding(marker, Verdict.DONE, text, steps, now)
+            done = _finding(marker, Verdict.DONE, text, steps, now)
+            return replace(done, entries=(*done.entries, *kept_later(marker, now)))
         why = tr("nobody verified it") if all(new) else tr("the change is not complete")
         text = tr("{holds} Written, but {why}.", holds=sentence, why=why)
         numbers = ", ".join(
@@ -80,6 +84,7 @@ class Settler:
         """
         outcomes = self._controller.outcomes
         outcomes.change = str(finding.marker.details.get("change", ""))
+        outcomes.order = order_of(finding.marker)
         try:
             if finding.marker.kind is MarkerKind.HISTORY:
                 self._controller.finish(finding.marker, *finding.entries)
@@ -90,7 +95,7 @@ class Settler:
             else:
                 self._put_back(finding.marker)
         finally:
-            outcomes.change = ""
+            outcomes.change = outcomes.order = ""
 
     def forget(self, marker: Marker) -> None:
         """Forget a marker on a person's word alone."""
@@ -102,6 +107,7 @@ class Settler:
                 verdict=tr("forgotten without looking"),
                 details={"request": marker.request, **marker.details},
             ),
+            *forgotten(marker),
         )
 
     def _require_robot(self, marker: Marker) -> None:

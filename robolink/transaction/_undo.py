@@ -19,7 +19,7 @@ from robolink.model import (
     new_operation,
     require_engineer,
 )
-from robolink.transaction._change import Wanted, change_tools
+from robolink.transaction._change import change_tools
 from robolink.transaction._history import changed_since, last_proof
 from robolink.transaction._put_back import Step
 from robolink.transaction._undo_history import (
@@ -29,6 +29,7 @@ from robolink.transaction._undo_history import (
     proof_numbered,
     tool_of,
 )
+from robolink.transaction._wanted import Wanted
 from robolink.ways import Way, way
 
 

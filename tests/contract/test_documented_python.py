@@ -114,6 +114,15 @@ def two_tools(stack: ExitStack) -> dict[str, Any]:
     }
 
 
+def undelivered(stack: ExitStack) -> dict[str, Any]:
+    simulator = stack.enter_context(epson())
+
+    def written_once() -> bool:
+        return simulator.machine.tools.get(1) == ToolOffset(12.5, -3.5, -20)
+
+    return {"then": written_once}
+
+
 def above_two_beams(stack: ExitStack) -> dict[str, Any]:
     simulator = stack.enter_context(epson())
     world, arm = simulator.world, simulator.machine.arm
@@ -305,6 +314,7 @@ MAKERS = {
     "fault-plans.md 1": a_fault_plan,
     "io-and-variables.md 1": with_variables,
     "journal.md 1": a_journal,
+    "line-computer.md 1": undelivered,
     "plc-maps.md 1": a_map,
     "recipes.md 1": a_recipe,
     "simulated-softmotion.md 1": nothing,

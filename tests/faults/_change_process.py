@@ -20,11 +20,13 @@ from robolink_simulators.cell.clock import ManualClock
 import robolink
 from robolink.journal import open_journal
 from robolink.model import TIP, Controller, LookingController, ToolOffset
-from robolink.transaction import ToolChange, Wanted, change_tools, recover
+from robolink.transaction import ToolChange, Wanted, carrying_out, change_tools, recover
 from tests.faults import _client_process
 
 OLD: Final = {1: ToolOffset(12.0, -3.5, -20.0), 2: ToolOffset(-12.0, -3.5, -21.0)}
 NEW: Final = {1: ToolOffset(12.25, -3.25, -20.0), 2: ToolOffset(-11.75, -3.5, -21.0)}
+
+ORDER: Final = "A-17/3"
 
 CommitMoment = Literal["before it is durable", "once it is durable"]
 _PATIENCE_S: Final = 30.0
@@ -54,6 +56,13 @@ def _write_verified(controller: Controller) -> None:
             change.keep("verified")
 
 
+def _deliver(controller: Controller, *tools: int) -> None:
+    """Carry an order out, unless it was carried out before."""
+    with carrying_out(controller, ORDER, {"tools": list(tools)}) as order:
+        if order.done is None:
+            change_tools(controller, _wanted(*tools), order=order)
+
+
 def _look(controller: Controller) -> None:
     assert isinstance(controller, LookingController)
     controller.look(TIP, program=7)
@@ -63,6 +72,8 @@ PROGRAMS: Final[dict[str, Callable[[Controller], object]]] = {
     "one tool": lambda controller: change_tools(controller, _wanted(1)),
     "two tools": lambda controller: change_tools(controller, _wanted(1, 2)),
     "two tools, verified": _write_verified,
+    "one tool, ordered": lambda controller: _deliver(controller, 1),
+    "two tools, ordered": lambda controller: _deliver(controller, 1, 2),
     "recover": recover,
     "look": _look,
 }

@@ -55,12 +55,15 @@ class OutcomeLog(Protocol):
     Attributes:
         signature: Who works here, and with what.
         change: Id of the tool change under way, empty for none; it goes with every entry.
+        order: Id of the order that is carried out, empty for none; it stands in the details of
+            every entry.
         trouble: Why nothing can be recorded, so that nothing may be changed; ``None`` for a
             record that is as it should be.
     """
 
     signature: Signature
     change: str
+    order: str
 
     @property
     def trouble(self) -> ConfigError | None:

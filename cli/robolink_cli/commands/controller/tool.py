@@ -1,6 +1,9 @@
 """tool list, get, set, clear, select: the tool table."""
 
+from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import click
 
@@ -21,6 +24,17 @@ from robolink_cli.prompts.questions import agree
 from robolink_cli.session.completing import complete_tool
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.opening import open_controller
+from robolink_cli.session.ordering import (
+    order_option,
+    ordered,
+    require_no_dry_run,
+    show_done,
+    with_order,
+)
+
+if TYPE_CHECKING:
+    from robolink.model import Controller, ToolOffset, ToolReceipt
+    from robolink.transaction import Order
 
 _FROM_FILES = "robolink_cli.commands.controller.backup"
 
@@ -120,6 +134,7 @@ def _get_by_mode(context: CliContext, mode: str) -> None:
 @click.option("--v", type=DECIMAL, help="Degrees about Y; six-axis robots only.")
 @click.option("--w", type=DECIMAL, help="Degrees about X; six-axis robots only.")
 @accept_jump_options
+@order_option
 @controller_options
 @dry_run_option
 @yes_option
@@ -129,6 +144,7 @@ def set_tool(
     *,
     accepted_mm: float | None,
     accepted_deg: float | None,
+    order: str | None,
     dry_run: bool,
     yes: bool,
     **given: float | None,
@@ -138,11 +154,7 @@ def set_tool(
     A change beyond the cell's max_change_mm or max_change_deg takes an engineer, who is asked
     with the figure, whatever --yes says.
     """
-    from robolink.backup import keep_first_backup
-    from robolink.model import ToolOffset
-    from robolink.transaction import Jump, Wanted, change_tools
-    from robolink_cli.views.documents import offset_payload, receipt_payload
-    from robolink_cli.views.tables import show_change
+    from robolink.transaction import Wanted, change_tools
 
     units = {"x": "x_mm", "y": "y_mm", "z": "z_mm", "u": "u_deg", "v": "v_deg", "w": "w_deg"}
     changes = {units[axis]: value for axis, value in given.items() if value is not None}
@@ -150,45 +162,111 @@ def set_tool(
         raise ConfigError(
             tr("No component was given."), remedy=tr("Give at least one of --x --y --z --u.")
         )
-    # Checks the numbers before a connection is made.
-    ToolOffset(**changes)
-    with open_controller(context, changes=not dry_run) as controller:
-        controller.tools.require_writable(number)
-        before = controller.tools.read(number)
-        note_change(controller, number, before)
+    if order is not None:
+        require_no_dry_run(order, dry_run=dry_run)
+    setting = _Setting(
+        context, number, changes, [name for name in units.values() if name not in changes]
+    )
+    with (
+        open_controller(context, changes=not dry_run) as controller,
+        nullcontext() if order is None else ordered(controller, order, "tool set") as found,
+    ):
+        if found is not None and found.done is not None:
+            payload = found.done.result
+        else:
+            before, wanted = setting.look_up(controller)
+            if dry_run:
+                context.show_requests(controller.tools.preview_write(number, wanted))
+                return
+            setting.ask(
+                controller, before, wanted, accepted=Allowed(accepted_mm, accepted_deg), yes=yes
+            )
+            receipts = change_tools(
+                controller,
+                [Wanted(number, wanted, before)],
+                tell=note,
+                order=found,
+                describe=setting.document,
+            )
+            payload = setting.document(receipts)
+    setting.show(payload, found)
+
+
+class _Setting:
+    """What ``tool set`` was told, in the steps of its write."""
+
+    def __init__(
+        self, context: CliContext, number: int, changes: Mapping[str, float], kept: list[str]
+    ) -> None:
+        from robolink.model import ToolOffset
+
+        # Checks the numbers before a connection is made.
+        ToolOffset(**changes)
+        self._context, self._number, self._changes, self._kept = context, number, changes, kept
+
+    def look_up(self, controller: "Controller") -> "tuple[ToolOffset | None, ToolOffset]":
+        """Return what the tool holds, and what it is to hold."""
+        from robolink.model import ToolOffset
+
+        controller.tools.require_writable(self._number)
+        before = controller.tools.read(self._number)
+        note_change(controller, self._number, before)
         # Nothing of what no tool has is kept beside what was given.
         kept_from = ToolOffset() if before is None or before.of_no_tool else before
-        wanted = replace(kept_from, **changes)
-        kept = [name for name in units.values() if name not in changes]
-        shown = offset_payload(before), offset_payload(wanted)
-        if dry_run:
-            requests = controller.tools.preview_write(number, wanted)
-            context.show_requests(requests)
-            return
+        return before, replace(kept_from, **self._changes)
+
+    def ask(
+        self,
+        controller: "Controller",
+        before: "ToolOffset | None",
+        wanted: "ToolOffset",
+        *,
+        accepted: Allowed,
+        yes: bool,
+    ) -> None:
+        """Have a person agree; back up before the first write."""
+        from robolink.backup import keep_first_backup
+        from robolink.transaction import Jump
+        from robolink_cli.views.documents import offset_payload
+        from robolink_cli.views.tables import show_change
+
+        number, context = self._number, self._context
         controller.tools.selected()  # read now: the last line of a failure names it
         if not context.json:
+            shown = offset_payload(before), offset_payload(wanted)
             show_change(number, *shown, after_name=tr("new"))
         # An undefined tool has no place from which its tip could jump.
-        accepted = before is not None and accept_jump(
+        asked = before is not None and accept_jump(
             controller,
             number,
             Jump.between(before, wanted),
             allowed=allowed_by(context.cell),
-            accepted=Allowed(accepted_mm, accepted_deg),
+            accepted=accepted,
         )
-        if not (accepted or context.json):
+        if not (asked or context.json):
             agree(tr("Write this to tool {number}?", number=number), yes=yes)
         keep_first_backup(controller, tell=note)
-        (receipt,) = change_tools(controller, [Wanted(number, wanted, before)], tell=note)
-    payload = receipt_payload(receipt) | {"kept": kept}
-    done = (
-        tr("already stored, nothing was written") if receipt.skipped else tr("written, read back")
-    )
-    context.emit(
-        "tool-write",
-        payload,
-        lambda: say(tr("tool {number}: {done}", number=number, done=done)),
-    )
+
+    def document(self, receipts: "Sequence[ToolReceipt]") -> dict[str, object]:
+        """Return the document of the write."""
+        from robolink_cli.views.documents import receipt_payload
+
+        (receipt,) = receipts
+        return receipt_payload(receipt) | {"kept": self._kept}
+
+    def show(self, payload: Mapping[str, object], order: "Order | None") -> None:
+        """Give the result: of this write, or of the one that the order was carried out with."""
+        skipped = tr("already stored, nothing was written")
+        done = skipped if payload["skipped"] else tr("written, read back")
+
+        def tell() -> None:
+            if order is not None and order.done is not None:
+                show_done(order)
+            else:
+                say(tr("tool {number}: {done}", number=self._number, done=done))
+
+        shown = payload if order is None else with_order(payload, order)
+        self._context.emit("tool-write", shown, tell)
 
 
 @tool.command("clear")

@@ -12,6 +12,7 @@ from robolink_cli.options.sensor import sensor_option
 from robolink_cli.session.completing import complete_recipe
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.operator_identity import nozzle_options
+from robolink_cli.session.ordering import order_option, require_no_dry_run
 
 if TYPE_CHECKING:
     from robolink.recipe import LoadedRecipe
@@ -50,6 +51,7 @@ if TYPE_CHECKING:
 )
 @answer_options
 @nozzle_options
+@order_option
 @controller_options
 @dry_run_option
 @yes_option
@@ -67,6 +69,7 @@ def recalibrate(
     lot: str | None,
     answers: tuple[str, ...],
     z_mm: tuple[str, ...],
+    order: str | None,
     dry_run: bool,
     yes: bool,
 ) -> None:
@@ -86,6 +89,7 @@ def recalibrate(
 
     if recipe is None and not may_be_guided():
         raise nobody_to_ask()
+    require_no_dry_run(order, dry_run=dry_run)
     events = EventStream(click.get_current_context(), on=jsonl)
 
     def change() -> None:
@@ -104,10 +108,12 @@ def recalibrate(
             take_reference=reference,
             accepted_change_mm=accepted_change_mm,
             sensor=sensor,
+            order=order,
         ).run(dry_run=dry_run)
 
     with events.closing():
-        alone = recipe is None or (assist is None and not dry_run)
+        # An order comes from a program, also where that has a terminal.
+        alone = recipe is None or (assist is None and not dry_run and order is None)
         guided_if_alone(context, change, job=tr("Change needle"), alone=alone)
 
 

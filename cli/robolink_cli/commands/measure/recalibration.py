@@ -1,6 +1,6 @@
 """One run of a recipe from the command line."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from robolink.backup import keep_first_backup
 from robolink.errors import DeclinedError
@@ -8,6 +8,7 @@ from robolink.messages import tr
 from robolink.model import Controller
 from robolink.nozzle_change import ChangeReport, preview
 from robolink.recipe import Answers, LoadedRecipe, RecipeRun, require_answers
+from robolink.transaction import Order
 from robolink_cli.access.capabilities import io_of
 from robolink_cli.commands.measure.recipe_events import EventStream, Progress
 from robolink_cli.console.render import note, say
@@ -18,8 +19,12 @@ from robolink_cli.session.check_before_start import check_before_start
 from robolink_cli.session.context import CliContext
 from robolink_cli.session.motion_consent import agree_to_motion, motion_question
 from robolink_cli.session.opening import open_controller
+from robolink_cli.session.ordering import ordered, show_done, with_order
 from robolink_cli.views.calibration import report_payload, show_report
 from robolink_cli.views.planned_steps import steps_payload
+
+_Show = Callable[[dict[str, object]], None]
+"""Shows a document to a person."""
 
 
 class Recalibration:
@@ -34,6 +39,7 @@ class Recalibration:
         take_reference: Whether only a reference is taken.
         accepted_change_mm: A larger jump that an engineer accepts this time.
         sensor: The camera, in place of the recipe's.
+        order: Id of the line computer's order; ``None`` without one.
     """
 
     def __init__(
@@ -47,6 +53,7 @@ class Recalibration:
         take_reference: bool,
         accepted_change_mm: float | None,
         sensor: str | None,
+        order: str | None = None,
     ) -> None:
         self._context = context
         self._loaded = loaded
@@ -56,6 +63,7 @@ class Recalibration:
         self._take_reference = take_reference
         self._accepted_change_mm = accepted_change_mm
         self._sensor = sensor
+        self._order = order
 
     def run(self, *, dry_run: bool) -> None:
         """Carry the recipe out, or only show it.
@@ -66,10 +74,33 @@ class Recalibration:
         if not dry_run and self._assist_url is None and not on_terminal():
             require_answers(self._answers, self._loaded.recipe)
         progress = Progress(self._events)
+        answers, loaded = self._answers, self._loaded
         with (
             open_controller(self._context, changes=not dry_run) as controller,
-            operator_at(self._assist_url, lambda: progress.tool, controller.clock) as operator,
+            ordered(
+                controller,
+                self._order,
+                "change",
+                recipe=loaded.sha256,
+                nozzle=answers.nozzle,
+                lot=answers.lot,
+            ) as order,
         ):
+            if order is not None and order.done is not None:
+                done: tuple[Mapping[str, object], _Show] = (order.done.result, _nothing)
+                show_done(order)
+            else:
+                done = self._run(controller, order, progress, dry_run=dry_run)
+        payload, show = with_order(done[0], order), done[1]
+        self._events.emit("result", **payload)
+        if not self._events.on:
+            self._context.emit("recalibration", payload, lambda: show(payload))
+
+    def _run(
+        self, controller: Controller, order: Order | None, progress: Progress, *, dry_run: bool
+    ) -> tuple[Mapping[str, object], _Show]:
+        """Return the document of the run, and how a person is shown it."""
+        with operator_at(self._assist_url, lambda: progress.tool, controller.clock) as operator:
             run = RecipeRun(
                 controller,
                 self._loaded,
@@ -81,19 +112,15 @@ class Recalibration:
                 ask_before_write=not self._answers.yes,
                 sensor=self._sensor,
                 cell=self._context.cell,
+                order=order,
+                describe=lambda report: self._document(controller, report),
             )
             run.preflight()
             self._start(controller, run)
             if dry_run:
-                payload = self._dry_run(controller, run)
-                show: Callable[[dict[str, object]], None] = _shown_plan
-            else:
-                self._consent(controller, run)
-                payload = self._carry_out(controller, run)
-                show = _nothing
-        self._events.emit("result", **payload)
-        if not self._events.on:
-            self._context.emit("recalibration", payload, lambda: show(payload))
+                return self._dry_run(controller, run), _shown_plan
+            self._consent(controller, run)
+            return self._carry_out(controller, run), _nothing
 
     def _start(self, controller: Controller, run: RecipeRun) -> None:
         for change in run.changed:
@@ -221,13 +248,18 @@ class Recalibration:
                 change=report.change[:8],
             )
         )
+        return self._document(controller, report, reference_taken=run.takes_reference)
+
+    def _document(
+        self, controller: Controller, report: ChangeReport, *, reference_taken: bool = False
+    ) -> dict[str, object]:
         return {
             "recipe": self._loaded.name,
             "recipe_hash": self._loaded.sha256,
             "controller": controller.identity,
             **_payload(report),
             "old_names": list(self._loaded.notes),
-            "reference_taken": run.takes_reference,
+            "reference_taken": reference_taken,
         }
 
 

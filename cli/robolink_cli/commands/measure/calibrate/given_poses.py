@@ -1,6 +1,6 @@
 """A calibration from poses that exist already: nothing moves, no tool is selected."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 from robolink.backup import keep_first_backup
@@ -11,6 +11,8 @@ from robolink.methods import PointsSource
 from robolink.model import Controller
 from robolink.nozzle_change import (
     ChangePlan,
+    ChangeReport,
+    DescribeReport,
     Listener,
     Moment,
     NozzleChange,
@@ -18,7 +20,7 @@ from robolink.nozzle_change import (
     ToolReport,
 )
 from robolink.procedures import MeasurementContext, PoseMethod
-from robolink.transaction import earlier_corrections
+from robolink.transaction import Order, earlier_corrections
 from robolink_cli.access.warnings import note_change
 from robolink_cli.commands.measure.calibrate.listener import CalibrationListener
 from robolink_cli.commands.measure.calibrate.request import CalibrationRequest
@@ -31,6 +33,7 @@ from robolink_cli.prompts.operator import terminal
 from robolink_cli.prompts.questions import agree, on_terminal
 from robolink_cli.session.context import CliContext
 from robolink_cli.session.opening import open_controller
+from robolink_cli.session.ordering import ordered, show_done, with_order
 from robolink_cli.views.calibration import judged_payload, report_payload
 
 
@@ -114,13 +117,31 @@ def calibrate_from_poses(
         DeclinedError: A person said no, or nobody could be asked.
         ToolChangedError: The tool was changed meanwhile; nothing was written.
     """
-    context = frame.context
     with (
-        open_controller(context, changes=not frame.dry_run) as controller,
-        reporting(frame.report, controller) as draft,
+        open_controller(frame.context, changes=not frame.dry_run) as controller,
+        ordered(controller, frame.order, f"calibrate {frame.method}") as order,
     ):
+        if order is not None and order.done is not None:
+            payload = order.done.result
+            show_done(order)
+        else:
+            payload = _calibrate(controller, frame, source, method_for(controller), order)
+    if frame.dry_run:
+        _show_dry_run(frame.context, payload)
+    else:
+        frame.context.emit("calibration", with_order(payload, order), lambda: None)
+
+
+def _calibrate(
+    controller: Controller,
+    frame: CalibrationRequest,
+    source: PoseSource,
+    method: PoseMethod,
+    order: Order | None,
+) -> Mapping[str, object]:
+    """Carry it out, or look what it would do; return the document."""
+    with reporting(frame.report, controller) as draft:
         remark_on_pin(frame, controller)
-        method = method_for(controller)
         # A pin that is kept needs its height.
         needs = {*method.needs, "z_mm"} if frame.pin else {*method.needs}
         given = PointsSource(
@@ -135,23 +156,29 @@ def calibrate_from_poses(
             draft, frame, given, controller=controller, taught_tool=source.taught_tool
         )
         listener.read_points(controller)
+
+        def document(report: ChangeReport) -> dict[str, object]:
+            return {**report_payload(report.tools[0]), **_extra(source, listener), "report": None}
+
         if frame.dry_run:
-            payload = _dry_run(controller, frame, given, listener)
+            payload = _dry_run(controller, frame, given, listener) | _extra(source, listener)
         else:
-            done = _carry_out(controller, frame, given, listener)
-            payload = report_payload(done)
+            done = _carry_out(controller, frame, given, listener, order=order, describe=document)
+            payload = document(done)
             # Now, because Ctrl-C may come before the logout is answered.
-            _show_end(done)
-    extra = _extra(source, listener) | {"report": draft.saved}
-    if frame.dry_run:
-        _show_dry_run(context, {**payload, **extra})
-    else:
-        context.emit("calibration", {**payload, **extra}, lambda: None)
+            _show_end(done.tools[0])
+    return {**payload, "report": draft.saved}
 
 
 def _carry_out(
-    controller: Controller, frame: CalibrationRequest, given: PointsSource, listener: Listener
-) -> ToolReport:
+    controller: Controller,
+    frame: CalibrationRequest,
+    given: PointsSource,
+    listener: Listener,
+    *,
+    order: Order | None,
+    describe: DescribeReport,
+) -> ChangeReport:
     one = frame.tool_plan(given, verify=False)
     attended = not frame.yes and on_terminal()
     change = NozzleChange(
@@ -160,9 +187,10 @@ def _carry_out(
         operator=terminal(),
         listener=listener,
         earlier=partial(earlier_corrections, controller),
+        order=order,
+        describe=describe,
     )
-    (report,) = change.run().tools
-    return report
+    return change.run()
 
 
 def _dry_run(
@@ -192,7 +220,7 @@ def _extra(source: PoseSource, listener: _PosesListener) -> dict[str, object]:
     }
 
 
-def _show_dry_run(context: CliContext, payload: dict[str, object]) -> None:
+def _show_dry_run(context: CliContext, payload: Mapping[str, object]) -> None:
     requests = payload["requests"]
     assert isinstance(requests, list)  # noqa: S101 - made by _dry_run
 

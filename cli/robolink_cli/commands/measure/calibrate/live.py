@@ -1,6 +1,6 @@
 """A calibration in which the robot moves: plan, consent, measurement, proposal, write, proof."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 from robolink.backup import keep_first_backup
@@ -9,6 +9,7 @@ from robolink.messages import tr
 from robolink.model import Controller
 from robolink.nozzle_change import (
     ChangePlan,
+    ChangeReport,
     NozzleChange,
     Proposal,
     ToolReport,
@@ -17,7 +18,7 @@ from robolink.nozzle_change import (
     require_ready,
 )
 from robolink.procedures import TipSource
-from robolink.transaction import earlier_corrections
+from robolink.transaction import Order, earlier_corrections
 from robolink_cli.access.warnings import note_change
 from robolink_cli.commands.measure.calibrate.listener import CalibrationListener
 from robolink_cli.commands.measure.calibrate.request import CalibrationRequest
@@ -30,6 +31,7 @@ from robolink_cli.prompts.present import present_desk
 from robolink_cli.session.check_before_start import agree_to_procedure
 from robolink_cli.session.guidance import guided_if_alone
 from robolink_cli.session.opening import open_controller
+from robolink_cli.session.ordering import ordered, show_done, with_order
 from robolink_cli.views.calibration import (
     report_payload,
     show_course,
@@ -64,8 +66,10 @@ class LiveCalibration:
         draft: ReportDraft,
         assist_url: str | None = None,
         impact: ImpactRequest | None = None,
+        order: Order | None = None,
     ) -> None:
         self._controller = controller
+        self._order = order
         self._plan = plan
         self._assist_url = assist_url
         self._listener = _LiveListener(draft, plan, impact)
@@ -118,17 +122,23 @@ class LiveCalibration:
                 operator=operator,
                 listener=self._listener,
                 earlier=partial(earlier_corrections, self._controller),
+                order=self._order,
+                describe=self._document,
             )
             whole = change.run()
             (self._report,) = whole.tools
         desk = present_desk()
         if desk is not None:
             desk.regard(whole)
+        return self._document(whole)
+
+    def _document(self, report: ChangeReport) -> dict[str, object]:
         impact = self._listener.impact
         return {
-            **report_payload(self._report),
+            **report_payload(report.tools[0]),
             "source": {"kind": "live"},
             "impact": impact_payload(impact) if impact else None,
+            "report": None,
         }
 
     def show_end(self) -> None:
@@ -146,7 +156,8 @@ def calibrate_live(frame: CalibrationRequest, source: Callable[[Controller], Tip
         LimitError: The foreseen course leads outside the limits; nothing was moved.
         VerifyError: The tip drifts too far; the old value was put back.
     """
-    alone = frame.assist is None and not frame.dry_run
+    # An order comes from a program, also where that has a terminal.
+    alone = frame.assist is None and not frame.dry_run and frame.order is None
     guided_if_alone(
         frame.context,
         lambda: _calibrate(frame, source),
@@ -159,20 +170,35 @@ def _calibrate(frame: CalibrationRequest, source: Callable[[Controller], TipSour
     context = frame.context
     with (
         open_controller(context, changes=not frame.dry_run) as controller,
-        reporting(frame.report, controller) as draft,
+        ordered(controller, frame.order, f"calibrate {frame.method}") as order,
     ):
+        if order is not None and order.done is not None:
+            payload = order.done.result
+            show_done(order)
+        else:
+            payload = _measure(controller, frame, frame.plan(source(controller)), order)
+    if frame.dry_run:
+        context.emit("dry-run", payload, lambda: show_plan(payload))
+    else:
+        context.emit("calibration", with_order(payload, order), lambda: None)
+
+
+def _measure(
+    controller: Controller, frame: CalibrationRequest, plan: ChangePlan, order: Order | None
+) -> Mapping[str, object]:
+    """Carry it out, or look how it would go; return the document."""
+    with reporting(frame.report, controller) as draft:
         remark_on_pin(frame, controller)
         live = LiveCalibration(
             controller,
-            frame.plan(source(controller)),
+            plan,
             draft=draft,
             assist_url=frame.assist,
             impact=frame.impact,
+            order=order,
         )
         if frame.dry_run:
-            payload = live.dry_run()
-            context.emit("dry-run", payload, lambda: show_plan(payload))
-            return
+            return live.dry_run()
         live.require_writable()
         moves = live.check_limits()
         agree_to_procedure(
@@ -186,4 +212,4 @@ def _calibrate(frame: CalibrationRequest, source: Callable[[Controller], TipSour
         payload = live.run()
         # Now, because Ctrl-C may come before the logout is answered.
         live.show_end()
-    context.emit("calibration", {**payload, "report": draft.saved}, lambda: None)
+    return {**payload, "report": draft.saved}

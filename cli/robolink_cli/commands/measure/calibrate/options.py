@@ -17,6 +17,7 @@ from robolink_cli.prompts.jumps import USUAL_CHANGE_MM
 from robolink_cli.session.completing import complete_tool
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.operator_identity import nozzle_options
+from robolink_cli.session.ordering import order_option
 
 _CELL_KEYS: Final = {
     "lift_mm": "lift_mm",
@@ -50,7 +51,7 @@ def calibration_options(function: Callable[..., None]) -> Callable[..., int | No
 
     command: Callable[..., Any] = framed
     command = plain_option(yes_option(dry_run_option(controller_options(command))))
-    command = impact_options(report_options(nozzle_options(command)))
+    command = impact_options(report_options(nozzle_options(order_option(command))))
     for option in reversed(_own_options()):
         command = option(command)
     return command
@@ -87,6 +88,7 @@ _FRAME: Final = (
     "force",
     "nozzle",
     "lot",
+    "order",
     "dry_run",
     "yes",
 )

@@ -10,6 +10,7 @@ from robolink_cli.options.impact import ImpactRequest, impact_request
 from robolink_cli.options.report import ReportRequest, report_request
 from robolink_cli.prompts.jumps import jump_limit_mm
 from robolink_cli.session.context import CliContext
+from robolink_cli.session.ordering import require_no_dry_run
 
 if TYPE_CHECKING:
     from robolink.methods import LengthRule
@@ -38,6 +39,7 @@ class CalibrationRequest:
         length: What is done where the touches show that the tip is longer or shorter.
         method: Name of the method.
         station: Name of the station on whose record the measurement rests; empty for none.
+        order: Id of the line computer's order; ``None`` without one.
     """
 
     context: CliContext
@@ -55,6 +57,7 @@ class CalibrationRequest:
     length: "LengthRule" = "ask"
     method: str = ""
     station: str = ""
+    order: str | None = None
 
     def at(self, station: str) -> "CalibrationRequest":
         """Return the same at a station of that name, which goes on record."""
@@ -129,6 +132,7 @@ def request_from(
     force: bool,
     nozzle: str | None,
     lot: str | None,
+    order: str | None,
     dry_run: bool,
     yes: bool,
 ) -> CalibrationRequest:
@@ -143,6 +147,7 @@ def request_from(
     from robolink.nozzle_change import AcceptanceCriteria, Limits, usual_box
 
     _require_tool(tool)
+    require_no_dry_run(order, dry_run=dry_run)
     criteria = AcceptanceCriteria(
         max_change_mm=min(max_change_mm, jump_limit_mm(context.cell)),
         accepted_change_mm=max_change_mm,
@@ -164,6 +169,7 @@ def request_from(
         report=report_request(report_path, force=force),
         dry_run=dry_run,
         yes=yes,
+        order=order,
     )
 
 

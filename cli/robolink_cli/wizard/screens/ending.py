@@ -15,7 +15,12 @@ def done_lines(state: WizardState, report: ChangeReport) -> list[str]:
     lines = [head, *(line for one in report.tools for line in _tool_lines(one))]
     lines.append(tr("Record: change {id} in the journal", id=report.change[:8]))
     if any(one.receipt is not None for one in report.tools):
-        lines.append(tr("To take it back: robolink undo {id}", id=report.change[:8]))
+        back = tr(
+            'To take it back: robolink -c "{cell}" undo {id}',
+            cell=state.header.cell,
+            id=report.change[:8],
+        )
+        lines.append(back)
         lines.append(tr("Run the first part slowly and look at it."))
     return lines
 

@@ -81,7 +81,7 @@ def test_what_a_command_says_comes_from_the_catalogue(marked, arguments, capfd):
     assert unmarked(said.out + said.err) == []
 
 
-@pytest.fixture
+@pytest.fixture(scope="module", autouse=True)
 def other_help_options():
     """A process speaks one language, so click keeps the option ``--help`` of each command."""
     forget_help_options()
@@ -95,7 +95,6 @@ def forget_help_options():
             command._help_option = None
 
 
-@pytest.mark.usefixtures("other_help_options")
 def test_help_pages_come_from_the_catalogue_and_keep_to_their_width(marked, capfd):
     for words in (["--help"], ["tool", "set", "--help"], ["calibrate", "n-angle", "--help"]):
         assert main.run(words) == 0

@@ -4,6 +4,7 @@ In each sentence 【 and 】 stand about the text, which is two fifths longer: a
 catalogue knows shows, and so does what the journal keeps.
 """
 
+import gc
 import io
 import json
 import re
@@ -78,6 +79,20 @@ def test_what_a_command_says_comes_from_the_catalogue(marked, arguments, capfd):
     said = capfd.readouterr()
     assert re.search("[\u3010\u4e00-\u9fff]", said.out + said.err)  # some come from click
     assert unmarked(said.out + said.err) == []
+
+
+@pytest.fixture(scope="module", autouse=True)
+def other_help_options():
+    """A process speaks one language, so click keeps the option ``--help`` of each command."""
+    forget_help_options()
+    yield
+    forget_help_options()
+
+
+def forget_help_options():
+    for command in gc.get_objects():
+        if isinstance(command, click.Command):
+            command._help_option = None
 
 
 def test_help_pages_come_from_the_catalogue_and_keep_to_their_width(marked, capfd):

@@ -358,3 +358,22 @@ def off_circle_mm(place, *three):
     centre = np.linalg.solve(rows, heights)
     aside = (at - a) @ normal / np.linalg.norm(normal)
     return math.hypot(np.linalg.norm(at - centre) - np.linalg.norm(a - centre), aside)
+
+
+def test_ljm_counts_from_another_point_than_where_the_arm_is(robot):
+    run = robot("C8-C901S")
+    run("Tool 0; P2 = JA(0, -35, 5, 0, -60, -150); Go JA(0, -35, 5, 0, -60, 150)")
+    run("P1 = Here +TLU(40)")
+    turns = {}
+    for flags in ("P1", "P1, Here", "P1, P2", "P1, P2, 4"):
+        turns[flags] = float(run(f"Print PAgl(LJM({flags}), 6)"))
+    here = turns["P1"]
+    assert abs(here - 150) == pytest.approx(40, abs=1e-3)
+    assert turns["P1, Here"] == here
+    # The same place, one turn of joint 6 nearer to the reference.
+    other = turns["P1, P2"]
+    assert abs(other - here) == pytest.approx(360, abs=1e-3)
+    assert abs(other + 150) < 180
+    # Joint 6 first, with the other wrist.
+    assert abs(turns["P1, P2, 4"] + 150) == pytest.approx(80, abs=1e-3)
+    assert run("Print PAgl(LJM(P1, XY(5000, 0, 0, 0, 0, 180)), 6)") == "!Execute,99"

@@ -113,3 +113,77 @@ def test_a_program_that_cannot_be_built_leaves_the_controller_as_it_was(loaded, 
     client.ask("$Start,0")
     client.wait(0.1)
     assert list(client.simulator.program.console) == ["first\r\n"]
+
+
+PAST = "Function main\nMotor On\nQP {}\nMove Here -X(40)\nOn 5\nMove Here +X(40)\nFend\n"
+
+
+@pytest.mark.parametrize("quick", [True, False])
+def test_qp_says_whether_a_pause_lets_the_movement_end(loaded, quick):
+    client = loaded(PAST.format("On" if quick else "Off"))
+    machine = client.simulator.machine
+    x_mm = machine.tip().x_mm
+    client.ask("$Start,0")
+    client.wait(0.3)
+    assert machine.arm.moving
+    client.ask("$Pause")
+    client.wait(0.01)
+    assert client.flags() == PAUSED
+    assert machine.arm.moving is not quick
+    client.wait(5)
+    way_mm = x_mm - machine.tip().x_mm
+    assert way_mm < 39 if quick else way_mm == pytest.approx(40)
+    assert not machine.outputs.get(5)
+    assert (client.flags(), machine.arm.moves_started) == (PAUSED, 1)
+    client.ask("$Continue")
+    client.wait(10)
+    assert machine.outputs.get(5)
+    assert machine.tip().x_mm == pytest.approx(x_mm)
+    assert client.flags() == READY
+
+
+def test_with_qp_off_what_belongs_to_the_movement_ends_with_it(loaded):
+    client = loaded(
+        "Function main\nMotor On\nQP Off\nMove Here -X(40) Till Sw(3) = On\nOn 5\nFend\n"
+    )
+    machine = client.simulator.machine
+    x_mm = machine.tip().x_mm
+    client.ask("$Start,0")
+    client.wait(0.3)
+    client.ask("$Pause")
+    client.wait(0.05)
+    client.simulator.panel.switch_input(3, True)
+    client.wait(5)
+    assert not machine.arm.moving
+    assert 1 < x_mm - machine.tip().x_mm < 39
+    assert machine.till_met
+    assert not machine.outputs.get(5)
+
+
+def test_with_qp_off_continue_before_the_end_changes_nothing(loaded):
+    client = loaded(PAST.format("Off"))
+    machine = client.simulator.machine
+    client.ask("$Start,0")
+    client.wait(0.3)
+    client.ask("$Pause")
+    client.wait(0.05)
+    end_ns = machine.arm.next_change()
+    client.ask("$Continue")
+    client.wait(0.05)
+    assert (machine.arm.next_change(), machine.arm.moves_started) == (end_ns, 1)
+    client.wait(10)
+    assert machine.outputs.get(5)
+    assert machine.arm.moves_started == 2
+
+
+def test_with_qp_off_an_open_door_stops_it_at_once(loaded):
+    client = loaded(PAST.format("Off"))
+    client.ask("$Start,0")
+    client.wait(0.3)
+    client.simulator.panel.open_guard()
+    client.wait(0.01)
+    assert not client.simulator.machine.arm.moving
+    stood = client.simulator.machine.arm.joints
+    client.wait(5)
+    assert client.simulator.machine.arm.joints == stood
+    assert not client.simulator.machine.outputs.get(5)

@@ -14,6 +14,7 @@ anything moves (assumed).
 import math
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Protocol
 
 from robolink.model import Pose, ToolOffset
 from robolink.timing import NS_PER_S
@@ -49,6 +50,27 @@ _USUAL = SingularSurroundings()
 _CHECK_EVERY_MM = 2.0
 _CHECK_EVERY_DEG = 2.0
 _MOST_CHECKS = 2000
+
+
+class TiltedCourse(Protocol):
+    """Where the flange goes, by the share of its way.
+
+    Attributes:
+        model: The robot.
+        first: Where its tip begins.
+        angle_deg: How far the tool turns altogether.
+    """
+
+    @property
+    def model(self) -> RobotModel: ...  # noqa: D102
+    @property
+    def first(self) -> Pose: ...  # noqa: D102
+    @property
+    def angle_deg(self) -> float: ...  # noqa: D102
+
+    def flange(self, share: float) -> Frame:
+        """Return the frame of the flange after a share of the way."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +125,7 @@ class TiltedLeg:
         detours: Numbers of the knots between which it goes from joint to joint instead.
     """
 
-    course: _Course | _HeldCourse
+    course: TiltedCourse
     knots: tuple[Joints, ...]
     ramp: TimeLaw | None
     detours: tuple[tuple[int, int], ...] = ()
@@ -174,9 +196,9 @@ def plan_line(
         return plan_move(model, ends, pace, offset=offset, near=near)
     start, end = (pose.coordinates()[:3] for pose in ends)
     way, length_mm = _straight(start, end)
-    _require_same_posture(model, near, ends[1])
+    require_same_posture(model, near, ends[1])
     course = _course(model, way, ends, offset)
-    return _leg(course, length_mm, pace, near=near, avoiding=avoiding)
+    return plan_course(course, length_mm, pace, near=near, avoiding=avoiding)
 
 
 def plan_about_point(
@@ -205,14 +227,14 @@ def plan_about_point(
     Raises:
         Refusal: As :func:`plan_line`.
     """
-    _require_same_posture(model, near, ends[1])
+    require_same_posture(model, near, ends[1])
     start, end = (frame_of(pose).inverse() @ point for pose in ends)
     course, length_mm = way or _straight(start.shift_mm, end.shift_mm)
     # The workpiece turns, so the point turns against it.
     axis, angle_deg = _turn(model, ends[::-1], product(end.rotation, transposed(start.rotation)))
-    to_flange = _carried_by(model, offset).inverse()
+    to_flange = carried_by(model, offset).inverse()
     held = _HeldCourse(model, point, ends[0], course, start.rotation, axis, angle_deg, to_flange)
-    return _leg(held, length_mm, pace, near=near, avoiding=avoiding)
+    return plan_course(held, length_mm, pace, near=near, avoiding=avoiding)
 
 
 def _straight(start: Vector, end: Vector) -> MeasuredWay:
@@ -231,7 +253,7 @@ def _turn(model: RobotModel, ends: tuple[Pose, ...], turn: Matrix) -> tuple[Vect
     return (0.0, 0.0, math.copysign(1.0, by_deg)), abs(by_deg)
 
 
-def _carried_by(model: RobotModel, offset: ToolOffset | None) -> Frame:
+def carried_by(model: RobotModel, offset: ToolOffset | None) -> Frame:
     """Return the frame of a tool on the flange; a SCARA takes up no V and W."""
     if offset is None or model.six_axes:
         return tool_frame(offset)
@@ -259,12 +281,19 @@ def plan_way(
     """
     if not model.six_axes:
         return plan_level_way(model, ends, way, pace, offset=offset, near=near)
-    _require_same_posture(model, near, ends[1])
+    require_same_posture(model, near, ends[1])
     course, length_mm = way
-    return _leg(_course(model, course, ends, offset), length_mm, pace, near=near, avoiding=avoiding)
+    return plan_course(
+        _course(model, course, ends, offset), length_mm, pace, near=near, avoiding=avoiding
+    )
 
 
-def _require_same_posture(model: RobotModel, near: Joints, end: Pose) -> None:
+def require_same_posture(model: RobotModel, near: Joints, end: Pose) -> None:
+    """Refuse a place on the way for which hand, elbow or wrist would have to change.
+
+    Raises:
+        Refusal: It has others than the arm.
+    """
     now, wanted = posture_of(model, near), end.posture
     changed = end.hand is not None and end.hand is not hand_of(model, near)
     if now is not None and wanted is not None:
@@ -283,15 +312,21 @@ def _course(
     return _Course(model, way, ends[0], start, axis, angle_deg, tool_frame(offset).inverse())
 
 
-def _leg(
-    course: _Course | _HeldCourse,
+def plan_course(
+    course: TiltedCourse,
     length_mm: float,
     pace: LinePace,
     *,
     near: Joints,
     avoiding: SingularSurroundings | None,
 ) -> TiltedLeg:
-    """Look at the whole way before anything moves, as for a SCARA (assumed)."""
+    """Plan a leg along a course of a length; the other arguments are those of :func:`plan_line`.
+
+    The whole way is looked at before anything moves, as for a SCARA (assumed).
+
+    Raises:
+        Refusal: It leaves the envelope, or a joint would be too fast.
+    """
     model, angle_deg = course.model, course.angle_deg
     steps = math.ceil(min(length_mm / _CHECK_EVERY_MM + angle_deg / _CHECK_EVERY_DEG, _MOST_CHECKS))
     knots = [near]

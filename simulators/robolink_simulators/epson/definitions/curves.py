@@ -5,11 +5,14 @@ from typing import Final, NamedTuple
 
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
-Place = tuple[float, float, float, float]
-"""X, Y, Z in mm, U in degrees, in the robot's coordinates."""
+Place = tuple[float, ...]
+"""X, Y, Z in mm, U in degrees, on six axes V and W too, in the robot's coordinates."""
 
 AXES_OF_CURVES: Final = (2, 3, 4)
-"""How many of X, Y, Z, U a curve rules; the others stay (assumed)."""
+"""How many of X, Y, Z, U a curve of four axes rules; the others stay (assumed)."""
+
+SIX_AXES: Final = 6
+"""How many a curve of a robot of six axes rules."""
 
 TANGENTIAL: Final = 2
 """The mode of a curve that turns U with its direction in the plane (documented)."""
@@ -26,13 +29,15 @@ class CurveSwitch(NamedTuple):
 class FreeCurve(NamedTuple):
     """What one Curve stored; ``places`` of a closed one end where they begin.
 
-    ``tangential``: U follows the direction of the way instead of the points.
+    ``tangential``: U follows the direction of the way instead of the points. ``control_point``: the
+    number of the external control point that the workpiece is led past, 0 for none.
     """
 
     axes: int
     places: tuple[Place, ...]
     switches: tuple[CurveSwitch, ...] = ()
     tangential: bool = False
+    control_point: int = 0
 
 
 class CurveFiles:
@@ -82,7 +87,11 @@ def _restored(
     places: list[list[float]],
     switches: list[list[object]],
     tangential: object = False,  # a file of before there were any has none
+    control_point: int = 0,
 ) -> FreeCurve:
-    read = tuple((float(x), float(y), float(z), float(u)) for x, y, z, u in places)
+    read = tuple(tuple(map(float, place)) for place in places)
+    if len({len(place) for place in read} - {4, 6}) or len({len(place) for place in read}) > 1:
+        raise ValueError("places of a curve have four numbers, or six")
     bits = tuple(CurveSwitch(int(str(at)), str(word), int(str(n))) for at, word, n in switches)
-    return FreeCurve(int(axes), read, bits, tangential=bool(tangential))
+    number = int(control_point)
+    return FreeCurve(int(axes), read, bits, tangential=bool(tangential), control_point=number)

@@ -114,13 +114,17 @@ class StatementExecution:
         """Note that nothing that it waits for came before an instant."""
         self._seen_ns = max(self._seen_ns, now_ns)
 
+    @property
+    def travels(self) -> bool:
+        """Whether its motion is under way."""
+        return self._aim is not None and self._evaluator.session.machine.arm.moving
+
     def suspend(self, now_ns: int) -> None:
         """Stop the motion where it is; nothing is done until :meth:`go_on`."""
-        arm = self._evaluator.session.machine.arm
-        if self._aim is not None and not arm.moving:
+        if self.travels:
+            self._evaluator.session.machine.arm.halt(now_ns)
+        else:
             self._aim = None
-        elif self._aim is not None:
-            arm.halt(now_ns)
 
     def go_on(self, now_ns: int) -> None:
         """Go on after :meth:`suspend`; a timed wait begins anew (docs/reference/spel.md 4.6).
@@ -162,8 +166,7 @@ class StatementExecution:
             rest_ns = watch.meet(change_ns)
             self._busy_until_ns = self._busy_until_ns if rest_ns is None else rest_ns
         elif self._meanwhile is not None:
-            # What stands inside !...! outlasts the motion; the next statement waits for it
-            # (docs/reference/spel.md 7.1).
+            # The next statement waits for what stands inside !...! (docs/reference/spel.md 7.1).
             self._busy_until_ns = self._meanwhile.due_ns(self._seen_ns)
         elif self._pending:
             self._aim = None
@@ -204,9 +207,7 @@ class StatementExecution:
 
     @property
     def _change_ns(self) -> int:
-        """When the condition that is waited for, or that a motion watches, is met, or the
-        statement ends.
-        """  # noqa: D205 - one sentence over two lines
+        """When something is due: an end of waiting, an edge, the end of the statement."""
         if self._waiting is not None:
             return self._waiting.next_look(self._seen_ns)
         change_ns = self._busy_until_ns
@@ -351,9 +352,8 @@ class StatementExecution:
 
     def _print_to(self, statement: PrintTo) -> StatementOutcome:
         """Print to a port: only those that a program has opened are there."""
-        evaluator = self._evaluator
+        evaluator, session = self._evaluator, self._evaluator.session
         channel = evaluator.integer(statement.channel)
-        session = evaluator.session
         values = [evaluator.shown(item) for item in statement.items]
         text = joined(values, session.options, session.machine.model, longest=LONGEST_PRINT_TO)
         evaluator.write_to(channel, text, ends=statement.newline)

@@ -1,4 +1,4 @@
-"""A smooth way of a SCARA's tip through many places (docs/reference/spel.md 7.1).
+"""A smooth way through many places, and a SCARA's tip on it (docs/reference/spel.md 7.1).
 
 How the curve runs between its points is not described. Assumed: a cubic from point to point over
 the length of the chords, whose direction at a point is that of the parabola through the point and
@@ -13,16 +13,20 @@ from itertools import accumulate, pairwise
 from typing import Final
 
 from robolink.model import Pose, ToolOffset
+from robolink.timing import NS_PER_S
+from robolink_simulators.cell.frames import Vector
 from robolink_simulators.epson.arm.arc import WayLeg, plan_level_way
 from robolink_simulators.epson.arm.joints import Joints, check_depth, check_ranges, nearest_turn
 from robolink_simulators.epson.arm.kinematics import flange_of
 from robolink_simulators.epson.arm.robots import RobotModel
+from robolink_simulators.epson.arm.tilted_legs import TiltedLeg
 from robolink_simulators.epson.arm.trajectory import LinePace
 from robolink_simulators.epson.definitions.curves import Place
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
 _STEPS_A_SPAN: Final = 20
 _SAME: Final = 1e-9
+_WITH_QUATERNION: Final = 7
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,11 +47,8 @@ class SmoothWay:
         index = min(max(bisect_right(self.shares, share), 1), len(self.shares) - 1)
         low, high = self.shares[index - 1], self.shares[index]
         part = min(max((share - low) / (high - low), 0.0), 1.0)
-        x, y, z, u = (
-            a + (b - a) * part
-            for a, b in zip(self.places[index - 1], self.places[index], strict=True)
-        )
-        return (x, y, z, u)
+        ends = zip(self.places[index - 1], self.places[index], strict=True)
+        return tuple(a + (b - a) * part for a, b in ends)
 
     def along_itself(self) -> "SmoothWay":
         """Return the same way with U turning as its direction in the plane does.
@@ -72,7 +73,7 @@ class SmoothWay:
 
 
 def through(places: Sequence[Place], *, closed: bool) -> SmoothWay:
-    """Return the curve through places.
+    """Return the curve through places, of three coordinates in mm and whatever turns with them.
 
     Raises:
         Refusal: Two neighbours are one place.
@@ -80,7 +81,7 @@ def through(places: Sequence[Place], *, closed: bool) -> SmoothWay:
     chords = [math.dist(a[:3], b[:3]) for a, b in pairwise(places)]
     if min(chords) < _SAME:
         raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, "Two neighbours of a curve are one place")
-    slopes = _slopes(places, chords, closed=closed)
+    slopes = _slopes(places, closed=closed)
     fine = [places[0]]
     for index, chord in enumerate(chords):
         for step in range(1, _STEPS_A_SPAN + 1):
@@ -90,26 +91,37 @@ def through(places: Sequence[Place], *, closed: bool) -> SmoothWay:
     return SmoothWay(shares, tuple(fine), lengths[-1])
 
 
-def _slopes(places: Sequence[Place], chords: Sequence[float], *, closed: bool) -> list[Place]:
+def same_sign(turn: Place, like: Place) -> Place:
+    """Return a place with the quaternion that is nearer to another's; both signs are one turn.
+
+    Places without a quaternion stay.
+    """
+    if len(turn) != _WITH_QUATERNION:
+        return turn
+    if sum(a * b for a, b in zip(turn[3:], like[3:], strict=True)) >= 0:
+        return turn
+    return (*turn[:3], *(-value for value in turn[3:]))
+
+
+def _slopes(places: Sequence[Place], *, closed: bool) -> list[Place]:
+    line = list(places)
+    if closed:
+        before, after = same_sign(places[-2], places[0]), same_sign(places[1], places[-1])
+        line = [before, *places, after]
+    chords = [math.dist(a[:3], b[:3]) for a, b in pairwise(line)]
     rises = [
         tuple((b - a) / chord for a, b in zip(p, q, strict=True))
-        for (p, q), chord in zip(pairwise(places), chords, strict=True)
+        for (p, q), chord in zip(pairwise(line), chords, strict=True)
     ]
-    last = len(places) - 1
     slopes = list[Place]()
-    for index in range(len(places)):
-        before, after = index - 1, index
-        if index in (0, last):
-            if not closed:
-                # The end of a parabola through the last two points alone is their chord.
-                before = after = min(index, last - 1)
-            else:
-                before, after = last - 1, 0
-        weight = chords[after] / (chords[before] + chords[after])
-        pairs = zip(rises[before], rises[after], strict=True)
-        x, y, z, u = (a * weight + b * (1 - weight) for a, b in pairs)
-        slopes.append((x, y, z, u))
-    return slopes
+    for (first, second), (before_mm, after_mm) in zip(
+        pairwise(rises), pairwise(chords), strict=True
+    ):
+        weight = after_mm / (before_mm + after_mm)
+        pairs = zip(first, second, strict=True)
+        slopes.append(tuple(a * weight + b * (1 - weight) for a, b in pairs))
+    # The end of a parabola through the last two points alone is their chord.
+    return slopes if closed else [rises[0], *slopes, rises[-1]]
 
 
 def _between(
@@ -117,13 +129,12 @@ def _between(
 ) -> Place:
     """Return the cubic of a span whose ends and slopes are given, after a part of its chord."""
     quads = zip(places[index], places[index + 1], slopes[index], slopes[index + 1], strict=True)
-    x, y, z, u = (
+    return tuple(
         (1 + 2 * t) * (1 - t) ** 2 * a
         + t * t * (3 - 2 * t) * b
         + t * (1 - t) * chord * ((1 - t) * m - t * n)
         for a, b, m, n in quads
     )
-    return (x, y, z, u)
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,16 +147,17 @@ class CurveLeg(WayLeg):
         tip = Pose(*self.way(share), self.turn(share))
         return flange_of(self.model, self.end if share >= 1 else tip, self.offset)
 
-    def when(self, share: float) -> int:
-        """Return how many ns after the start a share of the way is behind."""
-        low_ns, high_ns = 0, self.duration_ns
-        while high_ns - low_ns > 1:
-            middle_ns = (low_ns + high_ns) // 2
-            if self._share_at(middle_ns) < share:
-                low_ns = middle_ns
-            else:
-                high_ns = middle_ns
-        return high_ns if share > 0 else 0
+
+def when(leg: WayLeg | TiltedLeg, share: float) -> int:
+    """Return how many ns after the start of a leg a share of its way is behind."""
+    low_ns, high_ns = 0, leg.duration_ns
+    while leg.ramp is not None and high_ns - low_ns > 1:
+        middle_ns = (low_ns + high_ns) // 2
+        if leg.ramp.share_at(middle_ns / NS_PER_S) < share:
+            low_ns = middle_ns
+        else:
+            high_ns = middle_ns
+    return high_ns if share > 0 else 0
 
 
 def plan_curve(
@@ -165,8 +177,9 @@ def plan_curve(
     x, y, z, u = curve.places[-1]
     end = replace(start, x_mm=x, y_mm=y, z_mm=z, u_deg=u)
 
-    def way(share: float) -> tuple[float, float, float]:
-        return curve.at(share)[:3]
+    def way(share: float) -> Vector:
+        x, y, z, *_ = curve.at(share)
+        return (x, y, z)
 
     ends, measured = (start, end), (way, curve.length_mm)
     plain = plan_level_way(model, ends, measured, pace, offset=offset, near=near)

@@ -10,7 +10,13 @@ from typing import Any, Final
 
 from robolink.model import Elbow, Hand, Posture, Wrist
 from robolink_simulators.epson.arm.joints import Joints, check_ranges
-from robolink_simulators.epson.arm.kinematics import PLAIN, flange_of, frame_of
+from robolink_simulators.epson.arm.kinematics import (
+    PLAIN,
+    flange_of,
+    frame_of,
+    hand_of,
+    posture_of,
+)
 from robolink_simulators.epson.arm.robots import Mechanism, RobotModel
 from robolink_simulators.epson.arm.six_axes import solve_near, wrist_of
 from robolink_simulators.epson.machine import Machine
@@ -120,10 +126,13 @@ def _item(values: Sequence[int | float], number: Value) -> Value:
     return values[joint - 1]
 
 
-def least_motion(machine: Machine, target: Point, flag: int = 1) -> Joints:
+def least_motion(
+    machine: Machine, target: Point, flag: int = 1, near: Joints | None = None
+) -> Joints:
     """Return the joints of a target with the wrist and the turns that move the least (LJM).
 
-    Hand and elbow stay those of the target. Flag 1 looks at joint 4 first, 3 at joint 5, 4 at joint
+    ``near`` are the joints that it is counted from, those of the arm for ``None``. Hand and elbow
+    stay those of the target. Flag 1 looks at joint 4 first, 3 at joint 5, 4 at joint
     6, all three with either wrist; 2 keeps the wrist (documented, docs/reference/epson-robots.md,
     "Flags").
 
@@ -132,9 +141,9 @@ def least_motion(machine: Machine, target: Point, flag: int = 1) -> Joints:
     """
     if not 1 <= flag <= _HIGHEST_LJM:
         raise out_of_range(f"LJM flag {flag}")
-    model, near = machine.model, machine.arm.joints
+    model, near = machine.model, machine.arm.joints if near is None else near
     flange = flange_of(model, machine.pose_of(target), machine.offset)
-    start = _standing(machine, target)
+    start = _standing(machine, target, near)
     other_wrist = (target.posture or PLAIN).wrist is not wrist_of(start)
     found, failure = list[Joints](), OutOfReach("No turn of the wrist reaches that point")
     for flip in (other_wrist,) if flag == 2 else (False, True):
@@ -151,11 +160,10 @@ def least_motion(machine: Machine, target: Point, flag: int = 1) -> Joints:
     return min(found, key=lambda joints: [abs(joints[i] - near[i]) for i in order])
 
 
-def _standing(machine: Machine, target: Point) -> Joints:
-    """Return joints near the present ones, with the hand, elbow and wrist of the target."""
-    near = machine.arm.joints
-    posture = target.posture or PLAIN
-    same = (target.hand, posture.elbow) == (machine.arm.hand, machine.arm.posture.elbow)  # type: ignore[union-attr]
+def _standing(machine: Machine, target: Point, near: Joints) -> Joints:
+    """Return joints near those given, with the hand, elbow and wrist of the target."""
+    posture, there = target.posture or PLAIN, posture_of(machine.model, near) or PLAIN
+    same = (target.hand, posture.elbow) == (hand_of(machine.model, near), there.elbow)
     return near if same else machine.solved(target)
 
 
@@ -177,16 +185,20 @@ def _inside(model: RobotModel, joints: Joints) -> list[Joints]:
 def with_least_motion(session: Session, arguments: Arguments) -> Point:
     """LJM(point[, reference[, flag]]): the point with the flags that move the least.
 
-    The reference is where the arm is; another is not simulated. A SCARA's point stays as it is
-    (documented).
+    The reference is where the arm is unless another point is given; a SCARA's point stays as it is
+    (both documented, docs/reference/spel.md 5.3).
+
+    Raises:
+        Refusal: The arm cannot take the reference up, or as :func:`least_motion`.
     """
     machine, target = session.machine, as_point(arguments[0])
     if not machine.model.six_axes:
         return target
+    near = None
     if len(arguments) > 1 and as_point(arguments[1]) != Point.at(machine.tip()):
-        raise SpelRefusal(RefusalKind.NOT_SIMULATED, "LJM counts from where the arm is here")
+        near = machine.joints_for(as_point(arguments[1]))
     flag = as_integer(arguments[2]) if len(arguments) > 2 else 1
-    return machine.flagged(target, least_motion(machine, target, flag))
+    return machine.flagged(target, least_motion(machine, target, flag, near))
 
 
 def _hand(session: Session, arguments: Arguments) -> Value:

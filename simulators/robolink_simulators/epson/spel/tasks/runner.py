@@ -183,7 +183,7 @@ class ProgramRunner:
         """Return the task that is due first, when, and when the next one after it is."""
         first, first_ns, second_ns = None, NEVER_NS, NEVER_NS
         for task in self.tasks.values():
-            if task.halted or (self._paused and task.kind is TaskKind.NORMAL):
+            if task.halted or (self._paused and task.held_by_pause):
                 continue
             waiting = task.waiting
             due_ns = task.now_ns
@@ -360,9 +360,8 @@ class ProgramRunner:
     def _pause(self, now_ns: int) -> None:
         self._paused = True
         for task in self._pausing():
-            if task.waiting is not None:
-                with self.robot_of(task):
-                    task.waiting.suspend(now_ns)
+            with self.robot_of(task):
+                task.pause(now_ns)
         self.traps.happen("sgopen" if self._condition.guard_open else "pause", now_ns)
 
     def _pausing(self) -> list[SpelTask]:

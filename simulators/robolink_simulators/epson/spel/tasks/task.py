@@ -9,7 +9,12 @@ from robolink_simulators.epson.spel.expressions.data_types import Variable
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.session import Session, WindowMemory
 from robolink_simulators.epson.spel.tasks.compiled import CompiledFunction, JumpTarget, Operation
-from robolink_simulators.epson.spel.tasks.waits import Blocking, TaskWaiting
+from robolink_simulators.epson.spel.tasks.waits import (
+    Blocking,
+    OneAfterAnother,
+    StatementWaiting,
+    TaskWaiting,
+)
 
 DEEPEST_CALL: Final = 200
 """Functions, or subroutines of one, that may call each other (no limit is mentioned; assumed)."""
@@ -135,6 +140,31 @@ class SpelTask(Evaluator):
     def frame(self) -> CallFrame:
         """The function that runs."""
         return self.frames[-1]
+
+    @property
+    def held_by_pause(self) -> bool:
+        """Whether nothing of it goes on in a pause; QP Off lets a motion under way end."""
+        ends = isinstance(self.waiting, StatementWaiting) and self.waiting.finishing
+        return self.kind is TaskKind.NORMAL and not ends
+
+    def pause(self, now_ns: int) -> None:
+        """Hold what it waits for: a motion stops at once, with QP Off it ends first.
+
+        Source: docs/reference/spel.md 7.2.
+        """
+        if self.waiting is None:
+            return
+        waiting = self.waiting
+        if isinstance(waiting, OneAfterAnother):
+            waiting = waiting.present
+        if (
+            isinstance(waiting, StatementWaiting)
+            and waiting.execution.travels
+            and not self.session.machine.robot.drives.is_on("qp")
+        ):
+            waiting.finishing = True
+        else:
+            waiting.suspend(now_ns)
 
     @property
     def present_ns(self) -> int:

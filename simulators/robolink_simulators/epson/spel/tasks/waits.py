@@ -38,10 +38,17 @@ class TaskWaiting(Protocol):
 
 
 class StatementWaiting:
-    """A statement of the machine that takes time."""
+    """A statement of the machine that takes time.
+
+    Attributes:
+        execution: The statement under way.
+        finishing: Whether its motion goes on to its end although the task is paused: QP is off
+            (docs/reference/spel.md 7.2).
+    """
 
     def __init__(self, execution: StatementExecution) -> None:
         self.execution = execution
+        self.finishing = False
 
     def due_ns(self, seen_ns: int) -> int:
         """Return when something of it happens next."""
@@ -54,11 +61,14 @@ class StatementWaiting:
 
     def suspend(self, now_ns: int) -> None:
         """Stop its motion."""
+        self.finishing = False
         self.execution.suspend(now_ns)
 
     def go_on(self, now_ns: int) -> None:
         """Go on with its motion, or begin its time anew."""
-        self.execution.go_on(now_ns)
+        if not self.finishing:
+            self.execution.go_on(now_ns)
+        self.finishing = False
 
 
 class OneAfterAnother:
@@ -92,6 +102,11 @@ class OneAfterAnother:
     def go_on(self, now_ns: int) -> None:
         """Let the present one go on."""
         self._present.go_on(now_ns)
+
+    @property
+    def present(self) -> TaskWaiting:
+        """The one that is waited for now."""
+        return self._present
 
 
 class Blocking:

@@ -1,26 +1,35 @@
 """Curve and CVMove: a free curve is stored, and travelled (docs/reference/spel.md 7.1).
 
-``Curve "name", O | C, mode, axes, points``: open or closed; mode 2 keeps the tool along the curve.
-Modes with an external control point are refused.
+``Curve "name", O | C, mode, axes, points``: open or closed; mode 2 keeps the tool along the curve,
+the upper four bits of a mode name an external control point. Both at once, and mode 2 on six axes,
+are not described and refused.
 """
 
 import math
 from typing import Final
 
-from robolink_simulators.epson.arm.ways.curve import CurveLeg, plan_curve, through
+from robolink.model import Pose
+from robolink_simulators.cell.frames import Frame, axis_and_angle, product, transposed
+from robolink_simulators.epson.arm.kinematics import frame_of
+from robolink_simulators.epson.arm.tilted_legs import TiltedLeg, require_same_posture
+from robolink_simulators.epson.arm.trajectory import Leg
+from robolink_simulators.epson.arm.ways.curve import CurveLeg, SmoothWay, plan_curve, through, when
+from robolink_simulators.epson.arm.ways.turned_curve import plan_turned_curve, smooth_course_through
 from robolink_simulators.epson.definitions.curves import (
     AXES_OF_CURVES,
+    SIX_AXES,
     TANGENTIAL,
     CurveSwitch,
     FreeCurve,
     Place,
 )
 from robolink_simulators.epson.machine import Machine
-from robolink_simulators.epson.memory.points import Point
+from robolink_simulators.epson.memory.points import Point, frame_at
 from robolink_simulators.epson.refusals import OutOfReach, RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.defined.xy_limits import outside_limits_mm
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
-from robolink_simulators.epson.spel.expressions.values import as_text, out_of_range
+from robolink_simulators.epson.spel.expressions.values import Number, as_text, out_of_range
+from robolink_simulators.epson.spel.session import Session
 from robolink_simulators.epson.spel.statements.legs import line_pace
 from robolink_simulators.epson.spel.statements.through_points import worth_of
 from robolink_simulators.epson.spel.tree import (
@@ -37,6 +46,8 @@ from robolink_simulators.epson.spel.tree import (
 _KINDS: Final = {"o": False, "c": True}
 _FEWEST: Final = 3
 _MOST: Final = 1000
+_MODES: Final = 256
+_LOW_MODES: Final = 16
 _SAME: Final = 0.01
 """Assumed: how near the first point, in mm and degrees, the tip has to stand for CVMove."""
 
@@ -48,31 +59,80 @@ def store_curve(evaluator: Evaluator, motion: MotionStatement) -> None:
         Refusal: It is none, for other axes, or has too few or too many points.
     """
     machine = evaluator.session.machine
-    if machine.model.six_axes:
-        raise SpelRefusal(RefusalKind.NOT_SIMULATED, "Curve on six axes")
     if len(motion.targets) < 4 or motion.options.words or motion.options.meanwhile:
         raise SpelRefusal(RefusalKind.SYNTAX, "Curve takes a file, O or C, a mode, axes and points")
     name, kind, mode, axes, *rest = motion.targets
     closed = _is_closed(kind)
-    chosen = worth_of(evaluator, mode)
-    if chosen not in (0, TANGENTIAL):
-        raise SpelRefusal(RefusalKind.NOT_SIMULATED, "A curve of another mode than 0 and 2")
-    count = worth_of(evaluator, axes)
-    if count not in AXES_OF_CURVES:
-        raise out_of_range(f"A curve of {count} axes")
+    control_point, tangential = _mode(evaluator, mode)
+    count = _axes(machine, _whole(worth_of(evaluator, axes)))
     points, switches = _listed(evaluator, rest)
     if not _FEWEST <= len(points) <= _MOST:
         raise out_of_range(f"A curve of {len(points)} points")
     places = [_place(machine, point) for point in points]
     if closed:
         places.append(places[0])
-    through(places, closed=closed)
-    tangential = chosen == TANGENTIAL
-    curve = FreeCurve(int(count), tuple(places), switches, tangential=tangential)
+    curve = FreeCurve(count, tuple(places), switches, tangential, control_point)
+    _smooth_way(machine, curve)
     machine.kept.curves.store(_name(evaluator, name), curve)
 
 
-def curve_leg(evaluator: Evaluator, motion: MotionStatement) -> CurveLeg:
+def _mode(evaluator: Evaluator, target: Target) -> tuple[int, bool]:
+    """Return the external control point of a mode, 0 for none, and whether the tool follows."""
+    machine = evaluator.session.machine
+    chosen = _whole(worth_of(evaluator, target))
+    if not 0 <= chosen < _MODES:
+        raise out_of_range(f"A curve of mode {chosen}")
+    control_point, low = divmod(chosen, _LOW_MODES)
+    if low not in (0, TANGENTIAL):
+        raise SpelRefusal(RefusalKind.NOT_SIMULATED, "A curve of another mode than 0 and 2")
+    if low and (control_point or machine.model.six_axes):
+        raise SpelRefusal(
+            RefusalKind.NOT_SIMULATED,
+            "A tool that follows a curve on six axes, or past an external control point",
+        )
+    if control_point:
+        machine.control_points.get(control_point)
+    return control_point, bool(low)
+
+
+def _whole(worth: Point | Number) -> int:
+    if isinstance(worth, Point) or worth != int(worth):
+        raise out_of_range("A curve takes whole numbers")
+    return int(worth)
+
+
+def _axes(machine: Machine, count: int) -> int:
+    """Return how many axes a curve rules.
+
+    Raises:
+        Refusal: There is no such curve, or, on six axes, it rules fewer: what the others then do is
+            not described.
+    """
+    if machine.model.six_axes and count in AXES_OF_CURVES:
+        raise SpelRefusal(RefusalKind.NOT_SIMULATED, f"A curve of {count} axes on six")
+    usual = (SIX_AXES,) if machine.model.six_axes else AXES_OF_CURVES
+    if count not in usual:
+        raise out_of_range(f"A curve of {count} axes")
+    return count
+
+
+def _control_point(machine: Machine, curve: FreeCurve) -> Frame | None:
+    if not curve.control_point:
+        return None
+    return frame_at(machine.control_points.get(curve.control_point))
+
+
+def _smooth_way(machine: Machine, curve: FreeCurve) -> SmoothWay:
+    """Return the way of the tip, or of the control point over the workpiece."""
+    closed, point = curve.places[0] == curve.places[-1], _control_point(machine, curve)
+    if not machine.model.six_axes and point is None:
+        way = through(curve.places, closed=closed)
+        return way.along_itself() if curve.tangential else way
+    tips = [_pose(place) for place in curve.places]
+    return smooth_course_through(machine.model, tips, point=point, closed=closed)
+
+
+def curve_leg(evaluator: Evaluator, motion: MotionStatement) -> Leg:
     """Plan CVMove, and switch outputs on its way.
 
     Raises:
@@ -83,37 +143,66 @@ def curve_leg(evaluator: Evaluator, motion: MotionStatement) -> CurveLeg:
     machine = session.machine
     if len(motion.targets) != 1:
         raise SpelRefusal(RefusalKind.SYNTAX, "CVMove takes one file")
-    axes, stored, switches, tangential = machine.kept.curves.get(
-        _name(evaluator, motion.targets[0])
-    )
-    x, y, z, u, *_ = machine.tip().coordinates()
-    here: Place = (x, y, z, u)
-    closed = stored[0] == stored[-1]
-    places = [_ruled(place, here, axes) for place in stored]
-    if math.dist(places[0], here) > _SAME:
+    stored = machine.kept.curves.get(_name(evaluator, motion.targets[0]))
+    if (stored.axes == SIX_AXES) != machine.model.six_axes:
+        raise SpelRefusal(RefusalKind.OTHER_ROBOT, "The curve is one of another robot")
+    ruled = tuple(_ruled(place, machine.tip(), stored.axes) for place in stored.places)
+    if _is_off(machine.tip(), ruled[0]):
         raise SpelRefusal(RefusalKind.NOT_SIMULATED, "CVMove from elsewhere than its first point")
-    curve = through(places, closed=closed)
-    if tangential:
-        curve = curve.along_itself()
-    pace = line_pace(machine)
-    leg = plan_curve(
-        machine.model, machine.tip(), curve, pace, offset=machine.offset, near=machine.arm.joints
-    )
-    for point in range(len(places)):
-        if outside_limits_mm(session, leg.flange_at(leg.when(curve.share_of(point)))):
-            raise OutOfReach("A point of the curve lies outside the limits of XYLim")
+    curve = stored._replace(places=ruled)
+    way = _smooth_way(machine, curve)
+    leg = _leg(machine, curve, way)
+    _require_inside(session, leg, [when(leg, way.share_of(n)) for n in range(len(ruled))])
+    switches = stored.switches
     banks = [machine.memory if one.word.startswith("mem") else machine.outputs for one in switches]
     for switch, bank in zip(switches, banks, strict=True):
         bank.get(switch.number)
     for switch, bank in zip(switches, banks, strict=True):
-        at_ns = machine.arm.now_ns + leg.when(curve.share_of(switch.point))
+        at_ns = machine.arm.now_ns + when(leg, way.share_of(switch.point))
         machine.timed_bits.plan(at_ns, bank, switch.number, switch.word.endswith("on"))
     return leg
 
 
-def _ruled(place: Place, here: Place, axes: int) -> Place:
-    x, y, z, u = (*place[:axes], *here[axes:])
-    return (x, y, z, u)
+def _leg(machine: Machine, curve: FreeCurve, way: SmoothWay) -> CurveLeg | TiltedLeg:
+    pace, tip, near = line_pace(machine), machine.tip(), machine.arm.joints
+    point = _control_point(machine, curve)
+    if not machine.model.six_axes and point is None:
+        return plan_curve(machine.model, tip, way, pace, offset=machine.offset, near=near)
+    return plan_turned_curve(
+        machine.model,
+        tip,
+        way,
+        pace,
+        point=point,
+        offset=machine.offset,
+        near=near,
+        avoiding=machine.settings.avoided,
+    )
+
+
+def _require_inside(session: Session, leg: Leg, instants_ns: list[int]) -> None:
+    for instant_ns in instants_ns:
+        if outside_limits_mm(session, leg.flange_at(instant_ns)):
+            raise OutOfReach("A point of the curve lies outside the limits of XYLim")
+
+
+def _ruled(place: Place, tip: Pose, axes: int) -> Place:
+    return (*place[:axes], *tip.coordinates()[axes : len(place)])
+
+
+def _pose(place: Place) -> Pose:
+    x, y, z, u, *leaning = place
+    v, w = leaning or (0.0, 0.0)
+    return Pose(x, y, z, u, v, w)
+
+
+def _is_off(tip: Pose, place: Place) -> bool:
+    """Tell whether the tip stands elsewhere than at a place, or turned otherwise."""
+    here = tip.coordinates()
+    if len(place) < SIX_AXES:
+        return math.dist(place, here[: len(place)]) > _SAME
+    turn = product(frame_of(tip).rotation, transposed(frame_of(_pose(place)).rotation))
+    return max(math.dist(place[:3], here[:3]), axis_and_angle(turn)[1]) > _SAME
 
 
 def _is_closed(kind: Target) -> bool:
@@ -155,6 +244,5 @@ def _listed(
 
 def _place(machine: Machine, point: Point) -> Place:
     pose = machine.pose_of(point)
-    if pose.hand not in (None, machine.arm.hand):
-        raise SpelRefusal(RefusalKind.OUT_OF_REACH, "A curve cannot change the hand")
-    return (pose.x_mm, pose.y_mm, pose.z_mm, pose.u_deg)
+    require_same_posture(machine.model, machine.arm.joints, pose)
+    return pose.coordinates() if machine.model.six_axes else pose.coordinates()[:4]

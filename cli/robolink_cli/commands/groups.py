@@ -8,110 +8,105 @@ from typing import Final
 import click
 
 from robolink.messages import declared
+from robolink_cli.command_folders import COMPANIONS, COMPUTER, CONTROLLER, MEASURE, SHIPPED
 from robolink_cli.lazy_group import LazyGroup
 from robolink_cli.options.shared import shared_options
 
-_CONTROLLER: Final = "robolink_cli.commands.controller"
-_COMPUTER: Final = "robolink_cli.commands.computer"
-_COMPANIONS: Final = "robolink_cli.commands.companions"
-_MEASURE: Final = "robolink_cli.commands.measure"
-_SHIPPED: Final = "robolink_cli.commands.shipped"
-
 _ROBOT: Final = {
     "where": (
-        f"{_CONTROLLER}.operate:where",
+        f"{CONTROLLER}.operate:where",
         declared("Where the robot is, and with which tool."),
     ),
-    "jog": (f"{_CONTROLLER}.jog:jog", declared("Move a small step, in Power Low.")),
+    "jog": (f"{CONTROLLER}.jog:jog", declared("Move a small step, in Power Low.")),
     "motors": (
-        f"{_CONTROLLER}.operate:motors",
+        f"{CONTROLLER}.operate:motors",
         declared("Switch the motors, or the axis group of a PLC, on or off."),
     ),
-    "reset": (f"{_CONTROLLER}.operate:reset", declared("Clear an error of the controller.")),
+    "reset": (f"{CONTROLLER}.operate:reset", declared("Clear an error of the controller.")),
     "release": (
-        f"{_CONTROLLER}.operate:release",
+        f"{CONTROLLER}.operate:release",
         declared("Let the robot be moved again after a stop."),
     ),
-    "io": (f"{_CONTROLLER}.io:io", declared("Read inputs, switch outputs and memory bits.")),
-    "variable": (f"{_CONTROLLER}.var:var", declared("Read and set the project's variables.")),
+    "io": (f"{CONTROLLER}.io:io", declared("Read inputs, switch outputs and memory bits.")),
+    "variable": (f"{CONTROLLER}.var:var", declared("Read and set the project's variables.")),
     "take-ownership": (
-        f"{_CONTROLLER}.take_ownership:take_ownership",
+        f"{CONTROLLER}.take_ownership:take_ownership",
         declared("Take a PLC's mailbox from another client, because a person insists."),
     ),
 }
 
 _CELL: Final = {
-    "list": (f"{_COMPUTER}.config:list_cells", declared("The cells that have a name here.")),
-    "show": (f"{_COMPUTER}.config:show", declared("All that is in force for one cell.")),
+    "list": (f"{COMPUTER}.config:list_cells", declared("The cells that have a name here.")),
+    "show": (f"{COMPUTER}.config:show", declared("All that is in force for one cell.")),
     "check": (
-        f"{_COMPUTER}.cell_check:check",
+        f"{COMPUTER}.cell_check:check",
         declared(
             "Whether cells are in order and nothing is due; for a nightly job, moves nothing."
         ),
     ),
-    "files": (f"{_COMPUTER}.config:path", declared("Which cell files are looked at.")),
-    "validate": (f"{_COMPUTER}.config:check", declared("Whether the cell files are right.")),
+    "files": (f"{COMPUTER}.config:path", declared("Which cell files are looked at.")),
+    "validate": (f"{COMPUTER}.config:check", declared("Whether the cell files are right.")),
     "doctor": (
-        f"{_COMPUTER}.doctor:doctor",
+        f"{COMPUTER}.doctor:doctor",
         declared("What could get in the way on this computer."),
     ),
-    "scan": (f"{_COMPUTER}.scan:scan", declared("Try which of a few addresses answer.")),
-    "ports": (f"{_COMPUTER}.ports:ports", declared("List the serial ports.")),
-    "people": (f"{_COMPUTER}.config:people", declared("Who works at a cell, and in which role.")),
+    "scan": (f"{COMPUTER}.scan:scan", declared("Try which of a few addresses answer.")),
+    "ports": (f"{COMPUTER}.ports:ports", declared("List the serial ports.")),
+    "people": (f"{COMPUTER}.config:people", declared("Who works at a cell, and in which role.")),
     "station": (
-        f"{_MEASURE}.station:station",
+        f"{MEASURE}.station:station",
         declared("Pins, beams, surfaces and cameras of a cell: where they are, and how sure."),
     ),
 }
 
 _EXPERT: Final = {
     "serve": (
-        f"{_COMPANIONS}.serve:serve",
+        f"{COMPANIONS}.serve:serve",
         declared("Answer programs that calibrate a tool themselves."),
     ),
     "spel": (
-        f"{_COMPANIONS}.spel:spel",
+        f"{COMPANIONS}.spel:spel",
         declared("SPEL+ programs: check them, run them, write the companions."),
     ),
     "plc": (
-        f"{_COMPANIONS}.plc:plc",
+        f"{COMPANIONS}.plc:plc",
         declared("The register map and data types of a PLC's mailbox."),
     ),
     "verify-controller": (
-        f"{_CONTROLLER}.verify_controller:verify_controller",
+        f"{CONTROLLER}.verify_controller:verify_controller",
         declared("Find out, reading only, what this controller really does."),
     ),
     "check-contract": (
-        f"{_CONTROLLER}.check_contract:check_contract",
+        f"{CONTROLLER}.check_contract:check_contract",
         declared("Hold a controller, reading only, to what every kind promises."),
     ),
     "execute-raw": (
-        f"{_CONTROLLER}.operate:execute_raw",
+        f"{CONTROLLER}.operate:execute_raw",
         declared("Run one SPEL+ statement as typed; for engineers."),
     ),
     "solve": (
-        f"{_MEASURE}.solve.command:solve",
+        f"{MEASURE}.solve.command:solve",
         declared("Calculate a tool offset from a file, offline."),
     ),
     "poses": (
-        f"{_MEASURE}.poses:poses",
+        f"{MEASURE}.poses:poses",
         declared("What robolink understands of a file of poses."),
     ),
-    "docs": (f"{_SHIPPED}.docs:docs", declared("Read the pages of the documentation.")),
+    "docs": (f"{SHIPPED}.docs:docs", declared("Read the pages of the documentation.")),
     "recipe": (
-        f"{_SHIPPED}.recipe:recipe",
+        f"{SHIPPED}.recipe:recipe",
         declared("Copy a recipe to begin with; check your own."),
     ),
     "completion": (
-        f"{_COMPUTER}.completion:completion",
+        f"{COMPUTER}.completion:completion",
         declared("Make TAB complete commands."),
     ),
 }
 
 _CONFIG: Final = {
-    "path": (f"{_COMPUTER}.config:path", "cell files"),
-    "check": (f"{_COMPUTER}.config:check", "cell validate"),
-    "show": (f"{_COMPUTER}.config:show", "cell show"),
+    "path": (f"{COMPUTER}.config:path", "cell files"),
+    "check": (f"{COMPUTER}.config:check", "cell validate"),
+    "show": (f"{COMPUTER}.config:show", "cell show"),
 }
 
 robot = LazyGroup(

@@ -32,6 +32,13 @@ def say(text: str = "") -> None:
     show(text, beside=json_is_on())
 
 
+def say_listed(texts: Mapping[str, str]) -> None:
+    """Show a name and a text in each line, the texts below each other."""
+    width = max(map(len, texts), default=0)
+    for name, text in texts.items():
+        say(f"{name:{width}}  {text}")
+
+
 def note(text: str) -> None:
     """Show a person a remark beside the result; always on stderr, and no word of it is cut."""
     show(text if drawn_elsewhere() else sentences(text), beside=True)

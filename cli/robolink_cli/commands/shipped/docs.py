@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from robolink.messages import tr
-from robolink_cli.console.render import emit_json, json_is_on, say
+from robolink_cli.console.render import emit_json, json_is_on, say, say_listed
 from robolink_cli.session.context import json_option
 
 
@@ -75,9 +75,7 @@ def _list(titles: dict[str, str]) -> None:
         pages = [{"name": name, "title": title} for name, title in titles.items()]
         emit_json("robolink/pages/1", {"pages": pages})
         return
-    width = max(map(len, titles), default=0)
-    for name, title in titles.items():
-        say(f"{name:{width}}  {title}")
+    say_listed(titles)
     say(tr("To read one: robolink docs PAGE"))
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from robolink.messages import tr
-from robolink_cli.console.render import emit_json, json_is_on, say
+from robolink_cli.console.render import emit_json, json_is_on, say, say_listed
 from robolink_cli.session.completing import complete_recipe
 from robolink_cli.session.context import json_option
 
@@ -29,9 +29,7 @@ def list_models() -> None:
         entries = [{"name": name, "purpose": text} for name, text in purposes.items()]
         emit_json("robolink/recipes/1", {"recipes": entries})
         return
-    width = max(map(len, purposes), default=0)
-    for name, text in purposes.items():
-        say(f"{name:{width}}  {text}")
+    say_listed(purposes)
     say(tr("To begin with one: robolink recipe new NAME FILE"))
 
 

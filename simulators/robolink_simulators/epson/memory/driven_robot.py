@@ -4,6 +4,7 @@ import random
 from dataclasses import replace
 
 from robolink.model import Pose, ToolOffset
+from robolink_simulators.cell.frames import Frame
 from robolink_simulators.epson.arm.arm import Arm
 from robolink_simulators.epson.arm.joints import Joints, check_ranges
 from robolink_simulators.epson.arm.kinematics import (
@@ -20,6 +21,8 @@ from robolink_simulators.epson.arm.robots import Range, RobotModel
 from robolink_simulators.epson.definitions.drive_settings import DriveSettings, RestoredAt
 from robolink_simulators.epson.definitions.joint_ranges import JointRanges
 from robolink_simulators.epson.definitions.kept import KeptDefinitions
+from robolink_simulators.epson.definitions.local_frames import Coordinates, frame_at
+from robolink_simulators.epson.definitions.robot_base import RobotBase
 from robolink_simulators.epson.memory.control_points import ControlPoints
 from robolink_simulators.epson.memory.pallets import PalletTable
 from robolink_simulators.epson.memory.points import LocalTable, Point, PointTable
@@ -71,7 +74,8 @@ class DrivenRobot:
         self.pallets = PalletTable()
         self.control_points = ControlPoints()
         ranges = JointRanges(model.ranges, model.pulses_per_unit)
-        self.kept = KeptDefinitions(model.arm_values, ranges)
+        base = RobotBase(tilting=model.six_axes)
+        self.kept = KeptDefinitions(model.arm_values, ranges, base)
         self.drives = DriveSettings(model.axes)
         self.sensed = False
         self.till_met = False
@@ -142,16 +146,42 @@ class DrivenRobot:
         return replace(target, hand=hand, posture=posture)
 
     def pose_of(self, target: Point) -> Pose:
-        """Return where a point is in the base frame; on four axes without V and W.
+        """Return where the robot sees a point; on four axes without V and W.
 
         Raises:
             Refusal: Its local is not defined.
         """
         base = self.locals.to_base(target)
-        x, y, z, u, v, w = base.coordinates
+        x, y, z, u, v, w = self.kept.base.in_robot(base.coordinates)
         if not self.model.six_axes:
             v = w = 0.0
         return Pose(x, y, z, u, v, w, hand=base.hand, posture=base.posture)
+
+    def point_at(self, pose: Pose) -> Point:
+        """Return the point of a pose that the robot sees, as its base sees it."""
+        at = Point.at(pose)
+        return replace(at, coordinates=self.kept.base.seen(at.coordinates))
+
+    def here(self) -> Point:
+        """Return the commanded place of the selected tool's tip."""
+        return self.point_at(self.tip())
+
+    def control_point(self, number: int) -> Frame:
+        """Return where the robot sees an external control point; its place counts from the base.
+
+        Raises:
+            Refusal: It is not defined.
+        """
+        return frame_at(self.kept.base.in_robot(self.control_points.get(number)))
+
+    def move_base(self, coordinates: Coordinates) -> None:
+        """Put the base elsewhere: every local has to be defined anew (documented).
+
+        Raises:
+            Refusal: The robot cannot have such a base.
+        """
+        if self.kept.base.move(coordinates):
+            self.locals.clear_all()
 
     def switch_motors(self, on: bool) -> None:
         """Switch the motors; on also resets the motion parameters (docs/reference/spel.md 6.3)."""

@@ -315,12 +315,12 @@ def _on_pallet(session: Session, arguments: Arguments) -> Point:
 
 
 def _here(session: Session, _: Arguments) -> Point:
-    return Point.at(session.machine.tip())
+    return session.machine.here()
 
 
 def _real_position(session: Session, _: Arguments) -> Point:
     noise_mm = session.options.real_pos_noise_mm
-    return Point.at(session.machine.real_tip(session.rng, noise_mm))
+    return session.machine.point_at(session.machine.real_tip(session.rng, noise_mm))
 
 
 def _found_position(session: Session, _: Arguments) -> Point:

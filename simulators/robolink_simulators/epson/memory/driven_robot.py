@@ -1,6 +1,7 @@
 """One robot of a controller: its arm, and what the controller keeps for it alone."""
 
 import random
+from collections.abc import Sequence
 from dataclasses import replace
 
 from robolink.model import Pose, ToolOffset
@@ -19,6 +20,7 @@ from robolink_simulators.epson.arm.motion_parameters import MotionParameters
 from robolink_simulators.epson.arm.robot_settings import RobotSettings
 from robolink_simulators.epson.arm.robots import Range, RobotModel
 from robolink_simulators.epson.definitions.drive_settings import DriveSettings, RestoredAt
+from robolink_simulators.epson.definitions.joint_origins import JointOrigins
 from robolink_simulators.epson.definitions.joint_ranges import JointRanges
 from robolink_simulators.epson.definitions.kept import KeptDefinitions
 from robolink_simulators.epson.definitions.local_frames import Coordinates, frame_at
@@ -54,6 +56,7 @@ class DrivenRobot:
         found: Where the last Find met its condition, the selected tool's tip.
         motors_on: Whether the motors are on.
         power_high: Whether power is high; low after anything that resets the parameters.
+        opened_brakes: Joints whose brake was opened by hand while the motors are off.
     """
 
     def __init__(
@@ -75,18 +78,58 @@ class DrivenRobot:
         self.control_points = ControlPoints()
         ranges = JointRanges(model.ranges, model.pulses_per_unit)
         base = RobotBase(tilting=model.six_axes)
-        self.kept = KeptDefinitions(model.arm_values, ranges, base)
+        origins = JointOrigins(model.pulses_per_unit)
+        self.kept = KeptDefinitions(model.arm_values, ranges, base, origins)
+        self.opened_brakes = set[int]()
         self.drives = DriveSettings(model.axes)
         self.sensed = False
         self.till_met = False
         self.found: Point | None = None
         self.motors_on = False
+        self._motors_on_ns = self._motors_since_ns = 0
         self.power_high = False
 
     @property
     def model(self) -> RobotModel:
         """Which robot it is, with the ranges that its joints are held to."""
         return self.arm.model
+
+    def take_up_kept(self) -> None:
+        """Heed what has just been restored of ranges and zeros of the joints."""
+        self.hold_to_ranges()
+        self.arm.origin_errors = self.kept.origins.errors
+
+    def offset_origins(self, offsets: Sequence[int]) -> None:
+        """Take other zeros of the joints: the arm stays, the controller takes it for elsewhere.
+
+        Raises:
+            OutOfReach: A joint would stand outside its range.
+        """
+        origins, scales = self.kept.origins, self.model.pulses_per_unit
+        rows = zip(self.arm.joints, origins.offsets, offsets, scales, strict=True)
+        joints = Joints(*(at + (new - old) / scale for at, old, new, scale in rows))
+        self.arm.tell_elsewhere(joints)
+        origins.offset_by(offsets)
+        self.arm.origin_errors = origins.errors
+
+    @property
+    def at_home(self) -> bool:
+        """Whether it stands at HomeSet."""
+        scales = zip(self.arm.joints, self.model.pulses_per_unit, strict=True)
+        home = self.settings.home_pulses
+        return home is not None and list(home) == [round(at * scale) for at, scale in scales]
+
+    @property
+    def brakes_closed(self) -> tuple[bool, ...]:
+        """Whether each joint of six axes is held by its brake: all while the motors are off."""
+        joints = range(1, self.model.axes + 1)
+        return tuple(not self.motors_on and joint not in self.opened_brakes for joint in joints)
+
+    @property
+    def motors_on_ns(self) -> int:
+        """How long the motors have been on since the simulation began."""
+        since_ns = self._motors_since_ns
+        return self._motors_on_ns + (self.arm.now_ns - since_ns if self.motors_on else 0)
 
     def hold_to_ranges(self) -> None:
         """Heed the ranges of the joints that were given."""
@@ -185,7 +228,9 @@ class DrivenRobot:
 
     def switch_motors(self, on: bool) -> None:
         """Switch the motors; on also resets the motion parameters (docs/reference/spel.md 6.3)."""
+        self._motors_on_ns, self._motors_since_ns = self.motors_on_ns, self.arm.now_ns
         self.motors_on = on
+        self.opened_brakes.clear()
         if on:
             self.drives.put_back(RestoredAt.DRIVES)
             self.reset_motion_parameters()

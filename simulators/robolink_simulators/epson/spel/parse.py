@@ -35,7 +35,7 @@ OF_OTHER_ROBOTS: Final = frozenset(_WORDS_OF_OTHER_ROBOTS.split())
 _WORDS_NOT_SIMULATED = """
     areacorrectionclr areacorrectionset avgspeedclear chdisk collisiondetect peakspeedclear atrq
     dispdev enctemper msgbox olrate opencom opennet parsestr ptrq shutdown
-    syncrobots taskstate atclr closecom closenet close cls eresume error flush fmtstr
+    taskstate atclr closecom closenet close cls eresume error flush fmtstr
     input inputbox latchenable line ptclr randomize read redim
     resetelapsedtime setcom setlatch setnet signal simset taskwait tmreset toff ton vcal
     vcalpoints waitnet waitsig write writebin cont restart recover vdefgetmotionrange
@@ -74,7 +74,7 @@ _UNSIMULATED_FUNCTIONS = """
     opencom chkcom currobot ptrq atrq avgspeed peakspeed olrate sense till vxcalinfo vxcalpoints
     hand_on hand_off aio_in aio_inw aio_out aio_outw recover latchpos recoverpos lookup alignecp
     areacorrection areacorrectiondef collisiondetect
-    ptpboostok rotok syncrobots taskstate tmout vsd dispdev windowsstatus loadtype projectname$
+    ptpboostok rotok taskstate tmout vsd dispdev windowsstatus loadtype projectname$
     robotname joint restart setcom here eval
 """
 

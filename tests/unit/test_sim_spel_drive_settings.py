@@ -24,6 +24,7 @@ def window():
         ("TCLim 50, -1, -1, 20", "TCLim(4)", "50, -1, -1, 20", "-1, -1, -1, -1"),
         ("TCSpeed 5", "TCSpeed", "5", "100"),
         ("LimitTorque 80", "LimitTorque(1)", "80, 80, 80, 80", "100, 100, 100, 100"),
+        ("TC On", "TC", "1", "0"),
         ("OLAccel On", "OLAccel", "OLACCEL is ON", "OLACCEL is OFF"),
         ("SoftCP On", "SoftCP", "1", "0"),
         ("AutoLJM On", "AutoLJM", "1", "0"),
@@ -58,7 +59,6 @@ def test_reset_puts_back_some_and_start_up_others(window):
         ("TCSpeed 0", 4002),
         ("TCLim 1, 2", 2100),
         ("Print TCLim(5)", 4002),
-        ("TC On", 2199),
         ("PTPBoost 1, 2", 2100),
     ],
 )
@@ -107,7 +107,7 @@ def test_ranges_outlive_power_off_with_the_rest(window):
     window("JRange 2, -100, 100")
     other = Window().machine.robot
     other.kept.restore(window.machine.robot.kept.to_state())
-    other.hold_to_ranges()
+    other.heed_definitions()
     assert other.model == window.machine.model
     for state in ([], [[0, 1]] * 6, "text"):
         with pytest.raises((TypeError, ValueError)):

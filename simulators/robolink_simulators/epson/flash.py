@@ -52,7 +52,7 @@ class Flash:
                 other.tools.restore(tools)
             for one, kept in zip(self._machine.robots, state.get("kept", ()), strict=False):
                 one.kept.restore(kept)
-                one.hold_to_ranges()
+                one.heed_definitions()
             serial = state.get("serial")
         except (OSError, KeyError, RecursionError, TypeError, ValueError) as error:
             raise ConfigError(

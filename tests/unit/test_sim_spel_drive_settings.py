@@ -107,7 +107,7 @@ def test_ranges_outlive_power_off_with_the_rest(window):
     window("JRange 2, -100, 100")
     other = Window().machine.robot
     other.kept.restore(window.machine.robot.kept.to_state())
-    other.heed_definitions()
+    other.hold_to_ranges()
     assert other.model == window.machine.model
     for state in ([], [[0, 1]] * 6, "text"):
         with pytest.raises((TypeError, ValueError)):

@@ -132,6 +132,7 @@ class Arm:
         added_in_force: Whether motions are of an added arm; what is mounted stays on the own one.
         on_travelled: Told of each motion when it is over.
         guard: Cuts the legs of a motion short where the drives would stop it.
+        origin_errors: How far each joint really stands from where its encoder is taken to say.
     """
 
     def __init__(
@@ -146,6 +147,7 @@ class Arm:
         self.added_in_force = False
         self.on_travelled: Callable[[Travelled], None] = _heedless
         self.guard: Callable[[Sequence[Leg]], Sequence[Leg]] = _whole
+        self.origin_errors: tuple[float, ...] = (0.0,) * model.axes
         self._joints = joints
         self._now_ns = 0
         self._travel: _Travel | None = None
@@ -174,7 +176,7 @@ class Arm:
 
     @property
     def true_joints(self) -> Joints:
-        """Where the joints really are: commanded, less the backlash. No noise."""
+        """Where the joints really are: commanded, less backlash and false zeros. No noise."""
         return self._trailing(self._joints, self._turned)
 
     @property
@@ -194,7 +196,7 @@ class Arm:
         """Return where the flange will really be, or was, in the motion under way."""
         if self._travel is None:
             return self.true_flange()
-        if not self.backlash_deg and not self.backlash_mm:
+        if not self.backlash_deg and not self.backlash_mm and not any(self.origin_errors):
             return self._seen_at(self._travel, now_ns)
         before, then = (self._travel.joints_at(t) for t in (now_ns - _LOOK_BACK_NS, now_ns))
         return forward(self.model, self._trailing(then, self._ways(before, then)))
@@ -305,6 +307,15 @@ class Arm:
         self.halt(now_ns)
         self._take_up(joints)
 
+    def tell_elsewhere(self, joints: Joints) -> None:
+        """Take the arm, which stays where it is, for one that stands elsewhere.
+
+        Raises:
+            OutOfReach: A joint would stand outside its range.
+        """
+        check_ranges(self.model, joints)
+        self._joints = joints
+
     def _take_up(self, joints: Joints) -> None:
         self._turned = self._ways(self._joints, joints)
         self._joints = joints
@@ -318,8 +329,8 @@ class Arm:
         plays = [self.backlash_deg / 2] * len(joints)
         for number in self.model.linear_joints:
             plays[number - 1] = self.backlash_mm / 2
-        trails = zip(joints, plays, ways, strict=True)
-        return Joints(*(value - play * way for value, play, way in trails))
+        trails = zip(joints, plays, ways, self.origin_errors, strict=True)
+        return Joints(*(value - play * way + error for value, play, way, error in trails))
 
 
 def _heedless(travelled: Travelled) -> None:

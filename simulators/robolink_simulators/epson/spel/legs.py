@@ -13,7 +13,6 @@ from robolink_simulators.epson.arm.ramps import Ramp
 from robolink_simulators.epson.arm.tilted_legs import plan_about_point, plan_line, plan_way
 from robolink_simulators.epson.arm.trajectory import JointLeg, JointPace, Leg, LinePace, plan_go
 from robolink_simulators.epson.machine import Machine
-from robolink_simulators.epson.memory.points import frame_at
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
 _PERCENT = 100
@@ -124,7 +123,7 @@ def _point_in_force(machine: Machine) -> Frame:
     number = machine.control_points.selected
     if not number:
         raise SpelRefusal(RefusalKind.ECP_UNDEFINED, "No external control point is in force")
-    return frame_at(machine.control_points.get(number))
+    return machine.robot.control_point(number)
 
 
 def way_leg(machine: Machine, end: Pose, way: MeasuredWay) -> Leg:

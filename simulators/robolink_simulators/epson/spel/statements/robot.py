@@ -19,6 +19,7 @@ from robolink_simulators.epson.spel.statements.defined.added_arms import ARM_SET
 from robolink_simulators.epson.spel.statements.defined.arches import ARCH_SETTINGS
 from robolink_simulators.epson.spel.statements.defined.drive_settings import DRIVE_STATEMENTS
 from robolink_simulators.epson.spel.statements.defined.joint_ranges import RANGE_STATEMENTS
+from robolink_simulators.epson.spel.statements.defined.origins import ORIGIN_STATEMENTS
 from robolink_simulators.epson.spel.statements.defined.torques import TORQUE_STATEMENTS
 from robolink_simulators.epson.spel.statements.defined.xy_limits import LIMIT_SETTINGS
 
@@ -171,6 +172,7 @@ ROBOT_SETTINGS: Final[dict[str, Setting]] = {
     **DRIVE_STATEMENTS,
     **RANGE_STATEMENTS,
     **TORQUE_STATEMENTS,
+    **ORIGIN_STATEMENTS,
     "weight": _weight,
     "inertia": _inertia,
     "fine": _fine,

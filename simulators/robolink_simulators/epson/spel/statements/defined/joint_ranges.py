@@ -32,7 +32,7 @@ def _range(machine: Machine, values: Sequence[Number]) -> str:
     except SpelRefusal:
         robot.kept.ranges.restore(before)
         raise
-    robot.heed_definitions()
+    robot.hold_to_ranges()
     return ""
 
 
@@ -43,7 +43,7 @@ def _of_one_joint(machine: Machine, values: Sequence[Number]) -> str:
     if not 1 <= joint <= machine.model.axes:
         raise out_of_range(f"There is no joint {joint}")
     machine.robot.kept.ranges.set_pulses(joint, low, high)
-    machine.robot.heed_definitions()
+    machine.robot.hold_to_ranges()
     return ""
 
 

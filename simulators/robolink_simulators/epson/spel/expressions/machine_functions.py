@@ -28,6 +28,8 @@ from robolink_simulators.epson.spel.expressions.defined.origins import (
     NS_PER_HOUR,
     ORIGIN_FUNCTIONS,
 )
+from robolink_simulators.epson.spel.expressions.defined.torques import TORQUE_FUNCTIONS
+from robolink_simulators.epson.spel.expressions.defined.travel_times import TRAVEL_FUNCTIONS
 from robolink_simulators.epson.spel.expressions.defined.xy_limits import (
     LIMIT_FUNCTIONS,
     corner_of_limits,
@@ -183,6 +185,8 @@ MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     **LIMIT_FUNCTIONS,
     **AREA_FUNCTIONS,
     **DRIVE_FUNCTIONS,
+    **TORQUE_FUNCTIONS,
+    **TRAVEL_FUNCTIONS,
     **ORIGIN_FUNCTIONS,
     "pagl": (range(2, 3), joint_of_point),
     "ppls": (range(2, 3), pulses_of_point),

@@ -29,8 +29,8 @@ from robolink_simulators.epson.refusals import OutOfReach, RefusalKind, SpelRefu
 from robolink_simulators.epson.spel.expressions.defined.xy_limits import outside_limits_mm
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.values import Number, as_text, out_of_range
+from robolink_simulators.epson.spel.legs import line_pace
 from robolink_simulators.epson.spel.session import Session
-from robolink_simulators.epson.spel.statements.legs import line_pace
 from robolink_simulators.epson.spel.statements.through_points import worth_of
 from robolink_simulators.epson.spel.tree import (
     LabelledPoint,

@@ -33,6 +33,7 @@ class RefusalKind(StrEnum):
     HOME_UNDEFINED = "home_undefined"
     CALIBRATION_PULSES = "calibration_pulses"
     MOTORS_ON = "motors_on"
+    NOT_RESERVED = "not_reserved"
     WAIT_TIMED_OUT = "wait_timed_out"
     JOINT_FREE = "joint_free"
     JOINT_TOO_FAST = "joint_too_fast"

@@ -3,6 +3,7 @@
 import random
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Protocol
 
 from robolink.model import Hand, Pose, Posture, ToolOffset
 from robolink_simulators.cell.frames import Frame
@@ -35,6 +36,19 @@ from robolink_simulators.epson.memory.points import LocalTable, Point, PointTabl
 from robolink_simulators.epson.memory.tools import ToolMemory
 
 
+class ReservedMotion(Protocol):
+    """A motion that waits for SyncRobots (docs/reference/spel.md 7.1)."""
+
+    @property
+    def stands(self) -> bool:
+        """Whether whoever gave it still waits for it."""
+        ...
+
+    def start_reserved(self, now_ns: int) -> None:
+        """Begin it at an instant, with its robot in force."""
+        ...
+
+
 class DrivenRobot:
     """A robot: arm, tools, points, locals, pallets, settings, motors and power.
 
@@ -62,6 +76,7 @@ class DrivenRobot:
         found: Where the last Find met its condition, the selected tool's tip.
         motors_on: Whether the motors are on.
         power_high: Whether power is high; low after anything that resets the parameters.
+        reservation: The motion that waits for SyncRobots, if whoever gave it still does.
         opened_brakes: Joints whose brake was opened by hand while the motors are off.
     """
 
@@ -87,6 +102,7 @@ class DrivenRobot:
         origins = JointOrigins(model.pulses_per_unit)
         self.kept = KeptDefinitions(model.arm_values, ranges, base, origins)
         self.opened_brakes = set[int]()
+        self.reservation: ReservedMotion | None = None
         self.drives = DriveSettings(model.axes)
         limits = TorqueLimits(lambda: self.drives, lambda: self.power_high)
         self.observer = DriveObserver(self.arm, self._load, limits.shares)
@@ -132,6 +148,12 @@ class DrivenRobot:
     def _travelled(self, travelled: Travelled) -> None:
         self.observer.take(travelled)
         self.guard.ended(complete=travelled.complete)
+
+    @property
+    def reserved(self) -> ReservedMotion | None:
+        """The motion that waits for SyncRobots."""
+        motion = self.reservation
+        return motion if motion is not None and motion.stands else None
 
     def take_up_kept(self) -> None:
         """Heed what has just been restored of arm, ranges and zeros of the joints."""
@@ -292,6 +314,7 @@ class DrivenRobot:
     def forget_volatile(self, now_ns: int) -> None:
         """Forget what a power cycle takes: all but tools, HomeSet and its place."""
         self.arm.halt(now_ns)
+        self.reservation = None
         self.switch_motors(False)
         self.reset_motion_parameters()
         home, order = self.settings.home_pulses, self.settings.home_order

@@ -35,7 +35,7 @@ OF_OTHER_ROBOTS: Final = frozenset(_WORDS_OF_OTHER_ROBOTS.split())
 _WORDS_NOT_SIMULATED = """
     areacorrectionclr areacorrectionset chdisk collisiondetect
     dispdev enctemper msgbox opencom opennet parsestr shutdown
-    syncrobots taskstate closecom closenet close cls eresume error flush fmtstr
+    taskstate closecom closenet close cls eresume error flush fmtstr
     input inputbox latchenable line randomize read redim
     resetelapsedtime setcom setlatch setnet signal simset taskwait tmreset toff ton vcal
     vcalpoints waitnet waitsig write writebin cont restart recover vdefgetmotionrange
@@ -74,7 +74,7 @@ _UNSIMULATED_FUNCTIONS = """
     opencom chkcom currobot sense till vxcalinfo vxcalpoints
     hand_on hand_off aio_in aio_inw aio_out aio_outw recover latchpos recoverpos lookup alignecp
     areacorrection areacorrectiondef collisiondetect
-    rotok syncrobots taskstate tmout vsd dispdev windowsstatus loadtype projectname$
+    rotok taskstate tmout vsd dispdev windowsstatus loadtype projectname$
     robotname joint restart setcom here eval
 """
 

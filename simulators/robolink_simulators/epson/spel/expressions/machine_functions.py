@@ -165,6 +165,12 @@ def _robot(session: Session, arguments: Arguments) -> DrivenRobot:
     return machine.numbered(as_integer(arguments[0])) if arguments else machine.robot
 
 
+def _reserved(session: Session, _: Arguments) -> Value:
+    """Return a bit for each robot whose motion is reserved, bit 0 for robot 1."""
+    robots = enumerate(session.machine.robots)
+    return sum(1 << bit for bit, robot in robots if robot.reserved is not None)
+
+
 def _calibration_information(session: Session, arguments: Arguments) -> Value:
     number, which = (as_integer(argument) for argument in arguments)
     return session.machine.image_calibrations.information(number, which)
@@ -249,6 +255,7 @@ MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     "iodef": (range(1, 2), lambda s, a: as_text(a[0]).lower() in s.machine.io_labels),
     "pnumber": (range(1, 2), _point_number),
     "vxcalinfo": (range(2, 3), _calibration_information),
+    "syncrobots": (range(1), _reserved),
     "ctrldev": (range(1), lambda s, _: s.machine.control_device),
 }
 """Name to the numbers of arguments allowed and the function."""

@@ -31,6 +31,7 @@ from robolink_simulators.epson.spel.statements.defined.base import BASE_STATEMEN
 from robolink_simulators.epson.spel.statements.defined.locals_and_pallets import (
     PLACE_STATEMENTS,
 )
+from robolink_simulators.epson.spel.statements.defined.sync import SYNC_STATEMENTS
 from robolink_simulators.epson.spel.statements.defined.xy_limits import require_within_limits
 from robolink_simulators.epson.spel.statements.motion import require_drives
 from robolink_simulators.epson.spel.statements.points import POINT_STATEMENTS, point_argument
@@ -326,6 +327,7 @@ _AT_ONCE: Final = {
     **PLACE_STATEMENTS,
     **AREA_STATEMENTS,
     **BASE_STATEMENTS,
+    **SYNC_STATEMENTS,
     **FILE_COMMANDS,
     **POINT_FILE_COMMANDS,
 }

@@ -225,6 +225,10 @@ class Workplace(ABC):
         wobble_mm = self.parameters.wobble_mm
         return x_mm + wobble_mm * math.cos(toward), y_mm + wobble_mm * math.sin(toward), z_mm
 
+    def told_flange(self) -> Pose:
+        """Return where the flange is by what the controller tells of it."""
+        return self.robot.flange()
+
     def axis(self, axis: Axis, tool: int = MOUNTED_TOOL) -> Direction:
         """Return how an axis of a physical tool lies in the base now."""
         return self.robot.turned(axis_of(self.tips.get(tool, ToolOffset()), axis))

@@ -57,6 +57,8 @@ class SpelNumbers:
     aborted: int = 2995
     logged_out_in_task: int = 2996
     home_undefined: int = 2228  # docs/reference/spel.md 10
+    calibration_pulses: int = 2197
+    motors_on: int = 4029
     serious: int = 9001
     no_such_file: int = 7213  # docs/reference/spel.md 10, path not found
     task_gone: int = 2261  # docs/reference/spel.md 10

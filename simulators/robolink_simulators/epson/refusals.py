@@ -31,6 +31,8 @@ class RefusalKind(StrEnum):
     ROBOT_NUMBER = "robot_number"
     NAME_UNDEFINED = "name_undefined"
     HOME_UNDEFINED = "home_undefined"
+    CALIBRATION_PULSES = "calibration_pulses"
+    MOTORS_ON = "motors_on"
     WAIT_TIMED_OUT = "wait_timed_out"
     JOINT_FREE = "joint_free"
     JOINT_TOO_FAST = "joint_too_fast"

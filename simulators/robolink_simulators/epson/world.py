@@ -23,7 +23,6 @@ from robolink_simulators.epson.arm.robots import RobotModel
 from robolink_simulators.epson.memory.bits import IO_BITS
 from robolink_simulators.epson.memory.driven_robot import DrivenRobot
 from robolink_simulators.epson.memory.input_bits import InputBits
-from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.memory.tip_input import Nozzle, TipInput
 from robolink_simulators.epson.refusals import OutOfReach
 
@@ -155,6 +154,10 @@ class World(Workplace):
         """Take off what an input is connected to; it is off then."""
         self._inputs.set(number, on=False)
 
+    def told_flange(self) -> Pose:
+        """Return where the flange is as the base sees it."""
+        return Pose(*self.machine.point_at(self.robot.flange()).coordinates)
+
     def truth(self) -> dict[str, Any]:
         """Return all of it, ready for JSON."""
         stored = self.machine.tools.defined()
@@ -202,7 +205,7 @@ class PendantOperator(SimulatedOperator):
         there = replace(arm.flange(), u_deg=u_deg)
         arm.place(continued(arm.model, there, arm.joints), self._now_ns())
         flange = self.jog_onto_pin()
-        self._machine.points.store(number, Point.at(flange))
+        self._machine.points.store(number, self._machine.point_at(flange))
         return flange
 
     def _require_pendant(self) -> None:

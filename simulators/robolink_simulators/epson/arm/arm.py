@@ -104,6 +104,7 @@ class Arm:
     Attributes:
         motions: Those begun since the arm was made.
         backlash_mm: Play of a SCARA's joint 3, likewise; none at first.
+        origin_errors: How far each joint really stands from where its encoder is taken to say.
     """
 
     def __init__(
@@ -115,6 +116,7 @@ class Arm:
         self.motions = MotionLog()
         self.backlash_deg = backlash_deg
         self.backlash_mm = 0.0
+        self.origin_errors: tuple[float, ...] = (0.0,) * model.axes
         self._joints = joints
         self._now_ns = 0
         self._travel: _Travel | None = None
@@ -143,7 +145,7 @@ class Arm:
 
     @property
     def true_joints(self) -> Joints:
-        """Where the joints really are: commanded, less the backlash. No noise."""
+        """Where the joints really are: commanded, less backlash and false zeros. No noise."""
         return self._trailing(self._joints, self._turned)
 
     def flange(self) -> Pose:
@@ -158,7 +160,7 @@ class Arm:
         """Return where the flange will really be, or was, in the motion under way."""
         if self._travel is None:
             return self.true_flange()
-        if not self.backlash_deg and not self.backlash_mm:
+        if not self.backlash_deg and not self.backlash_mm and not any(self.origin_errors):
             return self._seen_at(self._travel, now_ns)
         before, then = (self._travel.joints_at(t) for t in (now_ns - _LOOK_BACK_NS, now_ns))
         return forward(self.model, self._trailing(then, self._ways(before, then)))
@@ -251,6 +253,15 @@ class Arm:
         self.halt(now_ns)
         self._take_up(joints)
 
+    def tell_elsewhere(self, joints: Joints) -> None:
+        """Take the arm, which stays where it is, for one that stands elsewhere.
+
+        Raises:
+            OutOfReach: A joint would stand outside its range.
+        """
+        check_ranges(self.model, joints)
+        self._joints = joints
+
     def _take_up(self, joints: Joints) -> None:
         self._turned = self._ways(self._joints, joints)
         self._joints = joints
@@ -264,8 +275,8 @@ class Arm:
         plays = [self.backlash_deg / 2] * len(joints)
         for number in self.model.linear_joints:
             plays[number - 1] = self.backlash_mm / 2
-        trails = zip(joints, plays, ways, strict=True)
-        return Joints(*(value - play * way for value, play, way in trails))
+        trails = zip(joints, plays, ways, self.origin_errors, strict=True)
+        return Joints(*(value - play * way + error for value, play, way, error in trails))
 
 
 def _place(flange: Pose) -> Place:

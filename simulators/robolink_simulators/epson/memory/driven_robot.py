@@ -1,9 +1,11 @@
 """One robot of a controller: its arm, and what the controller keeps for it alone."""
 
 import random
+from collections.abc import Sequence
 from dataclasses import replace
 
 from robolink.model import Pose, ToolOffset
+from robolink_simulators.cell.frames import Frame
 from robolink_simulators.epson.arm.arm import Arm
 from robolink_simulators.epson.arm.joints import Joints, check_ranges
 from robolink_simulators.epson.arm.kinematics import (
@@ -18,8 +20,11 @@ from robolink_simulators.epson.arm.motion_parameters import MotionParameters
 from robolink_simulators.epson.arm.robot_settings import RobotSettings
 from robolink_simulators.epson.arm.robots import Range, RobotModel
 from robolink_simulators.epson.definitions.drive_settings import DriveSettings, RestoredAt
+from robolink_simulators.epson.definitions.joint_origins import JointOrigins
 from robolink_simulators.epson.definitions.joint_ranges import JointRanges
 from robolink_simulators.epson.definitions.kept import KeptDefinitions
+from robolink_simulators.epson.definitions.local_frames import Coordinates, frame_at
+from robolink_simulators.epson.definitions.robot_base import RobotBase
 from robolink_simulators.epson.memory.control_points import ControlPoints
 from robolink_simulators.epson.memory.pallets import PalletTable
 from robolink_simulators.epson.memory.points import LocalTable, Point, PointTable
@@ -51,6 +56,7 @@ class DrivenRobot:
         found: Where the last Find met its condition, the selected tool's tip.
         motors_on: Whether the motors are on.
         power_high: Whether power is high; low after anything that resets the parameters.
+        opened_brakes: Joints whose brake was opened by hand while the motors are off.
     """
 
     def __init__(
@@ -71,18 +77,59 @@ class DrivenRobot:
         self.pallets = PalletTable()
         self.control_points = ControlPoints()
         ranges = JointRanges(model.ranges, model.pulses_per_unit)
-        self.kept = KeptDefinitions(model.arm_values, ranges)
+        base = RobotBase(tilting=model.six_axes)
+        origins = JointOrigins(model.pulses_per_unit)
+        self.kept = KeptDefinitions(model.arm_values, ranges, base, origins)
+        self.opened_brakes = set[int]()
         self.drives = DriveSettings(model.axes)
         self.sensed = False
         self.till_met = False
         self.found: Point | None = None
         self.motors_on = False
+        self._motors_on_ns = self._motors_since_ns = 0
         self.power_high = False
 
     @property
     def model(self) -> RobotModel:
         """Which robot it is, with the ranges that its joints are held to."""
         return self.arm.model
+
+    def take_up_kept(self) -> None:
+        """Heed what has just been restored of ranges and zeros of the joints."""
+        self.hold_to_ranges()
+        self.arm.origin_errors = self.kept.origins.errors
+
+    def offset_origins(self, offsets: Sequence[int]) -> None:
+        """Take other zeros of the joints: the arm stays, the controller takes it for elsewhere.
+
+        Raises:
+            OutOfReach: A joint would stand outside its range.
+        """
+        origins, scales = self.kept.origins, self.model.pulses_per_unit
+        rows = zip(self.arm.joints, origins.offsets, offsets, scales, strict=True)
+        joints = Joints(*(at + (new - old) / scale for at, old, new, scale in rows))
+        self.arm.tell_elsewhere(joints)
+        origins.offset_by(offsets)
+        self.arm.origin_errors = origins.errors
+
+    @property
+    def at_home(self) -> bool:
+        """Whether it stands at HomeSet."""
+        scales = zip(self.arm.joints, self.model.pulses_per_unit, strict=True)
+        home = self.settings.home_pulses
+        return home is not None and list(home) == [round(at * scale) for at, scale in scales]
+
+    @property
+    def brakes_closed(self) -> tuple[bool, ...]:
+        """Whether each joint of six axes is held by its brake: all while the motors are off."""
+        joints = range(1, self.model.axes + 1)
+        return tuple(not self.motors_on and joint not in self.opened_brakes for joint in joints)
+
+    @property
+    def motors_on_ns(self) -> int:
+        """How long the motors have been on since the simulation began."""
+        since_ns = self._motors_since_ns
+        return self._motors_on_ns + (self.arm.now_ns - since_ns if self.motors_on else 0)
 
     def hold_to_ranges(self) -> None:
         """Heed the ranges of the joints that were given."""
@@ -142,20 +189,48 @@ class DrivenRobot:
         return replace(target, hand=hand, posture=posture)
 
     def pose_of(self, target: Point) -> Pose:
-        """Return where a point is in the base frame; on four axes without V and W.
+        """Return where the robot sees a point; on four axes without V and W.
 
         Raises:
             Refusal: Its local is not defined.
         """
         base = self.locals.to_base(target)
-        x, y, z, u, v, w = base.coordinates
+        x, y, z, u, v, w = self.kept.base.in_robot(base.coordinates)
         if not self.model.six_axes:
             v = w = 0.0
         return Pose(x, y, z, u, v, w, hand=base.hand, posture=base.posture)
 
+    def point_at(self, pose: Pose) -> Point:
+        """Return the point of a pose that the robot sees, as its base sees it."""
+        at = Point.at(pose)
+        return replace(at, coordinates=self.kept.base.seen(at.coordinates))
+
+    def here(self) -> Point:
+        """Return the commanded place of the selected tool's tip."""
+        return self.point_at(self.tip())
+
+    def control_point(self, number: int) -> Frame:
+        """Return where the robot sees an external control point; its place counts from the base.
+
+        Raises:
+            Refusal: It is not defined.
+        """
+        return frame_at(self.kept.base.in_robot(self.control_points.get(number)))
+
+    def move_base(self, coordinates: Coordinates) -> None:
+        """Put the base elsewhere: every local has to be defined anew (documented).
+
+        Raises:
+            Refusal: The robot cannot have such a base.
+        """
+        if self.kept.base.move(coordinates):
+            self.locals.clear_all()
+
     def switch_motors(self, on: bool) -> None:
         """Switch the motors; on also resets the motion parameters (docs/reference/spel.md 6.3)."""
+        self._motors_on_ns, self._motors_since_ns = self.motors_on_ns, self.arm.now_ns
         self.motors_on = on
+        self.opened_brakes.clear()
         if on:
             self.drives.put_back(RestoredAt.DRIVES)
             self.reset_motion_parameters()

@@ -72,7 +72,7 @@ def _joints(session: Session, arguments: Arguments) -> Joints:
 
 
 def _joint_point(machine: Machine, joints: Joints) -> Point:
-    return Point.at(machine.tip_at(joints))
+    return machine.point_at(machine.tip_at(joints))
 
 
 def of_angles(session: Session, arguments: Arguments) -> Point:
@@ -195,7 +195,7 @@ def with_least_motion(session: Session, arguments: Arguments) -> Point:
     if not machine.model.six_axes:
         return target
     near = None
-    if len(arguments) > 1 and as_point(arguments[1]) != Point.at(machine.tip()):
+    if len(arguments) > 1 and as_point(arguments[1]) != machine.here():
         near = machine.joints_for(as_point(arguments[1]))
     flag = as_integer(arguments[2]) if len(arguments) > 2 else 1
     return machine.flagged(target, least_motion(machine, target, flag, near))

@@ -37,7 +37,8 @@ def jump(
         raise SpelRefusal(RefusalKind.OTHER_ROBOT, "Jump is not for six axes; Jump3 is")
     height_mm = machine.parameters.limz_mm
     if limz_mm is not None:
-        height_mm = limz_mm + machine.locals.get(point.local).z_mm
+        local, base = machine.locals.get(point.local), machine.kept.base
+        height_mm = limz_mm + local.z_mm + base.coordinates[2]
     start, end = machine.arm.joints, machine.joints_for(point)
     for joints, what in ((start, "The motion starts"), (end, "The target lies")):
         if joints.j3_mm > height_mm + machine.robot.drives.get("limzmargin")[0]:

@@ -12,7 +12,6 @@ from robolink_simulators.epson.arm.motion_parameters import MotionPhase
 from robolink_simulators.epson.arm.tilted_legs import plan_about_point, plan_line, plan_way
 from robolink_simulators.epson.arm.trajectory import JointLeg, Leg, LinePace, plan_go
 from robolink_simulators.epson.machine import Machine
-from robolink_simulators.epson.memory.points import frame_at
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
 _PERCENT = 100
@@ -95,7 +94,7 @@ def _point_in_force(machine: Machine) -> Frame:
     number = machine.control_points.selected
     if not number:
         raise SpelRefusal(RefusalKind.ECP_UNDEFINED, "No external control point is in force")
-    return frame_at(machine.control_points.get(number))
+    return machine.robot.control_point(number)
 
 
 def way_leg(machine: Machine, end: Pose, way: MeasuredWay) -> Leg:

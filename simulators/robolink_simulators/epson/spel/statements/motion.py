@@ -10,13 +10,13 @@ from robolink_simulators.cell.frames import Frame, add, axis_and_angle, product,
 from robolink_simulators.epson.arm.kinematics import frame_of
 from robolink_simulators.epson.arm.trajectory import Leg
 from robolink_simulators.epson.definitions.arches import GATE, Arch
-from robolink_simulators.epson.machine import Machine
-from robolink_simulators.epson.memory.points import (
+from robolink_simulators.epson.definitions.local_frames import (
     Coordinates,
-    Point,
     coordinates_of_frame,
     frame_at,
 )
+from robolink_simulators.epson.machine import Machine
+from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.joint_functions import least_motion
@@ -177,7 +177,7 @@ def _absolute(_: Machine, point: Point) -> Point:
 
 def _in_tool(machine: Machine, point: Point) -> Point:
     """Shift along the axes of the selected tool; the hand stays (documented)."""
-    tip = Point.at(machine.tip())
+    tip = machine.here()
     if machine.model.six_axes:
         there = frame_at(tip.coordinates) @ frame_at(point.coordinates)
         return replace(tip, coordinates=coordinates_of_frame(there))
@@ -193,7 +193,7 @@ def _in_local(machine: Machine, point: Point) -> Point:
 
     That six axes turn about the axes of that local is assumed.
     """
-    here = machine.locals.convert(Point.at(machine.tip()), point.local)
+    here = machine.locals.convert(machine.here(), point.local)
     if not machine.model.six_axes:
         return here.plus(point)
     seen, by = frame_at(here.coordinates), frame_at(point.coordinates)

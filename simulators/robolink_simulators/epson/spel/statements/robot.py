@@ -19,6 +19,7 @@ from robolink_simulators.epson.spel.statements.defined.added_arms import ARM_SET
 from robolink_simulators.epson.spel.statements.defined.arches import ARCH_SETTINGS
 from robolink_simulators.epson.spel.statements.defined.drive_settings import DRIVE_STATEMENTS
 from robolink_simulators.epson.spel.statements.defined.joint_ranges import RANGE_STATEMENTS
+from robolink_simulators.epson.spel.statements.defined.origins import ORIGIN_STATEMENTS
 from robolink_simulators.epson.spel.statements.defined.xy_limits import LIMIT_SETTINGS
 
 Numbers = Sequence[Number]
@@ -167,6 +168,7 @@ ROBOT_SETTINGS: Final[dict[str, Setting]] = {
     **LIMIT_SETTINGS,
     **DRIVE_STATEMENTS,
     **RANGE_STATEMENTS,
+    **ORIGIN_STATEMENTS,
     "weight": _weight,
     "inertia": _inertia,
     "fine": _fine,

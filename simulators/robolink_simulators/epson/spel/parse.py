@@ -33,10 +33,10 @@ OF_OTHER_ROBOTS: Final = frozenset(_WORDS_OF_OTHER_ROBOTS.split())
 """Statements that the reference allows, for arms that this simulator has none of."""
 
 _WORDS_NOT_SIMULATED = """
-    areacorrectionclr areacorrectionset avgspeedclear chdisk collisiondetect peakspeedclear atrq
-    dispdev enctemper msgbox olrate opencom opennet parsestr ptrq shutdown
-    syncrobots taskstate atclr closecom closenet close cls eresume error flush fmtstr
-    input inputbox latchenable line ptclr randomize read redim
+    areacorrectionclr areacorrectionset chdisk collisiondetect
+    dispdev enctemper msgbox opencom opennet parsestr shutdown
+    taskstate closecom closenet close cls eresume error flush fmtstr
+    input inputbox latchenable line randomize read redim
     resetelapsedtime setcom setlatch setnet signal simset taskwait tmreset toff ton vcal
     vcalpoints waitnet waitsig write writebin cont restart recover vdefgetmotionrange
     vdefsetmotionrange vshowmodel vtrain sysconfig workque_list cnv_quelist history clearhistory
@@ -71,17 +71,17 @@ _OF_PROGRAMS_ALONE = """
 """
 
 _UNSIMULATED_FUNCTIONS = """
-    opencom chkcom currobot ptrq atrq avgspeed peakspeed olrate sense till vxcalinfo vxcalpoints
+    opencom chkcom currobot sense till vxcalinfo vxcalpoints
     hand_on hand_off aio_in aio_inw aio_out aio_outw recover latchpos recoverpos lookup alignecp
     areacorrection areacorrectiondef collisiondetect
-    ptpboostok rotok syncrobots taskstate tmout vsd dispdev windowsstatus loadtype projectname$
+    rotok taskstate tmout vsd dispdev windowsstatus loadtype projectname$
     robotname joint restart setcom here eval
 """
 
 _WITH_A_FORM_OF_THEIR_OWN = """
     opencom opennet parsestr eresume error fmtstr input line read redim setcom setnet signal
     taskwait waitnet waitsig write writebin readbin close closecom closenet flush cont restart
-    tmreset resetelapsedtime randomize vrun vget vset vload vsave vcls vcal vxcalib
+    tmreset resetelapsedtime randomize vrun vget vset vload vsave vcls vcal vsaveimage vxcalib
 """
 
 WINDOW_ONLY: Final = frozenset(

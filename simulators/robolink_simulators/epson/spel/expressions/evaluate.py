@@ -112,6 +112,10 @@ class Evaluator:
         """
         raise SpelRefusal(RefusalKind.NOT_SIMULATED, f"Port {channel} of the command window")
 
+    def carries(self, statement: object) -> bool:  # noqa: ARG002
+        """Tell whether a statement that it has begun is still being carried out by it."""
+        return True
+
     def closure(self, expression: Expression) -> Run:
         """Return what works an expression out; the last ones are remembered.
 

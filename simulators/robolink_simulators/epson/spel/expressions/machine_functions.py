@@ -28,6 +28,8 @@ from robolink_simulators.epson.spel.expressions.defined.origins import (
     NS_PER_HOUR,
     ORIGIN_FUNCTIONS,
 )
+from robolink_simulators.epson.spel.expressions.defined.torques import TORQUE_FUNCTIONS
+from robolink_simulators.epson.spel.expressions.defined.travel_times import TRAVEL_FUNCTIONS
 from robolink_simulators.epson.spel.expressions.defined.xy_limits import (
     LIMIT_FUNCTIONS,
     corner_of_limits,
@@ -163,6 +165,12 @@ def _robot(session: Session, arguments: Arguments) -> DrivenRobot:
     return machine.numbered(as_integer(arguments[0])) if arguments else machine.robot
 
 
+def _reserved(session: Session, _: Arguments) -> Value:
+    """Return a bit for each robot whose motion is reserved, bit 0 for robot 1."""
+    robots = enumerate(session.machine.robots)
+    return sum(1 << bit for bit, robot in robots if robot.reserved is not None)
+
+
 def _calibration_information(session: Session, arguments: Arguments) -> Value:
     number, which = (as_integer(argument) for argument in arguments)
     return session.machine.image_calibrations.information(number, which)
@@ -177,6 +185,8 @@ MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     **LIMIT_FUNCTIONS,
     **AREA_FUNCTIONS,
     **DRIVE_FUNCTIONS,
+    **TORQUE_FUNCTIONS,
+    **TRAVEL_FUNCTIONS,
     **ORIGIN_FUNCTIONS,
     "pagl": (range(2, 3), joint_of_point),
     "ppls": (range(2, 3), pulses_of_point),
@@ -245,6 +255,7 @@ MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     "iodef": (range(1, 2), lambda s, a: as_text(a[0]).lower() in s.machine.io_labels),
     "pnumber": (range(1, 2), _point_number),
     "vxcalinfo": (range(2, 3), _calibration_information),
+    "syncrobots": (range(1), _reserved),
     "ctrldev": (range(1), lambda s, _: s.machine.control_device),
 }
 """Name to the numbers of arguments allowed and the function."""

@@ -21,10 +21,10 @@ from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.joint_functions import least_motion
 from robolink_simulators.epson.spel.expressions.values import out_of_range
+from robolink_simulators.epson.spel.legs import go_leg, held_leg, line_leg
 from robolink_simulators.epson.spel.statements.defined.curves import curve_leg
 from robolink_simulators.epson.spel.statements.defined.xy_limits import require_within_limits
 from robolink_simulators.epson.spel.statements.jump import jump, jump3
-from robolink_simulators.epson.spel.statements.legs import go_leg, held_leg, line_leg
 from robolink_simulators.epson.spel.statements.through_points import ARC_VERBS, arc, passing
 from robolink_simulators.epson.spel.tree import (
     MotionStatement,
@@ -39,15 +39,16 @@ _SAME_DEG = 0.001
 # LJM leaves a SCARA's point unchanged (documented); TGo and BGo move six axes
 # the least. An arch rounds Jump; Jump3 comes to rest at its corners under each (assumed).
 _UNTIL_WORDS: Final = frozenset({"till", "find"})
-_LINE_WORDS: Final = frozenset({"cp", "rot"}) | _UNTIL_WORDS
+_JOINT_WORDS: Final = frozenset({"cp", "sync"}) | _UNTIL_WORDS
+_LINE_WORDS: Final = frozenset({"rot"}) | _JOINT_WORDS
 _ARCH_WORDS: Final = frozenset(f"c{n}" for n in range(GATE + 1))
-_GATE_WORDS: Final = frozenset({"cp", "sense", "c"}) | _ARCH_WORDS | _UNTIL_WORDS
+_GATE_WORDS: Final = frozenset({"sense", "c"}) | _ARCH_WORDS | _JOINT_WORDS
 _WORDS: Final = {
-    "go": frozenset({"cp", "ljm"}) | _UNTIL_WORDS,
-    "tgo": frozenset({"cp"}) | _UNTIL_WORDS,
-    "bgo": frozenset({"cp"}) | _UNTIL_WORDS,
+    "go": frozenset({"ljm"}) | _JOINT_WORDS,
+    "tgo": _JOINT_WORDS,
+    "bgo": _JOINT_WORDS,
     "pass": frozenset({"cp", "ljm"}),
-    "cvmove": frozenset({"cp"}) | _UNTIL_WORDS,
+    "cvmove": _JOINT_WORDS,
     "move": _LINE_WORDS | {"ecp"},
     "tmove": _LINE_WORDS,
     "bmove": _LINE_WORDS,
@@ -77,8 +78,6 @@ def plan(evaluator: Evaluator, motion: MotionStatement) -> list[Leg]:
 
 def _planned(evaluator: Evaluator, motion: MotionStatement) -> list[Leg]:
     machine = evaluator.session.machine
-    if "sync" in motion.options.words:
-        raise SpelRefusal(RefusalKind.NOT_SIMULATED, "Robots that start together with SYNC")
     wrong = motion.options.words - _WORDS[motion.verb]
     if wrong:
         raise SpelRefusal(RefusalKind.SYNTAX, f"{motion.verb} knows no {', '.join(sorted(wrong))}")
@@ -161,9 +160,11 @@ def require_drives(machine: Machine) -> None:
     """Hold a motion back that the drives would not carry out.
 
     Raises:
-        Refusal: The motors are off, or a joint is free (documented for SFree, but not its
-            number).
+        Refusal: The motors are off, a joint is free (documented for SFree, but not its number), or
+            a motion of the robot waits for SyncRobots (assumed).
     """
+    if machine.robot.reserved is not None:
+        raise SpelRefusal(RefusalKind.ROBOT_IN_USE, "A motion of the robot is reserved")
     if not machine.motors_on:
         raise SpelRefusal(RefusalKind.MOTORS_OFF, "Motors are off")
     if machine.settings.free_joints:

@@ -15,7 +15,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def simulation_options(function: F) -> F:
-    """Add ``--seed``, ``--state``, ``--speed``, ``--option``, ``--allow-remote``, ``--faults``,
+    """Add ``--seed``, ``--state``, the pace, ``--option``, ``--allow-remote``, ``--faults``,
     ``--world``.
     """  # noqa: D205 - one sentence over two lines
     options = (
@@ -25,14 +25,7 @@ def simulation_options(function: F) -> F:
             type=click.Path(dir_okay=False, path_type=Path),
             help="File that keeps the tools over a restart, as flash or retained memory does.",
         ),
-        click.option(
-            "--speed",
-            type=click.FloatRange(min=0.01, max=1000),
-            default=1.0,
-            show_default=True,
-            metavar="FACTOR",
-            help="How many times faster than real the simulated time passes.",
-        ),
+        pace_options,
         click.option(
             "--option",
             "options",
@@ -63,11 +56,13 @@ class ServedLife:
         control: Where its control API listens, HOST:PORT.
         with_parent: Whether it ends when the process that started it has ended.
         idle_exit_s: After how many seconds without a request it ends; ``None`` for never.
+        parent: The process meant by ``with_parent``; ``None`` for the one that started it.
     """
 
     control: str
     with_parent: bool
     idle_exit_s: float | None
+    parent: int | None = None
 
 
 def life_options(function: F) -> F:
@@ -126,6 +121,26 @@ def seed_option(function: F) -> F:
         default=1,
         show_default=True,
         help="Another cell: other tools, another tip.",
+    )(function)
+
+
+def pace_options(function: F) -> F:
+    """Add ``--speed`` and ``--exchange``."""
+    function = click.option(
+        "--exchange",
+        type=click.FloatRange(min=0, max=10),
+        metavar="SECONDS",
+        show_default="0; 0.05 at speed 0",
+        help="How much simulated time each request takes besides.",
+    )(function)
+    return click.option(
+        "--speed",
+        type=click.FloatRange(min=0, max=1000),
+        default=1.0,
+        show_default=True,
+        metavar="FACTOR",
+        help="How many times faster than real the simulated time passes. At 0 it passes with "
+        "requests and steps of the control API alone.",
     )(function)
 
 

@@ -37,14 +37,14 @@ speed = 0
 
 [cells.glue]
 kind = "softmotion"
-modbus_tcp = "127.0.0.1:0"
-modbus_rtu = "pty"
+tcp = "127.0.0.1:0"
+serial = "pty"
 world = {{ eye_sigma_mm = 0.25 }}
 
 [cells.filler]
 kind = "plc"
 map = "{MAP}"
-modbus_tcp = "127.0.0.1:0"
+tcp = "127.0.0.1:0"
 """
 
 
@@ -64,6 +64,7 @@ def file(tmp_path):
 def test_every_option_of_a_command_is_a_key_of_its_table(kind):
     command = sim.commands[kind]
     alone = {"control", "with-parent", "idle-exit", "json", "lang", "help", "replay"}
+    alone |= {"modbus-tcp", "modbus-rtu"}  # what --tcp and --serial were called
     options = {max(it.opts, key=len).lstrip("-") for it in command.params} - alone
     keys = DeclaredKeys(command, Path()).options
     assert set(keys) == {name.replace("-", "_") for name in options}
@@ -109,7 +110,7 @@ state = "{{name}}.json"
 [cells.b]
 kind = "softmotion"
 count = 3
-modbus_tcp = "[::1]:7000"
+tcp = "[::1]:7000"
 can = "virtual:x"
 [cells.c]
 kind = "epson"
@@ -123,7 +124,7 @@ tcp = "127.0.0.1:6012"
         16,
         tmp_path / "a-12.json",
     )
-    assert [cells[f"b-{n}"].given["modbus_tcp"] for n in (1, 2, 3)] == [
+    assert [cells[f"b-{n}"].given["address"] for n in (1, 2, 3)] == [
         "[::1]:7000",
         "[::1]:7001",
         "[::1]:7002",

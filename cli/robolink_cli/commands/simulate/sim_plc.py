@@ -5,7 +5,9 @@ from typing import Any
 
 import click
 
+from robolink_cli.console.help_sections import SectionedCommand
 from robolink_cli.options.simulation import (
+    SECTIONS,
     ServedLife,
     allow_remote_option,
     faults_option,
@@ -17,7 +19,7 @@ from robolink_cli.options.simulation import (
 from robolink_cli.session.context import json_option
 
 
-@click.command("plc")
+@click.command("plc", cls=SectionedCommand, sections=SECTIONS)
 @click.option(
     "--map",
     "map_file",

@@ -5,7 +5,9 @@ from typing import Any
 
 import click
 
+from robolink_cli.console.help_sections import SectionedCommand
 from robolink_cli.options.simulation import (
+    SECTIONS,
     ServedLife,
     life_options,
     modbus_options,
@@ -21,7 +23,7 @@ def _complete_kinematics(_: click.Context, __: click.Parameter, start: str) -> l
     return complete_kinematics(start)
 
 
-@click.command()
+@click.command(cls=SectionedCommand, sections=SECTIONS)
 @modbus_options
 @click.option(
     "--can",

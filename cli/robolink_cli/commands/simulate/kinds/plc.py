@@ -22,8 +22,8 @@ def make_plc(
     unit: int,
     seed: int,
     faults: Path | None,
-    modbus_tcp: str | None,
-    modbus_rtu: str | None,
+    address: str | None,
+    serial: str | None,
     cell: str = "",
     **_placing: Any,  # noqa: ANN401 - other options
 ) -> PlcSimulator:
@@ -35,8 +35,8 @@ def make_plc(
         ConfigError: One of them makes no sense.
     """
     simulator = PlcSimulator(load_map(map_file), unit=unit, seed=seed)
-    served = {LinkKind.PLC_RTU} if modbus_rtu is not None else set()
-    if modbus_tcp is not None or modbus_rtu is None:
+    served = {LinkKind.PLC_RTU} if serial is not None else set()
+    if address is not None or serial is None:
         served |= {LinkKind.PLC_TCP}
     plan_faults(simulator, faults, served, cell=cell)
     return simulator
@@ -48,20 +48,20 @@ def _place(
     clock: ScaledClock,
     *,
     map_file: Path,
-    modbus_tcp: str | None,
-    modbus_rtu: str | None,
+    address: str | None,
+    serial: str | None,
     allow_remote: bool,
     **_making: Any,  # noqa: ANN401 - other options
 ) -> dict[str, str]:
     """Serve it on each bus."""
-    if modbus_tcp is None and modbus_rtu is None:
-        modbus_tcp = DEFAULT_ADDRESS
+    if address is None and serial is None:
+        address = DEFAULT_ADDRESS
     urls: dict[str, str] = {}
-    if modbus_tcp is not None:
-        listen = host_and_port(modbus_tcp, "--modbus-tcp")
+    if address is not None:
+        listen = host_and_port(address, "--tcp")
         tcp = serve_plc(simulator, map_file, *listen, clock=clock, allow_remote=allow_remote)
         urls["modbus-tcp"] = stack.enter_context(tcp).url
-    if modbus_rtu is not None:
+    if serial is not None:
         line = serve_plc_line(simulator, map_file, clock=clock)
         urls["modbus-rtu"] = stack.enter_context(line).url
     return urls

@@ -105,15 +105,15 @@ def _place(
 
 def _buses(
     *,
-    modbus_tcp: str | None,
-    modbus_rtu: str | None,
+    address: str | None,
+    serial: str | None,
     can: str | None,
     unit: int,
     node: int,
     allow_remote: bool,
     **_making: Any,  # noqa: ANN401 - other options
 ) -> Buses:
-    return Buses(modbus_tcp, modbus_rtu, can, unit=unit, node=node, allow_remote=allow_remote)
+    return Buses(address, serial, can, unit=unit, node=node, allow_remote=allow_remote)
 
 
 def _served(
@@ -127,7 +127,7 @@ def _served(
     if address is not None:
         from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
 
-        host, port = host_and_port(address, "--modbus-tcp")
+        host, port = host_and_port(address, "--tcp")
         tcp = serve_modbus_tcp(simulator, host, port, clock=clock, allow_remote=buses.allow_remote)
         urls["modbus-tcp"] = stack.enter_context(tcp).url
     if buses.modbus_rtu is not None:

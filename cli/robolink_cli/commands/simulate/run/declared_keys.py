@@ -1,6 +1,6 @@
 """The keys of a simulated cell in a file: the options of its command, and nothing besides.
 
-Each key is the name of an option without its dashes: ``--modbus-tcp`` is ``modbus_tcp``. What a
+Each key is the name of an option without its dashes: ``--allow-remote`` is ``allow_remote``. What a
 value may be is asked of the option itself, so that file and command line cannot differ.
 """
 
@@ -42,6 +42,7 @@ class DeclaredKeys:
             for option in command.params
             if isinstance(option, click.Option)
             and option.expose_value
+            and not option.hidden
             and (key := _key_of(option)) not in _OF_THE_RUN
         }
 

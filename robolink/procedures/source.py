@@ -153,6 +153,34 @@ class MovingSource(TipSource, Protocol):
 
 
 @runtime_checkable
+class TouchesFurther(Protocol):
+    """A source in which a person may go back to the touches of a measurement."""
+
+    @property
+    def adds_touch(self) -> bool | None:
+        """Whether one more can be made than planned; ``None`` where none can be made again."""
+
+    def further(
+        self,
+        context: MeasurementContext,
+        stored: ToolOffset | None,
+        result: CalibrationResult,
+        again: int | None,
+    ) -> CalibrationResult:
+        """Go on with a measurement that has ended, in Tool 0; ends lifted.
+
+        Args:
+            context: What to work with.
+            stored: The offset stored now.
+            result: What was measured, with the touches that were made.
+            again: Index of the touch that is made again, ``None`` for one more.
+
+        Raises:
+            CalibrationError: As the measurement.
+        """
+
+
+@runtime_checkable
 class StopsAbovePin(Protocol):
     """A source that brings the tip near a pin, and leaves the rest to the person."""
 

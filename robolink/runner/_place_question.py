@@ -31,7 +31,7 @@ MOST_NOT_YET: Final = 3
 """So often a place is asked for that is not to be taken yet, before it ends the measurement."""
 
 AGAIN: Final = "taken_again"
-"""The code with which a person begins the touches anew."""
+"""The code with which a person wants an earlier touch again."""
 
 MOST_REFUSED: Final = 10
 """So many answers in a row that lead nowhere end a question: whoever answers, a person or what
@@ -89,8 +89,8 @@ class PlaceQuestion:
         """Ask until the person says that it is there; return the pose, and how it was taken.
 
         Raises:
-            CalibrationError: ``typed_ahead``; ``taken_again`` where the person begins anew; and
-                what is not taken however often it is said, by its own code.
+            CalibrationError: ``typed_ahead``; ``taken_again`` where the person wants an earlier
+                touch again; and what is not taken however often it is said, by its own code.
             ConfigError: The controller has no inputs, and one is to show contact.
             DeclinedError: The person ended it, or gets nowhere.
         """
@@ -109,8 +109,8 @@ class PlaceQuestion:
                     return touch
                 hasty += 1
                 self._refuse_hasty(why, hasty)
-            elif word == "again" and self._may_begin_anew:
-                raise _begun_anew()
+            elif word.startswith("again") and (again := self._again(word)) is not None:
+                raise again
             else:
                 refused = self._jogged(word, refused)
 
@@ -125,10 +125,20 @@ class PlaceQuestion:
     def _seconds(self) -> float:
         return (self._controller.clock.now_ns() - self._asked_ns) / NS_PER_S
 
-    @property
-    def _may_begin_anew(self) -> bool:
+    def _again(self, word: str) -> "TakenAgainError | None":
+        """Return the end of this question by which an earlier touch is made again.
+
+        ``again`` alone is the one before, ``again 1`` the first; ``None`` where there is none.
+        """
         subject = self._step.subject
-        return subject is not None and subject.number > 1 and not subject.proof
+        if subject is None or subject.number < 2 or subject.proof:
+            return None
+        named = word.removeprefix("again").strip() or str(subject.number - 1)
+        if not subject.retakes:
+            return TakenAgainError(1)
+        if not named.isdigit() or not 1 <= int(named) < subject.number:
+            return None
+        return TakenAgainError(int(named))
 
     def _looked_at(self) -> tuple[TouchedAt, NotYet | None]:
         """Return where the tip is, and why that does not count yet."""
@@ -219,12 +229,22 @@ class PlaceQuestion:
         )
 
 
-def _begun_anew() -> CalibrationError:
-    return CalibrationError(
-        AGAIN,
-        tr("The touches are begun again from the first."),
-        remedy=tr("Nothing was written."),
-    )
+class TakenAgainError(CalibrationError):
+    """A person wants an earlier touch again.
+
+    A procedure that does not hear it ends, and is begun anew.
+
+    Attributes:
+        number: Which touch, from 1.
+    """
+
+    def __init__(self, number: int) -> None:
+        super().__init__(
+            AGAIN,
+            tr("Touch {k} is made again.", k=number),
+            remedy=tr("Nothing was written."),
+        )
+        self.number = number
 
 
 class _ContactWatch:

@@ -204,10 +204,12 @@ class Confirm:
     Attributes:
         question: What is offered.
         fit: What a screen shows of it.
+        also: Further words that may answer it; it is answered with the word itself then.
     """
 
     question: str
     fit: FitSubject | None = field(default=None, compare=False)
+    also: tuple[str, ...] = ()
 
 
 TakenStep = Move | Ask | Seek | Look | Notify | Confirm

@@ -26,7 +26,7 @@ from robolink_cli.wizard.happenings import (
     WasTold,
     WizardCommand,
 )
-from robolink_cli.wizard.keys import folded, meaning_of, step_of, with_point
+from robolink_cli.wizard.keys import folded, meaning_of, number_in, step_of, with_point
 from robolink_cli.wizard.questions_flow import answered_by_key, answered_by_line
 from robolink_cli.wizard.state import (
     ARMED_AFTER_S,
@@ -211,11 +211,17 @@ def _take(state: WizardState, at_s: float) -> Advanced:
     return (state.says(why), []) if why else _answer(state, "done")
 
 
-def _again(state: WizardState) -> Advanced:
+def _again(state: WizardState, number: int | None = None) -> Advanced:
+    """Have an earlier touch made again: the one before, where no other is named."""
     touch = state.touch
     if touch is None or touch.number < 2 or touch.proof:
-        return state.says(tr("There is no earlier touch to begin with.")), []
-    return _answer(state, "again")
+        return state.says(tr("There is no earlier touch to make again.")), []
+    if not touch.retakes:
+        return _answer(state, "again")
+    number = touch.number - 1 if number is None else number
+    if not 1 <= number < touch.number:
+        return state.says(tr("Touch {k} was not made yet.", k=number)), []
+    return _answer(state, f"again {number}")
 
 
 def _line(state: WizardState, line: LineTyped) -> Advanced:
@@ -237,7 +243,7 @@ def _line_at_place(state: WizardState, line: LineTyped, meaning: str) -> Advance
     if meaning == "take":
         return _take(state, line.at_s)
     if meaning == "again":
-        return _again(state)
+        return _again(state, number_in(line.text))
     if meaning == "help":
         return state.says(help_at_place()), []
     pointed = with_point(line.text)
@@ -251,7 +257,7 @@ def help_at_place() -> str:
     """Return what can be typed at a place."""
     return tr(
         "Steps: x+0.1 moves 0.1 mm to +X; x y z in mm, u in degrees; several at once: x+0.1 z-0.5. "
-        "take records, again 1 begins at touch 1, stop ends."
+        "take records, again 1 makes touch 1 again, stop ends."
     )
 
 

@@ -1,5 +1,7 @@
 """The flow of the wizard: what a key or a line does, and what it never does."""
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -206,6 +208,48 @@ def test_lines_at_a_touch(line, sent, message):
     assert "take records" in at_touch().line("帮助").state.message
 
 
+@pytest.mark.parametrize(
+    ("line", "sent"),
+    [("/", "again 3"), ("again 1", "again 1"), ("again", "again 3"), ("again 4", None)],
+)
+def test_one_earlier_touch_is_made_again_where_the_method_hears_it(line, sent):
+    hand = at_touch(number=4, retakes=True)
+    hand = hand.keys("/") if line == "/" else hand.line(line)
+    assert hand.sent == ([sent] if sent else [])
+    assert sent or hand.state.message == "Touch 4 was not made yet."
+
+
+@pytest.mark.parametrize(
+    ("again", "adds", "typed", "sent"),
+    [
+        (3, True, "/", "back"),
+        (3, True, "+", "more"),
+        (3, False, "+", None),
+        (None, True, "/", None),
+        (None, True, "+", None),
+    ],
+)
+def test_from_the_new_values_one_key_goes_back_to_the_touches(again, adds, typed, sent):
+    subject = replace(write_subject(1), again=again, adds_touch=adds)
+    assert Sitting().asked(subject, Question.YES_NO).keys(typed).sent == ([sent] if sent else [])
+    words = {"/": "back", "+": "more"}
+    line = Sitting().asked(subject, Question.YES_NO).line(words[typed])
+    assert line.sent == ([sent] if sent else [])
+
+
+def test_one_more_touch_is_offered_beside_the_worst():
+    first = replace(fit_subject(0.006, 0.08, 0.004, worst=1), more=True)
+    later = replace(fit_subject(0.02, 0.03, 0.02, worst=1), more=True)
+    for fit, answers in (
+        (first, {"5": "y", "1": "more", "3": "n", "/": "y"}),
+        (later, {"5": "n", "1": "more", "/": "y"}),
+    ):
+        for key, sent in answers.items():
+            assert Sitting().asked(fit, Question.YES_NO).keys(key).sent == [sent]
+        assert Sitting().asked(fit, Question.YES_NO).line("再触碰").sent == ["more"]
+        assert Sitting().asked(fit, Question.YES_NO).line("again").sent == ["y"]
+
+
 def test_the_first_touch_and_the_turn_test_are_not_begun_again():
     assert at_touch(number=1, arrival=None).keys("/").sent == []
     assert at_touch(proof=True).keys("/").sent == []
@@ -221,12 +265,28 @@ def test_a_reading_that_is_old_takes_no_touch():
 
 
 NAMES = [*"0123456789+-*/nyqt", "main", "stop", "enter", "backspace"]
-WORDS = ["take", "done", "again", "y", "n", "1", "", "x+0.1", "z-2", "stop", "记录", "12"]
+WORDS = [
+    "take",
+    "done",
+    "again",
+    "y",
+    "n",
+    "1",
+    "",
+    "x+0.1",
+    "z-2",
+    "stop",
+    "记录",
+    "12",
+    "back",
+    "more",
+]
 SUBJECTS = [
     (touch_subject(), Question.PLACE),
     (touch_subject(arrival=None, number=1), Question.PLACE),
     (write_subject(1), Question.YES_NO),
-    (write_subject(3), Question.YES_NO),
+    (replace(write_subject(3), again=2, adds_touch=True), Question.YES_NO),
+    (touch_subject(retakes=True), Question.PLACE),
     (CHECK, Question.YES_NO),
     (fit_subject(0.1, 0.01, worst=0), Question.YES_NO),
     (None, Question.YES_NO),

@@ -1,6 +1,7 @@
 """Screens are compared with stored text, in two languages and one that is 40 % longer."""
 
 import unicodedata
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -62,6 +63,13 @@ SCREENS = {
         fit_subject(0.006, 0.004, 0.131, 0.007, worst=2), Question.YES_NO
     ),
     "values": lambda: Sitting().asked(write_subject(1), Question.YES_NO).keys("1"),
+    "values again": lambda: Sitting().asked(
+        replace(write_subject(1), again=3, adds_touch=True), Question.YES_NO
+    ),
+    "fit more": lambda: Sitting().asked(
+        replace(fit_subject(0.006, 0.004, 0.131, 0.007, worst=2), more=True), Question.YES_NO
+    ),
+    "touch again": lambda: Sitting().asked(touch_subject(number=3, retakes=True)),
     "two tools": lambda: Sitting().asked(write_subject(1, 2), Question.YES_NO),
     "question": lambda: Sitting().asked(None, Question.YES_NO, "Is the valve shut?"),
     "text": lambda: Sitting().asked(None, Question.TEXT, "Id of the new needle?").keys(*"N-0418"),

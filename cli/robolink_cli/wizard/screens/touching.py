@@ -119,4 +119,6 @@ def _actions(touch: TouchSubject | None) -> tuple[tuple[str, str], ...]:
     take, stop = ("5", tr("Record this touch")), ("0", tr("STOP"))
     if touch.number < 2:
         return take, stop
-    return take, ("/", tr("Begin at touch 1 again")), stop
+    if not touch.retakes:
+        return take, ("/", tr("Begin at touch 1 again")), stop
+    return take, ("/", tr("Touch {k} again", k=touch.number - 1)), stop

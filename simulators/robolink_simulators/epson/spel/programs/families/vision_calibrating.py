@@ -65,7 +65,7 @@ def _calibrating(t: SpelTask, name: str, poses: tuple[Pose, ...]) -> Iterator[Ta
     pixels, places = list[Pixel](), list[tuple[float, float]]()
     vision, machine = vision_of(t), t.session.machine
     for pose in poses:
-        going = StatementWaiting(t.runner.carried_out(t, _go_to(pose)))
+        going = StatementWaiting(t.runner.steps.carried_out(t, _go_to(pose)))
         yield going
         if going.execution.error is not None:
             raise RaisedError(going.execution.error.number, going.execution.error.text)

@@ -15,6 +15,7 @@ from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.happenings import (
     Effect,
     Happening,
+    HasEnded,
     KeyPressed,
     LineTyped,
     SendAnswer,
@@ -32,6 +33,7 @@ from robolink_cli.wizard.state import (
     ARMED_AFTER_S,
     LEAST_WAY_MM,
     STEP_SIZES,
+    Ended,
     Header,
     Jogging,
     WizardState,
@@ -54,6 +56,10 @@ def advance(state: WizardState, happening: Happening) -> Advanced:
             return _regarding(state, subject), []
         case WasAsked():
             return _asked(state, happening), []
+        case HasEnded(ended=Ended() as ended):
+            return replace(state, ended=ended, message=""), []
+        case HasEnded():
+            return state, []
         case WaitsForAnswer():
             return _waiting(state, happening.at_s), []
         case TooFast():
@@ -170,7 +176,20 @@ def _armed(state: WizardState, at_s: float) -> bool:
     return state.question is not None and at_s - state.question.at_s >= ARMED_AFTER_S
 
 
+def _last_key(state: WizardState, ended: Ended, key: KeyPressed) -> Advanced:
+    """Leave the last screen, or begin again; ENTER does neither."""
+    if key.at_s - ended.at_s < ARMED_AFTER_S:
+        return state, []
+    if key.name in ("stop", "0", "q") or (ended.done and key.name in ("5", "main")):
+        return state, [WizardCommand.LEAVE]
+    if key.name in ("5", "main"):
+        return replace(state, begins_again=True), [WizardCommand.BEGIN_AGAIN]
+    return state, []
+
+
 def _key(state: WizardState, key: KeyPressed) -> Advanced:
+    if state.ended is not None:
+        return _last_key(state, state.ended, key)
     if key.name == "stop" or (key.name == "0" and not (state.has_field and key.text)):
         return _stop(state)
     if state.question is None or not state.waits or not _armed(state, key.at_s):

@@ -61,11 +61,33 @@ class Header:
         cell: Name of the cell, or how the controller is reached.
         job: What is done.
         simulated: Whether nothing real moves.
+        command: What is typed to begin the same job once more, empty where nobody typed it.
+        needle: Id of the needle or nozzle, empty where nobody was asked.
     """
 
     cell: str
     job: str
     simulated: bool = False
+    command: str = ""
+    needle: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """How the work ended, for the last screen.
+
+    Attributes:
+        done: Whether it was carried out.
+        lines: What the screen says.
+        kept: What stays on the terminal when the screen is gone; how every command ends is said
+            besides.
+        at_s: When.
+    """
+
+    done: bool
+    lines: tuple[str, ...]
+    kept: tuple[str, ...]
+    at_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +112,8 @@ class WizardState:
         message: The row above the keys.
         ending: Whether the work was told to end.
         report: What was reached, ``None`` before the end.
+        ended: The last screen, ``None`` before it.
+        begins_again: Whether the same job is to be begun once more.
     """
 
     header: Header
@@ -108,6 +132,8 @@ class WizardState:
     message: str = ""
     ending: bool = False
     report: ChangeReport | None = None
+    ended: Ended | None = None
+    begins_again: bool = False
 
     def says(self, message: str) -> "WizardState":
         """Return the same with another message."""

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from robolink_cli.wizard.happenings import (
+    HasEnded,
     KeyPressed,
     LineTyped,
     Reading,
@@ -17,7 +18,7 @@ from robolink_cli.wizard.happenings import (
     WasTold,
     WizardCommand,
 )
-from robolink_cli.wizard.state import STEP_SIZES
+from robolink_cli.wizard.state import STEP_SIZES, Ended
 
 from robolink.model import Path as Way
 from robolink.model import Pose
@@ -262,6 +263,28 @@ def test_a_reading_that_is_old_takes_no_touch():
     hand.now += 2.0
     hand.keys("5")
     assert hand.state.message == "No reading from the controller for 2 s."
+
+
+@pytest.mark.parametrize(
+    ("done", "key", "effect"),
+    [
+        (True, "5", WizardCommand.LEAVE),
+        (True, "0", WizardCommand.LEAVE),
+        (True, "enter", None),
+        (False, "5", WizardCommand.BEGIN_AGAIN),
+        (False, "stop", WizardCommand.LEAVE),
+        (False, "enter", None),
+        (False, "6", None),
+    ],
+)
+def test_the_last_screen_is_left_by_its_keys_alone_and_not_by_one_that_is_held(done, key, effect):
+    hand = at_touch()
+    hand.happens(HasEnded(Ended(done, ("line",), (), hand.now)))
+    hand.now += 0.2
+    assert hand.keys(key).sent == []
+    hand.now += 0.2
+    assert hand.keys(key).sent == ([effect] if effect else [])
+    assert hand.state.begins_again is (effect is WizardCommand.BEGIN_AGAIN)
 
 
 NAMES = [*"0123456789+-*/nyqt", "main", "stop", "enter", "backspace"]

@@ -130,7 +130,7 @@ class NozzleChange:
                 self._controller.tools.require_writable(one.tool)
             require_measurable(self._controller, self._plan)
         require_contacts(self._controller, self._plan)
-        plan, listener, context = self._plan, self._listener, self._context()
+        plan, listener, context = self._plan, self._listener, self._context(write=write)
         measuring = Measuring(context, listener)
         measuring.go_to(plan.safe, tr("Moving to the safe pose."))
         listener.moment(Moment.START, context)
@@ -166,7 +166,7 @@ class NozzleChange:
             measured = [(plan, measuring.further(plan, before, again=further.again))]
         return proposals
 
-    def _context(self) -> MeasurementContext:
+    def _context(self, *, write: bool) -> MeasurementContext:
         start = None
         if self._plan.moves:
             self._controller.tools.select(0)
@@ -178,6 +178,7 @@ class NozzleChange:
             start=start,
             settings=settings,
             offers=self._plan.ask_before_write,
+            types=write and all(one.verify and one.moving for one in self._plan.tools),
         )
 
     def _checked(

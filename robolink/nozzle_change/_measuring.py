@@ -99,10 +99,12 @@ class Measuring:
         self._listener.moment(Moment.BEFORE_MEASURE, context, tool)
         before = context.controller.tools.read(tool)
         with self._watched(plan):
-            result = plan.named(measure(before))
+            result, notes = told_of_typed(plan.named(measure(before)))
             plan.criteria.judge_fit(result)
             rests_on = self._station_record(plan.station)
-            fresh = Proposal(tool, before, result, record=rests_on, kept_record=rests_on)
+            fresh = Proposal(
+                tool, before, result, notes=notes, record=rests_on, kept_record=rests_on
+            )
             proposal = self._listener.adjusted(fresh, context)
         entry = calibration_entry(
             proposal,
@@ -156,6 +158,18 @@ class Measuring:
         # The error that is under way matters more than that it cannot be recorded.
         with suppress(ConfigError, RobolinkError):
             self._context.controller.outcomes.append(entry)
+
+
+def told_of_typed(result: CalibrationResult) -> tuple[CalibrationResult, tuple[str, ...]]:
+    """Return a result that says which of its touches were only typed, and that in words."""
+    typed = [n for n, touch in enumerate(touches_of(result), start=1) if touch.typed]
+    if not typed:
+        return result, ()
+    told = tr(
+        "Typed, not touched: touch {numbers}. The turn test has to prove it.",
+        numbers=", ".join(map(str, typed)),
+    )
+    return replace(result, notes=(*result.notes, "touches_not_witnessed")), (told,)
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,6 +23,7 @@ class MeasurementContext:
     Args:
         settings: Limits and speeds for a tip at an offset from the flange.
         offers: Whether the person is asked about what a procedure offers.
+        types: Whether the pose of a touch may be typed: a turn test by touches follows.
     """
 
     def __init__(
@@ -33,7 +34,9 @@ class MeasurementContext:
         start: Pose | None,
         settings: Callable[[Pose, ToolOffset | None], RunSettings],
         offers: bool = True,
+        types: bool = False,
     ) -> None:
+        self._types = types
         self.controller = controller
         self.operator = operator
         self.start = start
@@ -95,6 +98,7 @@ class MeasurementContext:
             offers=self._offers,
             # About a new tip nothing is repeated: its value is written and not yet proved.
             repeats=tip is None,
+            types=self._types and tip is None,
         )
 
 

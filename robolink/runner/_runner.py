@@ -28,7 +28,7 @@ from robolink.model import (
 )
 from robolink.runner._endings import as_measurement, ended_by
 from robolink.runner._foreseeing import considered
-from robolink.runner._jog_steps import jog_target, parse_steps, way_in_words
+from robolink.runner._jog_steps import jog_target, parse_steps, typed_pose, way_in_words
 from robolink.runner._operator import Operator, Question
 from robolink.runner._place_question import MOST_REFUSED, PlaceQuestion, ended_by_operator
 from robolink.runner._settings import RunSettings
@@ -92,6 +92,8 @@ class Runner:
         offers: Whether the person is asked about offers; else each is declined unasked.
         repeats: Whether the person is also asked to repeat a step that ended because this
             computer fell silent. It is for measuring, where nothing was written yet.
+        types: Whether the person may type the pose of a touch that says it may be typed; what
+            rests on it has to be proved by touches.
     """
 
     def __init__(
@@ -105,6 +107,7 @@ class Runner:
         camera: TipSensor | None = None,
         offers: bool = True,
         repeats: bool = False,
+        types: bool = False,
     ) -> None:
         self._controller = controller
         self._group = group
@@ -113,6 +116,7 @@ class Runner:
         self._on_step = on_step
         self._camera = camera
         self._offers = offers
+        self._types = types
         self._runs = False
         self._repeats_left = _MOST_REPEATS if offers and repeats else 0
 
@@ -268,6 +272,7 @@ class Runner:
             jog=self._jogged,
             line=self._line,
             runs=lambda: self._runs,
+            typed=self._typed_pose if self._types else None,
         )
         return question.answer()
 
@@ -276,6 +281,9 @@ class Runner:
         repeats_left = self._repeats_left
         self.jog(steps)
         return self._repeats_left != repeats_left
+
+    def _typed_pose(self, text: str, here: Pose) -> Pose:
+        return typed_pose(text, here, self._settings)
 
     def _seen_through(self, go: Callable[[], T], target: Pose) -> T:
         """Move, and once more from where the robot stands if this computer was too busy to.

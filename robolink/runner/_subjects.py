@@ -28,6 +28,7 @@ class TouchSubject:
         proof: Whether it is a touch of the turn test.
         retakes: Whether an earlier touch may be made again from here, alone; else all of them are
             begun again from the first.
+        types: Whether the pose may be typed in place of being read.
     """
 
     number: int = 0
@@ -37,6 +38,7 @@ class TouchSubject:
     contact: InputEdge | None = None
     proof: bool = False
     retakes: bool = False
+    types: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,15 +27,15 @@ from robolink_cli.wizard.happenings import (
     WasTold,
     WizardCommand,
 )
-from robolink_cli.wizard.keys import folded, meaning_of, number_in, step_of, with_point
-from robolink_cli.wizard.questions_flow import answered_by_key, answered_by_line
+from robolink_cli.wizard.keys import folded, meaning_of, number_in, pose_in, step_of, with_point
+from robolink_cli.wizard.questions_flow import answered_by_key, answered_by_line, into_field
 from robolink_cli.wizard.state import (
     ARMED_AFTER_S,
     LEAST_WAY_MM,
     STEP_SIZES,
-    Ended,
     Header,
     Jogging,
+    LastScreen,
     WizardState,
 )
 
@@ -56,7 +56,7 @@ def advance(state: WizardState, happening: Happening) -> Advanced:
             return _regarding(state, subject), []
         case WasAsked():
             return _asked(state, happening), []
-        case HasEnded(ended=Ended() as ended):
+        case HasEnded(ended=LastScreen() as ended):
             return replace(state, ended=ended, message=""), []
         case HasEnded():
             return state, []
@@ -143,6 +143,8 @@ def _asked(state: WizardState, asked: WasAsked) -> WizardState:
         fresh=(),
         waits=False,
         typed="",
+        typing=False,
+        pose_typed="",
         marked=state.subject.marked if isinstance(state.subject, ChoiceSubject) else None,
         message="",
         ending=False,
@@ -176,7 +178,7 @@ def _armed(state: WizardState, at_s: float) -> bool:
     return state.question is not None and at_s - state.question.at_s >= ARMED_AFTER_S
 
 
-def _last_key(state: WizardState, ended: Ended, key: KeyPressed) -> Advanced:
+def _last_key(state: WizardState, ended: LastScreen, key: KeyPressed) -> Advanced:
     """Leave the last screen, or begin again; ENTER does neither."""
     if key.at_s - ended.at_s < ARMED_AFTER_S:
         return state, []
@@ -202,7 +204,11 @@ def _key(state: WizardState, key: KeyPressed) -> Advanced:
 
 
 def _key_at_place(state: WizardState, key: KeyPressed) -> Advanced:
+    if state.typing:
+        return _key_in_pose(state, key)
     jogging = state.jogging
+    if key.name in (".", "delete"):
+        return _begin_pose(state)
     if key.name in ("+", "-"):
         size = jogging.size + (1 if key.name == "+" else -1)
         size = min(max(size, 0), len(STEP_SIZES) - 1)
@@ -220,12 +226,39 @@ def _key_at_place(state: WizardState, key: KeyPressed) -> Advanced:
     return (state, []) if step is None else _jog(state, step, key.at_s)
 
 
+def _begin_pose(state: WizardState) -> Advanced:
+    """Open the field into which a pose is typed."""
+    if state.touch is None or not state.touch.types:
+        return state.says(tr("Here no pose can be typed.")), []
+    return replace(state, typing=True, typed="", pose_typed="", message=""), []
+
+
+def _key_in_pose(state: WizardState, key: KeyPressed) -> Advanced:
+    """Fill the field; ENTER closes it, and takes nothing."""
+    if key.name != "enter":
+        return into_field(state, key), []
+    return _pose_typed(replace(state, typing=False), state.typed)
+
+
+def _pose_typed(state: WizardState, text: str) -> Advanced:
+    """Keep a typed pose until it is taken."""
+    numbers = folded(text).replace(";", " ").split()
+    if not numbers:
+        return replace(state, pose_typed="", message=""), []
+    if len(numbers) not in (4, 6):
+        return state.says(tr("A pose is X Y Z U, or X Y Z U V W. Nothing was taken.")), []
+    said = tr("Typed: {pose}. [5] or take records it as typed.", pose=" ".join(numbers))
+    return replace(state, pose_typed=" ".join(numbers), message=said), []
+
+
 def _jog(state: WizardState, step: str, at_s: float) -> Advanced:
     jogging = replace(state.jogging, ended_s=at_s)
-    return _answer(replace(state, jogging=jogging), step)
+    return _answer(replace(state, jogging=jogging, pose_typed=""), step)
 
 
 def _take(state: WizardState, at_s: float) -> Advanced:
+    if state.pose_typed:
+        return _answer(replace(state, pose_typed=""), f"pose {state.pose_typed}")
     why = not_yet(state, at_s)
     return (state.says(why), []) if why else _answer(state, "done")
 
@@ -265,6 +298,10 @@ def _line_at_place(state: WizardState, line: LineTyped, meaning: str) -> Advance
         return _again(state, number_in(line.text))
     if meaning == "help":
         return state.says(help_at_place()), []
+    typed = pose_in(line.text)
+    if typed is not None:
+        begun, _ = _begin_pose(state)
+        return _pose_typed(replace(begun, typing=False), typed) if begun.typing else (begun, [])
     pointed = with_point(line.text)
     if pointed is not None:
         said = tr("Write the decimal point as '.': {step}. Nothing moved.", step=pointed)
@@ -276,7 +313,7 @@ def help_at_place() -> str:
     """Return what can be typed at a place."""
     return tr(
         "Steps: x+0.1 moves 0.1 mm to +X; x y z in mm, u in degrees; several at once: x+0.1 z-0.5. "
-        "take records, again 1 makes touch 1 again, stop ends."
+        "take records, pose X Y Z U types one, again 1 makes touch 1 again, stop ends."
     )
 
 

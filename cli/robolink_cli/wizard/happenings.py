@@ -111,7 +111,7 @@ class HasEnded:
     """The work has ended, and its last screen is shown.
 
     Attributes:
-        ended: A :class:`~robolink_cli.wizard.state.Ended`.
+        ended: A :class:`~robolink_cli.wizard.state.LastScreen`.
     """
 
     ended: object

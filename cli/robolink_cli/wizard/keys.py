@@ -68,6 +68,12 @@ def number_in(text: str) -> int | None:
     return int(words[1]) if len(words) == 2 and words[1].isdigit() else None
 
 
+def pose_in(text: str) -> str | None:
+    """Return the numbers behind ``pose``, ``None`` where the line is none."""
+    word, _, rest = folded(text).partition(" ")
+    return rest if word in ("pose", "位姿") else None
+
+
 def with_point(text: str) -> str | None:
     """Return a step with its decimal comma written as a point; ``None`` where it has none."""
     plain = folded(text)

@@ -122,10 +122,11 @@ def _choice_key(state: WizardState, subject: ChoiceSubject, key: KeyPressed) -> 
 def _text_key(state: WizardState, key: KeyPressed) -> Answered:
     if key.name == "enter":
         return state.typed.strip() or state.says(tr("Nothing was typed."))
-    return _into_field(state, key)
+    return into_field(state, key)
 
 
-def _into_field(state: WizardState, key: KeyPressed) -> WizardState:
+def into_field(state: WizardState, key: KeyPressed) -> WizardState:
+    """Write a key into the field."""
     if key.name == "backspace":
         return replace(state, typed=state.typed[:-1], message="")
     return replace(state, typed=(state.typed + key.text)[:60], message="") if key.text else state
@@ -140,7 +141,7 @@ def _write_key(state: WizardState, subject: WriteSubject, key: KeyPressed) -> An
     if word in offered_words(subject):
         return word
     if key.text.isdigit() or key.name == "backspace":
-        return _into_field(state, key)
+        return into_field(state, key)
     return state  # ENTER never writes
 
 

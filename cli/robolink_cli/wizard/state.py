@@ -73,7 +73,7 @@ class Header:
 
 
 @dataclass(frozen=True, slots=True)
-class Ended:
+class LastScreen:
     """How the work ended, for the last screen.
 
     Attributes:
@@ -106,6 +106,8 @@ class WizardState:
             where the robot put it.
         jogging: The steps made.
         typed: What stands in the field.
+        typing: Whether the field of a pose is open at a touch.
+        pose_typed: The pose that was typed there, and is taken next; empty for none.
         marked: Index of the marked row of a list.
         remarks: What was told last, oldest first.
         fresh: What of it was told since the last question, so that nobody had a screen to read it.
@@ -126,13 +128,15 @@ class WizardState:
     carried: bool = False
     jogging: Jogging = field(default_factory=Jogging)
     typed: str = ""
+    typing: bool = False
+    pose_typed: str = ""
     marked: int | None = None
     remarks: tuple[str, ...] = ()
     fresh: tuple[str, ...] = ()
     message: str = ""
     ending: bool = False
     report: ChangeReport | None = None
-    ended: Ended | None = None
+    ended: LastScreen | None = None
     begins_again: bool = False
 
     def says(self, message: str) -> "WizardState":
@@ -163,6 +167,8 @@ class WizardState:
         question = self.question
         if isinstance(self.subject, ChoiceSubject):
             return False
+        if self.typing:
+            return True
         return self.writing is not None or (question is not None and question.kind is Question.TEXT)
 
     @property

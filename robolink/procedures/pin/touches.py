@@ -142,12 +142,16 @@ class PinTouches(WitnessedTouches):
         return lift_off(self._plan, touch)
 
     @property
+    def _may_be_typed(self) -> bool:
+        return not self._proof
+
+    @property
     def _compares_heights(self) -> bool:
         return self._planar
 
     def _not_yet(self, touch: TouchedAt, arrival: Pose) -> NotYet | None:
         made = replace(touch, arrival=arrival)
-        if not self._made(made):
+        if not (touch.typed or self._made(made)):
             return None  # told by whoever asks for it once more
         return super()._not_yet(touch, arrival) or self._in_the_air(touch) or self._unturned(made)
 

@@ -98,7 +98,7 @@ class WitnessedTouches(ABC):
         )
         for left in reversed(range(MOST_ASKED)):
             touch = yield from self._answered(ask, arrival, standoff_mm)
-            if self._plan.nominal or self._made(touch):
+            if self._plan.nominal or touch.typed or self._made(touch):
                 self._taken[key] = touch
                 return touch
             told = self._not_made(touch)
@@ -128,6 +128,7 @@ class WitnessedTouches(ABC):
             contact=self._plan.contact,
             proof=self._proof,
             retakes=self._retakes,
+            types=self._may_be_typed,
         )
 
     @property
@@ -139,6 +140,11 @@ class WitnessedTouches(ABC):
     def _count(self) -> int:
         """Return which touch the next one is that is not made again, from 1."""
         return max(self._numbers.values(), default=0) + 1
+
+    @property
+    def _may_be_typed(self) -> bool:
+        """Whether the pose of one may be typed in place of being read."""
+        return False
 
     @property
     def _compares_heights(self) -> bool:
@@ -183,9 +189,10 @@ class WitnessedTouches(ABC):
         except CalibrationError:
             yield self.off(arrival)
             raise
-        return replace(
-            TouchedAt.of(answer), arrival=arrival, standoff_mm=standoff_mm, seed=self._seed
-        )
+        touch = replace(TouchedAt.of(answer), seed=self._seed)
+        if touch.typed:
+            return touch  # nothing shows that its standoff was jogged away
+        return replace(touch, arrival=arrival, standoff_mm=standoff_mm)
 
     def _made(self, touch: TouchedAt) -> bool:
         if self._plan.contact is not None:

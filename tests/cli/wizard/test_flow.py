@@ -18,7 +18,7 @@ from robolink_cli.wizard.happenings import (
     WasTold,
     WizardCommand,
 )
-from robolink_cli.wizard.state import STEP_SIZES, Ended
+from robolink_cli.wizard.state import STEP_SIZES, LastScreen
 
 from robolink.model import Path as Way
 from robolink.model import Pose
@@ -279,7 +279,7 @@ def test_a_reading_that_is_old_takes_no_touch():
 )
 def test_the_last_screen_is_left_by_its_keys_alone_and_not_by_one_that_is_held(done, key, effect):
     hand = at_touch()
-    hand.happens(HasEnded(Ended(done, ("line",), (), hand.now)))
+    hand.happens(HasEnded(LastScreen(done, ("line",), (), hand.now)))
     hand.now += 0.2
     assert hand.keys(key).sent == []
     hand.now += 0.2
@@ -287,7 +287,31 @@ def test_the_last_screen_is_left_by_its_keys_alone_and_not_by_one_that_is_held(d
     assert hand.state.begins_again is (effect is WizardCommand.BEGIN_AGAIN)
 
 
-NAMES = [*"0123456789+-*/nyqt", "main", "stop", "enter", "backspace"]
+def test_a_pose_is_typed_into_a_field_that_enter_only_closes():
+    hand = at_touch(types=True).keys(".").keys(*"250.1 199.9 -83.5 90")
+    assert hand.sent == []
+    assert hand.state.typing
+    hand.key("enter")
+    assert (hand.sent, hand.state.typing) == ([], False)
+    assert "Typed: 250.1 199.9 -83.5 90." in hand.state.message
+    assert hand.keys("5").sent == ["pose 250.1 199.9 -83.5 90"]
+    line = at_touch(types=True).line("pose 250.1 199.9 -83.5 90")
+    assert line.sent == []
+    assert line.line("take").sent == ["pose 250.1 199.9 -83.5 90"]
+
+
+def test_a_typed_pose_is_gone_after_a_step_and_where_none_is_taken():
+    hand = at_touch(types=True).line("pose 1 2 3 4").keys("6")
+    assert hand.jogs("x+0.1").keys("5").sent == ["x+0.1", "done"]
+    assert at_touch().keys(".").state.message == "Here no pose can be typed."
+    assert at_touch().line("pose 1 2 3 4").state.pose_typed == ""
+    three = at_touch(types=True).line("pose 1 2 3")
+    assert "Nothing was taken." in three.state.message
+    assert three.keys("5").sent == []
+    assert at_touch(types=True).keys(".").key("stop").sent == ["q"]
+
+
+NAMES = [*"0123456789+-*/nyqt. ", "main", "stop", "enter", "backspace"]
 WORDS = [
     "take",
     "done",
@@ -309,7 +333,7 @@ SUBJECTS = [
     (touch_subject(arrival=None, number=1), Question.PLACE),
     (write_subject(1), Question.YES_NO),
     (replace(write_subject(3), again=2, adds_touch=True), Question.YES_NO),
-    (touch_subject(retakes=True), Question.PLACE),
+    (touch_subject(retakes=True, types=True), Question.PLACE),
     (CHECK, Question.YES_NO),
     (fit_subject(0.1, 0.01, worst=0), Question.YES_NO),
     (None, Question.YES_NO),
@@ -326,7 +350,7 @@ HAPPENINGS = st.one_of(
 
 def check_history(history, first):
     """Nothing is taken unjogged and nothing written untyped, whatever comes in which order."""
-    hand, pose, moved, digits, lined = Sitting(), ARRIVAL, 0.0, "", ""
+    hand, pose, moved, digits, lined, posed = Sitting(), ARRIVAL, 0.0, "", "", False
     hand.asked(*SUBJECTS[first])
     for what, of in history:
         before = len(hand.sent)
@@ -336,10 +360,10 @@ def check_history(history, first):
             digits = "" if of == "backspace" else digits
             hand.key(of, of if len(of) == 1 else "")
         elif what == "line":
-            lined = of
+            lined, posed = of, posed or of.startswith("pose")
             hand.line(of)
         elif what == "ask":
-            pose, moved, digits, lined = ARRIVAL, 0.0, "", ""
+            pose, moved, digits, lined, posed = ARRIVAL, 0.0, "", "", False
             hand.asked(*SUBJECTS[of])
         elif what == "jogged":
             there = Pose(pose.x_mm, pose.y_mm, pose.z_mm - of, 90.0, tool=0)
@@ -357,6 +381,10 @@ def check_history(history, first):
         for text in hand.sent[before:]:
             if text == "done" and state.touch is not None and state.touch.arrival is not None:
                 assert moved > 0.0
+            if text.startswith("pose"):
+                assert state.touch is not None
+                assert state.touch.types
+                assert len(digits) >= 4 or posed
             if text == "y" and state.writing is not None:
                 number = str(state.writing.tools[0])
                 assert number in digits or lined == number

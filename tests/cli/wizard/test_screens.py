@@ -100,7 +100,10 @@ SCREENS = {
     "fit more": lambda: Sitting().asked(
         replace(fit_subject(0.006, 0.004, 0.131, 0.007, worst=2), more=True), Question.YES_NO
     ),
-    "touch again": lambda: Sitting().asked(touch_subject(number=3, retakes=True)),
+    "touch again": lambda: Sitting().asked(touch_subject(number=3, retakes=True, types=True)),
+    "touch typed": lambda: (
+        Sitting().asked(touch_subject(types=True)).keys(".").keys(*"250.112 199.954")
+    ),
     "two tools": lambda: Sitting().asked(write_subject(1, 2), Question.YES_NO),
     "question": lambda: Sitting().asked(None, Question.YES_NO, "Is the valve shut?"),
     "text": lambda: Sitting().asked(None, Question.TEXT, "Id of the new needle?").keys(*"N-0418"),

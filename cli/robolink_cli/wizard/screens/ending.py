@@ -10,7 +10,7 @@ from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.screens.layout import Screen
 from robolink_cli.wizard.screens.rows import mm, title_row
 from robolink_cli.wizard.screens.touching import touch_title
-from robolink_cli.wizard.state import Ended, WizardState
+from robolink_cli.wizard.state import LastScreen, WizardState
 
 
 def done_lines(state: WizardState, report: ChangeReport) -> list[str]:
@@ -54,7 +54,7 @@ def _tool_lines(report: ToolReport, needle: str) -> list[str]:
     return lines
 
 
-def ended_of(state: WizardState, error: BaseException | None, at_s: float) -> Ended | None:
+def ended_of(state: WizardState, error: BaseException | None, at_s: float) -> LastScreen | None:
     """Return the last screen; ``None`` for an end that is told by lines alone.
 
     Args:
@@ -66,7 +66,7 @@ def ended_of(state: WizardState, error: BaseException | None, at_s: float) -> En
         if state.report is None:
             return None
         lines = done_lines(state, state.report)
-        return Ended(True, tuple(lines), (_head(state, tr("DONE")), *lines), at_s)
+        return LastScreen(True, tuple(lines), (_head(state, tr("DONE")), *lines), at_s)
     begun = state.subject is not None
     left = isinstance(error, DeclinedError) and isinstance(
         state.subject, (ChoiceSubject, CheckSubject)
@@ -74,7 +74,7 @@ def ended_of(state: WizardState, error: BaseException | None, at_s: float) -> En
     if not begun or left or not isinstance(error, RobolinkError):
         return None
     kept = (_head(state, tr("STOPPED")), *_where(state), *_next(state, error))
-    return Ended(False, tuple(stopped_lines(state, error)), kept, at_s)
+    return LastScreen(False, tuple(stopped_lines(state, error)), kept, at_s)
 
 
 def stopped_lines(state: WizardState, error: RobolinkError) -> list[str]:
@@ -93,7 +93,7 @@ def kept_lines(state: WizardState, error: BaseException | None) -> list[str]:
     return [_head(state, tr("STOPPED")), *_where(state)] if state.subject is not None else []
 
 
-def ended_screen(state: WizardState, ended: Ended) -> Screen:
+def ended_screen(state: WizardState, ended: LastScreen) -> Screen:
     """Return the last screen."""
     if ended.done:
         keys: tuple[tuple[str, str], ...] = (("5", tr("Finish")),)

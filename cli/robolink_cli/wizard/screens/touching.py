@@ -16,7 +16,7 @@ def touch_screen(state: WizardState, now_s: float) -> Screen:
     """Return the screen on which a person jogs the tip to a place."""
     touch = state.touch
     lines = [*_what(state, touch), "", *_where(state), *_since(state), *_contact(touch), ""]
-    lines += _keypad(state)
+    lines += [*_keypad(state), *_typing(state)]
     return Screen(
         title_row(state, touch_title(touch)),
         tuple(lines),
@@ -104,6 +104,15 @@ def _keypad(state: WizardState) -> list[str]:
         padded(f" [4] {left}   [6] {right}", 40) + sizes,
         padded(f"     [2] {down}         [3] {below}", 40) + f"[1] U-   [7] U+   [*] {turns}",
     ]
+
+
+def _typing(state: WizardState) -> list[str]:
+    """Return the field of a typed pose, where one can be typed."""
+    if state.typing:
+        return ["", tr("Pose X Y Z U: {typed}_   Enter closes the field.", typed=state.typed)]
+    if state.touch is None or not state.touch.types:
+        return []
+    return ["", tr("[.] Type the pose, if an instrument fails")]
 
 
 def _turned(names: tuple[str, ...], quarters: int) -> tuple[str, ...]:

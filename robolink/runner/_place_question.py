@@ -22,7 +22,7 @@ from robolink.runner._capture import (
 from robolink.runner._jog_steps import parse_steps
 from robolink.runner._operator import Operator, Question
 from robolink.runner._steps import Ask, TeachPrompt, TouchedAt
-from robolink.runner._subjects import GuidedOperator, regard
+from robolink.runner._subjects import GuidedOperator, TouchSubject, regard
 from robolink.timing import FASTEST_ANSWER_S, NS_PER_S
 
 MOST_EARLY: Final = 3
@@ -83,7 +83,8 @@ class PlaceQuestion:
         self._line = line
         self._runs = runs
         subject = step.subject
-        self._typed = typed if subject is not None and subject.types else None
+        types = isinstance(subject, TouchSubject) and subject.types
+        self._typed = typed if types else None
         edge = step.contact
         self._contact = _ContactWatch(inputs_of(controller), edge) if edge else None
         self._asked_ns = 0
@@ -125,7 +126,7 @@ class PlaceQuestion:
 
     def _ask(self) -> None:
         subject = self._step.subject
-        if subject is not None:
+        if isinstance(subject, TouchSubject):
             subject = replace(subject, types=self._typed is not None)
         regard(self._operator, [subject])
         self._operator.ask(self._step.instruction, _QUESTIONS[self._step.shown])
@@ -143,7 +144,7 @@ class PlaceQuestion:
         ``again`` alone is the one before, ``again 1`` the first; ``None`` where there is none.
         """
         subject = self._step.subject
-        if subject is None or subject.number < 2 or subject.proof:
+        if not isinstance(subject, TouchSubject) or subject.number < 2 or subject.proof:
             return None
         named = word.removeprefix("again").strip() or str(subject.number - 1)
         if not subject.retakes:

@@ -1,5 +1,7 @@
 """A pose that a person types: what it may be used for, and that it proves nothing by itself."""
 
+from typing import Any
+
 import pytest
 
 import robolink
@@ -21,7 +23,9 @@ def cell(tmp_path, monkeypatch):
 
 
 class Types(Undecided):
-    """Types ``pose`` with the numbers of the controller, changed by ``apart``."""
+    """Types ``pose`` with the numbers of the controller, changed by what follows it."""
+
+    group: Any
 
     def poll(self, wait_s):
         word = super().poll(wait_s)

@@ -144,7 +144,7 @@ class EpsonSimulator(HostedDevice):
         self._session = interpreter.session
         self.program: ProgramRunner | None = None
         self._window = SpelWindow(interpreter, self.condition, self.options)
-        self._slot = ClientSlot(self.options.remote_timeout_s)
+        self._slot = ClientSlot(self.options.remote_timeout_s, self.wire_time)
         options, condition, window, slot = self.options, self.condition, self._window, self._slot
         held = (self.variables, self.alarms, self.card)
         self._desk = CommandDesk(self.machine, condition, *held, options=options)

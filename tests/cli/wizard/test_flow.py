@@ -381,7 +381,7 @@ def check_history(history, first):
         for text in hand.sent[before:]:
             if text == "done" and state.touch is not None and state.touch.arrival is not None:
                 assert moved > 0.0
-            if text.startswith("pose"):
+            if str(text).startswith("pose"):
                 assert state.touch is not None
                 assert state.touch.types
                 assert len(digits) >= 4 or posed

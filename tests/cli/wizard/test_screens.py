@@ -18,9 +18,9 @@ from robolink.calibration import Drift, VerifyResult
 from robolink.errors import DeclinedError
 from robolink.locale.languages import translator
 from robolink.model import Path as Way
-from robolink.model import Pose, ToolReceipt
+from robolink.model import Pose, ToolReceipt, WorkBox
 from robolink.nozzle_change import ChangeReport, ToolReport
-from robolink.runner import MoveSubject, Question
+from robolink.runner import JogRange, MoveSubject, Question
 from robolink.standing import Standing, note_standing
 from tests.cli.wizard._people import (
     ARRIVAL,
@@ -83,7 +83,15 @@ def ended(header, error=None, report=None):
     return hand.happens(HasEnded(ended_of(hand.state, error, hand.now)))
 
 
+def jogging():
+    box = WorkBox.around(ARRIVAL, xy_mm=50.0, below_mm=50.0, above_mm=50.0)
+    return (
+        Sitting().asked(JogRange(ARRIVAL, box), text="Jog the tool.").keys("+", "6").jogs("x+0.5")
+    )
+
+
 SCREENS = {
+    "free jog": jogging,
     "choose": choosing,
     "check": lambda: Sitting().asked(CHECK, Question.YES_NO).keys("1"),
     "moving": moving,

@@ -71,7 +71,7 @@ def ended_of(state: WizardState, error: BaseException | None, at_s: float) -> La
     left = isinstance(error, DeclinedError) and isinstance(
         state.subject, (ChoiceSubject, CheckSubject)
     )
-    if not begun or left or not isinstance(error, RobolinkError):
+    if not begun or left or state.free_jog is not None or not isinstance(error, RobolinkError):
         return None
     kept = (_head(state, tr("STOPPED")), *_where(state), *_next(state, error))
     return LastScreen(False, tuple(stopped_lines(state, error)), kept, at_s)

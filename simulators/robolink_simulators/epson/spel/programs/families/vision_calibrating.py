@@ -74,8 +74,8 @@ def _calibrating(t: SpelTask, name: str, poses: tuple[Pose, ...]) -> Iterator[Ta
         t.now_ns += _SETTLING_NS
         machine.advance(t.now_ns)
         pixels.append(vision.target())
-        at = machine.tip()
-        places.append((at.x_mm, at.y_mm))
+        x_mm, y_mm, *_ = machine.here().coordinates
+        places.append((x_mm, y_mm))
     vision.calibrate(name, pixels, places)
 
 

@@ -232,7 +232,9 @@ class NozzleChange:
             adds_touch=offer is not None and offer.adds,
         )
         regard(self._operator, [subject])
-        question = tr("Write this to tool {tool}?", tool=numbers)
+        question = tr(
+            "Write these values to tool {tool}? 'robolink undo' takes them back.", tool=numbers
+        )
         said = context.runner().confirm_or(question, also=() if offer is None else offer.words)
         if offer is not None and isinstance(said, str):
             return offer.meant_by(said)
@@ -241,7 +243,7 @@ class NozzleChange:
         outcomes.append(decision_entry(verdict, accepted=accepted))
         if not accepted:
             raise DeclinedError(
-                tr("The proposal was not accepted."), remedy=tr("Nothing was written.")
+                tr("You did not accept the new value."), remedy=tr("Nothing was written.")
             )
         return None
 
@@ -318,7 +320,7 @@ class NozzleChange:
                 raise
             self._controller.outcomes.append(refusal_entry(tool, criteria, error))
             raise VerifyError(
-                tr("The new tip was not proved. {cause}", cause=error.what),
+                tr("The new tip was not tested. {cause}", cause=error.what),
                 remedy=error.remedy,
                 code=error.code,
                 controller=self._controller.identity,

@@ -81,7 +81,7 @@ _UNSIMULATED_FUNCTIONS = """
 _WITH_A_FORM_OF_THEIR_OWN = """
     opencom opennet parsestr eresume error fmtstr input line read redim setcom setnet signal
     taskwait waitnet waitsig write writebin readbin close closecom closenet flush cont restart
-    tmreset resetelapsedtime randomize vrun vget vset vload vsave vcls vcal vxcalib
+    tmreset resetelapsedtime randomize vrun vget vset vload vsave vcls vcal vsaveimage vxcalib
 """
 
 WINDOW_ONLY: Final = frozenset(

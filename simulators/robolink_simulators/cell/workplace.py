@@ -15,6 +15,7 @@ from robolink.messages import tr
 from robolink.model import TIP, Pose, ToolOffset
 from robolink_simulators.cell.camera import CameraTruth, Pixel
 from robolink_simulators.cell.held_board import SimulatedBoard
+from robolink_simulators.cell.late_random import late_random
 from robolink_simulators.cell.places import Axis, Direction, axis_of
 from robolink_simulators.cell.places import XyzMm as XyzMm
 from robolink_simulators.cell.surfaces import FlatPlate, RoundBall, Surface, SurfaceContact
@@ -95,7 +96,7 @@ class Workplace(ABC):
         self.leans: dict[int, Lean] = {}
         self.board: SimulatedBoard | None = None
         self._seed = seed
-        self._random = random.Random(f"nozzles {seed}")
+        self._random = late_random(f"nozzles {seed}")
         self._replaced = replaced
         self.parameters = WorldParameters()
         rng = random.Random(f"camera {seed}")

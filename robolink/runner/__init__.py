@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     from robolink.runner._subjects import FitRow as FitRow
     from robolink.runner._subjects import FitSubject as FitSubject
     from robolink.runner._subjects import GuidedOperator as GuidedOperator
+    from robolink.runner._subjects import JogRange as JogRange
     from robolink.runner._subjects import JogSubject as JogSubject
     from robolink.runner._subjects import MoveSubject as MoveSubject
     from robolink.runner._subjects import TouchSubject as TouchSubject
@@ -70,7 +71,8 @@ __getattr__ = lazy_exports(
         "_settings": "RunSettings",
         "_steps": "Ask Confirm Consider Look Move Notify Procedure Seek SeenAt Step TakenStep "
         "TeachPrompt TouchedAt",
-        "_subjects": "FitRow FitSubject GuidedOperator JogSubject MoveSubject TouchSubject regard",
+        "_subjects": "FitRow FitSubject GuidedOperator JogRange JogSubject MoveSubject "
+        "TouchSubject regard",
         "_yes_no": "ask_yes_no yes_or_no",
     },
 )

@@ -21,7 +21,7 @@ from robolink.runner._capture import (
 from robolink.runner._jog_steps import parse_steps
 from robolink.runner._operator import Operator, Question
 from robolink.runner._steps import Ask, TeachPrompt, TouchedAt
-from robolink.runner._subjects import GuidedOperator, regard
+from robolink.runner._subjects import GuidedOperator, TouchSubject, regard
 from robolink.timing import FASTEST_ANSWER_S, NS_PER_S
 
 MOST_EARLY: Final = 3
@@ -128,7 +128,7 @@ class PlaceQuestion:
     @property
     def _may_begin_anew(self) -> bool:
         subject = self._step.subject
-        return subject is not None and subject.number > 1 and not subject.proof
+        return isinstance(subject, TouchSubject) and subject.number > 1 and not subject.proof
 
     def _looked_at(self) -> tuple[TouchedAt, NotYet | None]:
         """Return where the tip is, and why that does not count yet."""

@@ -47,7 +47,7 @@ from robolink.runner._steps import (
     SeenAt,
     TakenStep,
 )
-from robolink.runner._subjects import GuidedOperator, JogSubject, MoveSubject, regard
+from robolink.runner._subjects import GuidedOperator, JogRange, JogSubject, MoveSubject, regard
 from robolink.runner._yes_no import ask_yes_no
 from robolink.sensing import seen_once
 from robolink.ways import Way, way
@@ -174,7 +174,7 @@ class Runner:
     def jog(self, steps: str) -> Pose:
         """Move by typed steps, for example ``x+0.1 z-0.5``, in one straight move.
 
-        How far it went and where it is then is told to the operator, unless the settings spare it.
+        How far it went and where it is then is told to the operator.
 
         Raises:
             ConfigError: The text is not a list of steps.
@@ -186,7 +186,7 @@ class Runner:
         if isinstance(self._operator, GuidedOperator):
             longest = max(map(abs, parse_steps(steps).values()))
             self._operator.regard(JogSubject(before, after, longest))
-        elif self._settings.tell_jogs:
+        else:
             self._operator.tell(way_in_words(before, after))
         return after
 
@@ -362,9 +362,14 @@ def _answer(done: StepDone) -> Pose | bool | None:
     return done.accepted is True if isinstance(done.step, Confirm) else done.pose
 
 
-def ask_for_pose(instruction: str) -> Procedure[Pose]:
-    """Let a person bring the tool somewhere, for its own sake; returns the pose there."""
-    pose: Pose = yield Ask(instruction, evidence=False)
+def ask_for_pose(instruction: str, jog: JogRange | None = None) -> Procedure[Pose]:
+    """Let a person bring the tool somewhere, for its own sake; returns the pose there.
+
+    Args:
+        instruction: What the person is to do.
+        jog: Where it began and where it may go, for a screen.
+    """
+    pose: Pose = yield Ask(instruction, evidence=False, subject=jog)
     return pose
 
 

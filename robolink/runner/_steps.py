@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 from robolink.model import TIP, InputEdge, Path, Pose, Spot, SpotUnit
 from robolink.runner._capture import NotYet
-from robolink.runner._subjects import FitSubject, TouchSubject
+from robolink.runner._subjects import FitSubject, JogRange, TouchSubject
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +72,7 @@ class Ask:
     foreseen: Pose | None = None
     contact: InputEdge | None = None
     evidence: bool = True
-    subject: TouchSubject | None = None
+    subject: TouchSubject | JogRange | None = None
     judge: "Callable[[TouchedAt], NotYet | None] | None" = field(default=None, compare=False)
 
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
-from robolink.model import InputEdge, Path, Pose
+from robolink.model import InputEdge, Path, Pose, WorkBox
 from robolink.runner._operator import Operator
 
 
@@ -34,6 +34,19 @@ class TouchSubject:
     first_z_mm: float | None = None
     contact: InputEdge | None = None
     proof: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class JogRange:
+    """Jogging for its own sake: nothing is measured, and it ends where the person leaves it.
+
+    Attributes:
+        start: Where the frame in force was when it began.
+        box: Where it may go.
+    """
+
+    start: Pose
+    box: WorkBox
 
 
 @dataclass(frozen=True, slots=True)

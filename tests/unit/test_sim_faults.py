@@ -131,9 +131,9 @@ def test_what_leaves_late_is_told_before_what_leaves_at_once_was_taken(login):
     simulator = EpsonSimulator()
     client = login(simulator)
     simulator.faults.add(Fault(FaultAction.SPLIT_REPLY, position=2, seconds=0.5))
-    simulator.advance(3 * S)
+    simulator.advance(3_000_000_000)
     client.send("$GetStatus")
-    simulator.advance(3 * S)
-    assert simulator.next_change() == 3 * S + S // 2
+    simulator.advance(3_000_000_000)
+    assert simulator.next_change() == 3_500_000_000
     assert client.heard() == "#G"
-    assert simulator.next_change() == 3 * S + S // 2
+    assert simulator.next_change() == 3_500_000_000

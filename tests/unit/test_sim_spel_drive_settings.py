@@ -24,6 +24,7 @@ def window():
         ("TCLim 50, -1, -1, 20", "TCLim(4)", "50, -1, -1, 20", "-1, -1, -1, -1"),
         ("TCSpeed 5", "TCSpeed", "5", "100"),
         ("LimitTorque 80", "LimitTorque(1)", "80, 80, 80, 80", "100, 100, 100, 100"),
+        ("TC On", "TC", "1", "0"),
         ("OLAccel On", "OLAccel", "OLACCEL is ON", "OLACCEL is OFF"),
         ("SoftCP On", "SoftCP", "1", "0"),
         ("AutoLJM On", "AutoLJM", "1", "0"),
@@ -58,7 +59,6 @@ def test_reset_puts_back_some_and_start_up_others(window):
         ("TCSpeed 0", 4002),
         ("TCLim 1, 2", 2100),
         ("Print TCLim(5)", 4002),
-        ("TC On", 2199),
         ("PTPBoost 1, 2", 2100),
     ],
 )

@@ -13,8 +13,8 @@ from robolink_simulators.epson.arm.kinematics import frame_of
 from robolink_simulators.epson.arm.robots import find_robot
 from robolink_simulators.epson.arm.ways.turned_curve import smooth_course_through
 from robolink_simulators.epson.definitions.curves import CurveFiles, CurveSwitch, FreeCurve
+from robolink_simulators.epson.definitions.local_frames import frame_at
 from robolink_simulators.epson.machine import Machine
-from robolink_simulators.epson.memory.points import frame_at
 from robolink_simulators.epson.spel.interpreter import Interpreter
 
 from robolink.model import Pose

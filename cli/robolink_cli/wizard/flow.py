@@ -40,6 +40,7 @@ from robolink_cli.wizard.state import (
 Advanced = tuple[WizardState, list[Effect]]
 
 _MOST_REMARKS = 40
+_FREE_STOPS = frozenset({"main", "5", "0", "q"})
 
 
 def advance(state: WizardState, happening: Happening) -> Advanced:
@@ -160,7 +161,9 @@ def _stop(state: WizardState) -> Advanced:
     if question is None or not state.waits:
         return ending, [WizardCommand.END_WORK]
     if question.kind is not Question.YES_NO:
-        return ending, [SendAnswer(question.number, "q")]
+        # Who jogs for its own sake has not broken anything off.
+        word = "q" if state.free_jog is None else "done"
+        return replace(ending, waits=False), [SendAnswer(question.number, word)]
     if state.writing is not None or confirms(state) is not None:
         return ending, [SendAnswer(question.number, "n")]
     return ending, [WizardCommand.END_WORK]  # a no would go on
@@ -173,6 +176,8 @@ def _armed(state: WizardState, at_s: float) -> bool:
 def _key(state: WizardState, key: KeyPressed) -> Advanced:
     if key.name == "stop" or (key.name == "0" and not (state.has_field and key.text)):
         return _stop(state)
+    if stops_at_once(state, key.name):
+        return _stop(state)
     if state.question is None or not state.waits or not _armed(state, key.at_s):
         if state.at_place and key.name == "main" and not state.waits:
             return state.says(tr("Wait: the robot is still moving.")), []
@@ -180,6 +185,14 @@ def _key(state: WizardState, key: KeyPressed) -> Advanced:
     if state.at_place:
         return _key_at_place(state, key)
     return _taken(state, answered_by_key(state, key))
+
+
+def stops_at_once(state: WizardState, name: str) -> bool:
+    """Tell whether a key stops, however fast it follows another one.
+
+    Who jogs for its own sake has nothing to record, so the largest key stops too.
+    """
+    return state.free_jog is not None and name in _FREE_STOPS
 
 
 def _key_at_place(state: WizardState, key: KeyPressed) -> Advanced:
@@ -235,11 +248,11 @@ def _line_at_place(state: WizardState, line: LineTyped, meaning: str) -> Advance
     if not folded(line.text):
         return state.says(""), []  # the position is shown again
     if meaning == "take":
-        return _take(state, line.at_s)
+        return _stop(state) if state.free_jog is not None else _take(state, line.at_s)
     if meaning == "again":
         return _again(state)
     if meaning == "help":
-        return state.says(help_at_place()), []
+        return state.says(help_at_place(free=state.free_jog is not None)), []
     pointed = with_point(line.text)
     if pointed is not None:
         said = tr("Write the decimal point as '.': {step}. Nothing moved.", step=pointed)
@@ -247,8 +260,13 @@ def _line_at_place(state: WizardState, line: LineTyped, meaning: str) -> Advance
     return _jog(state, folded(line.text), line.at_s)
 
 
-def help_at_place() -> str:
-    """Return what can be typed at a place."""
+def help_at_place(*, free: bool) -> str:
+    """Return what can be typed at a place, or while somebody jogs for its own sake."""
+    if free:
+        return tr(
+            "Steps: x+0.1 moves 0.1 mm to +X; x y z in mm, u in degrees; several at once: "
+            "x+0.1 z-0.5. stop ends."
+        )
     return tr(
         "Steps: x+0.1 moves 0.1 mm to +X; x y z in mm, u in degrees; several at once: x+0.1 z-0.5. "
         "take records, again 1 begins at touch 1, stop ends."

@@ -6,7 +6,7 @@ from typing import Final
 
 from robolink.model import Pose
 from robolink.nozzle_change import ChangeReport, WriteSubject
-from robolink.runner import FINEST_STEP, FitSubject, Question, TouchSubject
+from robolink.runner import FINEST_STEP, FitSubject, JogRange, Question, TouchSubject
 from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.happenings import Reading, WasAsked
 
@@ -125,6 +125,12 @@ class WizardState:
         return subject if self.at_place and isinstance(subject, TouchSubject) else None
 
     @property
+    def free_jog(self) -> JogRange | None:
+        """The limits of jogging for its own sake."""
+        subject = self.subject
+        return subject if self.at_place and isinstance(subject, JogRange) else None
+
+    @property
     def writing(self) -> WriteSubject | None:
         """The write that is asked about."""
         subject, question = self.subject, self.question
@@ -144,10 +150,17 @@ class WizardState:
         """Where the frame in force is."""
         return None if self.reading is None else self.reading.pose
 
+    @property
+    def arrival(self) -> Pose | None:
+        """Where the robot stood before the person jogged, as far as that says something."""
+        if self.free_jog is not None:
+            return self.free_jog.start
+        return None if self.touch is None else self.touch.arrival
+
     def way_mm(self) -> tuple[float, float, float] | None:
         """Return how far the tip was brought since the robot arrived, base axes."""
-        touch, pose = self.touch, self.pose
-        if touch is None or touch.arrival is None or pose is None:
+        arrival, pose = self.arrival, self.pose
+        if arrival is None or pose is None:
             return None
-        here, there = pose.coordinates()[:3], touch.arrival.coordinates()[:3]
+        here, there = pose.coordinates()[:3], arrival.coordinates()[:3]
         return here[0] - there[0], here[1] - there[1], here[2] - there[2]

@@ -13,8 +13,8 @@ from typing import Any
 from robolink.model import Secret
 from robolink.protocols.epson_binary import Dialect
 from robolink.protocols.epson_text import ErrorCode, StatusFlags
-from robolink_simulators.cell.late_random import late_random
 from robolink_simulators.cell.world_parameters import WorldParameters
+from robolink_simulators.device.late_random import late_random
 from robolink_simulators.device.motion_log import StartedMotion
 from robolink_simulators.epson.arm.robots import find_robot
 from robolink_simulators.epson.card import ControllerCard
@@ -175,7 +175,7 @@ class EpsonSimulator(RequestTaking):
         self._session = interpreter.session
         self.program = None
         self._window = SpelWindow(interpreter, self.condition, self.options)
-        self._slot = ClientSlot(self.options.remote_timeout_s)
+        self._slot = ClientSlot(self.options.remote_timeout_s, self.wire_time)
         options, condition, window, slot = self.options, self.condition, self._window, self._slot
         held = (self.variables, self.alarms, self.card)
         self._desk = CommandDesk(self.machine, condition, *held, options=options)

@@ -13,8 +13,8 @@ from wcwidth import wcswidth
 from robolink import messages
 from robolink.locale.languages import translator
 from robolink.model import Path as Way
-from robolink.model import Pose
-from robolink.runner import MoveSubject, Question
+from robolink.model import Pose, WorkBox
+from robolink.runner import JogRange, MoveSubject, Question
 from tests.cli.wizard._people import (
     ARRIVAL,
     CHECK,
@@ -51,7 +51,15 @@ def choosing():
     return Sitting().asked(ChoiceSubject("Choose", (), rows), Question.TEXT, "Which cell?")
 
 
+def jogging():
+    box = WorkBox.around(ARRIVAL, xy_mm=50.0, below_mm=50.0, above_mm=50.0)
+    return (
+        Sitting().asked(JogRange(ARRIVAL, box), text="Jog the tool.").keys("+", "6").jogs("x+0.5")
+    )
+
+
 SCREENS = {
+    "free jog": jogging,
     "choose": choosing,
     "check": lambda: Sitting().asked(CHECK, Question.YES_NO).keys("1"),
     "moving": moving,

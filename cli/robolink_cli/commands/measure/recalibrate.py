@@ -10,7 +10,7 @@ from robolink_cli.options.consent import dry_run_option, plain_option, yes_optio
 from robolink_cli.options.recipe_answers import answer_options
 from robolink_cli.options.sensor import sensor_option
 from robolink_cli.session.completing import complete_recipe
-from robolink_cli.session.context import CliContext, controller_options
+from robolink_cli.session.context import CliContext, optional_controller
 from robolink_cli.session.operator_identity import nozzle_options
 from robolink_cli.session.ordering import order_option, require_no_dry_run
 
@@ -52,7 +52,7 @@ if TYPE_CHECKING:
 @answer_options
 @nozzle_options
 @order_option
-@controller_options
+@optional_controller
 @dry_run_option
 @yes_option
 @plain_option

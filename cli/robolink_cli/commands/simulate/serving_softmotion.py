@@ -87,7 +87,7 @@ def _served(
     if address is not None:
         from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
 
-        host, port = host_and_port(address, "--modbus-tcp")
+        host, port = host_and_port(address, "--tcp")
         tcp = serve_modbus_tcp(simulator, host, port, clock=clock, allow_remote=buses.allow_remote)
         urls["modbus-tcp"] = stack.enter_context(tcp).url
     if buses.modbus_rtu is not None:

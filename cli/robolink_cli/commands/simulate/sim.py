@@ -4,13 +4,18 @@ from pathlib import Path
 
 import click
 
+from robolink.messages import declared
 from robolink_cli.commands.simulate.sim_plc import sim_plc
 from robolink_cli.commands.simulate.sim_softmotion import softmotion
+from robolink_cli.console.help_sections import SectionedCommand
 from robolink_cli.options.simulation import (
+    SECTIONS,
     ServedLife,
     life_options,
     project_options,
+    serial_option,
     simulation_options,
+    tcp_option,
 )
 from robolink_cli.session.context import json_option
 
@@ -34,19 +39,10 @@ sim.add_command(sim_plc)
 sim.add_command(softmotion)
 
 
-@sim.command()
-@click.option(
-    "--tcp",
-    "address",
-    metavar="HOST:PORT",
-    default="127.0.0.1:5000",
-    show_default=True,
-    help="Where to listen; port 0 takes a free one.",
-)
-@click.option(
-    "--serial",
-    type=click.Choice(["pty"]),
-    help="Remote RS232 on a pseudo terminal, whose path is printed, in place of --tcp.",
+@sim.command(cls=SectionedCommand, sections=SECTIONS)
+@tcp_option("127.0.0.1:5000", declared("Where to listen; port 0 takes a free one."))
+@serial_option(
+    declared("Remote RS232 on a pseudo terminal, whose path is printed, in place of --tcp.")
 )
 @click.option(
     "--baud",

@@ -6,19 +6,22 @@ from pathlib import Path
 import click
 
 from robolink.messages import tr
+from robolink_cli.console.help_sections import SectionedCommand
 from robolink_cli.options.simulation import (
     DEFAULT_ADDRESS,
+    SECTIONS,
     ServedLife,
     allow_remote_option,
     faults_option,
     life_options,
     modbus_options,
     seed_option,
+    speed_option,
 )
 from robolink_cli.session.context import json_option
 
 
-@click.command("plc")
+@click.command("plc", cls=SectionedCommand, sections=SECTIONS)
 @click.option(
     "--map",
     "map_file",
@@ -36,6 +39,7 @@ from robolink_cli.session.context import json_option
     help="The unit identifier that answers; 1 to 247 on a serial line.",
 )
 @seed_option
+@speed_option
 @faults_option
 @allow_remote_option
 @life_options
@@ -43,10 +47,11 @@ from robolink_cli.session.context import json_option
 def sim_plc(
     *,
     map_file: Path,
-    modbus_tcp: str | None,
-    modbus_rtu: str | None,
+    address: str | None,
+    serial: str | None,
     unit: int,
     seed: int,
+    speed: float,
     faults: Path | None,
     allow_remote: bool,
     life: ServedLife,
@@ -69,21 +74,21 @@ def sim_plc(
         host_and_port,
     )
 
-    if modbus_tcp is None and modbus_rtu is None:
-        modbus_tcp = DEFAULT_ADDRESS
+    if address is None and serial is None:
+        address = DEFAULT_ADDRESS
     register_map = load_map(map_file)
-    simulator, clock = PlcSimulator(register_map, unit=unit, seed=seed), SteeredClock()
-    served = {LinkKind.PLC_TCP} if modbus_tcp is not None else set()
-    served |= {LinkKind.PLC_RTU} if modbus_rtu is not None else set()
+    simulator, clock = PlcSimulator(register_map, unit=unit, seed=seed), SteeredClock(speed)
+    served = {LinkKind.PLC_TCP} if address is not None else set()
+    served |= {LinkKind.PLC_RTU} if serial is not None else set()
     plan_faults(simulator, faults, served)
     urls: dict[str, str] = {}
     with ExitStack() as stack:
         stopped = stack.enter_context(Termination(life))
-        if modbus_tcp is not None:
-            listen = host_and_port(modbus_tcp, "--modbus-tcp")
+        if address is not None:
+            listen = host_and_port(address, "--tcp")
             tcp = serve_plc(simulator, map_file, *listen, clock=clock, allow_remote=allow_remote)
             urls["modbus-tcp"] = stack.enter_context(tcp).url
-        if modbus_rtu is not None:
+        if serial is not None:
             line = serve_plc_line(simulator, map_file, clock=clock)
             urls["modbus-rtu"] = stack.enter_context(line).url
         first = next(iter(urls.values()))

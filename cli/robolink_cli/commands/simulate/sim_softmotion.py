@@ -5,7 +5,9 @@ from pathlib import Path
 
 import click
 
+from robolink_cli.console.help_sections import SectionedCommand
 from robolink_cli.options.simulation import (
+    SECTIONS,
     ServedLife,
     life_options,
     modbus_options,
@@ -21,7 +23,7 @@ def _complete_kinematics(_: click.Context, __: click.Parameter, start: str) -> l
     return complete_kinematics(start)
 
 
-@click.command()
+@click.command(cls=SectionedCommand, sections=SECTIONS)
 @modbus_options
 @click.option(
     "--can",
@@ -61,8 +63,8 @@ def _complete_kinematics(_: click.Context, __: click.Parameter, start: str) -> l
 @json_option
 def softmotion(
     *,
-    modbus_tcp: str | None,
-    modbus_rtu: str | None,
+    address: str | None,
+    serial: str | None,
     can: str | None,
     unit: int,
     node: int,
@@ -103,6 +105,6 @@ def softmotion(
         world=world_from(world),
         make_plc=plc_maker(program),
     )
-    buses = Buses(modbus_tcp, modbus_rtu, can, unit=unit, node=node, allow_remote=allow_remote)
+    buses = Buses(address, serial, can, unit=unit, node=node, allow_remote=allow_remote)
     plan_faults(simulator, faults, buses.kinds)
     serve_plc(simulator, buses, speed=speed, life=life)

@@ -21,7 +21,7 @@ from robolink_cli.console.output import visible
 from robolink_cli.wizard.desk import Desk
 from robolink_cli.wizard.faces.effects import carry_out
 from robolink_cli.wizard.faces.lines import LineFace
-from robolink_cli.wizard.flow import advance
+from robolink_cli.wizard.flow import advance, stops_at_once
 from robolink_cli.wizard.happenings import Happening, KeyPressed, TooFast
 from robolink_cli.wizard.key_gate import KeyGate, name_of
 from robolink_cli.wizard.screens.drawing import screen_of
@@ -110,7 +110,7 @@ class FullFace:
             if self._fills(key, text):
                 self._happens(KeyPressed(name_of(key), text, now_s))
                 return
-        for one in self._gate.press(key, now_s):
+        for one in self._gate.press(key, now_s, stops=stops_at_once(self._state, name_of(key))):
             self._happens(self._pressed(one, now_s))
 
     def _fills(self, key: str, text: str) -> bool:

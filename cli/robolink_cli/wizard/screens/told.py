@@ -56,7 +56,9 @@ def _place(state: WizardState) -> str:
     title = touch_title(state.touch)
     head = f"{title}. {instruction(state)}" if state.touch is not None else instruction(state)
     touch, here = state.touch, told_where(state)
-    if touch is not None and touch.number > 1 and not touch.proof:
+    if state.free_jog is not None:
+        how = tr("Type steps (x+0.1 z-0.5), stop, or help.")
+    elif touch is not None and touch.number > 1 and not touch.proof:
         how = tr("Type steps (x+0.1 z-0.5), take, again 1, stop, or help.")
     else:
         how = tr("Type steps (x+0.1 z-0.5), take, stop, or help.")
@@ -84,5 +86,9 @@ def told_after_jog(state: WizardState) -> str:
     way, where = state.way_mm(), told_where(state)
     if way is None:
         return where
-    since = tr("Since arrival {mm} mm.", mm=mm(math.hypot(*way)))
+    far = mm(math.hypot(*way))
+    if state.free_jog is not None:
+        since = tr("Since start {mm} mm.", mm=far)
+    else:
+        since = tr("Since arrival {mm} mm.", mm=far)
     return f"{where} {since}"

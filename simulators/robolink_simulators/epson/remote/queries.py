@@ -61,7 +61,7 @@ def query_commands(
         "getrobotname": of_robot(lambda _: (card.robot_name,)),
         "getrobotserial": of_robot(lambda robot: (robot.serial,)),
         "getmotor": of_robot(_drives),
-        "gethofs": of_robot(lambda _: ("0.000",) * _AXES, counted=False),
+        "gethofs": of_robot(_offsets, counted=False),
         "geterrmsg": _messages(card, options, condition),
         "geterrfunc": lambda code: _function_of(condition, number(code)),
         "gethealthcont": lambda: health,
@@ -150,6 +150,11 @@ def _of_robot(
 
 def _kind(robot: DrivenRobot) -> Fields:
     return (str(robot.model.robot_type), robot.model.name)
+
+
+def _offsets(robot: DrivenRobot) -> Fields:
+    offsets = [f"{offset:.3f}" for offset in robot.kept.origins.offsets]
+    return tuple(offsets + ["0.000"] * (_AXES - len(offsets)))
 
 
 def _drives(robot: DrivenRobot) -> Fields:

@@ -252,7 +252,7 @@ class VisionSystem:
     def _taken(self) -> VisionPicture:
         world = self._world()
         tips, fiducials = (self._seen(world, mark) for mark in (TIP, _FIDUCIAL))
-        return VisionPicture(tips, fiducials, world.robot.flange())
+        return VisionPicture(tips, fiducials, world.told_flange())
 
     def _seen(self, world: Workplace, mark: int) -> tuple[VisionFind, ...]:
         marks = world.marks(mark)

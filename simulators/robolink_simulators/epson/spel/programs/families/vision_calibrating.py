@@ -65,7 +65,7 @@ def _calibrating(t: SpelTask, name: str, poses: tuple[Pose, ...]) -> Iterator[Ta
     pixels, places = list[Pixel](), list[tuple[float, float]]()
     vision, machine = vision_of(t), t.session.machine
     for pose in poses:
-        going = StatementWaiting(t.runner.carried_out(t, _go_to(pose)))
+        going = StatementWaiting(t.runner.steps.carried_out(t, _go_to(pose)))
         yield going
         if going.execution.error is not None:
             raise RaisedError(going.execution.error.number, going.execution.error.text)
@@ -74,8 +74,8 @@ def _calibrating(t: SpelTask, name: str, poses: tuple[Pose, ...]) -> Iterator[Ta
         t.now_ns += _SETTLING_NS
         machine.advance(t.now_ns)
         pixels.append(vision.target())
-        at = machine.tip()
-        places.append((at.x_mm, at.y_mm))
+        x_mm, y_mm, *_ = machine.here().coordinates
+        places.append((x_mm, y_mm))
     vision.calibrate(name, pixels, places)
 
 

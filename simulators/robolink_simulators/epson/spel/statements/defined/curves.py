@@ -24,13 +24,13 @@ from robolink_simulators.epson.definitions.curves import (
     Place,
 )
 from robolink_simulators.epson.machine import Machine
-from robolink_simulators.epson.memory.points import Point, frame_at
+from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.refusals import OutOfReach, RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.defined.xy_limits import outside_limits_mm
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.values import Number, as_text, out_of_range
+from robolink_simulators.epson.spel.legs import line_pace
 from robolink_simulators.epson.spel.session import Session
-from robolink_simulators.epson.spel.statements.legs import line_pace
 from robolink_simulators.epson.spel.statements.through_points import worth_of
 from robolink_simulators.epson.spel.tree import (
     LabelledPoint,
@@ -119,7 +119,7 @@ def _axes(machine: Machine, count: int) -> int:
 def _control_point(machine: Machine, curve: FreeCurve) -> Frame | None:
     if not curve.control_point:
         return None
-    return frame_at(machine.control_points.get(curve.control_point))
+    return machine.robot.control_point(curve.control_point)
 
 
 def _smooth_way(machine: Machine, curve: FreeCurve) -> SmoothWay:

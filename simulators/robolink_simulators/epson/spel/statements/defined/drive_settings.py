@@ -37,8 +37,6 @@ def _setting(word: str) -> Callable[[Machine, Sequence[Number]], str]:
             raise SpelRefusal(RefusalKind.SYNTAX, f"{word} does not take {len(values)} values")
         if any(not setting.low <= value <= setting.high for value in values):
             raise out_of_range(f"Allowed are {setting.low:g} to {setting.high:g}")
-        if word == "tc" and values[0]:
-            raise SpelRefusal(RefusalKind.NOT_SIMULATED, "Torque control")
         drives.set(word, tuple(map(float, values)))
         return ""
 

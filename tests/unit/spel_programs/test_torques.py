@@ -126,6 +126,26 @@ def test_a_limit_of_the_torque_stops_the_motion_by_its_number(plate, power, limi
     assert (0.5 < inside_mm(made) < 4) is bool(number)
 
 
+@pytest.mark.parametrize(("power", "number"), [("High", 5057), ("Low", 5058)])
+def test_a_collision_is_met_early_where_it_is_looked_for(plate, power, number):
+    """Help on the collision detection."""
+    made = plate(f"Power {power}", "CollisionDetect On", "Go Here -Z(12)", "Print 1")
+    assert made.run() == []
+    assert made.runner.failure.number == number
+    assert 0 < inside_mm(made) < 1.5
+
+
+def test_a_collision_is_looked_for_neither_unasked_nor_under_torque_control(plate):
+    made = plate(
+        "P1 = Here",
+        "Go P1 -Z(12); Go P1",
+        "TCLim -1, -1, 30, -1; CollisionDetect On; TC On",
+        "Go P1 -Z(12)",
+        "Print CZ(Here) > CZ(P1) - 12",
+    )
+    assert made.run() == ["-1"]
+
+
 def test_onerr_catches_a_limit_of_the_torque_and_the_robot_can_come_off(plate):
     made = plate(
         "OnErr GoTo met",

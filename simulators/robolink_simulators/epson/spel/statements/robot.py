@@ -20,8 +20,8 @@ from robolink_simulators.epson.spel.statements.defined.arches import ARCH_SETTIN
 from robolink_simulators.epson.spel.statements.defined.drive_settings import DRIVE_STATEMENTS
 from robolink_simulators.epson.spel.statements.defined.joint_ranges import RANGE_STATEMENTS
 from robolink_simulators.epson.spel.statements.defined.origins import ORIGIN_STATEMENTS
-from robolink_simulators.epson.spel.statements.defined.torques import TORQUE_STATEMENTS
 from robolink_simulators.epson.spel.statements.defined.xy_limits import LIMIT_SETTINGS
+from robolink_simulators.epson.spel.statements.torques import TORQUE_STATEMENTS
 
 Numbers = Sequence[Number]
 Setting = Callable[[Machine, Numbers], str]

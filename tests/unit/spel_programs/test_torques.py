@@ -3,6 +3,8 @@
 from dataclasses import replace
 
 import pytest
+from robolink_simulators.epson.condition import Task
+from robolink_simulators.epson.drives.observer import DriveQuantity
 
 
 @pytest.fixture
@@ -92,6 +94,45 @@ def test_a_limit_lower_than_the_load_moves_nothing(plate):
         "Print Dist(Here, P1) < 1",
     )
     assert made.run() == ["-1"]
+
+
+def test_a_motion_that_goes_over_into_the_next_is_stopped_as_well(plate):
+    made = plate(
+        "CP On",
+        "P1 = Here",
+        "LimitTorqueLP 25; LimitTorqueStopLP On",
+        "Go P1 -Z(12)",
+        "Go P1 -Z(13)",
+        "Print 1",
+    )
+    assert made.run() == []
+    assert made.runner.failure.number == 5041
+    assert 0.5 < inside_mm(made) < 4
+
+
+def test_a_paused_motion_meets_its_limit_when_it_goes_on(plate):
+    made = plate("TCLim -1, -1, 30, -1; TC On", "P1 = Here", "Go P1 -Z(20)", "Print 1")
+    simulator = made.simulator
+    made.runner.start("main", simulator.now_ns)
+    simulator.advance(simulator.now_ns + 60_000_000)
+    assert simulator.machine.arm.moving
+    made.runner.turn_to(Task.PAUSED)
+    simulator.advance(simulator.now_ns + 1_000_000_000)
+    assert not simulator.machine.arm.moving
+    assert inside_mm(made) < 0
+    made.runner.turn_to(Task.RUNNING)
+    simulator.advance(simulator.now_ns + 20_000_000_000)
+    assert list(made.runner.console) == ["1\r\n"]
+    assert 0.5 < inside_mm(made) < 5
+
+
+def test_nothing_is_measured_any_more_after_a_power_cycle(plate):
+    made = plate("PTCLR", "Go Here -Y(50)", "Print PTRQ(1) > 0")
+    assert made.run() == ["-1"]
+    made.simulator.restart()
+    observer = made.simulator.machine.robot.observer
+    assert observer.value(DriveQuantity.PEAK_TORQUE, 1) == 0
+    assert observer.overload(1) == pytest.approx(0, abs=1e-9)
 
 
 def test_tcspeed_holds_the_speed_under_torque_control_alone(plate):

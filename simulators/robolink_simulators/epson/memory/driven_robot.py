@@ -315,6 +315,7 @@ class DrivenRobot:
         """Forget what a power cycle takes: all but tools, HomeSet and its place."""
         self.arm.halt(now_ns)
         self.reservation = None
+        self.observer.forget()
         self.switch_motors(False)
         self.reset_motion_parameters()
         home, order = self.settings.home_pulses, self.settings.home_order

@@ -29,8 +29,12 @@ def run(arguments: Sequence[str], *, last: bool = False) -> int:
         request = read_stop(arguments)
         if request is not None:
             return _stop(request, arguments)
-    from robolink_cli.main import run as run_any
+    try:
+        from robolink_cli.main import run as run_any
+    except Exception as error:  # a package of another version fails in its own way
+        from robolink_cli.unfit_packages import answer_without_click
 
+        return answer_without_click(arguments, error)
     return run_any(arguments, last=last)
 
 

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Final, NoReturn
 import click
 
 from robolink import __version__
+from robolink.errors import ConfigError
 from robolink.interrupts import Interrupted, one_ending
 from robolink.messages import declared, spoken
 from robolink.ways import speaking
 from robolink_cli.command_map import RENAMED, SECTIONS, SHORT_NAMES
-from robolink_cli.console.exit_codes import exit_code, report
+from robolink_cli.console.exit_codes import BUG, exit_code, report
 from robolink_cli.console.help_pages import in_language
 from robolink_cli.console.language import speaking_for
 from robolink_cli.console.output import hand_over, watched_output
@@ -27,7 +28,7 @@ from robolink_cli.console.tolerance import (
 )
 from robolink_cli.console.ways import SHELL_WAYS
 from robolink_cli.front_page import FrontPage
-from robolink_cli.options.shared import shared_options
+from robolink_cli.options.shared import TYPED, shared_options
 
 if TYPE_CHECKING:
     from robolink_cli.stopping.request import StopRequest
@@ -127,13 +128,28 @@ def _answer(arguments: Sequence[str]) -> int:
         return _invoke(arguments)
     except click.exceptions.Exit as end:
         return end.exit_code
-    except (Exception, KeyboardInterrupt) as error:
+    except (Exception, KeyboardInterrupt) as caught:
+        error = _explained(caught)
         code = exit_code(error)
         # That nobody is left to read how it ended is no other end.
         with suppress(Interrupted):
             # Looked for by hand, because the arguments may be what is wrong.
             report(error, as_json="--json" in arguments)
         return code
+
+
+def _explained(error: BaseException) -> BaseException:
+    """Return the error; what looks like a defect beside packages that do not fit is none."""
+    if exit_code(error) != BUG:
+        return error
+    from robolink_cli.unfit_packages import cannot_run, unfit_packages
+
+    unfit = unfit_packages()
+    if not unfit:
+        return error
+    told = ConfigError(cannot_run(unfit, error), remedy=" ".join(remark.remedy for remark in unfit))
+    told.__cause__ = error
+    return told
 
 
 def _invoke(arguments: Sequence[str]) -> int:
@@ -144,6 +160,7 @@ def _invoke(arguments: Sequence[str]) -> int:
     with _root().make_context(
         "robolink", list(arguments), color=colour, terminal_width=width
     ) as context:
+        context.meta[TYPED] = tuple(arguments)
         code = cli.invoke(context)
         print_document(context)
     return code if isinstance(code, int) else 0

@@ -38,7 +38,7 @@ MEANINGS: Final[dict[int, str]] = {
         "stands out in `journal drift`; `cell doctor`, `cell ports` or `cell check` found "
         "something to see to"
     ),
-    USAGE: "the command, a file, a setting or the journal is wrong",
+    USAGE: "the command, a file, a setting, the journal or an installed package is wrong",
     3: "the controller is not reached, or the link broke",
     4: "the two sides do not understand each other",
     5: "the controller, or a check of its state, said no",

@@ -106,8 +106,27 @@ class TooFast:
     """A burst of characters, as from a scanner or a paste, was dropped."""
 
 
+@dataclass(frozen=True, slots=True)
+class HasEnded:
+    """The work has ended, and its last screen is shown.
+
+    Attributes:
+        ended: A :class:`~robolink_cli.wizard.state.LastScreen`.
+    """
+
+    ended: object
+
+
 Happening = (
-    WasTold | WasRegarded | WasAsked | WaitsForAnswer | WasRead | KeyPressed | LineTyped | TooFast
+    WasTold
+    | WasRegarded
+    | WasAsked
+    | WaitsForAnswer
+    | WasRead
+    | KeyPressed
+    | LineTyped
+    | TooFast
+    | HasEnded
 )
 
 
@@ -124,6 +143,12 @@ class WizardCommand(Enum):
 
     END_WORK = "end"
     """End what is under way, as Ctrl-C would."""
+
+    LEAVE = "leave"
+    """Leave the last screen."""
+
+    BEGIN_AGAIN = "begin again"
+    """Begin the same job once more, from its first question."""
 
 
 Effect = SendAnswer | WizardCommand

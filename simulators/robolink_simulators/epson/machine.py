@@ -186,6 +186,14 @@ class Machine:
         """See :meth:`DrivenRobot.pose_of`."""
         return self.robot.pose_of(target)
 
+    def point_at(self, pose: Pose) -> Point:
+        """See :meth:`DrivenRobot.point_at`."""
+        return self.robot.point_at(pose)
+
+    def here(self) -> Point:
+        """See :meth:`DrivenRobot.here`."""
+        return self.robot.here()
+
     def advance(self, now_ns: int) -> None:
         """Let simulated time reach ``now_ns`` for every arm."""
         for robot in self.robots:

@@ -1,15 +1,13 @@
 """The checks of ``doctor``: this computer, never a controller."""
 
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
-from robolink.config import cell_names, check_file, config_files
 from robolink.errors import ConfigError
 from robolink.files.durable import state_folder
 from robolink.messages import tr
 from robolink_cli.commands.computer.doctor_finding import Level, Remark, guarded
-from robolink_cli.commands.computer.lines import devices_of_cells
 from robolink_cli.commands.computer.requirements import check_name, check_versions
 from robolink_cli.commands.computer.serial_ports import serial_ports
 
@@ -28,6 +26,18 @@ def check_up() -> list[Remark]:
     }
     found = [remark for subject, look in looks.items() for remark in guarded(subject, look)]
     return sorted(found, key=lambda remark: list(Level).index(remark.level), reverse=True)
+
+
+def in_words(remarks: Sequence[Remark]) -> Iterator[str]:
+    """Yield the lines that a person reads, the verdict last."""
+    for remark in remarks:
+        yield f"{remark.level:4}  {remark.subject}: {remark.what}"
+        if remark.remedy:
+            yield f"      {remark.remedy}"
+    if any(remark.level is Level.BAD for remark in remarks):
+        yield tr("Something is in the way; see the first lines.")
+    else:
+        yield tr("No obstacle was found.")
 
 
 def check_state_folder() -> Iterator[Remark]:
@@ -54,6 +64,8 @@ def check_state_folder() -> Iterator[Remark]:
 
 def check_cell_files() -> Iterator[Remark]:
     """Check each cell file, and who may change the addresses in it."""
+    from robolink.config import cell_names, check_file, config_files
+
     files = [file.path for file in config_files() if file.present]
     for path in files:
         try:
@@ -121,6 +133,8 @@ def check_serial_ports() -> Iterator[Remark]:
 
 def check_lines_of_cells() -> Iterator[Remark]:
     """See whether the ports that cells name are there."""
+    from robolink_cli.commands.computer.lines import devices_of_cells
+
     known = [port.device for port in serial_ports()]
     for device, names in devices_of_cells().items():
         if not Path(device).exists() and device not in known:

@@ -2,7 +2,6 @@
 
 import click
 
-from robolink.messages import tr
 from robolink_cli.console.render import emit_json, json_is_on, say
 from robolink_cli.session.context import json_option
 
@@ -17,7 +16,7 @@ def doctor() -> int:
     """
     from dataclasses import asdict
 
-    from robolink_cli.commands.computer.checkup import check_up
+    from robolink_cli.commands.computer.checkup import check_up, in_words
     from robolink_cli.commands.computer.doctor_finding import Level
 
     remarks = check_up()
@@ -26,13 +25,6 @@ def doctor() -> int:
         entries = [asdict(remark) for remark in remarks]
         emit_json("robolink/doctor/1", {"healthy": healthy, "checks": entries})
     else:
-        for remark in remarks:
-            say(f"{remark.level:4}  {remark.subject}: {remark.what}")
-            if remark.remedy:
-                say(f"      {remark.remedy}")
-        say(
-            tr("No obstacle was found.")
-            if healthy
-            else tr("Something is in the way; see the first lines.")
-        )
+        for line in in_words(remarks):
+            say(line)
     return 0 if healthy else 1

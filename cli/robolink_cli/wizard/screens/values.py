@@ -21,9 +21,17 @@ def values_screen(state: WizardState, subject: WriteSubject) -> Screen:
     return Screen(
         title_row(state, tr("New values")),
         (*value_lines(subject), "", typed),
-        (("*", tr("Write")), ("Esc", tr("Do not write"))),
+        (("*", tr("Write")), *_further(subject), ("Esc", tr("Do not write"))),
         message=state.message,
     )
+
+
+def _further(subject: WriteSubject) -> tuple[tuple[str, str], ...]:
+    """Return the keys that lead back to the touches."""
+    if subject.again is None:
+        return ()
+    again = ("/", tr("Touch {k} again", k=subject.again))
+    return (again, ("+", tr("One more touch"))) if subject.adds_touch else (again,)
 
 
 def value_lines(subject: WriteSubject) -> list[str]:

@@ -8,13 +8,13 @@ from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.variables import Variables
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.epson.refusals import SpelRefusal
+from robolink_simulators.epson.spel.execution.statement_execution import SpelError as SpelError
+from robolink_simulators.epson.spel.execution.statement_execution import (
+    StatementExecution as StatementExecution,
+)
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.parse import parse
 from robolink_simulators.epson.spel.session import Session, WindowMemory
-from robolink_simulators.epson.spel.statement_execution import SpelError as SpelError
-from robolink_simulators.epson.spel.statement_execution import (
-    StatementExecution as StatementExecution,
-)
 
 
 class Interpreter:

@@ -11,7 +11,6 @@ from collections.abc import Callable
 from typing import Final
 
 from robolink_simulators.epson.memory.input_bits import InputsAsked
-from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.values import truth
 from robolink_simulators.epson.spel.statements.waiting import follows_robot
@@ -81,8 +80,9 @@ class Watch:
         machine = self._evaluator.session.machine
         if self.stops:
             machine.till_met = True
+            machine.robot.guard.coming = None
             return machine.arm.brake(instant_ns)
-        machine.found = Point.at(machine.tip())
+        machine.found = machine.here()
         return None
 
     @property

@@ -115,7 +115,7 @@ TASK_FUNCTIONS: Final[dict[str, tuple[range, TaskFunction]]] = {
     "taskdone": (range(1, 2), _done),
     "taskinfo": (range(2, 3), _task_info),
     "taskinfo$": (range(2, 3), _task_text),
-    "taskreserve": (range(1), lambda t, _: _runner(t).free_number(TaskKind.NORMAL)),
+    "taskreserve": (range(1), lambda t, _: _runner(t).table.free_number(TaskKind.NORMAL)),
     "synclockreserve": (range(1), lambda t, _: _runner(t).sharing.reserve_lock()),
     "err": (range(2), _of_failure("number", 0)),
     "erl": (range(2), _of_failure("line", 0)),

@@ -106,7 +106,7 @@ class Traps:
             self._start(trap.function, now_ns)
             return
         if task.waiting is not None:
-            with self._runner.robot_of(task):
+            with self._runner.table.robot_of(task):
                 task.waiting.suspend(now_ns)
             task.waiting = None
         task.now_ns = max(task.now_ns, now_ns)

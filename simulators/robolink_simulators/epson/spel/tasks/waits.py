@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 from typing import Final, Protocol
 
-from robolink_simulators.epson.spel.statement_execution import StatementExecution
+from robolink_simulators.epson.spel.execution.statement_execution import StatementExecution
 from robolink_simulators.epson.spel.statements.waiting import NEVER_NS
 
 POLL_NS: Final = 10_000_000

@@ -108,7 +108,7 @@ def _abort_motion(emitter: Emitter, node: TaskStatement) -> Operation:
         wanted = None if number is None else as_integer(number(t))
         if wanted is not None and not 1 <= wanted <= len(robots):
             raise SpelRefusal(RefusalKind.ROBOT_NUMBER, f"There is no robot {wanted}")
-        movers = dict(t.runner.movers)
+        movers = dict(t.runner.steps.movers)
         for at in range(1, len(robots) + 1) if wanted is None else (wanted,):
             mover = movers.get(at)
             if mover is None or mover.ended:
@@ -120,7 +120,7 @@ def _abort_motion(emitter: Emitter, node: TaskStatement) -> Operation:
             kind = RefusalKind.MOTION_ABORTED if arm.moving else RefusalKind.ABORTED_AT_REST
             arm.halt(t.now_ns)
             mover.now_ns = max(mover.now_ns, t.now_ns)
-            t.runner.fail(mover, SpelRefusal(kind, f"AbortMotion of robot {at}"))
+            t.runner.steps.fail(mover, SpelRefusal(kind, f"AbortMotion of robot {at}"))
         return t.turn() if t.ended else None
 
     return go
@@ -133,7 +133,7 @@ def _halt(emitter: Emitter, node: TaskStatement) -> Operation:
         for task in which(t):
             task.halted = True
             if task.waiting is not None:
-                with task.runner.robot_of(task):
+                with task.runner.table.robot_of(task):
                     task.waiting.suspend(t.now_ns)
         return t.turn() if t.halted else None
 
@@ -149,7 +149,7 @@ def _resume(emitter: Emitter, node: TaskStatement) -> Operation:
                 task.halted = False
                 task.now_ns = max(task.now_ns, t.now_ns)
                 if task.waiting is not None:
-                    with task.runner.robot_of(task):
+                    with task.runner.table.robot_of(task):
                         task.waiting.go_on(t.now_ns)
 
     return go
@@ -252,7 +252,7 @@ def _raise(emitter: Emitter, node: TaskStatement) -> Operation:
         if other is t:
             raise error
         if other is not None:
-            t.runner.fail(other, error)
+            t.runner.steps.fail(other, error)
 
     return go
 

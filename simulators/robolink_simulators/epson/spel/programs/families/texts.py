@@ -129,7 +129,7 @@ def evaluated(emitter: Emitter, arguments: Sequence[Expression], slot: int) -> O
         said = ""
         try:
             for statement in parse(text):
-                running = StatementWaiting(t.runner.carried_out(t, statement))
+                running = StatementWaiting(t.runner.steps.carried_out(t, statement))
                 yield running
                 said += running.execution.output
                 t.now_ns = max(t.now_ns, running.execution.ended_ns)

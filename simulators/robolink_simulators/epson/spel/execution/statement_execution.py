@@ -4,25 +4,19 @@ The command window carries a line out so, a task of a program each statement tha
 the machine: what a statement means does not depend on who says it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from robolink.timing import NS_PER_S
 from robolink_simulators.epson.arm.trajectory import Leg
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
-from robolink_simulators.epson.request_refusals import RequestRefused
+from robolink_simulators.epson.spel.execution.instant_effects import effect
+from robolink_simulators.epson.spel.execution.motion_start import begin_motion
+from robolink_simulators.epson.spel.execution.settling import settling_ns
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
-from robolink_simulators.epson.spel.expressions.printing import (
-    CRLF,
-    LONGEST_PRINT_TO,
-    joined,
-    number_text,
-)
-from robolink_simulators.epson.spel.expressions.values import Value, as_number, truth
-from robolink_simulators.epson.spel.statements.blending import blends, fall_ns, rest_of_way
-from robolink_simulators.epson.spel.statements.defined.curves import store_curve
-from robolink_simulators.epson.spel.statements.jump import DESCENT
-from robolink_simulators.epson.spel.statements.keywords import StatementOutcome, run_command
+from robolink_simulators.epson.spel.expressions.values import truth
+from robolink_simulators.epson.spel.statements.blending import rest_of_way
+from robolink_simulators.epson.spel.statements.keywords import StatementOutcome
 from robolink_simulators.epson.spel.statements.motion import plan
 from robolink_simulators.epson.spel.statements.until import DescentWatch, Watch
 from robolink_simulators.epson.spel.statements.waiting import (
@@ -33,20 +27,13 @@ from robolink_simulators.epson.spel.statements.waiting import (
     wait_limit,
 )
 from robolink_simulators.epson.spel.tree import (
-    AssignCoordinate,
-    AssignPoint,
-    AssignVariable,
-    Coordinates,
     Distance,
     If,
     KeywordStatement,
     MotionStatement,
-    Print,
-    PrintTo,
     Statement,
 )
 
-WAYS_OF_JUMP: Final = 3
 HIGHEST_PERCENT: Final = 100
 
 
@@ -93,6 +80,8 @@ class StatementExecution:
         self._waiting: Waiting | None = None
         self._meanwhile: StatementExecution | None = None
         self._aim: Leg | None = None
+        self._reserved: MotionStatement | None = None
+        self._held = self._released = False
         self._done = False
 
     @property
@@ -119,9 +108,27 @@ class StatementExecution:
         """Whether its motion is under way."""
         return self._aim is not None and self._evaluator.session.machine.arm.moving
 
+    @property
+    def stands(self) -> bool:
+        """Whether its motion is reserved and waits for SyncRobots."""
+        return self._reserved is not None and not self._done and self._evaluator.carries(self)
+
+    def start_reserved(self, now_ns: int) -> None:
+        """Begin the motion that was reserved; one that is held begins when it goes on (assumed)."""
+        if self._held:
+            self._released = True
+        elif self._reserved is not None:
+            motion, self._reserved = self._reserved, None
+            options = replace(motion.options, words=motion.options.words - {"sync"})
+            self._pending.append(replace(motion, options=options))
+            self._busy_until_ns = now_ns
+            self._attempt(now_ns)
+
     def suspend(self, now_ns: int) -> None:
         """Stop the motion where it is; nothing is done until :meth:`go_on`."""
-        if self.travels:
+        if self._reserved is not None:
+            self._held = True
+        elif self.travels:
             self._evaluator.session.machine.arm.halt(now_ns)
         else:
             self._aim = None
@@ -134,7 +141,11 @@ class StatementExecution:
         """
         machine = self._evaluator.session.machine
         self._seen_ns = now_ns
-        if self._aim is not None:
+        if self._reserved is not None:
+            self._held = False
+            if self._released:
+                self.start_reserved(now_ns)
+        elif self._aim is not None:
             self._busy_until_ns = machine.arm.start([rest_of_way(machine, self._aim)], now_ns)
         elif self._waiting is not None:
             self._waiting.restart(now_ns)
@@ -168,7 +179,12 @@ class StatementExecution:
         elif self._meanwhile is not None:
             # The next statement waits for what stands inside !...! (docs/reference/spel.md 7.1).
             self._busy_until_ns = self._meanwhile.due_ns(self._seen_ns)
-        elif self._pending:
+        else:
+            self._evaluator.session.machine.robot.guard.require_no_error()
+            self._begin_next()
+
+    def _begin_next(self) -> None:
+        if self._pending:
             self._aim = None
             self._run(self._pending.pop())
         else:
@@ -208,6 +224,8 @@ class StatementExecution:
     @property
     def _change_ns(self) -> int:
         """When something is due: an end of waiting, an edge, the end of the statement."""
+        if self._reserved is not None:
+            return NEVER_NS
         if self._waiting is not None:
             return self._waiting.next_look(self._seen_ns)
         change_ns = self._busy_until_ns
@@ -260,8 +278,16 @@ class StatementExecution:
         if outcome.legs:
             self._aim = outcome.legs[-1]
             self._busy_until_ns = machine.arm.start(outcome.legs, start_ns)
+            self._busy_until_ns += settling_ns(self._evaluator.session, outcome.legs)
         self._duration_ns = outcome.duration_ns
         self._busy_until_ns += outcome.duration_ns
+
+    def _reserve(self, motion: MotionStatement) -> StatementOutcome:
+        """Keep a motion with SYNC for SyncRobots; what it could not do is refused now (assumed)."""
+        robot = self._evaluator.session.machine.robot
+        plan(self._evaluator, motion)
+        self._reserved, robot.reservation = motion, self
+        return StatementOutcome()
 
     def _begin(self, motion: MotionStatement) -> StatementOutcome:
         machine, start_ns = self._evaluator.session.machine, self._busy_until_ns
@@ -269,42 +295,17 @@ class StatementExecution:
             # The motion before was to blend into this one; here it ends first (assumed).
             self._pending.append(motion)
             return StatementOutcome(duration_ns=(machine.arm.next_change() or start_ns) - start_ns)
-        legs, until = plan(self._evaluator, motion), motion.options.until
-        machine.till_met = machine.sensed = False
+        start = begin_motion(self._evaluator, motion, start_ns)
         if motion.options.meanwhile:
-            travel = legs[1:2] if motion.verb == "jump" and len(legs) == WAYS_OF_JUMP else legs
-            before_ns = legs[0].duration_ns if travel is not legs else 0
+            before_ns, travel_ns = start.travelled_ns
             self._meanwhile = StatementExecution(
                 self._evaluator,
                 motion.options.meanwhile,
                 start_ns + before_ns,
-                travel_ns=sum(leg.duration_ns for leg in travel),
+                travel_ns=travel_ns,
             )
-        if self._evaluator.blends and blends(machine, motion):
-            end_ns = machine.arm.start(legs, start_ns)
-            self._aim = legs[-1]
-            return StatementOutcome(duration_ns=end_ns - start_ns - fall_ns(legs[-1]))
-        if until is None:
-            return StatementOutcome(legs=legs)
-        if until.word == "sense":
-            descent_ns = start_ns + sum(leg.duration_ns for leg in legs[:DESCENT])
-            self._watch = DescentWatch(self._evaluator, until, descent_ns)
-            return StatementOutcome(legs=legs)
-        watch = Watch(self._evaluator, until)
-        if not watch.stops:
-            machine.found = None
-        if self._stays(watch, start_ns):
-            watch.meet(start_ns)
-            return StatementOutcome()
-        end_ns = machine.arm.start(legs, start_ns)
-        self._aim = legs[-1]
-        watch.foresee(start_ns, end_ns)
-        self._watch = watch
-        return StatementOutcome(duration_ns=end_ns - start_ns)
-
-    def _stays(self, watch: Watch, start_ns: int) -> bool:
-        stays = self._evaluator.session.options.till_already_met == "stays"
-        return watch.holds(start_ns) and watch.stops and stays
+        self._aim, self._watch = start.aim, start.watch
+        return start.outcome
 
     def _wait(self, command: KeywordStatement) -> StatementOutcome:
         """Wait for a condition, or for some seconds."""
@@ -336,65 +337,16 @@ class StatementExecution:
         self._pending += reversed(statement.then if holds else statement.otherwise)
         return StatementOutcome()
 
-    def _assign(self, name: str, value: Value) -> StatementOutcome:
-        session = self._evaluator.session
-        if session.options.variable_assignment == "refused":
-            # Whether the command window takes variables is left open (docs/reference/spel.md 13).
-            raise SpelRefusal(RefusalKind.NOT_ALLOWED_HERE, f"{name} needs a program")
-        if not session.variables.holds(name):
-            raise SpelRefusal(RefusalKind.NAME_UNDEFINED, f"Nothing is called {name}")
-        text = value if isinstance(value, str) else number_text(as_number(value))
-        try:
-            session.variables.set(name, text)
-        except RequestRefused as refused:
-            raise SpelRefusal(RefusalKind.TYPE_MISMATCH, f"{name} cannot hold {text}") from refused
-        return StatementOutcome()
-
-    def _print_to(self, statement: PrintTo) -> StatementOutcome:
-        """Print to a port: only those that a program has opened are there."""
-        evaluator, session = self._evaluator, self._evaluator.session
-        channel = evaluator.integer(statement.channel)
-        values = [evaluator.shown(item) for item in statement.items]
-        text = joined(values, session.options, session.machine.model, longest=LONGEST_PRINT_TO)
-        evaluator.write_to(channel, text, ends=statement.newline)
-        return StatementOutcome()
-
     def _outcome(self, statement: Statement) -> StatementOutcome:
-        evaluator = self._evaluator
-        machine = evaluator.session.machine
         match statement:
-            case Print(items, newline):
-                values = [evaluator.shown(item) for item in items]
-                text = joined(values, evaluator.session.options, machine.model)
-                return StatementOutcome(text + (CRLF if newline else ""))
             case KeywordStatement("wait"):
                 return self._wait(statement)
             case If():
                 return self._branch(statement)
-            case KeywordStatement():
-                return run_command(evaluator, statement)
-            case MotionStatement("curve"):
-                store_curve(evaluator, statement)
-                return StatementOutcome()
-            case MotionStatement():
-                return self._begin(statement)
+            case MotionStatement(verb) if verb != "curve":
+                reserves = "sync" in statement.options.words
+                return self._reserve(statement) if reserves else self._begin(statement)
             case Distance(percent):
                 return self._wait_for_distance(percent)
-            case PrintTo():
-                return self._print_to(statement)
-            case AssignPoint(number, value):
-                point = evaluator.point_of(value)
-                machine.points.store(evaluator.point_number(number), point)
-                return StatementOutcome()
-            case AssignCoordinate(axis, place, value):
-                number_of_point = evaluator.stored_number(place)
-                changed = machine.points.get(number_of_point).assigned(
-                    axis, float(evaluator.number(value))
-                )
-                machine.points.store(number_of_point, changed)
-                return StatementOutcome()
-            case AssignVariable(name, Coordinates()):
-                raise SpelRefusal(RefusalKind.TYPE_MISMATCH, f"{name} cannot hold coordinates")
-            case AssignVariable(name, expression) if not isinstance(expression, Coordinates):
-                return self._assign(name, evaluator.value(expression))
-        raise AssertionError(statement)
+            case _:
+                return effect(self._evaluator, statement)

@@ -1,0 +1,86 @@
+"""What is said when the packages beside robolink are not those that it asks for.
+
+Then anything may fail anywhere, ``import click`` included, and no failure is a defect of
+robolink. So nothing is imported here but Python's own library and what of ours needs no more.
+"""
+
+import json
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+
+from robolink.messages import joined, tr
+from robolink_cli.commands.computer.doctor_finding import Level, Remark
+from robolink_cli.commands.computer.requirements import check_versions
+from robolink_cli.console.language import speaking_for
+from robolink_cli.console.tolerance import tolerate_any_console
+
+_FOUND = 1
+_NOT_RUNNABLE = 2
+
+
+def unfit_packages() -> list[Remark]:
+    """Return what is missing or of a version that robolink does not run with; mostly nothing."""
+    with suppress(Exception):  # metadata that cannot be read accuse nobody
+        return [remark for remark in check_versions() if remark.level is Level.BAD]
+    return []
+
+
+def cannot_run(unfit: Sequence[Remark], error: BaseException) -> str:
+    """Return the sentence for a failure beside packages that do not fit.
+
+    Args:
+        unfit: Those packages, at least one.
+        error: What the failure was.
+    """
+    return tr(
+        "robolink cannot work with the packages that are installed: {packages} It ended with "
+        "{kind}: {error}",
+        packages=joined(" ", (f"{remark.subject}: {remark.what}" for remark in unfit)),
+        kind=type(error).__name__,
+        error=error,
+    )
+
+
+def answer_without_click(arguments: Sequence[str], error: Exception) -> int:
+    """Answer a command line whose program could not be imported; return the exit code.
+
+    ``doctor`` looks at everything all the same. Any other command says what does not fit.
+
+    Args:
+        arguments: The command line without the program's name.
+        error: Why the import failed.
+
+    Raises:
+        Exception: ``error`` itself, where every package fits: then it is a defect.
+    """
+    unfit = unfit_packages()
+    if not unfit:
+        raise error
+    tolerate_any_console()
+    with speaking_for(arguments):
+        if "doctor" in arguments:
+            return _examined(as_json="--json" in arguments)
+        lines = [cannot_run(unfit, error), *(remark.remedy for remark in unfit)]
+        if "--json" in arguments:
+            body = {"kind": type(error).__name__, "what": lines[0], "remedy": " ".join(lines[1:])}
+            document = {"schema": "robolink/error/1", "error": body, "exit_code": _NOT_RUNNABLE}
+            sys.stdout.write(json.dumps(document, indent=2) + "\n")
+        else:
+            sys.stderr.write("\n  ".join([f"robolink: {lines[0]}", *lines[1:]]) + "\n")
+    return _NOT_RUNNABLE
+
+
+def _examined(*, as_json: bool) -> int:
+    from dataclasses import asdict
+
+    from robolink_cli.commands.computer.checkup import check_up, in_words
+
+    remarks = check_up()
+    if as_json:
+        document = {"schema": "robolink/doctor/1", "healthy": False}
+        checks = [asdict(remark) for remark in remarks]
+        sys.stdout.write(json.dumps(document | {"checks": checks}, indent=2) + "\n")
+    else:
+        sys.stdout.write("\n".join(in_words(remarks)) + "\n")
+    return _FOUND

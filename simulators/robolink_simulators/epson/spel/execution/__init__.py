@@ -1,0 +1,1 @@
+"""How statements are carried out in simulated time."""

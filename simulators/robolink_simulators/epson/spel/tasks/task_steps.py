@@ -1,0 +1,125 @@
+"""Carries out what tasks do: operation by operation, until one takes time."""
+
+from typing import Any
+
+from robolink_simulators.epson.refusals import RaisedError, RefusalKind, SpelRefusal
+from robolink_simulators.epson.spel.execution.statement_execution import StatementExecution
+from robolink_simulators.epson.spel.session import Session
+from robolink_simulators.epson.spel.tasks.permissions import forbidden_in
+from robolink_simulators.epson.spel.tasks.task import SpelTask
+from robolink_simulators.epson.spel.tasks.waits import StatementWaiting, TaskWaiting
+from robolink_simulators.epson.spel.tree import KeywordStatement, MotionStatement, Statement
+
+
+class TaskSteps:
+    """Lets one task at a time go on.
+
+    Args:
+        runner: Whose tasks they are: a ``ProgramRunner``, which makes this. It is shown what
+            Print says, and told which errors no task dealt with.
+        session: What statements reach.
+
+    Attributes:
+        movers: The task that moved each robot last, by the robot's number.
+    """
+
+    def __init__(self, runner: Any, session: Session) -> None:  # noqa: ANN401 - see above
+        self._runner = runner
+        self._session = session
+        self._step_ns = session.options.statement_us * 1000
+        self.movers: dict[int, SpelTask] = {}
+
+    def burst(self, task: SpelTask, until_ns: int) -> None:
+        """Carry operations out until an instant, or until one takes time."""
+        operations, step_ns, runner = task.operations, self._step_ns, self._runner
+        try:
+            while task.now_ns <= until_ns:
+                pc = task.pc
+                task.pc = pc + 1
+                if runner.on_statement is not None:
+                    self._trace(task, pc)
+                outcome = operations[pc](task)
+                task.now_ns += step_ns
+                if outcome is None:
+                    continue
+                if not self._take_up(task, outcome):
+                    return
+                operations = task.operations
+        except SpelRefusal as refusal:
+            self.fail(task, refusal)
+        except RecursionError:
+            self.fail(task, SpelRefusal(RefusalKind.SYNTAX, "Expression too deeply nested"))
+
+    def _trace(self, task: SpelTask, pc: int) -> None:
+        function = task.frame.function
+        if function.starts[pc] == pc:
+            place = function.places[pc]
+            text = self._runner.project.sources.get(place, "")
+            self._runner.on_statement(task, place.file, place.line, text)
+
+    def _take_up(self, task: SpelTask, outcome: object) -> bool:
+        """Deal with what an operation gave; tell whether the task goes on at once."""
+        if isinstance(outcome, Statement):
+            waiting: TaskWaiting = StatementWaiting(self.carried_out(task, outcome))
+        elif hasattr(outcome, "look"):
+            waiting = outcome  # type: ignore[assignment]
+        else:
+            return not task.ended
+        self.look(task, waiting, task.now_ns)
+        if isinstance(outcome, KeywordStatement) and outcome.name == "wait":
+            return False  # Wait 0 gives the others a turn (documented)
+        return task.waiting is None and not task.ended and not task.halted
+
+    def carried_out(self, task: SpelTask, statement: Statement) -> StatementExecution:
+        """Begin a statement of the machine for a task.
+
+        Raises:
+            Refusal: This kind of task may not, or another task moves the robot.
+        """
+        machine = self._session.machine
+        machine.advance(task.now_ns)
+        machine.timed_bits.advance(task.now_ns)
+        if forbidden_in(task.kind, statement):
+            raise SpelRefusal(RefusalKind.NOT_IN_THIS_TASK, "Not allowed in this kind of task")
+        if isinstance(statement, MotionStatement):
+            number = machine.robot_number
+            if machine.arm.moving and self.movers.get(number) is not task:
+                raise SpelRefusal(RefusalKind.ROBOT_IN_USE, "Another task moves the robot")
+            self.movers[number] = task
+        return StatementExecution(task, (statement,), task.now_ns)
+
+    def look(self, task: SpelTask, waiting: TaskWaiting, now_ns: int) -> None:
+        """Look at what a task waits for, and let it go on if that is over."""
+        task.waiting = waiting
+        try:
+            over = waiting.look(max(now_ns, task.now_ns))
+            if not over:
+                return
+            task.waiting = None
+            task.loop_passes = 0
+            task.now_ns = max(task.now_ns, now_ns)
+            if isinstance(waiting, StatementWaiting):
+                self._finish(task, waiting.execution)
+        except SpelRefusal as refusal:
+            task.waiting = None
+            task.now_ns = max(task.now_ns, now_ns)
+            self.fail(task, refusal)
+
+    def _finish(self, task: SpelTask, execution: StatementExecution) -> None:
+        if execution.output:
+            self._runner.show(execution.output)
+        task.now_ns = max(task.now_ns, execution.ended_ns)
+        if execution.error is not None:
+            self._fail(task, execution.error.number, execution.error.text)
+
+    def fail(self, task: SpelTask, refusal: SpelRefusal) -> None:
+        """Let a task meet an error: where it deals with it, or at its end."""
+        if isinstance(refusal, RaisedError):
+            self._fail(task, refusal.number, refusal.text)
+        else:
+            self._fail(task, getattr(self._session.options.numbers, refusal.kind), refusal.text)
+
+    def _fail(self, task: SpelTask, number: int, text: str) -> None:
+        task.waiting = None
+        if not task.fail(number, text) and task.failure is not None:
+            self._runner.give_up(task, task.failure)

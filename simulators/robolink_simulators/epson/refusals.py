@@ -34,6 +34,7 @@ class RefusalKind(StrEnum):
     CALIBRATION_PULSES = "calibration_pulses"
     MOTORS_ON = "motors_on"
     NOT_RESERVED = "not_reserved"
+    LATCH_UNSET = "latch_unset"
     WAIT_TIMED_OUT = "wait_timed_out"
     JOINT_FREE = "joint_free"
     JOINT_TOO_FAST = "joint_too_fast"

@@ -6,7 +6,7 @@ is (assumed: a real one needs a few milliseconds to come to rest).
 
 import math
 import random
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import accumulate
 from typing import Final
@@ -104,6 +104,7 @@ class Arm:
     Attributes:
         motions: Those begun since the arm was made.
         backlash_mm: Play of a SCARA's joint 3, likewise; none at first.
+        followed: Told of each part of a motion, from when to when, before its end is forgotten.
         origin_errors: How far each joint really stands from where its encoder is taken to say.
     """
 
@@ -116,6 +117,7 @@ class Arm:
         self.motions = MotionLog()
         self.backlash_deg = backlash_deg
         self.backlash_mm = 0.0
+        self.followed: Callable[[int, int], None] | None = None
         self.origin_errors: tuple[float, ...] = (0.0,) * model.axes
         self._joints = joints
         self._now_ns = 0
@@ -222,6 +224,8 @@ class Arm:
         since_ns, self._now_ns = self._now_ns, max(self._now_ns, now_ns)
         if self._travel is None:
             return
+        if self.followed is not None:
+            self.followed(since_ns, min(self._now_ns, self._travel.end_ns))
         for instant_ns in self._travel.looks(since_ns, self._now_ns):
             self._take_up(self._travel.joints_at(instant_ns))
         if self._now_ns >= self._travel.end_ns:

@@ -29,6 +29,7 @@ from robolink_simulators.epson.definitions.robot_base import RobotBase
 from robolink_simulators.epson.memory.control_points import ControlPoints
 from robolink_simulators.epson.memory.pallets import PalletTable
 from robolink_simulators.epson.memory.points import LocalTable, Point, PointTable
+from robolink_simulators.epson.memory.position_latch import PositionLatch
 from robolink_simulators.epson.memory.tools import ToolMemory
 
 
@@ -70,6 +71,7 @@ class DrivenRobot:
         found: Where the last Find met its condition, the selected tool's tip.
         motors_on: Whether the motors are on.
         power_high: Whether power is high; low after anything that resets the parameters.
+        latch: Takes its position at edges of an input.
         reservation: The motion that waits for SyncRobots, if whoever gave it still does.
         opened_brakes: Joints whose brake was opened by hand while the motors are off.
     """
@@ -97,6 +99,7 @@ class DrivenRobot:
         self.kept = KeptDefinitions(model.arm_values, ranges, base, origins)
         self.opened_brakes = set[int]()
         self.reservation: ReservedMotion | None = None
+        self.latch = PositionLatch(self.arm)
         self.drives = DriveSettings(model.axes)
         self.sensed = False
         self.till_met = False
@@ -271,6 +274,7 @@ class DrivenRobot:
         """Forget what a power cycle takes: all but tools, HomeSet and its place."""
         self.arm.halt(now_ns)
         self.reservation = None
+        self.latch.forget()
         self.switch_motors(False)
         self.reset_motion_parameters()
         home, order = self.settings.home_pulses, self.settings.home_order

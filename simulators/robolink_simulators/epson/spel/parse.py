@@ -36,8 +36,8 @@ _WORDS_NOT_SIMULATED = """
     areacorrectionclr areacorrectionset avgspeedclear chdisk collisiondetect peakspeedclear atrq
     dispdev enctemper msgbox olrate opencom opennet parsestr ptrq shutdown
     taskstate atclr closecom closenet close cls eresume error flush fmtstr
-    input inputbox latchenable line ptclr randomize read redim
-    resetelapsedtime setcom setlatch setnet signal simset taskwait tmreset toff ton vcal
+    input inputbox line ptclr randomize read redim
+    resetelapsedtime setcom setnet signal simset taskwait tmreset toff ton vcal
     vcalpoints waitnet waitsig write writebin cont restart recover vdefgetmotionrange
     vdefsetmotionrange vshowmodel vtrain sysconfig workque_list cnv_quelist history clearhistory
 """
@@ -72,7 +72,7 @@ _OF_PROGRAMS_ALONE = """
 
 _UNSIMULATED_FUNCTIONS = """
     opencom chkcom currobot ptrq atrq avgspeed peakspeed olrate sense till vxcalinfo vxcalpoints
-    hand_on hand_off aio_in aio_inw aio_out aio_outw recover latchpos recoverpos lookup alignecp
+    hand_on hand_off aio_in aio_inw aio_out aio_outw recover recoverpos lookup alignecp
     areacorrection areacorrectiondef collisiondetect
     ptpboostok rotok taskstate tmout vsd dispdev windowsstatus loadtype projectname$
     robotname joint restart setcom here eval

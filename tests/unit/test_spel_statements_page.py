@@ -8,6 +8,7 @@ from robolink_simulators.epson import EpsonOptions, EpsonSimulator
 from robolink_simulators.epson.spel.expressions.functions import PLAIN_FUNCTIONS
 from robolink_simulators.epson.spel.expressions.machine_functions import (
     MACHINE_FUNCTIONS,
+    OF_POINT_NUMBERS,
     POINT_FUNCTIONS,
 )
 from robolink_simulators.epson.spel.expressions.state_functions import STATE_FUNCTIONS
@@ -88,7 +89,7 @@ def test_an_assigned_variable_is_read_over_the_wire_and_back(login):
 def refused_words():
     """Return the statements and the functions that a program may hold and that are refused."""
     known = {"pdef", *PLAIN_FUNCTIONS, *MACHINE_FUNCTIONS, *POINT_FUNCTIONS, *STATE_FUNCTIONS}
-    known |= {*TASK_FUNCTIONS, *FUNCTIONS_OF_ARRAYS}
+    known |= {*TASK_FUNCTIONS, *FUNCTIONS_OF_ARRAYS, *OF_POINT_NUMBERS}
     return UNSIMULATED - WINDOW_ONLY, UNSIMULATED_FUNCTIONS - known
 
 

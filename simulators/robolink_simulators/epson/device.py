@@ -142,6 +142,7 @@ class EpsonSimulator(HostedDevice):
             messages=self.card.messages,
         )
         self._session = interpreter.session
+        self._session.project_name = self.card.project
         self.program: ProgramRunner | None = None
         self._window = SpelWindow(interpreter, self.condition, self.options)
         self._slot = ClientSlot(self.options.remote_timeout_s, self.wire_time)

@@ -205,6 +205,12 @@ class Machine:
         for robot in self.robots:
             robot.arm.halt(now_ns)
 
+    def keep_places(self, now_ns: int) -> None:
+        """Stop every arm, and keep where it is for Recover (documented for the safeguard)."""
+        self.halt(now_ns)
+        for robot in self.robots:
+            robot.recovers_to = robot.arm.joints
+
     def switch_motors(self, on: bool) -> None:
         """Switch the motors of the robot in force ."""
         self.robot.switch_motors(on)

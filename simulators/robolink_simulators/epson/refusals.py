@@ -35,6 +35,8 @@ class RefusalKind(StrEnum):
     MOTORS_ON = "motors_on"
     NOT_RESERVED = "not_reserved"
     LATCH_UNSET = "latch_unset"
+    GUARD_OPEN = "guard_open"
+    EMERGENCY_STOP = "emergency_stop"
     WAIT_TIMED_OUT = "wait_timed_out"
     JOINT_FREE = "joint_free"
     JOINT_TOO_FAST = "joint_too_fast"

@@ -71,6 +71,8 @@ class DrivenRobot:
         found: Where the last Find met its condition, the selected tool's tip.
         motors_on: Whether the motors are on.
         power_high: Whether power is high; low after anything that resets the parameters.
+        jump: When the last Jump began, and how long its three parts were to take, in ns.
+        recovers_to: Where it was when the safeguard opened, until it is back there.
         latch: Takes its position at edges of an input.
         reservation: The motion that waits for SyncRobots, if whoever gave it still does.
         opened_brakes: Joints whose brake was opened by hand while the motors are off.
@@ -100,6 +102,8 @@ class DrivenRobot:
         self.opened_brakes = set[int]()
         self.reservation: ReservedMotion | None = None
         self.latch = PositionLatch(self.arm)
+        self.jump: tuple[int, tuple[int, ...]] | None = None
+        self.recovers_to: Joints | None = None
         self.drives = DriveSettings(model.axes)
         self.sensed = False
         self.till_met = False
@@ -275,6 +279,7 @@ class DrivenRobot:
         self.arm.halt(now_ns)
         self.reservation = None
         self.latch.forget()
+        self.jump = self.recovers_to = None
         self.switch_motors(False)
         self.reset_motion_parameters()
         home, order = self.settings.home_pulses, self.settings.home_order

@@ -38,7 +38,7 @@ _WORDS_NOT_SIMULATED = """
     taskstate atclr closecom closenet close cls eresume error flush fmtstr
     input inputbox line ptclr randomize read redim
     resetelapsedtime setcom setnet signal simset taskwait tmreset toff ton vcal
-    vcalpoints waitnet waitsig write writebin cont restart recover vdefgetmotionrange
+    vcalpoints waitnet waitsig write writebin cont restart vdefgetmotionrange
     vdefsetmotionrange vshowmodel vtrain sysconfig workque_list cnv_quelist history clearhistory
 """
 
@@ -72,9 +72,9 @@ _OF_PROGRAMS_ALONE = """
 
 _UNSIMULATED_FUNCTIONS = """
     opencom chkcom currobot ptrq atrq avgspeed peakspeed olrate sense till vxcalinfo vxcalpoints
-    hand_on hand_off aio_in aio_inw aio_out aio_outw recover recoverpos lookup alignecp
+    hand_on hand_off aio_in aio_inw aio_out aio_outw lookup
     areacorrection areacorrectiondef collisiondetect
-    ptpboostok rotok taskstate tmout vsd dispdev windowsstatus loadtype projectname$
+    ptpboostok taskstate tmout vsd dispdev loadtype
     robotname joint restart setcom here eval
 """
 

@@ -42,6 +42,8 @@ def begin_motion(evaluator: Evaluator, motion: MotionStatement, start_ns: int) -
     legs, until = plan(evaluator, motion), motion.options.until
     machine.till_met = machine.sensed = False
     way_ns = _travelled_ns(motion, legs)
+    if motion.verb.startswith("jump"):
+        machine.robot.jump = start_ns, tuple(leg.duration_ns for leg in legs)
     if evaluator.blends and blends(machine, motion):
         end_ns = machine.arm.start(legs, start_ns)
         outcome = StatementOutcome(duration_ns=end_ns - start_ns - fall_ns(legs[-1]))

@@ -24,9 +24,17 @@ from robolink_simulators.epson.spel.expressions.defined.differences import (
     turned_tool,
 )
 from robolink_simulators.epson.spel.expressions.defined.drive_settings import DRIVE_FUNCTIONS
+from robolink_simulators.epson.spel.expressions.defined.orientations import (
+    ORIENTATION_FUNCTIONS,
+    aligned,
+)
 from robolink_simulators.epson.spel.expressions.defined.origins import (
     NS_PER_HOUR,
     ORIGIN_FUNCTIONS,
+)
+from robolink_simulators.epson.spel.expressions.defined.unfinished import (
+    UNFINISHED_FUNCTIONS,
+    place_to_recover,
 )
 from robolink_simulators.epson.spel.expressions.defined.xy_limits import (
     LIMIT_FUNCTIONS,
@@ -184,6 +192,8 @@ MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     **AREA_FUNCTIONS,
     **DRIVE_FUNCTIONS,
     **ORIGIN_FUNCTIONS,
+    **ORIENTATION_FUNCTIONS,
+    **UNFINISHED_FUNCTIONS,
     "pagl": (range(2, 3), joint_of_point),
     "ppls": (range(2, 3), pulses_of_point),
     "avoidsingularity": (range(1), lambda s, _: s.machine.settings.avoid_singularity),
@@ -369,6 +379,9 @@ POINT_FUNCTIONS: Final[dict[str, tuple[range, PointFunction]]] = {
     "realpos": (range(1), _real_position),
     "findpos": (range(1), _found_position),
     "latchpos": (range(3), _latched_position),
+    "recoverpos": (range(2), place_to_recover),
+    "align": (range(1, 4), aligned),
+    "alignecp": (range(2, 3), aligned),
     "tlset": (range(1, 2), _tool_point),
     "local": (range(1, 2), _local_point),
     "xylim": (range(1, 2), corner_of_limits),

@@ -201,12 +201,14 @@ class NozzleChange:
         judged = [(one, plan.criteria.verdicts(one)) for plan, one in proposals]
         shown, verdicts = zip(*judged, strict=True)
         regard(self._operator, [WriteSubject(shown, verdicts)])
-        accepted = context.runner().confirm(tr("Write this to tool {tool}?", tool=numbers))
+        accepted = context.runner().confirm(
+            tr("Write these values to tool {tool}? 'robolink undo' takes them back.", tool=numbers)
+        )
         verdict = tr("accepted") if accepted else tr("declined")
         outcomes.append(decision_entry(verdict, accepted=accepted))
         if not accepted:
             raise DeclinedError(
-                tr("The proposal was not accepted."), remedy=tr("Nothing was written.")
+                tr("You did not accept the new value."), remedy=tr("Nothing was written.")
             )
 
     def _write(self, context: MeasurementContext, proposals: Proposals) -> tuple[ToolReport, ...]:
@@ -282,7 +284,7 @@ class NozzleChange:
                 raise
             self._controller.outcomes.append(refusal_entry(tool, criteria, error))
             raise VerifyError(
-                tr("The new tip was not proved. {cause}", cause=error.what),
+                tr("The new tip was not tested. {cause}", cause=error.what),
                 remedy=error.remedy,
                 code=error.code,
                 controller=self._controller.identity,

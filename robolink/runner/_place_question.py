@@ -167,7 +167,9 @@ class PlaceQuestion:
             raise CalibrationError(
                 why.code,
                 why.sentence,
-                remedy=tr("Nothing was written. Measure again, each time until the tip is on it."),
+                remedy=tr(
+                    "Nothing was written. Measure again, and jog each time until the tip is on it."
+                ),
             )
         self._operator.tell(why.sentence)
 

@@ -220,7 +220,7 @@ def _done(
         raise _refused(tr("Order {order} was given before, for another job.", order=order))
     if entry.details.get("forgotten"):
         raise _refused(
-            tr("How order {order} ended was closed without looking.", order=order),
+            tr("Order {order} was closed without a look at how it ended.", order=order),
         )
     if _taken_back(controller.outcomes, entry):
         raise _refused(tr("What order {order} did was taken back.", order=order))

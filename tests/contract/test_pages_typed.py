@@ -25,6 +25,18 @@ CELL = '[cells.line3]\nurl = "epson+tcp://192.168.0.1:5000"\n'
 RECIPES = {"line-computer": "needle-beams", "ci": "needle-beams"}
 """The recipe that a page calls needle.toml without saying where it is from."""
 
+TYPED: dict[str, pytest.MarkDecorator | tuple[()]] = {
+    "tutorial": (),
+    "after-a-crash": (),
+    "people": (),
+    "nightly-check": (),
+    "epson-controller": (),
+    "first-hardware": pytest.mark.soak,
+    "line-computer": pytest.mark.soak,
+    "ci": (),
+}
+"""The pages that are typed here, with their marks."""
+
 
 @pytest.fixture
 def cell(tmp_path, monkeypatch):
@@ -51,19 +63,7 @@ def typed(page):
     ]
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "tutorial",
-        "after-a-crash",
-        "people",
-        "nightly-check",
-        "epson-controller",
-        pytest.param("first-hardware", marks=pytest.mark.soak),
-        pytest.param("line-computer", marks=pytest.mark.soak),
-        "ci",
-    ],
-)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=marks) for name, marks in TYPED.items()])
 def test_a_page_can_be_typed_from_top_to_bottom(cell, name, tmp_path, capsys):
     page = (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8")
     cells = "".join(block for block in TOML.findall(page) if "[cells." in block) or CELL

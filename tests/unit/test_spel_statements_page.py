@@ -27,7 +27,8 @@ _LONGEST_S = 120
 
 
 def rows():
-    found = map(_ROW.match, PAGE.read_text(encoding="utf-8").splitlines())
+    answered = PAGE.read_text(encoding="utf-8").partition("## Not carried out")[0]
+    found = map(_ROW.match, answered.splitlines())
     return [(row["statement"], row["answer"]) for row in found if row]
 
 

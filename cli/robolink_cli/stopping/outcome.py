@@ -40,12 +40,15 @@ class Telling:
         named, state = _shown(outcome.url), outcome.state
         if outcome.holder:
             return tr(
-                "{controller} stands; its state is: {state}. {holder} had it, and stopped.",
+                "{controller} stands still; its state is: {state}. {holder} was working on "
+                "it, and stopped it.",
                 controller=named,
                 state=state,
                 holder=outcome.holder,
             )
-        return tr("{controller} stands; its state is: {state}.", controller=named, state=state)
+        return tr(
+            "{controller} stands still; its state is: {state}.", controller=named, state=state
+        )
 
     def remarks(self) -> list[str]:
         """Leave the note, look at what was not looked at before, and return what is to be said."""
@@ -57,7 +60,7 @@ class Telling:
         told += self._recorded()
         told += self._journal()
         if told and outcome.error is None:
-            told.append(tr("None of this kept the stop back."))
+            told.append(tr("The stop went out all the same."))
         if outcome.error is None:
             told.append(
                 tr(

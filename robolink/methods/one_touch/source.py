@@ -42,10 +42,7 @@ class OneTouchSource:
     @property
     def remedy(self) -> str:
         """What to do when a measurement makes the tip jump."""
-        return tr(
-            "Look whether the pin was bumped and whether the nozzle sits firmly. A full "
-            "calibration tells."
-        )
+        return tr("Was the pin bumped, or is the nozzle loose? A full calibration tells.")
 
     def measure(
         self,

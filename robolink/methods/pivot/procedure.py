@@ -129,7 +129,7 @@ def verify_by_tilting(
 def _shown(swing: "_Swing", proof: DriftProof, tilt: Tilt) -> Procedure[None]:
     found = yield from swing.touch(
         tilt,
-        tr("Jog the tip onto the pin again: that shows how far it was off."),
+        tr("Jog the tip onto the pin again. We measure how far it was off."),
         key=len(proof.touches),
     )
     proof.add(swing.over.pose(tilt, 0.0), found, in_space=True)

@@ -106,7 +106,7 @@ OPCODES: Final[Mapping[Opcode, OpcodeFacts]] = MappingProxyType(
             "select a tool slot (SMC_GroupSetTool)",
             _TOOLS,
             "i0 slot, 0 = no tool; legal while moving, counts for later movements",
-            "tool in force",
+            "selected tool",
         ),
         Opcode.READ_TOOL: OpcodeFacts(
             "read the tool (SMC_GroupReadTool)",

@@ -17,6 +17,7 @@ from robolink_simulators.cell.camera import CameraTruth, Pixel
 from robolink_simulators.cell.held_board import SimulatedBoard
 from robolink_simulators.cell.places import Axis, Direction, axis_of
 from robolink_simulators.cell.places import XyzMm as XyzMm
+from robolink_simulators.cell.pressing import resistance_n
 from robolink_simulators.cell.surfaces import FlatPlate, RoundBall, Surface, SurfaceContact
 from robolink_simulators.cell.tip_switches import (
     STANDING,
@@ -194,6 +195,10 @@ class Workplace(ABC):
             return self.surface or FlatPlate(self.pin_mm, STANDING)
 
         return SurfaceContact(touched)
+
+    def resistance_n(self, tip_mm: XyzMm) -> XyzMm:
+        """Return the force, N, of what is touched on a tip at a place; see :mod:`pressing`."""
+        return resistance_n(tip_mm, self.pin_mm, self.parameters.pin_radius_mm, self.surface)
 
     def lean_of(self, tool: int) -> Lean:
         """Return by how much a nozzle is bent, in the flange's axes."""

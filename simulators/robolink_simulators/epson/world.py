@@ -18,7 +18,15 @@ from robolink_simulators.cell.workplace import MOUNTED_TOOL as MOUNTED_TOOL
 from robolink_simulators.cell.workplace import Workplace, XyzMm, exchanged, pin_beside
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.epson.arm.arm import rest_of
-from robolink_simulators.epson.arm.kinematics import continued, frame_of, pose_of_frame, tip_of
+from robolink_simulators.epson.arm.joints import Joints
+from robolink_simulators.epson.arm.kinematics import (
+    continued,
+    forward,
+    frame_of,
+    pose_of_frame,
+    tip_of,
+    tip_place,
+)
 from robolink_simulators.epson.arm.robots import RobotModel
 from robolink_simulators.epson.memory.bits import IO_BITS
 from robolink_simulators.epson.memory.driven_robot import DrivenRobot
@@ -78,6 +86,7 @@ class World(Workplace):
             replaced=stored_on(robot.model),
             parameters=parameters or WorldParameters(),
         )
+        robot.observer.resistance_n = self._resistance_n
         self.operator = PendantOperator(self, pendant_live=pendant_live, now_ns=now_ns, seed=seed)
 
     @classmethod
@@ -121,6 +130,12 @@ class World(Workplace):
             now_ns=now_ns,
             parameters=parameters,
         )
+
+    def _resistance_n(self, joints: Joints) -> XyzMm:
+        """Return the force on the mounted nozzle's tip, N, at joints without any play."""
+        model = self.machine.arm.model
+        tip_mm = tip_place(model, forward(model, joints), self.tips.get(MOUNTED_TOOL))
+        return self.resistance_n(tip_mm)
 
     def connect(
         self,

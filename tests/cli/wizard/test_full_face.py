@@ -223,6 +223,6 @@ def test_what_a_command_says_without_a_question_stays_when_the_screen_is_gone(si
         hand = ScreenHand(["recover", "-c", host.url])
         try:
             assert hand.end() == 0
-            assert "Nothing is unsettled on this controller." in hand.text
+            assert "Nothing is left unfinished on this controller." in hand.text
         finally:
             hand.close()

@@ -50,7 +50,7 @@ def jog(
     dry_run: bool,
     yes: bool,
 ) -> None:
-    """Move the tool in force by STEPS such as x+0.1 z-0.5 u+5; without STEPS, ask for them.
+    """Move the selected tool by STEPS such as x+0.1 z-0.5 u+5; without STEPS, ask for them.
 
     Each step is one move in Power Low of at most 5 mm or 5 degrees. Negative numbers need no
     quoting: write x-0.1.

@@ -1,7 +1,8 @@
 """Settings of a robot's drives: what each may be, and what puts it back.
 
-Source: docs/reference/spel.md 6.3, 7.2. LimZMargin, QP and AutoLJM rule how a robot moves here; the
-others act on torques, vibration and times that are not simulated: they are kept, told and put back.
+Source: docs/reference/spel.md 6.3, 7.2, 7.4. Those whose effect a page describes rule how a robot
+moves here; of PerformMode, QPDecelR, QPDecelS, OLAccel, SoftCP, SpeedRLimitation, CP_Offset and VSD
+none does: they are kept, told and put back.
 """
 
 from enum import Enum
@@ -44,6 +45,9 @@ def _switch(put_back: RestoredAt, listing: str = "{}", *, on: bool = False) -> D
 
 OF_EACH_JOINT: Final = -1
 
+OF_SIX_AXES: Final = frozenset({"vsd"})
+"""Settings that other robots do not have."""
+
 DRIVE_SETTINGS: Final[dict[str, DriveSetting]] = {
     "limzmargin": DriveSetting((1,), 0, 1000, 0.02, RestoredAt.DRIVES),
     "finedist": DriveSetting((1,), 0.001, 10, 0, RestoredAt.DRIVES),
@@ -56,6 +60,11 @@ DRIVE_SETTINGS: Final[dict[str, DriveSetting]] = {
     "limittorque": DriveSetting((OF_EACH_JOINT, 1), 0, 100, 100, RestoredAt.FIVE),
     "limittorquelp": DriveSetting((OF_EACH_JOINT, 1), 0, 100, 100, RestoredAt.START),
     "limittorquestop": _switch(RestoredAt.START),
+    "limittorquestoplp": _switch(RestoredAt.START),
+    "collisiondetect": DriveSetting(
+        (OF_EACH_JOINT, 1), 0, 1, 0, RestoredAt.START, switched=True, listing="{}"
+    ),
+    "vsd": _switch(RestoredAt.START),
     "qp": _switch(RestoredAt.START, "QP {}", on=True),
     "olaccel": _switch(RestoredAt.FIVE, "OLACCEL is {}"),
     "softcp": _switch(RestoredAt.FIVE),

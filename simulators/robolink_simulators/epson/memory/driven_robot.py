@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Protocol
 
-from robolink.model import Pose, ToolOffset
+from robolink.model import Hand, Pose, Posture, ToolOffset
 from robolink_simulators.cell.frames import Frame
-from robolink_simulators.epson.arm.arm import Arm
+from robolink_simulators.epson.arm.arm import Arm, Travelled
 from robolink_simulators.epson.arm.joints import Joints, check_ranges
 from robolink_simulators.epson.arm.kinematics import (
     flange_of,
@@ -26,6 +26,10 @@ from robolink_simulators.epson.definitions.joint_ranges import JointRanges
 from robolink_simulators.epson.definitions.kept import KeptDefinitions
 from robolink_simulators.epson.definitions.local_frames import Coordinates, frame_at
 from robolink_simulators.epson.definitions.robot_base import RobotBase
+from robolink_simulators.epson.drives.guard import DriveGuard
+from robolink_simulators.epson.drives.limits import TorqueLimits
+from robolink_simulators.epson.drives.observer import DriveObserver
+from robolink_simulators.epson.drives.torque import CarriedLoad
 from robolink_simulators.epson.memory.control_points import ControlPoints
 from robolink_simulators.epson.memory.pallets import PalletTable
 from robolink_simulators.epson.memory.points import LocalTable, Point, PointTable
@@ -66,6 +70,8 @@ class DrivenRobot:
         control_points: External control points 1 to 15.
         kept: What it was told once and keeps, but for tools.
         drives: Settings of its drives.
+        observer: What is measured of its drives.
+        guard: What stops them.
         sensed: Whether the last Jump was stopped by its Sense.
         till_met: Whether the last motion was stopped by its Till.
         found: Where the last Find met its condition, the selected tool's tip.
@@ -105,6 +111,10 @@ class DrivenRobot:
         self.jump: tuple[int, tuple[int, ...]] | None = None
         self.recovers_to: Joints | None = None
         self.drives = DriveSettings(model.axes)
+        limits = TorqueLimits(lambda: self.drives, lambda: self.power_high)
+        self.observer = DriveObserver(self.arm, self._load, limits.shares)
+        self.guard = DriveGuard(self.observer, limits.limits)
+        self.arm.guard, self.arm.on_travelled = self.guard.cut, self._travelled
         self.sensed = False
         self.till_met = False
         self.found: Point | None = None
@@ -114,8 +124,37 @@ class DrivenRobot:
 
     @property
     def model(self) -> RobotModel:
-        """Which robot it is, with the ranges that its joints are held to."""
-        return self.arm.model
+        """Which robot it is, with its arm in force and the ranges that its joints are held to."""
+        arms = self.kept.arms
+        return (
+            self.arm.model.with_arm(arms.values(arms.selected)) if arms.selected else self.arm.model
+        )
+
+    def put_in_force(self, number: int) -> None:
+        """Put an arm in force: all that is said of places counts for it from then on.
+
+        Raises:
+            Refusal: It is not defined, or has none of that number.
+        """
+        self.kept.arms.select(number)
+        self.take_up_kept()
+
+    @property
+    def hand(self) -> Hand:
+        """The present hand of the arm in force."""
+        return hand_of(self.model, self.arm.joints)
+
+    @property
+    def posture(self) -> Posture | None:
+        """The present elbow, wrist and flags of the arm in force, ``None`` where it has none."""
+        return posture_of(self.model, self.arm.joints)
+
+    def _load(self) -> CarriedLoad:
+        return CarriedLoad(self.settings.weight_kg, self.settings.inertia_kg_m2)
+
+    def _travelled(self, travelled: Travelled) -> None:
+        self.observer.take(travelled)
+        self.guard.ended(complete=travelled.complete)
 
     @property
     def reserved(self) -> ReservedMotion | None:
@@ -124,7 +163,8 @@ class DrivenRobot:
         return motion if motion is not None and motion.stands else None
 
     def take_up_kept(self) -> None:
-        """Heed what has just been restored of ranges and zeros of the joints."""
+        """Heed what has just been restored of arm, ranges and zeros of the joints."""
+        self.arm.added_in_force = self.kept.arms.selected != 0
         self.hold_to_ranges()
         self.arm.origin_errors = self.kept.origins.errors
 
@@ -163,7 +203,7 @@ class DrivenRobot:
     def hold_to_ranges(self) -> None:
         """Heed the ranges of the joints that were given."""
         ranges = tuple(Range(*ends) for ends in self.kept.ranges.ends)
-        self.arm.model = replace(self.model, ranges=ranges)
+        self.arm.model = replace(self.arm.model, ranges=ranges)
 
     @property
     def offset(self) -> ToolOffset | None:
@@ -172,11 +212,11 @@ class DrivenRobot:
 
     def tip(self) -> Pose:
         """Return the commanded pose of the selected tool's tip (Here, CurPos)."""
-        return self._tip_of(self.arm.flange())
+        return self._tip_of(forward(self.model, self.arm.joints))
 
     def real_tip(self, rng: random.Random, noise_mm: float) -> Pose:
         """Return the measured pose of the selected tool's tip (RealPos)."""
-        return self._tip_of(self.arm.real_position(rng, noise_mm))
+        return self._tip_of(self.arm.real_position(rng, noise_mm, self.model))
 
     def tip_at(self, joints: Joints) -> Pose:
         """Return where the selected tool's tip would be with other joints.
@@ -185,6 +225,10 @@ class DrivenRobot:
             OutOfReach: A joint would leave its range.
         """
         check_ranges(self.model, joints)
+        return self._tip_of(forward(self.model, joints))
+
+    def tip_near(self, joints: Joints) -> Pose:
+        """Return where the selected tool's tip would be with joints, whatever their ranges."""
         return self._tip_of(forward(self.model, joints))
 
     def tip_on_the_way(self, instant_ns: int | None) -> Pose:

@@ -26,17 +26,17 @@ PROGRAM_ONLY: Final = frozenset(_PROGRAM_WORDS.split())
 """Statements that exist in programs only (docs/reference/spel.md 13, class E)."""
 
 _WORDS_OF_OTHER_ROBOTS = """
-    hofsjointaccuracy jumptlz vsd
+    hofsjointaccuracy jumptlz
 """
 
 OF_OTHER_ROBOTS: Final = frozenset(_WORDS_OF_OTHER_ROBOTS.split())
 """Statements that the reference allows, for arms that this simulator has none of."""
 
 _WORDS_NOT_SIMULATED = """
-    areacorrectionclr areacorrectionset avgspeedclear chdisk collisiondetect peakspeedclear atrq
-    dispdev enctemper msgbox olrate opencom opennet parsestr ptrq shutdown
-    taskstate atclr closecom closenet close cls eresume error flush fmtstr
-    input inputbox line ptclr randomize read redim
+    areacorrectionclr areacorrectionset chdisk
+    dispdev enctemper msgbox opencom opennet parsestr shutdown
+    taskstate closecom closenet close cls eresume error flush fmtstr
+    input inputbox line randomize read redim
     resetelapsedtime setcom setnet signal simset taskwait tmreset toff ton vcal
     vcalpoints waitnet waitsig write writebin cont restart vdefgetmotionrange
     vdefsetmotionrange vshowmodel vtrain sysconfig workque_list cnv_quelist history clearhistory
@@ -71,17 +71,17 @@ _OF_PROGRAMS_ALONE = """
 """
 
 _UNSIMULATED_FUNCTIONS = """
-    opencom chkcom currobot ptrq atrq avgspeed peakspeed olrate sense till vxcalinfo vxcalpoints
+    opencom chkcom currobot sense till vxcalinfo vxcalpoints
     hand_on hand_off aio_in aio_inw aio_out aio_outw lookup
-    areacorrection areacorrectiondef collisiondetect
-    ptpboostok taskstate tmout vsd dispdev loadtype
+    areacorrection areacorrectiondef
+    taskstate tmout dispdev loadtype
     robotname joint restart setcom here eval
 """
 
 _WITH_A_FORM_OF_THEIR_OWN = """
     opencom opennet parsestr eresume error fmtstr input line read redim setcom setnet signal
     taskwait waitnet waitsig write writebin readbin close closecom closenet flush cont restart
-    tmreset resetelapsedtime randomize vrun vget vset vload vsave vcls vcal vxcalib
+    tmreset resetelapsedtime randomize vrun vget vset vload vsave vcls vcal vsaveimage vxcalib
 """
 
 WINDOW_ONLY: Final = frozenset(

@@ -56,16 +56,21 @@ class SmoothWay:
         U begins at that of the first place (documented). Where the way stands still in the plane
         its direction stays (assumed).
         """
-        turned, last = [self.places[0]], None
+        first_deg = self.places[0][3]
+        pairs = zip(self.places, self.turns_deg(), strict=True)
+        return replace(self, places=tuple((*at[:3], first_deg + turn) for at, turn in pairs))
+
+    def turns_deg(self) -> list[float]:
+        """Return how far the direction in the plane has turned at each place, whole turns too."""
+        turns, last = [0.0], None
         for a, b in pairwise(self.places):
-            x, y, z, _ = b
-            u = turned[-1][3]
-            if math.hypot(x - a[0], y - a[1]) > _SAME:
-                heading = math.degrees(math.atan2(y - a[1], x - a[0]))
-                u += 0.0 if last is None else nearest_turn(heading - last, 0.0)
+            turn, along, across = turns[-1], b[0] - a[0], b[1] - a[1]
+            if math.hypot(along, across) > _SAME:
+                heading = math.degrees(math.atan2(across, along))
+                turn += 0.0 if last is None else nearest_turn(heading - last, 0.0)
                 last = heading
-            turned.append((x, y, z, u))
-        return replace(self, places=tuple(turned))
+            turns.append(turn)
+        return turns
 
     def share_of(self, point: int) -> float:
         """Return the share of the length at one of the points, counted from 0."""

@@ -9,7 +9,7 @@ of :func:`curve.through`, the quaternion brought back to length 1
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import accumulate, pairwise
 from typing import Final
 
@@ -77,6 +77,27 @@ def smooth_course_through(
     """
     places = [_place(model, tip, point) for tip in tips]
     return through(list(accumulate(places, lambda a, b: same_sign(b, a))), closed=closed)
+
+
+def following(way: SmoothWay) -> SmoothWay:
+    """Return a way of six axes on which the tool turns about the base's Z with the way's direction.
+
+    Tangential correction keeps the tool along the curve in the XY plane (documented). The
+    quaternions of ``way`` are those of the points with the U of the first.
+    """
+    places = list[Place]()
+    for at, turn_deg in zip(way.places, way.turns_deg(), strict=True):
+        half_rad = math.radians(turn_deg) / 2
+        cos, sin = math.cos(half_rad), math.sin(half_rad)
+        real, x, y, z = at[3:]
+        turned_about_z = (
+            cos * real - sin * z,
+            cos * x - sin * y,
+            cos * y + sin * x,
+            cos * z + sin * real,
+        )
+        places.append((*at[:3], *turned_about_z))
+    return replace(way, places=tuple(places))
 
 
 def plan_turned_curve(

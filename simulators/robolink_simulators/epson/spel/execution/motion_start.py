@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 from robolink_simulators.epson.arm.trajectory import Leg
+from robolink_simulators.epson.spel.execution.settling import settling_ns
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.statements.blending import blends, fall_ns
 from robolink_simulators.epson.spel.statements.jump import DESCENT
@@ -62,6 +63,7 @@ def begin_motion(evaluator: Evaluator, motion: MotionStatement, start_ns: int) -
         return MotionStart(StatementOutcome(), travelled_ns=way_ns)
     end_ns = machine.arm.start(legs, start_ns)
     watch.foresee(start_ns, end_ns)
+    end_ns += settling_ns(evaluator.session, legs)
     outcome = StatementOutcome(duration_ns=end_ns - start_ns)
     return MotionStart(outcome, legs[-1], watch, way_ns)
 

@@ -8,7 +8,7 @@ from typing import Final
 from robolink_simulators.epson.memory.driven_robot import DrivenRobot
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
-from robolink_simulators.epson.spel.statements.legs import go_leg
+from robolink_simulators.epson.spel.legs import go_leg
 from robolink_simulators.epson.spel.tree import Expression, KeywordStatement, Name
 
 _WITH_MOVE: Final = 0

@@ -14,6 +14,7 @@ from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.execution.instant_effects import effect
 from robolink_simulators.epson.spel.execution.motion_start import begin_motion
 from robolink_simulators.epson.spel.execution.recovering import recover
+from robolink_simulators.epson.spel.execution.settling import settling_ns
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.values import truth
 from robolink_simulators.epson.spel.statements.blending import rest_of_way
@@ -187,7 +188,12 @@ class StatementExecution:
         elif self._meanwhile is not None:
             # The next statement waits for what stands inside !...! (docs/reference/spel.md 7.1).
             self._busy_until_ns = self._meanwhile.due_ns(self._seen_ns)
-        elif self._pending:
+        else:
+            self._evaluator.session.machine.robot.guard.require_no_error()
+            self._begin_next()
+
+    def _begin_next(self) -> None:
+        if self._pending:
             self._aim = None
             self._run(self._pending.pop())
         else:
@@ -281,6 +287,7 @@ class StatementExecution:
         if outcome.legs:
             self._aim = outcome.legs[-1]
             self._busy_until_ns = machine.arm.start(outcome.legs, start_ns)
+            self._busy_until_ns += settling_ns(self._evaluator.session, outcome.legs)
         self._duration_ns = outcome.duration_ns
         self._busy_until_ns += outcome.duration_ns
 

@@ -202,7 +202,7 @@ def with_least_motion(session: Session, arguments: Arguments) -> Point:
 
 
 def _hand(session: Session, arguments: Arguments) -> Value:
-    hand = as_point(arguments[0]).hand if arguments else session.machine.arm.hand
+    hand = as_point(arguments[0]).hand if arguments else session.machine.robot.hand
     return _HANDS[hand]
 
 
@@ -210,7 +210,7 @@ def _of_posture(read: Callable[[Posture], int]) -> Callable[[Session, Arguments]
     """Return a function of a point's posture, or the arm's; a SCARA's is that of no flags."""
 
     def tell(session: Session, arguments: Arguments) -> Value:
-        posture = as_point(arguments[0]).posture if arguments else session.machine.arm.posture
+        posture = as_point(arguments[0]).posture if arguments else session.machine.robot.posture
         return read(posture or PLAIN)
 
     return tell
@@ -225,7 +225,7 @@ def _of_singular_place(joint: int) -> Callable[[Session, Arguments], Value]:
 
     def tell(session: Session, arguments: Arguments) -> Value:
         require_singular_angle(session.machine.model, joint)
-        posture = as_point(arguments[0]).posture if arguments else session.machine.arm.posture
+        posture = as_point(arguments[0]).posture if arguments else session.machine.robot.posture
         told = posture or PLAIN
         return (told.j1_angle_deg if joint == 1 else told.j4_angle_deg) or 0.0
 

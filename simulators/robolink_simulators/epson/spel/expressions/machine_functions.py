@@ -32,6 +32,8 @@ from robolink_simulators.epson.spel.expressions.defined.origins import (
     NS_PER_HOUR,
     ORIGIN_FUNCTIONS,
 )
+from robolink_simulators.epson.spel.expressions.defined.torques import TORQUE_FUNCTIONS
+from robolink_simulators.epson.spel.expressions.defined.travel_times import TRAVEL_FUNCTIONS
 from robolink_simulators.epson.spel.expressions.defined.unfinished import (
     UNFINISHED_FUNCTIONS,
     place_to_recover,
@@ -191,6 +193,8 @@ MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     **LIMIT_FUNCTIONS,
     **AREA_FUNCTIONS,
     **DRIVE_FUNCTIONS,
+    **TORQUE_FUNCTIONS,
+    **TRAVEL_FUNCTIONS,
     **ORIGIN_FUNCTIONS,
     **ORIENTATION_FUNCTIONS,
     **UNFINISHED_FUNCTIONS,

@@ -10,7 +10,7 @@ from robolink_simulators.epson.definitions.arches import Arch
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
-from robolink_simulators.epson.spel.statements.legs import go_leg, line_leg
+from robolink_simulators.epson.spel.legs import go_leg, line_leg
 
 DESCENT = 2
 """Which leg of a Jump is the descent; Sense is looked at just before it (documented)."""
@@ -74,4 +74,4 @@ def jump3(machine: Machine, points: tuple[Point, Point, Point]) -> list[Leg]:
 
 def _joints(machine: Machine, tip: Pose) -> Joints:
     flange = flange_of(machine.model, tip, machine.offset)
-    return solve(machine.model, flange, tip.hand or machine.arm.hand, tip.posture)
+    return solve(machine.model, flange, tip.hand or machine.robot.hand, tip.posture)

@@ -24,6 +24,7 @@ from robolink_simulators.epson.spel.expressions.machine_functions import clock_o
 from robolink_simulators.epson.spel.expressions.printing import CRLF, number_text
 from robolink_simulators.epson.spel.expressions.values import out_of_range
 from robolink_simulators.epson.spel.file_commands import FILE_COMMANDS
+from robolink_simulators.epson.spel.legs import go_leg
 from robolink_simulators.epson.spel.point_file_commands import POINT_FILE_COMMANDS
 from robolink_simulators.epson.spel.statements.defined.areas import AREA_STATEMENTS
 from robolink_simulators.epson.spel.statements.defined.base import BASE_STATEMENTS
@@ -32,7 +33,6 @@ from robolink_simulators.epson.spel.statements.defined.locals_and_pallets import
 )
 from robolink_simulators.epson.spel.statements.defined.sync import SYNC_STATEMENTS
 from robolink_simulators.epson.spel.statements.defined.xy_limits import require_within_limits
-from robolink_simulators.epson.spel.statements.legs import go_leg
 from robolink_simulators.epson.spel.statements.motion import require_drives
 from robolink_simulators.epson.spel.statements.points import POINT_STATEMENTS, point_argument
 from robolink_simulators.epson.spel.statements.ports_and_bits import BIT_STATEMENTS, set_latch

@@ -24,10 +24,10 @@ from robolink_simulators.epson.spel.expressions.defined.orientations import (
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.joint_functions import least_motion
 from robolink_simulators.epson.spel.expressions.values import out_of_range
+from robolink_simulators.epson.spel.legs import go_leg, held_leg, line_leg
 from robolink_simulators.epson.spel.statements.defined.curves import curve_leg
 from robolink_simulators.epson.spel.statements.defined.xy_limits import require_within_limits
 from robolink_simulators.epson.spel.statements.jump import jump, jump3
-from robolink_simulators.epson.spel.statements.legs import go_leg, held_leg, line_leg
 from robolink_simulators.epson.spel.statements.through_points import ARC_VERBS, arc, passing
 from robolink_simulators.epson.spel.tree import (
     MotionStatement,

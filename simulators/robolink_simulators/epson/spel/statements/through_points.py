@@ -27,7 +27,7 @@ from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.values import Number
-from robolink_simulators.epson.spel.statements.legs import go_leg, held_leg, seen_from, way_leg
+from robolink_simulators.epson.spel.legs import go_leg, held_leg, seen_from, way_leg
 from robolink_simulators.epson.spel.tree import (
     LabelledPoint,
     Literal,

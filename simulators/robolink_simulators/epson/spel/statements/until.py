@@ -79,6 +79,7 @@ class Watch:
         machine = self._evaluator.session.machine
         if self.stops:
             machine.till_met = True
+            machine.robot.guard.coming = None
             return machine.arm.brake(instant_ns)
         machine.found = machine.here()
         return None

@@ -1,0 +1,200 @@
+"""Every block of commands of README and of the pages is typed as it stands, or it is named why not.
+
+``test_pages_typed.py`` types whole pages, those of its list. Here are the others: the blocks of a
+page from top to bottom against one simulated cell, which stands in for every address, cell and
+served simulator. A command that asks is typed once as it stands, where nobody can answer: it ends
+with 9. Then it is typed with ``--yes``, which is the answer of the person at the cell.
+"""
+
+import json
+import re
+import shlex
+import shutil
+import sys
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from robolink_cli import main
+from robolink_simulators.assist.port import serve_assist
+from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.cell.tip_switches import LightBeam
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.epson.memory.points import Point
+from robolink_simulators.hosting.in_process.epson import register, unregister
+from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+
+from tests.contract.test_pages_typed import TYPED
+from tests.unit.test_epson_point_files import block as point
+from tests.unit.test_epson_point_files import pts
+
+pytestmark = pytest.mark.simulator_only
+
+ROOT = Path(__file__).parents[2]
+PAGES = [ROOT / "README.md", ROOT / "README.zh.md", *sorted(ROOT.glob("docs/*.md"))]
+BLOCK = re.compile(r"^```(?:console|sh)\n(.*?)^```", re.M | re.S)
+URL = "epson+sim://pages"
+
+NOT_RUN = {
+    "README.md 1, 4": "a person jogs; tests/contract/test_calibrate_methods.py lets one",
+    "camera-and-board.md 1": "a camera; tests/contract/test_calibrate_camera.py brings three",
+    "camera-and-board.md 2": "a controller's camera; tests/contract/test_vision_guide.py has it",
+    "control-api.md 1": "curl and a port; tests/contract/test_control_api.py is that client",
+    "fault-plans.md 1": "serves until Ctrl-C; tests/cli/test_sim_faults_option.py does",
+    "journal.md 1": "a server of PostgreSQL; tests/contract/journal starts one",
+    "poses.md 5, 1": "steps are typed one by one; tests/contract/test_typed_answers.py types",
+    "poses.md 6": "held keys on a terminal; tests/contract/test_jog_keys.py holds them",
+}
+"""Blocks, and single commands of blocks, that need what is not here; which test does it instead."""
+
+
+def page_name(page):
+    return page.relative_to(ROOT).as_posix().removeprefix("docs/")
+
+
+def blocks(page):
+    return BLOCK.findall(page.read_text(encoding="utf-8"))
+
+
+def commands(page):
+    """Yield of each command its place, such as ``README.md 1, 4``, what is typed, and its end."""
+    for number, shown in enumerate(blocks(page), start=1):
+        typed = list(re.finditer(r"^\$ (.*)$", shown, re.M))
+        for at, line in enumerate(typed, start=1):
+            rest = shown[line.end() :].partition("\n$ ")[0]
+            end = re.search(r"^\(exit code (\d+)\)$", rest, re.M)
+            place = f"{page_name(page)} {number}, {at}"
+            yield place, line[1], int(end[1]) if end else 0
+
+
+HERE = [page for page in PAGES if blocks(page) and page.stem not in TYPED]
+
+LONG = dict.fromkeys(("README.zh.md", "recipes.md", "stations.md"), pytest.mark.soak)
+"""Whole changes of a needle, and a search of beams: others in the default suite have them too."""
+
+CELLS = "".join(
+    f"""[cells.{name}]
+url = "ADDRESS"
+remote_timeout_s = 60
+remote_timeout_confirmed_by = "me"
+"""
+    for name in ("line3", "cell-3", "cell-5")
+)
+STATION = """[cells.line3.stations.BEAMS-02]
+kind = "beams"
+z_mm = -106.0
+beams = [
+    { input = 3, x_mm = 175.0, y_mm = 488.0, direction_deg = 2.0 },
+    { input = 4, x_mm = 175.0, y_mm = 488.0, direction_deg = 91.0 },
+]
+"""
+POSES = "x,y,z,u\n287.5,103.25,-60,0\n312.5,96.75,-60,180\n"
+TOUCHES = "x,y,z,a,b,c\n287.5,103.25,-60,0,0,180\n312.5,96.75,-60,180,0,180\n"
+
+
+@pytest.fixture
+def cell(tmp_path, monkeypatch):
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
+    monkeypatch.setitem(sys.modules, "keyring", None)
+    monkeypatch.chdir(tmp_path)
+    simulator = EpsonSimulator(seed=3, serial="SIM00001", state_path=tmp_path / "flash.json")
+    for number, heading_deg in ((3, 2.0), (4, 91.0)):
+        beam = LightBeam((175.0, 488.0, -106.0), heading_deg, radius_mm=0.1)
+        simulator.world.connect(number, beam, latency_s=0.002, noise_mm=0.003)
+    for number in range(1, 61):
+        place = (250.0, 200.0 + number / 10, -30.0, 0.0, 0.0, 0.0)
+        simulator.machine.points.store(number, Point(place))
+    simulator.panel.teach()
+    for number, u_deg in ((901, 0.0), (902, 180.0), (903, 90.0), (904, -90.0)):
+        simulator.world.operator.teach_point(number, u_deg)
+    simulator.panel.auto()
+    simulator.machine.motors_on = True
+    for name in ("needle.toml", "scara-pin.toml"):
+        shutil.copy(ROOT / "examples" / "recipes" / "scara-pin.toml", name)
+    Path("poses.csv").write_text(POSES)
+    Path("touches.csv").write_text(TOUCHES)
+    Path("robot1.pts").write_text(pts(point(1, 1, X=250, Y=200, Z=-30)))
+    return simulator
+
+
+@contextmanager
+def served(cell, page):
+    """Yield the addresses of the cell and of its person: on ports where a page names both."""
+    if "sim assist" in "".join(line for _, line, _ in commands(page)):
+        clock = ScaledClock(40.0)
+        with serve_tcp(cell, clock=clock) as host, serve_assist(cell, clock=clock) as assist:
+            yield host.url, assist.url
+        return
+    register("pages", cell)
+    yield URL, URL
+    unregister("pages")
+
+
+def ended(words, capsys):
+    capsys.readouterr()
+    code = main.run(words)
+    return code, capsys.readouterr()
+
+
+def agreed(words, person):
+    """Return what is typed where the person of the cell says yes, and brings the tip."""
+    if "--report" in words:  # it is written before the question
+        Path(words[words.index("--report") + 1]).unlink()
+    live = "change" in words or "two-pose" in words
+    by_hand = live and not {"--points", "--pose", "--poses"} & {*words}
+    return [*words, "--yes", *(["--assist", person] if by_hand else [])]
+
+
+def recorded(capsys):
+    """Write tool 1 twice; return the id of the first change and the number of its value."""
+    for x in ("12.3", "12.35"):
+        assert main.run(["tool", "set", "1", "--x", x, "--y", "-3.7", "--z", "-20"]) == 0
+    _, shown = ended(["journal", "list", "--kind", "done", "--json"], capsys)
+    first = json.loads(shown.out)["entries"][-1]
+    return first["change"], first["number"]
+
+
+def before(place, cell):
+    """Bring the cell to where a page says that it is by then."""
+    if place == "first-day.md 5, 1":
+        cell.panel.teach()
+    if place == "stations.md 1, 3":
+        gauge = cell.world.tips[15] = cell.world.tips[1]
+        cell.machine.tools.set(15, gauge)
+
+
+@pytest.mark.parametrize(
+    "page",
+    [pytest.param(page, marks=LONG.get(page_name(page), ()), id=page_name(page)) for page in HERE],
+)
+def test_the_blocks_of_a_page_can_be_typed(cell, page, capsys, monkeypatch):
+    with served(cell, page) as (url, person):
+        monkeypatch.setenv("ROBOLINK_CONTROLLER", url)
+        Path("robolink.toml").write_text(CELLS.replace("ADDRESS", url) + STATION)
+        change, entry = recorded(capsys) if page.name == "records.md" else ("", "")
+        for place, line, end in commands(page):
+            if not_run(place) or not line.startswith("robolink ") or " sim epson " in line:
+                continue  # what is exported is set, what is served stands here
+            before(place, cell)
+            typed = line.partition("  #")[0].replace("9a59", change[:8])
+            typed = re.sub(r"(sim assist) (URL|assist\+tcp://\S+)", rf"\1 {person}", typed)
+            typed = re.sub(r"epson\+tcp://192\.168\S+|epson\+tcp://127\S+", url, typed)
+            typed = re.sub(r"assist\+tcp://TOKEN\S+", person, typed)
+            words = shlex.split(typed.replace("undo --to 7", f"undo --to {entry}"))[1:]
+            code, shown = ended(words, capsys)
+            if code == 9 or "nobody can be asked here" in shown.err:
+                code, shown = ended(agreed(words, person), capsys)
+            assert code == end, f"{place}: {line}\n{shown.out}{shown.err}"
+
+
+def not_run(place):
+    return NOT_RUN.get(place) or NOT_RUN.get(place.rpartition(",")[0])
+
+
+@pytest.mark.parametrize("place", NOT_RUN)
+def test_a_block_that_is_not_run_is_there_and_says_why(place):
+    places = [one for page in HERE for one, *_ in commands(page)]
+    assert place in places or place in {one.rpartition(",")[0] for one in places}
+    (test,) = re.findall(r"tests/[\w/.]+", NOT_RUN[place])
+    assert (ROOT / test).exists()
+    pytest.skip(f"{place} is not run: {NOT_RUN[place]}")

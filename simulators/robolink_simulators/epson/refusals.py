@@ -43,6 +43,8 @@ class RefusalKind(StrEnum):
     SPEED_TOO_LATE = "speed_too_late"
     TORQUE_HIGH_POWER = "torque_high_power"
     TORQUE_LOW_POWER = "torque_low_power"
+    COLLISION_HIGH_POWER = "collision_high_power"
+    COLLISION_LOW_POWER = "collision_low_power"
     FUNCTION_ONLY = "function_only"
     NOT_SIMULATED = "not_simulated"
     SUBSCRIPT = "subscript"

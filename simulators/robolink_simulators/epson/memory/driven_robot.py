@@ -106,7 +106,7 @@ class DrivenRobot:
         self.drives = DriveSettings(model.axes)
         limits = TorqueLimits(lambda: self.drives, lambda: self.power_high)
         self.observer = DriveObserver(self.arm, self._load, limits.shares)
-        self.guard = DriveGuard(self.observer, limits.limit)
+        self.guard = DriveGuard(self.observer, limits.limits)
         self.arm.guard, self.arm.on_travelled = self.guard.cut, self._travelled
         self.sensed = False
         self.till_met = False
@@ -315,6 +315,7 @@ class DrivenRobot:
         """Forget what a power cycle takes: all but tools, HomeSet and its place."""
         self.arm.halt(now_ns)
         self.reservation = None
+        self.observer.forget()
         self.switch_motors(False)
         self.reset_motion_parameters()
         home, order = self.settings.home_pulses, self.settings.home_order

@@ -58,7 +58,7 @@ def measure_mailbox() -> Iterator[Figure]:
     try:
         if simulator_cpu is not None:
             os.sched_setaffinity(0, {cpus[0]})
-        serving = ("softmotion", "--modbus-tcp", "127.0.0.1:0")
+        serving = ("softmotion", "--tcp", "127.0.0.1:0")
         yield from _compare("Modbus TCP", "pymodbus", serving, bare_modbus, simulator_cpu)
         yield from _compare("CAN", "canopen", ("softmotion", "--can", can), bare_can, simulator_cpu)
     finally:

@@ -176,7 +176,7 @@ def restore(
             receipts.append(_set(tools, change, tell))
         if plan.select is not None:
             tools.select(plan.select)
-            tell(tr("tool in force: {tool}", tool=plan.select))
+            tell(tr("tool {tool}: selected", tool=plan.select))
         for change in plan.clears:
             receipts.append(_set(tools, change, tell))
     except RobolinkError as error:
@@ -223,7 +223,7 @@ def _check_selection(plan: RestorePlan, now: ToolState) -> None:
     if plan.select and after[plan.select] is None:
         raise UndefinedToolError(
             tr(
-                "The backup has tool {tool} in force, but that would not be defined.",
+                "The backup has tool {tool} selected, but that would not be defined.",
                 tool=plan.select,
             ),
             remedy=tr(
@@ -234,7 +234,7 @@ def _check_selection(plan: RestorePlan, now: ToolState) -> None:
     if any(change.tool == in_force for change in plan.clears):
         raise ToolError(
             tr(
-                "Tool {tool} is in force, and the backup has no definition for it.",
+                "Tool {tool} is selected, and the backup has no definition for it.",
                 tool=in_force,
             ),
             remedy=tr(

@@ -242,8 +242,8 @@ class MarkerStore:
                 cause=error.what,
             ),
             remedy=tr(
-                "It was not sent again. Look at the robot, connect again and run "
-                "'robolink recover'; motion is blocked until then."
+                "It was not sent again. Look at the robot. Next: 'robolink recover'. The "
+                "robot stays blocked until then."
             ),
             controller=self._identity,
             request=request,

@@ -108,7 +108,7 @@ class MotionGroupCore(ABC):
         if target.tool is None or target.tool != found:
             raise NotReadyError(
                 tr(
-                    "The target is meant for tool {meant}, but tool {found} is in force.",
+                    "The target is meant for tool {meant}, but tool {found} is selected.",
                     meant=target.tool,
                     found=found,
                 ),

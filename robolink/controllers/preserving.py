@@ -106,7 +106,7 @@ class Preserver:
 
     def _action(self, marker: Marker, now: int | None) -> str:
         """Return what :meth:`restore` would do, without a full stop."""
-        return tr("select tool {tool} again", tool=tool_before(marker))
+        return tr("Select tool {tool} again", tool=tool_before(marker))
 
     def _restore_after(self, error: BaseException, marker: Marker) -> None:
         """Restore while ``error`` is on its way; if impossible, let it say what is left."""
@@ -133,7 +133,7 @@ def tool_before(marker: Marker) -> int:
 def not_understood(marker: Marker) -> ConfigError:
     """Return the error for the marker of a procedure that something else has written."""
     return ConfigError(
-        tr("The marker of {when} cannot be understood.", when=marker.begun_at),
+        tr("What was left unfinished at {when} cannot be read.", when=marker.begun_at),
         remedy=tr("Select the right tool by hand, then {forget}.", forget=way(Way.FORGET_MARKER)),
     )
 

@@ -50,7 +50,7 @@ def examine_write(tools: ToolTable, marker: Marker) -> Finding:
     else:
         verdict = Verdict.CONFLICT
         sentence = tr(
-            "Tool {tool} holds {now}: neither the old value {before} nor the new one {requested}.",
+            "Tool {tool} holds {now}, neither the old value {before} nor the new one {requested}.",
             tool=tool,
             now=describe_offset(now),
             before=describe_offset(before),
@@ -119,7 +119,7 @@ class MarkerResolver:
         if "tool" in marker.details:
             return examine_write(self._tools, marker)
         raise ConfigError(
-            tr("The marker of {when} cannot be understood.", when=marker.begun_at),
+            tr("What was left unfinished at {when} cannot be read.", when=marker.begun_at),
             remedy=tr("Look at the controller, then {forget}.", forget=way(Way.FORGET_MARKER)),
         )
 

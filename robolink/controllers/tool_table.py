@@ -228,7 +228,7 @@ class ToolTableCore(ABC):
             if before is None:  # what was in force could not be put back, nor the new one proved
                 raise RejectedError(
                     tr(
-                        "{controller} does not tell which tool is in force.",
+                        "{controller} does not tell which tool is selected.",
                         controller=self._driver.identity,
                     ),
                     remedy=tr("Select tool {tool} at the machine.", tool=tool),
@@ -249,8 +249,8 @@ class ToolTableCore(ABC):
             if found != tool:
                 raise ReadBackError(
                     tr(
-                        "Tool {tool} was selected, but the controller says that tool {found} is "
-                        "in force.",
+                        "Tool {tool} was to be selected, but the controller has tool {found} "
+                        "selected.",
                         tool=tool,
                         found=found,
                     ),

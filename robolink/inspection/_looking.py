@@ -91,7 +91,7 @@ def _in_error(status: ControllerStatus) -> Iterator[InspectionFinding]:
                 state=status.state,
                 code=status.code,
             ),
-            tr("Remove the cause, then: robolink robot reset"),
+            tr("Remove the cause, then run 'robolink robot reset'."),
         )
 
 

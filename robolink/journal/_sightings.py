@@ -91,7 +91,7 @@ class LeaseSighting:
             because: Why that could be done, in words.
         """
         if self.token == FREE:
-            verdict = tr("The lease was free; {because}.", because=because)
+            verdict = tr("Nobody worked on this cell; {because}.", because=because)
         else:
             holder = describe(self.who())
             verdict = tr(

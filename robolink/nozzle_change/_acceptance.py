@@ -71,12 +71,14 @@ class AcceptanceCriteria:
                 raise CalibrationError(
                     verdict.code,
                     tr(
-                        "{name} is {found:.3f} mm; {limit:.3f} mm are allowed.",
+                        "{name}: {found:.3f} mm, limit {limit:.3f} mm.",
                         name=verdict.name,
                         found=verdict.found_mm,
                         limit=verdict.limit_mm,
                     ),
-                    remedy=tr("Clean pin and tip, check that the nozzle sits firmly, and repeat."),
+                    remedy=tr(
+                        "Clean pin and tip, check that the nozzle is tight, then measure again."
+                    ),
                 )
 
     def judge_change(
@@ -102,8 +104,8 @@ class AcceptanceCriteria:
             raise CalibrationError(
                 "implausible_change",
                 tr(
-                    "The tip would move by {change:.3f} mm against the stored tool; {limit:.3f} "
-                    "mm are plausible.",
+                    "The tip would move by {change:.3f} mm; up to {limit:.3f} mm are allowed "
+                    "here. Is the right nozzle mounted, and tight?",
                     change=change,
                     limit=self.limit_mm,
                 ),
@@ -116,7 +118,7 @@ class AcceptanceCriteria:
         if proposal.change_mm is None:
             return tuple(fit)
         change = LimitVerdict(
-            "implausible_change", tr("The change"), proposal.change_mm, self.limit_mm
+            "implausible_change", tr("Change of the tip"), proposal.change_mm, self.limit_mm
         )
         return (*fit, change)
 
@@ -147,10 +149,10 @@ class AcceptanceCriteria:
 
     def _of_fit(self, result: CalibrationResult) -> Iterator[LimitVerdict]:
         for code, name, found_mm, limit_mm in (
-            ("large_rms", tr("The rms residual"), result.rms_mm, self.rms_mm),
+            ("large_rms", tr("Scatter (rms)"), result.rms_mm, self.rms_mm),
             (
                 "large_residual",
-                tr("The largest residual"),
+                tr("Worst sample"),
                 result.max_residual_mm,
                 self.max_residual_mm,
             ),
@@ -163,7 +165,7 @@ class AcceptanceCriteria:
 def _sureness(result: CalibrationResult) -> tuple[str, float | None]:
     """Return what a limit of the process is compared with, and its name."""
     region = result.region95_radius_mm is not None
-    name = tr("The radius of the 95 % region") if region else tr("Half the 95 % interval")
+    name = tr("Uncertainty, all axes together (95 %)") if region else tr("Uncertainty (95 %)")
     return name, result.known_within_mm
 
 
@@ -198,8 +200,8 @@ def require_proved(result: VerifyResult, identity: str) -> None:
     drift_mm, limit_mm = result.max_drift_mm, result.tolerance_mm
     if result.verdict is DriftVerdict.UNDECIDED:
         what = tr(
-            "The tip drifts {drift:.3f} mm when the tool turns: too near to {limit:.3f} mm to tell "
-            "whether that is inside, and further touches did not decide it.",
+            "Turn test not decided: {drift:.3f} mm off, too near to the limit of {limit:.3f} "
+            "mm; further touches did not settle it.",
             drift=drift_mm,
             limit=limit_mm,
         )
@@ -211,7 +213,7 @@ def require_proved(result: VerifyResult, identity: str) -> None:
         )
     raise VerifyError(
         what,
-        remedy=tr("Check that the nozzle sits firmly and measure again."),
+        remedy=tr("Clean pin and tip, check that the nozzle is tight, then measure again."),
         code=result.verdict.value,
         controller=identity,
     )

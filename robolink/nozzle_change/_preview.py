@@ -127,9 +127,9 @@ def require_inside(controller: Controller, steps: Sequence[PlannedStep]) -> None
             raise LimitError(
                 tr("{step} {refusal}", step=step.text, refusal=step.refusal),
                 remedy=tr(
-                    "Nothing was moved. The box lies about where the robot stands at the start: "
-                    "bring it nearer, or widen the box. Where it is the arm that cannot, put the "
-                    "station elsewhere, or turn the tool otherwise."
+                    "Nothing moved. The allowed area lies about where the robot stands at "
+                    "the start: jog closer to the pin, or widen the area. Where the arm "
+                    "cannot reach, put the station elsewhere, or turn the tool another way."
                 ),
                 controller=controller.identity,
             )

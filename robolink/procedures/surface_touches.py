@@ -134,7 +134,7 @@ class SurfaceTouches(WitnessedTouches):
         return tr(
             "Touch {number} was not made: the robot is where it stopped, {away:.1f} mm from the "
             "surface. Jog onto it.",
-            number=self._count,
+            number=self._number,
             away=away_mm,
         )
 
@@ -145,12 +145,12 @@ class SurfaceTouches(WitnessedTouches):
 def _refusal(code: str, residual_mm: float) -> CalibrationError:
     whats = {
         "touch_not_proven": tr(
-            "The distances at which the robot stopped from the surface were not jogged away: the "
-            "tip was not brought onto it each time."
+            "At least one touch was not made: the tip stayed where the robot had stopped "
+            "above the surface."
         ),
         "large_residual": tr(
-            "One touch is {residual:.3f} mm from the surface that the others show: the tip was not "
-            "on it, or it moved.",
+            "One touch is {residual:.3f} mm off the others: the tip was not on the surface, "
+            "or the surface moved.",
             residual=residual_mm,
         ),
     }
@@ -158,7 +158,7 @@ def _refusal(code: str, residual_mm: float) -> CalibrationError:
         code,
         whats[code],
         remedy=tr(
-            "Nothing was written. Look whether the surface is fast and clean, and measure again, "
-            "each time until the tip is on it."
+            "Nothing was written. Check that the surface is clean and fixed and measure "
+            "again, each time until the tip is on it."
         ),
     )

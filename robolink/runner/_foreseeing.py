@@ -128,7 +128,9 @@ def first_clear(
         refusal = next(((move, why) for move, why in in_the_way if why), None)
         if refusal is None:
             if refusals:
-                yield Notify(tr("Another way is taken than planned: {why}", why=refusals[0][1]))
+                yield Notify(
+                    tr("The robot takes another way than planned: {why}", why=refusals[0][1])
+                )
             return option
         refusals.append(refusal)
     move, why = refusals[0]

@@ -16,7 +16,6 @@ class RunSettings:
         max_jog_mm: Largest single step that a person may type.
         max_jog_deg: The same for U.
         motion_timeout_s: Longest duration of one movement before it is aborted.
-        tell_jogs: Whether the operator is told after each jog how far it went, and where it is.
     """
 
     box: WorkBox
@@ -25,4 +24,3 @@ class RunSettings:
     max_jog_mm: float = 5.0
     max_jog_deg: float = 5.0
     motion_timeout_s: float = 120.0
-    tell_jogs: bool = True

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 from robolink.model import TIP, InputEdge, Path, Pose, Spot, SpotUnit
 from robolink.runner._capture import NotYet
-from robolink.runner._subjects import FitSubject, TouchSubject
+from robolink.runner._subjects import FitSubject, JogRange, TouchSubject
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +72,7 @@ class Ask:
     foreseen: Pose | None = None
     contact: InputEdge | None = None
     evidence: bool = True
-    subject: TouchSubject | None = None
+    subject: TouchSubject | JogRange | None = None
     judge: "Callable[[TouchedAt], NotYet | None] | None" = field(default=None, compare=False)
 
 
@@ -160,6 +160,7 @@ class TouchedAt(Pose):
             from wherever it was.
         standoff_mm: How far from the expected contact that was, base: X, Y, Z.
         seed: From which the standoff was drawn, ``None`` where none was.
+        typed: Whether a person typed the pose: nothing then shows that it was touched.
     """
 
     seconds: float | None = None
@@ -167,10 +168,16 @@ class TouchedAt(Pose):
     arrival: Pose | None = None
     standoff_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
     seed: int | None = None
+    typed: bool = False
 
     @classmethod
     def of(
-        cls, pose: Pose, *, seconds: float | None = None, contact: bool | None = None
+        cls,
+        pose: Pose,
+        *,
+        seconds: float | None = None,
+        contact: bool | None = None,
+        typed: bool = False,
     ) -> "TouchedAt":
         """Return what was shown at ``pose``; as it is where that is known already.
 
@@ -187,7 +194,7 @@ class TouchedAt(Pose):
         """
         if isinstance(pose, cls):
             return pose
-        return cls(**_as_it_is(pose), seconds=seconds, contact=contact)
+        return cls(**_as_it_is(pose), seconds=seconds, contact=contact, typed=typed)
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,10 +236,12 @@ class Confirm:
     Attributes:
         question: What is offered.
         fit: What a screen shows of it.
+        also: Further words that may answer it; it is answered with the word itself then.
     """
 
     question: str
     fit: FitSubject | None = field(default=None, compare=False)
+    also: tuple[str, ...] = ()
 
 
 TakenStep = Move | Ask | Seek | Look | Notify | Confirm

@@ -61,7 +61,7 @@ def _seen(sensor: TipSensor, mark: int) -> Sequence[Spot]:
         raise CalibrationError(
             "sensor_failed",
             tr("The camera {camera} failed: {cause}", camera=sensor.identity, cause=error),
-            remedy=tr("Look after its cable, power and program, and start again."),
+            remedy=tr("Check cable, power and program of the camera, then start again."),
         ) from error
 
 

@@ -208,7 +208,7 @@ class PermitCall:
             raise CalibrationError("not_still", tr("The tip did not stay at its touch."))
         if controller.condition().get("tool_known") is not True:
             raise CalibrationError(
-                "tool_pose", tr("The tool in force is not the one that was selected here.")
+                "tool_pose", tr("The selected tool is not the one that was chosen here.")
             )
         return replace(pose, tool=selected)
 

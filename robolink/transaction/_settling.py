@@ -73,7 +73,7 @@ class Settler:
         numbers = ", ".join(
             str(step.tool) for step, is_old in zip(steps, old, strict=True) if not is_old
         )
-        action = tr("put the old value of tool {numbers} back", numbers=numbers)
+        action = tr("Put the old value of tool {numbers} back", numbers=numbers)
         return Finding(marker, Verdict.NOT_FINISHED, text, action)
 
     def settle(self, finding: Finding) -> None:
@@ -233,7 +233,7 @@ def _steps(marker: Marker) -> list[Step]:
         ]
     except (KeyError, TypeError, ValueError) as error:
         raise ConfigError(
-            tr("The marker of {when} cannot be understood.", when=marker.begun_at),
+            tr("What was left unfinished at {when} cannot be read.", when=marker.begun_at),
             remedy=tr(
                 "Compare the tools with a backup, then {forget}.", forget=way(Way.FORGET_MARKER)
             ),

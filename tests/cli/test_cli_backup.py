@@ -21,7 +21,7 @@ def test_a_backup_says_what_it_saved_and_of_which_robot(run, tmp_path):
     assert code == 0
     assert "robot T6-602S, serial SIM00001" in out
     assert "1 of 15 tools are defined." in out
-    assert "Tool 1 is in force." in out
+    assert "Tool 1 is selected." in out
     assert load(tmp_path / "cell.json").state.selected == 1
 
 
@@ -84,10 +84,10 @@ def test_another_tool_in_force_is_shown_and_may_be_ignored(run, simulator, golde
     simulator.machine.tools.select(0)
     code, out, _ = run("compare", golden)
     assert code == 1
-    assert "tool in force: 1 in the file, 0 on the controller" in out
+    assert "selected tool: 1 in the file, 0 on the controller" in out
     code, out, _ = run("compare", golden, "--ignore-selected")
     assert code == 0
-    assert "tool in force: 1 in the file, 0 on the controller" in out
+    assert "selected tool: 1 in the file, 0 on the controller" in out
 
 
 def test_one_golden_file_is_compared_with_many_cells(golden, capsys):
@@ -155,7 +155,7 @@ def test_only_named_tools_and_the_selection_are_restored_when_asked(run, simulat
     assert [receipt["tool"] for receipt in document["restored"]] == [1]
     code, _, err = run("restore", golden)
     assert code == 5
-    assert "Tool 3 is in force" in err
+    assert "Tool 3 is selected" in err
     assert run("restore", golden, "--selected")[0] == 0
     assert simulator.machine.tools.selected == 1
     assert simulator.machine.tools.get(3) is None

@@ -217,7 +217,7 @@ def test_what_was_left_unfinished_is_said_on_connecting(command, capsys, monkeyp
     for text in ("Tool 0 is selected now", "puts tool 3 back", f'robolink -c "{URL}" recover'):
         assert text in shown.err
     assert "TLSet 3, XY(1,2,3,0)" in shown.err
-    assert "motion is blocked" in shown.err
+    assert "robot stays blocked" in shown.err
 
 
 def test_a_selection_that_was_not_answered_leaves_two_tools_to_be_named(capsys):

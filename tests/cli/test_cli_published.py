@@ -35,7 +35,7 @@ def test_status_shows_the_published_tool_where_execute_is_not_available(run, sim
     simulator.panel.start_production()
     code, out, _ = run("status")
     assert code == 0
-    assert "tool in force, as published: 1" in out
+    assert "selected tool, as published: 1" in out
     document = json.loads(run("status", "--json")[1])
     assert (document["selected_tool"], document["published_selected_tool"]) == (None, 1)
 

@@ -29,9 +29,9 @@ def cell(tmp_path, monkeypatch):
 
 
 COMMANDS = {
-    "status": (["status"], "robolink/status/1", "tool in force: 1"),
+    "status": (["status"], "robolink/status/1", "tool 1 selected"),
     "where": (["where"], "robolink/where/1", "tool 1 in local 0"),
-    "stop": (["stop"], "robolink/stop/1", "stands; its state is: ready"),
+    "stop": (["stop"], "robolink/stop/1", "stands still; its state is: ready"),
     "reset": (["reset", "--yes"], "robolink/reset/1", "ready"),
     "motors on": (["motors", "on", "--yes"], "robolink/motors/1", "The motors are on."),
     "motors off": (["motors", "off"], "robolink/motors/1", "The motors are off."),
@@ -46,7 +46,7 @@ COMMANDS = {
     "tool select": (
         ["tool", "select", "2"],
         "robolink/tool-select/1",
-        "tool in force: 2 (was 1)",
+        "Tool 2 is selected (before: 1).",
     ),
     "jog": (["jog", "x+0.5", "z+1", "--yes"], "robolink/jog/1", "tool 1 in local 0"),
     "calibrate two-pose": ([], "robolink/calibration/1", "Tool 1 is written and read back."),

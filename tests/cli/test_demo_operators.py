@@ -40,6 +40,6 @@ def test_a_careless_person_is_refused_and_the_old_tool_stays_in_force(capsys, se
         assert "recovered" not in one
         assert {name: one["in_force"][name] for name in STORED} == pytest.approx(STORED)
         assert abs(one["truth"]["x_mm"] - STORED["x_mm"]) > 0.1
-    assert "only presses ENTER" in shown.err
+    assert "only presses Enter" in shown.err
     assert shown.err.count("Refused: ") == 2
     assert shown.err.count("still holds X 12.000 Y -3.500 Z -20.000") == 2

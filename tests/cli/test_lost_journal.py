@@ -52,14 +52,14 @@ def test_a_journal_without_history_of_a_known_controller_blocks_until_a_person_l
     assert simulator.machine.tip() == stood
     code, out, err = run("recover")
     assert code == 6
-    assert "Nothing is unsettled" not in out + err
+    assert "Nothing is left unfinished" not in out + err
     assert "Tool 0 is selected" in out + err
     assert "robolink tool compare" in out + err
     # It is not said to be settled by having been asked for.
     assert run("recover")[0] == 6
     assert run("resolve", "--yes")[0] == 0
     code, out, err = run("recover")
-    assert "Nothing is unsettled" in out + err
+    assert "Nothing is left unfinished" in out + err
     assert "knows nothing" not in run("status")[2]
 
 

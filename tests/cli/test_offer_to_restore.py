@@ -63,8 +63,8 @@ def test_a_yes_selects_the_cells_own_tool_again(cell, person, capsys):
     assert open_markers(url) == ()
     shown = capsys.readouterr()
     assert "Tool 0 is selected now; it was tool 1 before" in shown.err
-    assert "tool in force: 1" in shown.out
-    assert "select tool 1 again" in person.questions[0]
+    assert "tool 1 selected" in shown.out
+    assert "Select tool 1 again" in person.questions[0]
 
 
 @pytest.mark.parametrize("person", ["n"], indirect=True)
@@ -73,7 +73,7 @@ def test_a_no_changes_nothing_and_the_command_goes_on(cell, person, capsys):
     assert main.run(["-c", url, "status"]) == 0
     assert simulator.machine.tools.selected == 0
     assert len(open_markers(url)) == 1
-    assert "tool in force: 0" in capsys.readouterr().out
+    assert "tool 0 selected" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("person", ["y"], indirect=True)

@@ -112,7 +112,7 @@ def test_what_is_undone_already_is_not_written_again(run, simulator, changed):
     written = simulator.machine.flash_writes
     code, out, _ = run("undo")
     assert (code, simulator.machine.flash_writes) == (0, written)
-    assert "nothing was written" in out
+    assert "Nothing was written." in out
 
 
 def test_a_fresh_controller_is_backed_up_before_the_first_write(run, simulator, state_folder):
@@ -129,7 +129,7 @@ def test_a_fresh_controller_is_backed_up_before_the_first_write(run, simulator, 
 MISTAKES = {
     "no change": ([], "No finished change"),
     "an unknown change": (["abcd"], "No entry and no change"),
-    "both": (["abcd", "--to", "1"], "exclude each other"),
+    "both": (["abcd", "--to", "1"], "not both"),
     "no proof": (["--to", "1"], "does not say what was read"),
     "number 0": (["--to", "0"], "--to"),
 }

@@ -90,7 +90,7 @@ def test_taught_points_give_the_tip_and_what_was_not_measured_is_kept(command, s
     assert stored(simulator) == ToolOffset(12.3, -3.9, -20.0)
     assert "Z -20.000: not measured, stays" in out
     assert "Tool 1 is written and read back." in out
-    assert "not proved by turning" in out
+    assert "Not tested yet. To test:" in out
 
 
 @pytest.mark.parametrize("layout", ["json", "csv"])
@@ -185,8 +185,8 @@ def test_on_a_terminal_a_no_writes_nothing(command, simulator, monkeypatch):
     monkeypatch.setattr(given_poses, "agree", decline)
     assert command(*calibrate("--points", "901,902"))[0] == 9
     (question,) = asked
-    assert question.endswith("Write this to tool 1?")
-    assert "Nobody witnessed these touches" in question
+    assert "Write them to tool 1 all the same?" in question
+    assert "Nobody saw these touches" in question
     assert stored(simulator) == STORED
 
 
@@ -418,7 +418,7 @@ def test_that_nobody_saw_the_touches_is_said_though_yes_was_said_beforehand(comm
     code, out, err = command(*calibrate("--points", "901,902", "--yes"))
     assert code == 0
     assert "Nobody saw these touches being made" in out
-    assert "not proved" in out + err
+    assert "Not tested yet" in out + err
     assert "verified" not in out + err
     assert stored(simulator) != STORED
 

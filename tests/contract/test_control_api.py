@@ -96,6 +96,22 @@ def test_both_kinds_are_looked_at_and_pushed_alike(at, name):
     assert control.do("counters")["starts"] >= 1
 
 
+@pytest.mark.parametrize("name", ["a", "b"])
+def test_a_cable_is_pulled_and_a_client_that_connects_again_is_served(
+    at, cells, name, monkeypatch, tmp_path
+):
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path))
+    control, _ = at(name)
+    (url,) = cells.cells[name].urls.values()
+    with robolink.connect(url, timeout_s=3.0) as controller:
+        before = controller.tools.read(1)
+        assert control.do("cut_link") == {}
+        with pytest.raises(TransportBrokenError):
+            controller.tools.read(1)
+    with robolink.connect(url, timeout_s=3.0) as controller:
+        assert controller.tools.read(1) == before
+
+
 def test_an_answer_is_lost_as_often_as_was_asked_for(at, cells, monkeypatch, tmp_path):
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path))
     control, simulator = at("a")

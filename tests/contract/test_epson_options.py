@@ -82,6 +82,9 @@ def test_every_option_with_named_values_is_varied_here():
         "numbers",
         # Of the serial line alone: tests/contract/test_epson_serial_line.py.
         *(field.name for field in fields(EpsonOptions) if field.name.startswith("rs232_")),
+        # Of the settling of the servo: tests/unit/test_sim_drives.py.
+        "servo_lag_ms",
+        "servo_unrest_pulses",
         # Of programs alone: tests/unit/spel_programs.
         "vision_acquisition_ms",
         "vision_object_ms",

@@ -1,6 +1,6 @@
 """Jogging by keys: the real command on a real terminal pair, against a served simulator."""
 
-import signal
+import os
 import sys
 import termios
 import time
@@ -11,7 +11,8 @@ from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 
-from tests.contract._terminal import LONGEST_S, Terminal
+from tests.cli.wizard._screen import ScreenHand
+from tests.contract._terminal import Terminal
 
 RIGHT, PAGE_DOWN = b"\x1b[C", b"\x1b[6~"
 SPEED = 40.0
@@ -31,141 +32,189 @@ def speed():
 
 
 @pytest.fixture
-def url(simulator, monkeypatch, capsys, speed):
+def host(simulator, monkeypatch, capsys, speed):
     for name in ("ROBOLINK_PASSWORD", "ROBOLINK_CONTROLLER"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setitem(sys.modules, "keyring", None)
     with serve_tcp(simulator, clock=ScaledClock(speed)) as host:
         assert main.run(["-c", host.url, "motors", "on", "--yes"]) == 0
-        yield host.url
+        yield host
 
 
 @pytest.fixture
-def jog(url):
+def jog(host):
     opened = []
 
     def start(*more):
-        terminal = Terminal("jog", "--keys", "-c", url, *more)
-        opened.append(terminal)
-        return terminal
+        hand = ScreenHand(["jog", "--keys", "-c", host.url, *more])
+        hand.host = host
+        opened.append(hand)
+        return hand
 
     yield start
-    for terminal in opened:
-        terminal.close()
+    for hand in opened:
+        hand.close()
 
 
-def flange(simulator):
-    return simulator.machine.arm.flange()
+def ready(hand):
+    """Wait until a key counts: the question has stood for a moment."""
+    hand.see(r"Tip now +(-?[\d.]+)")
+    hand.rest(0.4)
 
 
-POSITION = r"X +(-?[\d.]+)  Y +(-?[\d.]+)  Z +(-?[\d.]+)  U +(-?[\d.]+)   step ([\d.]+)"
+def moves(simulator):
+    return simulator.machine.arm.moves_started
 
 
-def test_keys_move_the_arm_by_steps_and_show_where_it_is(jog, simulator):
-    start = flange(simulator)
-    terminal = jog()
-    terminal.wait_for(r"Is everybody out of the cell\? \[y or n\]")
-    terminal.press(b"y")
-    terminal.wait_for(r"box: X ")
-    first = terminal.wait_for(POSITION)
-    terminal.press(b"+")
-    terminal.wait_for(r"step 1\s")
-    terminal.press(RIGHT)
-    moved = terminal.wait_for(POSITION)
-    assert float(moved[1]) == pytest.approx(float(first[1]) + 1.0, abs=0.05)
-    terminal.press(PAGE_DOWN)
-    terminal.wait_for(POSITION)
-    terminal.press(b"q")
-    assert terminal.end() == 0
-    end = flange(simulator)
+def moved(hand, simulator, count):
+    """Wait until so many steps were begun and the last one has ended."""
+    hand.see(rf"\D{count} steps")
+    hand.rest(0.1)
+    assert moves(simulator) == count
+
+
+def check_all_is_put_back(hand, simulator):
+    assert termios.tcgetattr(hand.master) == hand.before
+    assert simulator.machine.tools.selected == 1
+    assert not simulator.status_flags().running
+
+
+def test_keys_move_the_arm_by_steps_inside_of_the_box_and_leave_where_it_stands(jog, simulator):
+    start = simulator.machine.arm.flange()
+    hand = jog("--box", "1.05")
+    os.write(hand.master, b"y66\r\n")  # typed ahead: neither a yes nor a step
+    hand.see(r"everybody out of\s+the cell\?")
+    hand.rest(0.5)
+    assert moves(simulator) == 0
+    hand.press(["\r", "y"])
+    ready(hand)
+    assert "Highest" in hand.text
+    hand.press(["+", "+"])
+    hand.see(r"\(1\.00\)")
+    hand.press([RIGHT])
+    moved(hand, simulator, 1)
+    hand.see(r"Since start +\+(0\.9|1\.0)")
+    hand.press([PAGE_DOWN])
+    moved(hand, simulator, 2)
+    hand.press([RIGHT])
+    hand.see("would leave the allowed area")
+    assert moves(simulator) == 2
+    hand.press(["\r"])  # takes nothing, ends nothing
+    assert hand.command.poll() is None
+    hand.press(["\x1b"])
+    assert hand.end() == 0, hand.text
+    end = simulator.machine.arm.flange()
     assert (end.x_mm - start.x_mm, end.z_mm - start.z_mm) == pytest.approx((1.0, -1.0), abs=0.05)
-    assert simulator.machine.arm.moves_started == 2
-
-
-def test_a_step_out_of_the_box_is_refused_and_jogging_goes_on(jog, simulator):
-    terminal = jog("--yes", "--box", "0.05")
-    terminal.wait_for(POSITION)
-    terminal.press(RIGHT)
-    terminal.wait_for("would leave the allowed area")
-    terminal.wait_for(POSITION)  # until then, keys are dropped
-    terminal.press(b"-")
-    terminal.wait_for(r"step 0\.01\s")
-    terminal.press(RIGHT)
-    terminal.wait_for(POSITION)
-    terminal.press(b"\n")
-    assert terminal.end() == 0
-    assert simulator.machine.arm.moves_started == 1
-
-
-def test_the_link_outlives_the_remote_time_out_while_no_key_is_pressed(jog, simulator):
-    terminal = jog("--yes")
-    terminal.wait_for(POSITION)
-    time.sleep(1.25 * REMOTE_TIMEOUT_S)
-    terminal.press(RIGHT)
-    terminal.wait_for(POSITION)
-    terminal.press(b"q")
-    assert terminal.end() == 0
-    assert simulator.machine.arm.moves_started == 1
-
-
-def test_an_emergency_stop_shows_while_no_key_is_pressed(jog, simulator):
-    terminal = jog("--yes")
-    terminal.wait_for(POSITION)
-    simulator.panel.press_estop()
-    terminal.wait_for("emergency stop was pressed")
-    assert terminal.end() == 5
+    check_all_is_put_back(hand, simulator)
 
 
 @pytest.mark.parametrize("speed", [1.0])
-def test_ctrl_c_aborts_a_step_and_keys_pressed_meanwhile_are_dropped(jog, simulator, speed):
-    start = flange(simulator)
-    terminal = jog("--yes", "--speed", "1")
-    terminal.wait_for(POSITION)
-    terminal.press(b"++")
-    terminal.wait_for(r"step 5\s")
-    terminal.press(RIGHT)
-    while simulator.machine.arm.moves_started == 0:
-        time.sleep(0.02)
-    terminal.press(RIGHT * 20)
-    time.sleep(0.3)
-    # The pair is not the command's controlling terminal, so Ctrl-C's signal is sent by hand.
-    terminal.command.send_signal(signal.SIGINT)
-    assert terminal.end() == 130
-    assert simulator.machine.arm.moves_started == 1
-    assert 0 < flange(simulator).x_mm - start.x_mm < 4.5
-    assert simulator.machine.tools.selected == 1
+def test_a_key_that_is_held_down_queues_nothing_and_escape_stops_the_step(jog, simulator, speed):
+    start = simulator.machine.arm.flange()
+    hand = jog("--yes", "--speed", "1")
+    ready(hand)
+    hand.press(["+", "+", "+"])
+    hand.see(r"\(5\.00\)")
+    hand.press([RIGHT])
+    while moves(simulator) == 0:
+        hand.rest(0.02)
+    for _ in range(10):
+        os.write(hand.master, RIGHT)
+        hand.rest(0.033)
+    hand.press(["\x1b"])
+    assert hand.end() == 130, hand.text
+    assert moves(simulator) == 1
+    assert 0 < simulator.machine.arm.flange().x_mm - start.x_mm < 4.5
+    check_all_is_put_back(hand, simulator)
 
 
-def test_keys_pressed_during_a_step_start_no_other(jog, simulator):
-    terminal = jog("--yes")
-    terminal.wait_for(POSITION)
-    terminal.press(RIGHT * 50)
-    terminal.wait_for(POSITION)
-    terminal.press(b"q")
-    assert terminal.end() == 0
-    assert simulator.machine.arm.moves_started == 1
+@pytest.mark.soak
+def test_a_key_that_is_held_down_makes_steps_and_ends_with_its_release(jog, simulator):
+    hand = jog("--yes")
+    ready(hand)
+    end_s = time.monotonic() + 1.5
+    while time.monotonic() < end_s:
+        os.write(hand.master, RIGHT)
+        hand.rest(0.033)
+    hand.rest(0.5)
+    made = moves(simulator)
+    assert 2 <= made < 45
+    hand.rest(1.0)
+    assert moves(simulator) == made
+    hand.press([" "])
+    assert hand.end() == 0
+    assert moves(simulator) == made
+    check_all_is_put_back(hand, simulator)
 
 
-def test_a_no_moves_nothing(jog, simulator):
-    terminal = jog()
-    terminal.wait_for(r"\[y or n\]")
-    terminal.press(b"n")
-    assert terminal.end() == 9
-    assert simulator.machine.arm.moves_started == 0
+@pytest.mark.soak
+@pytest.mark.parametrize("key", [" ", "0", "q", "\x03"])
+def test_each_key_that_stops_leaves_at_rest(jog, simulator, key):
+    hand = jog("--yes")
+    ready(hand)
+    os.write(hand.master, key.encode() + RIGHT * 3)  # nothing moves after it
+    assert hand.end() == 0, hand.text
+    assert moves(simulator) == 0
+    check_all_is_put_back(hand, simulator)
 
 
-def test_the_terminal_is_as_it_was_afterwards(jog):
-    terminal = jog()
-    terminal.wait_for(r"\[y or n\]")
-    assert not termios.tcgetattr(terminal.descriptor)[3] & termios.ECHO
-    terminal.press(b"n")
-    terminal.command.wait(LONGEST_S)
-    assert terminal.before[3] & termios.ECHO
-    assert termios.tcgetattr(terminal.descriptor) == terminal.before
+@pytest.mark.soak
+def test_the_link_outlives_the_remote_time_out_while_no_key_is_pressed(jog, simulator):
+    hand = jog("--yes")
+    ready(hand)
+    hand.rest(1.25 * REMOTE_TIMEOUT_S)
+    hand.press([RIGHT])
+    moved(hand, simulator, 1)
+    hand.press(["0"])
+    assert hand.end() == 0
+
+
+@pytest.mark.parametrize(
+    ("how", "code", "said"),
+    [
+        ("estop", 5, "emergency stop was pressed"),
+        pytest.param("link", 3, "controller", marks=pytest.mark.soak),
+        pytest.param("no", 9, "not y", marks=pytest.mark.soak),
+    ],
+)
+def test_each_other_end_is_told_and_moves_nothing(jog, simulator, how, code, said):
+    if how == "no":
+        hand = jog()
+        hand.see(r"everybody out of\s+the\s+cell\?")
+        hand.rest(0.4)
+        hand.press(["n"])
+    else:
+        hand = jog("--yes")
+        ready(hand)
+        simulator.panel.press_estop() if how == "estop" else hand.host.close()
+    assert hand.end() == code, hand.text
+    assert said in hand.text
+    assert moves(simulator) == 0
+    assert termios.tcgetattr(hand.master) == hand.before
+
+
+def test_on_a_dumb_terminal_keys_are_lines_and_what_is_typed_during_a_step_is_dropped(
+    host, simulator
+):
+    terminal = Terminal("jog", "--keys", "--yes", "-c", host.url)
+    try:
+        terminal.wait_for(r"Tip X [^\n]*\n[^\n]*Type steps \(x\+0\.1 z-0\.5\), stop, or help\.")
+        terminal.press(b"help\n")
+        terminal.wait_for("stop ends")
+        terminal.press(b"x+0.5\nx+1\n")
+        terminal.wait_for(r"Typed too early, so it was not taken: 'x\+1'")
+        terminal.wait_for(r"Since start 0\.[45]\d\d mm")
+        terminal.press(b"\n")
+        terminal.wait_for(r"Since start 0\.[45]\d\d mm")
+        terminal.press(b"stop\n")
+        assert terminal.end() == 0
+    finally:
+        terminal.close()
+    assert moves(simulator) == 1
 
 
 @pytest.mark.parametrize("words", [("--keys",), ("--keys", "x+1"), ("--keys", "--dry-run")])
-def test_off_a_terminal_or_with_steps_keys_are_a_mistake(url, simulator, capsys, words):
-    assert main.run(["-c", url, "jog", *words, "--yes"]) == 2
+def test_off_a_terminal_or_with_steps_keys_are_a_mistake(host, simulator, capsys, words):
+    assert main.run(["-c", host.url, "jog", *words, "--yes"]) == 2
     assert "keys" in capsys.readouterr().err
-    assert simulator.machine.arm.moves_started == 0
+    assert moves(simulator) == 0

@@ -97,8 +97,6 @@ def test_options_password_and_state_reach_the_simulator(tmp_path):
     arguments = (
         *("--json", "--option", "status_flags=10", "--option", "numbers.tool_undefined=4321"),
         *("--password-env", "CELL_PASSWORD", "--state", str(state), "--speed", "50"),
-        # At that speed the controller's own minute would be 1.2 s of a busy computer.
-        *("--option", "remote_timeout_s=3000"),
     )
     with started(*arguments, CELL_PASSWORD="s3cret") as process:
         url = json.loads(first_line(process))["url"]

@@ -170,7 +170,7 @@ def test_requests_cut_anywhere_are_the_same_requests():
 
 
 def test_an_idle_link_is_cut_without_anybody_sending():
-    simulator = EpsonSimulator(options=EpsonOptions(remote_timeout_s=5))
+    simulator = EpsonSimulator(options=EpsonOptions(remote_timeout_s=0.1))
     with served(simulator, factor=50) as host, raw(host.url) as client:
         assert client.socket.recv(10) == b""
         assert simulator.condition.code == 19

@@ -8,7 +8,12 @@ from robolink_simulators.testkit.asked import CellRequest
 
 import robolink
 from robolink import ToolOffset
-from robolink.errors import ConfigError, OutcomeUnknownError, RobolinkError
+from robolink.errors import (
+    ConfigError,
+    OutcomeUnknownError,
+    RobolinkError,
+    TransportBrokenError,
+)
 from robolink.journal import EntryKind
 from robolink.protocols.mailbox import program_texts
 from robolink.transaction import Wanted, change_tools
@@ -38,6 +43,19 @@ def test_a_plc_is_served_on_each_bus(softmotion_sim):
     assert softmotion_sim.truth()["stored"]["2"]["z_mm"] == pytest.approx(WANTED.z_mm)
     softmotion_sim.wire.assert_sent("WRITE_TOOL", times=1)
     softmotion_sim.motions.assert_none()
+
+
+@pytest.mark.parametrize("softmotion_sim", ["sim", "modbus-rtu", "can"], indirect=True)
+def test_the_cable_of_a_plc_is_pulled_where_a_connection_ends_with_it(softmotion_sim):
+    with robolink.connect(softmotion_sim.url) as controller:
+        if softmotion_sim.url.startswith("softmotion+sim"):
+            softmotion_sim.do("cut_link")
+            with pytest.raises(TransportBrokenError):
+                controller.status()
+        else:
+            with pytest.raises(ConfigError, match="no connection that could be cut"):
+                softmotion_sim.do("cut_link")
+            controller.status()
 
 
 @pytest.mark.parametrize("plc_sim", ["modbus-tcp", "modbus-rtu"], indirect=True)

@@ -6,7 +6,7 @@ from robolink.model import ToolOffset
 from tests.faults._change_cell import ChangeCell, Step
 from tests.faults._change_process import NEW, OLD, CommitStep
 
-NOTHING_LEFT = "Nothing is unsettled on this controller."
+NOTHING_LEFT = "Nothing is left unfinished on this controller."
 
 
 def chosen(cell: ChangeCell, steps: list[Step], *, every: int = 1) -> list[Step]:

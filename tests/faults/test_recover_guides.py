@@ -69,7 +69,7 @@ def test_what_reading_can_tell_is_settled_and_the_movement_waits_for_a_word(cell
     assert cell.settings() == cell.settings_before
     assert kinds(cell) == {MarkerKind.MOVE}
     said = ended.err + ended.out
-    assert "  done: put the old value of tool 1 back" in said
+    assert "  done: Put the old value of tool 1 back" in said
     (pose,) = poses(said)
     assert pose.endswith("(tool 1)"), "the cell's own tool is selected by then"
     assert "'robolink recover' again on a terminal, or with --yes" in said
@@ -107,8 +107,8 @@ def test_a_dry_run_tells_what_it_would_do_and_does_nothing(cell):
     before, sent = cell.open_markers(), len(cell.writes())
     ended = cell.run("recover", "--dry-run")
     assert ended.code == 6, ended.err
-    assert "  to do: put the old value of tool 1 back" in ended.err
-    assert "  to do: it takes your word" in ended.err
+    assert "  to do: Put the old value of tool 1 back" in ended.err
+    assert "  to do: you decide" in ended.err
     assert cell.open_markers() == before
     assert (len(cell.writes()), cell.changed()) == (sent, {1})
 
@@ -161,7 +161,7 @@ def test_what_nobody_can_read_takes_a_word_too(cell):
     log.close()
     left = cell.run("recover")
     assert left.code == 6, left.err
-    assert f"The marker of {WHEN} cannot be understood." in left.err
+    assert f"What was left unfinished at {WHEN} cannot be read." in left.err
     assert {marker.request for marker in cell.open_markers()} >= {"something newer"}
     assert cell.run("recover", "--yes").code == 0
     assert cell.open_markers() == ()

@@ -141,7 +141,7 @@ def test_f69_a_heartbeat_that_freezes_during_a_movement_leaves_it_unknown_and_bl
         cell.simulator.panel.freeze()
         with pytest.raises(OutcomeUnknownError, match=r"heartbeat .* stands still") as unknown:
             motion.wait(timeout_s=30)
-    assert "motion is blocked" in unknown.value.remedy
+    assert "robot stays blocked" in unknown.value.remedy
     cell.simulator.panel.thaw()
     with cell.connect() as controller, pytest.raises(OutcomeUnknownError, match="MOVE_LINEAR"):
         lift(controller)
@@ -285,7 +285,7 @@ def test_a_can_node_whose_heartbeat_is_lost_leaves_the_movement_unknown(tmp_path
             host.close()
             with pytest.raises(OutcomeUnknownError, match=r"MOVE_LINEAR.*heartbeat") as unknown:
                 motion.wait(timeout_s=30)
-    assert "motion is blocked" in unknown.value.remedy
+    assert "robot stays blocked" in unknown.value.remedy
     assert [marker.request for marker in outcomes.open_markers()] == [unknown.value.request]
     assert simulator.plc.group.movements_started == 1
 

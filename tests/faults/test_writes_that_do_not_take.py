@@ -79,7 +79,7 @@ def test_f44_a_movement_in_another_tool_than_the_one_in_force_is_refused_on_epso
         machine.tools.select(2)  # at the pendant
         began, slow = machine.arm.moves_started, MotionProfile(Path.STRAIGHT, 1, 1.0)
         for target in (here, replace(group.pose(), tool=1)):
-            with pytest.raises(NotReadyError, match="tool 1, but tool 2 is in force") as refusal:
+            with pytest.raises(NotReadyError, match="tool 1, but tool 2 is selected") as refusal:
                 group.move_to(target, slow, box=ANYWHERE)
             assert refusal.value.reason is NotReadyReason.WRONG_TOOL
         assert machine.arm.moves_started == began
@@ -94,7 +94,7 @@ def test_f44_a_movement_in_another_tool_than_the_one_in_force_is_refused_on_a_pl
         controller.tools.write(2, NEW, expected=None)
         assert controller.tools.selected() == 1
         controller.tools.select(2)
-        with pytest.raises(NotReadyError, match="tool 1, but tool 2 is in force") as refusal:
+        with pytest.raises(NotReadyError, match="tool 1, but tool 2 is selected") as refusal:
             group.move_to(above(here, 1.0), SLOW, box=ANYWHERE)
         assert refusal.value.reason is NotReadyReason.WRONG_TOOL
         assert cell.movements_started == 0

@@ -1,7 +1,7 @@
 """Every command of README and of the pages is one of today, and takes what is typed after it.
 
 Nothing is carried out here: names, options and numbers of arguments are those of the command.
-``tests/cli/test_pages_typed.py`` types whole pages.
+``tests/contract/test_pages_typed.py`` types whole pages.
 """
 
 import re
@@ -113,3 +113,10 @@ def test_the_sentences_of_troubleshooting_are_those_of_the_screen():
     shown = {re.sub(r"\{[^}]*\}", "...", sentence) for sentence in sentences}
     assert len(quoted) > 20
     assert [one for one in quoted if not any(one in sentence for sentence in shown)] == []
+
+
+def test_the_index_names_every_page_once():
+    index = (ROOT / "docs" / "README.md").read_text(encoding="utf-8")
+    named = re.findall(r"\]\(([\w.-]+\.md)", index)
+    pages = {page.name for page in (ROOT / "docs").glob("*.md")} - {"README.md"}
+    assert sorted(named) == sorted(pages)

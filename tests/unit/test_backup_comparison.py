@@ -128,7 +128,7 @@ def test_a_tool_that_would_not_be_defined_is_not_selected():
 def test_the_tool_in_force_is_never_cleared():
     wanted = backup_of(state(selected=2, t2=TIP))
     now = state(selected=1, t1=TIP, t2=TIP)
-    with pytest.raises(ToolError, match="Tool 1 is in force"):
+    with pytest.raises(ToolError, match="Tool 1 is selected"):
         plan_restore(wanted, now)
     plan = plan_restore(wanted, now, selected=True)
     assert (plan.select, plan.clears) == (2, (RestoreChange(1, TIP, None),))

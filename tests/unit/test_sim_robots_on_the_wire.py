@@ -15,7 +15,7 @@ from robolink_simulators.epson.arm.robots import find_robot
 from robolink_simulators.epson.arm.six_axes import forward
 from robolink_simulators.epson.arm.tilted_legs import plan_line
 from robolink_simulators.epson.arm.trajectory import LinePace
-from robolink_simulators.epson.memory.points import frame_at
+from robolink_simulators.epson.definitions.local_frames import frame_at
 
 from robolink.model import Elbow, Posture, Wrist
 from robolink.protocols.spel import parse_point, parse_where

@@ -1,6 +1,12 @@
 """Settings of the drives, ranges of joints, words on ports (docs/reference/spel.md 6.3, 7.2)."""
 
+import random
+
 import pytest
+from robolink_simulators.epson.arm.robots import find_robot
+from robolink_simulators.epson.machine import Machine
+from robolink_simulators.epson.options import EpsonOptions
+from robolink_simulators.epson.spel import Interpreter
 
 from tests.unit.test_sim_spel_points import Window
 
@@ -24,6 +30,7 @@ def window():
         ("TCLim 50, -1, -1, 20", "TCLim(4)", "50, -1, -1, 20", "-1, -1, -1, -1"),
         ("TCSpeed 5", "TCSpeed", "5", "100"),
         ("LimitTorque 80", "LimitTorque(1)", "80, 80, 80, 80", "100, 100, 100, 100"),
+        ("TC On", "TC", "1", "0"),
         ("OLAccel On", "OLAccel", "OLACCEL is ON", "OLACCEL is OFF"),
         ("SoftCP On", "SoftCP", "1", "0"),
         ("AutoLJM On", "AutoLJM", "1", "0"),
@@ -58,12 +65,27 @@ def test_reset_puts_back_some_and_start_up_others(window):
         ("TCSpeed 0", 4002),
         ("TCLim 1, 2", 2100),
         ("Print TCLim(5)", 4002),
-        ("TC On", 2199),
         ("PTPBoost 1, 2", 2100),
     ],
 )
 def test_what_a_setting_cannot_be(window, statement, number):
     assert window.error(statement) == number
+
+
+def test_collisions_are_looked_for_by_every_joint_until_start_up(window):
+    """Help: the list has a word for each joint."""
+    assert window("CollisionDetect") == "OFF,OFF,OFF,OFF\r\n"
+    window("CollisionDetect On; Motor On; Reset")
+    assert window("CollisionDetect") == "ON,ON,ON,ON\r\n"
+    window.machine.robot.forget_volatile(0)
+    assert window("Print CollisionDetect(2)") == "0\r\n"
+
+
+def test_vsd_is_kept_by_six_axes_alone(window):
+    assert window.error("VSD On") == 4028
+    cell = Machine(find_robot("C8-C901S"))
+    interpreter = Interpreter(cell, EpsonOptions(), random.Random(1))
+    assert interpreter.start("VSD On; Print VSD", 0).output == "1\r\n"
 
 
 def test_limzmargin_is_how_far_above_limz_a_jump_may_start(window):

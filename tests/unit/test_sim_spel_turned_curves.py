@@ -6,15 +6,15 @@ import random
 from itertools import pairwise
 
 import pytest
-from robolink_simulators.cell.frames import axis_and_angle, product, transposed
+from robolink_simulators.cell.frames import axis_and_angle, product, subtract, transposed
 from robolink_simulators.epson import EpsonOptions
 from robolink_simulators.epson.arm.joints import Joints
 from robolink_simulators.epson.arm.kinematics import frame_of
 from robolink_simulators.epson.arm.robots import find_robot
 from robolink_simulators.epson.arm.ways.turned_curve import smooth_course_through
 from robolink_simulators.epson.definitions.curves import CurveFiles, CurveSwitch, FreeCurve
+from robolink_simulators.epson.definitions.local_frames import frame_at
 from robolink_simulators.epson.machine import Machine
-from robolink_simulators.epson.memory.points import frame_at
 from robolink_simulators.epson.spel.interpreter import Interpreter
 
 from robolink.model import Pose
@@ -90,9 +90,26 @@ def test_a_closed_curve_on_six_axes_ends_as_it_began():
     assert min(off(frame, point(cell, 3)) for frame in frames) < 0.3
 
 
-def quaternion_turn_deg(a, b):
-    along = sum(p * q for p, q in zip(a, b, strict=True)) / (math.hypot(*a) * math.hypot(*b))
-    return 2 * math.degrees(math.acos(min(1.0, abs(along))))
+@pytest.mark.parametrize(("kind", "least", "most"), [("O", 170, 245), ("C", 335, 365)])
+def test_the_tool_of_six_axes_keeps_its_angle_to_the_way_in_the_plane(kind, least, most):
+    """Help on Curve: tangential correction takes U from the first point alone."""
+    cell = six_axes()
+    for n in range(6):
+        along, across = (30 * f(math.tau * n / 6) for f in (math.cos, math.sin))
+        cell.run(f"P{10 + n} = P1 +X({along - 30}) +Y({across}) +Z({n % 2}) +U({n})")
+    cell.run(f'Curve "cut", {kind}, 2, 6, P(10:{15 if kind == "C" else 14})')
+    frames, _ = frames_on_the_way(cell, 'CVMove "cut"')
+    first, spread = point(cell, 1).rotation, []
+    for before, after in list(pairwise(frames))[80:-80]:
+        dx, dy, _ = subtract(after.shift_mm, before.shift_mm)
+        axis, angle = axis_and_angle(product(after.rotation, transposed(first)))
+        assert abs(axis[2]) > 0.999
+        turned_deg = angle * math.copysign(1, axis[2])
+        spread.append((turned_deg - math.degrees(math.atan2(dy, dx))) % 360)
+    # A span is twenty straight pieces of 3 degrees each.
+    assert max(spread) - min(spread) < 6
+    # An open way begins and ends along its chords.
+    assert least < sum(turn_deg(a, b) for a, b in pairwise(frames)) < most
 
 
 def test_a_tool_that_turns_right_round_turns_evenly_over_the_seam():
@@ -103,9 +120,11 @@ def test_a_tool_that_turns_right_round_turns_evenly_over_the_seam():
         for angle in (math.tau * n / 5 for n in (0, 1, 2, 3, 4, 5))
     ]
     way = smooth_course_through(cell.machine.model, tips, point=None, closed=True)
-    turns = [quaternion_turn_deg(a[3:], b[3:]) for a, b in pairwise(way.places)]
-    assert sum(turns) == pytest.approx(360, rel=0.02)
+    turns = [b[3] - a[3] for a, b in pairwise(way.places)]
+    assert sum(turns) == pytest.approx(360)
     assert max(turns) < 1.2 * min(turns)
+    # Each angle runs by itself: what no point changes stays.
+    assert all(place[4:] == pytest.approx((10, 170)) for place in way.places)
 
 
 @pytest.mark.parametrize("make", [six_axes, four_axes])
@@ -138,9 +157,8 @@ def test_a_turn_about_the_control_point_alone_is_no_way_past_it():
 @pytest.mark.parametrize(
     ("statement", "number"),
     [
-        ('Curve "c", O, 0, 4, P1, P2, P3', 2199),
+        ('Curve "c", O, 0, 4, P1, P2, P3', 4002),
         ('Curve "c", O, 0, 5, P1, P2, P3', 4002),
-        ('Curve "c", O, 2, 6, P1, P2, P3', 2199),
         ('Curve "c", O, 18, 6, P1, P2, P3', 2199),
         ('Curve "c", O, 32, 6, P1, P2, P3', 2232),
         ('Curve "c", O, 0, 6, P1, P2, P3 /F', 4001),

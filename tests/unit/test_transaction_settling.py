@@ -78,7 +78,7 @@ def test_what_is_not_finished_is_put_back(cell, controller, verify, there):
     assert finding.verdict is Verdict.NOT_FINISHED
     assert not finding.verdict.needs_a_person
     numbers = ", ".join(map(str, there))
-    assert finding.action == f"put the old value of tool {numbers} back"
+    assert finding.action == f"Put the old value of tool {numbers} back"
     why = "nobody verified it" if verify else "the change is not complete"
     assert finding.sentence.endswith(f"Written, but {why}.")
     Settler(controller).settle(finding)
@@ -118,7 +118,7 @@ def test_a_person_may_forget_a_marker_and_that_is_on_record(cell, controller):
 @pytest.mark.parametrize("tools", [None, {"one": {}}, {"1": {"before": None}}])
 def test_a_marker_that_makes_no_sense_is_left_to_a_person(cell, controller, tools):
     marker = leave_open(cell, tools=tools)
-    with pytest.raises(ConfigError, match="cannot be understood") as refused:
+    with pytest.raises(ConfigError, match="cannot be read") as refused:
         Settler(controller).examine(marker)
     assert "Compare the tools with a backup" in refused.value.remedy
 

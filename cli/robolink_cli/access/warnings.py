@@ -61,14 +61,14 @@ def marker_notice(marker: "Marker", url: str) -> str:
         return _record_missing(marker, url)
     if marker.kind is MarkerKind.CHANGE:
         return tr(
-            'Not finished since {when}: {request}.\n  This settles it: robolink -c "{url}" recover',
+            'Not finished since {when}: {request}.\n  Next: robolink -c "{url}" recover',
             when=marker.begun_at,
             request=marker.request,
             url=url,
         )
     return tr(
-        "Sent {when} without a clear answer: {request}. It may or may not have run, so motion is "
-        'blocked.\n  This settles it: robolink -c "{url}" recover',
+        "Sent {when} without a clear answer: {request}. It may or may not have run, so the "
+        'robot stays blocked.\n  Next: robolink -c "{url}" recover',
         when=marker.begun_at,
         request=marker.request,
         url=url,
@@ -138,7 +138,7 @@ def _unfinished(marker: "Marker", url: str, now: str) -> str:
             )
         )
     if now == before:
-        remedy = tr('This settles it: robolink -c "{url}" recover', url=url)
+        remedy = tr('Next: robolink -c "{url}" recover', url=url)
     else:
         remedy = tr(
             "This puts tool {tool} back, with the power mode and speed of then: "

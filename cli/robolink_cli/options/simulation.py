@@ -1,5 +1,6 @@
 """The options that every command has that serves a simulated controller."""
 
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import wraps
@@ -8,14 +9,44 @@ from typing import Any, Final, TypeVar, cast
 
 import click
 
+from robolink.messages import declared, tr
+from robolink_cli.console.help_sections import HelpSection
+from robolink_cli.console.render import note
+
 DEFAULT_ADDRESS: Final = "127.0.0.1:5020"
 """Where Modbus TCP is served when no bus is named."""
+
+SECTIONS: Final[tuple[HelpSection, ...]] = (
+    (
+        declared("Where it is served"),
+        frozenset({"--tcp", "--serial", "--baud", "--can", "--unit", "--node", "--allow-remote"}),
+    ),
+    (
+        declared("What is simulated"),
+        frozenset(
+            {
+                *("--robot", "--kinematics", "--param", "--map", "--seed", "--state", "--speed"),
+                "--exchange",
+                *("--option", "--profile", "--world", "--password-env", "--replay", "--faults"),
+            }
+        ),
+    ),
+    (
+        declared("Programs of the controller"),
+        frozenset({"--program", "--points", "--vision", "--com", "--files"}),
+    ),
+    (
+        declared("How it is controlled, and when it ends"),
+        frozenset({"--control", "--with-parent", "--idle-exit"}),
+    ),
+)
+"""The same headings on the help page of every simulator."""
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
 def simulation_options(function: F) -> F:
-    """Add ``--seed``, ``--state``, ``--speed``, ``--option``, ``--allow-remote``, ``--faults``,
+    """Add ``--seed``, ``--state``, the pace, ``--option``, ``--allow-remote``, ``--faults``,
     ``--world``.
     """  # noqa: D205 - one sentence over two lines
     options = (
@@ -25,14 +56,7 @@ def simulation_options(function: F) -> F:
             type=click.Path(dir_okay=False, path_type=Path),
             help="File that keeps the tools over a restart, as flash or retained memory does.",
         ),
-        click.option(
-            "--speed",
-            type=click.FloatRange(min=0.01, max=1000),
-            default=1.0,
-            show_default=True,
-            metavar="FACTOR",
-            help="How many times faster than real the simulated time passes.",
-        ),
+        pace_options,
         click.option(
             "--option",
             "options",
@@ -63,11 +87,13 @@ class ServedLife:
         control: Where its control API listens, HOST:PORT.
         with_parent: Whether it ends when the process that started it has ended.
         idle_exit_s: After how many seconds without a request it ends; ``None`` for never.
+        parent: The process meant by ``with_parent``; ``None`` for the one that started it.
     """
 
     control: str
     with_parent: bool
     idle_exit_s: float | None
+    parent: int | None = None
 
 
 def life_options(function: F) -> F:
@@ -103,19 +129,65 @@ def life_options(function: F) -> F:
     return cast("F", command)
 
 
-def modbus_options(function: F) -> F:
-    """Add ``--modbus-tcp`` and ``--modbus-rtu``."""
-    function = click.option(
-        "--modbus-rtu",
-        type=click.Choice(["pty"]),
-        help="Serve Modbus RTU on a pseudo terminal, whose path is printed.",
-    )(function)
+def tcp_option(default: str | None, help_text: str) -> Callable[[F], F]:
+    """Return what adds ``--tcp``: the network address of a simulated controller.
+
+    Args:
+        default: Where it listens when nothing is said, ``None`` where other buses may be meant.
+        help_text: What is served there.
+    """
     return click.option(
-        "--modbus-tcp",
+        "--tcp",
+        "address",
         metavar="HOST:PORT",
-        help="Serve Modbus TCP there; port 0 takes a free one. Without any bus: "
-        f"{DEFAULT_ADDRESS}.",
-    )(function)
+        default=default,
+        show_default=default is not None,
+        help=help_text,
+    )
+
+
+def serial_option(help_text: str) -> Callable[[F], F]:
+    """Return what adds ``--serial``: the serial line of a simulated controller."""
+    return click.option("--serial", type=click.Choice(["pty"]), help=help_text)
+
+
+def modbus_options(function: F) -> F:
+    """Add ``--tcp`` and ``--serial`` of a PLC, and the names that they had."""
+
+    @wraps(function)
+    def merged(*, modbus_tcp: str | None, modbus_rtu: str | None, **given: Any) -> Any:  # noqa: ANN401 - whatever the command takes
+        given["address"] = _renamed("--modbus-tcp", modbus_tcp, "--tcp", given["address"])
+        given["serial"] = _renamed("--modbus-rtu", modbus_rtu, "--serial", given["serial"])
+        return function(**given)
+
+    options = (
+        tcp_option(
+            None,
+            declared(
+                "Serve Modbus TCP there; port 0 takes a free one. Without any bus: 127.0.0.1:5020."
+            ),
+        ),
+        serial_option(declared("Serve Modbus RTU on a pseudo terminal, whose path is printed.")),
+        click.option("--modbus-tcp", hidden=True),
+        click.option("--modbus-rtu", type=click.Choice(["pty"]), hidden=True),
+    )
+    command: Any = merged
+    for option in reversed(options):
+        command = option(command)
+    return cast("F", command)
+
+
+def _renamed(before: str, old: str | None, now: str, new: str | None) -> str | None:
+    """Return what was given by either name; say on a terminal which one it has now."""
+    if old is None:
+        return new
+    if new is not None:
+        raise click.UsageError(
+            tr("{old} is now called {new}: give one of them.", old=before, new=now)
+        )
+    if sys.stderr.isatty():
+        note(tr("{old} is now called {new}.", old=before, new=now))
+    return old
 
 
 def seed_option(function: F) -> F:
@@ -126,6 +198,26 @@ def seed_option(function: F) -> F:
         default=1,
         show_default=True,
         help="Another cell: other tools, another tip.",
+    )(function)
+
+
+def pace_options(function: F) -> F:
+    """Add ``--speed`` and ``--exchange``."""
+    function = click.option(
+        "--exchange",
+        type=click.FloatRange(min=0, max=10),
+        metavar="SECONDS",
+        show_default="0; 0.05 at speed 0",
+        help="How much simulated time each request takes besides.",
+    )(function)
+    return click.option(
+        "--speed",
+        type=click.FloatRange(min=0, max=1000),
+        default=1.0,
+        show_default=True,
+        metavar="FACTOR",
+        help="How many times faster than real the simulated time passes. At 0 it passes with "
+        "requests and steps of the control API alone.",
     )(function)
 
 

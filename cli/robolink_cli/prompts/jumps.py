@@ -128,7 +128,7 @@ def _ask(tool: int, jump: "Jump", allowed: Allowed) -> None:
                 "terminal, or with --accept-jump and --accept-turn."
             ),
         )
-    if not asked(tr("{figure} Are sign and unit right, and is it to be written?", figure=figure)):
+    if not asked(tr("{figure} Are sign and unit right? Write it?", figure=figure)):
         raise DeclinedError(tr("That was not y."), remedy=tr("Nothing was written."))
 
 

@@ -77,12 +77,12 @@ class TerminalOperator:
 def _how(kind: Question) -> str:
     """Return how a question is answered."""
     if kind is Question.PLACE:
-        return tr("Steps: x+0.1 z-0.5. ENTER when it is on the pin. To end: q.")
+        return tr("Steps: x+0.1 z-0.5. Enter when it is on the pin. To end: q.")
     if kind is Question.TEXT:
-        return tr("Type or scan it, then ENTER. To end: q.")
+        return tr("Type or scan it, then Enter. To end: q.")
     if kind is Question.YES_NO:
         return tr("y or n")
-    return tr("Steps: x+5 z-0.5. ENTER when it is there. To end: q.")
+    return tr("Steps: x+5 z-0.5. Enter when it is there. To end: q.")
 
 
 def terminal() -> Operator:
@@ -214,7 +214,7 @@ class AssistedOperator:
         if self._kind is Question.TEXT:
             return tr("simulated")
         if self._stays:
-            self._show(tr("  operator: presses ENTER, without a look"))
+            self._show(tr("  operator: presses Enter, without a look"))
             return ""
         steps, arrived = self._ahead.pop(0) if self._ahead else "", tr("there")
         if self._kind is Question.PLACE:

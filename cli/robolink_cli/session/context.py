@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from robolink.errors import ConfigError
-from robolink.messages import tr
 from robolink_cli.access.cell import (
     is_cell_name,
     link_options,
 )
+from robolink_cli.access.only_cell import nothing_named, only_cell, which_cell
 from robolink_cli.console.render import emit_json, json_is_on, note, say
+from robolink_cli.console.tolerance import may_be_guided
 from robolink_cli.options.shared import GIVEN, shared_options
 from robolink_cli.options.shared import json_option as json_option
 from robolink_cli.options.shared import origin_of as origin_of
@@ -66,16 +67,10 @@ class CliContext(NamedTuple):
         """Return the URL.
 
         Raises:
-            ConfigError: None was given.
+            ConfigError: None was given, and no only cell was taken.
         """
         if self.url is None:
-            raise ConfigError(
-                tr("No controller is named."),
-                remedy=tr(
-                    "Give -c CELL from a cell file, or -c URL, for example "
-                    "-c epson+tcp://192.168.0.1:5000, or set ROBOLINK_CONTROLLER."
-                ),
-            )
+            raise nothing_named()
         return self.url
 
     @property
@@ -127,8 +122,19 @@ def stop_request() -> StopRequest:
 def controller_options(command: Callable[..., int | None]) -> Callable[..., int | None]:
     """Add the same options to a command, and pass it a :class:`CliContext` first.
 
-    What the command returns becomes the exit code.
+    Where no cell is named, the only one is taken (:func:`_with_only_cell`). What the command
+    returns becomes the exit code.
     """
+
+    @wraps(command)
+    def with_context(*args: object, **kwargs: object) -> int | None:
+        return command(_context_from(_with_only_cell(kwargs)), *args, **kwargs)
+
+    return shared_options(with_context)
+
+
+def optional_controller(command: Callable[..., int | None]) -> Callable[..., int | None]:
+    """As :func:`controller_options`, for a command that means something without a controller."""
 
     @wraps(command)
     def with_context(*args: object, **kwargs: object) -> int | None:
@@ -147,8 +153,7 @@ def calming_options(command: Callable[..., int | None]) -> Callable[..., int | N
 
     @wraps(command)
     def with_context(*args: object, **kwargs: object) -> int | None:
-        given = click.get_current_context().meta.get(GIVEN, {})
-        return command(_calming_context_from(given), *args, **kwargs)
+        return command(_calming_context_from(_with_only_cell(kwargs)), *args, **kwargs)
 
     return shared_options(with_context)
 
@@ -161,8 +166,7 @@ def looking_options(command: Callable[..., int | None]) -> Callable[..., int | N
 
     @wraps(command)
     def with_context(*args: object, **kwargs: object) -> int | None:
-        given = click.get_current_context().meta.get(GIVEN, {})
-        return command(_looking_context_from(given), *args, **kwargs)
+        return command(_looking_context_from(_with_only_cell(kwargs)), *args, **kwargs)
 
     return shared_options(with_context)
 
@@ -178,6 +182,26 @@ def context_of_cell(name: str) -> CliContext:
     """
     given = click.get_current_context().meta.get(GIVEN, {})
     return _context_from({**given, "url": name})
+
+
+def _with_only_cell(options: Mapping[str, object]) -> Mapping[str, Any]:
+    """Return what stands beside the command, with the only cell where none is named.
+
+    The cell that is taken is said first. A command that may move or write takes none where
+    nobody is asked before: off a terminal, and with ``--yes``.
+
+    Args:
+        options: The command's own.
+    """
+    given: Mapping[str, Any] = click.get_current_context().meta.get(GIVEN, {})
+    changes = "yes" in options and not options.get("dry_run")
+    if given.get("url") is not None or (changes and (options["yes"] or not may_be_guided())):
+        return given
+    name = only_cell()
+    if not name:
+        return given
+    note(which_cell(name))
+    return {**given, "url": name}
 
 
 def _context_from(given: Mapping[str, Any]) -> CliContext:

@@ -234,6 +234,6 @@ def _offer_to_restore(controller: "Controller", markers: "Iterable[Marker]") -> 
             continue
         with suppress(ControllerError):
             finding = controller.resolver.examine(marker)
-            if finding.action and asked(tr("Do it now: {action}?", action=finding.action)):
+            if finding.action and asked(tr("{action}. Do that now?", action=finding.action)):
                 controller.resolver.settle(finding)
                 note(tr("Done, and read back."))

@@ -66,9 +66,8 @@ def heed_selection(controller: "Controller", cell: "Expected | None", *, yes: bo
     if not doubt:
         return
     remedy = tr(
-        "Somebody else may have left it so: another program, or another computer. Select the "
-        "right one with 'robolink tool select N'; the key 'tool' of the cell file says which "
-        "it is. Nothing moved."
+        "Nothing moved. Another program or computer may have left it so. Select the right "
+        "one: 'robolink tool select N'; the key 'tool' of the cell file says which it is."
     )
     if yes or json_is_on() or not on_terminal():
         raise DeclinedError(doubt, remedy=remedy)

@@ -107,17 +107,19 @@ def url_of(request: "StopRequest") -> str:
         ConfigError: No controller is named, or no cell file has it.
     """
     from robolink_cli.access.cell import is_cell_name
+    from robolink_cli.access.only_cell import nothing_named, only_cell, which_cell
 
-    if not request.named:
-        raise ConfigError(
-            tr("No controller is named."),
-            remedy=tr("Give -c CELL from a cell file, or -c URL."),
-        )
-    if not is_cell_name(request.named):
-        return request.named
+    named = request.named
+    if not named:
+        named = only_cell()
+        if not named:
+            raise nothing_named()
+        note(which_cell(named))
+    if not is_cell_name(named):
+        return named
     from robolink.config import reach_cell
 
-    return reach_cell(request.named).url
+    return reach_cell(named).url
 
 
 def _clear(keys: frozenset[str], name: str) -> None:

@@ -6,6 +6,7 @@ from robolink.errors import JournalError, LeaseHeldError, RobolinkError
 from robolink.messages import tr
 from robolink.stopping import leave_note
 from robolink.transport import parse_url
+from robolink_cli.access.only_cell import which_cell
 from robolink_cli.stopping.request import StopRequest
 from robolink_cli.stopping.stop_first import StopOutcome, is_beside_another, who_asks
 
@@ -21,6 +22,7 @@ class Telling:
     def __init__(self, request: StopRequest, outcome: StopOutcome) -> None:
         self._request = request
         self._outcome = outcome
+        self._named = request.named or outcome.only
 
     def payload(self) -> dict[str, object]:
         """Return what the document of a stop that ended well holds."""
@@ -38,23 +40,27 @@ class Telling:
         named, state = _shown(outcome.url), outcome.state
         if outcome.holder:
             return tr(
-                "{controller} stands; its state is: {state}. {holder} had it, and stopped.",
+                "{controller} stands still; its state is: {state}. {holder} was working on "
+                "it, and stopped it.",
                 controller=named,
                 state=state,
                 holder=outcome.holder,
             )
-        return tr("{controller} stands; its state is: {state}.", controller=named, state=state)
+        return tr(
+            "{controller} stands still; its state is: {state}.", controller=named, state=state
+        )
 
     def remarks(self) -> list[str]:
         """Leave the note, look at what was not looked at before, and return what is to be said."""
         outcome = self._outcome
         told = [*outcome.doubts]
+        taken = [which_cell(outcome.only)] if outcome.only else []
         if outcome.may_stand and outcome.keys:
             told += self._noted()
         told += self._recorded()
         told += self._journal()
         if told and outcome.error is None:
-            told.append(tr("None of this kept the stop back."))
+            told.append(tr("The stop went out all the same."))
         if outcome.error is None:
             told.append(
                 tr(
@@ -62,7 +68,7 @@ class Telling:
                     "'robolink robot release'."
                 )
             )
-        return told
+        return [*taken, *told]
 
     def explain_the_holder(self) -> None:
         """Add to the error of a login that is taken who has it, as far as the record knows."""
@@ -143,9 +149,9 @@ class Telling:
             return [error.what]
         from robolink_cli.access.warnings import marker_notice, note_at_work
 
-        if open_now and note_at_work(log, self._request.named):
+        if open_now and note_at_work(log, self._named):
             return []
-        return [marker_notice(marker, self._request.named) for marker in open_now]
+        return [marker_notice(marker, self._named) for marker in open_now]
 
 
 def _shown(url: str) -> str:

@@ -42,6 +42,7 @@ class StopOutcome:
         controller: Which controller it is, as it said itself once it stood; empty where it
             did not.
         doubts: What was wrong on the way, and did not keep the stop back.
+        only: The cell that was taken because it is the only one; empty where one was named.
         heard: What went over the connection: time, direction, bytes; without the login.
     """
 
@@ -52,6 +53,7 @@ class StopOutcome:
     keys: frozenset[str] = frozenset()
     controller: str = ""
     doubts: list[str] = field(default_factory=list)
+    only: str = ""
     heard: "list[tuple[int, Direction, bytes]]" = field(default_factory=list)
 
     @property
@@ -91,19 +93,18 @@ def who_asks(request: StopRequest) -> str:
 def _stop(request: StopRequest, outcome: StopOutcome) -> None:
     password_file = request.password_file or os.environ.get("ROBOLINK_PASSWORD_FILE", "")
     password_env = ""
-    if not request.named:
-        raise ConfigError(
-            tr("No controller is named."),
-            remedy=tr(
-                "Give -c CELL from a cell file, or -c URL, for example "
-                "-c epson+tcp://192.168.0.1:5000, or set ROBOLINK_CONTROLLER."
-            ),
-        )
-    outcome.url = request.named
-    if "+" not in request.named and "://" not in request.named:
+    named = request.named
+    if not named:
+        from robolink_cli.access.only_cell import nothing_named, only_cell
+
+        named = outcome.only = only_cell()
+        if not named:
+            raise nothing_named()
+    outcome.url = named
+    if "+" not in named and "://" not in named:
         from robolink.config import reach_cell
 
-        reach = reach_cell(request.named)
+        reach = reach_cell(named)
         outcome.url, password_env = reach.url, reach.password_env
         password_file = password_file or reach.password_file
         outcome.doubts += [reach.doubt] if reach.doubt else []

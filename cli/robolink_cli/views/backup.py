@@ -44,7 +44,7 @@ def show_backup(backup: Backup, file: Path) -> None:
         )
     )
     if backup.state.selected is not None:
-        say(tr("Tool {selected} is in force.", selected=backup.state.selected))
+        say(tr("Tool {tool} is selected.", tool=backup.state.selected))
 
 
 def comparison_payload(comparison: Comparison, tolerance: ComparisonTolerance) -> dict[str, object]:
@@ -80,7 +80,7 @@ def show_comparison(comparison: Comparison, tolerance: ComparisonTolerance, iden
     if not comparison.same_selection:
         say(
             tr(
-                "  tool in force: {expected} in the file, {found} on the controller",
+                "  selected tool: {expected} in the file, {found} on the controller",
                 expected=comparison.expected_selected,
                 found=comparison.found_selected,
             )

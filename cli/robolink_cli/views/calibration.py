@@ -41,7 +41,7 @@ def show_verdicts(verdicts: Sequence[LimitVerdict]) -> None:
         mark = tr("ok") if verdict.passed else tr("too much")
         say(
             tr(
-                "  {name} {found:.3f} mm, {limit:.3f} mm allowed: {mark}",
+                "  {name}: {found:.3f} mm, limit {limit:.3f} mm: {mark}",
                 name=verdict.name,
                 found=verdict.found_mm,
                 limit=verdict.limit_mm,
@@ -56,11 +56,11 @@ def show_report(report: ToolReport) -> None:
     if receipt is None:
         return
     if receipt.skipped:
-        say(tr("Tool {tool} held this value already; nothing was written.", tool=tool))
+        say(tr("Tool {tool} has this value already. Nothing was written.", tool=tool))
     else:
         say(tr("Tool {tool} is written and read back.", tool=tool))
     if report.verification is None:
-        say(tr("It was not verified."))
+        say(tr("Not tested yet."))
         return
     for drift in report.verification.drifts:
         say(

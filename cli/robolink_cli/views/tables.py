@@ -37,14 +37,14 @@ def _show_epson(payload: Mapping[str, object]) -> None:
     if payload["selected_tool"] is not None:
         say(
             tr(
-                "  tool in force: {tool}; motors {motors}, power {power}",
+                "  tool {tool} selected; motors {motors}, power {power}",
                 tool=payload["selected_tool"],
                 motors=tr("on") if payload["motors_on"] else tr("off"),
                 power=payload["power"],
             )
         )
     elif payload["published_selected_tool"] is not None:
-        say(tr("  tool in force, as published: {tool}", tool=payload["published_selected_tool"]))
+        say(tr("  selected tool, as published: {tool}", tool=payload["published_selected_tool"]))
 
 
 def _show_preferences(told: object) -> None:
@@ -84,7 +84,7 @@ def show_tools(tools: Mapping[str, Mapping[str, object] | None], selected: int |
             mark = "*" if int(tool) == selected else " "
             rows.append([f"{mark}{tool}", *offset_cells(offset)])
     if rows:
-        table(tr("tools (* in force)"), (tr("tool"), *AXES), rows)
+        table(tr("tools (* selected)"), (tr("tool"), *AXES), rows)
     odd = [tool for tool, offset in tools.items() if offset is not None and _of_no_tool(offset)]
     if odd:
         say(tr("  holding the values of no tool: {tools}", tools=", ".join(odd)))

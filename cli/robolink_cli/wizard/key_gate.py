@@ -51,9 +51,15 @@ class KeyGate:
         self._last: tuple[str, float] | None = None
         self._burst_s: float | None = None
 
-    def press(self, key: str, at_s: float) -> list[str]:
-        """Take a key; return those that count by now, in their order."""
-        if key in AT_ONCE:
+    def press(self, key: str, at_s: float, *, stops: bool = False) -> list[str]:
+        """Take a key; return those that count by now, in their order.
+
+        Args:
+            key: The key.
+            at_s: When it came.
+            stops: Whether it stops where the person is now, and so never waits either.
+        """
+        if stops or key in AT_ONCE:
             self._held, self._burst_s = None, None
             self._last = (key, at_s)
             return [key]

@@ -76,7 +76,7 @@ class Handshake:
             raise RejectedError(
                 tr("The PLC refused the new value: {error}.", error=self._error_text(code)),
                 code=code,
-                remedy=tr("The old value stays in force. Remove the cause, then try again."),
+                remedy=tr("The old value stays. Remove the cause, then try again."),
                 controller=registers.identity,
                 request=request,
             )

@@ -173,7 +173,7 @@ def _state(now: Response) -> Iterator[MailboxFinding]:
     powered = tr("with power") if now.bits & Bits.POWERED else tr("without power")
     state = states.get(now.group_state, str(int(now.group_state)))
     yield MailboxFinding(tr("axis group"), f"{state}, {powered}")
-    yield MailboxFinding(tr("tool in force"), str(now.tool_slot) if now.tool_slot else tr("none"))
+    yield MailboxFinding(tr("selected tool"), str(now.tool_slot) if now.tool_slot else tr("none"))
     damaged = now.rejected == 0
     yield MailboxFinding(
         tr("damaged command blocks"),

@@ -104,11 +104,11 @@ class CrossingSolver:
             raise CalibrationError(
                 "bent_needle",
                 tr(
-                    "The needle leans by {lean:.1f} degrees; {limit:.1f} are allowed.",
+                    "The needle leans by {lean:.1f} degrees, limit {limit:.1f}.",
                     lean=lean_deg,
                     limit=max_lean_deg,
                 ),
-                remedy=tr("Change it, and look whether it is seated straight."),
+                remedy=tr("Change it, and check that the new one is straight and tight."),
             )
 
     def _height(self, tip: ToolOffset, deeper_mm: float) -> TipHeight:

@@ -37,10 +37,7 @@ class BeamsSource(InputSource[BeamsParameters]):
     @property
     def remedy(self) -> str:
         """What to do when a measurement makes the tip jump."""
-        return tr(
-            "Look whether the beams were moved since the reference record, and whether the "
-            "needle sits straight."
-        )
+        return tr("Were the beams moved since the reference was taken, or does the needle lean?")
 
     def _steps(
         self, stored: ToolOffset | None, here: Pose, plan: BeamsParameters

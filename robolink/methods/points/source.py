@@ -39,7 +39,7 @@ def taught_poses(points: PointReader, numbers: Sequence[int]) -> tuple[Pose, ...
         raise CalibrationError(
             "undefined_point",
             tr("Not taught on this controller: {points}.", points=", ".join(missing)),
-            remedy=tr("Teach them on the pendant, on the robot that is in force."),
+            remedy=tr("Teach them on the pendant, on the selected robot."),
         )
     return tuple(pose for pose in found.values() if pose is not None)
 

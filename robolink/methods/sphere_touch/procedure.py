@@ -66,7 +66,7 @@ def measure_sphere_touch(
     possible = reachable(drive, centre, radius_mm, tilts, survey)
     spots, columns = informative_spots(drive, uprights, possible, survey, stored, centre)
     for number in range(UPRIGHTS, survey.count):
-        yield Notify(tr("Touch {number} of {count}.", number=number + 1, count=survey.count))
+        yield Notify(tr("Touch {k} of {n}", k=number + 1, n=survey.count))
         yield from drive.touch(spots[number], key=number, columns=columns[: number + 1])
     yield from drive.to(UPRIGHT)
     return _solved(touches, stored, sigma_mm)

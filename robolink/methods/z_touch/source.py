@@ -39,7 +39,7 @@ class ZTouchSource(InputSource[ZTouchParameters]):
     @property
     def remedy(self) -> str:
         """What to do when a measurement makes the tip jump."""
-        return tr("Clean the tip and the surface, and look whether the nozzle sits firmly.")
+        return tr("Clean tip and surface, and check that the nozzle is tight.")
 
     def measure(
         self, context: MeasurementContext, tool: int, stored: ToolOffset | None

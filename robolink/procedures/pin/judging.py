@@ -94,16 +94,16 @@ def witnessed_by(touch: TouchedAt) -> "WitnessedTouch":
 def _refusal(code: str, range_mm: float | None, residual_mm: float | None) -> CalibrationError:
     whats = {
         "touch_heights_differ": tr(
-            "Heights differ by {range:.2f} mm on one pin: at least one touch was in the air.",
-            range=range_mm or 0.0,
+            "Heights differ by {spread:.2f} mm on one pin: at least one touch was in the air.",
+            spread=range_mm or 0.0,
         ),
         "touch_not_proven": tr(
-            "The distances at which the robot stopped beside the pin were not jogged away: the tip "
-            "was not brought onto the pin each time."
+            "At least one touch was not made: the tip stayed where the robot had stopped "
+            "beside the pin."
         ),
         "large_residual": tr(
-            "One touch is {residual:.3f} mm from where the others say: the tip was not on the "
-            "pin, or the pin moved.",
+            "One touch is {residual:.3f} mm off the others: the tip was not on the pin, or "
+            "the pin moved.",
             residual=residual_mm or 0.0,
         ),
     }
@@ -111,7 +111,7 @@ def _refusal(code: str, range_mm: float | None, residual_mm: float | None) -> Ca
         code,
         whats.get(code, tr("A touch was not made.")),
         remedy=tr(
-            "Nothing was written. Look whether the pin is fast, and measure again, each time until "
-            "the tip is on it."
+            "Nothing was written. Check that the pin is tight and measure again, each time "
+            "until the tip is on it."
         ),
     )

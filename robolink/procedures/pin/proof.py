@@ -107,7 +107,7 @@ class _Turning:
             place,
             key=self._count,
             turning=tr("Turning about the new tip."),
-            instruction=tr("Jog the tip onto the pin again: that shows how far it was off."),
+            instruction=tr("Jog the tip onto the pin again. We measure how far it was off."),
         )
         self._count += 1
         return place, found
@@ -185,8 +185,8 @@ class DriftProof:
     def told(self, drift: Drift) -> str:
         """Return why it is touched again."""
         return tr(
-            "At U {u:.1f} the tip drifts {drift:.3f} mm: too near to {limit:.3f} mm to decide. "
-            "It is touched once more there, and the mean counts.",
+            "At U {u:.1f} the tip is {drift:.3f} mm off, too near to the limit of "
+            "{limit:.3f} mm. Touch it once more there; the mean counts.",
             u=drift.u_deg,
             drift=drift.distance_mm,
             limit=self.tolerance_mm,

@@ -70,7 +70,7 @@ def read_answer(frame: SerialFrame, dialect: Dialect) -> Reply | Refusal:
         raise _no_answer(
             frame,
             tr("The check sum of an answer is wrong."),
-            tr("Check the cable and its shield, and the port's settings, then connect again."),
+            tr("Check the cable and its shield, and the port's settings, then try again."),
         )
     letter = BY_BYTE.get(frame.letter)
     if frame.first == NAK:

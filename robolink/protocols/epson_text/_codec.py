@@ -144,7 +144,7 @@ class EpsonCodec(ABC):
         if held := self._arrived.held:
             raise RemoteProtocolError(
                 tr("The connection ended inside a message."),
-                remedy=tr("Check the cable and the controller's power, then connect again."),
+                remedy=tr("Check cable and power of the controller, then try again."),
                 raw=held,
             )
         return EndOfStream()

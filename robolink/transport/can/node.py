@@ -171,7 +171,7 @@ class NodeWatch:
                     period_s=self._period_s,
                     silent_s=self._silent_s(),
                 ),
-                remedy=tr("Check the PLC's power and state and the cable, then connect again."),
+                remedy=tr("Check cable, power and state of the PLC, then try again."),
                 controller=self._identity,
             )
 

@@ -54,7 +54,8 @@ def unanswered(identity: str, request: ModbusRequest, held: bytes) -> TransportT
     return TransportTimeoutError(
         what,
         remedy=tr(
-            "Check the PLC, the cable, the baud rate and the unit ({unit}), then connect again.",
+            "Check cable and power of the PLC, the baud rate and the unit ({unit}), then try "
+            "again.",
             unit=request.unit,
         ),
         controller=identity,

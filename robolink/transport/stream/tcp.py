@@ -177,7 +177,7 @@ class TcpTransport:
     def _timed_out(self) -> TransportTimeoutError:
         return TransportTimeoutError(
             tr("{identity} did not answer in time.", identity=self._identity),
-            remedy=tr("Check the controller and the cable, then connect again."),
+            remedy=tr("Check cable and power of the controller, then try again."),
             controller=self._identity,
         )
 
@@ -194,7 +194,7 @@ class TcpTransport:
                 identity=self._identity,
                 cause=error.strerror or error,
             ),
-            remedy=tr("Check the controller's power and the cable, then connect again."),
+            remedy=tr("Check cable and power of the controller, then try again."),
             controller=self._identity,
         )
 

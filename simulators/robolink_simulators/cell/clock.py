@@ -12,6 +12,10 @@ _LOOK_S: Final = 0.05
 
 _PAUSED_S: Final = 86_400.0
 
+EXCHANGE_S: Final = 0.05
+"""What a request takes where time does not pass by itself, and in tests: who asks how far a
+movement is need not wait for it."""
+
 
 class ManualClock:
     """A clock that stands still until someone waits on it or advances it. Thread-safe.
@@ -54,6 +58,14 @@ class ManualClock:
         with self._lock:
             self._now_ns = max(self._now_ns, now_ns)
 
+    def wire_at(self, now_ns: int) -> int:
+        """See :class:`~robolink_simulators.device.wire_time.WireClock`: clients wait by it, too."""
+        return now_ns
+
+    def simulated_at(self, wire_ns: int) -> int:
+        """See :meth:`wire_at`."""
+        return wire_ns
+
 
 class ScaledClock:
     """Simulated time that runs ``factor`` times as fast as another clock.
@@ -75,6 +87,7 @@ class ScaledClock:
         self._factor = factor
         self._base = base or SystemClock()
         self._origin_ns = self._base.now_ns()
+        self._hastened = factor > 1
 
     def exchanged(self) -> None:
         """Be told that a request has come in; time goes on all the same."""
@@ -95,6 +108,30 @@ class ScaledClock:
     def really_takes_s(self, seconds: float) -> float:
         """Return how many seconds of the base clock so many simulated ones are."""
         return seconds / self._factor
+
+    def wire_at(self, now_ns: int) -> int:
+        """Return the time on the wire, which is never hastened, at a simulated instant, in ns.
+
+        See :class:`~robolink_simulators.device.wire_time.WireClock`. Right for an instant since
+        the pace was changed last.
+        """
+        if not self._hastened:
+            return now_ns
+        wire_ns, there_ns = self._both_now()
+        return wire_ns + int((now_ns - there_ns) / max(1.0, self._factor))
+
+    def simulated_at(self, wire_ns: int) -> int:
+        """Return the simulated instant of a time on the wire, as things are; see above."""
+        if not self._hastened:
+            return wire_ns
+        passed_ns, there_ns = self._both_now()
+        return there_ns + int((wire_ns - passed_ns) * max(1.0, self._factor))
+
+    def _both_now(self) -> tuple[int, int]:
+        """Return the time on the wire and the simulated time, both of this instant."""
+        now_ns = self.now_ns()
+        passed_ns = (now_ns - self._origin_ns) / max(1.0, self._factor)
+        return self._origin_ns + int(passed_ns), now_ns
 
 
 class SteeredClock(ScaledClock):
@@ -122,7 +159,7 @@ class SteeredClock(ScaledClock):
             )
         self._exchange_s = exchange_s
         self._lock = threading.Lock()
-        self._since_ns = self._held_ns = self._origin_ns
+        self._since_ns = self._held_ns = self._wire_ns = self._origin_ns
         self.run(factor)
 
     @property
@@ -143,13 +180,15 @@ class SteeredClock(ScaledClock):
             )
         with self._lock:
             base_ns = self._base.now_ns()
-            self._held_ns, self._since_ns = self._at(base_ns), base_ns
-            self._factor = factor
+            self._wire_ns, self._held_ns = self._on_wire(base_ns), self._at(base_ns)
+            self._since_ns, self._factor = base_ns, factor
+            self._hastened |= factor > 1
 
     def advance(self, seconds: float) -> None:
         """Let so many simulated seconds pass at once."""
         with self._lock:
             self._held_ns += round(max(0.0, seconds) * NS_PER_S)
+            self._hastened = True
 
     def exchanged(self) -> None:
         """Let pass what a request takes."""
@@ -178,3 +217,11 @@ class SteeredClock(ScaledClock):
 
     def _at(self, base_ns: int) -> int:
         return self._held_ns + int((base_ns - self._since_ns) * self._factor)
+
+    def _on_wire(self, base_ns: int) -> int:
+        return self._wire_ns + int((base_ns - self._since_ns) * min(1.0, self._factor))
+
+    def _both_now(self) -> tuple[int, int]:
+        with self._lock:
+            base_ns = self._base.now_ns()
+            return self._on_wire(base_ns), self._at(base_ns)

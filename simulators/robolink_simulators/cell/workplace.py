@@ -17,6 +17,7 @@ from robolink_simulators.cell.camera import CameraTruth, Pixel
 from robolink_simulators.cell.held_board import SimulatedBoard
 from robolink_simulators.cell.places import Axis, Direction, axis_of
 from robolink_simulators.cell.places import XyzMm as XyzMm
+from robolink_simulators.cell.pressing import resistance_n
 from robolink_simulators.cell.surfaces import FlatPlate, RoundBall, Surface, SurfaceContact
 from robolink_simulators.cell.tip_switches import (
     STANDING,
@@ -26,6 +27,7 @@ from robolink_simulators.cell.tip_switches import (
     TipSwitch,
 )
 from robolink_simulators.cell.world_parameters import WorldParameters
+from robolink_simulators.device.late_random import late_random
 
 MOUNTED_TOOL: Final = 1
 """The tool number of the nozzle on the arm."""
@@ -95,7 +97,7 @@ class Workplace(ABC):
         self.leans: dict[int, Lean] = {}
         self.board: SimulatedBoard | None = None
         self._seed = seed
-        self._random = random.Random(f"nozzles {seed}")
+        self._random = late_random(f"nozzles {seed}")
         self._replaced = replaced
         self.parameters = WorldParameters()
         rng = random.Random(f"camera {seed}")
@@ -195,6 +197,10 @@ class Workplace(ABC):
 
         return SurfaceContact(touched)
 
+    def resistance_n(self, tip_mm: XyzMm) -> XyzMm:
+        """Return the force, N, of what is touched on a tip at a place; see :mod:`pressing`."""
+        return resistance_n(tip_mm, self.pin_mm, self.parameters.pin_radius_mm, self.surface)
+
     def lean_of(self, tool: int) -> Lean:
         """Return by how much a nozzle is bent, in the flange's axes."""
         return self.leans.get(tool, UPRIGHT)
@@ -224,6 +230,10 @@ class Workplace(ABC):
         toward = math.radians(2 * self.robot.flange().u_deg + self.parameters.wobble_toward_deg)
         wobble_mm = self.parameters.wobble_mm
         return x_mm + wobble_mm * math.cos(toward), y_mm + wobble_mm * math.sin(toward), z_mm
+
+    def told_flange(self) -> Pose:
+        """Return where the flange is by what the controller tells of it."""
+        return self.robot.flange()
 
     def axis(self, axis: Axis, tool: int = MOUNTED_TOOL) -> Direction:
         """Return how an axis of a physical tool lies in the base now."""

@@ -11,6 +11,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_simulators.device.motion_log import StartedMotion
 from robolink_simulators.device.wire_record import WireRecord
+from robolink_simulators.device.wire_time import WireClock, WireTime
 
 RequestHook = Callable[[int, str], None]
 """Called with the running number of a request and a text, passwords hidden."""
@@ -47,7 +48,8 @@ class HostedDevice(ABC):
             host, and the request is carried out all the same.
         on_reply: Called with the answer before it leaves; it leaves all the same.
         watchers: Called after each act past the wire, so that a host looks for what leaves now.
-        present_ns: Tells such acts the time, in place of the instant given last; a host sets it.
+        present_ns: Tells such acts the time, in place of the instant given last.
+        wire_time: By which it counts how long a client is silent.
         durable: Whether what it keeps outlives the process.
         kind: ``epson``, ``softmotion`` or ``plc``.
     """
@@ -59,6 +61,7 @@ class HostedDevice(ABC):
         self.url, self.seed = "", seed
         self.watchers: list[Callable[[], None]] = []
         self.present_ns: Callable[[], int] | None = None
+        self.wire_time = WireTime()
         self.exchanges = 0
         self.log = WireRecord()
         self.on_request: RequestHook | None = None
@@ -72,6 +75,10 @@ class HostedDevice(ABC):
     def now_ns(self) -> int:
         """The instant last given."""
         return self._now_ns
+
+    def keep_time(self, clock: WireClock) -> None:
+        """Take the present time from a clock; whoever hosts it says so."""
+        self.present_ns, self.wire_time.clock = clock.now_ns, clock
 
     @contextmanager
     def acting(self) -> Iterator[int]:

@@ -52,7 +52,7 @@ class Flash:
                 other.tools.restore(tools)
             for one, kept in zip(self._machine.robots, state.get("kept", ()), strict=False):
                 one.kept.restore(kept)
-                one.hold_to_ranges()
+                one.take_up_kept()
             serial = state.get("serial")
         except (OSError, KeyError, RecursionError, TypeError, ValueError) as error:
             raise ConfigError(
@@ -126,9 +126,11 @@ def put_back(
         robot.serial = held["serials"][number]
         robot.tools.restore(held["tools"][number])
         robot.kept.restore(deepcopy(held["kept"][number]))
+        robot.take_up_kept()
         robot.points = deepcopy(held["points"][number])
         robot.locals = deepcopy(held["locals"][number])
         robot.switch_motors(held["motors"][number])
+        robot.latch.forget()
         robot.arm.place(held["joints"][number], now_ns)
     machine.robot_number = held["robot"]
     variables.put_back(held["variables"])

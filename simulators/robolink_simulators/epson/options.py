@@ -38,6 +38,13 @@ class SpelNumbers:
     joint_free: int = 4027
     other_robot: int = 4028
     joint_too_fast: int = 4242  # docs/reference/spel.md 10
+    fine_not_reached: int = 4024  # docs/reference/spel.md 10, as the six that follow
+    torque_too_late: int = 4030
+    speed_too_late: int = 4088
+    torque_high_power: int = 5040
+    torque_low_power: int = 5041
+    collision_high_power: int = 5057
+    collision_low_power: int = 5058
     arm_undefined: int = 2227  # docs/reference/spel.md 10
     ecp_undefined: int = 2232  # docs/reference/spel.md 10
     pallet_undefined: int = 2238  # docs/reference/spel.md 10
@@ -57,6 +64,10 @@ class SpelNumbers:
     aborted: int = 2995
     logged_out_in_task: int = 2996
     home_undefined: int = 2228  # docs/reference/spel.md 10
+    calibration_pulses: int = 2197
+    motors_on: int = 4029
+    not_reserved: int = 2198
+    latch_unset: int = 2196
     serious: int = 9001
     no_such_file: int = 7213  # docs/reference/spel.md 10, path not found
     task_gone: int = 2261  # docs/reference/spel.md 10
@@ -102,6 +113,8 @@ class SpelNumbers:
     tool_number: int = 2229
     arm_number: int = 2226
     arm_zero: int = 2205
+    arm_in_force: int = 2204
+    joint_number: int = 2265
     arch_number: int = 2271
     ecp_number: int = 2231
     ecp_zero: int = 2208
@@ -206,6 +219,10 @@ class EpsonOptions:
             2 um seen].
         till_already_met: What a motion does whose Till holds from the start: it stays, or
             starts and stops at once [open, docs/reference/spel.md 15].
+        servo_lag_ms: Time in which the servo makes good two thirds of how far the joints are
+            behind their command; Fine waits for the rest [U; 0 is a servo without delay].
+        servo_unrest_pulses: By how many pulses the joints stay off their target at rest: Fine
+            below it is never met [U; 0 for a servo that is well].
         angle_wrap: Whether a stored tool angle is brought into -180..180 [U].
         statement_us: Simulated time that a statement of a program takes, in microseconds [U].
         loop_passes: Passes of loops of a task without a Wait after which error 2556 is raised
@@ -276,6 +293,8 @@ class EpsonOptions:
     rc_plus: Literal[5, 7, 8] = 7
     real_pos_noise_mm: float = 0.002
     till_already_met: Literal["stays", "starts"] = "stays"
+    servo_lag_ms: float = 0.0
+    servo_unrest_pulses: int = 0
     angle_wrap: bool = False
     statement_us: int = 50
     loop_passes: int = 1_000_000

@@ -18,12 +18,19 @@ from robolink_simulators.cell.workplace import MOUNTED_TOOL as MOUNTED_TOOL
 from robolink_simulators.cell.workplace import Workplace, XyzMm, exchanged, pin_beside
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.epson.arm.arm import rest_of
-from robolink_simulators.epson.arm.kinematics import continued, frame_of, pose_of_frame, tip_of
+from robolink_simulators.epson.arm.joints import Joints
+from robolink_simulators.epson.arm.kinematics import (
+    continued,
+    forward,
+    frame_of,
+    pose_of_frame,
+    tip_of,
+    tip_place,
+)
 from robolink_simulators.epson.arm.robots import RobotModel
 from robolink_simulators.epson.memory.bits import IO_BITS
 from robolink_simulators.epson.memory.driven_robot import DrivenRobot
 from robolink_simulators.epson.memory.input_bits import InputBits
-from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.memory.tip_input import Nozzle, TipInput
 from robolink_simulators.epson.refusals import OutOfReach
 
@@ -79,6 +86,7 @@ class World(Workplace):
             replaced=stored_on(robot.model),
             parameters=parameters or WorldParameters(),
         )
+        robot.observer.resistance_n = self._resistance_n
         self.operator = PendantOperator(self, pendant_live=pendant_live, now_ns=now_ns, seed=seed)
 
     @classmethod
@@ -123,6 +131,12 @@ class World(Workplace):
             parameters=parameters,
         )
 
+    def _resistance_n(self, joints: Joints) -> XyzMm:
+        """Return the force on the mounted nozzle's tip, N, at joints without any play."""
+        model = self.machine.arm.model
+        tip_mm = tip_place(model, forward(model, joints), self.tips.get(MOUNTED_TOOL))
+        return self.resistance_n(tip_mm)
+
     def connect(
         self,
         number: int,
@@ -154,6 +168,10 @@ class World(Workplace):
     def disconnect(self, number: int) -> None:
         """Take off what an input is connected to; it is off then."""
         self._inputs.set(number, on=False)
+
+    def told_flange(self) -> Pose:
+        """Return where the flange is as the base sees it."""
+        return Pose(*self.machine.point_at(self.robot.flange()).coordinates)
 
     def truth(self) -> dict[str, Any]:
         """Return all of it, ready for JSON."""
@@ -202,7 +220,7 @@ class PendantOperator(SimulatedOperator):
         there = replace(arm.flange(), u_deg=u_deg)
         arm.place(continued(arm.model, there, arm.joints), self._now_ns())
         flange = self.jog_onto_pin()
-        self._machine.points.store(number, Point.at(flange))
+        self._machine.points.store(number, self._machine.point_at(flange))
         return flange
 
     def _require_pendant(self) -> None:

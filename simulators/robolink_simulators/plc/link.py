@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Final, Protocol
 
 from robolink.timing import NS_PER_S
+from robolink_simulators.device.wire_time import WireTime
 from robolink_simulators.faults import Departure
 from robolink_simulators.faults.departing import DepartingReplies
 from robolink_simulators.plc.frames import Frames, PlcRequest
@@ -18,6 +19,8 @@ of them, and no busy computer cuts a frame in two.
 
 class ServedFrame(Protocol):
     """The PLC, as its connections see it."""
+
+    wire_time: WireTime
 
     @property
     def now_ns(self) -> int:
@@ -48,7 +51,7 @@ class PlcLink:
         self._frames = frames
         self._outbox = DepartingReplies()
         self._late: list[PlcRequest] = []
-        self._heard_ns = plc.now_ns
+        self._heard_ns = plc.wire_time.at(plc.now_ns)
         self._over = False
 
     @property
@@ -73,9 +76,9 @@ class PlcLink:
             return
         if not data:
             self._over = True
-        if self._frames.shared and self._plc.now_ns - self._heard_ns > _SILENCE_NS:
+        before_ns, self._heard_ns = self._heard_ns, self._plc.wire_time.at(self._plc.now_ns)
+        if self._frames.shared and self._heard_ns - before_ns > _SILENCE_NS:
             self._frames.forget()
-        self._heard_ns = self._plc.now_ns
         self._frames.feed(data)
         try:
             self._answer_all()

@@ -39,11 +39,20 @@ class PlcHost(TcpHost):
             lock=simulator.lock,
             allow_remote=allow_remote,
         )
+        self._simulator = simulator
+        simulator.keep_time(clock)
+        simulator.watchers.append(self.wake)
 
     @property
     def url(self) -> str:
         """Where clients connect to, with the unit and the map."""
         return super().url + self._options
+
+    def close(self) -> None:
+        """Stop serving and close every connection. Idempotent."""
+        super().close()
+        if self.wake in self._simulator.watchers:
+            self._simulator.watchers.remove(self.wake)
 
 
 class PlcLineHost(LineHost):
@@ -61,6 +70,7 @@ class PlcLineHost(LineHost):
         self.url = (
             f"plc+modbus-rtu://{self.cable.near}?{urlencode(options)}&{_map_option(map_file)}"
         )
+        simulator.keep_time(clock)
 
 
 class PlcOnLine:

@@ -8,10 +8,9 @@ from typing import Any, Final
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Secret
-from robolink_simulators.cell.clock import ManualClock, SteeredClock
+from robolink_simulators.cell.clock import EXCHANGE_S, ManualClock, SteeredClock
 from robolink_simulators.cell.workplace import MOUNTED_TOOL
 from robolink_simulators.cell.world_parameters import WorldParameters, parameters_from_text
-from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.faults import LinkKind, faults_of_table, read_fault_file
 from robolink_simulators.testkit.asked import CellRequest
 from robolink_simulators.testkit.recipes import written_map, written_recipe
@@ -20,15 +19,13 @@ from robolink_simulators.testkit.served import OwnFolder, SimulatedCell
 SERVED_SPEED: Final = 20.0
 """Simulated seconds per real one, on a port."""
 
-PLC_SPEED: Final = 1.0
-"""The same of a PLC with a mailbox: it counts 500 ms between two heartbeats of a client, who
-must not have to be faster than a real one because the build machine is busy."""
+PROGRAM_SPEED: Final = 1.0
+"""Simulated seconds per real one of a PLC that executes a program. That one counts 500 ms between
+two heartbeats by its own cycles, and a client must not have to be faster than a real one because
+the build machine is busy."""
 
-EXCHANGE_S: Final = 0.05
-"""What each request takes besides: who asks how far a movement is need not wait for it."""
-
-PLC_EXCHANGE_S: Final = 0.005
-"""The same of a PLC with a mailbox, a hundredth of its patience with a heartbeat."""
+PROGRAM_EXCHANGE_S: Final = 0.005
+"""What each request takes there, a hundredth of that patience."""
 
 _count = itertools.count(1)
 
@@ -61,7 +58,7 @@ def make_epson(
         request.robot,
         seed=_seed(own, request),
         password=Secret(request.password) if request.password else None,
-        options=options_from_text({**_patience(request, medium), **request.texts("options")}),
+        options=options_from_text(request.texts("options")),
         world=_world(request),
     )
     time: Any
@@ -125,7 +122,8 @@ def make_softmotion(
         url = register(name, simulator, clock=time)
         own.stack.callback(unregister, name)
     else:
-        time = _served_clock(request, PLC_SPEED, PLC_EXCHANGE_S)
+        pace = (PROGRAM_SPEED, PROGRAM_EXCHANGE_S) if request.program else (SERVED_SPEED,)
+        time = _served_clock(request, *pace)
         url = _on_bus(own, simulator, medium, time)
     return _furnished(own, simulator, time, {medium: url}, request, person=person)
 
@@ -213,16 +211,6 @@ def _served_clock(
     """Return the time on a port; in real time, which a test asked for, requests take none."""
     factor = speed if request.speed is None else request.speed
     return SteeredClock(factor, exchange_s=0.0 if request.speed == 1 else exchange_s)
-
-
-def _patience(request: CellRequest, medium: str) -> dict[str, str]:
-    """Return what lets silence count in real seconds, however fast simulated time runs."""
-    if medium == "sim":
-        return {}
-    factor = max(1.0, SERVED_SPEED if request.speed is None else request.speed)
-    usual = EpsonOptions()
-    names = ("remote_timeout_s", "login_timeout_s")
-    return {name: str(getattr(usual, name) * factor) for name in names}
 
 
 def _world(request: CellRequest) -> WorldParameters:

@@ -55,7 +55,7 @@ def prepare(simulator):
 
 
 class LineTypist:
-    """The dialogue of before: steps typed, ENTER when it is on the pin."""
+    """The dialogue of before: steps typed, Enter when it is on the pin."""
 
     def __init__(self, terminal, simulator):
         self.terminal, self.eyes, self.keys = terminal, InProcessEyes(simulator), 0
@@ -65,7 +65,7 @@ class LineTypist:
         self.terminal.press(text.encode() + b"\n")
 
     def touch(self):
-        self.terminal.wait_for("ENTER when it is on the pin")
+        self.terminal.wait_for("Enter when it is on the pin")
         time.sleep(0.5)
         for digits in (1, 1, 2):
             seen = self.eyes.look(1)
@@ -87,7 +87,7 @@ def by_lines(words, simulator):
     touched = 0
     while True:
         found = hand.terminal.wait_for(
-            r"(ENTER when it is on the pin)|\[y or n\]|(type it, then ENTER)|[Oo]n record as"
+            r"(Enter when it is on the pin)|\[y or n\]|(scan it, then Enter)|[Oo]n record as"
         )
         if found[0].endswith("as"):
             break

@@ -1,6 +1,7 @@
 """Vision Guide, and the two programs that calculate a tool with it (docs/reference/vision.md)."""
 
 import math
+import struct
 from dataclasses import astuple, replace
 from pathlib import Path
 
@@ -369,3 +370,54 @@ def test_vget_into_too_few_variables_is_told_at_the_build(faults):
 
 def test_without_a_vision_project_there_is_no_sequence(failure):
     assert failure("VRun findTip").number == 2543
+
+
+SAVING = """
+Function main
+  OnErr GoTo said
+  {before}
+  VSaveImage findTip, "C:\\{folder}\\tip{suffix}"
+  Print FileExists("C:\\{folder}\\tip{suffix}")
+  Exit Function
+said:
+  Print Err
+  EResume out
+out:
+Fend
+"""
+
+
+def saved(vision_cell, before="VRun findTip", folder="none", suffix=".bmp"):
+    """Save the picture of a tip before the camera; return what the program prints."""
+    tip = vision_cell.world.tips[1]
+    vision_cell.stand(flange_over(vision_cell.world, tip, 30.0, beside=(1.5, -0.7)))
+    vision_cell.load(SAVING.format(before=before, folder=folder, suffix=suffix))
+    return vision_cell.run()
+
+
+def test_a_saved_picture_shows_the_tip_where_it_was_found(vision_cell):
+    """A public program saves its pictures so."""
+    made = 'MkDir "C:\\images"; VRun findTip'
+    assert saved(vision_cell, made, "images") == ["-1"]
+    files = vision_cell.made.runner.session.files
+    data = files.path("C:/images/tip.bmp").read_bytes()
+    width, height = vision_cell.world.camera.optics.size_px
+    kind, size, start = struct.unpack_from("<2sI4xI", data)
+    assert (kind, size) == (b"BM", len(data))
+    assert struct.unpack_from("<ii", data, 18) == (width, height)
+    ((x, y),) = vision_cell.world.see()
+    row = start + (height - 1 - round(y)) * width
+    assert data[row + round(x)] < 100
+    assert data[row + (round(x) + 40) % width] > 100
+
+
+@pytest.mark.parametrize(
+    ("given", "number"),
+    [
+        ({}, "7213"),
+        ({"suffix": ".png"}, "2199"),
+        ({"before": "Print 1"}, "7806"),
+    ],
+)
+def test_a_picture_that_cannot_be_saved_is_an_error_of_its_program(vision_cell, given, number):
+    assert saved(vision_cell, **given)[-1] == number

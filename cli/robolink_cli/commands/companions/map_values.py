@@ -161,7 +161,7 @@ def place_rows(register_map: RegisterMap) -> list[list[str]]:
         (tr("error code"), commit.error_code),
         (tr("tool number"), commit.tool_number),
         (tr("permit"), register_map.permit),
-        (tr("tool in force"), register_map.selected),
+        (tr("selected tool"), register_map.selected),
     )
     rows += [[what, place.place, ""] for what, place in named if place is not None]
     rows += [

@@ -6,7 +6,7 @@ import click
 
 from robolink.messages import declared, tr
 from robolink_cli.console.render import note
-from robolink_cli.session.context import CliContext, controller_options
+from robolink_cli.session.context import CliContext, optional_controller
 
 if TYPE_CHECKING:
     from robolink.serving import CallbackLimits, CallbackServer
@@ -93,7 +93,7 @@ if TYPE_CHECKING:
         "With a PLC: its permit comes only by the contact of tip and pin while it calibrates."
     ),
 )
-@controller_options
+@optional_controller
 def serve(
     context: CliContext,
     *,

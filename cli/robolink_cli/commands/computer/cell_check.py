@@ -14,7 +14,7 @@ from robolink_cli.console.exit_codes import DIFFERENT, exit_code
 from robolink_cli.console.render import note, say
 from robolink_cli.options.consent import published_option
 from robolink_cli.session.completing import complete_recipe
-from robolink_cli.session.context import CliContext, context_of_cell, controller_options
+from robolink_cli.session.context import CliContext, context_of_cell, optional_controller
 from robolink_cli.session.opening import open_controller
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ class CheckedCell(NamedTuple):
     ),
 )
 @published_option
-@controller_options
+@optional_controller
 def check(
     context: CliContext,
     cells: tuple[str, ...],

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from robolink_cli.console.render import emit_json, json_is_on
-from robolink_cli.session.context import CliContext, controller_options, emit, json_option
+from robolink_cli.session.context import CliContext, emit, json_option, optional_controller
 
 
 @click.command()
@@ -39,7 +39,7 @@ def check(file: Path | None) -> int:
 @click.command()
 @click.argument("cell", required=False)
 @click.option("--origin", is_flag=True, help="Say where each value came from.")
-@controller_options
+@optional_controller
 def show(context: CliContext, cell: str | None, origin: bool) -> None:
     """Show the cells, or all that is in force for one CELL.
 
@@ -71,7 +71,7 @@ def list_cells() -> None:
 
 @click.command()
 @click.argument("cell", required=False)
-@controller_options
+@optional_controller
 def people(context: CliContext, cell: str | None) -> None:
     """List who works at one CELL, or at all, and in which role; an engineer may do everything."""
     from robolink.config import find_cell, load_cells

@@ -19,7 +19,7 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
 @click.option("--force", is_flag=True, help="Write over a file that is there already.")
 @controller_options
 def backup(context: CliContext, file: Path, force: bool) -> None:
-    """Save all fifteen tools, the one in force, and which controller it is. Reads only."""
+    """Save all fifteen tools, the one that is selected, and which controller it is. Reads only."""
     from robolink.backup import save, take_backup
     from robolink.files.named import require_free
     from robolink_cli.views.backup import backup_payload, show_backup
@@ -54,7 +54,7 @@ def backup(context: CliContext, file: Path, force: bool) -> None:
 @click.option(
     "--ignore-selected",
     is_flag=True,
-    help="Show another tool in force, but do not count it: a program selects tools by itself.",
+    help="Show another selected tool, but do not count it: a program selects tools by itself.",
 )
 @published_option
 @controller_options
@@ -103,7 +103,7 @@ def compare(
     shell_complete=complete_tool,
     help="Only this tool; may be repeated.",
 )
-@click.option("--selected", is_flag=True, help="Also put the backup's tool in force.")
+@click.option("--selected", is_flag=True, help="Also select the backup's tool.")
 @click.option(
     "--other-controller",
     is_flag=True,

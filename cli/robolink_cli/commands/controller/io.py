@@ -45,7 +45,7 @@ def get(
     """Show an input. Legal while production runs, except with --output."""
     if sum(at is not None for at in (bit, byte, word)) != 1:
         raise ConfigError(
-            tr("Exactly one place can be read at a time."),
+            tr("One place can be read at a time."),
             remedy=tr("Give one of BIT, --byte PORT and --word PORT."),
         )
     if output and (memory or bit is None):

@@ -45,7 +45,7 @@ def status(context: CliContext) -> None:
 @click.command()
 @looking_options
 def where(context: CliContext) -> None:
-    """Show where the tool in force is (measured), and the joints."""
+    """Show where the selected tool is (measured), and the joints."""
     from robolink_cli.views.documents import pose_payload
     from robolink_cli.views.tables import show_pose
 
@@ -187,7 +187,7 @@ def _switch_group(context: CliContext, *, on: bool, dry_run: bool, yes: bool) ->
             context.show_requests(controller.preview(Act.MOTORS_ON if on else Act.MOTORS_OFF))
             return
         if on:
-            agree(tr("Is the machine clear? The axis group is enabled."), yes=yes)
+            agree(tr("Enable the axis group? Nobody may be at the machine."), yes=yes)
         controller.motors(on)
     payload: dict[str, object] = {"enabled": on}
     state = tr("enabled") if on else tr("disabled")

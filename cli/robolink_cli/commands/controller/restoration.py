@@ -46,7 +46,7 @@ class Restoration:
                 after_name=tr("backup"),
             )
         if self._plan.select is not None:
-            say(tr("tool {tool} will be put in force", tool=self._plan.select))
+            say(tr("tool {tool} will be selected", tool=self._plan.select))
 
     def run(self) -> dict[str, object]:
         """Carry it out and return the document; nothing is sent when nothing differs."""
@@ -63,7 +63,7 @@ class Restoration:
     def show_end(self) -> None:
         """Say how it ended."""
         if self._plan.empty:
-            say(tr("The controller holds this already; nothing was written."))
+            say(tr("The controller has these values already. Nothing was written."))
         elif self._plan.changes:
             numbers = ", ".join(str(change.tool) for change in self._plan.changes)
             say(tr("Tools restored and read back: {numbers}.", numbers=numbers))

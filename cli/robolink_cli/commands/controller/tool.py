@@ -61,7 +61,7 @@ def tool() -> None:
 @published_option
 @controller_options
 def list_tools(context: CliContext, published: bool) -> None:
-    """Show all tools and which one is in force."""
+    """Show all tools and which one is selected."""
     from robolink_cli.session.tool_source import find_tools
     from robolink_cli.views.documents import offset_payload
     from robolink_cli.views.tables import show_tools
@@ -244,7 +244,13 @@ class _Setting:
             accepted=accepted,
         )
         if not (asked or context.json):
-            agree(tr("Write this to tool {number}?", number=number), yes=yes)
+            agree(
+                tr(
+                    "Write these values to tool {tool}? 'robolink undo' takes them back.",
+                    tool=number,
+                ),
+                yes=yes,
+            )
         keep_first_backup(controller, tell=note)
 
     def document(self, receipts: "Sequence[ToolReceipt]") -> dict[str, object]:
@@ -333,7 +339,7 @@ def _clear_question(number: int, then_select: int | None) -> str:
 @dry_run_option
 @yes_option
 def select(context: CliContext, number: int, dry_run: bool, yes: bool) -> None:
-    """Put a tool in force; the choice survives power-off. 0 is the flange."""
+    """Select a tool; the choice survives power-off. 0 is the flange."""
     with open_controller(context, changes=not dry_run) as controller:
         before = controller.tools.selected()
         if dry_run:
@@ -350,5 +356,7 @@ def select(context: CliContext, number: int, dry_run: bool, yes: bool) -> None:
     context.emit(
         "tool-select",
         payload,
-        lambda: say(tr("tool in force: {number} (was {before})", number=number, before=before)),
+        lambda: say(
+            tr("Tool {number} is selected (before: {before}).", number=number, before=before)
+        ),
     )

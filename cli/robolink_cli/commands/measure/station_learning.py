@@ -96,7 +96,7 @@ def learn(
             _show(known, found)
             if not yes and not bench.runner().confirm(tr("Keep this on record?")):
                 raise DeclinedError(
-                    tr("The place was not accepted."), remedy=tr("Nothing was recorded.")
+                    tr("You did not accept the place."), remedy=tr("Nothing was recorded.")
                 )
             controller.outcomes.append(station_entry(found))
         kept = _known(context, controller, name)

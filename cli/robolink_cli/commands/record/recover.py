@@ -10,14 +10,14 @@ from robolink_cli.commands.record.recovery_choice import BLOCKED, NEW, OLD, chos
 from robolink_cli.commands.record.recovery_guide import Guide, show_end
 from robolink_cli.options.consent import dry_run_option, plain_option, yes_option
 from robolink_cli.prompts.questions import on_terminal
-from robolink_cli.session.context import CliContext, controller_options, emit
+from robolink_cli.session.context import CliContext, controller_options, emit, optional_controller
 from robolink_cli.session.guidance import guided_if_alone
 from robolink_cli.session.opening import open_controller
 from robolink_cli.views.documents import finding_payload
 
 
 @click.command("recover")
-@controller_options
+@optional_controller
 @dry_run_option
 @plain_option
 @click.option(

@@ -13,7 +13,7 @@ from robolink_cli.views.documents import finding_payload, pose_payload
 
 DECLINED: Final = 9
 LEFT: Final = 6
-_NOTHING: Final = declared("Nothing is unsettled on this controller.")
+_NOTHING: Final = declared("Nothing is left unfinished on this controller.")
 
 
 class Guide:
@@ -108,7 +108,7 @@ class Guide:
             return True
         if json_is_on() or not on_terminal():
             return False
-        agreed = asked(tr("Is that as it should be, and may work go on?"))
+        agreed = asked(tr("Is that right, and may work go on?"))
         self.declined = self.declined or not agreed
         return agreed
 
@@ -145,8 +145,8 @@ def show_end(payload: dict[str, object]) -> None:
     if left:
         say(
             tr(
-                "What is left takes your word: look at the robot and the controller, then run "
-                "'robolink recover' again on a terminal, or with --yes."
+                "The rest only you can decide. Look at the robot and the controller, then "
+                "run 'robolink recover' again on a terminal, or with --yes."
             )
         )
     elif payload["settled"]:
@@ -162,7 +162,7 @@ def _foretell(finding: Finding) -> None:
     if finding.action:
         note(tr("  to do: {action}", action=finding.action))
     elif finding.verdict.needs_a_person:
-        note(tr("  to do: it takes your word"))
+        note(tr("  to do: you decide"))
 
 
 def _show(finding: Finding) -> None:

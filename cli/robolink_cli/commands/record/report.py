@@ -7,7 +7,7 @@ import click
 from robolink.messages import declared, tr
 from robolink_cli.console.render import note, say
 from robolink_cli.options.pose_source import point_numbers
-from robolink_cli.session.context import CliContext, controller_options
+from robolink_cli.session.context import CliContext, optional_controller
 
 _ENDINGS = (".html", ".htm")
 
@@ -21,7 +21,7 @@ _ENDINGS = (".html", ".htm")
     metavar="1-50",
     help=declared("Also show how far the tip moves at these taught points, read now from -c."),
 )
-@controller_options
+@optional_controller
 def report(
     context: CliContext,
     *,

@@ -48,7 +48,7 @@ def undo(
 
     if change is not None and to is not None:
         raise ConfigError(
-            tr("CHANGE and --to exclude each other."),
+            tr("Give CHANGE or --to, not both."),
             remedy=tr("Name a change to undo, or an entry whose value is to come back."),
         )
     with open_controller(context, changes=not dry_run) as controller:

@@ -71,7 +71,7 @@ class Undoing:
     def show_end(self) -> None:
         """Say how it ended, and how it is undone."""
         if not self._done.receipts:
-            say(tr("The controller holds the old values already; nothing was written."))
+            say(tr("The controller has the old values already. Nothing was written."))
             return
         numbers = ", ".join(str(receipt.tool) for receipt in self._done.receipts)
         say(tr("Old values written and read back: tool {numbers}.", numbers=numbers))

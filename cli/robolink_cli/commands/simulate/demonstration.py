@@ -155,7 +155,7 @@ def _announce(simulated: str, operator: DemoOperator) -> None:
     say(simulated)
     say(tr("The nozzle was changed; tool {tool} still holds the old tip.", tool=TOOL))
     if operator is DemoOperator.CARELESS:
-        say(tr("The person at this cell only presses ENTER: the tip never comes onto the pin."))
+        say(tr("The person at this cell only presses Enter: the tip never comes onto the pin."))
     say()
 
 
@@ -179,7 +179,7 @@ class _Cell:
                 raise
             held = controller.tools.read(TOOL)
             if held is None or not controller.tools.same(held, before):
-                raise RuntimeError(tr("The refusal left another tool in force.")) from error
+                raise RuntimeError(tr("The refusal left another tool selected.")) from error
             return RefusedChange(
                 self.kind, self.robot, truth, controller.exchanges, error, in_force=held
             )

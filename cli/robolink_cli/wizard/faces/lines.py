@@ -84,8 +84,11 @@ class LineFace:
                 self._begin_question(state, kind)
             case WaitsForAnswer(number=number) if number != self._shown:
                 self._shown = number
+                self._forget(0.0)
                 _put(told_question(state))
             case WaitsForAnswer() if state.at_place:
+                # What was typed while it moved is no step to go on with.
+                self._forget(0.0)
                 _put(told_after_jog(state))
             case WasRegarded():
                 pass

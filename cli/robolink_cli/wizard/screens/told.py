@@ -2,7 +2,7 @@
 
 import math
 
-from robolink.messages import tr
+from robolink.messages import joined, tr
 from robolink.nozzle_change import WriteSubject
 from robolink.runner import FitSubject, Question
 from robolink_cli.wizard.check_list import CheckSubject
@@ -46,17 +46,29 @@ def told_question(state: WizardState) -> str:
         return tr("{question} [Type or scan it, then Enter. To end: stop.]", question=question.text)
     if isinstance(subject, WriteSubject):
         numbers = ", ".join(map(str, subject.tools))
-        return tr("To write, type the tool number ({numbers}). n = do not write.", numbers=numbers)
+        write = tr("To write, type the tool number ({numbers}). n = do not write.", numbers=numbers)
+        return joined(" ", (write, *_further(subject)))
     if isinstance(subject, CheckSubject):
         return tr("Type the number of a point, then y to start; n = leave.")
+    if isinstance(subject, FitSubject) and subject.more:
+        return tr("{question} [y, n, or more for one more touch]", question=question.text)
     return tr("{question} [y or n]", question=question.text)
+
+
+def _further(subject: WriteSubject) -> list[str]:
+    if subject.again is None:
+        return []
+    told = [tr("again = touch {k} again.", k=subject.again)]
+    return [*told, tr("more = one more touch.")] if subject.adds_touch else told
 
 
 def _place(state: WizardState) -> str:
     title = touch_title(state.touch)
     head = f"{title}. {instruction(state)}" if state.touch is not None else instruction(state)
     touch, here = state.touch, told_where(state)
-    if touch is not None and touch.number > 1 and not touch.proof:
+    if state.free_jog is not None:
+        how = tr("Type steps (x+0.1 z-0.5), stop, or help.")
+    elif touch is not None and touch.number > 1 and not touch.proof:
         how = tr("Type steps (x+0.1 z-0.5), take, again 1, stop, or help.")
     else:
         how = tr("Type steps (x+0.1 z-0.5), take, stop, or help.")
@@ -84,5 +96,9 @@ def told_after_jog(state: WizardState) -> str:
     way, where = state.way_mm(), told_where(state)
     if way is None:
         return where
-    since = tr("Since arrival {mm} mm.", mm=mm(math.hypot(*way)))
+    far = mm(math.hypot(*way))
+    if state.free_jog is not None:
+        since = tr("Since start {mm} mm.", mm=far)
+    else:
+        since = tr("Since arrival {mm} mm.", mm=far)
     return f"{where} {since}"

@@ -3,7 +3,8 @@
 import math
 
 from robolink.messages import tr
-from robolink.runner import Question, TouchSubject
+from robolink.model import angle_difference_deg
+from robolink.runner import JogRange, Question, TouchSubject
 from robolink_cli.console.columns import padded
 from robolink_cli.wizard.screens.layout import Screen, row_of
 from robolink_cli.wizard.screens.rows import mm, signed, status_row, title_row
@@ -15,12 +16,12 @@ _HEAD = 14
 def touch_screen(state: WizardState, now_s: float) -> Screen:
     """Return the screen on which a person jogs the tip to a place."""
     touch = state.touch
-    lines = [*_what(state, touch), "", *_where(state), *_since(state), *_contact(touch), ""]
-    lines += _keypad(state)
+    lines = [*_what(state, touch), "", *_where(state), *_since(state), *_contact(touch)]
+    lines += [*_range(state.free_jog), "", *_keypad(state), *_typing(state)]
     return Screen(
         title_row(state, touch_title(touch)),
         tuple(lines),
-        _actions(touch),
+        _actions(state),
         status=status_row(state, now_s),
         message=state.message,
     )
@@ -67,14 +68,15 @@ def _where(state: WizardState) -> list[str]:
 
 
 def _since(state: WizardState) -> list[str]:
-    way, touch, pose = state.way_mm(), state.touch, state.pose
-    if way is None or pose is None or touch is None or touch.arrival is None:
+    way, touch, pose, arrival = state.way_mm(), state.touch, state.pose, state.arrival
+    if way is None or pose is None or arrival is None:
         return []
-    turned = signed(pose.u_deg - touch.arrival.u_deg, 2)
+    turned = signed(angle_difference_deg(pose.u_deg, arrival.u_deg), 2)
     total = tr("{mm} mm, {n} steps", mm=f"{math.hypot(*way):.2f}", n=state.jogging.steps)
     parts = row_of((*map(signed, way), turned))
-    lines = [padded(" " + tr("Since arrival"), _HEAD) + parts + f"   {total}"]
-    if touch.first_z_mm is not None:
+    name = tr("Since arrival") if touch is not None else tr("Since start")
+    lines = [padded(f" {name}", _HEAD) + parts + f"   {total}"]
+    if touch is not None and touch.first_z_mm is not None:
         apart = signed(pose.z_mm - touch.first_z_mm)
         lines.append(" " + tr("Height against touch 1") + f"   {apart} mm")
     return lines
@@ -89,6 +91,18 @@ def _contact(touch: TouchSubject | None) -> list[str]:
         else tr("input {n}", n=touch.contact.number)
     )
     return [padded(" " + tr("Contact"), _HEAD) + f"   {shown}"]
+
+
+def _range(jog: JogRange | None) -> list[str]:
+    """Return where a free jog may go, in the columns of where it is."""
+    if jog is None:
+        return []
+    box = jog.box
+    rows = (
+        (tr("Lowest"), (box.x_min_mm, box.y_min_mm, box.z_min_mm)),
+        (tr("Highest"), (box.x_max_mm, box.y_max_mm, box.z_max_mm)),
+    )
+    return [padded(f" {name}", _HEAD) + row_of([*map(mm, ends)]) for name, ends in rows]
 
 
 def _keypad(state: WizardState) -> list[str]:
@@ -106,12 +120,26 @@ def _keypad(state: WizardState) -> list[str]:
     ]
 
 
+def _typing(state: WizardState) -> list[str]:
+    """Return the field of a typed pose, where one can be typed."""
+    if state.typing:
+        return ["", tr("Pose X Y Z U: {typed}_   Enter closes the field.", typed=state.typed)]
+    if state.touch is None or not state.touch.types:
+        return []
+    return ["", tr("[.] Type the pose, if an instrument fails")]
+
+
 def _turned(names: tuple[str, ...], quarters: int) -> tuple[str, ...]:
     """Return the names of the axes that the arrows right, up, left and down move along."""
     return tuple(names[(index + quarters) % 4] for index in range(4))
 
 
-def _actions(touch: TouchSubject | None) -> tuple[tuple[str, str], ...]:
+def _actions(state: WizardState) -> tuple[tuple[str, str], ...]:
+    touch = state.touch
+    if state.free_jog is not None:
+        # While it moves they stop the step; at rest there is nothing left but to leave.
+        leaves = tr("STOP, leave")
+        return (("0", leaves), (tr("Space"), leaves), ("Esc", leaves))
     if touch is None or not touch.number:
         return (("5", tr("It is there")), ("0", tr("STOP")))
     if touch.proof:
@@ -119,4 +147,6 @@ def _actions(touch: TouchSubject | None) -> tuple[tuple[str, str], ...]:
     take, stop = ("5", tr("Record this touch")), ("0", tr("STOP"))
     if touch.number < 2:
         return take, stop
-    return take, ("/", tr("Begin at touch 1 again")), stop
+    if not touch.retakes:
+        return take, ("/", tr("Begin at touch 1 again")), stop
+    return take, ("/", tr("Touch {k} again", k=touch.number - 1)), stop

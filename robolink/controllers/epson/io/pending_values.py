@@ -31,7 +31,7 @@ class PendingValues:
                 now = self._variables.read(name, kind)
             case _:
                 raise ConfigError(
-                    tr("The marker of {when} cannot be understood.", when=marker.begun_at),
+                    tr("What was left unfinished at {when} cannot be read.", when=marker.begun_at),
                     remedy=tr(
                         "Look at the controller, then {forget}.", forget=way(Way.FORGET_MARKER)
                     ),

@@ -314,8 +314,7 @@ class EpsonSession:
             raise TransportBrokenError(
                 tr("{identity} closed the connection.", identity=self.identity),
                 remedy=tr(
-                    "Check the cable, the controller's power and its remote time-out, then "
-                    "connect again."
+                    "Check cable, power and remote time-out of the controller, then try again."
                 ),
                 controller=self.identity,
             )

@@ -203,7 +203,7 @@ class StopLine:
             if isinstance(event, EndOfStream):
                 raise TransportBrokenError(
                     tr("{identity} closed the connection.", identity=self._transport.identity),
-                    remedy=tr("Check the controller's power and the cable, then connect again."),
+                    remedy=tr("Check cable and power of the controller, then try again."),
                     controller=self._transport.identity,
                 )
             if event is NEED_DATA:

@@ -33,7 +33,7 @@ class EpsonActs:
             status = self._window.status()
             if status.emergency_stop:
                 raise ControllerFaultError(
-                    tr("The emergency stop is still in force after the reset."),
+                    tr("The emergency stop is still pressed after the reset."),
                     code=status.code,
                     remedy=tr("Release the button, then reset again."),
                     controller=self._link.identity,

@@ -112,5 +112,5 @@ class EpsonPreserver(Preserver):
     def _action(self, marker: Marker, now: int | None) -> str:
         tool = InForce.from_marker(marker).tool
         if now == tool:
-            return tr("set power mode and speed as they were")
-        return tr("select tool {tool} again, with the power mode and speed of then", tool=tool)
+            return tr("Set power mode and speed as they were")
+        return tr("Select tool {tool} again, with the power mode and speed of then", tool=tool)

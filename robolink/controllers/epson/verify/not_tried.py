@@ -25,7 +25,7 @@ def not_tried() -> tuple[Fact, ...]:
         (tr("Move ... Till whose input is on already"), moving, "till_already_met"),
         (tr("remote time-out while only monitoring"), minutes, "monitoring_timeout"),
         (tr("a second client"), disturbing, "second_client"),
-        (tr("TLClr of the tool in force"), writing, "clear_selected_tool"),
+        (tr("TLClr of the selected tool"), writing, "clear_selected_tool"),
         (tr("XYLim limits the tip or the flange"), writing, "xylim_counts"),
         (
             tr("a failed statement without the error state"),

@@ -63,7 +63,7 @@ def require_permit(now: Response, *, controller: str, request: str) -> None:
             tr("The machine does not permit it now."),
             reason=NotReadyReason.NOT_REMOTE,
             remedy=tr(
-                "Its program gives the permit (xPermit): bring the machine to its service state."
+                "The machine's program gives the permit (xPermit); bring it to its service state."
             ),
             controller=controller,
             request=request,
@@ -181,7 +181,7 @@ def _obstacle(now: Response) -> tuple[NotReadyReason, str, str] | None:
         return (
             NotReadyReason.PAUSED,
             tr("The axis group is held by a stop."),
-            tr("Run 'robolink robot reset' to release it when the cell is clear."),
+            tr("Run 'robolink robot reset' to release the stop when the cell is clear."),
         )
     if now.group_state == GroupState.DISABLED:
         return (

@@ -258,8 +258,8 @@ class JogWatch:
         error = OutcomeUnknownError(
             tr("The group did not come to rest after {jog}.", jog=self.request),
             remedy=tr(
-                "Press the emergency stop if the robot still moves. Then run 'robolink recover'; "
-                "motion is blocked until then."
+                "Press the emergency stop if the robot still moves. Next: 'robolink "
+                "recover'. The robot stays blocked until then."
             ),
             request=self.request,
         )

@@ -6,7 +6,7 @@ is (assumed: a real one needs a few milliseconds to come to rest).
 
 import math
 import random
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import accumulate
 from typing import Final
@@ -36,6 +36,23 @@ _LOOK_BACK_NS = 1_000_000
 _STILL = 1e-9
 
 _Ways = tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Travelled:
+    """A motion, or what there was of it until it was stopped or looked at.
+
+    Attributes:
+        start_ns: When it began.
+        end_ns: When it ended.
+        joints_at: Tells the commanded joints at an instant between the two.
+        complete: Whether it went as far as it was to go.
+    """
+
+    start_ns: int
+    end_ns: int
+    joints_at: Callable[[int], Joints]
+    complete: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +89,14 @@ class _Travel:
         leg, elapsed_ns = self._leg_at(now_ns)
         return leg.flange_at(elapsed_ns)
 
+    def until(self, end_ns: int) -> "Travelled":
+        """Return the part of the motion up to an instant, as far as it goes."""
+        end_ns = min(end_ns, self.end_ns)
+        return Travelled(self.start_ns, end_ns, self.joints_at, end_ns == self.end_ns)
+
+    def leg_at(self, now_ns: int) -> Leg:
+        return self._leg_at(now_ns)[0]
+
     def _leg_at(self, now_ns: int) -> tuple[Leg, int]:
         elapsed_ns = max(0, now_ns - self.start_ns)
         for leg in self.legs[:-1]:
@@ -104,6 +129,12 @@ class Arm:
     Attributes:
         motions: Those begun since the arm was made.
         backlash_mm: Play of a SCARA's joint 3, likewise; none at first.
+        travelled_until_ns: Until when the motion under way has gone, or the last one went.
+        followed: Told of each part of a motion, from when to when, before its end is forgotten.
+        added_in_force: Whether motions are of an added arm; what is mounted stays on the own one.
+        on_travelled: Told of each motion when it is over.
+        guard: Cuts the legs of a motion short where the drives would stop it.
+        origin_errors: How far each joint really stands from where its encoder is taken to say.
     """
 
     def __init__(
@@ -115,8 +146,14 @@ class Arm:
         self.motions = MotionLog()
         self.backlash_deg = backlash_deg
         self.backlash_mm = 0.0
+        self.followed: Callable[[int, int], None] | None = None
+        self.added_in_force = False
+        self.on_travelled: Callable[[Travelled], None] = _heedless
+        self.guard: Callable[[Sequence[Leg]], Sequence[Leg]] = _whole
+        self.origin_errors: tuple[float, ...] = (0.0,) * model.axes
         self._joints = joints
         self._now_ns = 0
+        self.travelled_until_ns = 0
         self._travel: _Travel | None = None
         self._seen: tuple[_Travel, int, Pose] | None = None
         self._turned: _Ways = (0.0,) * model.axes
@@ -143,8 +180,13 @@ class Arm:
 
     @property
     def true_joints(self) -> Joints:
-        """Where the joints really are: commanded, less the backlash. No noise."""
+        """Where the joints really are: commanded, less backlash and false zeros. No noise."""
         return self._trailing(self._joints, self._turned)
+
+    @property
+    def leg(self) -> Leg | None:
+        """The leg of the motion under way, ``None`` at rest."""
+        return None if self._travel is None else self._travel.leg_at(self._now_ns)
 
     def flange(self) -> Pose:
         """Return the commanded flange pose."""
@@ -158,7 +200,7 @@ class Arm:
         """Return where the flange will really be, or was, in the motion under way."""
         if self._travel is None:
             return self.true_flange()
-        if not self.backlash_deg and not self.backlash_mm:
+        if not self.backlash_deg and not self.backlash_mm and not any(self.origin_errors):
             return self._seen_at(self._travel, now_ns)
         before, then = (self._travel.joints_at(t) for t in (now_ns - _LOOK_BACK_NS, now_ns))
         return forward(self.model, self._trailing(then, self._ways(before, then)))
@@ -166,17 +208,23 @@ class Arm:
     def _seen_at(self, travel: _Travel, now_ns: int) -> Pose:
         """Return where the flange is; a search asks in each millisecond, once for each beam."""
         if self._seen is None or self._seen[0] is not travel or self._seen[1] != now_ns:
-            self._seen = (travel, now_ns, travel.flange_at(now_ns))
+            if self.added_in_force:
+                flange = forward(self.model, travel.joints_at(now_ns))
+            else:
+                flange = travel.flange_at(now_ns)
+            self._seen = (travel, now_ns, flange)
         return self._seen[2]
 
-    def real_position(self, rng: random.Random, noise_mm: float) -> Pose:
-        """Return the flange pose as RealPos measures it.
+    def real_position(
+        self, rng: random.Random, noise_mm: float, model: RobotModel | None = None
+    ) -> Pose:
+        """Return the flange pose as RealPos measures it; ``model`` has the arm in force.
 
         Encoders sit before the play, so backlash does not show; X, Y and Z scatter with the
         standard deviation ``noise_mm`` (seen in a transcript: 2 um, docs/reference/epson.md 6,
         vector 11).
         """
-        pose = self.flange()
+        pose = forward(model or self.model, self._joints)
         return replace(
             pose,
             x_mm=rng.gauss(pose.x_mm, noise_mm),
@@ -206,6 +254,7 @@ class Arm:
     def start(self, legs: Sequence[Leg], now_ns: int) -> int:
         """Begin one motion made of ``legs`` and return the instant at which it ends."""
         self.halt(now_ns)
+        legs = self.guard(legs)
         last = legs[-1]
         self.motions.add(self._now_ns, lambda: _place(last.flange_at(last.duration_ns)))
         self._travel = _Travel(self._now_ns, tuple(legs))
@@ -220,10 +269,18 @@ class Arm:
         since_ns, self._now_ns = self._now_ns, max(self._now_ns, now_ns)
         if self._travel is None:
             return
+        self.travelled_until_ns = min(self._now_ns, self._travel.end_ns)
+        if self.followed is not None:
+            self.followed(since_ns, self.travelled_until_ns)
         for instant_ns in self._travel.looks(since_ns, self._now_ns):
             self._take_up(self._travel.joints_at(instant_ns))
         if self._now_ns >= self._travel.end_ns:
-            self._travel = None
+            self._end()
+
+    @property
+    def under_way(self) -> Travelled | None:
+        """What has been travelled of the motion under way, ``None`` at rest."""
+        return None if self._travel is None else self._travel.until(self._now_ns)
 
     def next_change(self) -> int | None:
         """Return when the motion under way ends, ``None`` at rest."""
@@ -239,7 +296,13 @@ class Arm:
     def halt(self, now_ns: int) -> None:
         """Stop where the arm is."""
         self.advance(now_ns)
+        self._end()
+
+    def _end(self) -> None:
+        travelled = self.under_way
         self._travel = None
+        if travelled is not None:
+            self.on_travelled(travelled)
 
     def place(self, joints: Joints, now_ns: int) -> None:
         """Put the arm somewhere by hand or pendant: not a motion that a program started.
@@ -250,6 +313,15 @@ class Arm:
         check_ranges(self.model, joints)
         self.halt(now_ns)
         self._take_up(joints)
+
+    def tell_elsewhere(self, joints: Joints) -> None:
+        """Take the arm, which stays where it is, for one that stands elsewhere.
+
+        Raises:
+            OutOfReach: A joint would stand outside its range.
+        """
+        check_ranges(self.model, joints)
+        self._joints = joints
 
     def _take_up(self, joints: Joints) -> None:
         self._turned = self._ways(self._joints, joints)
@@ -264,8 +336,17 @@ class Arm:
         plays = [self.backlash_deg / 2] * len(joints)
         for number in self.model.linear_joints:
             plays[number - 1] = self.backlash_mm / 2
-        trails = zip(joints, plays, ways, strict=True)
-        return Joints(*(value - play * way for value, play, way in trails))
+        trails = zip(joints, plays, ways, self.origin_errors, strict=True)
+        return Joints(*(value - play * way + error for value, play, way, error in trails))
+
+
+def _heedless(travelled: Travelled) -> None:
+    """Do nothing: nobody measures the drives."""
+
+
+def _whole(legs: Sequence[Leg]) -> Sequence[Leg]:
+    """Return the legs as they are: nothing stops the drives."""
+    return legs
 
 
 def _place(flange: Pose) -> Place:

@@ -11,6 +11,10 @@ LOW_POWER_TIP_MM_S: Final = 250.0
 docs/reference/epson.md 3.4)."""
 
 
+HIGHEST_SPEED_S: Final = 2000.0
+"""SpeedS in mm/s (docs/reference/spel.md 7.2)."""
+
+
 class MotionPhase(IntEnum):
     """Which part of a Jump a leg belongs to; everything else is travel."""
 

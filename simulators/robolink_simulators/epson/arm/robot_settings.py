@@ -6,11 +6,10 @@ Source: docs/reference/spel.md 6.2, 6.3, 7.2.
 from dataclasses import dataclass, field
 from typing import Final
 
+from robolink_simulators.epson.definitions.joint_origins import joint_order
+
 FINE_PULSES: Final = 10
 """Default of Fine; per model in the reference, 10 in its sample (docs/reference/spel.md 7.3)."""
-
-UP_FIRST: Final = (0b0100, 0b1011, 0, 0)
-"""Default of Hordr on four axes (docs/reference/spel.md 7.2); six move all at once (assumed)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,8 +70,7 @@ class RobotSettings:
     @classmethod
     def of(cls, axes: int) -> "RobotSettings":
         """Return the settings of a new robot with so many joints."""
-        order = UP_FIRST if axes == len(UP_FIRST) else ((1 << axes) - 1, *(0,) * (axes - 1))
-        return cls((FINE_PULSES,) * axes, order)
+        return cls((FINE_PULSES,) * axes, joint_order(axes))
 
     def reset(self) -> None:
         """Set what start-up, Motor On, SFree, SLock and Reset set back."""

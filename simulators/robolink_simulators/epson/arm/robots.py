@@ -5,7 +5,8 @@ says where they come from.
 """
 
 import csv
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from enum import StrEnum
 from functools import cache
@@ -58,6 +59,23 @@ class Range(NamedTuple):
         return self.low - 1e-9 <= value <= self.high + 1e-9
 
 
+class ArmOffsets(NamedTuple):
+    """How an added arm of a SCARA sits beside its own (docs/reference/spel.md 6.2).
+
+    Attributes:
+        j2_deg: From the line of the own second arm to that of the added one.
+        z_mm: From the own axis of U to the added one, upwards.
+        u_deg: From the own zero of U to the added one.
+    """
+
+    j2_deg: float = 0.0
+    z_mm: float = 0.0
+    u_deg: float = 0.0
+
+
+OWN_ARM: Final = ArmOffsets()
+
+
 @dataclass(frozen=True, slots=True)
 class RobotModel:
     """Geometry and drives of one robot (docs/reference/epson-robots.md, "Families").
@@ -75,6 +93,7 @@ class RobotModel:
         payload_kg: Heaviest load.
         source: Where the row comes from, by the keys of docs/reference/epson-robots.md, "Sources".
         assumed: What in the row no source gives.
+        offsets: Those of an added arm, all 0 of its own.
     """
 
     name: str
@@ -87,6 +106,7 @@ class RobotModel:
     payload_kg: float
     source: str
     assumed: str
+    offsets: ArmOffsets = OWN_ARM
 
     @property
     def evidence(self) -> Evidence:
@@ -134,6 +154,15 @@ class RobotModel:
             return (*self.lengths_mm, *(0.0,) * 6)
         a1_mm, a2_mm = self.lengths_mm
         return (a2_mm, 0.0, 0.0, a1_mm, 0.0)
+
+    def with_arm(self, values: Sequence[float]) -> "RobotModel":
+        """Return a SCARA as it moves with an added arm in force; ``values`` as ArmSet takes them.
+
+        The lengths count from the axis of joint 2 and from that of joint 1 (documented).
+        """
+        a2_mm, j2_deg, z_mm, a1_mm, u_deg = values
+        offsets = ArmOffsets(j2_deg, z_mm, u_deg)
+        return replace(self, lengths_mm=(a1_mm, a2_mm), offsets=offsets)
 
     @property
     def reach_mm(self) -> float:

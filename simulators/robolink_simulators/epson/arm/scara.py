@@ -6,7 +6,8 @@ parallel to the robot axes, hence ``U = J1 + J2 + J4``; that U is printed and ta
 brought into -180..180, is assumed (a SCARA has no flag that could tell 270 from -90). Z is joint
 3's travel, 0 at the top, negative downwards (documented). An RS has arm 2 under arm 1 where joint
 2 is 0: its second arm points against ``J1 + J2``. Sources: docs/reference/epson-robots.md, "Arms
-that fold".
+that fold". With an added arm the second arm has another length and direction, U another axis,
+height and zero: :class:`~robolink_simulators.epson.arm.robots.ArmOffsets`.
 """
 
 import math
@@ -30,7 +31,7 @@ def hand_of(model: RobotModel, joints: Joints) -> Hand:
     Righty is the arm whose elbow lies to the right of the line from base to flange, as a person's
     right elbow does (inferred).
     """
-    bend_deg = joints[1]
+    bend_deg = joints[1] + model.offsets.j2_deg
     if model.mechanism is Mechanism.FOLDED_SCARA:
         bend_deg = wrapped(bend_deg + _HALF)
     return Hand.RIGHT if bend_deg >= 0 else Hand.LEFT
@@ -52,15 +53,16 @@ def posture_of(model: RobotModel, joints: Joints) -> Posture | None:
 def forward(model: RobotModel, joints: Joints) -> Pose:
     """Return the pose of the flange (Tool 0) in the robot's base frame."""
     j1_deg, j2_deg, j3_mm, j4_deg = joints
-    inner, outer = math.radians(j1_deg), math.radians(j1_deg + j2_deg)
+    added = model.offsets
+    inner, outer = math.radians(j1_deg), math.radians(j1_deg + j2_deg + added.j2_deg)
     a1_mm, a2_mm = model.lengths_mm
     if model.mechanism is Mechanism.FOLDED_SCARA:
         a2_mm = -a2_mm
     return Pose(
         x_mm=a1_mm * math.cos(inner) + a2_mm * math.cos(outer),
         y_mm=a1_mm * math.sin(inner) + a2_mm * math.sin(outer),
-        z_mm=j3_mm,
-        u_deg=j1_deg + j2_deg + j4_deg,
+        z_mm=j3_mm + added.z_mm,
+        u_deg=j1_deg + j2_deg + j4_deg + added.u_deg,
         hand=hand_of(model, joints),
         tool=0,
         posture=posture_of(model, joints),
@@ -103,4 +105,7 @@ def solve(model: RobotModel, flange: Pose, hand: Hand, posture: Posture) -> Join
             j2_deg += 360.0 if j2_deg < 0 else -360.0
     else:
         j1_deg = within(low, high, j1_deg)
-    return Joints(j1_deg, j2_deg, flange.z_mm, flange.u_deg - j1_deg - j2_deg)
+    added = model.offsets
+    j2_deg -= added.j2_deg
+    j4_deg = flange.u_deg - added.u_deg - j1_deg - j2_deg
+    return Joints(j1_deg, j2_deg, flange.z_mm - added.z_mm, j4_deg)

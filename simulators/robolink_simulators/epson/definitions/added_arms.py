@@ -6,6 +6,7 @@ from typing import Final
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
 HIGHEST_ARM: Final = 15
+_SELECTED: Final = "in_force"
 
 
 class AddedArms:
@@ -15,12 +16,14 @@ class AddedArms:
         own: The values of arm 0, as ArmSet lists them.
 
     Attributes:
-        changes: How often one was set or cleared.
+        selected: Which is in force.
+        changes: How often one was set, cleared or put in force.
     """
 
     def __init__(self, own: Sequence[float]) -> None:
         self._own = tuple(own)
         self._added: dict[int, tuple[float, ...]] = {}
+        self.selected = 0
         self.changes = 0
 
     def is_defined(self, number: int) -> bool:
@@ -61,15 +64,28 @@ class AddedArms:
         """Forget an added arm; one that is not defined is none after it, too.
 
         Raises:
-            Refusal: Arm 0, or no such number.
+            Refusal: Arm 0, the arm in force, or no such number.
         """
         self._require_added(number)
+        if number == self.selected:
+            raise SpelRefusal(RefusalKind.ARM_IN_FORCE, f"Arm {number} is in force")
         self._added.pop(number, None)
         self.changes += 1
 
-    def to_state(self) -> dict[str, list[float]]:
+    def select(self, number: int) -> None:
+        """Put an arm in force.
+
+        Raises:
+            Refusal: It is not defined, or there is no such number.
+        """
+        self.values(number)
+        self.selected = number
+        self.changes += 1
+
+    def to_state(self) -> dict[str, object]:
         """Return what survives power-off, ready for JSON."""
-        return {str(number): list(values) for number, values in self._added.items()}
+        added = {str(number): list(values) for number, values in self._added.items()}
+        return {**added, _SELECTED: self.selected}
 
     def restore(self, state: object) -> None:
         """Take over what :meth:`to_state` returned.
@@ -79,12 +95,16 @@ class AddedArms:
         """
         if not isinstance(state, Mapping):
             raise TypeError("not the arms of a robot")
-        added = {int(number): tuple(map(float, values)) for number, values in state.items()}
+        selected = state.get(_SELECTED, 0)
+        arms = {number: values for number, values in state.items() if number != _SELECTED}
+        added = {int(number): tuple(map(float, values)) for number, values in arms.items()}
         if any(len(values) != len(self._own) for values in added.values()):
             raise ValueError("not the arms of this robot")
         if not set(added) <= set(range(1, HIGHEST_ARM + 1)):
             raise ValueError("no such arms")
-        self._added = added
+        if selected not in {0, *added}:
+            raise ValueError("no such arm in force")
+        self._added, self.selected = added, selected
 
     def _require_added(self, number: int) -> None:
         self.is_defined(number)

@@ -5,7 +5,7 @@ Source: docs/reference/spel.md 6.2.
 
 from typing import Final
 
-from robolink_simulators.epson.memory.points import Coordinates
+from robolink_simulators.epson.definitions.local_frames import Coordinates
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
 HIGHEST_CONTROL_POINT: Final = 15

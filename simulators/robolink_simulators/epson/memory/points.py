@@ -3,8 +3,8 @@
 from dataclasses import dataclass, replace
 from typing import Final
 
-from robolink.model import Hand, Pose, Posture, rotate_xy
-from robolink_simulators.cell.frames import Frame, printed_angles, zyx
+from robolink.model import Hand, Pose, Posture
+from robolink_simulators.epson.definitions.local_frames import Coordinates, Local
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
 AXES: Final = "XYZUVW"
@@ -12,9 +12,6 @@ AXES: Final = "XYZUVW"
 
 HIGHEST_POINT: Final = 999
 HIGHEST_LOCAL: Final = 15
-
-Coordinates = tuple[float, float, float, float, float, float]
-"""X, Y, Z in mm and U, V, W in degrees."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +34,7 @@ class Point:
 
     @classmethod
     def at(cls, pose: Pose) -> "Point":
-        """Return the point of a pose in the base frame."""
+        """Return the point of a pose, in the frame that the pose is in."""
         return cls(pose.coordinates(), hand=pose.hand or Hand.RIGHT, posture=pose.posture)
 
     def with_axis(self, axis: str, value: float) -> "Point":
@@ -70,52 +67,6 @@ class Point:
             a + sign * b for a, b in zip(self.coordinates, other.coordinates, strict=True)
         )
         return replace(self, coordinates=(x, y, z, u, v, w))
-
-
-@dataclass(frozen=True, slots=True)
-class Local:
-    """A local coordinate system, seen from the base (V and W are 0 on a SCARA).
-
-    Attributes:
-        base_u: Whether U of its points is that of the base (BaseU).
-    """
-
-    x_mm: float = 0.0
-    y_mm: float = 0.0
-    z_mm: float = 0.0
-    u_deg: float = 0.0
-    v_deg: float = 0.0
-    w_deg: float = 0.0
-    base_u: bool = False
-
-    @property
-    def frame(self) -> Frame:
-        """Where it stands in the base."""
-        return frame_at((self.x_mm, self.y_mm, self.z_mm, self.u_deg, self.v_deg, self.w_deg))
-
-    def to_base(self, coordinates: Coordinates) -> Coordinates:
-        """Express coordinates of this planar local in the base frame, U taken literally."""
-        x, y, z, u, v, w = coordinates
-        dx_mm, dy_mm = rotate_xy(x, y, self.u_deg)
-        turned_deg = u if self.base_u else u + self.u_deg
-        return (self.x_mm + dx_mm, self.y_mm + dy_mm, self.z_mm + z, turned_deg, v, w)
-
-    def from_base(self, coordinates: Coordinates) -> Coordinates:
-        """Express base coordinates in this planar local."""
-        x, y, z, u, v, w = coordinates
-        in_x, in_y = rotate_xy(x - self.x_mm, y - self.y_mm, -self.u_deg)
-        return (in_x, in_y, z - self.z_mm, u if self.base_u else u - self.u_deg, v, w)
-
-
-def frame_at(coordinates: Coordinates) -> Frame:
-    """Return the frame of X, Y, Z in mm and U, V, W in degrees."""
-    x, y, z, u, v, w = coordinates
-    return Frame((x, y, z), zyx(u, v, w))
-
-
-def coordinates_of_frame(frame: Frame) -> Coordinates:
-    """Return X, Y, Z in mm and U, V, W in degrees of a frame, as they are printed."""
-    return (*frame.shift_mm, *printed_angles(frame.rotation))
 
 
 class LocalTable:
@@ -165,16 +116,16 @@ class LocalTable:
             raise SpelRefusal(RefusalKind.LOCAL_NUMBER, f"There is no local {number} to clear")
         self._locals.pop(number, None)
 
+    def clear_all(self) -> None:
+        """Forget locals 1 to 15."""
+        self._locals = {0: Local()}
+
     def to_base(self, point: Point) -> Point:
         """Express a point in the base frame."""
         local = self.get(point.local)
         if point.local == 0:
             return point
-        # A local of two pairs is turned about Z alone: with BaseU its U is simply not added.
-        if self.tilting and not local.base_u:
-            coordinates = coordinates_of_frame(local.frame @ frame_at(point.coordinates))
-        else:
-            coordinates = local.to_base(point.coordinates)
+        coordinates = local.carried(point.coordinates, tilting=self.tilting)
         return replace(point, coordinates=coordinates, local=0)
 
     def convert(self, point: Point, number: int) -> Point:
@@ -184,10 +135,8 @@ class LocalTable:
         base, local = self.to_base(point), self.get(number)
         if number == 0:
             return base
-        if self.tilting and not local.base_u:
-            seen = local.frame.inverse() @ frame_at(base.coordinates)
-            return replace(base, coordinates=coordinates_of_frame(seen), local=number)
-        return replace(base, coordinates=local.from_base(base.coordinates), local=number)
+        seen = local.seen(base.coordinates, tilting=self.tilting)
+        return replace(base, coordinates=seen, local=number)
 
 
 class PointTable:

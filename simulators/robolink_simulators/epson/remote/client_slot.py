@@ -3,6 +3,7 @@
 from typing import Protocol
 
 from robolink.timing import NS_PER_S
+from robolink_simulators.device.wire_time import WireTime
 
 
 class Client(Protocol):
@@ -20,17 +21,19 @@ class ClientSlot:
 
     Args:
         remote_timeout_s: Longest silence; 0 for any.
+        wire_time: By which it is counted.
     """
 
-    def __init__(self, remote_timeout_s: float) -> None:
+    def __init__(self, remote_timeout_s: float, wire_time: WireTime) -> None:
         self._timeout_ns = round(remote_timeout_s * NS_PER_S)
+        self._wire_time = wire_time
         self._heard_ns: int | None = None
         self.client: Client | None = None
 
     def admit(self, client: Client, now_ns: int) -> None:
         """Log a client in."""
         self.client = client
-        self._heard_ns = now_ns
+        self.heard(now_ns)
 
     def hears(self, link: Client, *, cuts: bool) -> bool:
         """Tell whether a connection is listened to; whoever comes second may be cut off."""
@@ -42,7 +45,7 @@ class ClientSlot:
 
     def heard(self, now_ns: int) -> None:
         """The client sent a request."""
-        self._heard_ns = now_ns
+        self._heard_ns = self._wire_time.at(now_ns)
 
     def free(self) -> None:
         """The client logged out."""
@@ -63,7 +66,7 @@ class ClientSlot:
         counted = self.client is not None or unfinished
         if self._heard_ns is None or not self._timeout_ns or not counted:
             return None
-        return self._heard_ns + self._timeout_ns
+        return self._wire_time.simulated_at(self._heard_ns + self._timeout_ns)
 
     def overdue(self, now_ns: int, *, unfinished: bool) -> tuple[bool, Client | None]:
         """Return whether the silence has lasted too long, and whose it was; its place is free."""

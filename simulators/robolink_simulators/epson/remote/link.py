@@ -20,6 +20,7 @@ from robolink.protocols.epson_text import (
     Role,
 )
 from robolink.timing import NS_PER_S
+from robolink_simulators.device.wire_time import WireTime
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.epson.remote.exchange import PendingRequest
 from robolink_simulators.faults import Departure
@@ -37,6 +38,7 @@ class ServedRequest(Protocol):
     """The controller, as its connections see it."""
 
     options: EpsonOptions
+    wire_time: WireTime
 
     @property
     def now_ns(self) -> int:
@@ -53,6 +55,9 @@ class ServedRequest(Protocol):
 
     def leaving(self, exchange: PendingRequest, reply: bytes) -> Sequence[Departure]:
         """Count a reply and return what of it leaves, when."""
+
+    def listening(self) -> None:
+        """Be told that a request has begun which silence may end."""
 
     def announce(self, exchange: PendingRequest, reply: bytes) -> None:
         """Tell whoever watches that a reply is about to leave."""
@@ -89,8 +94,9 @@ class EpsonServerLink:
         self._late: list[Request | BadRequest] = []
         self._hung_up = False
         self._over = False
-        self._anonymous_since_ns: int | None = now_ns
-        self._silent_from_ns: int | None = None
+        self._wire_time = controller.wire_time
+        self._anonymous_since_ns: int | None = self._wire_time.at(now_ns)
+        self._silent_since_ns: int | None = None
 
     @property
     def closed(self) -> bool:
@@ -135,7 +141,7 @@ class EpsonServerLink:
         leaving = self._outbox.next_change(self._controller.now_ns)
         if leaving is not None:
             return leaving
-        login_ns, silent_ns = self._login_deadline(), self._silent_from_ns
+        login_ns, silent_ns = self._login_deadline(), self._silence_ends_ns()
         if login_ns is None or silent_ns is None:
             return silent_ns if login_ns is None else login_ns
         return min(login_ns, silent_ns)
@@ -144,8 +150,9 @@ class EpsonServerLink:
         """End a request after which nothing came; cut whoever did not log in for too long."""
         if self._late and not self._stalled:
             self._catch_up()
-        if self._silent_from_ns is not None and now_ns >= self._silent_from_ns:
-            self._silent_from_ns = None
+        silent_ns = self._silence_ends_ns()
+        if silent_ns is not None and now_ns >= silent_ns:
+            self._silent_since_ns = None
             self._end_request()
         deadline = self._login_deadline()
         if deadline is not None and now_ns >= deadline:
@@ -153,7 +160,7 @@ class EpsonServerLink:
 
     def logged_in(self, logged_in: bool, now_ns: int) -> None:
         """Start or end the wait for a login."""
-        self._anonymous_since_ns = None if logged_in else now_ns
+        self._anonymous_since_ns = None if logged_in else self._wire_time.at(now_ns)
 
     def answer(self, exchange: PendingRequest, event: Reply | Refusal) -> None:
         """Let an answer leave, as the faults planned for it allow."""
@@ -213,9 +220,10 @@ class EpsonServerLink:
     def _read(self, data: bytes) -> None:
         self._codec.receive_data(data)
         self._serve()
-        by_silence = self._serial or self._controller.options.requests_end_with_silence
-        begun = by_silence and self._codec.bytes_held
-        self._silent_from_ns = self._controller.now_ns + _SILENCE_NS if begun else None
+        if self._serial or self._controller.options.requests_end_with_silence:
+            begun = self._codec.bytes_held
+            self._silent_since_ns = self._wire_time.at(self._controller.now_ns) if begun else None
+            self._controller.listening()
 
     def _end_request(self) -> None:
         broken = self._codec.end_of_request()
@@ -236,11 +244,18 @@ class EpsonServerLink:
 
     def _end(self) -> None:
         self._over = True
-        self._anonymous_since_ns = self._silent_from_ns = None
+        self._anonymous_since_ns = self._silent_since_ns = None
         self._controller.forget(self)
 
     def _login_deadline(self) -> int | None:
         timeout_s = self._controller.options.login_timeout_s
         if self._anonymous_since_ns is None or timeout_s == 0:
             return None
-        return self._anonymous_since_ns + round(timeout_s * NS_PER_S)
+        over_ns = self._anonymous_since_ns + round(timeout_s * NS_PER_S)
+        return self._wire_time.simulated_at(over_ns)
+
+    def _silence_ends_ns(self) -> int | None:
+        """Return when a request that was begun is taken for whole."""
+        if self._silent_since_ns is None:
+            return None
+        return self._wire_time.simulated_at(self._silent_since_ns + _SILENCE_NS)

@@ -66,7 +66,7 @@ class TreeBuilder(Transformer[Token, tuple[Statement, ...]]):
         name, given = word.lower(), items or ()
         if name == "box":
             given = _with_area_local(given)
-        elif name == "local":
+        elif name in ("local", "base"):
             given = _with_words(given)
         elif name.startswith("pallet") and name != "palletclr":
             name = " ".join(name.rstrip(", \t").split())
@@ -278,7 +278,7 @@ _FEWEST_BEFORE_WORDS = 3
 
 
 def _with_words(items: Items) -> Items:
-    """Return the arguments of Local with the words at their end as texts, not as names."""
+    """Return the arguments of Local or Base with the words at their end as texts, not as names."""
     words = list[Expression]()
     while len(items) > _FEWEST_BEFORE_WORDS:
         match items[-1]:

@@ -95,6 +95,14 @@ class FileFolder:
             raise SpelRefusal(RefusalKind.FILE_DRIVE, f"There is no drive {letter}")
         self.drive, self._present = drive, ()
 
+    def write(self, name: str, content: bytes) -> None:
+        """Write a whole file; one that is there is replaced (assumed).
+
+        Raises:
+            Refusal: Its folder is not there, or it cannot be written.
+        """
+        self._carry_out(name, lambda path: path.write_bytes(content))
+
     def copy(self, source: str, target: str) -> None:
         """Copy a file; one that is there is replaced (assumed).
 

@@ -258,6 +258,10 @@ class ProgramBuilder(TreeBuilder):
         """Build VCal."""
         return VisionStatement(word.lower(), (name,))
 
+    def vision_image(self, word: Token, *items: Expression) -> VisionStatement:
+        """Build VSaveImage."""
+        return VisionStatement(word.lower(), items)
+
     def image_calibrate(
         self, word: Token, number: Expression, mounting: Expression, *ranges: PointRange
     ) -> VisionStatement:

@@ -200,7 +200,7 @@ class VisionRun:
 
 @dataclass(frozen=True, slots=True)
 class VisionStatement:
-    """VLoad, VSave, VCls, ``VCal name``, ``VxCalib number, mounting, pixels, places``."""
+    """VLoad, VSave, VCls, ``VCal name``, ``VSaveImage sequence, file``, ``VxCalib ...``."""
 
     word: str
     items: tuple[Expression, ...] = ()

@@ -26,19 +26,19 @@ PROGRAM_ONLY: Final = frozenset(_PROGRAM_WORDS.split())
 """Statements that exist in programs only (docs/reference/spel.md 13, class E)."""
 
 _WORDS_OF_OTHER_ROBOTS = """
-    brake jumptlz vsd
+    hofsjointaccuracy jumptlz
 """
 
 OF_OTHER_ROBOTS: Final = frozenset(_WORDS_OF_OTHER_ROBOTS.split())
 """Statements that the reference allows, for arms that this simulator has none of."""
 
 _WORDS_NOT_SIMULATED = """
-    areacorrectionclr areacorrectionset avgspeedclear chdisk collisiondetect peakspeedclear atrq
-    dispdev enctemper hofs mcordr msgbox olrate opencom opennet parsestr ptrq shutdown
-    syncrobots taskstate atclr calib closecom closenet close cls eresume error flush fmtstr
-    homeclr hofsjointaccuracy input inputbox latchenable line mcal ptclr randomize read redim
-    resetelapsedtime setcom setlatch setnet signal simset taskwait tmreset toff ton vcal
-    vcalpoints waitnet waitsig write writebin cont restart recover vdefgetmotionrange
+    areacorrectionclr areacorrectionset chdisk
+    dispdev enctemper msgbox opencom opennet parsestr shutdown
+    taskstate closecom closenet close cls eresume error flush fmtstr
+    input inputbox line randomize read redim
+    resetelapsedtime setcom setnet signal simset taskwait tmreset toff ton vcal
+    vcalpoints waitnet waitsig write writebin cont restart vdefgetmotionrange
     vdefsetmotionrange vshowmodel vtrain sysconfig workque_list cnv_quelist history clearhistory
 """
 
@@ -71,23 +71,23 @@ _OF_PROGRAMS_ALONE = """
 """
 
 _UNSIMULATED_FUNCTIONS = """
-    opencom chkcom currobot ptrq atrq avgspeed peakspeed olrate sense till vxcalinfo vxcalpoints
-    hand_on hand_off aio_in aio_inw aio_out aio_outw recover latchpos recoverpos lookup alignecp
-    areacorrection areacorrectiondef brake calpls collisiondetect hofs mcalcomplete mcordr
-    ptpboostok rotok syncrobots taskstate tmout vsd dispdev windowsstatus loadtype projectname$
+    opencom chkcom currobot sense till vxcalinfo vxcalpoints
+    hand_on hand_off aio_in aio_inw aio_out aio_outw lookup
+    areacorrection areacorrectiondef
+    taskstate tmout dispdev loadtype
     robotname joint restart setcom here eval
 """
 
 _WITH_A_FORM_OF_THEIR_OWN = """
     opencom opennet parsestr eresume error fmtstr input line read redim setcom setnet signal
     taskwait waitnet waitsig write writebin readbin close closecom closenet flush cont restart
-    tmreset resetelapsedtime randomize vrun vget vset vload vsave vcls vcal vxcalib
+    tmreset resetelapsedtime randomize vrun vget vset vload vsave vcls vcal vsaveimage vxcalib
 """
 
 WINDOW_ONLY: Final = frozenset(
-    ["where", "sysconfig", "workque_list", "cnv_quelist", "history", "clearhistory"]
+    ["where", "brake", "sysconfig", "workque_list", "cnv_quelist", "history", "clearhistory"]
 )
-"""Statements that no program may hold (docs/reference/spel.md 13, class D)."""
+"""Statements that no program may hold (docs/reference/spel.md 13, classes D and G)."""
 
 UNSIMULATED: Final = (
     NOT_SIMULATED | OF_OTHER_ROBOTS | frozenset(_OF_PROGRAMS_ALONE.split())

@@ -17,6 +17,7 @@ from robolink_simulators.cell.workplace import Workplace
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.vision.calibration import CameraMounting, VisionCalibration
+from robolink_simulators.epson.vision.picture_file import bitmap
 from robolink_simulators.epson.vision.project import (
     VisionObject,
     VisionProject,
@@ -165,6 +166,19 @@ class VisionSystem:
         self.runs += 1
         return took_ms
 
+    def image(self, name: str) -> bytes:
+        """Return the picture that the last run of a sequence looked at, as the content of a file.
+
+        Raises:
+            Refusal: There is no such sequence, or it has not run.
+        """
+        outcome = self._outcomes.get(self.project.sequence(name).name)
+        if outcome is None:
+            raise SpelRefusal(RefusalKind.VISION_CAMERA, f"Sequence {name} has no picture")
+        marks = (outcome.picture.tips, outcome.picture.fiducials)
+        tips, fiducials = ([find.pixel for find in finds] for finds in marks)
+        return bitmap(self._world().camera.optics.size_px, tips, fiducials)
+
     def save(self) -> None:
         """Keep the project as it is (VSave)."""
         self._saved = deepcopy(self.project)
@@ -252,7 +266,7 @@ class VisionSystem:
     def _taken(self) -> VisionPicture:
         world = self._world()
         tips, fiducials = (self._seen(world, mark) for mark in (TIP, _FIDUCIAL))
-        return VisionPicture(tips, fiducials, world.robot.flange())
+        return VisionPicture(tips, fiducials, world.told_flange())
 
     def _seen(self, world: Workplace, mark: int) -> tuple[VisionFind, ...]:
         marks = world.marks(mark)

@@ -120,7 +120,7 @@ def serve_canopen(
         ConnectError: The bus cannot be opened.
     """
     clock = clock or ScaledClock()
-    simulator.present_ns = clock.now_ns
+    simulator.keep_time(clock)
     network = _connected(place)
     host = CanopenHost(simulator, place, clock, network)
     simulator.url = simulator.url or host.url

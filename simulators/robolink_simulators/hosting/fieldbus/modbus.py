@@ -42,7 +42,7 @@ class ModbusHost(ClosedAtExit):
         self._simulator = simulator
         self._server = server
         self._cable = cable
-        self._starts = simulator.plc.starts
+        self._seen = self._ends
         self.url = url
         simulator.watchers.append(self._look)
 
@@ -57,10 +57,15 @@ class ModbusHost(ClosedAtExit):
                 self._cable.close()
 
     def _look(self) -> None:
-        """Cut the connections when the PLC was started anew; a serial line has none."""
-        if self._cable is None and self._starts != self._simulator.plc.starts:
+        """Cut connections when the PLC was started anew or its cable pulled; a line has none."""
+        if self._cable is None and self._seen != self._ends:
             self._server.cut()
-        self._starts = self._simulator.plc.starts
+        self._seen = self._ends
+
+    @property
+    def _ends(self) -> tuple[int, int]:
+        """What counts the ends of all connections."""
+        return self._simulator.plc.starts, self._simulator.plc.cuts
 
 
 def serve_modbus_tcp(
@@ -138,7 +143,7 @@ def serve_modbus_rtu(
 
 def _presented(simulator: SoftMotionSimulator, clock: ScaledClock | None) -> ScaledClock:
     clock = clock or ScaledClock()
-    simulator.present_ns = clock.now_ns
+    simulator.keep_time(clock)
     return clock
 
 

@@ -32,7 +32,7 @@ _HEARTBEAT: Final = COMMAND["client_heartbeat"].word
 class InProcessMailboxLink:
     """Implements :class:`robolink.transport.MailboxLink`; each exchange takes simulated time.
 
-    It outlives a restart of the PLC, as a serial line does.
+    It outlives a restart of the PLC, as a serial line does, and no pulled cable.
 
     Args:
         identity: Which simulator.
@@ -50,6 +50,7 @@ class InProcessMailboxLink:
         self._timeout_s = timeout_s
         self._exchange_s = simulator.options.mailbox.exchange_us / 1e6
         self._closed = False
+        self._cuts = simulator.plc.cuts
         with simulator.lock:
             simulator.hear(clock.now_ns())
 
@@ -124,8 +125,11 @@ class InProcessMailboxLink:
                     controller=self._identity,
                 )
             self._clock.advance(self._exchange_s / 2)
-            served = serve(self._clock.now_ns())  # the simulator follows before it serves
-            if served.cut or served.meets(PlcFaultAction.RESET):
+            if pulled := self._cuts != self._simulator.plc.cuts:
+                served = ServedAccess(answered=False)
+            else:
+                served = serve(self._clock.now_ns())  # the simulator follows before it serves
+            if pulled or served.cut or served.meets(PlcFaultAction.RESET):
                 raise self._ended(
                     TransportBrokenError(
                         tr("{identity} cut the connection.", identity=self._identity),

@@ -10,17 +10,20 @@ from robolink.messages import tr
 from robolink.timing import Clock
 from robolink.transport import LinkUrl
 from robolink_simulators.cell.clock import ManualClock
+from robolink_simulators.device.wire_time import WireClock
 
 
 class Hosted(Protocol):
     """What the simulators of all kinds have in common."""
 
     url: str
-    present_ns: Callable[[], int] | None
 
     @property
     def now_ns(self) -> int:
         """The instant last given."""
+
+    def keep_time(self, clock: WireClock) -> None:
+        """Take the present time from a clock."""
 
 
 Simulator = TypeVar("Simulator", bound=Hosted)
@@ -125,7 +128,7 @@ class NamedSimulators(Generic[Simulator]):
         self, name: str, simulator: Simulator, clock: ManualClock, made_with: Mapping[str, str]
     ) -> Named[Simulator]:
         simulator.url = f"{self._scheme}://{name}"
-        simulator.present_ns = clock.now_ns
+        simulator.keep_time(clock)
         self._named[name] = Named(simulator, clock, dict(made_with))
         return self._named[name]
 

@@ -63,7 +63,7 @@ class EpsonLineHost(LineHost):
         options = {"baud": str(baud or _SHOWN_BAUD), **_told(serial_dialect(simulator.options))}
         self.url = f"epson+serial://{self.cable.near}?{urlencode(options)}"
         simulator.url = simulator.url or self.url
-        simulator.present_ns = clock.now_ns
+        simulator.keep_time(clock)
         simulator.watchers.append(self.wake)
 
     def close(self) -> None:

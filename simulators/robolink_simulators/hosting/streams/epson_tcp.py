@@ -51,7 +51,7 @@ class _EpsonHost(TcpHost):
         )
         self._simulator = simulator
         simulator.url = self.url
-        simulator.present_ns = clock.now_ns
+        simulator.keep_time(clock)
         simulator.watchers.append(self.wake)
 
     def close(self) -> None:

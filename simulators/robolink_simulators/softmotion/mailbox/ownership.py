@@ -4,6 +4,7 @@ from typing import Final
 
 from robolink.protocols.mailbox import Answer, Command, ErrorClass, next_number
 from robolink.timing import NS_PER_S
+from robolink_simulators.device.wire_time import WireTime
 from robolink_simulators.softmotion.mailbox.commands.complaints import Rejected
 from robolink_simulators.softmotion.mailbox.retained import RetainedMemory
 
@@ -18,13 +19,15 @@ class MailboxOwnership:
 
     Args:
         memory: Keeps the epoch.
+        wire_time: By which the owner's silence is counted.
 
     Attributes:
         holder: Token of the owner, 0 for nobody.
     """
 
-    def __init__(self, memory: RetainedMemory) -> None:
+    def __init__(self, memory: RetainedMemory, wire_time: WireTime) -> None:
         self._memory = memory
+        self._wire_time = wire_time
         self._heard_ns = 0
         self.holder = 0
 
@@ -34,7 +37,7 @@ class MailboxOwnership:
 
     def heard(self, now_ns: int) -> None:
         """Note a sign of the owner."""
-        self._heard_ns = now_ns
+        self._heard_ns = self._wire_time.at(now_ns)
 
     def owns(self, command: Command) -> bool:
         """Tell whether a command comes from the owner, in its present epoch."""
@@ -80,9 +83,10 @@ class MailboxOwnership:
         self._take(_A_STRANGER, now_ns, insists=True, moving=False)
 
     def _take(self, owner: int, now_ns: int, *, insists: bool, moving: bool) -> None:
-        silent = now_ns - self._heard_ns >= SILENCE_NS and not moving
+        silent_ns = self._wire_time.at(now_ns) - self._heard_ns
+        silent = silent_ns >= SILENCE_NS and not moving
         if self.holder not in (0, owner) and not silent and not insists:
             raise Rejected(ErrorClass.NOT_OWNER)
         self.holder = owner
         self._memory.epoch = next_number(self._memory.epoch)
-        self._heard_ns = now_ns
+        self.heard(now_ns)

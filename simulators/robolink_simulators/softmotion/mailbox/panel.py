@@ -156,6 +156,11 @@ class PlcPanel:
         with self._acting() as now_ns:
             self._plc.program.seize(now_ns)
 
+    def cut_link(self) -> None:
+        """Pull the cable of every client; a line or a bus has no connection that would end."""
+        with self._acting():
+            self._plc.cuts += 1
+
     def restart(self) -> None:
         """Start the PLC anew; what is retained stays."""
         with self._acting() as now_ns:

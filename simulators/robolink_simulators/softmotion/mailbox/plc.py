@@ -13,6 +13,7 @@ from robolink.protocols.mailbox import (
     Words,
     next_number,
 )
+from robolink_simulators.device.wire_time import WireTime
 from robolink_simulators.softmotion.catalogue import MachineModel
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
 from robolink_simulators.softmotion.group.condition import SmcGroupState
@@ -76,8 +77,10 @@ class Plc:
         tools: Slots and the tool in force.
         program: The mailbox program since the last start.
         starts: PLC starts so far.
+        cuts: How often its cable was pulled; hosts end their connections then.
         shift: How many words behind what they mean clients read and write.
         estop_pressed: Whether the drives are kept without power.
+        wire_time: By which its program counts the silence of clients, from the next start on.
         executes_program: Whether its mailbox program is executed from its own text.
     """
 
@@ -87,6 +90,7 @@ class Plc:
         self, model: MachineModel, parameters: Mapping[str, float], options: PlcOptions
     ) -> None:
         self._options = options
+        self.wire_time = WireTime()
         self._kinematics = model.kinematics
         self.group = AxisGroup(model.kinematics, model.limits, options.group)
         self.memory = RetainedMemory(options.mailbox.device_id)
@@ -101,7 +105,7 @@ class Plc:
             order=self._order,
             identified=options.mailbox.identified,
         )
-        self.starts = 0
+        self.starts = self.cuts = 0
         self.shift = 0
         self._beating_until_ns: int | None = None
         self.estop_pressed = False
@@ -223,7 +227,12 @@ class Plc:
 
     def _new_program(self) -> MailboxProgram:
         program = MailboxProgram(
-            self.group, self.memory, self.tools, self._units, options=self._options.mailbox
+            self.group,
+            self.memory,
+            self.tools,
+            self._units,
+            options=self._options.mailbox,
+            wire_time=self.wire_time,
         )
         program.inbox.lay_words(self._order)
         return program

@@ -20,6 +20,7 @@ from robolink.protocols.mailbox import (
     WordOrder,
     opcodes_of,
 )
+from robolink_simulators.device.wire_time import WireTime
 from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
 from robolink_simulators.softmotion.mailbox.commands.complaints import Rejected
@@ -59,6 +60,7 @@ class MailboxProgram:
         tools: Serves the opcodes about tools.
         units: Of the mailbox.
         options: How the project is set up.
+        wire_time: By which the silence of clients is counted.
 
     Attributes:
         inbox: What clients have written.
@@ -76,18 +78,19 @@ class MailboxProgram:
         units: UserUnits,
         *,
         options: MailboxOptions,
+        wire_time: WireTime,
     ) -> None:
         profile = ExportProfile(options.profile)
         self.capabilities = profile.capabilities
         self.inbox = Inbox(WordOrder[options.word_order.upper()])
         self.jobs = Jobs(group)
-        self.ownership = MailboxOwnership(memory)
+        self.ownership = MailboxOwnership(memory, wire_time)
         self.permitted = True
         self._group = group
         self._memory = memory
         self._tools = tools
         self._motion = MotionDesk(group, units, self.jobs)
-        self._watch = ClientWatch()
+        self._watch = ClientWatch(wire_time)
         self._cycle_ns = options.program_cycle_us * 1000
         self._look_ns: int | None = None
         self._answer = Answer()

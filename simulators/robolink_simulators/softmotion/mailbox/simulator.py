@@ -95,11 +95,12 @@ class SoftMotionSimulator(HostedDevice):
 
     def _make(self) -> None:
         """Make the controller and its world, as they are at first."""
-        self._watchdog = FieldbusWatchdog(self.options.mailbox.watchdog_ms)
+        self._watchdog = FieldbusWatchdog(self.options.mailbox.watchdog_ms, self.wire_time)
         self._overtaken: list[tuple[int, Words]] = []
         given = dict(self._given)
         model = machine_named(self._kinematics, given)
         self.plc = self._make_plc(model, given, self.options)
+        self.plc.wire_time = self.wire_time
         self.world = SoftMotionWorld.seeded(self.plc.group, self.seed, self._parameters)
         self.panel = PlcPanel(self.plc, self.acting)
         self._mishaps = PlcMishaps(self.panel)
@@ -214,9 +215,10 @@ class SoftMotionSimulator(HostedDevice):
 
     def _renew(self) -> None:
         self.faults.forget()
-        starts = self.plc.starts
+        starts, cuts = self.plc.starts, self.plc.cuts
         self._make()
         self.plc.starts += starts  # hosts cut their links when they see another number
+        self.plc.cuts = cuts
 
     def _moment(self) -> dict[str, Any]:
         return {

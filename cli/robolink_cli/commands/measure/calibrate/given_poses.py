@@ -247,7 +247,8 @@ def _agree_to_write(tool: int, *, yes: bool) -> None:
             remedy=tr("Run it on a terminal, or give --yes. Nothing was written."),
         )
     question = tr(
-        "Nobody witnessed these touches, and nothing has proved them. Write this to tool {tool}?",
+        "Nobody saw these touches, and nothing has tested them. Write them to tool {tool} "
+        "all the same? 'robolink undo' takes it back.",
         tool=tool,
     )
     agree(question, yes=False)
@@ -256,13 +257,13 @@ def _agree_to_write(tool: int, *, yes: bool) -> None:
 def _show_end(report: ToolReport) -> None:
     tool = report.proposal.tool
     if report.receipt is not None and report.receipt.skipped:
-        say(tr("Tool {tool} held this value already; nothing was written.", tool=tool))
+        say(tr("Tool {tool} has this value already. Nothing was written.", tool=tool))
     else:
         say(tr("Tool {tool} is written and read back.", tool=tool))
     say(
         tr(
-            "Nothing moved, so it was not proved by turning about the new tip. To prove it, turn "
-            "the tip on a pin in tool {tool}, or run 'robolink calibrate two-pose --tool {tool}'.",
+            "Not tested yet. To test: turn the tip on a pin in tool {tool}, or run 'robolink "
+            "calibrate two-pose --tool {tool}'.",
             tool=tool,
         )
     )

@@ -127,8 +127,8 @@ def _own_options() -> tuple[Callable[[Callable[..., Any]], Callable[..., Any]], 
             default=USUAL_CHANGE_MM,
             show_default=True,
             help=declared(
-                "Largest plausible change against the stored offset; more than the cell allows "
-                "takes an engineer."
+                "Largest change against the stored offset that is believed; more than the "
+                "cell allows takes an engineer."
             ),
         ),
         click.option(

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 from robolink_simulators.epson.arm.trajectory import Leg
+from robolink_simulators.epson.spel.execution.settling import settling_ns
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.statements.blending import blends, fall_ns
 from robolink_simulators.epson.spel.statements.jump import DESCENT
@@ -42,10 +43,14 @@ def begin_motion(evaluator: Evaluator, motion: MotionStatement, start_ns: int) -
     legs, until = plan(evaluator, motion), motion.options.until
     machine.till_met = machine.sensed = False
     way_ns = _travelled_ns(motion, legs)
+    if motion.verb.startswith("jump"):
+        machine.robot.jump = start_ns, tuple(leg.duration_ns for leg in legs)
     if evaluator.blends and blends(machine, motion):
-        end_ns = machine.arm.start(legs, start_ns)
-        outcome = StatementOutcome(duration_ns=end_ns - start_ns - fall_ns(legs[-1]))
-        return MotionStart(outcome, legs[-1], travelled_ns=way_ns)
+        lasts_ns = machine.arm.start(legs, start_ns) - start_ns
+        if lasts_ns >= sum(leg.duration_ns for leg in legs):
+            # What the drives cut short does not slow down before it rests.
+            lasts_ns -= fall_ns(legs[-1])
+        return MotionStart(StatementOutcome(duration_ns=lasts_ns), legs[-1], travelled_ns=way_ns)
     if until is None:
         return MotionStart(StatementOutcome(legs=legs), travelled_ns=way_ns)
     if until.word == "sense":
@@ -60,6 +65,7 @@ def begin_motion(evaluator: Evaluator, motion: MotionStatement, start_ns: int) -
         return MotionStart(StatementOutcome(), travelled_ns=way_ns)
     end_ns = machine.arm.start(legs, start_ns)
     watch.foresee(start_ns, end_ns)
+    end_ns += settling_ns(evaluator.session, legs)
     outcome = StatementOutcome(duration_ns=end_ns - start_ns)
     return MotionStart(outcome, legs[-1], watch, way_ns)
 

@@ -4,18 +4,22 @@ The command window carries a line out so, a task of a program each statement tha
 the machine: what a statement means does not depend on who says it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from robolink.timing import NS_PER_S
 from robolink_simulators.epson.arm.trajectory import Leg
+from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.execution.instant_effects import effect
 from robolink_simulators.epson.spel.execution.motion_start import begin_motion
+from robolink_simulators.epson.spel.execution.recovering import recover
+from robolink_simulators.epson.spel.execution.settling import settling_ns
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.values import truth
 from robolink_simulators.epson.spel.statements.blending import rest_of_way
 from robolink_simulators.epson.spel.statements.keywords import StatementOutcome
+from robolink_simulators.epson.spel.statements.motion import plan, require_drives
 from robolink_simulators.epson.spel.statements.until import DescentWatch, Watch
 from robolink_simulators.epson.spel.statements.waiting import (
     NEVER_NS,
@@ -78,6 +82,8 @@ class StatementExecution:
         self._waiting: Waiting | None = None
         self._meanwhile: StatementExecution | None = None
         self._aim: Leg | None = None
+        self._reserved: MotionStatement | None = None
+        self._held = self._released = False
         self._done = False
 
     @property
@@ -104,11 +110,29 @@ class StatementExecution:
         """Whether its motion is under way."""
         return self._aim is not None and self._evaluator.session.machine.arm.moving
 
+    @property
+    def stands(self) -> bool:
+        """Whether its motion is reserved and waits for SyncRobots."""
+        return self._reserved is not None and not self._done and self._evaluator.carries(self)
+
+    def start_reserved(self, now_ns: int) -> None:
+        """Begin the motion that was reserved; one that is held begins when it goes on (assumed)."""
+        if self._held:
+            self._released = True
+        elif self._reserved is not None:
+            motion, self._reserved = self._reserved, None
+            options = replace(motion.options, words=motion.options.words - {"sync"})
+            self._pending.append(replace(motion, options=options))
+            self._busy_until_ns = now_ns
+            self._attempt(now_ns)
+
     def suspend(self, now_ns: int) -> None:
         """Stop the motion where it is; nothing is done until :meth:`go_on`."""
-        if self.travels:
+        if self._reserved is not None:
+            self._held = True
+        elif self.travels:
             self._evaluator.session.machine.arm.halt(now_ns)
-        else:
+        elif now_ns >= self._busy_until_ns:  # else the safeguard has stopped it just now
             self._aim = None
 
     def go_on(self, now_ns: int) -> None:
@@ -119,7 +143,18 @@ class StatementExecution:
         """
         machine = self._evaluator.session.machine
         self._seen_ns = now_ns
-        if self._aim is not None:
+        try:
+            self._resume(machine, now_ns)
+        except SpelRefusal as refusal:
+            self.refuse(refusal)
+
+    def _resume(self, machine: Machine, now_ns: int) -> None:
+        if self._reserved is not None:
+            self._held = False
+            if self._released:
+                self.start_reserved(now_ns)
+        elif self._aim is not None:
+            require_drives(machine)
             self._busy_until_ns = machine.arm.start([rest_of_way(machine, self._aim)], now_ns)
         elif self._waiting is not None:
             self._waiting.restart(now_ns)
@@ -153,7 +188,12 @@ class StatementExecution:
         elif self._meanwhile is not None:
             # The next statement waits for what stands inside !...! (docs/reference/spel.md 7.1).
             self._busy_until_ns = self._meanwhile.due_ns(self._seen_ns)
-        elif self._pending:
+        else:
+            self._evaluator.session.machine.robot.guard.require_no_error()
+            self._begin_next()
+
+    def _begin_next(self) -> None:
+        if self._pending:
             self._aim = None
             self._run(self._pending.pop())
         else:
@@ -162,7 +202,7 @@ class StatementExecution:
     def due_ns(self, seen_ns: int) -> int:
         """Return when it has to be looked at again."""
         self.saw(seen_ns)
-        return NEVER_NS if self._done else self._change_ns
+        return seen_ns + 1 if self._done else self._change_ns
 
     def _go_on_meanwhile(self, now_ns: int) -> None:
         """Carry out what is due of that which stands inside ``!...!``."""
@@ -193,6 +233,8 @@ class StatementExecution:
     @property
     def _change_ns(self) -> int:
         """When something is due: an end of waiting, an edge, the end of the statement."""
+        if self._reserved is not None:
+            return NEVER_NS
         if self._waiting is not None:
             return self._waiting.next_look(self._seen_ns)
         change_ns = self._busy_until_ns
@@ -245,8 +287,16 @@ class StatementExecution:
         if outcome.legs:
             self._aim = outcome.legs[-1]
             self._busy_until_ns = machine.arm.start(outcome.legs, start_ns)
+            self._busy_until_ns += settling_ns(self._evaluator.session, outcome.legs)
         self._duration_ns = outcome.duration_ns
         self._busy_until_ns += outcome.duration_ns
+
+    def _reserve(self, motion: MotionStatement) -> StatementOutcome:
+        """Keep a motion with SYNC for SyncRobots; what it could not do is refused now (assumed)."""
+        robot = self._evaluator.session.machine.robot
+        plan(self._evaluator, motion)
+        self._reserved, robot.reservation = motion, self
+        return StatementOutcome()
 
     def _begin(self, motion: MotionStatement) -> StatementOutcome:
         machine, start_ns = self._evaluator.session.machine, self._busy_until_ns
@@ -300,10 +350,13 @@ class StatementExecution:
         match statement:
             case KeywordStatement("wait"):
                 return self._wait(statement)
+            case KeywordStatement("recover"):
+                return StatementOutcome(duration_ns=recover(self._evaluator, statement))
             case If():
                 return self._branch(statement)
             case MotionStatement(verb) if verb != "curve":
-                return self._begin(statement)
+                reserves = "sync" in statement.options.words
+                return self._reserve(statement) if reserves else self._begin(statement)
             case Distance(percent):
                 return self._wait_for_distance(percent)
             case _:

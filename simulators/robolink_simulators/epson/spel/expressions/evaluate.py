@@ -7,13 +7,8 @@ from typing import Any, Final
 from robolink.model import Elbow, Hand, Wrist, rotate_xy
 from robolink_simulators.cell.frames import X_AXIS, Y_AXIS, Z_AXIS, Frame, about, product
 from robolink_simulators.epson.arm.kinematics import PLAIN
-from robolink_simulators.epson.memory.points import (
-    AXES,
-    HIGHEST_LOCAL,
-    Point,
-    coordinates_of_frame,
-    frame_at,
-)
+from robolink_simulators.epson.definitions.local_frames import coordinates_of_frame, frame_at
+from robolink_simulators.epson.memory.points import AXES, HIGHEST_LOCAL, Point
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.request_refusals import RequestRefused
 from robolink_simulators.epson.spel.expressions.closures import Run, Scope, check_count, closure
@@ -116,6 +111,10 @@ class Evaluator:
             Refusal: The command window has none open.
         """
         raise SpelRefusal(RefusalKind.NOT_SIMULATED, f"Port {channel} of the command window")
+
+    def carries(self, statement: object) -> bool:  # noqa: ARG002
+        """Tell whether a statement that it has begun is still being carried out by it."""
+        return True
 
     def closure(self, expression: Expression) -> Run:
         """Return what works an expression out; the last ones are remembered.

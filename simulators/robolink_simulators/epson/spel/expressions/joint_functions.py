@@ -72,7 +72,7 @@ def _joints(session: Session, arguments: Arguments) -> Joints:
 
 
 def _joint_point(machine: Machine, joints: Joints) -> Point:
-    return Point.at(machine.tip_at(joints))
+    return machine.point_at(machine.tip_at(joints))
 
 
 def of_angles(session: Session, arguments: Arguments) -> Point:
@@ -195,14 +195,14 @@ def with_least_motion(session: Session, arguments: Arguments) -> Point:
     if not machine.model.six_axes:
         return target
     near = None
-    if len(arguments) > 1 and as_point(arguments[1]) != Point.at(machine.tip()):
+    if len(arguments) > 1 and as_point(arguments[1]) != machine.here():
         near = machine.joints_for(as_point(arguments[1]))
     flag = as_integer(arguments[2]) if len(arguments) > 2 else 1
     return machine.flagged(target, least_motion(machine, target, flag, near))
 
 
 def _hand(session: Session, arguments: Arguments) -> Value:
-    hand = as_point(arguments[0]).hand if arguments else session.machine.arm.hand
+    hand = as_point(arguments[0]).hand if arguments else session.machine.robot.hand
     return _HANDS[hand]
 
 
@@ -210,7 +210,7 @@ def _of_posture(read: Callable[[Posture], int]) -> Callable[[Session, Arguments]
     """Return a function of a point's posture, or the arm's; a SCARA's is that of no flags."""
 
     def tell(session: Session, arguments: Arguments) -> Value:
-        posture = as_point(arguments[0]).posture if arguments else session.machine.arm.posture
+        posture = as_point(arguments[0]).posture if arguments else session.machine.robot.posture
         return read(posture or PLAIN)
 
     return tell
@@ -225,7 +225,7 @@ def _of_singular_place(joint: int) -> Callable[[Session, Arguments], Value]:
 
     def tell(session: Session, arguments: Arguments) -> Value:
         require_singular_angle(session.machine.model, joint)
-        posture = as_point(arguments[0]).posture if arguments else session.machine.arm.posture
+        posture = as_point(arguments[0]).posture if arguments else session.machine.robot.posture
         told = posture or PLAIN
         return (told.j1_angle_deg if joint == 1 else told.j4_angle_deg) or 0.0
 

@@ -7,7 +7,6 @@ from datetime import datetime, timedelta
 from typing import Final
 
 from robolink.model import ToolOffset
-from robolink.timing import NS_PER_S
 from robolink_simulators.epson.arm.kinematics import forward
 from robolink_simulators.epson.memory.bits import BitBank
 from robolink_simulators.epson.memory.driven_robot import DrivenRobot
@@ -25,6 +24,20 @@ from robolink_simulators.epson.spel.expressions.defined.differences import (
     turned_tool,
 )
 from robolink_simulators.epson.spel.expressions.defined.drive_settings import DRIVE_FUNCTIONS
+from robolink_simulators.epson.spel.expressions.defined.orientations import (
+    ORIENTATION_FUNCTIONS,
+    aligned,
+)
+from robolink_simulators.epson.spel.expressions.defined.origins import (
+    NS_PER_HOUR,
+    ORIGIN_FUNCTIONS,
+)
+from robolink_simulators.epson.spel.expressions.defined.torques import TORQUE_FUNCTIONS
+from robolink_simulators.epson.spel.expressions.defined.travel_times import TRAVEL_FUNCTIONS
+from robolink_simulators.epson.spel.expressions.defined.unfinished import (
+    UNFINISHED_FUNCTIONS,
+    place_to_recover,
+)
 from robolink_simulators.epson.spel.expressions.defined.xy_limits import (
     LIMIT_FUNCTIONS,
     corner_of_limits,
@@ -50,7 +63,6 @@ from robolink_simulators.epson.spel.expressions.values import (
 )
 from robolink_simulators.epson.spel.session import Session
 
-NS_PER_HOUR: Final = 3600 * NS_PER_S
 _PER_HOUR: Final = (1, 60, 3600)
 _CLOCK_AT_START: Final = datetime(2026, 1, 1, 8)  # noqa: DTZ001 - a controller has no zone
 
@@ -95,19 +107,6 @@ def _reachable(session: Session, arguments: Arguments) -> Value:
 def _distance(_: Session, arguments: Arguments) -> Value:
     a, b = (as_point(argument).coordinates[:3] for argument in arguments)
     return math.dist(a, b)
-
-
-def _at_home(session: Session, _: Arguments) -> Value:
-    home = session.machine.settings.home_pulses
-    machine = session.machine
-    return home is not None and list(home) == pulses_of(machine, machine.arm.joints)
-
-
-def _home(session: Session, arguments: Arguments) -> Value:
-    home = session.machine.settings.home_pulses
-    if home is None:
-        raise SpelRefusal(RefusalKind.HOME_UNDEFINED, "No home position is set")
-    return _item(home, arguments)
 
 
 def _pulses(session: Session, arguments: Arguments) -> Value:
@@ -174,6 +173,12 @@ def _robot(session: Session, arguments: Arguments) -> DrivenRobot:
     return machine.numbered(as_integer(arguments[0])) if arguments else machine.robot
 
 
+def _reserved(session: Session, _: Arguments) -> Value:
+    """Return a bit for each robot whose motion is reserved, bit 0 for robot 1."""
+    robots = enumerate(session.machine.robots)
+    return sum(1 << bit for bit, robot in robots if robot.reserved is not None)
+
+
 def _calibration_information(session: Session, arguments: Arguments) -> Value:
     number, which = (as_integer(argument) for argument in arguments)
     return session.machine.image_calibrations.information(number, which)
@@ -188,6 +193,11 @@ MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     **LIMIT_FUNCTIONS,
     **AREA_FUNCTIONS,
     **DRIVE_FUNCTIONS,
+    **TORQUE_FUNCTIONS,
+    **TRAVEL_FUNCTIONS,
+    **ORIGIN_FUNCTIONS,
+    **ORIENTATION_FUNCTIONS,
+    **UNFINISHED_FUNCTIONS,
     "pagl": (range(2, 3), joint_of_point),
     "ppls": (range(2, 3), pulses_of_point),
     "avoidsingularity": (range(1), lambda s, _: s.machine.settings.avoid_singularity),
@@ -211,9 +221,8 @@ MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     "targetok": (range(1, 2), _reachable),
     "dist": (range(2, 3), _distance),
     "js": (range(1), lambda s, _: s.machine.sensed),
-    "athome": (range(2), _at_home),
+    "athome": (range(1), lambda s, _: s.machine.robot.at_home),
     "homedef": (range(1), lambda s, _: s.machine.settings.home_pulses is not None),
-    "homeset": (range(1, 2), _home),
     "accelmax": (range(1, 2), lambda s, _: s.options.accel_max),
     "speedfactor": (range(1), lambda s, _: s.machine.settings.speed_factor),
     "cp": (range(1), lambda s, _: int(s.machine.settings.continuous_path)),
@@ -256,6 +265,8 @@ MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     "iodef": (range(1, 2), lambda s, a: as_text(a[0]).lower() in s.machine.io_labels),
     "pnumber": (range(1, 2), _point_number),
     "vxcalinfo": (range(2, 3), _calibration_information),
+    "latchstate": (range(1), lambda s, _: s.machine.robot.latch.complete),
+    "syncrobots": (range(1), _reserved),
     "ctrldev": (range(1), lambda s, _: s.machine.control_device),
 }
 """Name to the numbers of arguments allowed and the function."""
@@ -315,12 +326,12 @@ def _on_pallet(session: Session, arguments: Arguments) -> Point:
 
 
 def _here(session: Session, _: Arguments) -> Point:
-    return Point.at(session.machine.tip())
+    return session.machine.here()
 
 
 def _real_position(session: Session, _: Arguments) -> Point:
     noise_mm = session.options.real_pos_noise_mm
-    return Point.at(session.machine.real_tip(session.rng, noise_mm))
+    return session.machine.point_at(session.machine.real_tip(session.rng, noise_mm))
 
 
 def _found_position(session: Session, _: Arguments) -> Point:
@@ -328,6 +339,16 @@ def _found_position(session: Session, _: Arguments) -> Point:
         # What FindPos gives before anything was found is not documented: an error here.
         raise SpelRefusal(RefusalKind.POINT_UNDEFINED, "No Find has met its condition")
     return session.machine.found
+
+
+def _latched_position(session: Session, arguments: Arguments) -> Point:
+    """LatchPos([WithToolArm | WithoutToolArm[, number]]): of the tool in force, or Tool 0."""
+    robot, numbers = session.machine.robot, [as_integer(argument) for argument in arguments]
+    bare, number = (*numbers, 0, 1)[:2] if len(numbers) != 1 else (numbers[0], 1)
+    if bare not in (0, 1):
+        raise out_of_range(f"LatchPos({bare})")
+    joints = robot.latch.position(number)
+    return robot.point_at(forward(robot.model, joints) if bare else robot.tip_at(joints))
 
 
 def _tool_point(session: Session, arguments: Arguments) -> Point:
@@ -361,6 +382,10 @@ POINT_FUNCTIONS: Final[dict[str, tuple[range, PointFunction]]] = {
     "curpos": (range(1), _here),
     "realpos": (range(1), _real_position),
     "findpos": (range(1), _found_position),
+    "latchpos": (range(3), _latched_position),
+    "recoverpos": (range(2), place_to_recover),
+    "align": (range(1, 4), aligned),
+    "alignecp": (range(2, 3), aligned),
     "tlset": (range(1, 2), _tool_point),
     "local": (range(1, 2), _local_point),
     "xylim": (range(1, 2), corner_of_limits),

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 from robolink_simulators.epson.condition import Mode, Task
+from robolink_simulators.epson.memory.driven_robot import DrivenRobot
 from robolink_simulators.epson.spel.expressions.values import (
     Value,
     as_integer,
@@ -54,12 +55,13 @@ def _controller(session: Session, arguments: Arguments) -> Value:
         | flags.error << 10
         | flags.serious_error << 11
         | flags.warning << 12
+        | any(robot.recovers_to is not None for robot in session.machine.robots) << 13
     )
     told = {
         1: ready,
         4: int(options.dry_run),
         5: session.machine.control_device,
-        6: 1,
+        6: len(session.machine.robots),
         7: 1,
         9: _VERSION[options.rc_plus],
     }
@@ -92,6 +94,7 @@ def _stat(session: Session, arguments: Arguments) -> Value:
         1: machine.sensed
         | machine.till_met << 1
         | machine.motors_on << 4
+        | machine.robot.at_home << 5
         | (not machine.power_high) << 6
         | (_engaged_bits(machine.model.axes) if machine.motors_on else 0),
         2: 0,
@@ -102,16 +105,21 @@ def _stat(session: Session, arguments: Arguments) -> Value:
     return int(words[index])
 
 
+def _brakes(robot: DrivenRobot) -> tuple[bool, ...]:
+    """Return which joints a brake holds; of a SCARA, whose brakes are not simulated, none."""
+    return robot.brakes_closed if robot.model.six_axes else ()
+
+
 def _robot(session: Session, arguments: Arguments) -> Value:
     """Return RobotInfo(i)."""
     machine = session.machine
     words = {
         0: machine.motors_on << 3 | machine.power_high << 4 | 1 << 8 | machine.till_met << 14,
-        1: 0,
-        2: 0,
+        1: (machine.robot.recovers_to is not None) << 1,
+        2: int(machine.robot.at_home),
         3: (1 << machine.model.axes) - 1 if machine.motors_on else 0,
         4: 0,
-        5: 0,
+        5: sum(closed << bit for bit, closed in enumerate(_brakes(machine.robot))),
     }
     index = as_integer(arguments[0])
     if index not in words:
@@ -146,6 +154,8 @@ STATE_FUNCTIONS: Final[dict[str, tuple[range, StateFunction]]] = {
     "folderexists": (range(1, 2), lambda s, a: s.files.exists(as_text(a[0]), folder=True)),
     "curdir$": (range(1), lambda s, _: s.files.present),
     "curdrive$": (range(1), lambda s, _: s.files.drive.upper()),
+    "windowsstatus": (range(1), lambda *_: 0),  # neither a PC nor RC+ is connected (assumed)
+    "projectname$": (range(1), lambda s, _: s.project_name),
     "tw": (range(1), lambda s, _: s.memory.timed_out),
 }
 """Name to the numbers of arguments allowed and the function."""

@@ -7,7 +7,7 @@ this one has ended (assumed simplification), what stands between them does not w
 from robolink_simulators.epson.arm.trajectory import JointLeg, Leg
 from robolink_simulators.epson.arm.ways.arch import ArchedLeg
 from robolink_simulators.epson.machine import Machine
-from robolink_simulators.epson.spel.statements.legs import go_leg, line_leg
+from robolink_simulators.epson.spel.legs import go_leg, line_leg
 from robolink_simulators.epson.spel.tree import MotionStatement
 
 _SAME_NS = 1000

@@ -10,7 +10,7 @@ from robolink_simulators.epson.definitions.arches import Arch
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
-from robolink_simulators.epson.spel.statements.legs import go_leg, line_leg
+from robolink_simulators.epson.spel.legs import go_leg, line_leg
 
 DESCENT = 2
 """Which leg of a Jump is the descent; Sense is looked at just before it (documented)."""
@@ -37,7 +37,8 @@ def jump(
         raise SpelRefusal(RefusalKind.OTHER_ROBOT, "Jump is not for six axes; Jump3 is")
     height_mm = machine.parameters.limz_mm
     if limz_mm is not None:
-        height_mm = limz_mm + machine.locals.get(point.local).z_mm
+        local, base = machine.locals.get(point.local), machine.kept.base
+        height_mm = limz_mm + local.z_mm + base.coordinates[2]
     start, end = machine.arm.joints, machine.joints_for(point)
     for joints, what in ((start, "The motion starts"), (end, "The target lies")):
         if joints.j3_mm > height_mm + machine.robot.drives.get("limzmargin")[0]:
@@ -73,4 +74,4 @@ def jump3(machine: Machine, points: tuple[Point, Point, Point]) -> list[Leg]:
 
 def _joints(machine: Machine, tip: Pose) -> Joints:
     flange = flange_of(machine.model, tip, machine.offset)
-    return solve(machine.model, flange, tip.hand or machine.arm.hand, tip.posture)
+    return solve(machine.model, flange, tip.hand or machine.robot.hand, tip.posture)

@@ -12,7 +12,6 @@ from robolink.timing import NS_PER_S
 from robolink_simulators.epson.arm.joints import Joints
 from robolink_simulators.epson.arm.trajectory import Leg
 from robolink_simulators.epson.memory.bits import BitBank
-from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.joint_functions import (
@@ -25,16 +24,18 @@ from robolink_simulators.epson.spel.expressions.machine_functions import clock_o
 from robolink_simulators.epson.spel.expressions.printing import CRLF, number_text
 from robolink_simulators.epson.spel.expressions.values import out_of_range
 from robolink_simulators.epson.spel.file_commands import FILE_COMMANDS
+from robolink_simulators.epson.spel.legs import go_leg
 from robolink_simulators.epson.spel.point_file_commands import POINT_FILE_COMMANDS
 from robolink_simulators.epson.spel.statements.defined.areas import AREA_STATEMENTS
+from robolink_simulators.epson.spel.statements.defined.base import BASE_STATEMENTS
 from robolink_simulators.epson.spel.statements.defined.locals_and_pallets import (
     PLACE_STATEMENTS,
 )
+from robolink_simulators.epson.spel.statements.defined.sync import SYNC_STATEMENTS
 from robolink_simulators.epson.spel.statements.defined.xy_limits import require_within_limits
-from robolink_simulators.epson.spel.statements.legs import go_leg
 from robolink_simulators.epson.spel.statements.motion import require_drives
 from robolink_simulators.epson.spel.statements.points import POINT_STATEMENTS, point_argument
-from robolink_simulators.epson.spel.statements.ports_and_bits import BIT_STATEMENTS
+from robolink_simulators.epson.spel.statements.ports_and_bits import BIT_STATEMENTS, set_latch
 from robolink_simulators.epson.spel.statements.robot import ROBOT_SETTINGS
 from robolink_simulators.epson.spel.statements.settings import SETTINGS, accel
 from robolink_simulators.epson.spel.statements.waiting import (
@@ -43,6 +44,9 @@ from robolink_simulators.epson.spel.statements.waiting import (
     shown_condition,
 )
 from robolink_simulators.epson.spel.tree import Expression, KeywordStatement
+
+LATCH_SETTING_NS: Final = 40_000_000
+"""How long SetLatch takes (documented, p. 721)."""
 
 SHORTEST_PULSE_S: Final = 0.01
 LONGEST_PULSE_S: Final = 10.0
@@ -140,7 +144,7 @@ def _where(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
     arguments, session = _expect(command, 0, 1), evaluator.session
     machine = session.machine
     local = evaluator.integer(arguments[0]) if arguments else 0
-    here = machine.locals.convert(Point.at(machine.tip()), local)
+    here = machine.locals.convert(machine.here(), local)
     joints = machine.arm.joints
     printed = PrintedWhere(here.coordinates, tuple(joints), tuple(pulses_of(machine, joints)))
     linear = machine.model.linear_joints
@@ -305,16 +309,6 @@ def _line_of_where(evaluator: Evaluator, line: int) -> str:
     return shown.splitlines()[line] + CRLF
 
 
-def _base(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
-    """Show the base, or accept the one that there is."""
-    if not command.arguments:
-        values = ", ".join(["0.000"] * 6)
-        return StatementOutcome(f"Base: {values}{CRLF}")
-    if any(point_argument(evaluator, command.arguments).coordinates):
-        raise SpelRefusal(RefusalKind.NOT_SIMULATED, "The base cannot be moved here")
-    return StatementOutcome()
-
-
 def _reset(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
     """Reset parameters and outputs; errors are the device's to clear.
 
@@ -328,6 +322,11 @@ def _reset(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
     return StatementOutcome()
 
 
+def _set_latch(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
+    set_latch(evaluator, command)
+    return StatementOutcome(duration_ns=LATCH_SETTING_NS)
+
+
 _MAY_END_OPEN: Final = frozenset({"plist", "plane"})
 
 _AT_ONCE: Final = {
@@ -335,6 +334,8 @@ _AT_ONCE: Final = {
     **POINT_STATEMENTS,
     **PLACE_STATEMENTS,
     **AREA_STATEMENTS,
+    **BASE_STATEMENTS,
+    **SYNC_STATEMENTS,
     **FILE_COMMANDS,
     **POINT_FILE_COMMANDS,
 }
@@ -346,7 +347,6 @@ _HANDLERS: Final[dict[str, Callable[[Evaluator, KeywordStatement], StatementOutc
     "tool": _tool,
     "where": _where,
     "joint": _joint,
-    "base": _base,
     "pulse": _pulse,
     "home": _home,
     "jtran": _turn_joint,
@@ -368,4 +368,5 @@ _HANDLERS: Final[dict[str, Callable[[Evaluator, KeywordStatement], StatementOutc
     "find": _keep_condition,
     "sense": _keep_condition,
     "reset": _reset,
+    "setlatch": _set_latch,
 }

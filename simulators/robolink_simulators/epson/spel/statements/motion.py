@@ -5,26 +5,29 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
-from robolink.model import Pose, rotate_xy
-from robolink_simulators.cell.frames import Frame, add, axis_and_angle, product, transposed
-from robolink_simulators.epson.arm.kinematics import frame_of
+from robolink.model import rotate_xy
+from robolink_simulators.cell.frames import Frame, add, product
 from robolink_simulators.epson.arm.trajectory import Leg
 from robolink_simulators.epson.definitions.arches import GATE, Arch
-from robolink_simulators.epson.machine import Machine
-from robolink_simulators.epson.memory.points import (
+from robolink_simulators.epson.definitions.local_frames import (
     Coordinates,
-    Point,
     coordinates_of_frame,
     frame_at,
 )
+from robolink_simulators.epson.machine import Machine
+from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+from robolink_simulators.epson.spel.expressions.defined.orientations import (
+    LEAST_TURN_DEG,
+    turn_deg,
+)
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.joint_functions import least_motion
 from robolink_simulators.epson.spel.expressions.values import out_of_range
+from robolink_simulators.epson.spel.legs import go_leg, held_leg, line_leg
 from robolink_simulators.epson.spel.statements.defined.curves import curve_leg
 from robolink_simulators.epson.spel.statements.defined.xy_limits import require_within_limits
 from robolink_simulators.epson.spel.statements.jump import jump, jump3
-from robolink_simulators.epson.spel.statements.legs import go_leg, held_leg, line_leg
 from robolink_simulators.epson.spel.statements.through_points import ARC_VERBS, arc, passing
 from robolink_simulators.epson.spel.tree import (
     MotionStatement,
@@ -34,20 +37,20 @@ from robolink_simulators.epson.spel.tree import (
 )
 
 _SAME_MM = 0.001
-_SAME_DEG = 0.001
 
 # LJM leaves a SCARA's point unchanged (documented); TGo and BGo move six axes
 # the least. An arch rounds Jump; Jump3 comes to rest at its corners under each (assumed).
 _UNTIL_WORDS: Final = frozenset({"till", "find"})
-_LINE_WORDS: Final = frozenset({"cp", "rot"}) | _UNTIL_WORDS
+_JOINT_WORDS: Final = frozenset({"cp", "sync"}) | _UNTIL_WORDS
+_LINE_WORDS: Final = frozenset({"rot"}) | _JOINT_WORDS
 _ARCH_WORDS: Final = frozenset(f"c{n}" for n in range(GATE + 1))
-_GATE_WORDS: Final = frozenset({"cp", "sense", "c"}) | _ARCH_WORDS | _UNTIL_WORDS
+_GATE_WORDS: Final = frozenset({"sense", "c"}) | _ARCH_WORDS | _JOINT_WORDS
 _WORDS: Final = {
-    "go": frozenset({"cp", "ljm"}) | _UNTIL_WORDS,
-    "tgo": frozenset({"cp"}) | _UNTIL_WORDS,
-    "bgo": frozenset({"cp"}) | _UNTIL_WORDS,
+    "go": frozenset({"ljm"}) | _JOINT_WORDS,
+    "tgo": _JOINT_WORDS,
+    "bgo": _JOINT_WORDS,
     "pass": frozenset({"cp", "ljm"}),
-    "cvmove": frozenset({"cp"}) | _UNTIL_WORDS,
+    "cvmove": _JOINT_WORDS,
     "move": _LINE_WORDS | {"ecp"},
     "tmove": _LINE_WORDS,
     "bmove": _LINE_WORDS,
@@ -77,8 +80,6 @@ def plan(evaluator: Evaluator, motion: MotionStatement) -> list[Leg]:
 
 def _planned(evaluator: Evaluator, motion: MotionStatement) -> list[Leg]:
     machine = evaluator.session.machine
-    if "sync" in motion.options.words:
-        raise SpelRefusal(RefusalKind.NOT_SIMULATED, "Robots that start together with SYNC")
     wrong = motion.options.words - _WORDS[motion.verb]
     if wrong:
         raise SpelRefusal(RefusalKind.SYNTAX, f"{motion.verb} knows no {', '.join(sorted(wrong))}")
@@ -161,9 +162,11 @@ def require_drives(machine: Machine) -> None:
     """Hold a motion back that the drives would not carry out.
 
     Raises:
-        Refusal: The motors are off, or a joint is free (documented for SFree, but not its
-            number).
+        Refusal: The motors are off, a joint is free (documented for SFree, but not its number), or
+            a motion of the robot waits for SyncRobots (assumed).
     """
+    if machine.robot.reserved is not None:
+        raise SpelRefusal(RefusalKind.ROBOT_IN_USE, "A motion of the robot is reserved")
     if not machine.motors_on:
         raise SpelRefusal(RefusalKind.MOTORS_OFF, "Motors are off")
     if machine.settings.free_joints:
@@ -177,7 +180,7 @@ def _absolute(_: Machine, point: Point) -> Point:
 
 def _in_tool(machine: Machine, point: Point) -> Point:
     """Shift along the axes of the selected tool; the hand stays (documented)."""
-    tip = Point.at(machine.tip())
+    tip = machine.here()
     if machine.model.six_axes:
         there = frame_at(tip.coordinates) @ frame_at(point.coordinates)
         return replace(tip, coordinates=coordinates_of_frame(there))
@@ -193,7 +196,7 @@ def _in_local(machine: Machine, point: Point) -> Point:
 
     That six axes turn about the axes of that local is assumed.
     """
-    here = machine.locals.convert(Point.at(machine.tip()), point.local)
+    here = machine.locals.convert(machine.here(), point.local)
     if not machine.model.six_axes:
         return here.plus(point)
     seen, by = frame_at(here.coordinates), frame_at(point.coordinates)
@@ -221,16 +224,9 @@ def _line(machine: Machine, target: Point, *, rot: bool) -> Leg:
     """
     end, tip = machine.pose_of(target), machine.tip()
     travels = math.dist(end.coordinates()[:3], tip.coordinates()[:3]) > _SAME_MM
-    turns = _turn_deg(machine, tip, end) > _SAME_DEG
+    turns = turn_deg(machine, tip, end) > LEAST_TURN_DEG
     if turns and not travels and not rot:
         raise out_of_range("The motion only turns the tool: ROT is needed")
     if rot and travels and not turns:
         raise out_of_range("ROT, but the tool does not turn")
     return line_leg(machine, tip, end, near=machine.arm.joints)
-
-
-def _turn_deg(machine: Machine, start: Pose, end: Pose) -> float:
-    if not machine.model.six_axes:
-        return abs(end.u_deg - start.u_deg)
-    before, after = frame_of(start).rotation, frame_of(end).rotation
-    return axis_and_angle(product(after, transposed(before)))[1]

@@ -44,7 +44,7 @@ def point_argument(evaluator: Evaluator, arguments: tuple[Expression, ...]) -> P
 def _here(evaluator: Evaluator, command: KeywordStatement) -> str:
     (target,) = _expect(command, 1)
     machine = evaluator.session.machine
-    machine.points.store(evaluator.stored_number(target), Point.at(machine.tip()))
+    machine.points.store(evaluator.stored_number(target), machine.here())
     return ""
 
 

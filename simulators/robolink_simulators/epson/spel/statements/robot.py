@@ -19,7 +19,9 @@ from robolink_simulators.epson.spel.statements.defined.added_arms import ARM_SET
 from robolink_simulators.epson.spel.statements.defined.arches import ARCH_SETTINGS
 from robolink_simulators.epson.spel.statements.defined.drive_settings import DRIVE_STATEMENTS
 from robolink_simulators.epson.spel.statements.defined.joint_ranges import RANGE_STATEMENTS
+from robolink_simulators.epson.spel.statements.defined.origins import ORIGIN_STATEMENTS
 from robolink_simulators.epson.spel.statements.defined.xy_limits import LIMIT_SETTINGS
+from robolink_simulators.epson.spel.statements.torques import TORQUE_STATEMENTS
 
 Numbers = Sequence[Number]
 Setting = Callable[[Machine, Numbers], str]
@@ -67,6 +69,8 @@ def _fine(machine: Machine, values: Numbers) -> str:
     if not values:
         return ", ".join(map(str, machine.settings.fine_pulses)) + CRLF
     machine.settings.fine_pulses = tuple(int(_within(value, 0, _HIGHEST_FINE)) for value in values)
+    # The one of Fine and FineDist counts that was said last (assumed).
+    machine.robot.drives.set("finedist", (0.0,))
     return ""
 
 
@@ -167,6 +171,8 @@ ROBOT_SETTINGS: Final[dict[str, Setting]] = {
     **LIMIT_SETTINGS,
     **DRIVE_STATEMENTS,
     **RANGE_STATEMENTS,
+    **TORQUE_STATEMENTS,
+    **ORIGIN_STATEMENTS,
     "weight": _weight,
     "inertia": _inertia,
     "fine": _fine,

@@ -8,6 +8,7 @@ Everything else shows its number alone, as a bare Tool does (assumed).
 from collections.abc import Callable, Sequence
 from typing import Final
 
+from robolink_simulators.epson.arm.motion_parameters import HIGHEST_SPEED_S
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.printing import CRLF, number_text
@@ -18,9 +19,6 @@ Setting = Callable[[Machine, Numbers], str]
 
 HIGHEST_ACCEL_S: Final = 25_000.0
 """AccelS in mm/s2 of most SCARA robots (docs/reference/spel.md 7.2)."""
-
-HIGHEST_SPEED_S: Final = 2000.0
-"""SpeedS in mm/s (docs/reference/spel.md 7.2)."""
 
 HIGHEST_SPEED_R: Final = 1000.0
 """SpeedR in degrees/s (docs/reference/spel.md 7.2)."""

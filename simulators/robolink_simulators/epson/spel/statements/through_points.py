@@ -5,12 +5,14 @@ behind it, a radius, ARC_SHORT or ARC_LONG, ARC_PLUS or ARC_MINUS. ARC_SHORT or 
 points says that they are the end and the centre.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import accumulate, pairwise
 from typing import Final
 
 from robolink.model import Pose
 from robolink_simulators.epson.arm.arc import (
+    MeasuredWay,
     level_about,
     level_by_angle,
     level_by_radius,
@@ -19,12 +21,13 @@ from robolink_simulators.epson.arm.arc import (
     space_through,
 )
 from robolink_simulators.epson.arm.trajectory import Leg
+from robolink_simulators.epson.definitions.local_frames import frame_at
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.values import Number
-from robolink_simulators.epson.spel.statements.legs import go_leg, held_leg, seen_from, way_leg
+from robolink_simulators.epson.spel.legs import go_leg, held_leg, seen_from, way_leg
 from robolink_simulators.epson.spel.tree import (
     LabelledPoint,
     Literal,
@@ -61,7 +64,7 @@ def arc(evaluator: Evaluator, motion: MotionStatement) -> Leg:
             _require_the_hand(mid, end)
             if held:
                 return held_leg(machine, end, space_through(*_seen(machine, start, mid, end)))
-            through = space_through if space else level_through
+            through = space_through if space else _level(machine, level_through)
             return way_leg(machine, end, through(start, mid, end))
         case (2, 1, _) if in_order:
             end, centre = points
@@ -69,14 +72,31 @@ def arc(evaluator: Evaluator, motion: MotionStatement) -> Leg:
             if held:
                 way = space_about(*_seen(machine, start, end, centre), long=long)
                 return held_leg(machine, end, way)
-            about = space_about if space else level_about
-            return way_leg(machine, end, about(start, end, centre, long=long))
+            about = partial(space_about if space else level_about, long=long)
+            level = about if space else _level(machine, about)
+            return way_leg(machine, end, level(start, end, centre))
         case (1, 1, False) if in_order:
             (end,) = points
-            return way_leg(machine, end, level_by_angle(start, end, float(numbers[0])))
+            by_angle = _level(machine, lambda a, b: level_by_angle(a, b, float(numbers[0])))
+            return way_leg(machine, end, by_angle(start, end))
         case (1, 3, False) if in_order:
             return _of_radius(evaluator, points[0], numbers)
     raise SpelRefusal(RefusalKind.SYNTAX, f"{motion.verb} does not take these")
+
+
+def _level(machine: Machine, made: Callable[..., MeasuredWay]) -> Callable[..., MeasuredWay]:
+    """Return what makes a level arc: level is the XY plane of the base (documented)."""
+    base = machine.kept.base
+    if not base.leans:
+        return made
+
+    def in_the_base(*tips: Pose) -> MeasuredWay:
+        seen = (Pose(*base.seen(tip.coordinates()), tip.hand) for tip in tips)
+        way, length_mm = made(*seen)
+        frame = frame_at(base.coordinates)
+        return lambda share: frame.point(way(share)), length_mm
+
+    return in_the_base
 
 
 def _seen(machine: Machine, *tips: Pose) -> tuple[Pose, Pose, Pose]:
@@ -91,10 +111,12 @@ def _seen(machine: Machine, *tips: Pose) -> tuple[Pose, Pose, Pose]:
 def _of_radius(evaluator: Evaluator, end: Pose, numbers: Sequence[Number]) -> Leg:
     machine = evaluator.session.machine
     radius_mm, path, sense = numbers
-    way = level_by_radius(
-        machine.tip(), end, float(radius_mm), long=path == _LONG, positive=sense == _PLUS
-    )
-    return way_leg(machine, end, way)
+    long, positive = path == _LONG, sense == _PLUS
+
+    def made(start: Pose, there: Pose) -> MeasuredWay:
+        return level_by_radius(start, there, float(radius_mm), long=long, positive=positive)
+
+    return way_leg(machine, end, _level(machine, made)(machine.tip(), end))
 
 
 def worth_of(evaluator: Evaluator, target: Target) -> Point | Number:

@@ -13,9 +13,13 @@ _WORDS = """
     homeset inertia limz local motor power pulse range sfree slock speed speeds speedr tlset
     tlclr tool weight till find sense jtran arch armclr xylim xylimclr xylimmode limzmargin
     finedist performmode ptpboost qpdecelr qpdecels tclim tcspeed limittorque qp olaccel softcp
-    speedrlimitation tc jrange ptran hordr finedist
+    speedrlimitation tc jrange ptran hordr finedist calib mcal mcordr homeclr
+    syncrobots latchenable setlatch
 """
 FORBIDDEN: Final = frozenset(_WORDS.split())
+_ALONE: Final = frozenset({"home", "slock", "xylimclr", "mcal", "homeclr"})
+"""Those that act without an argument; without one the others show what they set."""
+
 _BOUND: Final = frozenset({TaskKind.NO_ABORT, TaskKind.BACKGROUND})
 
 
@@ -27,5 +31,5 @@ def forbidden_in(kind: TaskKind, statement: Statement) -> bool:
         case MotionStatement():
             return True
         case KeywordStatement(name, arguments):
-            return name in FORBIDDEN and bool(arguments or name in ("home", "slock", "xylimclr"))
+            return name in FORBIDDEN and bool(arguments or name in _ALONE)
     return False

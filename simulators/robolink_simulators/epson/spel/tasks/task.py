@@ -166,6 +166,14 @@ class SpelTask(Evaluator):
         else:
             waiting.suspend(now_ns)
 
+    def carries(self, statement: object) -> bool:
+        """Tell whether it still waits for a statement that it has begun."""
+        waiting = self.waiting
+        if isinstance(waiting, OneAfterAnother):
+            waiting = waiting.present
+        waits = isinstance(waiting, StatementWaiting) and waiting.execution is statement
+        return waits and not self.ended
+
     @property
     def present_ns(self) -> int:
         """The instant of what is being carried out, inside ``!...!`` too."""

@@ -3,6 +3,7 @@
 from typing import Final
 
 from robolink.protocols.mailbox import beats_for
+from robolink_simulators.device.wire_time import WireTime
 
 PATIENCE_NS: Final = 500_000_000
 """Without a new beat for this long, what moves is halted (docs/mailbox.md, "What ends by
@@ -10,9 +11,14 @@ itself")."""
 
 
 class ClientWatch:
-    """Knows when the last beat came, and when the next one is due."""
+    """Knows when the last beat came, and when the next one is due.
 
-    def __init__(self) -> None:
+    Args:
+        wire_time: By which the time between beats is counted.
+    """
+
+    def __init__(self, wire_time: WireTime) -> None:
+        self._wire_time = wire_time
         self._word = 0
         self._heard_ns = 0
         self._since_ns: int | None = None
@@ -24,7 +30,7 @@ class ClientWatch:
         self._word = word
         if not beats_for(word, epoch):
             return False
-        self._heard_ns = now_ns
+        self._heard_ns = self._wire_time.at(now_ns)
         return True
 
     def watch(self, *, moving: bool, now_ns: int) -> None:
@@ -32,7 +38,7 @@ class ClientWatch:
         if not moving:
             self._since_ns = None
         elif self._since_ns is None:
-            self._since_ns = now_ns
+            self._since_ns = self._wire_time.at(now_ns)
 
     @property
     def zeroed(self) -> bool:
@@ -44,4 +50,5 @@ class ClientWatch:
         """When patience ends, ``None`` while nothing is supervised."""
         if self._since_ns is None:
             return None
-        return max(self._since_ns, self._heard_ns) + PATIENCE_NS
+        heard_ns = max(self._since_ns, self._heard_ns)
+        return self._wire_time.simulated_at(heard_ns + PATIENCE_NS)

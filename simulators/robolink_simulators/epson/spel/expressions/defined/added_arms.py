@@ -16,7 +16,7 @@ def _value(session: Session, arguments: Sequence[Value]) -> Value:
 
 
 ARM_FUNCTIONS: Final[dict[str, tuple[range, Callable[[Session, Sequence[Value]], Value]]]] = {
-    "arm": (range(1), lambda *_: 0),
+    "arm": (range(1), lambda s, _: s.machine.kept.arms.selected),
     "armdef": (range(1, 2), lambda s, a: s.machine.kept.arms.is_defined(as_integer(a[0]))),
     "armset": (range(2, 3), _value),
 }

@@ -31,7 +31,7 @@ def _table(robot: DrivenRobot, word: str) -> AreaTable[CheckBox] | AreaTable[Che
 
 
 def _holds(session: Session, robot: DrivenRobot, area: CheckBox | CheckPlane) -> bool:
-    tip = Point.at(robot.tip_on_the_way(session.machine.inputs.instant_ns))
+    tip = robot.point_at(robot.tip_on_the_way(session.machine.inputs.instant_ns))
     local = area.local if isinstance(area, CheckBox) else 0
     return area.holds(robot.locals.convert(tip, local).coordinates)
 

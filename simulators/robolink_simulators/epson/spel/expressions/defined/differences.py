@@ -9,7 +9,8 @@ from typing import Final
 
 from robolink_simulators.cell.frames import Frame
 from robolink_simulators.epson.arm.kinematics import frame_of
-from robolink_simulators.epson.memory.points import Point, coordinates_of_frame
+from robolink_simulators.epson.definitions.local_frames import coordinates_of_frame
+from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.spel.expressions.values import (
     Value,
     as_integer,

@@ -1,17 +1,18 @@
-"""VRun, VGet and VSet (docs/reference/vision.md 1)."""
+"""VRun, VGet, VSet and VSaveImage (docs/reference/vision.md 1)."""
 
 from collections.abc import Callable
 
 from robolink.messages import tr
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.values import as_integer, as_text
-from robolink_simulators.epson.spel.line_tree import VisionAccess, VisionRun
+from robolink_simulators.epson.spel.line_tree import VisionAccess, VisionRun, VisionStatement
 from robolink_simulators.epson.spel.programs.emitter import Emitter
 from robolink_simulators.epson.spel.programs.scope import Reference
 from robolink_simulators.epson.spel.tasks.compiled import Operation
 from robolink_simulators.epson.spel.tasks.task import SpelTask, TaskKind
 from robolink_simulators.epson.spel.tasks.waits import Blocking
 from robolink_simulators.epson.spel.tree import ByReference, Expression, Name
+from robolink_simulators.epson.vision.picture_file import SUFFIX
 from robolink_simulators.epson.vision.system import RESULTS, VisionSystem
 
 _NS_PER_MS = 1_000_000
@@ -91,6 +92,24 @@ def compile_access(emitter: Emitter, node: VisionAccess) -> Operation:
             if value is not None:
                 variable = target(t)
                 variable.values[0] = variable.kind.store(value)
+
+    return go
+
+
+def compile_image(emitter: Emitter, node: VisionStatement) -> Operation:
+    """``VSaveImage sequence, file``: the picture of the last run, into the controller's folder.
+
+    Raises:
+        ProgramFault: It makes no sense.
+    """
+    sequence, given = node.items
+    name, file = named(emitter, sequence), emitter.run(given)
+
+    def go(t: SpelTask) -> None:
+        path = as_text(file(t))
+        if not path.lower().endswith(SUFFIX):
+            raise SpelRefusal(RefusalKind.NOT_SIMULATED, f"A picture of another kind than {SUFFIX}")
+        t.session.files.write(path, vision_of(t).image(name(t)))
 
     return go
 

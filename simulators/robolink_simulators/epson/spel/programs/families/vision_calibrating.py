@@ -10,7 +10,11 @@ from robolink_simulators.epson.refusals import RaisedError
 from robolink_simulators.epson.spel.expressions.values import as_integer
 from robolink_simulators.epson.spel.line_tree import VisionStatement
 from robolink_simulators.epson.spel.programs.emitter import Emitter
-from robolink_simulators.epson.spel.programs.families.vision import named, vision_of
+from robolink_simulators.epson.spel.programs.families.vision import (
+    compile_image,
+    named,
+    vision_of,
+)
 from robolink_simulators.epson.spel.tasks.compiled import Operation
 from robolink_simulators.epson.spel.tasks.task import SpelTask
 from robolink_simulators.epson.spel.tasks.waits import (
@@ -74,8 +78,8 @@ def _calibrating(t: SpelTask, name: str, poses: tuple[Pose, ...]) -> Iterator[Ta
         t.now_ns += _SETTLING_NS
         machine.advance(t.now_ns)
         pixels.append(vision.target())
-        at = machine.tip()
-        places.append((at.x_mm, at.y_mm))
+        x_mm, y_mm, *_ = machine.here().coordinates
+        places.append((x_mm, y_mm))
     vision.calibrate(name, pixels, places)
 
 
@@ -107,6 +111,7 @@ VISION_STATEMENTS: Final[dict[str, Callable[[Emitter, VisionStatement], Operatio
     "vload": _take,
     "vcls": _clear_graphics,
     "vcal": _calibrate,
+    "vsaveimage": compile_image,
     "vxcalib": _calibrate_image,
 }
 """Statements about the vision project and its calibrations."""

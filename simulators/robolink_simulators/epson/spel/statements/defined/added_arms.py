@@ -1,7 +1,4 @@
-"""Arm, ArmSet and ArmClr (docs/reference/spel.md 6.2, 7.3).
-
-What the offsets of an added arm do to its movement is not described, so none can be put in force.
-"""
+"""Arm, ArmSet and ArmClr (docs/reference/spel.md 6.2, 7.3)."""
 
 from collections.abc import Callable, Sequence
 from typing import Final
@@ -22,12 +19,13 @@ def _listed(number: int, values: Sequence[float]) -> str:
 def _arm(machine: Machine, values: Sequence[Number]) -> str:
     match values:
         case []:
-            return "0" + CRLF
+            return f"{machine.kept.arms.selected}" + CRLF
         case [number]:
-            machine.kept.arms.values(int(number))
-            if number:
-                text = f"Arm {number} cannot move: what its offsets do is not described"
-                raise SpelRefusal(RefusalKind.NOT_SIMULATED, text)
+            if number and machine.model.six_axes:
+                # Which of its twelve values are angles of which joints is not described.
+                machine.kept.arms.values(int(number))
+                raise SpelRefusal(RefusalKind.NOT_SIMULATED, "An added arm of six axes")
+            machine.robot.put_in_force(int(number))
             return ""
     raise _miscounted("Arm", values)
 

@@ -1,8 +1,8 @@
 """Curve and CVMove: a free curve is stored, and travelled (docs/reference/spel.md 7.1).
 
 ``Curve "name", O | C, mode, axes, points``: open or closed; mode 2 keeps the tool along the curve,
-the upper four bits of a mode name an external control point. Both at once, and mode 2 on six axes,
-are not described and refused.
+the upper four bits of a mode name an external control point. Both at once are not described and
+refused.
 """
 
 import math
@@ -14,7 +14,10 @@ from robolink_simulators.epson.arm.kinematics import frame_of
 from robolink_simulators.epson.arm.tilted_legs import TiltedLeg, require_same_posture
 from robolink_simulators.epson.arm.trajectory import Leg
 from robolink_simulators.epson.arm.ways.curve import CurveLeg, SmoothWay, plan_curve, through, when
-from robolink_simulators.epson.arm.ways.turned_curve import plan_turned_curve, smooth_course_through
+from robolink_simulators.epson.arm.ways.turned_curve import (
+    plan_turned_curve,
+    smooth_course_through,
+)
 from robolink_simulators.epson.definitions.curves import (
     AXES_OF_CURVES,
     SIX_AXES,
@@ -24,13 +27,13 @@ from robolink_simulators.epson.definitions.curves import (
     Place,
 )
 from robolink_simulators.epson.machine import Machine
-from robolink_simulators.epson.memory.points import Point, frame_at
+from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.refusals import OutOfReach, RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.defined.xy_limits import outside_limits_mm
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.values import Number, as_text, out_of_range
+from robolink_simulators.epson.spel.legs import line_pace
 from robolink_simulators.epson.spel.session import Session
-from robolink_simulators.epson.spel.statements.legs import line_pace
 from robolink_simulators.epson.spel.statements.through_points import worth_of
 from robolink_simulators.epson.spel.tree import (
     LabelledPoint,
@@ -85,11 +88,10 @@ def _mode(evaluator: Evaluator, target: Target) -> tuple[int, bool]:
     control_point, low = divmod(chosen, _LOW_MODES)
     if low not in (0, TANGENTIAL):
         raise SpelRefusal(RefusalKind.NOT_SIMULATED, "A curve of another mode than 0 and 2")
-    if low and (control_point or machine.model.six_axes):
-        raise SpelRefusal(
-            RefusalKind.NOT_SIMULATED,
-            "A tool that follows a curve on six axes, or past an external control point",
-        )
+    if low and control_point:
+        # Whether the tangent lies in the plane of the point or of the workpiece is not said.
+        text = "A tool that follows a curve past an external control point"
+        raise SpelRefusal(RefusalKind.NOT_SIMULATED, text)
     if control_point:
         machine.control_points.get(control_point)
     return control_point, bool(low)
@@ -102,14 +104,11 @@ def _whole(worth: Point | Number) -> int:
 
 
 def _axes(machine: Machine, count: int) -> int:
-    """Return how many axes a curve rules.
+    """Return how many axes a curve rules: 2, 3 and 4 are not for six axes (documented).
 
     Raises:
-        Refusal: There is no such curve, or, on six axes, it rules fewer: what the others then do is
-            not described.
+        Refusal: There is no such curve of this robot.
     """
-    if machine.model.six_axes and count in AXES_OF_CURVES:
-        raise SpelRefusal(RefusalKind.NOT_SIMULATED, f"A curve of {count} axes on six")
     usual = (SIX_AXES,) if machine.model.six_axes else AXES_OF_CURVES
     if count not in usual:
         raise out_of_range(f"A curve of {count} axes")
@@ -119,7 +118,7 @@ def _axes(machine: Machine, count: int) -> int:
 def _control_point(machine: Machine, curve: FreeCurve) -> Frame | None:
     if not curve.control_point:
         return None
-    return frame_at(machine.control_points.get(curve.control_point))
+    return machine.robot.control_point(curve.control_point)
 
 
 def _smooth_way(machine: Machine, curve: FreeCurve) -> SmoothWay:
@@ -129,7 +128,8 @@ def _smooth_way(machine: Machine, curve: FreeCurve) -> SmoothWay:
         way = through(curve.places, closed=closed)
         return way.along_itself() if curve.tangential else way
     tips = [_pose(place) for place in curve.places]
-    return smooth_course_through(machine.model, tips, point=point, closed=closed)
+    way = smooth_course_through(machine.model, tips, point=point, closed=closed)
+    return way.along_itself() if curve.tangential else way
 
 
 def curve_leg(evaluator: Evaluator, motion: MotionStatement) -> Leg:

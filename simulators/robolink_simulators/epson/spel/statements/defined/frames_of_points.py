@@ -17,7 +17,7 @@ from robolink_simulators.cell.frames import (
     transposed,
 )
 from robolink_simulators.epson.arm.joints import wrapped
-from robolink_simulators.epson.memory.points import Coordinates, coordinates_of_frame
+from robolink_simulators.epson.definitions.local_frames import Coordinates, coordinates_of_frame
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
 _SHORTEST_MM: Final = 1e-3

@@ -5,7 +5,7 @@ from dataclasses import astuple
 from typing import Final
 
 from robolink.protocols.spel import decimal
-from robolink_simulators.epson.memory.points import Local
+from robolink_simulators.epson.definitions.local_frames import Local
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.printing import CRLF

@@ -8,11 +8,11 @@ from robolink_simulators.cell.frames import Frame
 from robolink_simulators.epson.arm.arc import MeasuredWay
 from robolink_simulators.epson.arm.joints import Joints
 from robolink_simulators.epson.arm.kinematics import frame_of
-from robolink_simulators.epson.arm.motion_parameters import MotionPhase
+from robolink_simulators.epson.arm.motion_parameters import HIGHEST_SPEED_S, MotionPhase
+from robolink_simulators.epson.arm.ramps import Ramp
 from robolink_simulators.epson.arm.tilted_legs import plan_about_point, plan_line, plan_way
-from robolink_simulators.epson.arm.trajectory import JointLeg, Leg, LinePace, plan_go
+from robolink_simulators.epson.arm.trajectory import JointLeg, JointPace, Leg, LinePace, plan_go
 from robolink_simulators.epson.machine import Machine
-from robolink_simulators.epson.memory.points import frame_at
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
 _PERCENT = 100
@@ -26,14 +26,42 @@ def go_leg(
     Raises:
         OutOfReach: The end lies outside a joint's range.
     """
+    pace, drives = joint_pace(machine, phase), machine.robot.drives
+    leg = _planned(machine, start, end, pace)
+    boost = 1.0 + drives.get("ptpboost")[phase] / _PERCENT
+    if not is_short(leg):
+        return leg
+    accel, decel = pace.accel_percent * boost, pace.decel_percent * boost
+    return _planned(machine, start, end, replace(pace, accel_percent=accel, decel_percent=decel))
+
+
+def is_short(leg: JointLeg) -> bool:
+    """Tell whether a point-to-point leg is too short for its speed: PTPBoost counts for it.
+
+    That it is these is read from the help on PTPBoost, docs/reference/spel.md 7.2.
+    """
+    return leg.ramp is None or (isinstance(leg.ramp, Ramp) and not leg.ramp.cruise_s)
+
+
+def joint_pace(machine: Machine, phase: MotionPhase = MotionPhase.TRAVEL) -> JointPace:
+    """Return the pace of a point-to-point leg, scaled by SpeedFactor, held by TCSpeed."""
     pace = machine.parameters.joint_pace(power_high=machine.power_high, phase=phase)
     factor = machine.settings.speed_factor / _PERCENT
-    pace = replace(
+    return replace(
         pace,
-        speed_percent=pace.speed_percent * factor,
+        speed_percent=min(pace.speed_percent * factor, _held_percent(machine)),
         accel_percent=pace.accel_percent * factor,
         decel_percent=pace.decel_percent * factor,
     )
+
+
+def _held_percent(machine: Machine) -> float:
+    """Return the highest speed that torque control allows, in percent (documented)."""
+    drives = machine.robot.drives
+    return drives.get("tcspeed")[0] if drives.is_on("tc") else _PERCENT
+
+
+def _planned(machine: Machine, start: Joints, end: Joints, pace: JointPace) -> JointLeg:
     offset = machine.offset
     radius_mm = 0.0
     if offset is not None:
@@ -95,7 +123,7 @@ def _point_in_force(machine: Machine) -> Frame:
     number = machine.control_points.selected
     if not number:
         raise SpelRefusal(RefusalKind.ECP_UNDEFINED, "No external control point is in force")
-    return frame_at(machine.control_points.get(number))
+    return machine.robot.control_point(number)
 
 
 def way_leg(machine: Machine, end: Pose, way: MeasuredWay) -> Leg:
@@ -116,11 +144,15 @@ def way_leg(machine: Machine, end: Pose, way: MeasuredWay) -> Leg:
 
 
 def line_pace(machine: Machine) -> LinePace:
-    """Return the pace of a straight leg, scaled by SpeedFactor."""
+    """Return the pace of a straight leg, scaled by SpeedFactor, held by TCSpeed.
+
+    That TCSpeed counts from the highest SpeedS there is, is assumed.
+    """
     pace = machine.parameters.line_pace(power_high=machine.power_high)
     factor = machine.settings.speed_factor / _PERCENT
+    held_mm_s = HIGHEST_SPEED_S * _held_percent(machine) / _PERCENT
     return LinePace(
-        pace.speed_mm_s * factor,
+        min(pace.speed_mm_s * factor, held_mm_s),
         pace.accel_mm_s2 * factor,
         pace.decel_mm_s2 * factor,
         pace.turn_deg_s * factor,

@@ -1,0 +1,47 @@
+"""The time in which two machines count each other's silence.
+
+A client at the other end of a real wire lives in real time, however simulated time is hastened:
+at twenty times its pace a minute of silence would be three seconds, and 500 ms between two
+heartbeats 25 ms, which a busy computer needs for nothing at all. So such patience is counted in
+simulated seconds that pass no faster than real ones. Where simulated time runs in step with real
+time or behind it, and in the process, where a client itself lets it pass, the two are the same.
+"""
+
+from typing import Protocol
+
+
+class WireClock(Protocol):
+    """A clock that knows of both times."""
+
+    def now_ns(self) -> int:
+        """Return the simulated time."""
+
+    def wire_at(self, now_ns: int) -> int:
+        """Return the time on the wire at a simulated instant that is hardly past."""
+
+    def simulated_at(self, wire_ns: int) -> int:
+        """Return when, as things are, the time on the wire is that."""
+
+
+class WireTime:
+    """What a simulated controller counts silence by; the time it is given while nobody hosts it.
+
+    Attributes:
+        clock: That of its host, or none.
+    """
+
+    __slots__ = ("clock",)
+
+    def __init__(self) -> None:
+        self.clock: WireClock | None = None
+
+    def at(self, now_ns: int) -> int:
+        """Return the time on the wire at a simulated instant that is hardly past, in ns."""
+        return now_ns if self.clock is None else self.clock.wire_at(now_ns)
+
+    def simulated_at(self, wire_ns: int) -> int:
+        """Return the simulated instant, in ns, at which the wire's time is or was that.
+
+        Of a time to come it is an estimate, right as long as the pace stays: ask again.
+        """
+        return wire_ns if self.clock is None else self.clock.simulated_at(wire_ns)

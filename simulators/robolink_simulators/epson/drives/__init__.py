@@ -1,0 +1,1 @@
+"""What a robot's drives give: estimated torques, what is measured of them, what stops them."""

@@ -5,7 +5,9 @@ moves here; of PerformMode, QPDecelR, QPDecelS, OLAccel, SoftCP, SpeedRLimitatio
 none does: they are kept, told and put back.
 """
 
+from collections.abc import Mapping
 from enum import Enum
+from functools import lru_cache
 from typing import Final, NamedTuple
 
 
@@ -98,7 +100,7 @@ class DriveSettings:
 
     def takes(self, word: str) -> tuple[int, ...]:
         """Return how many values a setting may be given."""
-        return tuple(self._axes if n == OF_EACH_JOINT else n for n in DRIVE_SETTINGS[word].counts)
+        return _counts(self._axes, DRIVE_SETTINGS[word])
 
     def set(self, word: str, values: tuple[float, ...]) -> None:
         """Keep the values of a setting; one stands for all that there are."""
@@ -107,6 +109,19 @@ class DriveSettings:
 
     def put_back(self, *occasions: RestoredAt) -> None:
         """Put back what some occasions put back."""
-        for word, setting in DRIVE_SETTINGS.items():
-            if setting.put_back in occasions:
-                self.set(word, (setting.usual,))
+        for occasion in occasions:
+            self._values.update(_usual_at(self._axes, occasion))
+
+
+def _counts(axes: int, setting: DriveSetting) -> tuple[int, ...]:
+    return tuple(axes if n == OF_EACH_JOINT else n for n in setting.counts)
+
+
+@lru_cache(maxsize=32)
+def _usual_at(axes: int, occasion: RestoredAt) -> Mapping[str, tuple[float, ...]]:
+    """Return what an occasion puts back on a robot of so many joints; robots share it."""
+    return {
+        word: (setting.usual,) * _counts(axes, setting)[0]
+        for word, setting in DRIVE_SETTINGS.items()
+        if setting.put_back is occasion
+    }

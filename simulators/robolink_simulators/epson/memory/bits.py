@@ -59,7 +59,9 @@ class BitBank:
         no_bit: RefusalKind = RefusalKind.IO_BIT,
         no_byte: RefusalKind = RefusalKind.IO_BYTE,
     ) -> None:
-        self._bits = [False] * size
+        self._size = size
+        # One whole number: a list of 1024 would take 8 KB, of which a process holds thousands.
+        self._bits = 0
         self._no_bit = no_bit
         self._no_byte = no_byte
 
@@ -70,7 +72,7 @@ class BitBank:
             Refusal: There is no such bit.
         """
         self._check(number)
-        return self._bits[number]
+        return bool(self._bits >> number & 1)
 
     def set(self, number: int, on: bool) -> None:
         """Switch one bit.
@@ -79,7 +81,7 @@ class BitBank:
             Refusal: There is no such bit.
         """
         self._check(number)
-        self._bits[number] = on
+        self._bits = self._bits | 1 << number if on else self._bits & ~(1 << number)
 
     def get_byte(self, port: int) -> int:
         """Return eight bits as 0 to 255.
@@ -99,7 +101,7 @@ class BitBank:
         self._check_byte(port)
         if not 0 <= value <= 0xFF:
             raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"Not a byte: {value}")
-        self._bits[port * 8 : port * 8 + 8] = [bool(value >> i & 1) for i in range(8)]
+        self._bits = self._bits & ~(0xFF << port * 8) | value << port * 8
 
     def get_real(self, word: int) -> float:
         """Return the 32 bits from a word port on as a number, the low word first (assumed).
@@ -126,12 +128,12 @@ class BitBank:
 
     def clear(self) -> None:
         """Switch every bit off."""
-        self._bits = [False] * len(self._bits)
+        self._bits = 0
 
     def _check(self, number: int) -> None:
-        if not 0 <= number < len(self._bits):
+        if not 0 <= number < self._size:
             raise SpelRefusal(self._no_bit, f"There is no bit {number}")
 
     def _check_byte(self, port: int) -> None:
-        if not 0 <= port < len(self._bits) // 8:
+        if not 0 <= port < self._size // 8:
             raise SpelRefusal(self._no_byte, f"There is no byte {port}")

@@ -322,6 +322,7 @@ class DrivenRobot:
         """Forget what a power cycle takes: all but tools, HomeSet and its place."""
         self.arm.halt(now_ns)
         self.reservation = None
+        self.observer.forget()
         self.latch.forget()
         self.jump = self.recovers_to = None
         self.switch_motors(False)

@@ -131,6 +131,7 @@ BAD = {
     "demo": (["--speed", "0"], "0"),
     "sim epson": (["--tcp", "nowhere"], "no address to listen on"),
     "sim softmotion": (["--modbus-tcp", "nowhere"], "no address to listen on"),
+    "sim run": (["missing.toml"], "missing.toml"),
     "sim plc": (["--map", "missing.toml"], "missing.toml"),
     "sim assist": (["http://127.0.0.1:1", "look"], ""),
     "sim ctl": (["look", "--at", "assist+tcp://127.0.0.1:1"], "control URL"),

@@ -8,7 +8,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from robolink_cli.commands.simulate.serving_epson import ProjectSurroundings
+from robolink_cli.commands.simulate.kinds.epson import ProjectSurroundings
 from robolink_simulators.epson import EpsonSimulator
 
 GOOD = (

@@ -25,7 +25,7 @@ CELL = '[cells.line3]\nurl = "epson+tcp://192.168.0.1:5000"\n'
 RECIPES = {"line-computer": "needle-beams", "ci": "needle-beams"}
 """The recipe that a page calls needle.toml without saying where it is from."""
 
-TYPED = {
+TYPED: dict[str, pytest.MarkDecorator | tuple[()]] = {
     "tutorial": (),
     "after-a-crash": (),
     "people": (),

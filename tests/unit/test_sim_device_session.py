@@ -167,8 +167,9 @@ def test_a_motion_goes_on_or_not_when_its_client_vanishes(login, habit, goes_on)
 
 def test_the_next_client_may_abort_what_the_last_one_left(login):
     simulator = EpsonSimulator()
-    login(simulator).send('$Execute,"Move Here +X(-50)"')
-    simulator._links[0].receive(b"", 0)
+    first = login(simulator)
+    first.send('$Execute,"Move Here +X(-50)"')
+    first.link.receive(b"", 0)
     client = login(simulator)
     assert client.ask('$Execute,"Print 1"') == "!Execute,21"
     assert client.ask("$Abort") == "#Abort,0"

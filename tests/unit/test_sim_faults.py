@@ -125,3 +125,15 @@ def test_a_planned_error_without_delay_comes_before_the_request(login):
 def test_an_opened_guard_is_shown(login):
     simulator = EpsonSimulator(faults=[Fault(FaultAction.GUARD_OPEN, match="GetStatus")])
     assert login(simulator).flags() == "00100100001"
+
+
+def test_what_leaves_late_is_told_before_what_leaves_at_once_was_taken(login):
+    simulator = EpsonSimulator()
+    client = login(simulator)
+    simulator.faults.add(Fault(FaultAction.SPLIT_REPLY, position=2, seconds=0.5))
+    simulator.advance(3_000_000_000)
+    client.send("$GetStatus")
+    simulator.advance(3_000_000_000)
+    assert simulator.next_change() == 3_500_000_000
+    assert client.heard() == "#G"
+    assert simulator.next_change() == 3_500_000_000

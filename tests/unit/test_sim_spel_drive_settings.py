@@ -1,6 +1,12 @@
 """Settings of the drives, ranges of joints, words on ports (docs/reference/spel.md 6.3, 7.2)."""
 
+import random
+
 import pytest
+from robolink_simulators.epson.arm.robots import find_robot
+from robolink_simulators.epson.machine import Machine
+from robolink_simulators.epson.options import EpsonOptions
+from robolink_simulators.epson.spel import Interpreter
 
 from tests.unit.test_sim_spel_points import Window
 
@@ -64,6 +70,22 @@ def test_reset_puts_back_some_and_start_up_others(window):
 )
 def test_what_a_setting_cannot_be(window, statement, number):
     assert window.error(statement) == number
+
+
+def test_collisions_are_looked_for_by_every_joint_until_start_up(window):
+    """Help: the list has a word for each joint."""
+    assert window("CollisionDetect") == "OFF,OFF,OFF,OFF\r\n"
+    window("CollisionDetect On; Motor On; Reset")
+    assert window("CollisionDetect") == "ON,ON,ON,ON\r\n"
+    window.machine.robot.forget_volatile(0)
+    assert window("Print CollisionDetect(2)") == "0\r\n"
+
+
+def test_vsd_is_kept_by_six_axes_alone(window):
+    assert window.error("VSD On") == 4028
+    cell = Machine(find_robot("C8-C901S"))
+    interpreter = Interpreter(cell, EpsonOptions(), random.Random(1))
+    assert interpreter.start("VSD On; Print VSD", 0).output == "1\r\n"
 
 
 def test_limzmargin_is_how_far_above_limz_a_jump_may_start(window):

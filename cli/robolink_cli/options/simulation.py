@@ -26,6 +26,7 @@ SECTIONS: Final[tuple[HelpSection, ...]] = (
         frozenset(
             {
                 *("--robot", "--kinematics", "--param", "--map", "--seed", "--state", "--speed"),
+                "--exchange",
                 *("--option", "--profile", "--world", "--password-env", "--replay", "--faults"),
             }
         ),
@@ -45,7 +46,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def simulation_options(function: F) -> F:
-    """Add ``--seed``, ``--state``, ``--speed``, ``--option``, ``--allow-remote``, ``--faults``,
+    """Add ``--seed``, ``--state``, the pace, ``--option``, ``--allow-remote``, ``--faults``,
     ``--world``.
     """  # noqa: D205 - one sentence over two lines
     options = (
@@ -55,7 +56,7 @@ def simulation_options(function: F) -> F:
             type=click.Path(dir_okay=False, path_type=Path),
             help="File that keeps the tools over a restart, as flash or retained memory does.",
         ),
-        speed_option,
+        pace_options,
         click.option(
             "--option",
             "options",
@@ -86,11 +87,13 @@ class ServedLife:
         control: Where its control API listens, HOST:PORT.
         with_parent: Whether it ends when the process that started it has ended.
         idle_exit_s: After how many seconds without a request it ends; ``None`` for never.
+        parent: The process meant by ``with_parent``; ``None`` for the one that started it.
     """
 
     control: str
     with_parent: bool
     idle_exit_s: float | None
+    parent: int | None = None
 
 
 def life_options(function: F) -> F:
@@ -198,15 +201,23 @@ def seed_option(function: F) -> F:
     )(function)
 
 
-def speed_option(function: F) -> F:
-    """Add ``--speed``."""
+def pace_options(function: F) -> F:
+    """Add ``--speed`` and ``--exchange``."""
+    function = click.option(
+        "--exchange",
+        type=click.FloatRange(min=0, max=10),
+        metavar="SECONDS",
+        show_default="0; 0.05 at speed 0",
+        help="How much simulated time each request takes besides.",
+    )(function)
     return click.option(
         "--speed",
-        type=click.FloatRange(min=0.01, max=1000),
+        type=click.FloatRange(min=0, max=1000),
         default=1.0,
         show_default=True,
         metavar="FACTOR",
-        help="How many times faster than real the simulated time passes.",
+        help="How many times faster than real the simulated time passes. At 0 it passes with "
+        "requests and steps of the control API alone.",
     )(function)
 
 

@@ -12,6 +12,10 @@ _LOOK_S: Final = 0.05
 
 _PAUSED_S: Final = 86_400.0
 
+EXCHANGE_S: Final = 0.05
+"""What a request takes where time does not pass by itself, and in tests: who asks how far a
+movement is need not wait for it."""
+
 
 class ManualClock:
     """A clock that stands still until someone waits on it or advances it. Thread-safe.

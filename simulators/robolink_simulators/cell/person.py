@@ -4,7 +4,6 @@ What they do otherwise than they should are their habits: :mod:`robolink_simulat
 """
 
 import math
-import random
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from typing import Final
@@ -14,6 +13,7 @@ from robolink_simulators.cell.frames import add, subtract
 from robolink_simulators.cell.habits import PersonManner, TouchCourse
 from robolink_simulators.cell.places import Axis, XyzMm
 from robolink_simulators.cell.workplace import MOUNTED_TOOL, Workplace
+from robolink_simulators.device.late_random import late_random
 
 LAMP_MM: Final = 0.025
 """So much below the first contact, and not above it, a person stops who watches the lamp of a
@@ -47,11 +47,11 @@ class SimulatedOperator:
         self._workplace = workplace
         self._require_jogging = require_jogging
         self._seed = seed
-        self._random = random.Random(f"operator {seed}")
+        self._random = late_random(f"operator {seed}")
         self._placement: tuple[Hashable, int] | None = None
         self._error = PersonLook(0.0, 0.0, 0.0)
         self._habits = workplace.parameters.habits, workplace.parameters.bump
-        self._course = TouchCourse(self._habits[0], random.Random(f"habits {seed}"))
+        self._course = TouchCourse(self._habits[0], late_random(f"habits {seed}"))
         self._manner: PersonManner | None = None
         self._left_at: tuple[Hashable, int] | None = None
         self._spot_mm: XyzMm | None = None
@@ -151,7 +151,7 @@ class SimulatedOperator:
         parameters = self._workplace.parameters
         if self._habits != (parameters.habits, parameters.bump):
             self._habits = parameters.habits, parameters.bump
-            rng = random.Random(f"habits {self._seed}")
+            rng = late_random(f"habits {self._seed}")
             self._course = TouchCourse(parameters.habits, rng)
             self._manner = self._left_at = None
         return self._course

@@ -27,6 +27,7 @@ from robolink_simulators.cell.tip_switches import (
     TipSwitch,
 )
 from robolink_simulators.cell.world_parameters import WorldParameters
+from robolink_simulators.device.late_random import late_random
 
 MOUNTED_TOOL: Final = 1
 """The tool number of the nozzle on the arm."""
@@ -96,7 +97,7 @@ class Workplace(ABC):
         self.leans: dict[int, Lean] = {}
         self.board: SimulatedBoard | None = None
         self._seed = seed
-        self._random = random.Random(f"nozzles {seed}")
+        self._random = late_random(f"nozzles {seed}")
         self._replaced = replaced
         self.parameters = WorldParameters()
         rng = random.Random(f"camera {seed}")

@@ -1,6 +1,7 @@
 """What GetStatus shows: mode selector, emergency stop, guard, errors and the task."""
 
 from enum import Enum, StrEnum, auto
+from functools import lru_cache
 
 from robolink.protocols.epson_text import StatusFlags
 
@@ -115,17 +116,22 @@ class Condition:
 
     def flags(self, *, executing: bool = False) -> StatusFlags:
         """Return the flags; ``executing`` makes an Execute show as a running task."""
-        idle = self.task is Task.NONE
-        return StatusFlags(
-            test=self.mode is Mode.TEST,
-            teach=self.mode is Mode.TEACH,
-            auto=self.mode is Mode.AUTO and not self.monitoring_only,
-            warning=self._warning,
-            serious_error=self._serious,
-            safeguard=self.guard_open,
-            emergency_stop=self._estop_latched,
-            error=self._error,
-            paused=self.task is Task.PAUSED,
-            running=self.task is Task.RUNNING or executing,
-            ready=idle and not executing,
+        return _shared_flags(
+            self.mode is Mode.TEST,
+            self.mode is Mode.TEACH,
+            self.mode is Mode.AUTO and not self.monitoring_only,
+            self._warning,
+            self._serious,
+            self.guard_open,
+            self._estop_latched,
+            self._error,
+            self.task is Task.PAUSED,
+            self.task is Task.RUNNING or executing,
+            self.task is Task.NONE and not executing,
         )
+
+
+@lru_cache(maxsize=512)
+def _shared_flags(*in_order: bool) -> StatusFlags:
+    """Return flags in the order of their class; they are asked for in every exchange."""
+    return StatusFlags(*in_order)

@@ -6,17 +6,15 @@ thread and no clock; whoever hosts it holds :attr:`EpsonSimulator.lock`, hands i
 the time, and asks when to call again.
 """
 
-import random
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from robolink.model import Secret
 from robolink.protocols.epson_binary import Dialect
-from robolink.protocols.epson_text import BadRequest, ErrorCode, Request, StatusFlags
+from robolink.protocols.epson_text import ErrorCode, StatusFlags
 from robolink_simulators.cell.world_parameters import WorldParameters
-from robolink_simulators.device.hosted import HostedDevice
+from robolink_simulators.device.late_random import late_random
 from robolink_simulators.device.motion_log import StartedMotion
 from robolink_simulators.epson.arm.robots import find_robot
 from robolink_simulators.epson.card import ControllerCard
@@ -24,30 +22,29 @@ from robolink_simulators.epson.companion import Companion
 from robolink_simulators.epson.condition import Condition, Mode, Task
 from robolink_simulators.epson.flash import Flash, moment_of, put_back
 from robolink_simulators.epson.machine import Machine
-from robolink_simulators.epson.memory.variables import project_variables
+from robolink_simulators.epson.memory.variables import Variables, project_variables
 from robolink_simulators.epson.mishaps import EpsonMishaps
 from robolink_simulators.epson.options import EpsonOptions, serial_dialect
 from robolink_simulators.epson.panel import EpsonPanel
-from robolink_simulators.epson.remote.bent_requests import arriving
 from robolink_simulators.epson.remote.client_slot import ClientSlot
 from robolink_simulators.epson.remote.command_window import SpelWindow
 from robolink_simulators.epson.remote.commands import CommandDesk
-from robolink_simulators.epson.remote.exchange import PendingRequest
 from robolink_simulators.epson.remote.link import EpsonServerLink
+from robolink_simulators.epson.remote.open_links import OpenLinks
 from robolink_simulators.epson.remote.queries import Alarms
+from robolink_simulators.epson.remote.requests import RequestTaking
 from robolink_simulators.epson.remote.service import Service
-from robolink_simulators.epson.remote.wire_text import shown_reply, shown_request
 from robolink_simulators.epson.spel import Interpreter
 from robolink_simulators.epson.spel.programs.loading import load_project
 from robolink_simulators.epson.spel.tasks.channels.ports import Ports
 from robolink_simulators.epson.spel.tasks.runner import ProgramRunner
 from robolink_simulators.epson.world import World
-from robolink_simulators.faults import Departure, Fault, FaultAction, FaultPlan, LinkKind
+from robolink_simulators.faults import Fault, FaultPlan
 from robolink_simulators.faults.links import EPSON_LINKS
 from robolink_simulators.serial_numbers import drawn_serial
 
 
-class EpsonSimulator(HostedDevice):
+class EpsonSimulator(RequestTaking):
     """Implements ``hosting.seam.WireDevice``.
 
     Args:
@@ -82,6 +79,15 @@ class EpsonSimulator(HostedDevice):
     """
 
     kind = "epson"
+    _mishaps: EpsonMishaps
+    machine: Machine
+    worlds: tuple[World, ...]
+    variables: Variables
+    panel: EpsonPanel
+    alarms: Alarms
+    card: ControllerCard
+    program: ProgramRunner | None
+    starts: int
 
     def __init__(
         self,
@@ -98,6 +104,9 @@ class EpsonSimulator(HostedDevice):
         super().__init__(seed)
         # Until when all is done: a transport asks for one and the same instant several times.
         self._settled_ns = -1
+        # What next_change found last, and for which of those instants.
+        self._next_ns: int | None = None
+        self._known_ns = -1
         self.options = options or EpsonOptions()
         self.faults = FaultPlan(faults, seed, links=EPSON_LINKS)
         self.durable = state_path is not None
@@ -105,8 +114,30 @@ class EpsonSimulator(HostedDevice):
         self._password = password.reveal() if password else ""
         self._state_path = state_path
         self._parameters = world
-        self._links: list[EpsonServerLink] = []
-        self._make(serial or drawn_serial())
+        self._links = OpenLinks()
+        self._serial = serial or drawn_serial()
+        self._begun = False
+        if state_path is not None or world is not None:
+            self._begin()  # a file or a world that does not fit is refused now
+
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - whatever a controller has
+        """Make the controller when something of it is first asked for.
+
+        A process serves thousands, of which few are ever used; so what stands in :meth:`_make`
+        costs nothing until then. It is what it would be, had it been made at once.
+        """
+        if not name.startswith("__"):
+            with self.lock:
+                if not self._begun:
+                    self._begin()
+                if name in self.__dict__:
+                    return self.__dict__[name]
+        raise AttributeError(name, name=name, obj=self)
+
+    def _begin(self) -> None:
+        self._begun = True
+        self._make(self._serial)
+        self.machine.advance(self._now_ns)
 
     def _make(self, serial: str) -> None:
         """Make the controller and its world, as they are at first."""
@@ -136,13 +167,14 @@ class EpsonSimulator(HostedDevice):
         interpreter = Interpreter(
             self.machine,
             self.options,
-            random.Random(f"arm {self.seed}"),
+            late_random(f"arm {self.seed}"),
             condition=self.condition,
             variables=self.variables,
             messages=self.card.messages,
         )
         self._session = interpreter.session
-        self.program: ProgramRunner | None = None
+        self._session.project_name = self.card.project
+        self.program = None
         self._window = SpelWindow(interpreter, self.condition, self.options)
         self._slot = ClientSlot(self.options.remote_timeout_s, self.wire_time)
         options, condition, window, slot = self.options, self.condition, self._window, self._slot
@@ -204,14 +236,14 @@ class EpsonSimulator(HostedDevice):
     def _connected(self, dialect: Dialect | None, now_ns: int) -> EpsonServerLink:
         self.advance(now_ns)
         link = EpsonServerLink(self, now_ns, dialect=dialect)
-        self._links.append(link)
+        self._links.add(link)
         if self._slot.client is not None and self.options.second_client == "closed":
             link.cut()
         return link
 
     def advance(self, now_ns: int) -> None:
         """Let simulated time reach ``now_ns``, stopping wherever something changes."""
-        if now_ns == self._settled_ns:
+        if now_ns == self._settled_ns or self._passes(now_ns):
             return
         while now_ns > self._now_ns < (change := self.next_change() or now_ns) < now_ns:
             self._step(change)
@@ -219,15 +251,24 @@ class EpsonSimulator(HostedDevice):
 
     def next_change(self) -> int | None:
         """Return when :meth:`advance` will next do something by itself, if ever."""
-        times = (
-            self._window.next_change(),
-            None if self.program is None else self.program.next_change(),
+        if not self._begun:
+            return None
+        if self._settled_ns == -1 or self._settled_ns != self._known_ns or self._at_work:
+            self._next_ns, self._known_ns = self._found_next(), self._settled_ns
+        return self._next_ns
+
+    def _found_next(self) -> int | None:
+        first = self._links.next_change()
+        for change in (
             self._slot.deadline(unfinished=self._service.unfinished),
+            self._window.next_change(),
             self._mishaps.next_change(),
             self.machine.timed_bits.next_change(),
-            *[link.next_change() for link in self._links],
-        )
-        return min((time_ns for time_ns in times if time_ns is not None), default=None)
+            None if self.program is None else self.program.next_change(),
+        ):
+            if change is not None and (first is None or change < first):
+                first = change
+        return first
 
     @property
     def machine_name(self) -> str:
@@ -252,8 +293,7 @@ class EpsonSimulator(HostedDevice):
         """Switch off and on: links are cut, all but the flash and the variables is forgotten."""
         with self.acting():
             self.starts += 1
-            for link in self._links:
-                link.cut()
+            self._links.cut()
             self._window.interrupt(self._now_ns)
             if self.program is not None:
                 self.program.forget()
@@ -266,76 +306,7 @@ class EpsonSimulator(HostedDevice):
     def push(self, data: bytes) -> None:
         """Send every client bytes that nobody asked for (F10)."""
         with self.acting():
-            for link in self._links:
-                link.push(data)
-
-    def take(self, link: EpsonServerLink, event: Request | BadRequest) -> None:
-        """Deal with a request of a client; while another is logged in, it is not heard."""
-        self._settled_ns, shown = -1, shown_request(event)
-        self.log.append((self._now_ns, ">", shown))
-        if not self._slot.hears(link, cuts=self.options.second_client == "closed"):
-            return
-        faults = self.faults.take(shown, LinkKind.EPSON_SERIAL if link.dialect else None)
-        silence = self.options.requests_end_with_silence
-        heard = arriving(link, event, faults, self.faults, unterminated=silence)
-        if heard is None:
-            return
-        self._mishaps.strike(faults, self._now_ns)
-        if link.over:  # a restart has cut it
-            return
-        self._carry_out(link, heard, shown, faults)
-        again = partial(self._carry_out, link, heard, shown, ())
-        for fault in faults:
-            if fault.action is FaultAction.DUPLICATE_REQUEST:
-                self._mishaps.plan(self._now_ns, fault.seconds, again)
-
-    def take_late(self, link: EpsonServerLink, event: Request | BadRequest) -> None:
-        """Deal with a request that was under way while its link carried nothing."""
-        if self._slot.hears(link, cuts=self.options.second_client == "closed"):
-            self._carry_out(link, event, shown_request(event), ())
-
-    def _carry_out(
-        self,
-        link: EpsonServerLink,
-        event: Request | BadRequest,
-        shown: str,
-        faults: tuple[Fault, ...],
-    ) -> None:
-        self._requests += 1
-        exchange = PendingRequest(self._requests, event.name, faults, link)
-        try:
-            if self.on_request is not None:
-                self.on_request(exchange.number, shown)
-        finally:
-            self._service.carry_out(link, exchange, event, self._now_ns)
-            self._flash.save_changes()
-
-    def leaving(self, exchange: PendingRequest, reply: bytes) -> Sequence[Departure]:
-        """Count a reply and return what of it leaves, when."""
-        self._flash.save_changes()
-        self.exchanges += 1
-        # A login that was bent may come back in its refusal.
-        echoed = bool(exchange.faults) and reply[:1] == b"!"
-        self.log.append((self._now_ns, "<", "***" if echoed else shown_reply(reply)))
-        if not exchange.faults:
-            self.faults.remember(reply)
-            return ((0.0, reply),)
-        return self.faults.departures(reply, exchange.faults)
-
-    def announce(self, exchange: PendingRequest, reply: bytes) -> None:
-        """Tell the hook that a reply is about to leave."""
-        if self.on_reply is not None:
-            self.on_reply(exchange.number, shown_reply(reply))
-
-    def forget(self, link: EpsonServerLink) -> None:
-        """A connection is over; what runs goes on or not, as the option says."""
-        self._settled_ns = -1
-        if self._slot.client is link:
-            # Production that another device started is not this client's to supervise.
-            own = self._service.unfinished and not self.condition.monitoring_only
-            self._slot.lost(unfinished=own)
-            if self.options.execute_on_disconnect == "stops":
-                self._window.interrupt(self._now_ns)
+            self._links.push(data)
 
     def _truth(self) -> dict[str, Any]:
         return self.world.truth()
@@ -346,8 +317,7 @@ class EpsonSimulator(HostedDevice):
         return self.program is not None
 
     def _renew(self) -> None:
-        for link in self._links:
-            link.cut()
+        self._links.cut()
         self.faults.forget()
         self._make(drawn_serial())
 
@@ -359,6 +329,34 @@ class EpsonSimulator(HostedDevice):
 
     def _after_act(self) -> None:
         self._settled_ns = -1
+
+    def _passes(self, now_ns: int) -> bool:
+        """Let time pass in which nothing happens, as it mostly does; False when something may.
+
+        What an idle controller does by itself :meth:`next_change` tells, all of it.
+        """
+        if not self._begun:
+            self._now_ns = max(now_ns, self._now_ns)
+            return True
+        if now_ns < self._now_ns or self._at_work or not self._links.settled:
+            return False
+        change = self.next_change()
+        if change is not None and change <= now_ns:
+            return False
+        self._now_ns = self._settled_ns = self._known_ns = now_ns
+        self.machine.advance(now_ns)
+        return True
+
+    @property
+    def _at_work(self) -> bool:
+        """Whether something goes on that is looked at as time passes."""
+        return (
+            self.program is not None
+            or self._window.busy
+            or self.condition.task is Task.RUNNING
+            or self.durable
+            or self.machine.moving
+        )
 
     def _step(self, now_ns: int) -> None:
         self._now_ns = now_ns
@@ -374,7 +372,7 @@ class EpsonSimulator(HostedDevice):
                 self._companion.publish_changes()
             self._supervise(now_ns)
             self._flash.save_changes()
-            self._settled_ns = now_ns
+            self._settled_ns, self._known_ns = now_ns, -1
         finally:
             self._stepping = False
 
@@ -387,6 +385,4 @@ class EpsonSimulator(HostedDevice):
             self.condition.raise_error(ErrorCode.TIMED_OUT)
         if client is not None:
             client.cut()
-        for link in self._links:
-            link.supervise(now_ns)
-        self._links = [link for link in self._links if not link.drained]
+        self._links.supervise(now_ns)

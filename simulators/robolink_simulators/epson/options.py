@@ -38,11 +38,13 @@ class SpelNumbers:
     joint_free: int = 4027
     other_robot: int = 4028
     joint_too_fast: int = 4242  # docs/reference/spel.md 10
-    fine_not_reached: int = 4024  # docs/reference/spel.md 10, as the four that follow
+    fine_not_reached: int = 4024  # docs/reference/spel.md 10, as the six that follow
     torque_too_late: int = 4030
     speed_too_late: int = 4088
     torque_high_power: int = 5040
     torque_low_power: int = 5041
+    collision_high_power: int = 5057
+    collision_low_power: int = 5058
     arm_undefined: int = 2227  # docs/reference/spel.md 10
     ecp_undefined: int = 2232  # docs/reference/spel.md 10
     pallet_undefined: int = 2238  # docs/reference/spel.md 10
@@ -65,6 +67,7 @@ class SpelNumbers:
     calibration_pulses: int = 2197
     motors_on: int = 4029
     not_reserved: int = 2198
+    latch_unset: int = 2196
     serious: int = 9001
     no_such_file: int = 7213  # docs/reference/spel.md 10, path not found
     task_gone: int = 2261  # docs/reference/spel.md 10

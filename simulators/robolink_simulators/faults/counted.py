@@ -1,10 +1,10 @@
 """Faults that wait for their request. Counted, never rolled."""
 
-import random
 from collections.abc import Callable, Collection, Iterable
 from heapq import heappop, heappush
 from typing import Final, Generic, Protocol, TypeVar, cast
 
+from robolink_simulators.device.late_random import late_random
 from robolink_simulators.faults.links import AnyAction, LinkKind, links_of, require_possible
 
 
@@ -92,7 +92,7 @@ class CountedFaults(Generic[AnyFault]):
 
     def reseed(self, seed: int) -> None:
         """Draw by another seed from here on."""
-        self._random = random.Random(f"faults {seed}")
+        self._random = late_random(f"faults {seed}")
 
     def clear(self) -> None:
         """Plan nothing any more; what fired stays told."""

@@ -24,12 +24,13 @@ class DepartingReplies:
     def depart(self, departures: Sequence[Departure], now_ns: int) -> bool:
         """Let replies leave as planned; False when the device has ended the link with them."""
         for after_s, leaving in departures:
-            if leaving is LinkEnd.HALF_OPEN:
+            if isinstance(leaving, bytes):
+                data = self._with_held(leaving) if self._held else leaving
+                self.post(data, now_ns + round(after_s * NS_PER_S))
+            elif leaving is LinkEnd.HALF_OPEN:
                 self.half_open = True
             elif isinstance(leaving, HeldBack):
                 self._held.append(leaving)
-            elif isinstance(leaving, bytes):
-                self.post(self._with_held(leaving), now_ns + round(after_s * NS_PER_S))
             else:
                 self.post(leaving, now_ns + round(after_s * NS_PER_S))
                 return False
@@ -61,8 +62,8 @@ class DepartingReplies:
             return None
         if self.stalled_until_ns > now_ns:
             return self.stalled_until_ns
-        leaving_ns = self._waiting[0][0] if self._waiting else 0
-        return leaving_ns if leaving_ns > now_ns else None
+        # What is due now may not have been taken yet; behind it something may leave later.
+        return next((at_ns for at_ns, _ in self._waiting if at_ns > now_ns), None)
 
     def empty(self, now_ns: int) -> bool:
         """Tell whether nothing will leave any more."""

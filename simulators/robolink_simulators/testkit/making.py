@@ -8,7 +8,7 @@ from typing import Any, Final
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Secret
-from robolink_simulators.cell.clock import ManualClock, SteeredClock
+from robolink_simulators.cell.clock import EXCHANGE_S, ManualClock, SteeredClock
 from robolink_simulators.cell.workplace import MOUNTED_TOOL
 from robolink_simulators.cell.world_parameters import WorldParameters, parameters_from_text
 from robolink_simulators.faults import LinkKind, faults_of_table, read_fault_file
@@ -18,9 +18,6 @@ from robolink_simulators.testkit.served import OwnFolder, SimulatedCell
 
 SERVED_SPEED: Final = 20.0
 """Simulated seconds per real one, on a port."""
-
-EXCHANGE_S: Final = 0.05
-"""What each request takes besides: who asks how far a movement is need not wait for it."""
 
 PROGRAM_SPEED: Final = 1.0
 """Simulated seconds per real one of a PLC that executes a program. That one counts 500 ms between

@@ -114,7 +114,7 @@ def run(
     """
     from robolink_simulators.epson import EpsonSimulator
 
-    from robolink_cli.commands.simulate.serving_epson import ProjectSurroundings, habits
+    from robolink_cli.commands.simulate.kinds.epson import ProjectSurroundings, habits
 
     simulator = EpsonSimulator(robot, options=habits(options, None))
     printed = list[str]()

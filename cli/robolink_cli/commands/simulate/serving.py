@@ -26,7 +26,8 @@ class Termination:
     """Makes SIGTERM an orderly end; Ctrl-C stays what it is.
 
     Args:
-        life: When it ends by itself; never where that is left out.
+        life: When it ends by itself; never where that is left out. Whose end it waits for is the
+            process that started this one, or the one that ``life`` names.
 
     Attributes:
         state_dir: A folder for what clients of this simulator keep on record, gone at its end.
@@ -69,9 +70,20 @@ class Termination:
     def _is_over(self, idle_s: float) -> bool:
         if self._life is None:
             return False
-        if self._life.with_parent and os.getppid() != self._parent:
+        if self._life.with_parent and self._parent_has_ended():
             return True
         return self._life.idle_exit_s is not None and idle_s >= self._life.idle_exit_s
+
+    def _parent_has_ended(self) -> bool:
+        if self._life is None or self._life.parent is None:
+            return os.getppid() != self._parent
+        try:
+            os.kill(self._life.parent, 0)
+        except ProcessLookupError:
+            return True
+        except PermissionError:
+            return False  # it lives, and is somebody else's
+        return False
 
     @property
     def came(self) -> bool:
@@ -87,7 +99,13 @@ class Termination:
         self._folder.cleanup()
 
 
-def announce(document: dict[str, object], lines: Sequence[str], state_dir: str) -> None:
+def announce(
+    document: dict[str, object],
+    lines: Sequence[str],
+    state_dir: str,
+    *,
+    schema: str = "robolink/sim/1",
+) -> None:
     """Print the first output: one line of JSON, or ``lines`` for a person.
 
     Scripts give ``state_dir`` to their clients as ROBOLINK_STATE_DIR, so that nothing of a run is
@@ -97,9 +115,10 @@ def announce(document: dict[str, object], lines: Sequence[str], state_dir: str) 
     """
     if json_is_on():
         document = {
-            "schema": "robolink/sim/1",
+            "schema": schema,
             **document,
             "state_dir": state_dir,
+            "pid": os.getpid(),
             "simulated": True,
         }
         hand_over(json.dumps(document))

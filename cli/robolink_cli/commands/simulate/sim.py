@@ -1,10 +1,12 @@
 """sim: serve a simulated controller for anybody's client."""
 
 from pathlib import Path
+from typing import Any
 
 import click
 
 from robolink.messages import declared
+from robolink_cli.commands.simulate.run.sim_run import sim_run
 from robolink_cli.commands.simulate.sim_plc import sim_plc
 from robolink_cli.commands.simulate.sim_softmotion import softmotion
 from robolink_cli.console.help_sections import SectionedCommand
@@ -32,11 +34,12 @@ def _complete_robot(_: click.Context, __: click.Parameter, start: str) -> list[s
 @click.group()
 @json_option
 def sim() -> None:
-    """Serve a simulated controller on this machine."""
+    """Serve simulated controllers on this machine."""
 
 
 sim.add_command(sim_plc)
 sim.add_command(softmotion)
+sim.add_command(sim_run)
 
 
 @sim.command(cls=SectionedCommand, sections=SECTIONS)
@@ -95,66 +98,28 @@ sim.add_command(softmotion)
 def epson(
     *,
     address: str,
-    serial: str | None,
-    baud: int,
-    robot: str,
-    seed: int,
-    password_env: str | None,
-    state: Path | None,
-    speed: float,
-    options: tuple[str, ...],
-    world: tuple[str, ...],
-    faults: Path | None,
-    profile: Path | None,
     replay: Path | None,
-    programs: tuple[Path, ...],
-    points: tuple[Path, ...],
-    vision: Path | None,
-    lines: tuple[str, ...],
-    folder: Path | None,
     allow_remote: bool,
     life: ServedLife,
+    **more: Any,  # noqa: ANN401 - the other options
 ) -> None:
     """Serve a simulated EPSON controller with Remote Ethernet, or RS232, until Ctrl-C.
 
     A second port, assist, stands in for the person at the cell: it looks at the tip, knows
     the truth, and presses the emergency stop.
     """
-    from robolink_cli.commands.simulate.serving import Termination, host_and_port
-
-    listen = host_and_port(address, "--tcp")
     if replay is not None:
         from robolink_cli.commands.simulate.replaying import serve_recording
+        from robolink_cli.commands.simulate.serving import Termination, host_and_port
 
+        listen = host_and_port(address, "--tcp")
         with Termination() as stopped:
             serve_recording(replay, listen, allow_remote=allow_remote, wait=stopped.wait)
         return
-    from robolink_simulators.epson import EpsonSimulator
-    from robolink_simulators.faults import LinkKind
+    from robolink_cli.commands.simulate.kinds.epson import EPSON_KIND
+    from robolink_cli.commands.simulate.kinds.simulated_kind import serve_alone
 
-    from robolink_cli.commands.simulate.planned_faults import plan_faults
-    from robolink_cli.commands.simulate.serving import world_from
-    from robolink_cli.commands.simulate.serving_epson import (
-        ProjectSurroundings,
-        habits,
-        load_programs,
-        password_in,
-        serve_epson,
-    )
-
-    simulator = EpsonSimulator(
-        robot,
-        seed=seed,
-        password=password_in(password_env),
-        options=habits(options, profile),
-        state_path=state,
-        world=world_from(world),
-    )
-    surroundings = ProjectSurroundings(vision, lines, folder)
-    load_programs(simulator, programs, points, surroundings)
-    plan_faults(simulator, faults, {LinkKind.EPSON_SERIAL if serial else LinkKind.EPSON_TCP})
-    place = None if serial else listen
-    serve_epson(simulator, place, speed=speed, allow_remote=allow_remote, life=life, baud=baud)
+    serve_alone(EPSON_KIND, life, {"address": address, "allow_remote": allow_remote, **more})
 
 
 @sim.command()

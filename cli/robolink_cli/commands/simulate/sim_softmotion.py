@@ -1,7 +1,7 @@
 """sim softmotion: serve a simulated PLC with a mailbox."""
 
-import sys
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -61,50 +61,13 @@ def _complete_kinematics(_: click.Context, __: click.Parameter, start: str) -> l
 @simulation_options
 @life_options
 @json_option
-def softmotion(
-    *,
-    address: str | None,
-    serial: str | None,
-    can: str | None,
-    unit: int,
-    node: int,
-    kinematics: str,
-    parameters: tuple[str, ...],
-    program: Path | None,
-    seed: int,
-    state: Path | None,
-    speed: float,
-    options: tuple[str, ...],
-    world: tuple[str, ...],
-    faults: Path | None,
-    allow_remote: bool,
-    life: ServedLife,
-) -> None:
+def softmotion(*, life: ServedLife, **given: Any) -> None:  # noqa: ANN401 - all other options
     """Serve a simulated SoftMotion PLC with a mailbox until Ctrl-C.
 
     Several buses may be given; one PLC stands behind them. The assist port stands in for the
     person at the machine.
     """
-    from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
-    from robolink_simulators.softmotion.mailbox.option_text import options_from_text
-    from robolink_simulators.softmotion.mailbox.parameters import parameters_from_text
-    from robolink_simulators.softmotion.program.plc_maker import plc_maker
+    from robolink_cli.commands.simulate.kinds.simulated_kind import serve_alone
+    from robolink_cli.commands.simulate.kinds.softmotion import SOFTMOTION_KIND
 
-    from robolink_cli.commands.simulate.planned_faults import plan_faults
-    from robolink_cli.commands.simulate.serving import named_values, world_from
-    from robolink_cli.commands.simulate.serving_softmotion import Buses, serve_plc
-
-    if ":" in kinematics:
-        sys.path.append(str(Path.cwd()))
-    simulator = SoftMotionSimulator(
-        kinematics,
-        seed=seed,
-        parameters=parameters_from_text(named_values(parameters, "--param dArmLength1=250")),
-        options=options_from_text(named_values(options, "--option profile=tools")),
-        state_path=state,
-        world=world_from(world),
-        make_plc=plc_maker(program),
-    )
-    buses = Buses(address, serial, can, unit=unit, node=node, allow_remote=allow_remote)
-    plan_faults(simulator, faults, buses.kinds)
-    serve_plc(simulator, buses, speed=speed, life=life)
+    serve_alone(SOFTMOTION_KIND, life, given)

@@ -1,11 +1,13 @@
 """Settings of a robot's drives: what each may be, and what puts it back.
 
 Source: docs/reference/spel.md 6.3, 7.2, 7.4. Those whose effect a page describes rule how a robot
-moves here; of PerformMode, QPDecelR, QPDecelS, OLAccel, SoftCP, SpeedRLimitation and CP_Offset none
-does: they are kept, told and put back.
+moves here; of PerformMode, QPDecelR, QPDecelS, OLAccel, SoftCP, SpeedRLimitation, CP_Offset and VSD
+none does: they are kept, told and put back.
 """
 
+from collections.abc import Mapping
 from enum import Enum
+from functools import lru_cache
 from typing import Final, NamedTuple
 
 
@@ -45,6 +47,9 @@ def _switch(put_back: RestoredAt, listing: str = "{}", *, on: bool = False) -> D
 
 OF_EACH_JOINT: Final = -1
 
+OF_SIX_AXES: Final = frozenset({"vsd"})
+"""Settings that other robots do not have."""
+
 DRIVE_SETTINGS: Final[dict[str, DriveSetting]] = {
     "limzmargin": DriveSetting((1,), 0, 1000, 0.02, RestoredAt.DRIVES),
     "finedist": DriveSetting((1,), 0.001, 10, 0, RestoredAt.DRIVES),
@@ -58,6 +63,10 @@ DRIVE_SETTINGS: Final[dict[str, DriveSetting]] = {
     "limittorquelp": DriveSetting((OF_EACH_JOINT, 1), 0, 100, 100, RestoredAt.START),
     "limittorquestop": _switch(RestoredAt.START),
     "limittorquestoplp": _switch(RestoredAt.START),
+    "collisiondetect": DriveSetting(
+        (OF_EACH_JOINT, 1), 0, 1, 0, RestoredAt.START, switched=True, listing="{}"
+    ),
+    "vsd": _switch(RestoredAt.START),
     "qp": _switch(RestoredAt.START, "QP {}", on=True),
     "olaccel": _switch(RestoredAt.FIVE, "OLACCEL is {}"),
     "softcp": _switch(RestoredAt.FIVE),
@@ -91,7 +100,7 @@ class DriveSettings:
 
     def takes(self, word: str) -> tuple[int, ...]:
         """Return how many values a setting may be given."""
-        return tuple(self._axes if n == OF_EACH_JOINT else n for n in DRIVE_SETTINGS[word].counts)
+        return _counts(self._axes, DRIVE_SETTINGS[word])
 
     def set(self, word: str, values: tuple[float, ...]) -> None:
         """Keep the values of a setting; one stands for all that there are."""
@@ -100,6 +109,19 @@ class DriveSettings:
 
     def put_back(self, *occasions: RestoredAt) -> None:
         """Put back what some occasions put back."""
-        for word, setting in DRIVE_SETTINGS.items():
-            if setting.put_back in occasions:
-                self.set(word, (setting.usual,))
+        for occasion in occasions:
+            self._values.update(_usual_at(self._axes, occasion))
+
+
+def _counts(axes: int, setting: DriveSetting) -> tuple[int, ...]:
+    return tuple(axes if n == OF_EACH_JOINT else n for n in setting.counts)
+
+
+@lru_cache(maxsize=32)
+def _usual_at(axes: int, occasion: RestoredAt) -> Mapping[str, tuple[float, ...]]:
+    """Return what an occasion puts back on a robot of so many joints; robots share it."""
+    return {
+        word: (setting.usual,) * _counts(axes, setting)[0]
+        for word, setting in DRIVE_SETTINGS.items()
+        if setting.put_back is occasion
+    }

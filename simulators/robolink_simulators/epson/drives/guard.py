@@ -1,4 +1,4 @@
-"""What ends a motion because of its torque: torque control, and LimitTorqueStop.
+"""What ends a motion because of its torque: torque control, LimitTorqueStop, CollisionDetect.
 
 Whether it comes to that is known before the motion starts: way, load and what stands in the way
 are. A drive that pushes no harder than it did when the motion began stops nothing, so that a tip
@@ -6,13 +6,14 @@ that is pressed onto something comes off it again (assumed). Source: docs/refere
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from robolink.model import Pose
 from robolink_simulators.epson.arm.joints import Joints
 from robolink_simulators.epson.arm.trajectory import Leg
 from robolink_simulators.epson.drives.observer import DriveObserver, motion_at
+from robolink_simulators.epson.drives.torque import JointMotion
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
 _LOOK_EVERY_NS: Final = 2_000_000
@@ -20,6 +21,8 @@ _HARDER: Final = 1.001
 _TEXTS: Final = {
     RefusalKind.TORQUE_HIGH_POWER: "A torque reached its upper limit in high power",
     RefusalKind.TORQUE_LOW_POWER: "A torque reached its upper limit in low power",
+    RefusalKind.COLLISION_HIGH_POWER: "The robot has met something in high power",
+    RefusalKind.COLLISION_LOW_POWER: "The robot has met something in low power",
     RefusalKind.FINE_NOT_REACHED: "The robot does not come within Fine of its target",
 }
 
@@ -31,10 +34,12 @@ class TorqueLimit:
     Attributes:
         shares: Of each joint what its drive may give, ``None`` for whatever it needs.
         error: The error that this is, ``None`` where the motion counts as done.
+        of_contact: Whether only what a thing in the way asks of the drives counts.
     """
 
     shares: tuple[float | None, ...]
     error: RefusalKind | None
+    of_contact: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,16 +68,18 @@ class DriveGuard:
 
     Args:
         observer: What estimates the torques.
-        limit: Tells the limit in force, ``None`` for none.
+        limits: Tells the limits in force.
 
     Attributes:
         coming: The error in which the motion under way is going to end.
     """
 
-    def __init__(self, observer: DriveObserver, limit: Callable[[], TorqueLimit | None]) -> None:
+    def __init__(
+        self, observer: DriveObserver, limits: Callable[[], Sequence[TorqueLimit]]
+    ) -> None:
         self.coming: RefusalKind | None = None
         self._come: RefusalKind | None = None
-        self._observer, self._limit = observer, limit
+        self._observer, self._limits = observer, limits
 
     def ended(self, *, complete: bool) -> None:
         """Take note that the motion is over, where it was to end or before."""
@@ -90,9 +97,12 @@ class DriveGuard:
 
     def cut(self, legs: Sequence[Leg]) -> Sequence[Leg]:
         """Return the legs of a motion as far as the drives go."""
-        self.coming, self._come, limit = None, None, self._limit()
-        if limit is None:
-            return legs
+        self.coming, self._come = None, None
+        for limit in self._limits():
+            legs = self._cut(legs, limit)
+        return legs
+
+    def _cut(self, legs: Sequence[Leg], limit: TorqueLimit) -> Sequence[Leg]:
         allowed = self._allowed(limit, legs[0])
         for index, leg in enumerate(legs):
             at_ns = self._first_beyond(leg, allowed)
@@ -101,34 +111,38 @@ class DriveGuard:
                 return [*legs[:index], CutLeg(leg, at_ns)]
         return legs
 
-    def _allowed(self, limit: TorqueLimit, leg: Leg) -> tuple[float | None, ...]:
-        here = motion_at(lambda _: leg.joints_at(0), 0, 0)
-        held = self._observer.torques(here)
+    def _allowed(self, limit: TorqueLimit, leg: Leg) -> TorqueLimit:
+        """Return a limit without what the drives push with already when the motion begins."""
+        held = self._shares(limit, motion_at(lambda _: leg.joints_at(0), 0, 0))
         pairs = zip(limit.shares, held, strict=True)
-        return tuple(None if s is None else max(s, abs(h) * _HARDER) for s, h in pairs)
+        shares = tuple(None if s is None else max(s, abs(h) * _HARDER) for s, h in pairs)
+        return replace(limit, shares=shares)
 
-    def _first_beyond(self, leg: Leg, allowed: Sequence[float | None]) -> int | None:
+    def _first_beyond(self, leg: Leg, limit: TorqueLimit) -> int | None:
         """Return the first instant of a leg at which a drive would push too hard."""
         before_ns, last_ns = 0, leg.duration_ns
         while before_ns < last_ns:
             after_ns = min(before_ns + _LOOK_EVERY_NS, last_ns)
-            if self._beyond(leg, after_ns, allowed):
-                return self._between(leg, before_ns, after_ns, allowed)
+            if self._beyond(leg, after_ns, limit):
+                return self._between(leg, before_ns, after_ns, limit)
             before_ns = after_ns
         return None
 
-    def _between(
-        self, leg: Leg, before_ns: int, after_ns: int, allowed: Sequence[float | None]
-    ) -> int:
+    def _between(self, leg: Leg, before_ns: int, after_ns: int, limit: TorqueLimit) -> int:
         while after_ns - before_ns > 1:
             middle_ns = (before_ns + after_ns) // 2
-            if self._beyond(leg, middle_ns, allowed):
+            if self._beyond(leg, middle_ns, limit):
                 after_ns = middle_ns
             else:
                 before_ns = middle_ns
         return after_ns
 
-    def _beyond(self, leg: Leg, at_ns: int, allowed: Sequence[float | None]) -> bool:
-        shares = self._observer.torques(motion_at(leg.joints_at, at_ns, 0))
-        pairs = zip(shares, allowed, strict=True)
-        return any(limit is not None and abs(share) > limit for share, limit in pairs)
+    def _beyond(self, leg: Leg, at_ns: int, limit: TorqueLimit) -> bool:
+        found = self._shares(limit, motion_at(leg.joints_at, at_ns, 0))
+        pairs = zip(found, limit.shares, strict=True)
+        return any(most is not None and abs(share) > most for share, most in pairs)
+
+    def _shares(self, limit: TorqueLimit, motion: JointMotion) -> tuple[float, ...]:
+        if limit.of_contact:
+            return self._observer.pressing(motion.now)
+        return self._observer.torques(motion)

@@ -1,4 +1,4 @@
-"""Upper limits of the torque: LimitTorque, LimitTorqueStop, TC and their kin.
+"""Limits of the torque: LimitTorque, LimitTorqueStop, TC, CollisionDetect.
 
 Source: docs/reference/spel.md 7.4.
 """
@@ -13,6 +13,10 @@ from robolink_simulators.epson.refusals import RefusalKind
 _PERCENT: Final = 100.0
 _LEAST: Final = 0.01
 """A limit of 0 counts as 1 %: no share of nothing can be told (assumed)."""
+
+_FELT: Final = 0.05
+"""Assumed: from this share of a drive's torque on a thing in the way counts as a collision. A
+controller compares speeds (documented)."""
 
 
 class TorqueLimits:
@@ -31,19 +35,22 @@ class TorqueLimits:
         word = "limittorque" if self._power_high() else "limittorquelp"
         return tuple(max(percent / _PERCENT, _LEAST) for percent in self._drives().get(word))
 
-    def limit(self) -> TorqueLimit | None:
-        """Return at which torques a motion ends, ``None`` where none does.
+    def limits(self) -> tuple[TorqueLimit, ...]:
+        """Return at which torques a motion ends.
 
-        Torque control goes before LimitTorqueStop (assumed).
+        Collisions are not looked for under torque control (documented); that it goes before
+        LimitTorqueStop is assumed.
         """
-        drives = self._drives()
+        drives, high, found = self._drives(), self._power_high(), list[TorqueLimit]()
         if drives.is_on("tc"):
             given = drives.get("tclim")
             shares = tuple(None if percent < 0 else percent / _PERCENT for percent in given)
-            return TorqueLimit(shares, None)
-        if self._power_high():
-            if drives.is_on("limittorquestop"):
-                return TorqueLimit(self.shares(), RefusalKind.TORQUE_HIGH_POWER)
-        elif drives.is_on("limittorquestoplp"):
-            return TorqueLimit(self.shares(), RefusalKind.TORQUE_LOW_POWER)
-        return None
+            return (TorqueLimit(shares, None),)
+        if drives.is_on("limittorquestop" if high else "limittorquestoplp"):
+            error = RefusalKind.TORQUE_HIGH_POWER if high else RefusalKind.TORQUE_LOW_POWER
+            found.append(TorqueLimit(self.shares(), error))
+        felt = tuple(_FELT if on else None for on in drives.get("collisiondetect"))
+        if any(felt):
+            error = RefusalKind.COLLISION_HIGH_POWER if high else RefusalKind.COLLISION_LOW_POWER
+            found.append(TorqueLimit(felt, error, of_contact=True))
+        return tuple(found)

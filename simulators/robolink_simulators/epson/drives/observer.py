@@ -79,6 +79,11 @@ class DriveObserver:
         self._seen_ns = 0
         self._last: deque[Travelled] = deque(maxlen=_KEPT)
 
+    def forget(self) -> None:
+        """Forget all that was measured, and the motions of the last minute."""
+        self._measured.clear()
+        self._last.clear()
+
     def clear(self, quantity: DriveQuantity, joints: Iterable[int]) -> None:
         """Begin to measure a quantity of some joints, by their numbers."""
         self._catch_up()
@@ -133,6 +138,17 @@ class DriveObserver:
     def torques(self, motion: JointMotion) -> tuple[float, ...]:
         """Return the torques of a motion at an instant, as shares of what the drives can give."""
         return torques(self._arm.model, self._load(), motion, self.resistance_n(motion.now))
+
+    def pressing(self, joints: Joints) -> tuple[float, ...]:
+        """Return the torques with which the drives push against a thing in the way, as shares."""
+        force_n = self.resistance_n(joints)
+        if force_n == NO_FORCE:
+            return (0.0,) * self._arm.model.axes
+        still = JointMotion(joints, joints, joints, _STEP_NS / NS_PER_S)
+        pushed, free = (
+            torques(self._arm.model, self._load(), still, force) for force in (force_n, NO_FORCE)
+        )
+        return tuple(a - b for a, b in zip(pushed, free, strict=True))
 
     def take(self, travelled: Travelled) -> None:
         """Take note of a motion that is over."""

@@ -1,7 +1,10 @@
-"""A row of input, output or memory bits, read by bit or by byte."""
+"""A row of input, output or memory bits, read by bit or by byte, and the names of such bits.
+
+Source: docs/reference/spel.md 8.
+"""
 
 import struct
-from typing import Final
+from typing import Final, NamedTuple
 
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
@@ -13,6 +16,31 @@ MEMORY_BITS: Final = 1024
 used)."""
 
 _REAL: Final = struct.Struct("<f")
+
+
+INPUT: Final = 0
+OUTPUT: Final = 1
+MEMORY: Final = 2
+
+BIT: Final = 1
+BYTE: Final = 8
+WORD: Final = 16
+
+
+class IOLabel(NamedTuple):
+    """What a name stands for that a project gives inputs, outputs or memory bits.
+
+    Attributes:
+        kind: Input, output or memory (IOTYPE_INPUT, IOTYPE_OUTPUT, IOTYPE_MEMORY).
+        width: Bits of the port: 1, 8 or 16 (IOSIZE_BIT, IOSIZE_BYTE, IOSIZE_WORD).
+        number: Its number among those of its kind and width.
+        name: As it is written.
+    """
+
+    kind: int
+    width: int
+    number: int
+    name: str
 
 
 class BitBank:
@@ -31,7 +59,9 @@ class BitBank:
         no_bit: RefusalKind = RefusalKind.IO_BIT,
         no_byte: RefusalKind = RefusalKind.IO_BYTE,
     ) -> None:
-        self._bits = [False] * size
+        self._size = size
+        # One whole number: a list of 1024 would take 8 KB, of which a process holds thousands.
+        self._bits = 0
         self._no_bit = no_bit
         self._no_byte = no_byte
 
@@ -42,7 +72,7 @@ class BitBank:
             Refusal: There is no such bit.
         """
         self._check(number)
-        return self._bits[number]
+        return bool(self._bits >> number & 1)
 
     def set(self, number: int, on: bool) -> None:
         """Switch one bit.
@@ -51,7 +81,7 @@ class BitBank:
             Refusal: There is no such bit.
         """
         self._check(number)
-        self._bits[number] = on
+        self._bits = self._bits | 1 << number if on else self._bits & ~(1 << number)
 
     def get_byte(self, port: int) -> int:
         """Return eight bits as 0 to 255.
@@ -71,7 +101,7 @@ class BitBank:
         self._check_byte(port)
         if not 0 <= value <= 0xFF:
             raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, f"Not a byte: {value}")
-        self._bits[port * 8 : port * 8 + 8] = [bool(value >> i & 1) for i in range(8)]
+        self._bits = self._bits & ~(0xFF << port * 8) | value << port * 8
 
     def get_real(self, word: int) -> float:
         """Return the 32 bits from a word port on as a number, the low word first (assumed).
@@ -98,12 +128,12 @@ class BitBank:
 
     def clear(self) -> None:
         """Switch every bit off."""
-        self._bits = [False] * len(self._bits)
+        self._bits = 0
 
     def _check(self, number: int) -> None:
-        if not 0 <= number < len(self._bits):
+        if not 0 <= number < self._size:
             raise SpelRefusal(self._no_bit, f"There is no bit {number}")
 
     def _check_byte(self, port: int) -> None:
-        if not 0 <= port < len(self._bits) // 8:
+        if not 0 <= port < self._size // 8:
             raise SpelRefusal(self._no_byte, f"There is no byte {port}")

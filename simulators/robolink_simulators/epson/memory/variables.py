@@ -42,11 +42,20 @@ _DECIMAL: Final = re.compile(
 class _Variable:
     """One declared variable; a scalar has no bounds. Subscripts run from 0 to the bound."""
 
+    __slots__ = ("_held", "bounds", "kind")
+
     def __init__(self, kind: VariableType, bounds: tuple[int, ...]) -> None:
         self.kind = kind
         self.bounds = bounds
-        start: Value = "" if kind is VariableType.STRING else 0
-        self._values: MutableSequence[Any] = [start] * math.prod(bound + 1 for bound in bounds)
+        self._held: MutableSequence[Any] | None = None
+
+    @property
+    def _values(self) -> MutableSequence[Any]:
+        """Every element, in a row; made at first use."""
+        if self._held is None:
+            start: Value = "" if self.kind is VariableType.STRING else 0
+            self._held = [start] * math.prod(bound + 1 for bound in self.bounds)
+        return self._held
 
     def index(self, subscripts: Sequence[int]) -> int:
         """Return where an element stands."""
@@ -60,7 +69,7 @@ class _Variable:
 
     def share(self, values: MutableSequence[Any]) -> None:
         """Hold what a program's variable holds."""
-        self._values = values
+        self._held = values
 
     def copied(self) -> list[Value]:
         """Return a copy of every element."""

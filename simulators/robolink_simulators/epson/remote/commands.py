@@ -1,7 +1,7 @@
 """Which request is served now, and what it does (docs/reference/epson.md 1.2)."""
 
 from collections.abc import Callable
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 from robolink.protocols.epson_text import (
     ErrorCode,
@@ -44,9 +44,15 @@ class CommandDesk:
         self._condition = condition
         self._options = options
         self.starter: Callable[[int], object] | None = None
-        self._served: dict[str, Served] = {
+        self._held = (variables, alarms, card)
+
+    @cached_property
+    def _served(self) -> dict[str, Served]:
+        """The commands by lower-case name, made when the first is asked for: most ask none."""
+        machine, (variables, alarms, card) = self._machine, self._held
+        return {
             **io_commands(machine),
-            **query_commands(machine, condition, card, options),
+            **query_commands(machine, self._condition, card, self._options),
             "getvariable": variables.get,
             "setvariable": variables.set,
             "getalm": alarms.get,

@@ -56,6 +56,9 @@ class ServedRequest(Protocol):
     def leaving(self, exchange: PendingRequest, reply: bytes) -> Sequence[Departure]:
         """Count a reply and return what of it leaves, when."""
 
+    def listening(self) -> None:
+        """Be told that a request has begun which silence may end."""
+
     def announce(self, exchange: PendingRequest, reply: bytes) -> None:
         """Tell whoever watches that a reply is about to leave."""
 
@@ -217,9 +220,10 @@ class EpsonServerLink:
     def _read(self, data: bytes) -> None:
         self._codec.receive_data(data)
         self._serve()
-        by_silence = self._serial or self._controller.options.requests_end_with_silence
-        begun = by_silence and self._codec.bytes_held
-        self._silent_since_ns = self._wire_time.at(self._controller.now_ns) if begun else None
+        if self._serial or self._controller.options.requests_end_with_silence:
+            begun = self._codec.bytes_held
+            self._silent_since_ns = self._wire_time.at(self._controller.now_ns) if begun else None
+            self._controller.listening()
 
     def _end_request(self) -> None:
         broken = self._codec.end_of_request()

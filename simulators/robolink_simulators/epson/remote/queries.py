@@ -3,9 +3,9 @@
 The order of fields is that of Epson's own client; the values are the simulator's.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
-from functools import partial
+from functools import lru_cache, partial
 from typing import Final
 
 from robolink.protocols.epson_text import ErrorCode, Preference, preferences_field
@@ -13,7 +13,7 @@ from robolink_simulators.epson.card import ControllerCard
 from robolink_simulators.epson.condition import Condition
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.driven_robot import DrivenRobot
-from robolink_simulators.epson.options import EpsonOptions
+from robolink_simulators.epson.options import EpsonOptions, SpelNumbers
 from robolink_simulators.epson.remote.io_commands import Fields, Served
 from robolink_simulators.epson.request_refusals import malformed, number
 
@@ -161,17 +161,22 @@ def _drives(robot: DrivenRobot) -> Fields:
     return (str(int(robot.motors_on)), str(int(robot.power_high)))
 
 
-def _messages(card: ControllerCard, options: EpsonOptions, condition: Condition) -> Served:
-    numbers = asdict(options.numbers)
-    texts = {value: name.replace("_", " ").capitalize() for name, value in numbers.items()}
-    texts[int(ErrorCode.TIMED_OUT)] = "Remote time-out"
+@lru_cache(maxsize=16)
+def _error_texts(numbers: SpelNumbers) -> Mapping[int, str]:
+    """Return what the errors are called; controllers with the same numbers share it."""
+    named = asdict(numbers).items()
+    texts = {value: name.replace("_", " ").capitalize() for name, value in named}
+    return {**texts, int(ErrorCode.TIMED_OUT): "Remote time-out"}
 
+
+def _messages(card: ControllerCard, options: EpsonOptions, condition: Condition) -> Served:
     def serve(code: str, language: str) -> Fields:
         number(language, _HIGHEST_LANGUAGE)
         own = card.messages.get(number(code))
         failure = condition.failure
         if failure is not None and failure[0] == number(code):
             own = failure[1]  # of the program that failed, with its line
+        texts = _error_texts(options.numbers)
         return (own or texts.get(number(code), f"Error {number(code)}"),)
 
     return serve

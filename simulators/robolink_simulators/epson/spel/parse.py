@@ -26,19 +26,19 @@ PROGRAM_ONLY: Final = frozenset(_PROGRAM_WORDS.split())
 """Statements that exist in programs only (docs/reference/spel.md 13, class E)."""
 
 _WORDS_OF_OTHER_ROBOTS = """
-    hofsjointaccuracy jumptlz vsd
+    hofsjointaccuracy jumptlz
 """
 
 OF_OTHER_ROBOTS: Final = frozenset(_WORDS_OF_OTHER_ROBOTS.split())
 """Statements that the reference allows, for arms that this simulator has none of."""
 
 _WORDS_NOT_SIMULATED = """
-    areacorrectionclr areacorrectionset chdisk collisiondetect
+    areacorrectionclr areacorrectionset chdisk
     dispdev enctemper msgbox opencom opennet parsestr shutdown
     taskstate closecom closenet close cls eresume error flush fmtstr
-    input inputbox latchenable line randomize read redim
-    resetelapsedtime setcom setlatch setnet signal simset taskwait tmreset toff ton vcal
-    vcalpoints waitnet waitsig write writebin cont restart recover vdefgetmotionrange
+    input inputbox line randomize read redim
+    resetelapsedtime setcom setnet signal simset taskwait tmreset toff ton vcal
+    vcalpoints waitnet waitsig write writebin cont restart vdefgetmotionrange
     vdefsetmotionrange vshowmodel vtrain sysconfig workque_list cnv_quelist history clearhistory
 """
 
@@ -72,9 +72,9 @@ _OF_PROGRAMS_ALONE = """
 
 _UNSIMULATED_FUNCTIONS = """
     opencom chkcom currobot sense till vxcalinfo vxcalpoints
-    hand_on hand_off aio_in aio_inw aio_out aio_outw recover latchpos recoverpos lookup alignecp
-    areacorrection areacorrectiondef collisiondetect
-    rotok taskstate tmout vsd dispdev windowsstatus loadtype projectname$
+    hand_on hand_off aio_in aio_inw aio_out aio_outw lookup
+    areacorrection areacorrectiondef
+    taskstate tmout dispdev loadtype
     robotname joint restart setcom here eval
 """
 

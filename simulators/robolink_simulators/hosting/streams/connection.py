@@ -8,6 +8,7 @@ import sys
 from typing import Final
 
 from robolink_simulators.hosting.seam import DeviceLink, ResettableLink
+from robolink_simulators.hosting.streams.wire_host import WireHost
 
 _CHUNK_BYTES: Final = 65536
 _MOST_UNSENT: Final = 1 << 20
@@ -16,20 +17,20 @@ NO_TIME: Final = struct.pack("HH" if sys.platform == "win32" else "ii", 1, 0)
 
 
 class Connection:
-    """Moves bytes between a socket and a device link; registers itself with the selector."""
+    """Moves bytes between a socket and a device link; has its host watch the socket."""
 
-    def __init__(
-        self, client: socket.socket, link: DeviceLink, selector: selectors.BaseSelector
-    ) -> None:
+    __slots__ = ("_client", "_host", "_link", "_unsent", "_watched", "finished")
+
+    def __init__(self, client: socket.socket, link: DeviceLink, host: WireHost) -> None:
         client.setblocking(False)
         client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._client = client
         self._link = link
-        self._selector = selector
+        self._host = host
         self._unsent = b""
         self._watched = selectors.EVENT_READ
         self.finished = False
-        selector.register(client, self._watched, self.serve)
+        host.watch(client, self._watched, self.serve)
 
     def serve(self, events: int, now_ns: int) -> None:
         """Deal with what the selector saw."""
@@ -78,12 +79,12 @@ class Connection:
     def _watch(self, events: int) -> None:
         if events != self._watched:
             self._watched = events
-            self._selector.modify(self._client, events, self.serve)
+            self._host.watch_for(self._client, events, self.serve)
 
     def _close(self, *, reset: bool = False) -> None:
         if not self.finished:
             self.finished = True
-            self._selector.unregister(self._client)
+            self._host.watch_no_more(self._client)
             if reset:  # to linger for no time is to reset
                 self._client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, NO_TIME)
             self._client.close()

@@ -45,14 +45,19 @@ class LineHost(WireHost):
         self._line = os.open(self.cable.far, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         self._link = device.connect(clock.now_ns())
         super().__init__(device, clock=clock, lock=lock)
-        self.selector.register(self._line, selectors.EVENT_READ, self._receive)
+        self._unplugged = False
         self.start()
 
     def close(self) -> None:
         """Stop serving and unplug the cable. Idempotent."""
-        if not self._stopping:
-            super().close()
+        super().close()
+        if not self._unplugged:
+            self._unplugged = True
             self.cable.close()
+
+    def open(self) -> None:
+        """See :meth:`WireHost.open`."""
+        self.watch(self._line, selectors.EVENT_READ, self._receive)
 
     def flush(self) -> None:
         """See :meth:`WireHost.flush`."""
@@ -65,6 +70,7 @@ class LineHost(WireHost):
     def shut(self, now_ns: int) -> None:
         """See :meth:`WireHost.shut`."""
         self._link.receive(b"", now_ns)
+        self.watch_no_more(self._line)
         os.close(self._line)
 
     def _receive(self, _events: int, now_ns: int) -> None:

@@ -40,7 +40,6 @@ class TcpHost(WireHost):
         self._connections: dict[int, Connection] = {}
         self._address = self._listener.getsockname()[:2]
         super().__init__(device, clock=clock, lock=lock)
-        self.selector.register(self._listener, selectors.EVENT_READ, self._accept)
         self.start()
 
     @property
@@ -58,6 +57,10 @@ class TcpHost(WireHost):
         """How many clients are connected."""
         return len(self._connections)
 
+    def open(self) -> None:
+        """See :meth:`WireHost.open`."""
+        self.watch(self._listener, selectors.EVENT_READ, self._accept)
+
     def flush(self) -> None:
         """See :meth:`WireHost.flush`."""
         for number, connection in tuple(self._connections.items()):
@@ -70,6 +73,7 @@ class TcpHost(WireHost):
         for connection in self._connections.values():
             connection.drop(now_ns)
         self._connections.clear()
+        self.watch_no_more(self._listener)
         self._listener.close()
 
     def _accept(self, _events: int, now_ns: int) -> None:
@@ -77,7 +81,7 @@ class TcpHost(WireHost):
             client, _ = self._listener.accept()
         except OSError:
             return  # it left before it was let in
-        connection = Connection(client, self._device.connect(now_ns), self.selector)
+        connection = Connection(client, self._device.connect(now_ns), self)
         self._connections[client.fileno()] = connection
 
 

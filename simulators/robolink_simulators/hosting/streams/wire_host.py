@@ -1,22 +1,27 @@
-"""What serves a device over anything that a selector can watch: one thread, one selector."""
+"""What serves a device over anything that a selector can watch, in the thread of all of them."""
 
-import contextlib
-import selectors
-import socket
-import threading
 from abc import abstractmethod
 from contextlib import AbstractContextManager
-from typing import Final
+from typing import TYPE_CHECKING
 
 from robolink.closing import ClosedAtExit
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.hosting.seam import WireDevice
+from robolink_simulators.hosting.streams.serving_loop import (
+    Served,
+    ServingLoop,
+    serve_beside_others,
+)
 
-_LONGEST_SLEEP_S: Final = 3600.0
+if TYPE_CHECKING:
+    import selectors
+    import socket
 
 
 class WireHost(ClosedAtExit):
-    """The thread that serves a device. What it watches, a subclass adds, and then starts it.
+    """Serves a device. What it listens to, a subclass names in :meth:`open`.
+
+    Implements :class:`~robolink_simulators.hosting.streams.serving_loop.LoopHost`.
 
     Args:
         device: What to serve.
@@ -24,8 +29,12 @@ class WireHost(ClosedAtExit):
         lock: Held while the device is touched.
 
     Attributes:
-        selector: What is watched; the data of each key is called with events and time.
+        stopping: Whether it is served no more.
+        due_s: See ``LoopHost``.
+        queued_s: See ``LoopHost``.
     """
+
+    _loop: ServingLoop
 
     def __init__(
         self, device: WireDevice, *, clock: ScaledClock, lock: AbstractContextManager[object]
@@ -33,30 +42,34 @@ class WireHost(ClosedAtExit):
         self._device = device
         self._clock = clock
         self._lock = lock
-        self._stopping = False
-        self._alarm, self._waker = socket.socketpair()
-        self._waker.setblocking(False)
-        self._alarm.setblocking(False)
-        self.selector = selectors.DefaultSelector()
-        self.selector.register(self._alarm, selectors.EVENT_READ, self._drain_alarm)
-        self._thread = threading.Thread(target=self._run, name=type(self).__name__, daemon=True)
+        self._woken = False
+        self.stopping = False
+        self.due_s: float | None = None
+        self.queued_s: float | None = None
 
     def start(self) -> None:
         """Begin to serve."""
-        self._thread.start()
+        self._loop = serve_beside_others(self)
 
     def wake(self) -> None:
-        """Make the thread look at the device again; any thread may call it."""
-        # A full pipe wakes it as well, and a closed one has nobody to wake.
-        with contextlib.suppress(OSError):
-            self._waker.send(b"\0")
+        """Have the device looked at again; any thread may call it."""
+        if not (self._woken or self.stopping):
+            self._woken = True
+            self._loop.wake(self)
 
     def close(self) -> None:
         """Stop serving and close what is open. Idempotent."""
-        self._stopping = True
-        self.wake()
-        if self._thread is not threading.current_thread():
-            self._thread.join()
+        self.stopping = True
+        self._loop.leave(self)
+
+    def begin(self, loop: ServingLoop) -> None:
+        """See ``LoopHost.begin``."""
+        self._loop = loop
+        self.open()
+
+    @abstractmethod
+    def open(self) -> None:
+        """Watch what the subclass listens to; in the thread of the loop."""
 
     @abstractmethod
     def flush(self) -> None:
@@ -66,33 +79,35 @@ class WireHost(ClosedAtExit):
     def shut(self, now_ns: int) -> None:
         """Close what the subclass has opened; the device is held."""
 
-    def _run(self) -> None:
-        try:
-            while not self._stopping:
-                ready = self.selector.select(self._patience_s())
-                if any(key.fileobj is not self._alarm for key, _ in ready):
-                    self._clock.exchanged()
-                with self._lock:
-                    now_ns = self._clock.now_ns()
-                    for key, events in ready:
-                        key.data(events, now_ns)
-                    self._device.advance(now_ns)
-                    self.flush()
-        finally:
-            with self._lock:
-                self.shut(self._clock.now_ns())
-            self.selector.close()
-            self._alarm.close()
-            self._waker.close()
-
-    def _patience_s(self) -> float:
+    def step(self, served: Served | None, events: int) -> float | None:
+        """See ``LoopHost.step``."""
+        if served is None:
+            self._woken = False
+        else:
+            self._clock.exchanged()
         with self._lock:
+            now_ns = self._clock.now_ns()
+            if served is not None:
+                served(events, now_ns)
+            self._device.advance(now_ns)
+            self.flush()
             change = self._device.next_change()
-        if change is None:
-            return _LONGEST_SLEEP_S
-        return min(_LONGEST_SLEEP_S, self._clock.real_seconds(change))
+        return None if change is None else self._clock.real_seconds(change)
 
-    def _drain_alarm(self, _events: int, _now_ns: int) -> None:
-        with contextlib.suppress(BlockingIOError):
-            while self._alarm.recv(4096):
-                pass
+    def end(self) -> None:
+        """See ``LoopHost.end``."""
+        self.stopping = True
+        with self._lock:
+            self.shut(self._clock.now_ns())
+
+    def watch(self, what: "socket.socket | int", events: int, served: Served) -> None:
+        """Have something called when one of the events is seen; in the thread of the loop."""
+        self._loop.selector.register(what, events, (self, served))
+
+    def watch_for(self, what: "socket.socket | int", events: int, served: Served) -> None:
+        """Look for other events from now on."""
+        self._loop.selector.modify(what, events, (self, served))
+
+    def watch_no_more(self, what: "socket.socket | int") -> "selectors.SelectorKey":
+        """Forget something before it is closed."""
+        return self._loop.selector.unregister(what)

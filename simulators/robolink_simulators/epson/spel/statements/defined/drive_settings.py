@@ -3,14 +3,21 @@
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from robolink_simulators.epson.definitions.drive_settings import DRIVE_SETTINGS, DriveSetting
+from robolink_simulators.epson.definitions.drive_settings import (
+    DRIVE_SETTINGS,
+    OF_SIX_AXES,
+    DriveSetting,
+)
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+from robolink_simulators.epson.spel.expressions.joint_functions import another_robot
 from robolink_simulators.epson.spel.expressions.printing import CRLF, number_text
 from robolink_simulators.epson.spel.expressions.values import Number, out_of_range
 
 
 def _listed(setting: DriveSetting, values: Sequence[float]) -> str:
+    if setting.switched and len(values) > 1:
+        return ",".join("ON" if value else "OFF" for value in values) + CRLF
     if setting.switched and setting.listing != "{}":
         return setting.listing.format("ON" if values[0] else "OFF") + CRLF
     return ", ".join(map(_number, values)) + CRLF
@@ -29,6 +36,8 @@ def _setting(word: str) -> Callable[[Machine, Sequence[Number]], str]:
 
     def choose(machine: Machine, values: Sequence[Number]) -> str:
         drives = machine.robot.drives
+        if word in OF_SIX_AXES and not machine.model.six_axes:
+            raise another_robot(machine.model)
         if not values:
             return _listed(setting, drives.get(word))
         if word == "performmode" and len(values) == 2:

@@ -1,30 +1,29 @@
 """sim softmotion: serving a simulated PLC on one or several field buses."""
 
-from collections.abc import Mapping, Sequence
+import sys
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
 
-from robolink_simulators.assist.port import serve_assist
-from robolink_simulators.cell.clock import ScaledClock, SteeredClock
-from robolink_simulators.control.cell import ControlledCell
+from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.faults import LinkKind
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
+from robolink_simulators.softmotion.mailbox.option_text import options_from_text
+from robolink_simulators.softmotion.mailbox.parameters import parameters_from_text
+from robolink_simulators.softmotion.program.plc_maker import plc_maker
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink_cli.commands.simulate.serving import (
-    Termination,
-    announce,
-    controlled,
-    host_and_port,
-)
-from robolink_cli.options.simulation import DEFAULT_ADDRESS, ServedLife
+from robolink_cli.commands.simulate.kinds.planned_faults import plan_faults
+from robolink_cli.commands.simulate.kinds.simulated_kind import SimulatedKind
+from robolink_cli.commands.simulate.serving import host_and_port, named_values, world_from
+from robolink_cli.options.simulation import DEFAULT_ADDRESS
 
 if TYPE_CHECKING:
     from robolink_simulators.hosting.fieldbus.canopen_node import CanPlace
 
-_PTY: Final = "pty"
 _MULTICAST: Final = "udp_multicast"
 
 
@@ -60,20 +59,61 @@ class Buses:
         return named or frozenset({LinkKind.MODBUS_TCP})
 
 
-def serve_plc(
-    simulator: SoftMotionSimulator, buses: Buses, *, speed: float, life: ServedLife
-) -> None:
-    """Serve a simulator, its assist port and its control API until SIGTERM or Ctrl-C."""
-    clock = SteeredClock(speed)
-    with ExitStack() as stack:
-        stopped = stack.enter_context(Termination(life))
-        urls = _served(stack, simulator, buses, clock)
-        assist = stack.enter_context(serve_assist(simulator, clock=clock))
-        cells = {"cell": ControlledCell(simulator, clock, urls)}
-        control = stack.enter_context(controlled(cells, life, allow_remote=buses.allow_remote))
-        beside = {"assist": assist.url, "control": control.url_of("cell")}
-        _announce(simulator, urls, beside, stopped.state_dir)
-        stopped.wait(lambda: simulator.log.added + control.requests)
+def make_softmotion(
+    *,
+    kinematics: str,
+    parameters: Sequence[str],
+    program: Path | None,
+    seed: int,
+    state: Path | None,
+    options: Sequence[str],
+    world: Sequence[str],
+    faults: Path | None,
+    cell: str = "",
+    **placing: Any,  # noqa: ANN401 - other options
+) -> SoftMotionSimulator:
+    """Make a simulator from the options of ``sim softmotion``, which explain each.
+
+    ``cell`` is its name among several, for what it tells meanwhile.
+
+    Raises:
+        ConfigError: One of them makes no sense.
+    """
+    if ":" in kinematics and str(Path.cwd()) not in sys.path:
+        sys.path.append(str(Path.cwd()))
+    simulator = SoftMotionSimulator(
+        kinematics,
+        seed=seed,
+        parameters=parameters_from_text(named_values(parameters, "--param dArmLength1=250")),
+        options=options_from_text(named_values(options, "--option profile=tools")),
+        state_path=state,
+        world=world_from(world),
+        make_plc=plc_maker(program),
+    )
+    plan_faults(simulator, faults, _buses(**placing).kinds, cell=cell)
+    return simulator
+
+
+def _place(
+    stack: ExitStack,
+    simulator: SoftMotionSimulator,
+    clock: ScaledClock,
+    **given: Any,  # noqa: ANN401
+) -> dict[str, str]:
+    return _served(stack, simulator, _buses(**given), clock)
+
+
+def _buses(
+    *,
+    address: str | None,
+    serial: str | None,
+    can: str | None,
+    unit: int,
+    node: int,
+    allow_remote: bool,
+    **_making: Any,  # noqa: ANN401 - other options
+) -> Buses:
+    return Buses(address, serial, can, unit=unit, node=node, allow_remote=allow_remote)
 
 
 def _served(
@@ -125,31 +165,22 @@ def _can_place(text: str, node: int) -> "CanPlace":
     return CanPlace(interface, channel, int(port), node)
 
 
-def _announce(
-    simulator: SoftMotionSimulator,
-    urls: Mapping[str, str],
-    beside: Mapping[str, str],
-    state_dir: str,
-) -> None:
-    kinematics = simulator.plc.group.kinematics.name
-    document: dict[str, object] = {
-        "url": simulator.url,
-        "urls": dict(urls),
-        **beside,
-        "kinematics": kinematics,
-        "seed": simulator.seed,
-    }
-    lines: Sequence[str] = (
-        tr(
-            "SIMULATED SoftMotion PLC, {kinematics} (seed {seed}). Nothing moves.",
-            kinematics=kinematics,
-            seed=simulator.seed,
-        ),
-        *(tr("  {bus}  {url}", bus=bus.ljust(10), url=url) for bus, url in urls.items()),
-        tr("  assist      {url}", url=beside["assist"]),
-        tr("  control     {url}", url=beside["control"]),
-        tr('Try: robolink -c "{url}" status', url=simulator.url),
-        tr("From the tip to the pin, seen now: robolink sim assist ASSIST look"),
-        tr("Ctrl-C ends it."),
+def _kinematics(simulator: SoftMotionSimulator) -> str:
+    return simulator.plc.group.kinematics.name
+
+
+def _title(simulator: SoftMotionSimulator) -> str:
+    return tr(
+        "SIMULATED SoftMotion PLC, {kinematics} (seed {seed}). Nothing moves.",
+        kinematics=_kinematics(simulator),
+        seed=simulator.seed,
     )
-    announce(document, lines, state_dir)
+
+
+SOFTMOTION_KIND: Final = SimulatedKind(
+    make_softmotion,
+    _place,
+    lambda simulator: {"kinematics": _kinematics(simulator)},
+    _title,
+)
+"""``sim softmotion``."""

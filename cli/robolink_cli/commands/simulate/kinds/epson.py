@@ -1,68 +1,105 @@
 """sim epson: serving a simulated EPSON controller."""
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Final
 
 import click
-from robolink_simulators.assist.port import serve_assist
-from robolink_simulators.cell.clock import SteeredClock
-from robolink_simulators.control.cell import ControlledCell
+from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson import EpsonOptions, EpsonSimulator
 from robolink_simulators.epson.options import options_from_text, read_profile
 from robolink_simulators.epson.spel.tasks.channels.serial_link import COM_NUMBERS
 from robolink_simulators.epson.vision.vision_file import install_vision
+from robolink_simulators.faults import LinkKind
 from robolink_simulators.hosting.streams.epson_serial import serve_serial
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Secret
-from robolink_cli.commands.simulate.serving import (
-    Termination,
-    announce,
-    controlled,
-    named_values,
-)
+from robolink_cli.commands.simulate.kinds.planned_faults import plan_faults
+from robolink_cli.commands.simulate.kinds.simulated_kind import SimulatedKind
+from robolink_cli.commands.simulate.serving import host_and_port, named_values, world_from
 from robolink_cli.console.render import note
-from robolink_cli.options.simulation import ServedLife
 
 
-def serve_epson(
-    simulator: EpsonSimulator,
-    address: tuple[str, int] | None,
+def make_epson(
     *,
-    speed: float,
-    allow_remote: bool,
-    life: ServedLife,
-    baud: int = 0,
-) -> None:
-    """Serve a simulator, its assist port and its control API until SIGTERM or Ctrl-C.
+    robot: str,
+    seed: int,
+    password_env: str | None,
+    options: Sequence[str],
+    profile: Path | None,
+    state: Path | None,
+    world: Sequence[str],
+    programs: Sequence[Path],
+    points: Sequence[Path],
+    vision: Path | None,
+    lines: Sequence[str],
+    folder: Path | None,
+    faults: Path | None,
+    serial: str | None,
+    cell: str = "",
+    **_placing: Any,  # noqa: ANN401 - other options
+) -> EpsonSimulator:
+    """Make a simulator from the options of ``sim epson``, which explain each.
 
-    Args:
-        simulator: What to serve.
-        address: Where Remote Ethernet listens; ``None`` for a serial line in its place.
-        speed: How many times faster than real the simulated time passes.
-        allow_remote: Whether an address that other machines can reach is taken.
-        life: Where it is controlled, and when it ends by itself.
-        baud: How fast the serial line is; 0 for at once.
+    ``cell`` is its name among several, for what it tells meanwhile.
+
+    Raises:
+        ConfigError: One of them makes no sense.
+        click.UsageError: There is something that goes with programs, and no programs.
     """
-    clock = SteeredClock(speed)
-    with ExitStack() as stack:
-        stopped = stack.enter_context(Termination(life))
-        if address is None:
-            url = stack.enter_context(serve_serial(simulator, baud=baud, clock=clock)).url
-        else:
-            tcp = serve_tcp(simulator, *address, clock=clock, allow_remote=allow_remote)
-            url = stack.enter_context(tcp).url
-        assist = stack.enter_context(serve_assist(simulator, clock=clock))
-        cell = ControlledCell(simulator, clock, {"serial" if address is None else "tcp": url})
-        control = stack.enter_context(controlled({"cell": cell}, life, allow_remote=allow_remote))
-        beside = {"assist": assist.url, "control": control.url_of("cell")}
-        _announce(simulator, url, beside, stopped.state_dir)
-        stopped.wait(lambda: simulator.log.added + control.requests)
+    simulator = EpsonSimulator(
+        robot,
+        seed=seed,
+        password=password_in(password_env),
+        options=habits(options, profile),
+        state_path=state,
+        world=world_from(world),
+    )
+    surroundings = ProjectSurroundings(vision, lines, folder)
+    load_programs(simulator, programs, points, surroundings, cell=cell)
+    link = LinkKind.EPSON_SERIAL if serial else LinkKind.EPSON_TCP
+    plan_faults(simulator, faults, {link}, cell=cell)
+    return simulator
+
+
+def _place(
+    stack: ExitStack,
+    simulator: EpsonSimulator,
+    clock: ScaledClock,
+    *,
+    address: str,
+    serial: str | None,
+    baud: int,
+    allow_remote: bool,
+    **_making: Any,  # noqa: ANN401 - other options
+) -> dict[str, str]:
+    """Serve it with Remote Ethernet, or with Remote RS232 in its place."""
+    if serial:
+        line = stack.enter_context(serve_serial(simulator, baud=baud, clock=clock))
+        return {"serial": line.url}
+    listen = host_and_port(address, "--tcp")
+    tcp = stack.enter_context(serve_tcp(simulator, *listen, clock=clock, allow_remote=allow_remote))
+    return {"tcp": tcp.url}
+
+
+def _title(simulator: EpsonSimulator) -> str:
+    robot, seed = simulator.machine.model.name, simulator.seed
+    return tr("SIMULATED EPSON {robot} (seed {seed}). No robot moves.", robot=robot, seed=seed)
+
+
+EPSON_KIND: Final = SimulatedKind(
+    make_epson,
+    _place,
+    lambda simulator: {"robot": simulator.machine.model.name},
+    _title,
+)
+"""``sim epson``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,6 +143,8 @@ def load_programs(
     programs: Sequence[Path],
     points: Sequence[Path],
     surroundings: ProjectSurroundings,
+    *,
+    cell: str = "",
 ) -> None:
     """Load a project, if any; what its tasks print is shown beside the announcement.
 
@@ -114,6 +153,7 @@ def load_programs(
         programs: Its programs.
         points: Its point files.
         surroundings: Its camera, serial lines and folder.
+        cell: Its name among several, which stands before what is printed.
 
     Raises:
         ConfigError: It cannot be built, or a file cannot be read.
@@ -126,7 +166,8 @@ def load_programs(
         return
     runner = simulator.load(programs, points)
     surroundings.install(simulator)
-    runner.on_print = lambda text: note(text.rstrip("\r\n"))
+    before = f"{cell}: " if cell else ""
+    runner.on_print = lambda text: note(before + text.rstrip("\r\n"))
 
 
 def password_in(variable: str | None) -> Secret | None:
@@ -155,23 +196,6 @@ def habits(options: Sequence[str], profile: Path | None) -> EpsonOptions:
     pairs = named_values(options, "--option terminator=cr")
     settled = {} if profile is None else read_profile(profile)
     return options_from_text({**settled, **pairs})
-
-
-def _announce(
-    simulator: EpsonSimulator, url: str, beside: Mapping[str, str], state_dir: str
-) -> None:
-    robot, seed = simulator.machine.model.name, simulator.seed
-    document: dict[str, object] = {"url": url, **beside, "robot": robot, "seed": seed}
-    lines = (
-        tr("SIMULATED EPSON {robot} (seed {seed}). No robot moves.", robot=robot, seed=seed),
-        tr("  controller  {url}", url=url),
-        tr("  assist      {url}", url=beside["assist"]),
-        tr("  control     {url}", url=beside["control"]),
-        tr('Try: robolink -c "{url}" status', url=url),
-        tr("From the tip to the pin, seen now: robolink sim assist ASSIST look"),
-        tr("Ctrl-C ends it."),
-    )
-    announce(document, lines, state_dir)
 
 
 def _lines(texts: Sequence[str]) -> dict[int, str]:

@@ -12,8 +12,20 @@ from robolink_cli.console.output import hand_over, show
 from robolink_cli.console.render import json_is_on
 
 
-def plan_faults(simulator: Any, file: Path | None, served: Collection[LinkKind]) -> None:  # noqa: ANN401 - any simulator with faults
+def plan_faults(
+    simulator: Any,  # noqa: ANN401 - any simulator with faults
+    file: Path | None,
+    served: Collection[LinkKind],
+    *,
+    cell: str = "",
+) -> None:
     """Plan what a file says; each fault that fires is told then, in one line on stdout.
+
+    Args:
+        simulator: For which.
+        file: The file, if any.
+        served: The links that it will be served on.
+        cell: Its name among several, which is told with each fault.
 
     Raises:
         ConfigError: The file is wrong, or a fault cannot happen on any link that is served.
@@ -27,9 +39,11 @@ def plan_faults(simulator: Any, file: Path | None, served: Collection[LinkKind])
     def tell(fault: Any, request: str) -> None:  # noqa: ANN401 - of any simulator
         keys = fault_as_keys(fault)
         if as_json:
-            document = {"schema": "robolink/fault/1", "fault": keys, "request": request}
+            named = {"cell": cell} if cell else {}
+            document = {"schema": "robolink/fault/1", **named, "fault": keys, "request": request}
             hand_over(json.dumps({**document, "simulated_s": simulator.now_ns / 1e9}))
         else:
-            show(tr("FAULT {action}: {request}", action=keys["action"], request=request))
+            told = tr("FAULT {action}: {request}", action=keys["action"], request=request)
+            show(f"{cell}: {told}" if cell else told)
 
     simulator.faults.on_fired = tell

@@ -1,0 +1,122 @@
+"""One kind of simulator: how it is made and served from the options of its command."""
+
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import Any
+
+from robolink_simulators.cell.clock import EXCHANGE_S, SteeredClock
+from robolink_simulators.control.cell import AnySimulator, ControlledCell
+from robolink_simulators.plc import PlcSimulator
+
+from robolink.messages import tr
+from robolink_cli.commands.simulate.serving import Termination, announce, controlled
+from robolink_cli.options.simulation import ServedLife
+
+Options = Mapping[str, Any]
+"""The values of a command's options, by the names of its parameters."""
+
+
+@dataclass(frozen=True, slots=True)
+class ServedCell:
+    """A simulator on its ports.
+
+    Attributes:
+        controlled: It, its time, and where clients connect to.
+        assist: Where robolink asks the person beside it; ``None`` where nobody stands there.
+        about: What else the first line says of it.
+    """
+
+    controlled: ControlledCell
+    assist: str | None
+    about: Mapping[str, object]
+
+    def document(self, control: str) -> dict[str, object]:
+        """Return what a script is told of it: URLs, kind, machine and seed."""
+        simulator, urls = self.controlled.simulator, dict(self.controlled.urls)
+        person = {} if self.assist is None else {"assist": self.assist}
+        where = {"url": next(iter(urls.values())), "urls": urls, **person, "control": control}
+        return {**where, "kind": simulator.kind, **self.about, "seed": simulator.seed}
+
+
+@dataclass(frozen=True, slots=True)
+class SimulatedKind:
+    """How the simulators of one command are made and served.
+
+    Attributes:
+        make: Makes one from them; no port is opened yet.
+        place: Serves it by them, and returns its URLs by link.
+        about: Returns what its first line says beside URLs and seed.
+        title: Returns the sentence that names it.
+        person: Whether a person stands beside it.
+    """
+
+    make: Callable[..., AnySimulator]
+    place: Callable[..., dict[str, str]]
+    about: Callable[[Any], Mapping[str, object]]
+    title: Callable[[Any], str]
+    person: bool = True
+
+    def serve(
+        self, stack: ExitStack, simulator: AnySimulator, given: Options, *, person: bool
+    ) -> ServedCell:
+        """Serve one until a stack is closed.
+
+        Args:
+            stack: Closes its ports.
+            simulator: What was made of these options.
+            given: The options.
+            person: Whether somebody stands beside it, where that is possible.
+
+        Raises:
+            ConfigError: An address is none, or other machines could reach it and may not.
+            ConnectError: A port is taken.
+        """
+        speed, exchange_s = given["speed"], given["exchange"]
+        if exchange_s is None:  # where time stands still, nothing else would let it pass
+            exchange_s = 0.0 if speed else EXCHANGE_S
+        clock = SteeredClock(speed, exchange_s=exchange_s)
+        urls = self.place(stack, simulator, clock, **given)
+        assist = None
+        if person and not isinstance(simulator, PlcSimulator):
+            from robolink_simulators.assist.port import serve_assist
+
+            assist = stack.enter_context(serve_assist(simulator, clock=clock)).url
+        return ServedCell(ControlledCell(simulator, clock, urls), assist, self.about(simulator))
+
+
+def serve_alone(kind: SimulatedKind, life: ServedLife, given: Options) -> None:
+    """Make one simulator and serve it, with its control API, until SIGTERM or Ctrl-C.
+
+    Args:
+        kind: Of which kind.
+        life: Where it is controlled, and when it ends by itself.
+        given: The options of its command.
+
+    Raises:
+        ConfigError: Something that was given makes no sense.
+        ConnectError: A port is taken.
+    """
+    simulator = kind.make(**given)
+    with ExitStack() as stack:
+        stopped = stack.enter_context(Termination(life))
+        served = kind.serve(stack, simulator, given, person=True)
+        cells = {"cell": served.controlled}
+        control = stack.enter_context(controlled(cells, life, allow_remote=given["allow_remote"]))
+        document = served.document(control.url_of("cell"))
+        announce(document, [kind.title(simulator), *_told(served, document)], stopped.state_dir)
+        stopped.wait(lambda: simulator.log.added + control.requests)
+
+
+def _told(served: ServedCell, document: Mapping[str, object]) -> list[str]:
+    lines = [f"  {link.ljust(10)}  {url}" for link, url in served.controlled.urls.items()]
+    if served.assist is not None:
+        lines.append(tr("  assist      {url}", url=served.assist))
+    lines.append(tr("  control     {url}", url=document["control"]))
+    if served.controlled.simulator.kind == "plc":
+        lines.append(tr('Try: robolink -c "{url}" expert plc check-map', url=document["url"]))
+    else:
+        lines.append(tr('Try: robolink -c "{url}" status', url=document["url"]))
+    if served.assist is not None:
+        lines.append(tr("From the tip to the pin, seen now: robolink sim assist ASSIST look"))
+    return [*lines, tr("Ctrl-C ends it.")]

@@ -1,0 +1,1 @@
+"""sim run: many simulated controllers of all kinds, from a file."""

@@ -1,0 +1,227 @@
+"""The one thread that serves every simulated controller of this process, thousands of them.
+
+Theory of operation. A device is bytes in, bytes out, and an instant at which it does something
+by itself, so serving it blocks nowhere: one selector tells whose bytes have come, one heap whose
+instant. Other threads ask for something by a queue and a byte that wakes the selector. The thread
+begins with the first host and ends with the last. Whatever a hook of a simulator does in it holds
+up all that this process serves, so it must never wait for another one of them.
+"""
+
+import contextlib
+import selectors
+import socket
+import threading
+from collections import deque
+from collections.abc import Callable
+from functools import partial
+from heapq import heapify, heappop, heappush
+from time import monotonic
+from typing import Final, Protocol
+
+Served = Callable[[int, int], None]
+"""Deals with what the selector saw; is given the events and the simulated time."""
+
+_LONGEST_SLEEP_S: Final = 3600.0
+_SPARE_ENTRIES: Final = 64
+"""The heap may hold so many more entries than twice the hosts before it is cleared up."""
+
+
+class LoopHost(Protocol):
+    """What a loop serves.
+
+    Attributes:
+        due_s: When it wants to be looked at, by the monotonic clock; the loop keeps it here.
+        queued_s: When the heap will have it looked at.
+        stopping: Whether it is served no more.
+    """
+
+    due_s: float | None
+    queued_s: float | None
+    stopping: bool
+
+    def begin(self, loop: "ServingLoop") -> None:
+        """Register what is watched with the loop that serves it."""
+
+    def step(self, served: Served | None, events: int) -> float | None:
+        """Serve what was ready, let time pass; return in how many seconds to look again."""
+
+    def end(self) -> None:
+        """Close all that is open."""
+
+
+class ServingLoop:
+    """One thread and one selector; see the module.
+
+    Attributes:
+        selector: What is watched; the data of each key is a host and what it has called.
+    """
+
+    def __init__(self) -> None:
+        self._alarm, self._waker = socket.socketpair()
+        self._waker.setblocking(False)
+        self._alarm.setblocking(False)
+        self.selector = selectors.DefaultSelector()
+        self.selector.register(self._alarm, selectors.EVENT_READ, None)
+        self._gate = threading.Lock()
+        self._asked: deque[Callable[[], None]] = deque()
+        self._alarmed = self._ended = False
+        self._hosts: set[LoopHost] = set()
+        self._members = 0
+        self._heap: list[tuple[float, int, LoopHost]] = []
+        self._thread = threading.Thread(target=self._run, name="simulators", daemon=True)
+        self._thread.start()
+
+    def join(self, host: LoopHost) -> bool:
+        """Serve a host from now on; False when this loop has ended, or a fork left it behind."""
+        with self._gate:
+            if self._ended or not self._thread.is_alive():
+                return False
+            self._members += 1
+            self._ask(partial(self._admit, host))
+        return True
+
+    def wake(self, host: LoopHost) -> None:
+        """Have a host look at its device again; any thread may call it."""
+        with self._gate:
+            if not self._ended:
+                self._ask(partial(self._step, host, None, 0))
+
+    def leave(self, host: LoopHost) -> None:
+        """Serve a host no more, and return once it is closed; in the loop itself, soon."""
+        inside = self._thread is threading.current_thread()
+        gone = threading.Event()
+        with self._gate:
+            asked = not self._ended and self._thread.is_alive()
+            if asked:
+                self._ask(partial(self._drop, host, gone))
+        if not inside:
+            if asked:
+                gone.wait()
+            if self._ended:
+                self._thread.join()
+
+    def _ask(self, act: Callable[[], None]) -> None:
+        """Have something done in the thread; the gate is held."""
+        self._asked.append(act)
+        if not self._alarmed:
+            self._alarmed = True
+            # A full pipe wakes it as well.
+            with contextlib.suppress(BlockingIOError):
+                self._waker.send(b"\0")
+
+    def _run(self) -> None:
+        try:
+            while not self._ended:
+                for key, events in self.selector.select(self._patience_s()):
+                    if key.data is not None:
+                        host, served = key.data
+                        self._step(host, served, events)
+                self._do_asked()
+                self._look_at_overdue()
+            self._do_asked()
+        finally:
+            self.selector.close()
+            self._alarm.close()
+            self._waker.close()
+
+    def _patience_s(self) -> float:
+        if not self._heap:
+            return _LONGEST_SLEEP_S
+        return max(0.0, min(_LONGEST_SLEEP_S, self._heap[0][0] - monotonic()))
+
+    def _do_asked(self) -> None:
+        if not self._alarmed:
+            return
+        with self._gate:
+            self._alarmed = False
+            with contextlib.suppress(BlockingIOError):
+                while self._alarm.recv(4096):
+                    pass
+            asked, self._asked = self._asked, deque()
+        for act in asked:
+            act()
+
+    def _look_at_overdue(self) -> None:
+        now_s = monotonic()
+        while self._heap and self._heap[0][0] <= now_s:
+            at_s, _, host = heappop(self._heap)
+            if at_s != host.queued_s:
+                continue  # an earlier look has taken its place
+            host.queued_s = None
+            if host.due_s is not None and host.due_s > now_s:
+                self._queue(host, host.due_s)
+            elif host.due_s is not None:
+                self._step(host, None, 0)
+
+    def _step(self, host: LoopHost, served: Served | None, events: int) -> None:
+        """Let a host work; one that fails is served no more, and the others are."""
+        if host.stopping or host not in self._hosts:
+            return
+        try:
+            patience_s = host.step(served, events)
+        except BaseException as error:
+            self._drop(host, None)
+            self._tell(error)
+            return
+        host.due_s = None if patience_s is None else monotonic() + patience_s
+        if host.due_s is not None and (host.queued_s is None or host.due_s < host.queued_s):
+            self._queue(host, host.due_s)
+
+    def _queue(self, host: LoopHost, at_s: float) -> None:
+        host.queued_s = at_s
+        if len(self._heap) > 2 * len(self._hosts) + _SPARE_ENTRIES:
+            kept = [entry for entry in self._heap if entry[0] == entry[2].queued_s]
+            self._heap = kept
+            heapify(self._heap)
+        heappush(self._heap, (at_s, id(host), host))
+
+    def _admit(self, host: LoopHost) -> None:
+        self._hosts.add(host)
+        try:
+            host.begin(self)
+        except BaseException as error:
+            self._drop(host, None)
+            self._tell(error)
+        else:
+            self._step(host, None, 0)
+
+    def _drop(self, host: LoopHost, gone: threading.Event | None) -> None:
+        try:
+            if host in self._hosts:
+                self._hosts.discard(host)
+                host.queued_s = host.due_s = None
+                host.end()
+                with self._gate:
+                    self._members -= 1
+                    self._ended = not self._members
+        finally:
+            if gone is not None:
+                gone.set()
+
+    def _tell(self, error: BaseException) -> None:
+        threading.excepthook(
+            threading.ExceptHookArgs((type(error), error, error.__traceback__, self._thread))
+        )
+
+
+class _SharedLoop:
+    """The loop of this process, if there is one now."""
+
+    def __init__(self) -> None:
+        self._gate = threading.Lock()
+        self._loop: ServingLoop | None = None
+
+    def join(self, host: LoopHost) -> ServingLoop:
+        with self._gate:
+            if self._loop is None or not self._loop.join(host):
+                self._loop = ServingLoop()
+                self._loop.join(host)
+            return self._loop
+
+
+_SHARED: Final = _SharedLoop()
+
+
+def serve_beside_others(host: LoopHost) -> ServingLoop:
+    """Have a host served by the thread of this process, which begins when there is none."""
+    return _SHARED.join(host)

@@ -1,0 +1,288 @@
+"""sim run: what its file may say, what is refused, and that all kinds are served at once."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from robolink_cli import main
+from robolink_cli.commands.simulate.run.cells_file import KINDS, read_cells
+from robolink_cli.commands.simulate.run.declared_keys import DeclaredKeys
+from robolink_cli.commands.simulate.sim import sim
+from robolink_simulators.control.client import ControlClient
+
+import robolink
+from robolink import ToolOffset
+from robolink.errors import ConfigError
+
+MAP = Path(__file__).parents[2] / "examples/plc-maps/commit-bit.toml"
+HEAD = 'schema = "robolink/sim-cells/1"\n'
+ALL_KINDS = f"""{HEAD}
+[cells.press]
+kind = "epson"
+count = 2
+tcp = "127.0.0.1:0"
+robot = "C8-C901S"
+option = {{ terminator = "cr" }}
+speed = 20
+
+[cells.line]
+kind = "epson"
+serial = "pty"
+speed = 0
+
+[cells.glue]
+kind = "softmotion"
+tcp = "127.0.0.1:0"
+serial = "pty"
+world = {{ eye_sigma_mm = 0.25 }}
+
+[cells.filler]
+kind = "plc"
+map = "{MAP}"
+tcp = "127.0.0.1:0"
+"""
+
+
+@pytest.fixture
+def file(tmp_path):
+    """A maker of files."""
+
+    def written(text):
+        path = tmp_path / "cells.toml"
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return written
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_option_of_a_command_is_a_key_of_its_table(kind):
+    command = sim.commands[kind]
+    alone = {"control", "with-parent", "idle-exit", "json", "lang", "help", "replay"}
+    alone |= {"modbus-tcp", "modbus-rtu"}  # what --tcp and --serial were called
+    options = {max(it.opts, key=len).lstrip("-") for it in command.params} - alone
+    keys = DeclaredKeys(command, Path()).options
+    assert set(keys) == {name.replace("-", "_") for name in options}
+
+
+def test_a_table_means_what_the_command_line_means(file, tmp_path):
+    typed = [
+        *("--tcp=127.0.0.1:5001", "--serial=pty", "--baud=9600", "--robot=T6-602S,C8-C901S"),
+        *("--option=terminator=cr", "--option=companion=true", "--world=eye_sigma_mm=0.5"),
+        *("--com=2=/dev/pts/9", "--allow-remote", "--speed=0.5", "--exchange=0.25", "--seed=4"),
+        *(f"--state={tmp_path / 'a.json'}", f"--program={MAP}", f"--program={MAP}"),
+    ]
+    table = {
+        "tcp": "127.0.0.1:5001",
+        "serial": "pty",
+        "baud": 9600,
+        "robot": "T6-602S,C8-C901S",
+        "option": {"terminator": "cr", "companion": True},
+        "world": {"eye_sigma_mm": 0.5},
+        "com": {"2": "/dev/pts/9"},
+        "allow_remote": True,
+        "speed": 0.5,
+        "exchange": 0.25,
+        "seed": 4,
+        "state": "a.json",
+        "program": [str(MAP), str(MAP)],
+    }
+    command = sim.commands["epson"]
+    objections = []
+    given = DeclaredKeys(command, tmp_path).values(table, lambda *said: objections.append(said))
+    assert objections == []
+    assert given == command.make_context("sim", typed).params
+
+
+def test_a_fleet_counts_ports_seeds_nodes_and_names_up(file, tmp_path):
+    text = f"""{HEAD}
+[cells.a]
+kind = "epson"
+count = 12
+tcp = "127.0.0.1:6000"
+seed = 5
+state = "{{name}}.json"
+[cells.b]
+kind = "softmotion"
+count = 3
+tcp = "[::1]:7000"
+can = "virtual:x"
+[cells.c]
+kind = "epson"
+tcp = "127.0.0.1:6012"
+"""
+    cells = {cell.name: cell for cell in read_cells(file(text), sim.commands)}
+    assert list(cells) == [*(f"a-{n:02}" for n in range(1, 13)), "b-1", "b-2", "b-3", "c"]
+    last = cells["a-12"].given
+    assert (last["address"], last["seed"], last["state"]) == (
+        "127.0.0.1:6011",
+        16,
+        tmp_path / "a-12.json",
+    )
+    assert [cells[f"b-{n}"].given["address"] for n in (1, 2, 3)] == [
+        "[::1]:7000",
+        "[::1]:7001",
+        "[::1]:7002",
+    ]
+    assert [cells[f"b-{n}"].given["node"] for n in (1, 2, 3)] == [5, 6, 7]
+    assert (cells["c"].assist, cells["a-01"].assist) == (True, False)
+    assert not (tmp_path / "a-01.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("tables", "told"),
+    [
+        ('[cells.a]\nkind = "epsom"', 'line 3, cells.a.kind: must be one of "epson"'),
+        ('[cells.a]\nkind = "epson"\ncolour = 1', "line 4, cells.a.colour: is not known"),
+        ('[cells.a]\nkind = "epson"\nreplay = "x"', "line 4, cells.a.replay: is not known"),
+        ('[cells.a]\nkind = "epson"\nseed = "1"', "line 4, cells.a.seed: must be a whole number"),
+        ('[cells.a]\nkind = "epson"\nseed = -1', "line 4, cells.a.seed: -1 is not in the range"),
+        ('[cells.a]\nkind = "epson"\nspeed = 1001', "line 4, cells.a.speed: 1001"),
+        ('[cells.a]\nkind = "epson"\ntcp = "here"', "line 4, cells.a.tcp: 'here' is no address"),
+        ('[cells.a]\nkind = "epson"\nserial = "com"', "line 4, cells.a.serial: 'com' is not 'pty'"),
+        ('[cells.a]\nkind = "epson"\nallow_remote = 1', "line 4, cells.a.allow_remote: must be"),
+        ('[cells.a]\nkind = "epson"\noption = ["a=1"]', "line 4, cells.a.option: must be a table"),
+        ('[cells.a]\nkind = "epson"\nprogram = "m.prg"', "line 4, cells.a.program: must be a list"),
+        ('[cells.a]\nkind = "epson"\ncount = 0', "line 4, cells.a.count: must be at least 1"),
+        ('[cells.a]\nkind = "epson"\nrobot = "R2D2"', "line 2, cells.a: There is no simulated"),
+        (
+            '[cells.a]\nkind = "epson"\noption.hue = 1',
+            "line 2, cells.a: The EPSON simulator has no",
+        ),
+        ('[cells.a]\nkind = "epson"\npoints = []\n[cells.a.world]\nx = 1', "line 2, cells.a: "),
+        ('[cells.a]\nkind = "plc"', "line 2, cells.a.map: is missing"),
+        (
+            f'[cells.a]\nkind = "plc"\nmap = "{MAP}"\nassist = true',
+            "line 5, cells.a.assist: must be f",
+        ),
+        ('[cells."a b"]\nkind = "epson"', "line 2, cells.a b: a name has"),
+        (
+            '[cells.a]\nkind = "epson"\n[cells.b]\nkind = "epson"\ntcp = "127.0.0.1:5000"',
+            "line 6, cells.b.tcp: a has it already",
+        ),
+        (
+            '[cells.a]\nkind = "epson"\ncount = 2\ntcp = "127.0.0.1:0"\nstate = "s.json"',
+            "line 6, cells.a.state: a-1 has it already",
+        ),
+        (
+            '[cells.a]\nkind = "epson"\ncount = 3\ntcp = "127.0.0.1:65534"',
+            "line 5, cells.a.tcp: there are not so many ports",
+        ),
+        (
+            '[cells.a]\nkind = "softmotion"\ncount = 124\ncan = "virtual:x"',
+            "line 4, cells.a.count: a bus has no more than 127 nodes",
+        ),
+        ("", "cells: must be a table"),
+        ('[cell.a]\nkind = "epson"', "line 2, cell: is not known; is cells meant?"),
+    ],
+)
+def test_what_is_wrong_is_told_with_line_and_key(file, tables, told):
+    with pytest.raises(ConfigError) as refused:
+        read_cells(file(HEAD + tables), sim.commands)
+    assert told in str(refused.value)
+
+
+def test_all_that_is_wrong_is_told_at_once_and_nothing_is_served(file, capsys):
+    path = file('[cells.a]\nkind = "epson"\nseed = "1"\nspeed = -1\n')
+    assert main.run(["sim", "run", str(path)]) == 2
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert "is wrong in 3 places" in told.err
+    assert all(word in told.err for word in ("schema", "line 3, cells.a.seed", "cells.a.speed"))
+
+
+def test_a_file_is_checked_without_opening_a_port(file, capsys):
+    path = file(ALL_KINDS)
+    assert main.run(["--json", "sim", "run", str(path), "--check"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["cells"] == ["press-1", "press-2", "line", "glue", "filler"]
+
+
+def started(path, *arguments, folder):
+    """Run ``sim run`` to its end in a process of its own."""
+    paths = os.pathsep.join(one for one in sys.path if one)
+    return subprocess.run(
+        [sys.executable, "-m", "robolink_cli", "sim", "run", str(path), *arguments],
+        env={**os.environ, "PYTHONPATH": paths, "TMPDIR": str(folder)},
+        capture_output=True,
+        text=True,
+        timeout=100,
+        check=False,
+    )
+
+
+def ended(pid):
+    """Wait until a process is gone."""
+    for _ in range(400):
+        try:
+            os.kill(pid, 0)
+        except ProcessLookupError:
+            return True
+        time.sleep(0.05)
+    return False
+
+
+@pytest.mark.skipif(os.name == "nt", reason="needs pseudo terminals")
+def test_all_kinds_are_served_by_one_process_until_it_is_told_to_end(file, tmp_path, monkeypatch):
+    done = started(file(ALL_KINDS), "--wait-ready", "--idle-exit", "60", folder=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    document = json.loads(done.stdout)
+    try:
+        cells = document["cells"]
+        assert list(cells) == ["press-1", "press-2", "line", "glue", "filler"]
+        for number, (name, cell) in enumerate(cells.items(), 1):
+            monkeypatch.setenv("ROBOLINK_STATE_DIR", cell["state_dir"])
+            for url in cell["urls"].values():
+                with robolink.connect(url, timeout_s=5.0) as controller:
+                    wanted = ToolOffset(number, len(url), -30.0)
+                    controller.tools.write(2, wanted, expected=robolink.ANY)
+            with ControlClient(cell["control"]) as control:
+                assert control.do("truth")["stored"]["2"]["x_mm"] == pytest.approx(number)
+                assert control.about()["seed"] == cell["seed"]
+                assert ("assist" in cell) == (name in ("line", "glue"))
+        with ControlClient(cells["glue"]["control"]) as control:
+            assert control.do("set_world")["parameters"]["eye_sigma_mm"] == 0.25
+    finally:
+        os.kill(document["pid"], signal.SIGTERM)
+    assert ended(document["pid"])
+    assert not Path(document["state_dir"]).exists()
+
+
+@pytest.mark.soak
+def test_a_port_that_is_taken_ends_it_all_by_the_name_of_the_cell(file, tmp_path):
+    import socket
+
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        table = '[cells.a]\nkind = "epson"\ntcp = "127.0.0.1:0"\n[cells.b]\nkind = "epson"\n'
+        path = file(f'{HEAD}{table}tcp = "127.0.0.1:{port}"\n')
+        for how in ((), ("--wait-ready",)):
+            done = started(path, *how, folder=tmp_path)
+            assert (done.returncode, done.stdout) == (3, "")
+            assert "b: The simulator cannot listen on 127.0.0.1" in done.stderr
+
+
+@pytest.mark.soak
+@pytest.mark.skipif(os.name == "nt", reason="Windows does not tell that a parent has ended")
+def test_in_the_background_they_end_with_the_shell_that_started_them(file, tmp_path):
+    path = file(f'{HEAD}[cells.a]\nkind = "epson"\ntcp = "127.0.0.1:0"\n')
+    line = f'"{sys.executable}" -m robolink_cli sim run "{path}" --wait-ready --with-parent'
+    paths = os.pathsep.join(one for one in sys.path if one)
+    shell = subprocess.Popen(
+        ["/bin/sh", "-c", f"{line}; read line"],
+        env={**os.environ, "PYTHONPATH": paths, "TMPDIR": str(tmp_path)},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert shell.stdout is not None
+    pid = json.loads(shell.stdout.readline())["pid"]
+    time.sleep(1.2)  # two looks
+    os.kill(pid, 0)
+    shell.communicate("\n")
+    assert ended(pid)

@@ -1,0 +1,97 @@
+"""All simulated controllers of a process are served by one thread, and do not feel each other."""
+
+import socket
+import threading
+
+import pytest
+from robolink_simulators.epson import EpsonSimulator
+from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+
+from robolink.transport import parse_url
+
+
+class Asking:
+    """A raw client."""
+
+    def __init__(self, url):
+        link = parse_url(url)
+        self.socket = socket.create_connection((link.host, link.port), timeout=20)
+
+    def ask(self, request):
+        self.socket.sendall(request + b"\r\n")
+        return self.socket.recv(4096)
+
+
+@pytest.fixture
+def asking():
+    """Connect raw clients that are closed at the end."""
+    clients = []
+
+    def connected(url):
+        clients.append(Asking(url))
+        return clients[-1]
+
+    yield connected
+    for client in clients:
+        client.socket.close()
+
+
+@pytest.fixture
+def hosts():
+    served = [serve_tcp(EpsonSimulator(seed=number)) for number in range(40)]
+    yield served
+    for host in served:
+        host.close()
+
+
+def test_forty_controllers_need_one_thread_and_each_answers_its_own_client(hosts, asking):
+    assert sum(thread.name == "simulators" for thread in threading.enumerate()) == 1
+    clients = [asking(host.url) for host in hosts]
+    for client in clients:
+        assert client.ask(b"$Login,") == b"#Login,0\r\n"
+    for number, client in enumerate(clients):
+        assert client.ask(b"$SetIO,%d,1" % number) == b"#SetIO,0\r\n"
+    for number, host in enumerate(hosts):
+        outputs = host._simulator.machine.outputs
+        assert [at for at in range(40) if outputs.get(at)] == [number]
+
+
+def test_a_hook_that_raises_ends_its_own_controller_and_no_other(hosts, asking, monkeypatch):
+    told = []
+    monkeypatch.setattr(threading, "excepthook", lambda args: told.append(args.exc_value))
+    broken, sound = asking(hosts[0].url), asking(hosts[1].url)
+
+    def fail(_number, _text):
+        raise RuntimeError("of a test")
+
+    hosts[0]._simulator.on_request = fail
+    assert broken.ask(b"$Login,") in (b"#Login,0\r\n", b"")
+    assert sound.ask(b"$Login,") == b"#Login,0\r\n"
+    with pytest.raises(ConnectionRefusedError):
+        asking(hosts[0].url)
+    assert [str(error) for error in told] == ["of a test"]
+
+
+def test_the_thread_goes_with_the_last_host_and_comes_again_with_the_next(asking):
+    for _ in range(3):
+        with serve_tcp(EpsonSimulator()) as one, serve_tcp(EpsonSimulator()) as other:
+            one.close()
+            assert asking(other.url).ask(b"$Login,") == b"#Login,0\r\n"
+        assert all(thread.name != "simulators" for thread in threading.enumerate())
+
+
+def test_a_host_may_be_closed_by_what_its_own_controller_does(asking):
+    simulator, gone = EpsonSimulator(), threading.Event()
+    host = serve_tcp(simulator)
+
+    def close(_number, _text):
+        host.close()
+        gone.set()
+
+    simulator.on_reply = close
+    client = asking(host.url)
+    client.ask(b"$Login,")
+    assert gone.wait(20)
+    host.close()
+    with pytest.raises(ConnectionRefusedError):
+        asking(host.url)

@@ -43,6 +43,8 @@ def begin_motion(evaluator: Evaluator, motion: MotionStatement, start_ns: int) -
     legs, until = plan(evaluator, motion), motion.options.until
     machine.till_met = machine.sensed = False
     way_ns = _travelled_ns(motion, legs)
+    if motion.verb.startswith("jump"):
+        machine.robot.jump = start_ns, tuple(leg.duration_ns for leg in legs)
     if evaluator.blends and blends(machine, motion):
         lasts_ns = machine.arm.start(legs, start_ns) - start_ns
         if lasts_ns >= sum(leg.duration_ns for leg in legs):

@@ -28,7 +28,7 @@ from robolink_cli.console.tolerance import (
 )
 from robolink_cli.console.ways import SHELL_WAYS
 from robolink_cli.front_page import FrontPage
-from robolink_cli.options.shared import shared_options
+from robolink_cli.options.shared import TYPED, shared_options
 
 if TYPE_CHECKING:
     from robolink_cli.stopping.request import StopRequest
@@ -160,6 +160,7 @@ def _invoke(arguments: Sequence[str]) -> int:
     with _root().make_context(
         "robolink", list(arguments), color=colour, terminal_width=width
     ) as context:
+        context.meta[TYPED] = tuple(arguments)
         code = cli.invoke(context)
         print_document(context)
     return code if isinstance(code, int) else 0

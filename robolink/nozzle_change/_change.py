@@ -17,7 +17,13 @@ from robolink.model import Controller, ToolReceipt, new_operation, require_engin
 from robolink.nozzle_change._acceptance import AcceptanceCriteria, require_proved
 from robolink.nozzle_change._length import settle_lengths
 from robolink.nozzle_change._listener import Listener, Moment
-from robolink.nozzle_change._measuring import Measuring
+from robolink.nozzle_change._measuring import (
+    MOST_FURTHER,
+    FurtherOffer,
+    FurtherTouch,
+    Measuring,
+    offer_of,
+)
 from robolink.nozzle_change._plan import (
     ChangePlan,
     ToolPlan,
@@ -33,7 +39,12 @@ from robolink.nozzle_change._proposal import (
     WriteSubject,
 )
 from robolink.nozzle_change._records import decision_entry, refusal_entry, verification_entry
-from robolink.nozzle_change._station_check import Proposals, check_stations, stations_found
+from robolink.nozzle_change._station_check import (
+    Proposals,
+    check_stations,
+    found_with,
+    stations_found,
+)
 from robolink.procedures import TOUCH_CODES, MeasurementContext
 from robolink.runner import Operator, regard
 from robolink.transaction import Order, ToolChange, Wanted, plain_result
@@ -124,17 +135,12 @@ class NozzleChange:
                 self._controller.tools.require_writable(one.tool)
             require_measurable(self._controller, self._plan)
         require_contacts(self._controller, self._plan)
-        plan, listener, context = self._plan, self._listener, self._context()
+        plan, listener, context = self._plan, self._listener, self._context(write=write)
         measuring = Measuring(context, listener)
         measuring.go_to(plan.safe, tr("Moving to the safe pose."))
         listener.moment(Moment.START, context)
-        proposals: Proposals = [(one, measuring.propose(one)) for one in plan.tools]
-        proposals = self._checked(context, proposals, write=write)
-        listener.proposed([proposal for _, proposal in proposals])
-        self._judge(proposals)
+        proposals = self._agreed(context, measuring, write=write)
         if write:
-            listener.moment(Moment.BEFORE_WRITE, context)
-            self._ask(context, proposals)
             reports = self._write(context, proposals)
         else:
             reports = tuple(
@@ -145,7 +151,27 @@ class NozzleChange:
         listener.moment(Moment.END, context)
         return ChangeReport(self._controller.outcomes.change, reports)
 
-    def _context(self) -> MeasurementContext:
+    def _agreed(
+        self, context: MeasurementContext, measuring: Measuring, *, write: bool
+    ) -> Proposals:
+        """Measure, and return what is to be written; a person may go back to the touches."""
+        measured: Proposals = [(one, measuring.propose(one)) for one in self._plan.tools]
+        for left in reversed(range(MOST_FURTHER + 1)):
+            proposals = self._checked(context, measured, write=write)
+            self._listener.proposed([proposal for _, proposal in proposals])
+            self._judge(proposals)
+            if not write:
+                break
+            if left == MOST_FURTHER:
+                self._listener.moment(Moment.BEFORE_WRITE, context)
+            further = self._ask(context, proposals, offer_of(measured) if left else None)
+            if further is None:
+                break
+            ((plan, before),) = measured
+            measured = [(plan, measuring.further(plan, before, again=further.again))]
+        return proposals
+
+    def _context(self, *, write: bool) -> MeasurementContext:
         start = None
         if self._plan.moves:
             self._controller.tools.select(0)
@@ -157,6 +183,7 @@ class NozzleChange:
             start=start,
             settings=settings,
             offers=self._plan.ask_before_write,
+            types=write and all(one.verify and one.moving for one in self._plan.tools),
         )
 
     def _checked(
@@ -192,24 +219,39 @@ class NozzleChange:
                     ),
                 )
 
-    def _ask(self, context: MeasurementContext, proposals: Proposals) -> None:
+    def _ask(
+        self, context: MeasurementContext, proposals: Proposals, offer: FurtherOffer | None
+    ) -> FurtherTouch | None:
+        """Have the proposals accepted; return the touch that is to be made before that."""
         outcomes = self._controller.outcomes
         if not self._plan.ask_before_write:
             outcomes.append(decision_entry(tr("accepted beforehand"), accepted=True))
-            return
+            return None
         numbers = ", ".join(str(plan.tool) for plan in self._plan.tools)
         judged = [(one, plan.criteria.verdicts(one)) for plan, one in proposals]
         shown, verdicts = zip(*judged, strict=True)
-        regard(self._operator, [WriteSubject(shown, verdicts)])
-        accepted = context.runner().confirm(
-            tr("Write these values to tool {tool}? 'robolink undo' takes them back.", tool=numbers)
+        subject = WriteSubject(
+            shown,
+            verdicts,
+            again=None if offer is None else offer.worst + 1,
+            adds_touch=offer is not None and offer.adds,
+            stations=found_with(self._controller, [one.tool for one in shown]),
         )
+        regard(self._operator, [subject])
+        question = tr(
+            "Write these values to tool {tool}? 'robolink undo' takes them back.", tool=numbers
+        )
+        said = context.runner().confirm_or(question, also=() if offer is None else offer.words)
+        if offer is not None and isinstance(said, str):
+            return offer.meant_by(said)
+        accepted = said is True
         verdict = tr("accepted") if accepted else tr("declined")
         outcomes.append(decision_entry(verdict, accepted=accepted))
         if not accepted:
             raise DeclinedError(
                 tr("You did not accept the new value."), remedy=tr("Nothing was written.")
             )
+        return None
 
     def _write(self, context: MeasurementContext, proposals: Proposals) -> tuple[ToolReport, ...]:
         """Write all, verify each, keep all; an error on the way takes all back."""

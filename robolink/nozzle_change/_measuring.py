@@ -1,23 +1,30 @@
 """The first half of a nozzle change: from a mounted nozzle to a proposal on record."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Final
 
+from robolink.calibration import CalibrationResult
 from robolink.errors import CalibrationError, ConfigError, RobolinkError
 from robolink.messages import tr
-from robolink.model import EntryKind, NewEntry, Pose
+from robolink.model import EntryKind, NewEntry, Pose, ToolOffset
 from robolink.nozzle_change._listener import Listener, Moment
 from robolink.nozzle_change._plan import ToolPlan
 from robolink.nozzle_change._proposal import Proposal
 from robolink.nozzle_change._records import calibration_entry, decision_entry, refusal_entry
-from robolink.procedures import MeasurementContext, approach_path
-from robolink.runner import AGAIN, Ask, Confirm, Look, Seek, StepDone
+from robolink.procedures import MeasurementContext, TouchesFurther, approach_path, touches_of
+from robolink.runner import AGAIN, BACK, MORE, Ask, Confirm, Look, Seek, StepDone
 from robolink.stations import find_stations
 
 MOST_ANEW: Final = 5
 """So often a person may begin the touches of one tool anew."""
+
+
+MOST_FURTHER: Final = 3
+"""So often touches are gone back to from one proposal: who touches until it fits has measured
+nothing."""
 
 
 class Measuring:
@@ -43,7 +50,7 @@ class Measuring:
         left, anew = plan.attempts - 1, MOST_ANEW
         while True:
             try:
-                return self._attempt(plan)
+                return self._attempt(plan, partial(plan.source.measure, self._context, plan.tool))
             except CalibrationError as error:
                 # A person who begins anew takes none of the attempts of the plan.
                 by_hand = error.code == AGAIN and anew > 0
@@ -51,6 +58,27 @@ class Measuring:
                 if not by_hand and not left:
                     raise
                 anew, left = (anew - 1, left) if by_hand else (anew, left - 1)
+
+    def further(self, plan: ToolPlan, proposal: Proposal, *, again: int | None) -> Proposal:
+        """Go on with the touches of a measurement, and put what they say then on record.
+
+        Args:
+            plan: What is measured.
+            proposal: What they said so far.
+            again: Index of the touch that is made again, ``None`` for one more.
+
+        Raises:
+            CalibrationError: They are not trusted any more.
+        """
+        source = plan.source
+        assert isinstance(source, TouchesFurther)  # noqa: S101 - it was offered
+        what = tr("one more touch") if again is None else tr("touch {k} again", k=again + 1)
+        self._context.controller.outcomes.append(decision_entry(what, tool=plan.tool))
+
+        def measure(before: ToolOffset | None) -> CalibrationResult:
+            return source.further(self._context, before, proposal.result, again)
+
+        return self._attempt(plan, measure)
 
     def go_to(self, pose: Pose | None, purpose: str) -> None:
         """Drive the flange to ``pose``: up, over, down; nowhere when there is none."""
@@ -63,16 +91,20 @@ class Measuring:
         target = replace(there, hand=here.hand, posture=here.posture)
         self._context.run(approach_path(target, here=here, purpose=purpose))
 
-    def _attempt(self, plan: ToolPlan) -> Proposal:
+    def _attempt(
+        self, plan: ToolPlan, measure: Callable[[ToolOffset | None], CalibrationResult]
+    ) -> Proposal:
         context, tool = self._context, plan.tool
         self.go_to(plan.approach, tr("Moving to where tool {tool} is measured.", tool=tool))
         self._listener.moment(Moment.BEFORE_MEASURE, context, tool)
         before = context.controller.tools.read(tool)
         with self._watched(plan):
-            result = plan.named(plan.source.measure(context, tool, before))
+            result, notes = told_of_typed(plan.named(measure(before)))
             plan.criteria.judge_fit(result)
             rests_on = self._station_record(plan.station)
-            fresh = Proposal(tool, before, result, record=rests_on, kept_record=rests_on)
+            fresh = Proposal(
+                tool, before, result, notes=notes, record=rests_on, kept_record=rests_on
+            )
             proposal = self._listener.adjusted(fresh, context)
         entry = calibration_entry(
             proposal,
@@ -110,7 +142,7 @@ class Measuring:
             if done.pose is not None and isinstance(done.step, (Ask, Seek, Look)):
                 poses.append(done.pose)
             if isinstance(done.step, Confirm) and done.accepted is not None:
-                answer = tr("accepted") if done.accepted else tr("declined")
+                answer = tr("accepted") if done.accepted else done.word or tr("declined")
                 details = {"question": done.step.question, "tool": plan.tool}
                 log.append(decision_entry(answer, **details))
             self._listener.step(plan.tool, done)
@@ -126,3 +158,65 @@ class Measuring:
         # The error that is under way matters more than that it cannot be recorded.
         with suppress(ConfigError, RobolinkError):
             self._context.controller.outcomes.append(entry)
+
+
+def told_of_typed(result: CalibrationResult) -> tuple[CalibrationResult, tuple[str, ...]]:
+    """Return a result that says which of its touches were only typed, and that in words."""
+    typed = [n for n, touch in enumerate(touches_of(result), start=1) if touch.typed]
+    if not typed:
+        return result, ()
+    told = tr(
+        "Typed, not touched: touch {numbers}. The turn test has to prove it.",
+        numbers=", ".join(map(str, typed)),
+    )
+    return replace(result, notes=(*result.notes, "touches_not_witnessed")), (told,)
+
+
+@dataclass(frozen=True, slots=True)
+class FurtherTouch:
+    """The touch that a person wants before anything is written.
+
+    Attributes:
+        again: Index of the one that is made again, ``None`` for one more.
+    """
+
+    again: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class FurtherOffer:
+    """What can be done with the touches of a measurement that has ended.
+
+    Attributes:
+        worst: Index of the one that fits worst; the last where nothing tells.
+        adds: Whether one more can be made.
+    """
+
+    worst: int
+    adds: bool
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """The words with which it is taken."""
+        return (BACK, MORE) if self.adds else (BACK,)
+
+    def meant_by(self, word: str) -> FurtherTouch:
+        """Return what one of the words asks for."""
+        return FurtherTouch(None if word == MORE else self.worst)
+
+
+def offer_of(measured: Sequence[tuple[ToolPlan, Proposal]]) -> FurtherOffer | None:
+    """Return what can be done, ``None`` for nothing: several tools, or no touches of a person."""
+    if len(measured) != 1:
+        return None
+    ((plan, proposal),) = measured
+    source, result = plan.source, proposal.result
+    if not isinstance(source, TouchesFurther) or not touches_of(result):
+        return None
+    adds = source.adds_touch
+    if adds is None:
+        return None
+    distances = result.residual_distances_mm if result.dof else ()
+    last = len(result.inputs) - 1
+    worst = max(range(len(distances)), key=distances.__getitem__) if distances else last
+    return FurtherOffer(worst, adds)

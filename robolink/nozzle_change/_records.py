@@ -150,8 +150,9 @@ def touches_made(poses: Sequence[Pose]) -> dict[str, object]:
     """Return how a person made each touch, plain JSON; nothing where nobody touched anything.
 
     ``touches`` has one entry a pose: where the robot had stopped, the standoff from there to the
-    expected contact, how far was jogged, after how many seconds it was answered, and whether an
-    input switched to contact meanwhile. ``standoff_seed`` is what the standoffs were drawn from.
+    expected contact, how far was jogged, after how many seconds it was answered, whether an input
+    switched to contact meanwhile, and, where it is so, that the pose was typed. ``standoff_seed``
+    is what the standoffs were drawn from.
     """
     if not any(isinstance(pose, TouchedAt) for pose in poses):
         return {}
@@ -167,6 +168,7 @@ def _touch(touch: TouchedAt) -> dict[str, object]:
         "jog_mm": jog_mm(touch),
         "answered_s": touch.seconds,
         "contact": touch.contact,
+        **({"typed": True} if touch.typed else {}),
     }
 
 

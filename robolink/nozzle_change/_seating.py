@@ -64,7 +64,7 @@ def seating_of(controller: Controller) -> Seating:
 def touched_by(poses: Sequence[Pose]) -> TouchWitness:
     """Return what witnessed touches: an input, the person who made them, or nobody."""
     touches = [pose for pose in poses if isinstance(pose, TouchedAt)]
-    if len(touches) < len(poses):
+    if len(touches) < len(poses) or any(touch.typed for touch in touches):
         return "poses"
     return "contact" if any(touch.contact is not None for touch in touches) else "person"
 

@@ -43,6 +43,8 @@ if TYPE_CHECKING:
     from robolink.procedures.pin.source import PinSource as PinSource
     from robolink.procedures.pin.source import TouchesPin as TouchesPin
     from robolink.procedures.pin.source import TouchSource as TouchSource
+    from robolink.procedures.pin.source import middles_of_gaps as middles_of_gaps
+    from robolink.procedures.pin.source import touches_of as touches_of
     from robolink.procedures.pin.touch_plan import TouchPlan as TouchPlan
     from robolink.procedures.pin.touch_plan import plain_pose as plain_pose
     from robolink.procedures.pin.touches import PinTouches as PinTouches
@@ -52,8 +54,10 @@ if TYPE_CHECKING:
     from robolink.procedures.pose_method import PoseMethod as PoseMethod
     from robolink.procedures.sequential_sampling import TAKE_ALL as TAKE_ALL
     from robolink.procedures.sequential_sampling import Sampler as Sampler
+    from robolink.procedures.sequential_sampling import Samples as Samples
     from robolink.procedures.sequential_sampling import SamplingPolicy as SamplingPolicy
     from robolink.procedures.sequential_sampling import SequentialSampler as SequentialSampler
+    from robolink.procedures.sequential_sampling import agreement as agreement
     from robolink.procedures.sequential_sampling import finalize_samples as finalize_samples
     from robolink.procedures.sequential_sampling import may_end_early as may_end_early
     from robolink.procedures.sequential_sampling import sample_sequentially as sample_sequentially
@@ -63,6 +67,7 @@ if TYPE_CHECKING:
     from robolink.procedures.source import RequiresSensor as RequiresSensor
     from robolink.procedures.source import StopsAbovePin as StopsAbovePin
     from robolink.procedures.source import TipSource as TipSource
+    from robolink.procedures.source import TouchesFurther as TouchesFurther
     from robolink.procedures.surface_proof import SurfaceProof as SurfaceProof
     from robolink.procedures.surface_touches import SurfaceTouches as SurfaceTouches
 
@@ -80,16 +85,18 @@ __getattr__ = lazy_exports(
         "lazy_source": "LazySource",
         "pin.judging": "TOUCH_CODES heights_agree jog_mm require_one_height require_touches",
         "pin.proof": "DriftProof MOST_MORE contact_pose drift_uncertainty_mm verify_by_turning",
-        "pin.source": "ManualPinSource PinSource TouchSource TouchesPin",
+        "pin.source": (
+            "ManualPinSource PinSource TouchSource TouchesPin middles_of_gaps touches_of"
+        ),
         "pin.touch_plan": "TouchPlan plain_pose",
         "pin.touches": "PinTouches lift_off touch_again turned_touches",
         "pose_method": "PoseMethod",
         "sequential_sampling": (
-            "Sampler SamplingPolicy SequentialSampler TAKE_ALL finalize_samples may_end_early "
-            "sample_sequentially"
+            "Sampler Samples SamplingPolicy SequentialSampler TAKE_ALL agreement finalize_samples "
+            "may_end_early sample_sequentially"
         ),
         "source": "FindsStation MeasurementContext MovingSource RequiresSensor StopsAbovePin "
-        "TipSource",
+        "TipSource TouchesFurther",
         "surface_proof": "SurfaceProof",
         "surface_touches": "SurfaceTouches",
     },

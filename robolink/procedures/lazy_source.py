@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from robolink.calibration import CalibrationResult, VerifyResult
 from robolink.model import Pose, ToolOffset
-from robolink.procedures.source import MeasurementContext, MovingSource
+from robolink.procedures.source import MeasurementContext, MovingSource, TouchesFurther
 from robolink.runner import Procedure
 
 
@@ -61,6 +61,24 @@ class LazySource:
     ) -> VerifyResult:
         """Prove the new tip; see :class:`~robolink.procedures.MovingSource`."""
         return self._source.verify(context, tool, result, tip=tip, tolerance_mm=tolerance_mm)
+
+    @property
+    def adds_touch(self) -> bool | None:
+        """What the source says; see :class:`~robolink.procedures.TouchesFurther`."""
+        source = self._source
+        return source.adds_touch if isinstance(source, TouchesFurther) else None
+
+    def further(
+        self,
+        context: MeasurementContext,
+        stored: ToolOffset | None,
+        result: CalibrationResult,
+        again: int | None,
+    ) -> CalibrationResult:
+        """Go on; see :class:`~robolink.procedures.TouchesFurther`."""
+        source = self._source
+        assert isinstance(source, TouchesFurther)  # noqa: S101 - adds_touch said so
+        return source.further(context, stored, result, again)
 
     @property
     def _source(self) -> MovingSource:

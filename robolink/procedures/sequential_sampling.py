@@ -1,13 +1,22 @@
 """Samples taken in sequence: live residuals, an early end, the worst one repeated."""
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Final, Protocol, TypeVar
+from typing import Final, Generic, Protocol, TypeVar, runtime_checkable
 
 from robolink.calibration import MOST_RESIDUAL_MM, CalibrationResult
 from robolink.errors import CalibrationError
 from robolink.messages import joined, tr
-from robolink.runner import Confirm, FitRow, FitSubject, Notify, Procedure
+from robolink.runner import (
+    MORE,
+    Confirm,
+    FitRow,
+    FitSubject,
+    Notify,
+    Procedure,
+    TakenAgainError,
+)
 
 MOST_REPEATED: Final = 3
 """How often one is offered to be taken again; after that the measurement stands as it is."""
@@ -22,6 +31,10 @@ TakenT = TypeVar("TakenT")
 ResultT = TypeVar("ResultT", bound=CalibrationResult)
 
 PlaceT_contra = TypeVar("PlaceT_contra", contravariant=True)
+
+PlaceT_co = TypeVar("PlaceT_co", covariant=True)
+
+TakenT_contra = TypeVar("TakenT_contra", contravariant=True)
 
 ResultT_co = TypeVar("ResultT_co", bound=CalibrationResult, covariant=True)
 
@@ -57,6 +70,75 @@ class Sampler(Protocol[PlaceT_contra, TakenT, ResultT_co]):
         """Return which one it is, for a person: "Pose 3, at U 120.0"."""
 
 
+@runtime_checkable
+class AddsSamples(Protocol[PlaceT_co, TakenT_contra]):
+    """A method that can take more than its plan says."""
+
+    def another(self, taken: Sequence[TakenT_contra]) -> Procedure[PlaceT_co | None]:
+        """Return where one more tells most, ``None`` where the arm has no room for it."""
+
+
+class Samples(Generic[PlaceT, TakenT, ResultT]):
+    """What was taken so far, and at which place each.
+
+    Attributes:
+        taken: In the order of the places; one that was taken again stands where it stood.
+
+    Args:
+        method: How it is taken and solved.
+        places: Where it is taken.
+        taken: What was taken at the first of them.
+    """
+
+    def __init__(
+        self,
+        method: Sampler[PlaceT, TakenT, ResultT],
+        places: Sequence[PlaceT],
+        taken: Sequence[TakenT],
+    ) -> None:
+        self._method = method
+        self._places = list(places)
+        self.taken = list(taken)
+
+    def take(self, index: int) -> Procedure[None]:
+        """Take the one at a place, once more or for the first time.
+
+        One that the person asks for again meanwhile comes first.
+        """
+        while True:
+            try:
+                one = yield from self._method.take(self._places[index])
+            except TakenAgainError as again:
+                yield Notify(again.what)
+                yield from self.take(again.number - 1)
+                continue
+            if index < len(self.taken):
+                self.taken[index] = one
+            else:
+                self.taken.append(one)
+            return
+
+    def another(self) -> Procedure[bool]:
+        """Take one more than planned; return whether there is room for it."""
+        if not isinstance(self._method, AddsSamples):
+            return False
+        place: PlaceT | None = yield from self._method.another(self.taken)
+        if place is None:
+            yield Notify(tr("The arm has no room for one more touch here."))
+            return False
+        self._places = [*self._places[: len(self.taken)], place]
+        yield from self.take(len(self.taken))
+        return True
+
+    def solved(self) -> ResultT:
+        """Return what they say.
+
+        Raises:
+            CalibrationError: They say nothing that can be trusted.
+        """
+        return self._method.solve(self.taken)
+
+
 def finalize_samples(
     method: Sampler[PlaceT, TakenT, ResultT],
     places: Sequence[PlaceT],
@@ -76,26 +158,46 @@ def finalize_samples(
         CalibrationError: Those of ``method``.
     """
     yield from method.away()
-    held, times = list(taken), [0] * len(taken)
-    result = method.solve(held)
+    samples, times = Samples(method, places, taken), Counter[int]()
+    also = (MORE,) if isinstance(method, AddsSamples) else ()
+    result = samples.solved()
     for _ in range(MOST_REPEATED if retake and result.dof else 0):
-        distances = result.residual_distances_mm
-        # Two that are checked by each other alone fit equally badly; then it is the other's turn.
-        worst = min(range(len(held)), key=lambda i: (-round(distances[i], _DIGITS), times[i]))
+        worst = worst_of(result, times)
         question = tr(
             "{which}, fits worst: it is {distance:.3f} mm off. Take it again?",
-            which=method.which(worst + 1, held[worst]),
-            distance=distances[worst],
+            which=method.which(worst + 1, samples.taken[worst]),
+            distance=result.residual_distances_mm[worst],
         )
-        shown = fit_subject(method, result, held, worst=worst)
-        if not (yield Confirm(question, fit=shown)):
+        shown = fit_subject(method, result, samples.taken, worst=worst)
+        offer = Confirm(question, fit=replace(shown, more=bool(also)), also=also)
+        said: bool | str = yield offer
+        if not said:
             break
-        times[worst] += 1
-        held[worst] = yield from method.take(places[worst])
+        if said == MORE:
+            if not (yield from samples.another()):
+                continue
+            worst = len(samples.taken) - 1
+        else:
+            times[worst] += 1
+            yield from samples.take(worst)
         yield from method.away()
-        result = method.solve(held)
+        result = samples.solved()
         yield Notify(agreement(method, result, last=worst))
     return result
+
+
+def worst_of(result: CalibrationResult, times: Mapping[int, int]) -> int:
+    """Return the index of the one that fits worst.
+
+    Args:
+        result: What they say.
+        times: How often each was taken again.
+    """
+    distances = result.residual_distances_mm
+    # Two that are checked by each other alone fit equally badly; then it is the other's turn.
+    return min(
+        range(len(distances)), key=lambda i: (-round(distances[i], _DIGITS), times.get(i, 0))
+    )
 
 
 def agreement(
@@ -212,11 +314,12 @@ def sample_sequentially(
     Raises:
         CalibrationError: Those of ``method``.
     """
-    taken = [first]
-    for number, place in enumerate(places[1:], start=2):
-        taken.append((yield from method.take(place)))
+    samples = Samples(method, places, [first])
+    taken = samples.taken
+    for number in range(2, len(places) + 1):
+        yield from samples.take(number - 1)
         try:
-            fit = method.solve(taken)
+            fit = samples.solved()
         except CalibrationError:
             # What is too little now may be enough in the end.
             continue

@@ -23,6 +23,7 @@ class MeasurementContext:
     Args:
         settings: Limits and speeds for a tip at an offset from the flange.
         offers: Whether the person is asked about what a procedure offers.
+        types: Whether the pose of a touch may be typed: a turn test by touches follows.
     """
 
     def __init__(
@@ -33,7 +34,9 @@ class MeasurementContext:
         start: Pose | None,
         settings: Callable[[Pose, ToolOffset | None], RunSettings],
         offers: bool = True,
+        types: bool = False,
     ) -> None:
+        self._types = types
         self.controller = controller
         self.operator = operator
         self.start = start
@@ -95,6 +98,7 @@ class MeasurementContext:
             offers=self._offers,
             # About a new tip nothing is repeated: its value is written and not yet proved.
             repeats=tip is None,
+            types=self._types and tip is None,
         )
 
 
@@ -149,6 +153,34 @@ class MovingSource(TipSource, Protocol):
             result: What was measured, with the offset that was written.
             tip: Where the tip was found, which differs from it where a difference was written.
             tolerance_mm: Largest drift that passes.
+        """
+
+
+@runtime_checkable
+class TouchesFurther(Protocol):
+    """A source in which a person may go back to the touches of a measurement."""
+
+    @property
+    def adds_touch(self) -> bool | None:
+        """Whether one more can be made than planned; ``None`` where none can be made again."""
+
+    def further(
+        self,
+        context: MeasurementContext,
+        stored: ToolOffset | None,
+        result: CalibrationResult,
+        again: int | None,
+    ) -> CalibrationResult:
+        """Go on with a measurement that has ended, in Tool 0; ends lifted.
+
+        Args:
+            context: What to work with.
+            stored: The offset stored now.
+            result: What was measured, with the touches that were made.
+            again: Index of the touch that is made again, ``None`` for one more.
+
+        Raises:
+            CalibrationError: As the measurement.
         """
 
 

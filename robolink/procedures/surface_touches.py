@@ -134,7 +134,7 @@ class SurfaceTouches(WitnessedTouches):
         return tr(
             "Touch {number} was not made: the robot is where it stopped, {away:.1f} mm from the "
             "surface. Jog onto it.",
-            number=self._count,
+            number=self._number,
             away=away_mm,
         )
 

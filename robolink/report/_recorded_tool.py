@@ -97,6 +97,7 @@ def _touch(said: Mapping[str, Any]) -> TouchOnRecord:
         standoff_mm=None if brought else tuple(said["standoff_mm"]),
         jog_mm=None if brought else said["jog_mm"],
         seconds=said["answered_s"],
+        typed=said.get("typed", False) is True,
         contact=said["contact"],
     )
 

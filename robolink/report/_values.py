@@ -67,12 +67,14 @@ class TouchOnRecord:
         jog_mm: How far the person jogged it from there, ``None`` likewise.
         seconds: How long that took.
         contact: Whether an input was seen to switch meanwhile; ``None`` where none was watched.
+        typed: Whether its pose was typed.
     """
 
     standoff_mm: tuple[float, ...] | None
     jog_mm: float | None
     seconds: float | None
     contact: bool | None
+    typed: bool = False
 
 
 @dataclass(frozen=True, slots=True)

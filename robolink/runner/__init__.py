@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from robolink.runner._operator import Question as Question
     from robolink.runner._place_question import AGAIN as AGAIN
     from robolink.runner._place_question import MOST_REFUSED as MOST_REFUSED
+    from robolink.runner._place_question import TakenAgainError as TakenAgainError
     from robolink.runner._place_question import inputs_of as inputs_of
     from robolink.runner._runner import POLL_S as POLL_S
     from robolink.runner._runner import Runner as Runner
@@ -55,7 +56,10 @@ if TYPE_CHECKING:
     from robolink.runner._subjects import MoveSubject as MoveSubject
     from robolink.runner._subjects import TouchSubject as TouchSubject
     from robolink.runner._subjects import regard as regard
+    from robolink.runner._yes_no import BACK as BACK
+    from robolink.runner._yes_no import MORE as MORE
     from robolink.runner._yes_no import ask_yes_no as ask_yes_no
+    from robolink.runner._yes_no import ask_yes_no_or as ask_yes_no_or
     from robolink.runner._yes_no import yes_or_no as yes_or_no
 
 __getattr__ = lazy_exports(
@@ -66,13 +70,13 @@ __getattr__ = lazy_exports(
         "_foreseeing": "ForeseenStep considered first_clear foreseen_steps nothing_in_the_way",
         "_jog_steps": "jog_target parse_decimal parse_steps",
         "_operator": "Operator Question",
-        "_place_question": "AGAIN MOST_REFUSED inputs_of",
+        "_place_question": "AGAIN MOST_REFUSED TakenAgainError inputs_of",
         "_runner": "POLL_S Runner StepDone ask_for_pose",
         "_settings": "RunSettings",
         "_steps": "Ask Confirm Consider Look Move Notify Procedure Seek SeenAt Step TakenStep "
         "TeachPrompt TouchedAt",
         "_subjects": "FitRow FitSubject GuidedOperator JogRange JogSubject MoveSubject "
         "TouchSubject regard",
-        "_yes_no": "ask_yes_no yes_or_no",
+        "_yes_no": "BACK MORE ask_yes_no ask_yes_no_or yes_or_no",
     },
 )

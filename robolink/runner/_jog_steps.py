@@ -27,6 +27,12 @@ _PLAIN: Final = str.maketrans(
 _TURNED_DEG: Final = 0.005
 """Less than this is what a position reads besides, not a turn."""
 
+TYPED_AWAY_MM: Final = 1.0
+"""Further from where the controller says the tool is no typed pose lies: half of the clearance with
+which the next touch is approached from it."""
+
+TYPED_AWAY_DEG: Final = 1.0
+
 _DECIMAL: Final = re.compile(r"[+-]?[0-9]{1,5}(?:\.[0-9]{1,6})?", re.ASCII)
 
 
@@ -58,6 +64,48 @@ def jog_target(here: Pose, steps: str, settings: RunSettings) -> tuple[Pose, Pat
     )
     # A straight move that only turns is an error in SPEL+ without ROT (docs/reference/spel.md 7.1).
     return target, Path.JOINT if "u" in deltas else Path.STRAIGHT
+
+
+def typed_pose(text: str, here: Pose, settings: RunSettings) -> Pose:
+    """Return a pose that a person typed: X, Y, Z in mm, U and perhaps V, W in degrees.
+
+    Args:
+        text: Four numbers, or six; blanks or semicolons between them.
+        here: Where the controller says that the frame is; a digit that slipped shows against it.
+        settings: For the box.
+
+    Raises:
+        ConfigError: It is no pose.
+        LimitError: It is not about where the frame is, or outside the box.
+    """
+    words = text.translate(_PLAIN).replace(";", " ").split()
+    if len(words) not in (4, 6):
+        raise ConfigError(
+            tr("A pose is X Y Z U, or X Y Z U V W; these are {count} numbers.", count=len(words)),
+            remedy=tr("For example: 250.112 199.954 -83.573 90"),
+        )
+    x_mm, y_mm, z_mm, *angles = map(parse_decimal, words)
+    u_deg, v_deg, w_deg = (*angles, here.v_deg, here.w_deg)[:3] if len(angles) == 1 else angles
+    typed = replace(here, x_mm=x_mm, y_mm=y_mm, z_mm=z_mm, u_deg=u_deg, v_deg=v_deg, w_deg=w_deg)
+    away_mm = math.dist(typed.coordinates()[:3], here.coordinates()[:3])
+    apart = zip(typed.coordinates()[3:], here.coordinates()[3:], strict=True)
+    away_deg = max(abs(angle_difference_deg(one, other)) for one, other in apart)
+    if away_mm > TYPED_AWAY_MM or away_deg > TYPED_AWAY_DEG:
+        raise LimitError(
+            tr(
+                "That is {mm:.2f} mm and {deg:.1f} degrees from where the controller says the tool "
+                "is. It was not taken.",
+                mm=away_mm,
+                deg=away_deg,
+            ),
+            remedy=tr(
+                "A typed pose may differ by {mm:g} mm and {deg:g} degrees: the robot goes by it.",
+                mm=TYPED_AWAY_MM,
+                deg=TYPED_AWAY_DEG,
+            ),
+        )
+    settings.box.check(typed)
+    return typed
 
 
 def way_in_words(before: Pose, after: Pose) -> str:

@@ -5,11 +5,12 @@ switched meanwhile. What it proves is for the procedure to say (docs/reference/e
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Final
 
 from robolink.errors import CalibrationError, ConfigError, DeclinedError, JournalError
 from robolink.messages import tr
-from robolink.model import Controller, DigitalIo, InputEdge, MotionGroup
+from robolink.model import Controller, DigitalIo, InputEdge, MotionGroup, Pose
 from robolink.runner._capture import (
     OLDEST_READING_S,
     NotYet,
@@ -31,7 +32,7 @@ MOST_NOT_YET: Final = 3
 """So often a place is asked for that is not to be taken yet, before it ends the measurement."""
 
 AGAIN: Final = "taken_again"
-"""The code with which a person begins the touches anew."""
+"""The code with which a person wants an earlier touch again."""
 
 MOST_REFUSED: Final = 10
 """So many answers in a row that lead nowhere end a question: whoever answers, a person or what
@@ -59,6 +60,7 @@ class PlaceQuestion:
         jog: Takes typed steps; returns whether another question came between.
         line: Fetches what is typed.
         runs: Tells whether the controller was at work when it was looked at last.
+        typed: Reads a typed pose, given where the frame is; ``None`` where none is taken.
     """
 
     def __init__(
@@ -71,6 +73,7 @@ class PlaceQuestion:
         jog: Callable[[str], bool],
         line: Line,
         runs: Callable[[], bool],
+        typed: Callable[[str, Pose], Pose] | None = None,
     ) -> None:
         self._step = step
         self._controller = controller
@@ -79,6 +82,9 @@ class PlaceQuestion:
         self._jog = jog
         self._line = line
         self._runs = runs
+        subject = step.subject
+        types = isinstance(subject, TouchSubject) and subject.types
+        self._typed = typed if types else None
         edge = step.contact
         self._contact = _ContactWatch(inputs_of(controller), edge) if edge else None
         self._asked_ns = 0
@@ -89,8 +95,8 @@ class PlaceQuestion:
         """Ask until the person says that it is there; return the pose, and how it was taken.
 
         Raises:
-            CalibrationError: ``typed_ahead``; ``taken_again`` where the person begins anew; and
-                what is not taken however often it is said, by its own code.
+            CalibrationError: ``typed_ahead``; ``taken_again`` where the person wants an earlier
+                touch again; and what is not taken however often it is said, by its own code.
             ConfigError: The controller has no inputs, and one is to show contact.
             DeclinedError: The person ended it, or gets nowhere.
         """
@@ -103,19 +109,26 @@ class PlaceQuestion:
             if self._step.evidence and self._seconds < FASTEST_ANSWER_S:
                 early += 1
                 self._refuse_early(early)
-            elif word in ("", "done"):
-                touch, why = self._looked_at()
+            elif word in ("", "done") or word.startswith("pose"):
+                try:
+                    touch, why = self._looked_at(word.removeprefix("pose"))
+                except ConfigError as error:
+                    refused = self._refuse(error, refused)
+                    continue
                 if why is None:
                     return touch
                 hasty += 1
                 self._refuse_hasty(why, hasty)
-            elif word == "again" and self._may_begin_anew:
-                raise _begun_anew()
+            elif word.startswith("again") and (again := self._again(word)) is not None:
+                raise again
             else:
                 refused = self._jogged(word, refused)
 
     def _ask(self) -> None:
-        regard(self._operator, [self._step.subject])
+        subject = self._step.subject
+        if isinstance(subject, TouchSubject):
+            subject = replace(subject, types=self._typed is not None)
+        regard(self._operator, [subject])
         self._operator.ask(self._step.instruction, _QUESTIONS[self._step.shown])
         self._asked_ns = self._controller.clock.now_ns()
         if self._contact:
@@ -125,19 +138,45 @@ class PlaceQuestion:
     def _seconds(self) -> float:
         return (self._controller.clock.now_ns() - self._asked_ns) / NS_PER_S
 
-    @property
-    def _may_begin_anew(self) -> bool:
-        subject = self._step.subject
-        return isinstance(subject, TouchSubject) and subject.number > 1 and not subject.proof
+    def _again(self, word: str) -> "TakenAgainError | None":
+        """Return the end of this question by which an earlier touch is made again.
 
-    def _looked_at(self) -> tuple[TouchedAt, NotYet | None]:
-        """Return where the tip is, and why that does not count yet."""
+        ``again`` alone is the one before, ``again 1`` the first; ``None`` where there is none.
+        """
+        subject = self._step.subject
+        if not isinstance(subject, TouchSubject) or subject.number < 2 or subject.proof:
+            return None
+        named = word.removeprefix("again").strip() or str(subject.number - 1)
+        if not subject.retakes:
+            return TakenAgainError(1)
+        if not named.isdigit() or not 1 <= int(named) < subject.number:
+            return None
+        return TakenAgainError(int(named))
+
+    def _looked_at(self, word: str) -> tuple[TouchedAt, NotYet | None]:
+        """Return where the tip is, by what the controller or a person says, and why not yet.
+
+        Raises:
+            ConfigError: What was typed is no pose that is taken.
+        """
         seconds = self._seconds
         before_ns = self._controller.clock.now_ns()
         switched = self._contact.switched() if self._contact else None
-        touch = TouchedAt.of(self._group.pose(), seconds=seconds, contact=switched)
+        here = self._group.pose()
+        if word in ("", "done"):
+            touch = TouchedAt.of(here, seconds=seconds, contact=switched)
+        else:
+            touch = TouchedAt.of(self._pose_typed(word, here), seconds=seconds, typed=True)
         took_s = (self._controller.clock.now_ns() - before_ns) / NS_PER_S
         return touch, self._not_yet(touch, took_s)
+
+    def _pose_typed(self, word: str, here: Pose) -> Pose:
+        if self._typed is None:
+            raise ConfigError(
+                tr("A pose is typed only at a touch that a turn test proves afterwards."),
+                remedy=tr("Bring the tip onto it, and take it."),
+            )
+        return self._typed(word, here)
 
     def _not_yet(self, touch: TouchedAt, took_s: float) -> NotYet | None:
         step = self._step
@@ -146,7 +185,9 @@ class PlaceQuestion:
         why = None
         if self._by_hand:
             self._group.require_able(step.instruction)
-            why = self._steps.too_soon() or self._without_contact()
+            why = self._steps.too_soon()
+            if why is None and not touch.typed:
+                why = self._without_contact()
             if why is None and took_s > OLDEST_READING_S:
                 why = old_reading(took_s)
         if why is None and self._runs():
@@ -197,15 +238,19 @@ class PlaceQuestion:
             self._steps.add(parse_steps(word))
             if again:
                 self._ask()
-        except JournalError:
-            raise  # no mistake of the person's: the record cannot be kept any more
         except ConfigError as error:
-            # A typing mistake ends nothing; the limits held and nothing was sent.
-            if refused + 1 == MOST_REFUSED:
-                raise self._gets_nowhere(error) from error
-            self._operator.tell(str(error))
-            return refused + 1
+            return self._refuse(error, refused)
         return 0
+
+    def _refuse(self, error: ConfigError, refused: int) -> int:
+        """Say why something is not taken; return how many in a row were not now."""
+        if isinstance(error, JournalError):
+            raise error  # no mistake of the person's: the record cannot be kept any more
+        # A typing mistake ends nothing; the limits held and nothing was sent.
+        if refused + 1 == MOST_REFUSED:
+            raise self._gets_nowhere(error) from error
+        self._operator.tell(str(error))
+        return refused + 1
 
     def _gets_nowhere(self, error: ConfigError) -> DeclinedError:
         return DeclinedError(
@@ -221,12 +266,22 @@ class PlaceQuestion:
         )
 
 
-def _begun_anew() -> CalibrationError:
-    return CalibrationError(
-        AGAIN,
-        tr("The touches are begun again from the first."),
-        remedy=tr("Nothing was written."),
-    )
+class TakenAgainError(CalibrationError):
+    """A person wants an earlier touch again.
+
+    A procedure that does not hear it ends, and is begun anew.
+
+    Attributes:
+        number: Which touch, from 1.
+    """
+
+    def __init__(self, number: int) -> None:
+        super().__init__(
+            AGAIN,
+            tr("Touch {k} is made again.", k=number),
+            remedy=tr("Nothing was written."),
+        )
+        self.number = number
 
 
 class _ContactWatch:

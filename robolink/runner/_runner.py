@@ -1,7 +1,6 @@
 """Takes the steps of a procedure on one motion group."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from itertools import starmap
 from typing import Final, TypeVar
@@ -14,15 +13,12 @@ from robolink.errors import (
     DeclinedError,
     HeartbeatLostError,
     LimitError,
-    NotReadyError,
-    NotReadyReason,
     StoppedError,
 )
 from robolink.messages import tr
 from robolink.model import (
     Controller,
     ControllerState,
-    ControllerStatus,
     MotionGroup,
     MotionOutcome,
     MotionProfile,
@@ -30,8 +26,9 @@ from robolink.model import (
     Pose,
     TipSensor,
 )
+from robolink.runner._endings import as_measurement, ended_by
 from robolink.runner._foreseeing import considered
-from robolink.runner._jog_steps import jog_target, parse_steps, way_in_words
+from robolink.runner._jog_steps import jog_target, parse_steps, typed_pose, way_in_words
 from robolink.runner._operator import Operator, Question
 from robolink.runner._place_question import MOST_REFUSED, PlaceQuestion, ended_by_operator
 from robolink.runner._settings import RunSettings
@@ -48,7 +45,7 @@ from robolink.runner._steps import (
     TakenStep,
 )
 from robolink.runner._subjects import GuidedOperator, JogRange, JogSubject, MoveSubject, regard
-from robolink.runner._yes_no import ask_yes_no
+from robolink.runner._yes_no import ask_yes_no, ask_yes_no_or
 from robolink.sensing import seen_once
 from robolink.ways import Way, way
 
@@ -73,11 +70,13 @@ class StepDone:
         pose: Where the frame was after it, ``None`` for a step that only concerns a person.
         accepted: Whether a person accepted an offer, ``None`` for other steps and where nobody was
             asked.
+        word: The further word with which an offer was answered; empty for none.
     """
 
     step: TakenStep
     pose: Pose | None = None
     accepted: bool | None = None
+    word: str = ""
 
 
 class Runner:
@@ -93,6 +92,8 @@ class Runner:
         offers: Whether the person is asked about offers; else each is declined unasked.
         repeats: Whether the person is also asked to repeat a step that ended because this
             computer fell silent. It is for measuring, where nothing was written yet.
+        types: Whether the person may type the pose of a touch that says it may be typed; what
+            rests on it has to be proved by touches.
     """
 
     def __init__(
@@ -106,6 +107,7 @@ class Runner:
         camera: TipSensor | None = None,
         offers: bool = True,
         repeats: bool = False,
+        types: bool = False,
     ) -> None:
         self._controller = controller
         self._group = group
@@ -114,6 +116,7 @@ class Runner:
         self._on_step = on_step
         self._camera = camera
         self._offers = offers
+        self._types = types
         self._runs = False
         self._repeats_left = _MOST_REPEATS if offers and repeats else 0
 
@@ -197,7 +200,11 @@ class Runner:
             self._operator.tell(step.text)
             return StepDone(step)
         if isinstance(step, Confirm):
-            return StepDone(step, accepted=self.confirm(step.question) if self._offers else None)
+            if not self._offers:
+                return StepDone(step)
+            said = self.confirm_or(step.question, also=step.also)
+            word = said if isinstance(said, str) else ""
+            return StepDone(step, accepted=said is True, word=word)
         return StepDone(step, self._moved(step))
 
     def _moved(self, step: Ask | Move | Seek | Look) -> Pose:
@@ -238,7 +245,7 @@ class Runner:
         settings = self._settings
 
         def go() -> Pose | None:
-            with _as_measurement():
+            with as_measurement():
                 motion = self._group.move_until_input(
                     step.target, step.edge, speed_mm_s=step.speed_mm_s, box=settings.box
                 )
@@ -265,6 +272,7 @@ class Runner:
             jog=self._jogged,
             line=self._line,
             runs=lambda: self._runs,
+            typed=self._typed_pose if self._types else None,
         )
         return question.answer()
 
@@ -273,6 +281,9 @@ class Runner:
         repeats_left = self._repeats_left
         self.jog(steps)
         return self._repeats_left != repeats_left
+
+    def _typed_pose(self, text: str, here: Pose) -> Pose:
+        return typed_pose(text, here, self._settings)
 
     def _seen_through(self, go: Callable[[], T], target: Pose) -> T:
         """Move, and once more from where the robot stands if this computer was too busy to.
@@ -307,6 +318,10 @@ class Runner:
     def confirm(self, question: str) -> bool:
         """Ask a yes-or-no question under the same watch; see :func:`ask_yes_no`."""
         return ask_yes_no(self._operator, question, self._line)
+
+    def confirm_or(self, question: str, *, also: Collection[str]) -> bool | str:
+        """Ask one that a further word may answer; see :func:`ask_yes_no_or`."""
+        return ask_yes_no_or(self._operator, question, self._line, also=also)
 
     def ask_text(self, question: str) -> str:
         """Ask for a line of text under the same watch.
@@ -348,7 +363,7 @@ class Runner:
         self._require_going()
         status = self._controller.status()
         self._runs = status.running
-        obstacle = _ended_by(status)
+        obstacle = ended_by(status)
         if obstacle:
             raise ControllerFaultError(
                 tr("{obstacle} The job has ended.", obstacle=obstacle),
@@ -357,9 +372,11 @@ class Runner:
             )
 
 
-def _answer(done: StepDone) -> Pose | bool | None:
+def _answer(done: StepDone) -> Pose | bool | str | None:
     """Return what a procedure is sent for a step: an offer that nobody heard is not accepted."""
-    return done.accepted is True if isinstance(done.step, Confirm) else done.pose
+    if isinstance(done.step, Confirm):
+        return done.word or done.accepted is True
+    return done.pose
 
 
 def ask_for_pose(instruction: str, jog: JogRange | None = None) -> Procedure[Pose]:
@@ -371,26 +388,3 @@ def ask_for_pose(instruction: str, jog: JogRange | None = None) -> Procedure[Pos
     """
     pose: Pose = yield Ask(instruction, evidence=False, subject=jog)
     return pose
-
-
-def _ended_by(status: ControllerStatus) -> str:
-    if status.serious_fault:
-        return tr("The controller reported a serious error.")
-    if status.emergency_stop:
-        return tr("The emergency stop was pressed.")
-    if status.guard_open:
-        return tr("The safety guard was opened.")
-    if status.fault:
-        return tr("The controller went into error {code:04d}.", code=status.code)
-    return ""
-
-
-@contextmanager
-def _as_measurement() -> Iterator[None]:
-    """Let an input that has switched too early count as a bad measurement."""
-    try:
-        yield
-    except NotReadyError as error:
-        if error.reason is not NotReadyReason.EDGE_PASSED:
-            raise
-        raise CalibrationError("edge_passed", error.what, remedy=error.remedy) from error

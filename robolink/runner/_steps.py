@@ -147,6 +147,7 @@ class TouchedAt(Pose):
             from wherever it was.
         standoff_mm: How far from the expected contact that was, base: X, Y, Z.
         seed: From which the standoff was drawn, ``None`` where none was.
+        typed: Whether a person typed the pose: nothing then shows that it was touched.
     """
 
     seconds: float | None = None
@@ -154,15 +155,21 @@ class TouchedAt(Pose):
     arrival: Pose | None = None
     standoff_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
     seed: int | None = None
+    typed: bool = False
 
     @classmethod
     def of(
-        cls, pose: Pose, *, seconds: float | None = None, contact: bool | None = None
+        cls,
+        pose: Pose,
+        *,
+        seconds: float | None = None,
+        contact: bool | None = None,
+        typed: bool = False,
     ) -> "TouchedAt":
         """Return what was shown at ``pose``; as it is where that is known already."""
         if isinstance(pose, cls):
             return pose
-        return cls(**_as_it_is(pose), seconds=seconds, contact=contact)
+        return cls(**_as_it_is(pose), seconds=seconds, contact=contact, typed=typed)
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,10 +211,12 @@ class Confirm:
     Attributes:
         question: What is offered.
         fit: What a screen shows of it.
+        also: Further words that may answer it; it is answered with the word itself then.
     """
 
     question: str
     fit: FitSubject | None = field(default=None, compare=False)
+    also: tuple[str, ...] = ()
 
 
 TakenStep = Move | Ask | Seek | Look | Notify | Confirm

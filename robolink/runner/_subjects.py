@@ -26,6 +26,9 @@ class TouchSubject:
             compared with it.
         contact: The input that shows contact.
         proof: Whether it is a touch of the turn test.
+        retakes: Whether an earlier touch may be made again from here, alone; else all of them are
+            begun again from the first.
+        types: Whether the pose may be typed in place of being read.
     """
 
     number: int = 0
@@ -34,6 +37,8 @@ class TouchSubject:
     first_z_mm: float | None = None
     contact: InputEdge | None = None
     proof: bool = False
+    retakes: bool = False
+    types: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +80,7 @@ class FitSubject:
         next_mm: What that becomes with one more.
         worst: Index of the one that fits worst, where it is offered to be taken again.
         limit_mm: The largest that is believed.
+        more: Whether one more is offered.
     """
 
     rows: tuple[FitRow, ...]
@@ -83,6 +89,7 @@ class FitSubject:
     next_mm: float | None = None
     worst: int | None = None
     limit_mm: float = 0.15
+    more: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,12 +1,18 @@
 """What counts as a yes and as a no, wherever a person is asked."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Final
 
 from robolink.messages import tr
 from robolink.runner._operator import Operator, Question
 
 _YES: Final = frozenset({"y", "yes", "j", "ja", "是"})
+MORE: Final = "more"
+"""The word for one more touch than planned."""
+
+BACK: Final = "back"
+"""The word for going back to the touches."""
+
 _NO: Final = frozenset({"n", "no", "nein", "否"})
 
 
@@ -28,17 +34,33 @@ def ask_yes_no(operator: Operator, question: str, answer: Callable[[], str]) -> 
         question: What a yes agrees to.
         answer: Fetches the next line that the person types.
     """
-    operator.ask(question, Question.YES_NO)
-    line = answer()
-    said = yes_or_no(line)
-    if said is None:
+    return ask_yes_no_or(operator, question, answer, also=()) is True
+
+
+def ask_yes_no_or(
+    operator: Operator, question: str, answer: Callable[[], str], *, also: Collection[str]
+) -> bool | str:
+    """Ask as :func:`ask_yes_no` does, of somebody who may also answer with one of further words.
+
+    Args:
+        operator: Who is asked.
+        question: What a yes agrees to.
+        answer: Fetches the next line that the person types.
+        also: The words; one of them is returned as it stands here.
+    """
+    for left in (1, 0):
+        operator.ask(question, Question.YES_NO)
+        line = answer().strip()
+        if line in also:
+            return line
+        said = yes_or_no(line)
+        if said is not None or not left:
+            break
         operator.tell(
             tr(
                 "{line!r} is neither yes nor no. It is asked once more; then anything but a yes "
                 "counts as no.",
-                line=line.strip(),
+                line=line,
             )
         )
-        operator.ask(question, Question.YES_NO)
-        said = yes_or_no(answer())
     return said is True

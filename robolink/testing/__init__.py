@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from robolink.testing.memory_controller import MemoryController as MemoryController
     from robolink.testing.memory_controller import MemoryMachine as MemoryMachine
     from robolink.testing.motion_checks import MOVING_CHECKS as MOVING_CHECKS
+    from robolink.testing.on_site import kept_on_site as kept_on_site
     from robolink.testing.reading_checks import READING_CHECKS as READING_CHECKS
     from robolink.testing.subject import Check as Check
     from robolink.testing.subject import ContractBrokenError as ContractBrokenError
@@ -26,6 +27,7 @@ else:
         {
             "memory_controller": "MemoryController MemoryMachine",
             "motion_checks": "MOVING_CHECKS",
+            "on_site": "kept_on_site",
             "reading_checks": "READING_CHECKS",
             "subject": "Check ContractBrokenError Subject",
             "suite": "CheckOutcome check_controller outcomes",

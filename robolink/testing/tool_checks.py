@@ -25,7 +25,7 @@ def a_write_is_read_back(subject: Subject) -> None:
     """The receipt holds what was there, what was asked for, and what is there now."""
     with subject.kept() as controller:
         tools, before = controller.tools, controller.tools.read(subject.tool)
-        wanted = _another(before)
+        wanted = another_offset(before)
         receipt = tools.write(subject.tool, wanted, expected=before)
         require(not receipt.skipped, "a new value is written")
         require(tools.same(receipt.before, before), "the receipt holds the old value")
@@ -37,9 +37,9 @@ def a_write_is_read_back(subject: Subject) -> None:
 def what_is_there_already_is_not_written_again(subject: Subject) -> None:
     """A write wears the memory of a controller."""
     with subject.kept() as controller:
-        value = _another(controller.tools.read(subject.tool))
+        value = another_offset(controller.tools.read(subject.tool))
         controller.tools.write(subject.tool, value, expected=ANY)
-        again = controller.tools.write(subject.tool, value, expected=_another(value))
+        again = controller.tools.write(subject.tool, value, expected=another_offset(value))
         require(again.skipped, "an equal value is skipped, whatever was expected")
         previewed = controller.tools.preview_write(subject.tool, value)
         require(previewed == (), "and nothing would be sent for it")
@@ -49,9 +49,9 @@ def an_unexpected_value_is_left_alone(subject: Subject) -> None:
     """Somebody else changed it meanwhile: he must not be overwritten."""
     with subject.kept() as controller:
         tools = controller.tools
-        there = _another(tools.read(subject.tool))
+        there = another_offset(tools.read(subject.tool))
         tools.write(subject.tool, there, expected=ANY)
-        believed, wanted = _another(there), _another(_another(there))
+        believed, wanted = another_offset(there), another_offset(another_offset(there))
         with refused(ToolChangedError, "another value than expected is not overwritten"):
             tools.write(subject.tool, wanted, expected=believed)
         require(tools.same(tools.read(subject.tool), there), "it is still there")
@@ -70,7 +70,7 @@ def a_preview_changes_nothing(subject: Subject) -> None:
     """It says what would be sent, and sends none of it."""
     with subject.kept() as controller:
         before = controller.tools.read(subject.tool)
-        requests = controller.tools.preview_write(subject.tool, _another(before))
+        requests = controller.tools.preview_write(subject.tool, another_offset(before))
         require(requests and all(requests), "a preview says what would be sent")
         unchanged = controller.tools.same(controller.tools.read(subject.tool), before)
         require(unchanged, "a preview changes nothing")
@@ -80,7 +80,7 @@ def a_cleared_tool_is_undefined(subject: Subject) -> None:
     """Where a kind cannot forget a tool, it says so and changes nothing."""
     with subject.kept() as controller:
         tools = controller.tools
-        value = _another(tools.read(subject.tool))
+        value = another_offset(tools.read(subject.tool))
         tools.write(subject.tool, value, expected=ANY)
         try:
             tools.clear(subject.tool, expected=value, then_select=0)
@@ -96,7 +96,7 @@ def a_selection_is_read_back(subject: Subject) -> None:
     """A tool in force keeps its definition, and only a defined one comes into force."""
     with subject.kept() as controller:
         tools = controller.tools
-        value = _another(tools.read(subject.tool))
+        value = another_offset(tools.read(subject.tool))
         tools.write(subject.tool, value, expected=ANY)
         try:
             tools.select(subject.tool)
@@ -119,7 +119,7 @@ def what_was_selected_is_put_back(subject: Subject) -> None:
         tools, before = controller.tools, controller.tools.selected()
         if before is None:
             return
-        tools.write(subject.tool, _another(tools.read(subject.tool)), expected=ANY)
+        tools.write(subject.tool, another_offset(tools.read(subject.tool)), expected=ANY)
         with suppress(_OursError), controller.preserved("a check"):
             with suppress(RejectedError):  # where the machine alone selects
                 tools.select(0 if before else subject.tool)
@@ -159,7 +159,7 @@ def a_stop_holds_writes_back(subject: Subject) -> None:
     """Stopped means stopped, until a person says otherwise."""
     with subject.kept() as controller:
         tools, before = controller.tools, controller.tools.read(subject.tool)
-        wanted = _another(before)
+        wanted = another_offset(before)
         with suppress(RobolinkError):  # a machine that cannot be stopped from here says so
             controller.stop()
         require(controller.latch.closed, "stop() closes the latch, whatever becomes of it")
@@ -172,7 +172,7 @@ def a_stop_holds_writes_back(subject: Subject) -> None:
         tools.write(subject.tool, wanted, expected=before)
 
 
-def _another(value: ToolOffset | None) -> ToolOffset:
+def another_offset(value: ToolOffset | None) -> ToolOffset:
     """Return an offset that no controller takes for the same."""
     return ToolOffset(10.0, 20.0, 30.0) if value is None else replace(value, x_mm=value.x_mm + 0.5)
 
@@ -184,7 +184,7 @@ def _write(
     ends: list[BaseException | None],
 ) -> None:
     try:
-        controller.tools.write(tool, _another(before), expected=before)
+        controller.tools.write(tool, another_offset(before), expected=before)
     except RobolinkError as error:
         ends.append(error)
     else:

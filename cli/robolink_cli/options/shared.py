@@ -22,6 +22,9 @@ CommandT = TypeVar("CommandT", bound=Callable[..., Any])
 GIVEN = "robolink.given"
 """Where the options of all levels are collected."""
 
+TYPED = "robolink.typed"
+"""Where the whole command line is kept, as it was typed."""
+
 _ORIGINS = "robolink.origins"
 
 

@@ -1,9 +1,13 @@
 """Whether a command is shown as a wizard, and what stands in its first row."""
 
+import shlex
 from collections.abc import Callable
 from typing import TYPE_CHECKING, TypeVar
 
+import click
+
 from robolink_cli.console.tolerance import may_be_guided
+from robolink_cli.options.shared import TYPED
 from robolink_cli.session.context import CliContext
 
 if TYPE_CHECKING:
@@ -31,10 +35,32 @@ def guided_if_alone(context: CliContext, do: Callable[[], T], *, job: str, alone
     return guided(header_of(context, job), do)
 
 
-def header_of(context: CliContext, job: str) -> "Header":
-    """Return the first row of a command's screens."""
+def header_of(context: CliContext, job: str, *chosen: str, needle: str = "") -> "Header":
+    """Return the first row of a command's screens.
+
+    Args:
+        context: What the command was told.
+        job: What it is called.
+        chosen: What was chosen from a list, as it would be typed behind the command.
+        needle: Id of the needle that is mounted.
+    """
     from robolink_cli.wizard.state import Header
 
     url = context.url or ""
     name = context.cell.name if context.cell is not None else url.partition("?")[0]
-    return Header(name, job, simulated="+sim://" in url)
+    return Header(
+        name,
+        job,
+        simulated="+sim://" in url,
+        command=_typed_again(context, chosen),
+        needle=needle,
+    )
+
+
+def _typed_again(context: CliContext, chosen: tuple[str, ...]) -> str:
+    """Return the command line that begins the same job, with what was chosen meanwhile."""
+    words = [*click.get_current_context().meta.get(TYPED, ()), *chosen]
+    named = any(word in ("-c", "--controller") or word[:13] == "--controller=" for word in words)
+    if context.cell is not None and not named:
+        words = ["-c", context.cell.name, *words]
+    return shlex.join(["robolink", *words])

@@ -13,11 +13,14 @@ from robolink.runner import SETTLING_S, FitSubject, JogSubject, MoveSubject, Que
 from robolink_cli.wizard.check_list import CheckSubject
 from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.happenings import (
+    CellIs,
     Effect,
     Happening,
+    HasEnded,
     KeyPressed,
     LineTyped,
     SendAnswer,
+    TaughtPoints,
     TooFast,
     WaitsForAnswer,
     WasAsked,
@@ -26,14 +29,15 @@ from robolink_cli.wizard.happenings import (
     WasTold,
     WizardCommand,
 )
-from robolink_cli.wizard.keys import folded, meaning_of, step_of, with_point
-from robolink_cli.wizard.questions_flow import answered_by_key, answered_by_line
+from robolink_cli.wizard.keys import folded, meaning_of, number_in, pose_in, step_of, with_point
+from robolink_cli.wizard.questions_flow import answered_by_key, answered_by_line, into_field
 from robolink_cli.wizard.state import (
     ARMED_AFTER_S,
     LEAST_WAY_MM,
     STEP_SIZES,
     Header,
     Jogging,
+    LastScreen,
     WizardState,
 )
 
@@ -55,6 +59,10 @@ def advance(state: WizardState, happening: Happening) -> Advanced:
             return _regarding(state, subject), []
         case WasAsked():
             return _asked(state, happening), []
+        case HasEnded(ended=LastScreen() as ended):
+            return replace(state, ended=ended, message=""), []
+        case HasEnded():
+            return state, []
         case WaitsForAnswer():
             return _waiting(state, happening.at_s), []
         case TooFast():
@@ -111,12 +119,22 @@ def _regarding(state: WizardState, subject: object) -> WizardState:
         moves = replace(state, subject=subject, question=None, waits=False, fresh=fresh)
         return replace(moves, carried=True, message="")
     if isinstance(subject, Header):
-        return replace(state, header=subject)
+        return _known(replace(state, header=subject), state.header.simulated, state.header.needle)
+    if isinstance(subject, CellIs):
+        return _known(state, subject.simulated, subject.needle)
+    if isinstance(subject, TaughtPoints):
+        return replace(state, impact=subject.impact)
     if isinstance(subject, ChangeReport):
         return replace(state, report=subject)
     if isinstance(subject, FitSubject):
         return replace(state, subject=subject, fit=subject)
     return replace(state, subject=subject)
+
+
+def _known(state: WizardState, simulated: bool, needle: str) -> WizardState:
+    header = state.header
+    simulated, needle = header.simulated or simulated, needle or header.needle
+    return replace(state, header=replace(header, simulated=simulated, needle=needle))
 
 
 def _waiting(state: WizardState, at_s: float) -> WizardState:
@@ -138,6 +156,8 @@ def _asked(state: WizardState, asked: WasAsked) -> WizardState:
         fresh=(),
         waits=False,
         typed="",
+        typing=False,
+        pose_typed="",
         marked=state.subject.marked if isinstance(state.subject, ChoiceSubject) else None,
         message="",
         ending=False,
@@ -173,7 +193,20 @@ def _armed(state: WizardState, at_s: float) -> bool:
     return state.question is not None and at_s - state.question.at_s >= ARMED_AFTER_S
 
 
+def _last_key(state: WizardState, ended: LastScreen, key: KeyPressed) -> Advanced:
+    """Leave the last screen, or begin again; ENTER does neither."""
+    if key.at_s - ended.at_s < ARMED_AFTER_S:
+        return state, []
+    if key.name in ("stop", "0", "q") or (ended.done and key.name in ("5", "main")):
+        return state, [WizardCommand.LEAVE]
+    if key.name in ("5", "main"):
+        return replace(state, begins_again=True), [WizardCommand.BEGIN_AGAIN]
+    return state, []
+
+
 def _key(state: WizardState, key: KeyPressed) -> Advanced:
+    if state.ended is not None:
+        return _last_key(state, state.ended, key)
     if key.name == "stop" or (key.name == "0" and not (state.has_field and key.text)):
         return _stop(state)
     if stops_at_once(state, key.name):
@@ -196,7 +229,11 @@ def stops_at_once(state: WizardState, name: str) -> bool:
 
 
 def _key_at_place(state: WizardState, key: KeyPressed) -> Advanced:
+    if state.typing:
+        return _key_in_pose(state, key)
     jogging = state.jogging
+    if key.name in (".", "delete"):
+        return _begin_pose(state)
     if key.name in ("+", "-"):
         size = jogging.size + (1 if key.name == "+" else -1)
         size = min(max(size, 0), len(STEP_SIZES) - 1)
@@ -214,21 +251,54 @@ def _key_at_place(state: WizardState, key: KeyPressed) -> Advanced:
     return (state, []) if step is None else _jog(state, step, key.at_s)
 
 
+def _begin_pose(state: WizardState) -> Advanced:
+    """Open the field into which a pose is typed."""
+    if state.touch is None or not state.touch.types:
+        return state.says(tr("Here no pose can be typed.")), []
+    return replace(state, typing=True, typed="", pose_typed="", message=""), []
+
+
+def _key_in_pose(state: WizardState, key: KeyPressed) -> Advanced:
+    """Fill the field; ENTER closes it, and takes nothing."""
+    if key.name != "enter":
+        return into_field(state, key), []
+    return _pose_typed(replace(state, typing=False), state.typed)
+
+
+def _pose_typed(state: WizardState, text: str) -> Advanced:
+    """Keep a typed pose until it is taken."""
+    numbers = folded(text).replace(";", " ").split()
+    if not numbers:
+        return replace(state, pose_typed="", message=""), []
+    if len(numbers) not in (4, 6):
+        return state.says(tr("A pose is X Y Z U, or X Y Z U V W. Nothing was taken.")), []
+    said = tr("Typed: {pose}. [5] or take records it as typed.", pose=" ".join(numbers))
+    return replace(state, pose_typed=" ".join(numbers), message=said), []
+
+
 def _jog(state: WizardState, step: str, at_s: float) -> Advanced:
     jogging = replace(state.jogging, ended_s=at_s)
-    return _answer(replace(state, jogging=jogging), step)
+    return _answer(replace(state, jogging=jogging, pose_typed=""), step)
 
 
 def _take(state: WizardState, at_s: float) -> Advanced:
+    if state.pose_typed:
+        return _answer(replace(state, pose_typed=""), f"pose {state.pose_typed}")
     why = not_yet(state, at_s)
     return (state.says(why), []) if why else _answer(state, "done")
 
 
-def _again(state: WizardState) -> Advanced:
+def _again(state: WizardState, number: int | None = None) -> Advanced:
+    """Have an earlier touch made again: the one before, where no other is named."""
     touch = state.touch
     if touch is None or touch.number < 2 or touch.proof:
-        return state.says(tr("There is no earlier touch to begin with.")), []
-    return _answer(state, "again")
+        return state.says(tr("There is no earlier touch to make again.")), []
+    if not touch.retakes:
+        return _answer(state, "again")
+    number = touch.number - 1 if number is None else number
+    if not 1 <= number < touch.number:
+        return state.says(tr("Touch {k} was not made yet.", k=number)), []
+    return _answer(state, f"again {number}")
 
 
 def _line(state: WizardState, line: LineTyped) -> Advanced:
@@ -250,9 +320,13 @@ def _line_at_place(state: WizardState, line: LineTyped, meaning: str) -> Advance
     if meaning == "take":
         return _stop(state) if state.free_jog is not None else _take(state, line.at_s)
     if meaning == "again":
-        return _again(state)
+        return _again(state, number_in(line.text))
     if meaning == "help":
         return state.says(help_at_place(free=state.free_jog is not None)), []
+    typed = pose_in(line.text)
+    if typed is not None:
+        begun, _ = _begin_pose(state)
+        return _pose_typed(replace(begun, typing=False), typed) if begun.typing else (begun, [])
     pointed = with_point(line.text)
     if pointed is not None:
         said = tr("Write the decimal point as '.': {step}. Nothing moved.", step=pointed)
@@ -269,7 +343,7 @@ def help_at_place(*, free: bool) -> str:
         )
     return tr(
         "Steps: x+0.1 moves 0.1 mm to +X; x y z in mm, u in degrees; several at once: x+0.1 z-0.5. "
-        "take records, again 1 begins at touch 1, stop ends."
+        "take records, pose X Y Z U types one, again 1 makes touch 1 again, stop ends."
     )
 
 

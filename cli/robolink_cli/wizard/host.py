@@ -7,7 +7,7 @@ from robolink_cli.console.output import shown_by
 from robolink_cli.console.render import note
 from robolink_cli.prompts.present import sitting_at
 from robolink_cli.wizard.desk import Desk
-from robolink_cli.wizard.screens.ending import done_lines, stopped_lines
+from robolink_cli.wizard.screens.ending import ended_of, kept_lines
 from robolink_cli.wizard.state import Header, WizardState
 from robolink_cli.wizard.work import Work
 
@@ -26,22 +26,27 @@ def guided(header: Header, do: Callable[[], T]) -> T:
     """
     from robolink_cli.wizard.faces.choice import face_here
 
-    desk, work, state = Desk(), Work(do), WizardState(header)
     face = face_here()
-    with sitting_at(desk), shown_by(lambda text, _beside: desk.tell(text)):
-        work.start()
-        state = face.run(desk, state, work)
+    while True:
+        desk, work = Desk(), Work(do)
+        with sitting_at(desk), shown_by(lambda text, _beside: desk.tell(text)):  # noqa: B023 - used inside the turn
+            work.start()
+            state = face.run(desk, WizardState(header), work)
+        _leave(state, work.error)
+        if not state.begins_again:
+            break
     if work.error is not None:
-        if state.subject is not None:  # else nothing was begun that could stop
-            _leave(stopped_lines(state))
         raise work.error
-    if state.report is not None:
-        _leave(done_lines(state, state.report))
-    elif state.fresh:
-        _leave(list(state.fresh))
     return work.result  # type: ignore[return-value]
 
 
-def _leave(lines: list[str]) -> None:
+def _leave(state: WizardState, error: BaseException | None) -> None:
     """Print what stays when the screen is gone."""
-    note("\n".join(lines))
+    ended = state.ended or ended_of(state, error, 0.0)
+    lines = ended.kept if ended is not None else (*kept_lines(state, error), *_unread(state, error))
+    if lines:
+        note("\n".join(lines))
+
+
+def _unread(state: WizardState, error: BaseException | None) -> tuple[str, ...]:
+    return state.fresh if error is None else ()

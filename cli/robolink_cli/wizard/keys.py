@@ -35,7 +35,8 @@ _ARROWS: Final = ("6", "8", "4", "2")
 _WORDS: Final = {
     "take": "take done record t 记录",
     "stop": "stop q quit abort end 停止",
-    "again": "again redo 重做",
+    "again": "again redo back 重做 返回",
+    "more": "more 再触碰",
     "help": "help ? h 帮助",
     "yes": "y yes j ja 是",
     "no": "n no nein 否",
@@ -53,12 +54,24 @@ def folded(text: str) -> str:
 def meaning_of(text: str) -> str:
     """Return which command a typed line is: ``take``, ``stop`` ..; empty for none.
 
-    The number after ``again 1`` says nothing: it always begins at the first.
+    The number after ``again 1`` is read by :func:`number_in`.
     """
     words = folded(text).split()
-    if not words or len(words) > 2 or (len(words) == 2 and words[0] not in ("again", "重做")):
-        return ""
-    return _MEANINGS.get(words[0], "")
+    meaning = _MEANINGS.get(words[0], "") if words else ""
+    alone = len(words) == 1 or (meaning == "again" and len(words) == 2 and words[1].isdigit())
+    return meaning if alone else ""
+
+
+def number_in(text: str) -> int | None:
+    """Return the number of a touch in ``again 1``, ``None`` where none is named."""
+    words = folded(text).split()
+    return int(words[1]) if len(words) == 2 and words[1].isdigit() else None
+
+
+def pose_in(text: str) -> str | None:
+    """Return the numbers behind ``pose``, ``None`` where the line is none."""
+    word, _, rest = folded(text).partition(" ")
+    return rest if word in ("pose", "位姿") else None
 
 
 def with_point(text: str) -> str | None:

@@ -8,7 +8,7 @@ from typing import Final
 
 from robolink.messages import tr
 from robolink.nozzle_change import WriteSubject
-from robolink.runner import FitSubject, Question
+from robolink.runner import BACK, MORE, FitSubject, Question
 from robolink_cli.wizard.check_list import SWITCH_ON, CheckSubject, Mark
 from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.happenings import KeyPressed
@@ -29,6 +29,13 @@ _LEAST_SHARE: Final = 1 / 3
 def expected_number(subject: WriteSubject) -> str:
     """Return what has to be typed before a write: the numbers of its tools, one after the other."""
     return "".join(map(str, subject.tools))
+
+
+def offered_words(subject: WriteSubject) -> tuple[str, ...]:
+    """Return the words by which a person may go back to the touches before a write."""
+    if subject.again is None:
+        return ()
+    return (BACK, MORE) if subject.adds_touch else (BACK,)
 
 
 def answered_by_key(state: WizardState, key: KeyPressed) -> Answered:
@@ -64,10 +71,17 @@ def answered_by_line(state: WizardState, line: str) -> Answered:
         return line.strip() or state.says(tr("Nothing was typed."))
     meaning = meaning_of(line)
     if isinstance(subject, WriteSubject):
+        word = {"again": BACK, "more": MORE}.get(meaning, "")
+        if word in offered_words(subject):
+            return word
         return _write(state, subject, folded(line), said_no=meaning == "no")
     if isinstance(subject, CheckSubject):
         word = {"yes": "main", "no": "0"}.get(meaning, folded(line))
         return "n" if word == "0" else _check(state, subject, word)
+    if isinstance(subject, FitSubject) and meaning == "again":
+        return "y"
+    if isinstance(subject, FitSubject) and subject.more and meaning == "more":
+        return MORE
     if meaning in ("yes", "no"):
         return meaning[0]
     return state.says(tr("Type y or n."))
@@ -83,12 +97,14 @@ def worst_first(fit: FitSubject) -> bool:
 
 
 def _fit_key(state: WizardState, fit: FitSubject, key: KeyPressed) -> Answered:
-    main = key.name in ("5", "main")
-    if worst_first(fit):
-        answers = {"3": "n", "n": "n", "y": "y"}
-        return "y" if main else answers.get(key.name, state)
-    answers = {"1": "y", "y": "y", "n": "n"}
-    return "n" if main else answers.get(key.name, state)
+    first = worst_first(fit)
+    answers = {"/": "y", "y": "y", "n": "n"} | ({"3": "n"} if first else {})
+    answers |= dict.fromkeys(("5", "main"), "y" if first else "n")
+    if fit.more:
+        answers["1"] = MORE
+    elif not first:
+        answers["1"] = "y"
+    return answers.get(key.name, state)
 
 
 def _choice_key(state: WizardState, subject: ChoiceSubject, key: KeyPressed) -> Answered:
@@ -106,10 +122,11 @@ def _choice_key(state: WizardState, subject: ChoiceSubject, key: KeyPressed) -> 
 def _text_key(state: WizardState, key: KeyPressed) -> Answered:
     if key.name == "enter":
         return state.typed.strip() or state.says(tr("Nothing was typed."))
-    return _into_field(state, key)
+    return into_field(state, key)
 
 
-def _into_field(state: WizardState, key: KeyPressed) -> WizardState:
+def into_field(state: WizardState, key: KeyPressed) -> WizardState:
+    """Write a key into the field."""
     if key.name == "backspace":
         return replace(state, typed=state.typed[:-1], message="")
     return replace(state, typed=(state.typed + key.text)[:60], message="") if key.text else state
@@ -120,8 +137,11 @@ def _write_key(state: WizardState, subject: WriteSubject, key: KeyPressed) -> An
         return _write(state, subject, folded(state.typed), said_no=False)
     if key.name == "n":
         return "n"
+    word = {"/": BACK, "+": MORE}.get(key.name, "")
+    if word in offered_words(subject):
+        return word
     if key.text.isdigit() or key.name == "backspace":
-        return _into_field(state, key)
+        return into_field(state, key)
     return state  # ENTER never writes
 
 

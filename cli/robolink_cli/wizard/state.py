@@ -2,13 +2,16 @@
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from robolink.model import Pose
 from robolink.nozzle_change import ChangeReport, WriteSubject
 from robolink.runner import FINEST_STEP, FitSubject, JogRange, Question, TouchSubject
 from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.happenings import Reading, WasAsked
+
+if TYPE_CHECKING:
+    from robolink.calibration import Impact  # numpy, which a touch does without
 
 STEP_SIZES: Final = (0.01, 0.1, 0.5, 1.0, 5.0)
 """In mm, and in degrees for U; the largest is the runner's own limit."""
@@ -61,11 +64,33 @@ class Header:
         cell: Name of the cell, or how the controller is reached.
         job: What is done.
         simulated: Whether nothing real moves.
+        command: What is typed to begin the same job once more, empty where nobody typed it.
+        needle: Id of the needle or nozzle, empty where nobody was asked.
     """
 
     cell: str
     job: str
     simulated: bool = False
+    command: str = ""
+    needle: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class LastScreen:
+    """How the work ended, for the last screen.
+
+    Attributes:
+        done: Whether it was carried out.
+        lines: What the screen says.
+        kept: What stays on the terminal when the screen is gone; how every command ends is said
+            besides.
+        at_s: When.
+    """
+
+    done: bool
+    lines: tuple[str, ...]
+    kept: tuple[str, ...]
+    at_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,12 +109,17 @@ class WizardState:
             where the robot put it.
         jogging: The steps made.
         typed: What stands in the field.
+        typing: Whether the field of a pose is open at a touch.
+        pose_typed: The pose that was typed there, and is taken next; empty for none.
         marked: Index of the marked row of a list.
         remarks: What was told last, oldest first.
         fresh: What of it was told since the last question, so that nobody had a screen to read it.
         message: The row above the keys.
         ending: Whether the work was told to end.
+        impact: What the new value does at taught points, ``None`` where none were named.
         report: What was reached, ``None`` before the end.
+        ended: The last screen, ``None`` before it.
+        begins_again: Whether the same job is to be begun once more.
     """
 
     header: Header
@@ -102,12 +132,17 @@ class WizardState:
     carried: bool = False
     jogging: Jogging = field(default_factory=Jogging)
     typed: str = ""
+    typing: bool = False
+    pose_typed: str = ""
     marked: int | None = None
     remarks: tuple[str, ...] = ()
     fresh: tuple[str, ...] = ()
     message: str = ""
     ending: bool = False
+    impact: "Impact | None" = None
     report: ChangeReport | None = None
+    ended: LastScreen | None = None
+    begins_again: bool = False
 
     def says(self, message: str) -> "WizardState":
         """Return the same with another message."""
@@ -143,6 +178,8 @@ class WizardState:
         question = self.question
         if isinstance(self.subject, ChoiceSubject):
             return False
+        if self.typing:
+            return True
         return self.writing is not None or (question is not None and question.kind is Question.TEXT)
 
     @property

@@ -122,7 +122,7 @@ _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
         "Too few touches to see whether something moved meanwhile; from six on that shows."
     ),
     "touches_not_witnessed": lambda: tr(
-        "Nobody saw these touches being made: the poses were taught or came in a file."
+        "Nobody saw these touches being made: the poses were taught, typed or in a file."
     ),
     "length_changed": lambda: tr("The length of the tool has changed."),
     "length_not_observable": lambda: tr(

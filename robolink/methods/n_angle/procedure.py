@@ -10,20 +10,25 @@ from robolink.calibration import (
     planar_sigma_gain,
     solvable_planes,
 )
+from robolink.errors import LimitError
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset, angle_difference_deg
 from robolink.procedures import (
     TAKE_ALL,
     PinTouches,
+    Samples,
     SamplingPolicy,
     TouchPlan,
+    agreement,
+    approach_path,
+    middles_of_gaps,
     offset_z,
     plain_pose,
     sample_sequentially,
     touch_again,
     turned_touches,
 )
-from robolink.runner import Procedure, TouchedAt, first_clear
+from robolink.runner import Notify, Procedure, TouchedAt, first_clear
 
 _SHARES: Final = (1.0, -1.0, 0.5, -0.5)
 """By which the planned turns are scaled where the arm cannot take them up: to the other side, and
@@ -55,7 +60,8 @@ def measure_n_angle(
             ``touch_not_proven``, ``large_residual``, and as :func:`solve_n_angle`.
         LimitError: The arm cannot turn so over this pin, nor to the other side, nor half as far.
     """
-    touches = PinTouches(plan, comes_down=stored is not None, total=1 + len(turns_deg))
+    count = 1 + len(turns_deg)
+    touches = PinTouches(plan, comes_down=stored is not None, total=count, retakes=True)
     first = yield from touches.first()
     # Refused before anything turns, not when all touches are made.
     solvable_planes([first], height_of(stored))
@@ -75,6 +81,51 @@ def measure_n_angle(
     turning = _NAngleSampler(touches, stored, sigma_mm, first)
     result = yield from sample_sequentially(turning, first, [first.u_deg, *angles], sampling)
     touches.require_made()
+    return result
+
+
+def go_on_n_angle(
+    plan: TouchPlan,
+    *,
+    here: Pose,
+    taken: Sequence[TouchedAt],
+    again: int | None,
+    stored: ToolOffset | None,
+    sigma_mm: float | None = None,
+) -> Procedure[CalibrationResult]:
+    """Touch the pin once more after :func:`measure_n_angle`. Runs in Tool 0, ends lifted.
+
+    Args:
+        plan: Lift and clearance.
+        here: Where the flange is.
+        taken: The touches of the measurement.
+        again: Index of the one that is made again; ``None`` for one more, in the largest gap of U.
+        stored: The offset stored now.
+        sigma_mm: Standard deviation of one coordinate of one touch, where it is known.
+
+    Raises:
+        CalibrationError: As :func:`measure_n_angle`.
+        LimitError: There is no room for one more.
+    """
+    touches = PinTouches(plan, comes_down=stored is not None, total=len(taken), retakes=True)
+    places = [touch.u_deg for touch in taken]
+    touches.adopt(dict(zip(places, taken, strict=True)))
+    yield from approach_path(
+        offset_z(plain_pose(taken[-1]), plan.lift_mm),
+        here=here,
+        purpose=tr("Moving above the pin."),
+    )
+    turning = _NAngleSampler(touches, stored, sigma_mm, taken[-1])
+    samples = Samples(turning, places, taken)
+    if again is not None:
+        yield from samples.take(again)
+    else:
+        yield from samples.another()
+    touches.require_made()
+    result = samples.solved()
+    if result.dof:
+        last = len(samples.taken) - 1 if again is None else again
+        yield Notify(agreement(turning, result, last=last))
     return result
 
 
@@ -105,6 +156,24 @@ class _NAngleSampler:
             self.touches, self.last, place, self.stored or ToolOffset()
         )
         return self.last
+
+    def another(self, taken: Sequence[Pose]) -> Procedure[float | None]:
+        """Return a U in a gap, the largest that the arm can turn into."""
+        nominal, guess = replace(self.touches.plan, nominal=True), self.stored or ToolOffset()
+        comes_down = self.stored is not None
+        lifted = offset_z(plain_pose(self.last), nominal.lift_mm)
+        try:
+            return (
+                yield from first_clear(
+                    middles_of_gaps([pose.u_deg for pose in taken]),
+                    lambda u_deg: turned_touches(
+                        nominal, self.last, [u_deg], guess, comes_down=comes_down
+                    ),
+                    lifted,
+                )
+            )
+        except LimitError:
+            return None
 
     def away(self) -> Procedure[None]:
         yield from ()

@@ -6,9 +6,16 @@ from typing import ClassVar
 
 from robolink.calibration import CalibrationResult
 from robolink.messages import tr
-from robolink.methods.n_angle.procedure import measure_n_angle
+from robolink.methods.n_angle.procedure import go_on_n_angle, measure_n_angle
 from robolink.model import Pose, ToolOffset
-from robolink.procedures import TAKE_ALL, ManualPinSource, SamplingPolicy, TouchPlan
+from robolink.procedures import (
+    TAKE_ALL,
+    ManualPinSource,
+    MeasurementContext,
+    SamplingPolicy,
+    TouchPlan,
+    touches_of,
+)
 from robolink.runner import Procedure
 
 
@@ -43,6 +50,30 @@ class NAngleSource(ManualPinSource):
             stored=stored,
             sigma_mm=self.sigma_mm,
             sampling=self.sampling if live else TAKE_ALL,
+        )
+
+    @property
+    def adds_touch(self) -> bool:
+        """There is always a gap between two angles."""
+        return True
+
+    def further(
+        self,
+        context: MeasurementContext,
+        stored: ToolOffset | None,
+        result: CalibrationResult,
+        again: int | None,
+    ) -> CalibrationResult:
+        """Go on; see :class:`~robolink.procedures.TouchesFurther`."""
+        return context.measure(
+            lambda here: go_on_n_angle(
+                self.touch,
+                here=here,
+                taken=touches_of(result),
+                again=again,
+                stored=stored,
+                sigma_mm=self.sigma_mm,
+            )
         )
 
 

@@ -59,6 +59,21 @@ class OneTouchSource:
         """Return the steps of a measurement; see :class:`~robolink.procedures.MovingSource`."""
         return self._steps(stored, here, replace(self.touch, nominal=True))
 
+    @property
+    def adds_touch(self) -> bool:
+        """One touch is the method."""
+        return False
+
+    def further(
+        self,
+        context: MeasurementContext,
+        stored: ToolOffset | None,
+        result: CalibrationResult,  # noqa: ARG002 - it rests on the touch that is made again
+        again: int | None,  # noqa: ARG002
+    ) -> CalibrationResult:
+        """Touch again; see :class:`~robolink.procedures.TouchesFurther`."""
+        return context.measure(lambda here: self._steps(stored, here, self.touch))
+
     def with_touch(self, plan: TouchPlan) -> Self:
         """Return the same source with another plan of its touch."""
         return replace(self, touch=plan)

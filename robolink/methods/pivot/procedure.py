@@ -24,8 +24,11 @@ from robolink.procedures import (
     TAKE_ALL,
     DriftProof,
     PinTouches,
+    Samples,
     SamplingPolicy,
     TouchPlan,
+    agreement,
+    approach_path,
     sample_sequentially,
 )
 from robolink.runner import Notify, Procedure, TouchedAt
@@ -71,7 +74,7 @@ def pivot_then_lift(
     sampling: SamplingPolicy,
 ) -> Procedure[tuple[CalibrationResult, Pose]]:
     """Do what :func:`measure_pivot` does; return the pose of the lifted flange as well."""
-    touches = PinTouches(plan, planar=False)
+    touches = PinTouches(plan, planar=False, retakes=True)
     first = yield from touches.first(UPRIGHT)
     over = OverPin.touched(first, stored)
     tilts = yield from tilts_in_reach(over, tilts, plan.lift_mm)
@@ -81,6 +84,48 @@ def pivot_then_lift(
     yield from swing.to(UPRIGHT)
     touches.require_made()
     return result, swing.over.pose(UPRIGHT, plan.lift_mm)
+
+
+def go_on_pivot(
+    plan: TouchPlan,
+    *,
+    here: Pose,
+    taken: Sequence[TouchedAt],
+    again: int,
+    tilts: Sequence[Tilt],
+    stored: ToolOffset,
+    sigma_mm: float | None = None,
+) -> Procedure[CalibrationResult]:
+    """Make one touch of :func:`measure_pivot` again. Runs in Tool 0, ends as it does.
+
+    Args:
+        plan: Lift and clearance.
+        here: Where the flange is, upright.
+        taken: The touches of the measurement.
+        again: Index of the one that is made again.
+        tilts: Orientations of the plan.
+        stored: The offset stored now.
+        sigma_mm: Standard deviation of one coordinate of one touch, where it is known.
+
+    Raises:
+        CalibrationError: As :func:`measure_pivot`.
+    """
+    over = OverPin.touched(taken[0], stored)
+    places = [UPRIGHT, *(yield from tilts_in_reach(over, tilts, plan.lift_mm))][: len(taken)]
+    touches = PinTouches(plan, planar=False, retakes=True)
+    touches.adopt(dict(zip(places, taken, strict=True)))
+    yield from approach_path(
+        over.pose(UPRIGHT, plan.lift_mm), here=here, purpose=tr("Moving above the pin.")
+    )
+    swing = _Swing(plan, over, touches)
+    tilting = _PivotSampler(swing, stored, sigma_mm)
+    samples = Samples(tilting, places, taken)
+    yield from samples.take(again)
+    yield from swing.to(UPRIGHT)
+    touches.require_made()
+    result = samples.solved()
+    yield Notify(agreement(tilting, result, last=again))
+    return result
 
 
 def verify_by_tilting(

@@ -15,6 +15,7 @@ from robolink.procedures import (
     SamplingPolicy,
     TouchPlan,
     drift_uncertainty_mm,
+    touches_of,
 )
 from robolink.runner import Procedure
 
@@ -85,6 +86,34 @@ class PivotSource(PinSource):
             u_mm=drift_uncertainty_mm(self.touch, result),
         )
         return context.run(procedure, tip=result.offset)
+
+    @property
+    def adds_touch(self) -> bool | None:
+        """Which further tilt tells most depends on those of the plan."""
+        return False
+
+    def further(
+        self,
+        context: MeasurementContext,
+        stored: ToolOffset | None,
+        result: CalibrationResult,
+        again: int | None,
+    ) -> CalibrationResult:
+        """Go on; see :class:`~robolink.procedures.TouchesFurther`."""
+        from robolink.methods.pivot.procedure import go_on_pivot  # numpy
+
+        taken = touches_of(result)
+        return context.measure(
+            lambda here: go_on_pivot(
+                self.touch,
+                here=here,
+                taken=taken,
+                again=len(taken) - 1 if again is None else again,
+                tilts=self.tilts,
+                stored=require_known_tip(stored),
+                sigma_mm=self.sigma_mm,
+            )
+        )
 
     @property
     def _tilt_deg(self) -> float:

@@ -37,6 +37,10 @@ class SixPointSource(PivotSource):
         )
         return f"{self._touched}; {shown}"
 
+    @property
+    def adds_touch(self) -> None:
+        """The ways along the axes were shown from where the touches left the tool."""
+
     def _steps(self, stored: ToolOffset | None, *, live: bool) -> Procedure[CalibrationResult]:
         from robolink.methods.six_point.procedure import measure_six_point  # numpy, as in the pivot
 

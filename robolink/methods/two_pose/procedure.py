@@ -1,5 +1,6 @@
 """A tip touched onto a pin at two angles of U."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from robolink.calibration import (
@@ -8,16 +9,18 @@ from robolink.calibration import (
     solvable_planes,
     solve_two_pose,
 )
-from robolink.model import ToolOffset
+from robolink.messages import tr
+from robolink.model import Pose, ToolOffset
 from robolink.procedures import (
     PinTouches,
     TouchPlan,
+    approach_path,
     offset_z,
     plain_pose,
     touch_again,
     turned_touches,
 )
-from robolink.runner import Procedure, first_clear
+from robolink.runner import Notify, Procedure, TakenAgainError, TouchedAt, first_clear
 
 
 def measure_two_pose(
@@ -33,7 +36,7 @@ def measure_two_pose(
             :func:`solve_two_pose`.
         LimitError: The arm cannot turn so over this pin, to neither side.
     """
-    touches = PinTouches(plan, comes_down=stored is not None, total=2)
+    touches = PinTouches(plan, comes_down=stored is not None, total=2, retakes=True)
     first = yield from touches.first()
     # Refused before anything turns, not when both touches are made.
     solvable_planes([first], height_of(stored))
@@ -48,6 +51,53 @@ def measure_two_pose(
         ),
         offset_z(plain_pose(first), plan.lift_mm),
     )
-    second = yield from touch_again(touches, first, u_deg, guess)
+    first, second = yield from _second(touches, first, u_deg, guess)
     touches.require_made()
+    return solve_two_pose(first, second, stored=stored, sigma_mm=sigma_mm)
+
+
+def _second(
+    touches: PinTouches, first: TouchedAt, u_deg: float, guess: ToolOffset
+) -> Procedure[tuple[TouchedAt, TouchedAt]]:
+    """Return both touches, the first one as it was made last."""
+    first_deg = first.u_deg
+    while True:
+        try:
+            return first, (yield from touch_again(touches, first, u_deg, guess))
+        except TakenAgainError as again:
+            yield Notify(again.what)
+            first = yield from touch_again(touches, first, first_deg, guess)
+
+
+def go_on_two_pose(
+    plan: TouchPlan,
+    *,
+    here: Pose,
+    taken: Sequence[TouchedAt],
+    again: int,
+    stored: ToolOffset | None,
+    sigma_mm: float | None = None,
+) -> Procedure[CalibrationResult]:
+    """Make one touch of :func:`measure_two_pose` again. Runs in Tool 0, ends lifted.
+
+    Args:
+        plan: Lift and clearance.
+        here: Where the flange is.
+        taken: Both touches.
+        again: Index of the one that is made again.
+        stored: The offset stored now.
+        sigma_mm: Standard deviation of one coordinate of one touch, where it is known.
+
+    Raises:
+        CalibrationError: As :func:`measure_two_pose`.
+    """
+    touches = PinTouches(plan, comes_down=stored is not None, total=2)
+    touches.adopt({touch.u_deg: touch for touch in taken})
+    other = taken[1 - again]
+    yield from approach_path(
+        offset_z(plain_pose(other), plan.lift_mm), here=here, purpose=tr("Moving above the pin.")
+    )
+    anew = yield from touch_again(touches, other, taken[again].u_deg, stored or ToolOffset())
+    touches.require_made()
+    first, second = (anew, other) if again == 0 else (other, anew)
     return solve_two_pose(first, second, stored=stored, sigma_mm=sigma_mm)

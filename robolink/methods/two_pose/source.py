@@ -6,9 +6,9 @@ from typing import ClassVar
 
 from robolink.calibration import CalibrationResult, solve_two_pose, two_of
 from robolink.messages import tr
-from robolink.methods.two_pose.procedure import measure_two_pose
+from robolink.methods.two_pose.procedure import go_on_two_pose, measure_two_pose
 from robolink.model import Pose, ToolOffset
-from robolink.procedures import ManualPinSource, TouchPlan
+from robolink.procedures import ManualPinSource, MeasurementContext, TouchPlan, touches_of
 from robolink.runner import Procedure
 
 
@@ -31,6 +31,30 @@ class TwoPoseSource(ManualPinSource):
 
     def _steps(self, stored: ToolOffset | None, *, live: bool) -> Procedure[CalibrationResult]:
         return measure_two_pose(self._touching(live=live), stored=stored, sigma_mm=self.sigma_mm)
+
+    @property
+    def adds_touch(self) -> bool:
+        """Two touches are the method; three are another one."""
+        return False
+
+    def further(
+        self,
+        context: MeasurementContext,
+        stored: ToolOffset | None,
+        result: CalibrationResult,
+        again: int | None,
+    ) -> CalibrationResult:
+        """Go on; see :class:`~robolink.procedures.TouchesFurther`."""
+        return context.measure(
+            lambda here: go_on_two_pose(
+                self.touch,
+                here=here,
+                taken=touches_of(result),
+                again=1 if again is None else again,
+                stored=stored,
+                sigma_mm=self.sigma_mm,
+            )
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@ from robolink.procedures.pin.proof import (
 )
 from robolink.procedures.pin.touch_plan import TouchPlan
 from robolink.procedures.source import MeasurementContext
-from robolink.runner import Procedure
+from robolink.runner import Procedure, TouchedAt
 
 
 @runtime_checkable
@@ -115,7 +115,7 @@ class ManualPinSource(PinSource):
         procedure = verify_by_turning(
             self.touch,
             contact=contact_pose(result, tool=tool),
-            angles_deg=(_middle_of_largest_gap(angles), angles[0]),
+            angles_deg=(middles_of_gaps(angles)[0], angles[0]),
             tolerance_mm=tolerance_mm,
             u_mm=drift_uncertainty_mm(self.touch, result),
             written=result.offset,
@@ -124,8 +124,13 @@ class ManualPinSource(PinSource):
         return context.run(procedure, tip=result.offset)
 
 
-def _middle_of_largest_gap(angles_deg: Sequence[float]) -> float:
-    """Return an angle between those that were measured, as far from any of them as there is one."""
-    gaps = pairwise(sorted(angles_deg))
-    low, high = max(gaps, key=lambda gap: gap[1] - gap[0])
-    return (low + high) / 2
+def middles_of_gaps(angles_deg: Sequence[float]) -> list[float]:
+    """Return the angles between those that were measured, the one farthest from any first."""
+    gaps = sorted(pairwise(sorted(angles_deg)), key=lambda gap: gap[0] - gap[1])
+    return [(low + high) / 2 for low, high in gaps]
+
+
+def touches_of(result: CalibrationResult) -> list[TouchedAt]:
+    """Return the touches that a measurement rests on; none where it rests on other poses too."""
+    touches = [pose for pose in result.inputs if isinstance(pose, TouchedAt)]
+    return touches if len(touches) == len(result.inputs) else []

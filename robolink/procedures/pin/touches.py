@@ -5,7 +5,7 @@ the pin, and the last bit is done by the person, who sees it. How far beside and
 that a touch that was not made shows (docs/reference/evidence.md 1).
 """
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
@@ -36,6 +36,7 @@ class PinTouches(WitnessedTouches):
             stops at the lift, and the person jogs the whole approach.
         total: How many touches are planned, ``None`` where nobody knows.
         proof: Whether they are those of a proof.
+        retakes: Whether whoever makes them hears of one that is to be made again, alone.
     """
 
     def __init__(
@@ -46,8 +47,9 @@ class PinTouches(WitnessedTouches):
         comes_down: bool = True,
         total: int | None = None,
         proof: bool = False,
+        retakes: bool = False,
     ) -> None:
-        super().__init__(plan, total=total, proof=proof)
+        super().__init__(plan, total=total, proof=proof, retakes=retakes)
         self._planar = planar
         self._low_mm = plan.clearance_mm if comes_down else plan.lift_mm
         self._comes_down = comes_down
@@ -96,6 +98,15 @@ class PinTouches(WitnessedTouches):
         arrival: Pose = yield self._move(target, Path.STRAIGHT, tr("Lowering beside the pin."))
         return arrival
 
+    def adopt(self, touches: Mapping[Hashable, TouchedAt]) -> None:
+        """Take over the touches of a measurement that is gone on with.
+
+        Args:
+            touches: By the keys by which later ones take their places, in their order.
+        """
+        self._taken = dict(touches)
+        self._numbers = {key: number for number, key in enumerate(touches, start=1)}
+
     def require_made(self) -> None:
         """Refuse touches that were not made, whatever each of them looked like.
 
@@ -131,27 +142,33 @@ class PinTouches(WitnessedTouches):
         return lift_off(self._plan, touch)
 
     @property
+    def _may_be_typed(self) -> bool:
+        return not self._proof
+
+    @property
     def _compares_heights(self) -> bool:
         return self._planar
 
     def _not_yet(self, touch: TouchedAt, arrival: Pose) -> NotYet | None:
         made = replace(touch, arrival=arrival)
-        if not self._made(made):
+        if not (touch.typed or self._made(made)):
             return None  # told by whoever asks for it once more
         return super()._not_yet(touch, arrival) or self._in_the_air(touch) or self._unturned(made)
 
     def _in_the_air(self, touch: Pose) -> NotYet | None:
-        heights = [one.z_mm for one in self._taken.values()]
-        if not (self._planar and heights):
+        others = self._by_number
+        if not (self._planar and others):
             return None
+        heights = [one.z_mm for one in others.values()]
         if heights_agree([*heights, touch.z_mm], self._plan.sigma_in_height_mm):
             return None
-        apart_mm = touch.z_mm - heights[0]
+        number, apart_mm = next(iter(others)), touch.z_mm - heights[0]
+        told = {"mm": f"{abs(apart_mm):.2f}", "k": number}
         return NotYet(
             "touch_heights_differ",
-            tr("{mm} mm higher than touch 1. Is the tip really on the pin?", mm=f"{apart_mm:.2f}")
+            tr("{mm} mm higher than touch {k}. Is the tip really on the pin?", **told)
             if apart_mm > 0.0
-            else tr("{mm} mm lower than touch 1. Was touch 1 on the pin?", mm=f"{-apart_mm:.2f}"),
+            else tr("{mm} mm lower than touch {k}. Was touch {k} on the pin?", **told),
         )
 
     def _unturned(self, touch: TouchedAt) -> NotYet | None:
@@ -159,7 +176,7 @@ class PinTouches(WitnessedTouches):
         arrival = touch.arrival
         if not self._planar or arrival is None:
             return None
-        for number, other in enumerate(self._taken.values(), start=1):
+        for number, other in self._by_number.items():
             planned_deg = abs(angle_difference_deg(arrival.u_deg, other.u_deg))
             least_deg = min(LEAST_TURN_DEG, planned_deg / 2)
             found_deg = abs(angle_difference_deg(touch.u_deg, other.u_deg))
@@ -183,7 +200,7 @@ class PinTouches(WitnessedTouches):
         return tr(
             "Touch {number} was not made: the robot is where it stopped, {away:.1f} mm from the "
             "pin. Jog onto it.",
-            number=self._count,
+            number=self._number,
             away=away_mm,
         )
 

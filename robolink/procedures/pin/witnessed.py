@@ -28,14 +28,24 @@ class WitnessedTouches(ABC):
         plan: Lift, clearance, contact input.
         total: How many touches are planned, ``None`` where nobody knows.
         proof: Whether they are those of a proof.
+        retakes: Whether whoever makes them hears of one that is to be made again, alone.
     """
 
-    def __init__(self, plan: TouchPlan, *, total: int | None = None, proof: bool = False) -> None:
+    def __init__(
+        self,
+        plan: TouchPlan,
+        *,
+        total: int | None = None,
+        proof: bool = False,
+        retakes: bool = False,
+    ) -> None:
         self._plan = plan
         self._total = total
         self._proof = proof
+        self._retakes = retakes
         self._taken: dict[Hashable, TouchedAt] = {}
-        self._count = 0
+        self._numbers: dict[Hashable, int] = {}
+        self._number = 0
 
     def shown(self, instruction: str, *, key: Hashable = None) -> Procedure[TouchedAt]:
         """Let the person bring the tip into contact from wherever it is, and lift off.
@@ -46,13 +56,15 @@ class WitnessedTouches(ABC):
             instruction: What the person is to do.
             key: By which a later touch takes the place of this one; ``None`` for its U.
         """
-        self._count += 1
+        self._number = self._count()
         answer: Pose = yield Ask(
             instruction, contact=self._plan.contact, subject=self._subject(None)
         )
         touch = TouchedAt.of(answer)
         yield self.off(touch)
-        self._taken[touch.u_deg if key is None else key] = touch
+        key = touch.u_deg if key is None else key
+        self._numbers[key] = self._number
+        self._taken[key] = touch
         return touch
 
     def touched(
@@ -76,7 +88,7 @@ class WitnessedTouches(ABC):
         Raises:
             CalibrationError: ``not_touched`` or ``typed_ahead``, with the tip drawn back.
         """
-        self._count += 1
+        self._number = self._numbers.setdefault(key, self._count())
         ask = Ask(
             instruction,
             foreseen=expected,
@@ -86,7 +98,7 @@ class WitnessedTouches(ABC):
         )
         for left in reversed(range(MOST_ASKED)):
             touch = yield from self._answered(ask, arrival, standoff_mm)
-            if self._plan.nominal or self._made(touch):
+            if self._plan.nominal or touch.typed or self._made(touch):
                 self._taken[key] = touch
                 return touch
             told = self._not_made(touch)
@@ -99,17 +111,40 @@ class WitnessedTouches(ABC):
             remedy=self._how_to_make(),
         )
 
+    @property
+    def plan(self) -> TouchPlan:
+        """Lift, clearance, contact input."""
+        return self._plan
+
     def _subject(self, arrival: Pose | None) -> TouchSubject:
         """Return what a screen shows of the touch that is asked for."""
-        first = next(iter(self._taken.values()), None)
+        first = self._by_number.get(1)
+        total = self._total
         return TouchSubject(
-            number=self._count,
-            total=self._total,
+            number=self._number,
+            total=None if total is None else max(total, self._number),
             arrival=arrival,
             first_z_mm=first.z_mm if first is not None and self._compares_heights else None,
             contact=self._plan.contact,
             proof=self._proof,
+            retakes=self._retakes,
+            types=self._may_be_typed,
         )
+
+    @property
+    def _by_number(self) -> dict[int, TouchedAt]:
+        """Those that count, by the numbers that a person knows them by."""
+        numbered = {self._numbers[key]: touch for key, touch in self._taken.items()}
+        return dict(sorted(numbered.items()))
+
+    def _count(self) -> int:
+        """Return which touch the next one is that is not made again, from 1."""
+        return max(self._numbers.values(), default=0) + 1
+
+    @property
+    def _may_be_typed(self) -> bool:
+        """Whether the pose of one may be typed in place of being read."""
+        return False
 
     @property
     def _compares_heights(self) -> bool:
@@ -154,9 +189,10 @@ class WitnessedTouches(ABC):
         except CalibrationError:
             yield self.off(arrival)
             raise
-        return replace(
-            TouchedAt.of(answer), arrival=arrival, standoff_mm=standoff_mm, seed=self._seed
-        )
+        touch = replace(TouchedAt.of(answer), seed=self._seed)
+        if touch.typed:
+            return touch  # nothing shows that its standoff was jogged away
+        return replace(touch, arrival=arrival, standoff_mm=standoff_mm)
 
     def _made(self, touch: TouchedAt) -> bool:
         if self._plan.contact is not None:
@@ -169,7 +205,7 @@ class WitnessedTouches(ABC):
                 "Touch {number} was not made: input {input} did not go over to contact since the "
                 "robot stopped. Jog until it does; if it shows contact all the time, look at its "
                 "wiring.",
-                number=self._count,
+                number=self._number,
                 input=self._plan.contact.number,
             )
         return self._not_jogged(math.hypot(*touch.standoff_mm))

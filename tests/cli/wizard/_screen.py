@@ -28,6 +28,7 @@ class ScreenHand:
     def __init__(self, words, simulator=None, tool=1, *, columns=80, rows=24):
         self.screen = pyte.Screen(columns, rows)
         self.stream = pyte.ByteStream(self.screen)
+        self.last = ""
         self.raw, self.keys, self.tool, self.host = b"", 0, tool, None
         self.eyes = InProcessEyes(simulator) if simulator is not None else None
         self.master, near = pty.openpty()
@@ -96,9 +97,13 @@ class ScreenHand:
             self.rest(0.12)
 
     def end(self):
-        end_s = time.monotonic() + LONGEST_S
+        """Leave the last screen, where there is one, and return the exit code."""
+        end_s, shown = time.monotonic() + LONGEST_S, ""
         while self.read(0.2) and time.monotonic() < end_s:
-            pass
+            if re.search(r"(DONE|STOPPED) *(SIMULATED *)?$", self.screen.display[0]) and not shown:
+                self.rest(0.5)
+                shown = self.last = self.text
+                self.press(["0"])
         return self.command.wait(5.0)
 
     def close(self):

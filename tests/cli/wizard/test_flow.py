@@ -1,9 +1,12 @@
 """The flow of the wizard: what a key or a line does, and what it never does."""
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from robolink_cli.wizard.happenings import (
+    HasEnded,
     KeyPressed,
     LineTyped,
     Reading,
@@ -15,7 +18,7 @@ from robolink_cli.wizard.happenings import (
     WasTold,
     WizardCommand,
 )
-from robolink_cli.wizard.state import STEP_SIZES
+from robolink_cli.wizard.state import STEP_SIZES, LastScreen
 
 from robolink.model import Path as Way
 from robolink.model import Pose
@@ -206,6 +209,48 @@ def test_lines_at_a_touch(line, sent, message):
     assert "take records" in at_touch().line("帮助").state.message
 
 
+@pytest.mark.parametrize(
+    ("line", "sent"),
+    [("/", "again 3"), ("again 1", "again 1"), ("again", "again 3"), ("again 4", None)],
+)
+def test_one_earlier_touch_is_made_again_where_the_method_hears_it(line, sent):
+    hand = at_touch(number=4, retakes=True)
+    hand = hand.keys("/") if line == "/" else hand.line(line)
+    assert hand.sent == ([sent] if sent else [])
+    assert sent or hand.state.message == "Touch 4 was not made yet."
+
+
+@pytest.mark.parametrize(
+    ("again", "adds", "typed", "sent"),
+    [
+        (3, True, "/", "back"),
+        (3, True, "+", "more"),
+        (3, False, "+", None),
+        (None, True, "/", None),
+        (None, True, "+", None),
+    ],
+)
+def test_from_the_new_values_one_key_goes_back_to_the_touches(again, adds, typed, sent):
+    subject = replace(write_subject(1), again=again, adds_touch=adds)
+    assert Sitting().asked(subject, Question.YES_NO).keys(typed).sent == ([sent] if sent else [])
+    words = {"/": "back", "+": "more"}
+    line = Sitting().asked(subject, Question.YES_NO).line(words[typed])
+    assert line.sent == ([sent] if sent else [])
+
+
+def test_one_more_touch_is_offered_beside_the_worst():
+    first = replace(fit_subject(0.006, 0.08, 0.004, worst=1), more=True)
+    later = replace(fit_subject(0.02, 0.03, 0.02, worst=1), more=True)
+    for fit, answers in (
+        (first, {"5": "y", "1": "more", "3": "n", "/": "y"}),
+        (later, {"5": "n", "1": "more", "/": "y"}),
+    ):
+        for key, sent in answers.items():
+            assert Sitting().asked(fit, Question.YES_NO).keys(key).sent == [sent]
+        assert Sitting().asked(fit, Question.YES_NO).line("再触碰").sent == ["more"]
+        assert Sitting().asked(fit, Question.YES_NO).line("again").sent == ["y"]
+
+
 def test_the_first_touch_and_the_turn_test_are_not_begun_again():
     assert at_touch(number=1, arrival=None).keys("/").sent == []
     assert at_touch(proof=True).keys("/").sent == []
@@ -220,13 +265,75 @@ def test_a_reading_that_is_old_takes_no_touch():
     assert hand.state.message == "No reading from the controller for 2 s."
 
 
-NAMES = [*"0123456789+-*/nyqt", "main", "stop", "enter", "backspace"]
-WORDS = ["take", "done", "again", "y", "n", "1", "", "x+0.1", "z-2", "stop", "记录", "12"]
+@pytest.mark.parametrize(
+    ("done", "key", "effect"),
+    [
+        (True, "5", WizardCommand.LEAVE),
+        (True, "0", WizardCommand.LEAVE),
+        (True, "enter", None),
+        (False, "5", WizardCommand.BEGIN_AGAIN),
+        (False, "stop", WizardCommand.LEAVE),
+        (False, "enter", None),
+        (False, "6", None),
+    ],
+)
+def test_the_last_screen_is_left_by_its_keys_alone_and_not_by_one_that_is_held(done, key, effect):
+    hand = at_touch()
+    hand.happens(HasEnded(LastScreen(done, ("line",), (), hand.now)))
+    hand.now += 0.2
+    assert hand.keys(key).sent == []
+    hand.now += 0.2
+    assert hand.keys(key).sent == ([effect] if effect else [])
+    assert hand.state.begins_again is (effect is WizardCommand.BEGIN_AGAIN)
+
+
+def test_a_pose_is_typed_into_a_field_that_enter_only_closes():
+    hand = at_touch(types=True).keys(".").keys(*"250.1 199.9 -83.5 90")
+    assert hand.sent == []
+    assert hand.state.typing
+    hand.key("enter")
+    assert (hand.sent, hand.state.typing) == ([], False)
+    assert "Typed: 250.1 199.9 -83.5 90." in hand.state.message
+    assert hand.keys("5").sent == ["pose 250.1 199.9 -83.5 90"]
+    line = at_touch(types=True).line("pose 250.1 199.9 -83.5 90")
+    assert line.sent == []
+    assert line.line("take").sent == ["pose 250.1 199.9 -83.5 90"]
+
+
+def test_a_typed_pose_is_gone_after_a_step_and_where_none_is_taken():
+    hand = at_touch(types=True).line("pose 1 2 3 4").keys("6")
+    assert hand.jogs("x+0.1").keys("5").sent == ["x+0.1", "done"]
+    assert at_touch().keys(".").state.message == "Here no pose can be typed."
+    assert at_touch().line("pose 1 2 3 4").state.pose_typed == ""
+    three = at_touch(types=True).line("pose 1 2 3")
+    assert "Nothing was taken." in three.state.message
+    assert three.keys("5").sent == []
+    assert at_touch(types=True).keys(".").key("stop").sent == ["q"]
+
+
+NAMES = [*"0123456789+-*/nyqt. ", "main", "stop", "enter", "backspace"]
+WORDS = [
+    "take",
+    "done",
+    "again",
+    "y",
+    "n",
+    "1",
+    "",
+    "x+0.1",
+    "z-2",
+    "stop",
+    "记录",
+    "12",
+    "back",
+    "more",
+]
 SUBJECTS = [
     (touch_subject(), Question.PLACE),
     (touch_subject(arrival=None, number=1), Question.PLACE),
     (write_subject(1), Question.YES_NO),
-    (write_subject(3), Question.YES_NO),
+    (replace(write_subject(3), again=2, adds_touch=True), Question.YES_NO),
+    (touch_subject(retakes=True, types=True), Question.PLACE),
     (CHECK, Question.YES_NO),
     (fit_subject(0.1, 0.01, worst=0), Question.YES_NO),
     (None, Question.YES_NO),
@@ -243,7 +350,7 @@ HAPPENINGS = st.one_of(
 
 def check_history(history, first):
     """Nothing is taken unjogged and nothing written untyped, whatever comes in which order."""
-    hand, pose, moved, digits, lined = Sitting(), ARRIVAL, 0.0, "", ""
+    hand, pose, moved, digits, lined, posed = Sitting(), ARRIVAL, 0.0, "", "", False
     hand.asked(*SUBJECTS[first])
     for what, of in history:
         before = len(hand.sent)
@@ -253,10 +360,10 @@ def check_history(history, first):
             digits = "" if of == "backspace" else digits
             hand.key(of, of if len(of) == 1 else "")
         elif what == "line":
-            lined = of
+            lined, posed = of, posed or of.startswith("pose")
             hand.line(of)
         elif what == "ask":
-            pose, moved, digits, lined = ARRIVAL, 0.0, "", ""
+            pose, moved, digits, lined, posed = ARRIVAL, 0.0, "", "", False
             hand.asked(*SUBJECTS[of])
         elif what == "jogged":
             there = Pose(pose.x_mm, pose.y_mm, pose.z_mm - of, 90.0, tool=0)
@@ -274,6 +381,10 @@ def check_history(history, first):
         for text in hand.sent[before:]:
             if text == "done" and state.touch is not None and state.touch.arrival is not None:
                 assert moved > 0.0
+            if str(text).startswith("pose"):
+                assert state.touch is not None
+                assert state.touch.types
+                assert len(digits) >= 4 or posed
             if text == "y" and state.writing is not None:
                 number = str(state.writing.tools[0])
                 assert number in digits or lined == number

@@ -15,14 +15,16 @@ from prompt_toolkit.input import create_pipe_input
 from prompt_toolkit.output.vt100 import Vt100_Output
 from robolink_cli.wizard.faces.full import FullFace
 from robolink_cli.wizard.happenings import Reading
-from robolink_cli.wizard.state import WizardState
+from robolink_cli.wizard.state import Header, WizardState
 from robolink_cli.wizard.work import Work
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 
+from robolink.errors import DeclinedError
 from robolink.model import Pose
 from robolink.runner import JogSubject, Question
+from robolink.standing import Standing
 from tests.cli.wizard._people import ARRIVAL, HEADER, touch_subject, until, write_subject
 from tests.cli.wizard._screen import ScreenHand
 
@@ -37,8 +39,11 @@ class Drawn:
         self.source, self.done = source, None
         output = Vt100_Output(self.paper, lambda: Size(rows=24, columns=80), term="xterm")
         face = FullFace(source, output)
-        self.thread = threading.Thread(target=lambda: face.run(desk, WizardState(HEADER), work))
+        self.thread = threading.Thread(target=lambda: self.show(face, desk, work))
         self.thread.start()
+
+    def show(self, face, desk, work):
+        self.state = face.run(desk, WizardState(HEADER), work)
 
     @property
     def text(self):
@@ -103,6 +108,49 @@ def test_keys_of_a_pipe_jog_take_and_write():
             face.thread.join(5.0)
     assert work.error is None, work.error
     assert answers == ["z-0.1", "done", "y"]
+
+
+@pytest.mark.parametrize(("keys", "again"), [(("\r", "5"), True), (("\r", "0"), False)])
+def test_the_last_screen_stays_until_it_is_left_and_may_begin_again(keys, again):
+    from robolink_cli.wizard.desk import Desk
+
+    desk, seen = Desk(), []
+
+    def do():
+        desk.regard(Header("line3", "Change needle", command="robolink -c line3 change a.toml"))
+        desk.regard(touch_subject())
+        desk.ask("?", Question.PLACE)
+        while desk.poll(0.2) is None:
+            pass
+        error = DeclinedError("You stopped it.", remedy="Nothing was written.")
+        error.controller_state = Standing(moved=True, selected=1, selected_before=1)
+        raise error
+
+    with click.Context(click.Command("x")), create_pipe_input() as source:
+        work = Work(do)
+        face = Drawn(desk, work, source)
+        work.start()
+        until(lambda: "Touch 2 of 4" in face.text)
+        source.send_text("\x1b")
+        until(lambda: "Start again" in face.text)
+        source.send_text("0")  # still held down
+        time.sleep(0.4)
+        for key in keys:
+            seen.append(face.text)
+            source.send_text(key)
+            time.sleep(0.1)
+        face.thread.join(5.0)
+    assert len(seen) == 2
+    for said in (
+        "STOPPED",
+        "You stopped it.",
+        "It ended here: Touch 2 of 4.",
+        "Every movement has ended.",
+        "Tool 1 is selected",
+        "Next: robolink -c line3 change a.toml",
+    ):
+        assert said in seen[-1], seen[-1]
+    assert face.state.begins_again is again
 
 
 @pytest.fixture

@@ -1,20 +1,27 @@
 """Screens are compared with stored text, in two languages and one that is 40 % longer."""
 
 import unicodedata
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from robolink_cli.wizard.choices import ChoiceSubject
-from robolink_cli.wizard.happenings import Reading, WasRead, WasRegarded
+from robolink_cli.wizard.happenings import HasEnded, Reading, TaughtPoints, WasRead, WasRegarded
 from robolink_cli.wizard.screens.drawing import screen_of
+from robolink_cli.wizard.screens.ending import ended_of
 from robolink_cli.wizard.screens.told import told_before, told_question
+from robolink_cli.wizard.state import Header
 from wcwidth import wcswidth
 
 from robolink import messages
+from robolink.calibration import Drift, VerifyResult, impact_on
+from robolink.errors import DeclinedError
 from robolink.locale.languages import translator
 from robolink.model import Path as Way
-from robolink.model import Pose, WorkBox
+from robolink.model import Pose, ToolReceipt, WorkBox
+from robolink.nozzle_change import ChangeReport, ToolReport
 from robolink.runner import JogRange, MoveSubject, Question
+from robolink.standing import Standing, note_standing
 from tests.cli.wizard._people import (
     ARRIVAL,
     CHECK,
@@ -51,6 +58,39 @@ def choosing():
     return Sitting().asked(ChoiceSubject("Choose", (), rows), Question.TEXT, "Which cell?")
 
 
+def done():
+    """A needle that was written and proved."""
+    subject = write_subject(1)
+    (proposal,), (verdicts,) = subject.proposals, subject.verdicts
+    receipt = ToolReceipt(1, proposal.before, proposal.offset, proposal.offset)
+    proof = VerifyResult((Drift(90.0, 0.006, 0.004), Drift(0.0, 0.002, 0.001)), 0.1)
+    tool = ToolReport(proposal, receipt, proof, verdicts)
+    header = Header("line3", "Change needle", needle="N-0418")
+    return ended(header, report=ChangeReport("7f3a5c1200", (tool,)))
+
+
+def taught():
+    """What the proposal does at fifteen points."""
+    (proposal,) = write_subject(1).proposals
+    points: dict[int, Pose | None] = {n: Pose(20.0 * n, 200.0, -50.0, 0.0) for n in range(1, 16)}
+    assert proposal.before is not None
+    return impact_on(points, old=proposal.before, new=proposal.offset)
+
+
+def stopped():
+    error = DeclinedError("You stopped it.", remedy="Nothing was written.")
+    note_standing(error, Standing(moved=True, selected=1, selected_before=1))
+    command = "robolink -c line3 change needle-22g.toml"
+    return ended(Header("line3", "Change needle", command=command), error)
+
+
+def ended(header, error=None, report=None):
+    hand = Sitting().asked(touch_subject()).happens(WasRegarded(header))
+    if report is not None:
+        hand.happens(WasRegarded(report))
+    return hand.happens(HasEnded(ended_of(hand.state, error, hand.now)))
+
+
 def jogging():
     box = WorkBox.around(ARRIVAL, xy_mm=50.0, below_mm=50.0, above_mm=50.0)
     return (
@@ -70,10 +110,27 @@ SCREENS = {
         fit_subject(0.006, 0.004, 0.131, 0.007, worst=2), Question.YES_NO
     ),
     "values": lambda: Sitting().asked(write_subject(1), Question.YES_NO).keys("1"),
+    "values again": lambda: Sitting().asked(
+        replace(write_subject(1), again=3, adds_touch=True), Question.YES_NO
+    ),
+    "fit more": lambda: Sitting().asked(
+        replace(fit_subject(0.006, 0.004, 0.131, 0.007, worst=2), more=True), Question.YES_NO
+    ),
+    "touch again": lambda: Sitting().asked(touch_subject(number=3, retakes=True, types=True)),
+    "touch typed": lambda: (
+        Sitting().asked(touch_subject(types=True)).keys(".").keys(*"250.112 199.954")
+    ),
+    "values taught": lambda: (
+        Sitting()
+        .happens(WasRegarded(TaughtPoints(taught())))
+        .asked(replace(write_subject(1), stations={1: ("PIN-07",)}), Question.YES_NO)
+    ),
     "two tools": lambda: Sitting().asked(write_subject(1, 2), Question.YES_NO),
     "question": lambda: Sitting().asked(None, Question.YES_NO, "Is the valve shut?"),
     "text": lambda: Sitting().asked(None, Question.TEXT, "Id of the new needle?").keys(*"N-0418"),
     "working": Sitting,
+    "done": done,
+    "stopped": stopped,
 }
 
 

@@ -1,40 +1,120 @@
 """check-contract: whether a controller keeps what every kind of controller promises."""
 
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
 import click
 
-import robolink
-from robolink.messages import tr
-from robolink_cli.console.render import say, table
+from robolink.errors import ConfigError, DeclinedError
+from robolink.messages import declared, tr
+from robolink_cli.console.render import note, say, table
+from robolink_cli.options.consent import yes_option
 from robolink_cli.session.context import CliContext, controller_options, emit
-from robolink_cli.session.opening import password_of
 
-_BROKEN = 1
+if TYPE_CHECKING:
+    from robolink.model import Controller
+    from robolink.testing import CheckOutcome, Subject
+
+_BROKEN: Final = 1
 """As of a comparison that found a difference."""
+
+_SPEED_MM_S: Final = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """What is to be checked besides what can be read.
+
+    Attributes:
+        tool: The tool that may be written; ``None`` for none.
+        step_mm: How far the robot may go up; ``None`` for nowhere.
+        yes: Whether a person agreed beforehand.
+    """
+
+    tool: int | None
+    step_mm: float | None
+    yes: bool
+
+    @property
+    def changes(self) -> bool:
+        """Whether anything is written or moved."""
+        return self.tool is not None or self.step_mm is not None
 
 
 @click.command("check-contract")
+@click.option(
+    "--write",
+    "writes",
+    is_flag=True,
+    help=declared("Also hold it to the promises about writing: with --tool, and after a yes."),
+)
+@click.option(
+    "--tool",
+    type=click.IntRange(min=1),
+    metavar="NUMBER",
+    help=declared("The tool that --write may change; one that no program uses."),
+)
+@click.option(
+    "--move",
+    "moves",
+    is_flag=True,
+    help=declared("Also hold it to the promises about movement: small steps up, after a yes."),
+)
+@click.option(
+    "--step",
+    "step_mm",
+    type=click.FloatRange(min=0.2, max=5),
+    default=1.0,
+    show_default=True,
+    metavar="MM",
+    help=declared("How far --move goes up, and down again."),
+)
+@click.option(
+    "--driver",
+    metavar="MODULE:NAME",
+    help=declared("Check a driver of your own: what this is called for gives a controller."),
+)
+@click.option(
+    "--junit",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help=declared("Also write the findings as JUnit XML, for pipelines."),
+)
 @controller_options
-def check_contract(context: CliContext) -> int:
-    """Hold a controller to what every kind of controller promises, reading only.
+@yes_option
+def check_contract(
+    context: CliContext,
+    writes: bool,
+    tool: int | None,
+    moves: bool,
+    step_mm: float,
+    driver: str | None,
+    junit: Path | None,
+    yes: bool,
+) -> int:
+    """Hold a controller to what every kind of controller promises; without more, reading only.
 
-    For a cell of your own, and for a driver of your own. Nothing is written and nothing moves;
-    tests of yours hold a driver to the rest, with robolink.testing. Ends with 1 where a promise
-    is broken; what a controller refuses to show in its present state is an error, as elsewhere.
+    With --write it writes one tool several times, selects it and the flange, stops and resets;
+    with --move it goes up and down in small steps. Tool, selection, power and speed come back, and
+    stand on record until they are back: 'robolink recover' does it where this is killed. Ends
+    with 1 where a promise is broken; what a controller refuses to show in its present state is an
+    error, as elsewhere.
     """
-    from robolink.testing import READING_CHECKS, Subject, outcomes
-
-    url, password = context.require_url(), password_of(context)
-
-    def connected() -> robolink.Controller:
-        return robolink.connect(url, password=password, timeout_s=context.timeout_s)
-
-    with connected() as controller:
-        subject = Subject(connected, tool=min(controller.tools.indices()))
-        identity = controller.outcomes.identity
-    found = list(outcomes(subject, READING_CHECKS))
+    if (writes and tool is None) or (tool is not None and not writes):
+        raise click.UsageError(tr("--write and --tool go together: say which tool may change."))
+    asked = _Asked(tool, step_mm if moves else None, yes)
+    if driver is not None:
+        identity, found = _of_a_driver(driver, asked)
+    else:
+        identity, found = _of_a_cell(context, asked)
     for one in found:
         if one.error is not None:
             raise one.error
+    if junit is not None:
+        _write_junit(junit, identity, found)
     broken = [one for one in found if one.broken]
 
     def show() -> None:
@@ -46,7 +126,7 @@ def check_contract(context: CliContext) -> int:
         say(
             tr("{count} of {all} promises are broken.", count=len(broken), all=len(found))
             if broken
-            else tr("All {all} promises that can be looked at are kept.", all=len(found))
+            else tr("All {all} promises that were looked at are kept.", all=len(found))
         )
 
     checks = [
@@ -55,3 +135,130 @@ def check_contract(context: CliContext) -> int:
     payload: dict[str, object] = {"controller": identity, "kept": not broken, "checks": checks}
     emit("contract", payload, show)
     return _BROKEN if broken else 0
+
+
+def _of_a_cell(context: CliContext, asked: _Asked) -> "tuple[str, list[CheckOutcome]]":
+    """Check a controller of a cell; what was there stands on its record meanwhile."""
+    from robolink.testing import Subject, kept_on_site
+    from robolink_cli.commands.controller.contract_trials import TrialConnections
+    from robolink_cli.session.opening import open_controller
+
+    trials = TrialConnections(context)
+    with ExitStack() as stack:
+        if asked.changes:
+            stack.enter_context(
+                kept_on_site(
+                    lambda: open_controller(context, quiet=True, changes=True),
+                    tr("checks of the contract"),
+                    tool=asked.tool,
+                    agree=lambda controller: _agree(controller, asked),
+                )
+            )
+        stack.callback(trials.close)
+        identity, tool, able = _looked_at(trials.connect, asked)
+        subject = Subject(trials.connect, tool=tool, step_mm=asked.step_mm or 1.0)
+        return identity, _found(subject, asked, able)
+
+
+def _of_a_driver(name: str, asked: _Asked) -> "tuple[str, list[CheckOutcome]]":
+    """Check what somebody's own function gives; only the checks put back what they change."""
+    from robolink.testing import Subject
+    from robolink_cli.commands.controller.contract_trials import driver_named
+
+    made = driver_named(name)
+    if asked.changes:
+        with made() as controller:
+            _agree(controller, asked)
+    identity, tool, able = _looked_at(made, asked)
+    subject = Subject(made, tool=tool, step_mm=asked.step_mm or 1.0)
+    return identity, _found(subject, asked, able)
+
+
+def _looked_at(connect: "Callable[[], Controller]", asked: _Asked) -> tuple[str, int, Any]:
+    """Return who it is, which tool is looked at, and what it is able to do.
+
+    Raises:
+        ConfigError: It cannot do what was asked for.
+    """
+    with connect() as controller:
+        able, tool = controller.capabilities, asked.tool or min(controller.tools.indices())
+        for wanted, can in ((asked.tool, able.tool_write), (asked.step_mm, able.motion)):
+            if wanted is not None and not can:
+                raise ConfigError(
+                    tr("This controller cannot be held to that: it is not able to do it."),
+                    remedy=tr("Leave --write or --move out."),
+                )
+        return controller.outcomes.identity, tool, able
+
+
+def _found(subject: "Subject", asked: _Asked, _able: object) -> "list[CheckOutcome]":
+    """Make the checks that were asked for, and tell of each on the way."""
+    from robolink.testing import MOVING_CHECKS, READING_CHECKS, WRITING_CHECKS, outcomes
+
+    checks: Sequence[Any] = READING_CHECKS
+    if asked.tool is not None:
+        checks = (*checks, *WRITING_CHECKS)
+    if asked.step_mm is not None:
+        checks = (*checks, *MOVING_CHECKS)
+    found = []
+    for one in outcomes(subject, checks):
+        found.append(one)
+        if asked.changes:
+            note(f"{one.name.replace('_', ' ')}: {one.broken or tr('kept')}")
+        if one.error is not None:
+            break  # a stop, a link that is gone, a state that refuses: nothing more is begun
+    return found
+
+
+def _agree(controller: "Controller", asked: _Asked) -> None:
+    """Have a person say yes to what will be written and moved.
+
+    Raises:
+        DeclinedError: No, or nobody could be asked.
+        NotReadyError: Nothing can move now.
+    """
+    from robolink_cli.prompts import questions
+    from robolink_cli.session.motion_consent import agree_to_motion, motion_question
+
+    said = []
+    if asked.step_mm is not None:
+        purpose, box_mm = tr("for the checks"), 2 * asked.step_mm
+        said.append(motion_question(controller, purpose, speed_mm_s=_SPEED_MM_S, box_mm=box_mm))
+    if asked.tool is not None:
+        said.append(tr("Tool {tool} is written several times and selected.", tool=asked.tool))
+    said.append(
+        tr(
+            "The controller is stopped and reset, which can switch outputs off: a part may drop. "
+            "What was there comes back. Go on?"
+        )
+    )
+    if asked.step_mm is not None:
+        agree_to_motion(" ".join(said), yes=asked.yes)
+    elif not asked.yes:
+        if not questions.on_terminal():
+            raise DeclinedError(
+                tr("A tool would be written for the checks, but there is nobody to ask."),
+                remedy=tr("Add --yes when nobody uses the controller, or run it on a terminal."),
+            )
+        questions.require_yes(" ".join(said))
+
+
+def _write_junit(path: Path, identity: str, found: "Sequence[CheckOutcome]") -> None:
+    """Write the findings as pipelines read them: one case a promise."""
+    from xml.etree import ElementTree as Xml
+
+    broken = sum(bool(one.broken) for one in found)
+    counts = {"tests": str(len(found)), "failures": str(broken), "errors": "0"}
+    suite = Xml.Element("testsuite", name=f"contract of {identity}", **counts)
+    for one in found:
+        case = Xml.SubElement(suite, "testcase", classname="robolink.contract", name=one.name)
+        if one.broken:
+            Xml.SubElement(case, "failure", message=one.broken).text = one.promise
+    Xml.indent(suite)
+    try:
+        path.write_bytes(Xml.tostring(suite, encoding="utf-8", xml_declaration=True))
+    except OSError as error:
+        raise ConfigError(
+            tr("{path} cannot be written: {cause}.", path=path, cause=error.strerror or error),
+            remedy=tr("Name another file."),
+        ) from error

@@ -9,6 +9,7 @@ from robolink.messages import declared, tr
 from robolink_cli.options.consent import dry_run_option, plain_option, yes_option
 from robolink_cli.options.recipe_answers import answer_options
 from robolink_cli.options.sensor import sensor_option
+from robolink_cli.options.shared import TYPED
 from robolink_cli.session.completing import complete_recipe
 from robolink_cli.session.context import CliContext, optional_controller
 from robolink_cli.session.operator_identity import nozzle_options
@@ -122,6 +123,7 @@ def _chosen(context: CliContext, recipe: Path | None) -> "tuple[CliContext, Load
     from robolink.recipe import load_recipe
     from robolink_cli.commands.measure.choosing import choose_recipe, context_at_desk
     from robolink_cli.prompts.present import present_desk
+    from robolink_cli.session.guidance import header_of
 
     named = None if recipe is None else load_recipe(recipe)
     at = context_at_desk(context, tr("Change needle"))
@@ -129,4 +131,14 @@ def _chosen(context: CliContext, recipe: Path | None) -> "tuple[CliContext, Load
         return at, named
     desk = present_desk()
     assert desk is not None  # noqa: S101 - looked at by whoever calls
-    return at, choose_recipe(desk, at.cell)
+    loaded = choose_recipe(desk, at.cell)
+    desk.regard(header_of(at, tr("Change needle"), *_as_typed(loaded.path)))
+    return at, loaded
+
+
+def _as_typed(path: Path) -> tuple[str, ...]:
+    """Return what is typed for a recipe that was chosen, as short as it goes."""
+    typed = click.get_current_context().meta.get(TYPED, ())
+    here = Path.cwd()
+    shown = path.relative_to(here) if path.is_relative_to(here) else path
+    return (str(shown),) if {"change", "recalibrate"} & set(typed) else ("change", str(shown))

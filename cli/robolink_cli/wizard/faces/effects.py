@@ -12,3 +12,8 @@ def carry_out(desk: Desk, effects: list[Effect]) -> None:
             desk.answer(effect)
         elif effect is WizardCommand.END_WORK:
             end(EndedBy.CTRL_C)
+
+
+def leaves(effects: list[Effect]) -> bool:
+    """Tell whether the last screen is left, to end or to begin again."""
+    return any(one in (WizardCommand.LEAVE, WizardCommand.BEGIN_AGAIN) for one in effects)

@@ -19,12 +19,13 @@ from prompt_toolkit.output import Output, create_output
 
 from robolink_cli.console.output import visible
 from robolink_cli.wizard.desk import Desk
-from robolink_cli.wizard.faces.effects import carry_out
+from robolink_cli.wizard.faces.effects import carry_out, leaves
 from robolink_cli.wizard.faces.lines import LineFace
 from robolink_cli.wizard.flow import advance, stops_at_once
-from robolink_cli.wizard.happenings import Happening, KeyPressed, TooFast
+from robolink_cli.wizard.happenings import Happening, HasEnded, KeyPressed, TooFast
 from robolink_cli.wizard.key_gate import KeyGate, name_of
 from robolink_cli.wizard.screens.drawing import screen_of
+from robolink_cli.wizard.screens.ending import ended_of
 from robolink_cli.wizard.screens.layout import HEIGHT, WIDTH
 from robolink_cli.wizard.state import WizardState
 
@@ -49,10 +50,12 @@ class FullFace:
         self._output = create_output(stdout=sys.stderr) if output is None else output
         self._gate = KeyGate()
         self._painted_s = 0.0
+        self._left = False
 
     def run(self, desk: Desk, state: WizardState, work: "Work[Any]") -> WizardState:
         """Show it until the work has ended; return the last state."""
         self._desk, self._state, self._work = desk, state, work
+        self._left = False
         application: Application[bool] = Application(
             layout=Layout(Window(FormattedTextControl(self._text, show_cursor=False))),
             key_bindings=self._bindings(),
@@ -84,10 +87,21 @@ class FullFace:
                 self._painted_s = now_s
                 application.invalidate()
             size = self._output.get_size()
-            if ended or size.columns < WIDTH or size.rows < HEIGHT:
+            narrow = size.columns < WIDTH or size.rows < HEIGHT
+            if narrow or (ended and not self._shows_the_end()):
                 application.exit(result=not ended)
                 return
             await asyncio.sleep(_TURN_S)
+
+    def _shows_the_end(self) -> bool:
+        """Show how the work ended, where there is a screen for it, until it is left."""
+        if self._state.ended is None:
+            ended = ended_of(self._state, self._work.error, time.monotonic())
+            if ended is None:
+                return False
+            self._happens(HasEnded(ended))
+            self._painted_s = 0.0
+        return not self._left
 
     def _bindings(self) -> KeyBindings:
         bindings = KeyBindings()
@@ -125,6 +139,7 @@ class FullFace:
     def _happens(self, happening: Happening) -> None:
         self._state, effects = advance(self._state, happening)
         carry_out(self._desk, effects)
+        self._left |= leaves(effects)
 
     def _text(self) -> str:
         rows = screen_of(self._state, time.monotonic()).rows()

@@ -7,6 +7,7 @@ from robolink_cli.wizard.check_list import CheckSubject
 from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.screens.checking import check_screen
 from robolink_cli.wizard.screens.choosing import choice_screen
+from robolink_cli.wizard.screens.ending import ended_screen
 from robolink_cli.wizard.screens.fitting import fit_screen
 from robolink_cli.wizard.screens.layout import BODY, Screen, broken
 from robolink_cli.wizard.screens.moving import moving_screen
@@ -24,6 +25,8 @@ def screen_of(state: WizardState, now_s: float) -> Screen:
         now_s: The time, by the clock of its readings.
     """
     subject, question = state.subject, state.question
+    if state.ended is not None:
+        return ended_screen(state, state.ended)
     if question is None:
         return moving_screen(state, now_s)
     if state.at_place:

@@ -1,18 +1,22 @@
-"""Screens (h) and (i) as lines: what stands at the end, printed where it stays."""
+"""Screens (h) and (i): what stands at the end, shown as the last screen and kept as lines."""
 
+from robolink.errors import DeclinedError, RobolinkError
 from robolink.messages import tr
-from robolink.model import describe_offset
+from robolink.model import describe_offset, describe_standing
 from robolink.nozzle_change import ChangeReport, ToolReport
-from robolink_cli.wizard.screens.rows import mm
+from robolink.standing import UNTOUCHED, standing_after
+from robolink_cli.wizard.check_list import CheckSubject
+from robolink_cli.wizard.choices import ChoiceSubject
+from robolink_cli.wizard.screens.layout import Screen
+from robolink_cli.wizard.screens.rows import mm, title_row
 from robolink_cli.wizard.screens.touching import touch_title
-from robolink_cli.wizard.state import WizardState
+from robolink_cli.wizard.state import LastScreen, WizardState
 
 
 def done_lines(state: WizardState, report: ChangeReport) -> list[str]:
     """Return what was reached."""
-    ended = tr("DONE")
-    head = f"{state.header.cell}   {state.header.job}   {ended}"
-    lines = [head, *(line for one in report.tools for line in _tool_lines(one))]
+    needle = state.header.needle
+    lines = [line for one in report.tools for line in _tool_lines(one, needle)]
     lines.append(tr("Record: change {id} in the journal", id=report.change[:8]))
     if any(one.receipt is not None for one in report.tools):
         back = tr(
@@ -25,12 +29,16 @@ def done_lines(state: WizardState, report: ChangeReport) -> list[str]:
     return lines
 
 
-def _tool_lines(report: ToolReport) -> list[str]:
+def _tool_lines(report: ToolReport, needle: str) -> list[str]:
     proposal, proof = report.proposal, report.verification
     if report.receipt is None:
         return [tr("Tool {t} is measured. Nothing was written.", t=proposal.tool)]
     value = describe_offset(proposal.offset)
-    if proof is None:
+    if proof is not None and needle:
+        said = tr(
+            "Needle {id} on tool {t} is measured, written and tested.", id=needle, t=proposal.tool
+        )
+    elif proof is None:
         said = tr("Tool {t} is measured and written, not tested.", t=proposal.tool)
     else:
         said = tr("Tool {t} is measured, written and tested.", t=proposal.tool)
@@ -46,11 +54,69 @@ def _tool_lines(report: ToolReport) -> list[str]:
     return lines
 
 
-def stopped_lines(state: WizardState) -> list[str]:
-    """Return where it ended early; why, and what stands, says how every command ends."""
-    ended = tr("STOPPED")
-    head = f"{state.header.cell}   {state.header.job}   {ended}"
+def ended_of(state: WizardState, error: BaseException | None, at_s: float) -> LastScreen | None:
+    """Return the last screen; ``None`` for an end that is told by lines alone.
+
+    Args:
+        state: The last one.
+        error: What ended the work, ``None`` where it was carried out.
+        at_s: When.
+    """
+    if error is None:
+        if state.report is None:
+            return None
+        lines = done_lines(state, state.report)
+        return LastScreen(True, tuple(lines), (_head(state, tr("DONE")), *lines), at_s)
+    begun = state.subject is not None
+    left = isinstance(error, DeclinedError) and isinstance(
+        state.subject, (ChoiceSubject, CheckSubject)
+    )
+    if not begun or left or state.free_jog is not None or not isinstance(error, RobolinkError):
+        return None
+    kept = (_head(state, tr("STOPPED")), *_where(state), *_next(state, error))
+    return LastScreen(False, tuple(stopped_lines(state, error)), kept, at_s)
+
+
+def stopped_lines(state: WizardState, error: RobolinkError) -> list[str]:
+    """Return why it ended, where, what stands on the controller, and the one command to go on."""
+    said = [one for one in (error.what, error.remedy) if one]
+    standing = standing_after(error)
+    if standing is not UNTOUCHED:
+        said.append(describe_standing(standing))
+    return [*_where(state), *said, "", *_next(state, error)]
+
+
+def kept_lines(state: WizardState, error: BaseException | None) -> list[str]:
+    """Return what stays on the terminal when no last screen was shown."""
+    if error is None:
+        return []
+    return [_head(state, tr("STOPPED")), *_where(state)] if state.subject is not None else []
+
+
+def ended_screen(state: WizardState, ended: LastScreen) -> Screen:
+    """Return the last screen."""
+    if ended.done:
+        keys: tuple[tuple[str, str], ...] = (("5", tr("Finish")),)
+    else:
+        keys = (("5", tr("Start again")), ("0", tr("Leave")))
+    return Screen(title_row(state, tr("DONE") if ended.done else tr("STOPPED")), ended.lines, keys)
+
+
+def _head(state: WizardState, ended: str) -> str:
+    return f"{state.header.cell}   {state.header.job}   {ended}"
+
+
+def _where(state: WizardState) -> list[str]:
     touch = state.touch
     if touch is None or not touch.number:
-        return [head]
-    return [head, tr("It ended here: {touch}.", touch=touch_title(touch))]
+        return []
+    return [tr("It ended here: {touch}.", touch=touch_title(touch))]
+
+
+def _next(state: WizardState, error: RobolinkError) -> list[str]:
+    """Return the one command to go on with, where it is known."""
+    if standing_after(error).left_open:
+        command = f'robolink -c "{state.header.cell}" recover'
+    else:
+        command = state.header.command
+    return [tr("Next: {command}", command=command)] if command else []

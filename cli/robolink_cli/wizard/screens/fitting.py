@@ -20,7 +20,11 @@ def fit_screen(state: WizardState, fit: FitSubject) -> Screen:
     again = worst_first(fit)
     worst = fit.rows[fit.worst].number if fit.worst is not None else 0
     retake, show = tr("Touch {k} again", k=worst), tr("Show the result")
-    keys = (("5", retake), ("3", show)) if again else (("5", show), ("1", retake))
+    more = (("1", tr("One more touch")),) if fit.more else ()
+    if again:
+        keys = (("5", retake), *more, ("3", show))
+    else:
+        keys = (("5", show), *more, ("/" if more else "1", retake))
     return Screen(
         title_row(state, tr("How well it fits")),
         ("", *fit_lines(fit)),

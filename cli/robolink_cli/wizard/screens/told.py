@@ -2,7 +2,7 @@
 
 import math
 
-from robolink.messages import tr
+from robolink.messages import joined, tr
 from robolink.nozzle_change import WriteSubject
 from robolink.runner import FitSubject, Question
 from robolink_cli.wizard.check_list import CheckSubject
@@ -46,10 +46,20 @@ def told_question(state: WizardState) -> str:
         return tr("{question} [Type or scan it, then Enter. To end: stop.]", question=question.text)
     if isinstance(subject, WriteSubject):
         numbers = ", ".join(map(str, subject.tools))
-        return tr("To write, type the tool number ({numbers}). n = do not write.", numbers=numbers)
+        write = tr("To write, type the tool number ({numbers}). n = do not write.", numbers=numbers)
+        return joined(" ", (write, *_further(subject)))
     if isinstance(subject, CheckSubject):
         return tr("Type the number of a point, then y to start; n = leave.")
+    if isinstance(subject, FitSubject) and subject.more:
+        return tr("{question} [y, n, or more for one more touch]", question=question.text)
     return tr("{question} [y or n]", question=question.text)
+
+
+def _further(subject: WriteSubject) -> list[str]:
+    if subject.again is None:
+        return []
+    told = [tr("again = touch {k} again.", k=subject.again)]
+    return [*told, tr("more = one more touch.")] if subject.adds_touch else told
 
 
 def _place(state: WizardState) -> str:

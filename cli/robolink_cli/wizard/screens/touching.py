@@ -17,7 +17,7 @@ def touch_screen(state: WizardState, now_s: float) -> Screen:
     """Return the screen on which a person jogs the tip to a place."""
     touch = state.touch
     lines = [*_what(state, touch), "", *_where(state), *_since(state), *_contact(touch)]
-    lines += [*_range(state.free_jog), "", *_keypad(state)]
+    lines += [*_range(state.free_jog), "", *_keypad(state), *_typing(state)]
     return Screen(
         title_row(state, touch_title(touch)),
         tuple(lines),
@@ -120,6 +120,15 @@ def _keypad(state: WizardState) -> list[str]:
     ]
 
 
+def _typing(state: WizardState) -> list[str]:
+    """Return the field of a typed pose, where one can be typed."""
+    if state.typing:
+        return ["", tr("Pose X Y Z U: {typed}_   Enter closes the field.", typed=state.typed)]
+    if state.touch is None or not state.touch.types:
+        return []
+    return ["", tr("[.] Type the pose, if an instrument fails")]
+
+
 def _turned(names: tuple[str, ...], quarters: int) -> tuple[str, ...]:
     """Return the names of the axes that the arrows right, up, left and down move along."""
     return tuple(names[(index + quarters) % 4] for index in range(4))
@@ -138,4 +147,6 @@ def _actions(state: WizardState) -> tuple[tuple[str, str], ...]:
     take, stop = ("5", tr("Record this touch")), ("0", tr("STOP"))
     if touch.number < 2:
         return take, stop
-    return take, ("/", tr("Begin at touch 1 again")), stop
+    if not touch.retakes:
+        return take, ("/", tr("Begin at touch 1 again")), stop
+    return take, ("/", tr("Touch {k} again", k=touch.number - 1)), stop

@@ -1,0 +1,32 @@
+"""What ends a step, or the whole: the controller's state, and an input that switched too early."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from robolink.errors import CalibrationError, NotReadyError, NotReadyReason
+from robolink.messages import tr
+from robolink.model import ControllerStatus
+
+
+def ended_by(status: ControllerStatus) -> str:
+    """Return why a controller goes on with nothing, empty where it does."""
+    if status.serious_fault:
+        return tr("The controller reported a serious error.")
+    if status.emergency_stop:
+        return tr("The emergency stop was pressed.")
+    if status.guard_open:
+        return tr("The safety guard was opened.")
+    if status.fault:
+        return tr("The controller went into error {code:04d}.", code=status.code)
+    return ""
+
+
+@contextmanager
+def as_measurement() -> Iterator[None]:
+    """Let an input that has switched too early count as a bad measurement."""
+    try:
+        yield
+    except NotReadyError as error:
+        if error.reason is not NotReadyReason.EDGE_PASSED:
+            raise
+        raise CalibrationError("edge_passed", error.what, remedy=error.remedy) from error

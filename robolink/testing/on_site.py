@@ -1,0 +1,152 @@
+"""The checks that write or move, on a controller that works: what was there comes back.
+
+The checks connect anew, stop and are interrupted on purpose, and a process may be killed among
+them. So before the first of them a durable change and a durable selection stand in the record of
+the controller, as those of any change of a tool and of any procedure (docs/reference/rules.md 4
+and 6); after the last one both are settled by reading, and put back where that is needed. Whatever
+ends the process in between, ``robolink recover`` finds the two and does the same.
+"""
+
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+
+from robolink.errors import ConfigError, OutcomeUnknownError, RobolinkError
+from robolink.messages import joined, tr
+from robolink.model import (
+    Controller,
+    EntryKind,
+    Marker,
+    MarkerKind,
+    NewEntry,
+    ToolOffset,
+    new_operation,
+    plain_offset,
+)
+from robolink.testing.tool_checks import another_offset
+
+Connect = Callable[[], AbstractContextManager[Controller]]
+"""Connects to the controller, with its own record."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Kept:
+    """What comes back.
+
+    Attributes:
+        change: Marker of the tool that is written; ``None`` where none is.
+        selection: Marker of tool, power and speed in force; ``None`` where the kind tells of none.
+        before: What the tool holds.
+        selected: The tool in force.
+    """
+
+    change: Marker | None
+    selection: Marker | None
+    before: ToolOffset | None
+    selected: int | None
+
+
+@contextmanager
+def kept_on_site(
+    connect: Connect, reason: str, *, tool: int | None, agree: Callable[[Controller], None]
+) -> Iterator[None]:
+    """Surround checks by a record of what was there, and put that back at their end.
+
+    Args:
+        connect: Connects to the controller, with its own record; once before the block and once
+            after it. Nobody else may be connected in between but the block itself.
+        reason: What is done, as a person may read it in the record.
+        tool: The tool that the checks write; ``None`` where they write none.
+        agree: Asks the person, while the controller is connected and nothing is begun.
+
+    Raises:
+        ConfigError: The tool is the selected one, or is not there.
+        OutcomeUnknownError: Something earlier is unsettled; or it could not be put back, and
+            stays open for ``recover``.
+    """
+    with connect() as controller:
+        controller.require_settled(reason)
+        if tool is not None:
+            _require_spare(controller, tool)
+        agree(controller)
+        kept = _put_on_record(controller, reason, tool)
+    try:
+        yield
+    finally:
+        _put_back(connect, kept, tool)
+
+
+def _require_spare(controller: Controller, tool: int) -> None:
+    controller.tools.require_writable(tool)
+    if controller.tools.selected() == tool:
+        raise ConfigError(
+            tr("Tool {tool} is selected: the checks would write over it.", tool=tool),
+            remedy=tr("Name a tool that no program uses."),
+        )
+
+
+def _put_on_record(controller: Controller, reason: str, tool: int | None) -> _Kept:
+    # What kind it is decides what is put back besides the tool in force: it says so itself.
+    with controller.preserved(reason):
+        found = [it for it in controller.outcomes.open_markers() if it.kind is MarkerKind.SELECTION]
+        before = None if tool is None else controller.tools.read(tool)
+        selected = controller.tools.selected()
+    change = selection = None
+    with controller.uninterrupted():
+        if tool is not None:
+            details: dict[str, object] = {
+                "tools": {
+                    str(tool): {
+                        "before": plain_offset(before),
+                        "requested": plain_offset(another_offset(before)),
+                    }
+                },
+                "verify": True,
+                "change": new_operation(),
+            }
+            if selected is not None:
+                details["selected"] = selected
+            change = controller.begin(MarkerKind.CHANGE, reason, details)
+        if found:
+            selection = controller.begin(MarkerKind.SELECTION, reason, found[0].details)
+    return _Kept(change, selection, before, selected)
+
+
+def _put_back(connect: Connect, kept: _Kept, tool: int | None) -> None:
+    try:
+        with connect() as controller, controller.uninterrupted():
+            controller.release_stop()
+            if kept.change is not None and tool is not None:
+                _restore_tool(controller, kept, tool)
+            if kept.selection is not None:
+                controller.resolver.settle(controller.resolver.examine(kept.selection))
+    except RobolinkError as error:
+        raise OutcomeUnknownError(
+            joined(" ", (tr("What the checks found was not put back:"), error.what)),
+            remedy=tr("Do not start the cell. Next: 'robolink recover'."),
+            controller=error.controller,
+        ) from error
+
+
+def _restore_tool(controller: Controller, kept: _Kept, tool: int) -> None:
+    """Give the tool back what it held; a check may have left any value of its own there."""
+    marker = kept.change
+    assert marker is not None  # noqa: S101 - asked for by the caller
+    tools = controller.tools
+    mine = controller.begin(marker.kind, marker.request, marker.details, operation=marker.operation)
+    now = tools.read(tool)
+    written = not tools.same(now, kept.before)
+    if written and kept.before is None:
+        tools.clear(tool, expected=now, then_select=kept.selected or 0)
+    elif written and kept.before is not None:
+        tools.write(tool, kept.before, expected=now)
+    controller.finish(
+        mine,
+        NewEntry(
+            EntryKind.ROLLED_BACK if written else EntryKind.NOT_APPLIED,
+            operation=mine.operation,
+            tool=tool,
+            verdict=tr("checked against the contract; it holds what it held before"),
+            details={**mine.details, "value": plain_offset(kept.before)},
+        ),
+    )

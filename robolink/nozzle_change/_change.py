@@ -39,7 +39,12 @@ from robolink.nozzle_change._proposal import (
     WriteSubject,
 )
 from robolink.nozzle_change._records import decision_entry, refusal_entry, verification_entry
-from robolink.nozzle_change._station_check import Proposals, check_stations, stations_found
+from robolink.nozzle_change._station_check import (
+    Proposals,
+    check_stations,
+    found_with,
+    stations_found,
+)
 from robolink.procedures import TOUCH_CODES, MeasurementContext
 from robolink.runner import Operator, regard
 from robolink.transaction import Order, ToolChange, Wanted, plain_result
@@ -230,6 +235,7 @@ class NozzleChange:
             verdicts,
             again=None if offer is None else offer.worst + 1,
             adds_touch=offer is not None and offer.adds,
+            stations=found_with(self._controller, [one.tool for one in shown]),
         )
         regard(self._operator, [subject])
         question = tr(

@@ -110,12 +110,14 @@ class WriteSubject:
         again: Number of the touch that can be made again from here, the one that fits worst, or
             the last where nothing tells; ``None`` where none can.
         adds_touch: Whether one more can be made.
+        stations: Names of the stations that were found with each tool, by its number.
     """
 
     proposals: tuple[Proposal, ...]
     verdicts: tuple[tuple[LimitVerdict, ...], ...]
     again: int | None = None
     adds_touch: bool = False
+    stations: Mapping[int, tuple[str, ...]] = field(default_factory=dict)
 
     @property
     def tools(self) -> tuple[int, ...]:

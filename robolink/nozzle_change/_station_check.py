@@ -191,3 +191,12 @@ def _sentence(station: str, shift: StationShift) -> str:
         limit=shift.chi_square_limit,
     )
     return f"{said} {sure}."
+
+
+def found_with(controller: Controller, tools: Sequence[int]) -> dict[int, tuple[str, ...]]:
+    """Return the names of the stations on record that were found with each of some tools."""
+    entries = list(controller.outcomes.recorded(kinds=(EntryKind.STATION,)))
+    found = find_stations(None, entries).values()
+    finders = {entry.number: entry.tool for entry in entries}
+    by = {one.id: finders.get(one.entry) for one in found if one.entry is not None}
+    return {tool: tuple(sorted(name for name, of in by.items() if of == tool)) for tool in tools}

@@ -22,6 +22,8 @@ class Answers:
         lot: Its lot.
         texts: Answers to other questions, by the number of the prompt in the recipe, from 1.
         z_mm: Z of the new tips, by tool, for z = "typed".
+        early: Ids that a person was asked for before anything moved, by the number of the prompt
+            and the tool that it is asked for; ``None`` for one of the whole change.
     """
 
     yes: bool = False
@@ -29,9 +31,12 @@ class Answers:
     lot: str = ""
     texts: Mapping[int, str] = field(default_factory=dict)
     z_mm: Mapping[int, float] = field(default_factory=dict)
+    early: Mapping[tuple[int, int | None], str] = field(default_factory=dict)
 
-    def prepared(self, number: int, prompt: Prompt) -> str | None:
+    def prepared(self, number: int, prompt: Prompt, tool: int | None = None) -> str | None:
         """Return the answer that was given beforehand, ``None`` when there is none."""
+        if (number, tool) in self.early:
+            return self.early[number, tool]
         if prompt.answer == "yes":
             return "yes" if self.yes else None
         if prompt.answer == "nozzle":
@@ -39,6 +44,18 @@ class Answers:
         if prompt.answer == "lot":
             return self.lot or None
         return self.texts.get(number)
+
+    def ids_wanted(self, recipe: Recipe) -> Iterator[tuple[int, Prompt, int | None]]:
+        """Yield the prompts for ids that nobody has answered, with the tool each is asked for."""
+        for number, prompt in enumerate(recipe.prompts, start=1):
+            if prompt.answer not in ("nozzle", "lot"):
+                continue
+            tools: list[int | None] = [None]
+            if prompt.at == "before_measure":
+                tools = [one.number for one in recipe.tools if prompt.tool in (None, one.number)]
+            for tool in tools:
+                if self.prepared(number, prompt, tool) is None:
+                    yield number, prompt, tool
 
     def missing(self, recipe: Recipe) -> Iterator[str]:
         """Yield what nobody answered beforehand, as what would."""

@@ -144,7 +144,7 @@ class RecipeListener(Listener):
     def _ask(
         self, context: MeasurementContext, number: int, prompt: Prompt, tool: int | None
     ) -> None:
-        answer = self._answers.prepared(number, prompt)
+        answer = self._answers.prepared(number, prompt, tool)
         given = answer is not None
         if answer is None:
             answer = ask_prompt(context, prompt)

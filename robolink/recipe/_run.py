@@ -1,5 +1,6 @@
 """One run of a recipe: preflight, then the nozzle change with all that the recipe adds."""
 
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -150,6 +151,21 @@ class RecipeRun:
             )
         require_ready(controller, self.plan)
         require_inside(controller, preview(controller, self.plan))
+
+    def ask_ids(self, ask: Callable[[str], str]) -> Iterator[str]:
+        """Have the ids of nozzles and lots asked before anything moves; yield each.
+
+        Args:
+            ask: Puts a question to the person and returns what was typed.
+        """
+        for number, prompt, tool in list(self._answers.ids_wanted(self._loaded.recipe)):
+            named = len(self._loaded.recipe.tools) > 1 and tool is not None
+            text = tr("Tool {tool}: {question}", tool=tool, question=prompt.text)
+            answer = ask(text if named else prompt.text)
+            early = {**self._answers.early, (number, tool): answer}
+            self._answers = replace(self._answers, early=early)
+            if prompt.answer == "nozzle":
+                yield answer
 
     def run(self) -> ChangeReport:
         """Carry it out, after :meth:`preflight`.

@@ -147,7 +147,8 @@ def carrying_out(controller: Controller, order: str, job: Mapping[str, object]) 
         ConfigError: The id is none, or the order is not to be carried out again: it was another
             job, or what it did was taken back, or closed on a person's word.
         ToolChangedError: A tool that it wrote holds another value since.
-        OutcomeUnknownError: Something earlier is unsettled, perhaps this very order.
+        OutcomeUnknownError: Something earlier is unsettled, perhaps this very order, or what was
+            in force before it and is not put back.
     """
     require_order_id(order)
     outcomes, purpose = controller.outcomes, tr("order {order}", order=order)
@@ -155,7 +156,11 @@ def carrying_out(controller: Controller, order: str, job: Mapping[str, object]) 
     with outcomes.hold(purpose):
         entry = _found(outcomes, order)
         if entry is not None:
-            yield Order(order, plain, _done(controller, order, plain, entry))
+            done = _done(controller, order, plain, entry)
+            # Whoever is told that it is done starts production: with the tool in force, at the
+            # speed and in the power that a killed run has perhaps not put back.
+            controller.require_settled(purpose)
+            yield Order(order, plain, done)
             return
         controller.require_settled(purpose)
         outcomes.order = order

@@ -161,3 +161,14 @@ def test_a_touch_made_again_is_judged_as_any_other(cell):
             writes=["back"],
         )
     assert refused.value.code == "touch_heights_differ"
+
+
+def test_stations_that_were_found_with_a_tool_are_named_before_it_is_written(cell):
+    from robolink.nozzle_change._station_check import found_with
+    from robolink.stations import Found, StationKind, station_entry
+
+    with robolink.connect(cell.cell.url) as controller:
+        for name, tool in (("PIN-07", 1), ("PIN-08", 2), ("PIN-09", 1), ("PIN-09", 3)):
+            found = Found(id=name, kind=StationKind.PIN, x_mm=300.0, y_mm=100.0, tool=tool)
+            controller.outcomes.append(station_entry(found))
+        assert found_with(controller, [1, 2]) == {1: ("PIN-07",), 2: ("PIN-08",)}

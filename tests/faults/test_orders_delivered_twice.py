@@ -19,7 +19,7 @@ import pytest
 import robolink
 from robolink.errors import BusyError, ConfigError, LeaseLostError, OutcomeUnknownError
 from robolink.journal import memory_journal, open_journal
-from robolink.model import ANY, EntryKind, plain_offset
+from robolink.model import ANY, EntryKind, Marker, MarkerKind, plain_offset
 from robolink.testing import MemoryController, MemoryMachine
 from robolink.transaction import Settler, ToolChange, Wanted, carrying_out, change_tools
 from tests.faults._change_cell import ChangeCell, Step, change_cell
@@ -289,6 +289,26 @@ def test_f79_a_value_that_stood_already_makes_an_order_done_all_the_same():
         with carrying_out(controller, ORDER, JOB) as order:
             (receipt,) = change_tools(controller, [Wanted(1, NEW[1], NEW[1])], order=order)
             assert receipt.skipped
+        with carrying_out(controller, ORDER, JOB) as order:
+            assert order.done is not None
+
+
+@pytest.mark.fault("F79")
+def test_f79_an_order_is_not_told_as_done_while_something_is_not_put_back():
+    """Production that is started on it would run with the tool in force of the measurement."""
+    desk = Desk()
+    with desk.connected() as controller:
+        with carrying_out(controller, ORDER, JOB) as order:
+            change_tools(controller, [Wanted(1, NEW[1], ANY)], order=order)
+        # As a process leaves it that is killed behind the transaction that keeps the value.
+        left = Marker("killed", MarkerKind.SELECTION, "calibrate tool 1", "then", {"tool": 1})
+        controller.outcomes.begin(left)
+        with (
+            pytest.raises(OutcomeUnknownError, match="calibrate tool 1"),
+            carrying_out(controller, ORDER, JOB),
+        ):
+            pytest.fail("it was told as done")
+        controller.finish(left)
         with carrying_out(controller, ORDER, JOB) as order:
             assert order.done is not None
 

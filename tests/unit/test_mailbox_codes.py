@@ -8,6 +8,7 @@ from robolink.protocols.mailbox import (
     OPCODES,
     Bits,
     Capability,
+    Command,
     CommandState,
     ErrorClass,
     ExportProfile,
@@ -56,15 +57,21 @@ def test_only_stop_halt_and_ownership_need_no_owner():
 
 
 def test_what_reads_or_stops_needs_no_permit():
-    free = {code for code, facts in OPCODES.items() if not facts.needs_permit}
+    free = {code for code in OPCODES if not Command(1, code).needs_permit}
     assert free == {
         Opcode.INTERRUPT,
         Opcode.STOP,
         Opcode.HALT,
+        Opcode.JOG,  # which presses no button
         Opcode.OWNERSHIP,
         Opcode.READ_TOOL,
         Opcode.READ_INPUT,
     }
+
+
+def test_to_release_a_held_stop_or_to_press_a_button_needs_the_permit():
+    assert Command(1, Opcode.STOP, operands=(1, 0, 0, 0)).needs_permit
+    assert Command(1, Opcode.JOG, operands=(0, 1, 0, 0)).needs_permit
 
 
 def test_codes_are_append_only():

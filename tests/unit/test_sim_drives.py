@@ -211,6 +211,19 @@ def test_torque_values_are_listed_two_a_row():
     assert cell.error("ATRQ 1, 2") == 2100
 
 
+@pytest.mark.parametrize("power", ["High", "Low"])
+def test_a_torque_is_told_as_a_share_of_its_limit_and_never_above(power):
+    """Help on the torque restriction: the limit counts as 1 for what is measured after it."""
+    cell = Cell()
+    word = "LimitTorque" if power == "High" else "LimitTorqueLP"
+    other = "LimitTorqueLP" if power == "High" else "LimitTorque"
+    way = f"Power {power}; P1 = Here; PTCLR; Go Here -Z(2); Go P1; Print PTRQ(3)"
+    plain = float(cell.run(way))
+    assert float(cell.run(f"{other} 50; {way}")) == pytest.approx(plain)
+    assert float(cell.run(f"{word} 50; {way}")) == pytest.approx(2 * plain, rel=1e-3)
+    assert float(cell.run(f"{word} 1; {way}")) == 1
+
+
 def test_olrate_rises_with_work_and_fades_in_a_minute():
     cell = Cell()
     cell.run("Power High; Speed 100; Accel 100, 100; Weight 6; P1 = Here; P2 = Here -Y(200)")

@@ -142,6 +142,8 @@ def test_what_only_ends_needs_no_permit_and_what_begins_does():
     assert client.refused(Opcode.JOG, 1, 0, MCS, dynamics=FAST) == ErrorClass.NOT_PERMITTED
     assert client.refused(Opcode.CONTINUE) == ErrorClass.NOT_PERMITTED
     client.done(Opcode.STOP)
+    assert client.refused(Opcode.STOP, 1) == ErrorClass.NOT_PERMITTED
+    assert client.now().group_state == GroupState.STOPPING
 
 
 def test_ending_a_jog_and_interrupting_take_the_owner_and_stopping_does_not():

@@ -82,10 +82,12 @@ def test_motions_bring_the_added_axis_to_the_same_point(robot, verb):
         cell.machine.switch_motors(True)
         cell.interpreter = Interpreter(cell.machine, EpsonOptions(), random.Random(1))
     own = cell.machine.arm
-    cell.run("P1 = Here; ArmSet 2, 150, 20, -15; TLSet 1, XY(3, 4, -10, 30); Arm 2; Tool 1; LimZ 0")
+    cell.run("P1 = Here; ArmSet 2, 150, 20, -15, ArmSet(0, 4), 40; TLSet 1, XY(3, 4, -10, 30)")
+    cell.run("Arm 2; Tool 1; LimZ 0")
     cell.run("P2 = Here -X(15) -Z(8) +U(10)")
     cell.run(f"{verb} P2")
     assert float(cell.run("Print Dist(Here, P2)")) == pytest.approx(0, abs=1e-6)
+    assert float(cell.run("Print CU(Here) - CU(P2)")) == pytest.approx(0, abs=1e-6)
     assert cell.run("Print TargetOK(P2)") == "-1\r\n"
     z_mm = own.flange().z_mm
     assert float(cell.run("Print CZ(Here)")) == pytest.approx(z_mm - 15 - 10, abs=1e-6)

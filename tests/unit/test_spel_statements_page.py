@@ -8,6 +8,7 @@ from robolink_simulators.epson import EpsonOptions, EpsonSimulator
 from robolink_simulators.epson.spel.expressions.functions import PLAIN_FUNCTIONS
 from robolink_simulators.epson.spel.expressions.machine_functions import (
     MACHINE_FUNCTIONS,
+    OF_POINT_NUMBERS,
     POINT_FUNCTIONS,
 )
 from robolink_simulators.epson.spel.expressions.state_functions import STATE_FUNCTIONS
@@ -26,7 +27,8 @@ _LONGEST_S = 120
 
 
 def rows():
-    found = map(_ROW.match, PAGE.read_text(encoding="utf-8").splitlines())
+    answered = PAGE.read_text(encoding="utf-8").partition("## Not carried out")[0]
+    found = map(_ROW.match, answered.splitlines())
     return [(row["statement"], row["answer"]) for row in found if row]
 
 
@@ -88,7 +90,7 @@ def test_an_assigned_variable_is_read_over_the_wire_and_back(login):
 def refused_words():
     """Return the statements and the functions that a program may hold and that are refused."""
     known = {"pdef", *PLAIN_FUNCTIONS, *MACHINE_FUNCTIONS, *POINT_FUNCTIONS, *STATE_FUNCTIONS}
-    known |= {*TASK_FUNCTIONS, *FUNCTIONS_OF_ARRAYS}
+    known |= {*TASK_FUNCTIONS, *FUNCTIONS_OF_ARRAYS, *OF_POINT_NUMBERS}
     return UNSIMULATED - WINDOW_ONLY, UNSIMULATED_FUNCTIONS - known
 
 

@@ -12,6 +12,8 @@ from robolink_cli.session.motion_consent import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
     from robolink.model import Controller
     from robolink_cli.prompts.present import AskingDesk
     from robolink_cli.wizard.check_list import CheckPoint
@@ -68,6 +70,39 @@ def check_before_start(
     )
     while _answer_to_list(desk, controller, purpose, plan) != "y":
         controller.motors(True)
+
+
+def name_the_needle(
+    controller: "Controller", ids: "Callable[[Callable[[str], str]], Iterator[str]]"
+) -> None:
+    """Have the person at the desk name what is mounted, before anything moves.
+
+    Args:
+        controller: Looked at meanwhile.
+        ids: Asks for each id by the function that it is given, and yields it.
+
+    Raises:
+        DeclinedError: The person leaves.
+    """
+    from robolink_cli.wizard.happenings import CellIs
+
+    desk = present_desk()
+    assert desk is not None  # noqa: S101 - looked at by whoever calls
+    named = list(ids(lambda question: _text(desk, controller, question)))
+    if named:
+        desk.regard(CellIs(needle=", ".join(named)))
+
+
+def _text(desk: "AskingDesk", controller: "Controller", question: str) -> str:
+    from robolink.runner import POLL_S, Question
+
+    desk.regard(None)
+    desk.ask(question, Question.TEXT)
+    while (answer := desk.poll(POLL_S)) is None:
+        controller.status()
+    if answer == "q":
+        raise DeclinedError(tr("You did not start it."), remedy=tr("Nothing moved."))
+    return answer
 
 
 def _answer_to_list(desk: "AskingDesk", controller: "Controller", purpose: str, plan: str) -> str:

@@ -13,12 +13,14 @@ from robolink.runner import SETTLING_S, FitSubject, JogSubject, MoveSubject, Que
 from robolink_cli.wizard.check_list import CheckSubject
 from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.happenings import (
+    CellIs,
     Effect,
     Happening,
     HasEnded,
     KeyPressed,
     LineTyped,
     SendAnswer,
+    TaughtPoints,
     TooFast,
     WaitsForAnswer,
     WasAsked,
@@ -117,12 +119,22 @@ def _regarding(state: WizardState, subject: object) -> WizardState:
         moves = replace(state, subject=subject, question=None, waits=False, fresh=fresh)
         return replace(moves, carried=True, message="")
     if isinstance(subject, Header):
-        return replace(state, header=subject)
+        return _known(replace(state, header=subject), state.header.simulated, state.header.needle)
+    if isinstance(subject, CellIs):
+        return _known(state, subject.simulated, subject.needle)
+    if isinstance(subject, TaughtPoints):
+        return replace(state, impact=subject.impact)
     if isinstance(subject, ChangeReport):
         return replace(state, report=subject)
     if isinstance(subject, FitSubject):
         return replace(state, subject=subject, fit=subject)
     return replace(state, subject=subject)
+
+
+def _known(state: WizardState, simulated: bool, needle: str) -> WizardState:
+    header = state.header
+    simulated, needle = header.simulated or simulated, needle or header.needle
+    return replace(state, header=replace(header, simulated=simulated, needle=needle))
 
 
 def _waiting(state: WizardState, at_s: float) -> WizardState:

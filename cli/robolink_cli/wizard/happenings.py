@@ -2,9 +2,13 @@
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import TYPE_CHECKING
 
 from robolink.model import Pose
 from robolink.runner import Question
+
+if TYPE_CHECKING:
+    from robolink.calibration import Impact  # numpy, which a touch does without
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +28,30 @@ class Reading:
     halted: bool = False
     pose: Pose | None = None
     axes: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class CellIs:
+    """What became known of the cell or the job, for the first row of every screen.
+
+    Attributes:
+        simulated: Whether the controller says of itself that nothing real moves.
+        needle: Id of the needle or nozzle, empty where nobody was asked.
+    """
+
+    simulated: bool = False
+    needle: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class TaughtPoints:
+    """The taught points that a person named, and what the new value does there.
+
+    Attributes:
+        impact: That.
+    """
+
+    impact: "Impact"
 
 
 @dataclass(frozen=True, slots=True)

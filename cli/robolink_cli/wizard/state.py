@@ -2,13 +2,16 @@
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from robolink.model import Pose
 from robolink.nozzle_change import ChangeReport, WriteSubject
 from robolink.runner import FINEST_STEP, FitSubject, JogRange, Question, TouchSubject
 from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.happenings import Reading, WasAsked
+
+if TYPE_CHECKING:
+    from robolink.calibration import Impact  # numpy, which a touch does without
 
 STEP_SIZES: Final = (0.01, 0.1, 0.5, 1.0, 5.0)
 """In mm, and in degrees for U; the largest is the runner's own limit."""
@@ -113,6 +116,7 @@ class WizardState:
         fresh: What of it was told since the last question, so that nobody had a screen to read it.
         message: The row above the keys.
         ending: Whether the work was told to end.
+        impact: What the new value does at taught points, ``None`` where none were named.
         report: What was reached, ``None`` before the end.
         ended: The last screen, ``None`` before it.
         begins_again: Whether the same job is to be begun once more.
@@ -135,6 +139,7 @@ class WizardState:
     fresh: tuple[str, ...] = ()
     message: str = ""
     ending: bool = False
+    impact: "Impact | None" = None
     report: ChangeReport | None = None
     ended: LastScreen | None = None
     begins_again: bool = False

@@ -46,8 +46,8 @@ class OpcodeFacts:
         operands: What the operands mean.
         answer: What stands in the answer words afterwards.
         needs_owner: Only the owner of the mailbox may send it.
-        needs_permit: It changes something, so the machine must permit it; what only ends
-            something needs no permit (see :attr:`Command.needs_permit`).
+        needs_permit: It can change something, so the machine must permit it; where its operands
+            only end something it needs no permit (see :attr:`Command.needs_permit`).
     """
 
     does: str
@@ -72,10 +72,9 @@ OPCODES: Final[Mapping[Opcode, OpcodeFacts]] = MappingProxyType(
         Opcode.STOP: OpcodeFacts(
             "stop",
             _MOTION,
-            "i0 0 stop and hold, 1 release (by the owner only); "
+            "i0 0 stop and hold, permit or not, 1 release (by the owner only); "
             "while held every movement and jog is 203",
             needs_owner=False,
-            needs_permit=False,
         ),
         Opcode.HALT: OpcodeFacts("halt", _MOTION, needs_owner=False, needs_permit=False),
         Opcode.JOG: OpcodeFacts(

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from robolink.protocols.spel._queries import print_tool_defined as print_tool_defined
     from robolink.protocols.spel._queries import print_tool_x as print_tool_x
     from robolink.protocols.spel._queries import print_two_texts as print_two_texts
+    from robolink.protocols.spel._queries import show_base as show_base
     from robolink.protocols.spel._queries import tilts_tool as tilts_tool
     from robolink.protocols.spel._queries import wait_half_a_second as wait_half_a_second
     from robolink.protocols.spel._queries import where as where
@@ -64,6 +65,7 @@ if TYPE_CHECKING:
     from robolink.protocols.spel._values import posture_marks as posture_marks
     from robolink.protocols.spel._where import PrintedWhere as PrintedWhere
     from robolink.protocols.spel._where import format_where as format_where
+    from robolink.protocols.spel._where import parse_base as parse_base
     from robolink.protocols.spel._where import parse_where as parse_where
 else:
     __getattr__ = lazy_exports(
@@ -76,7 +78,7 @@ else:
                 "print_robot print_robot_model print_robot_serial print_robot_type "
                 "print_selected_tool print_speed print_speed_s print_tool "
                 "print_plain_point print_tool_defined print_tool_x print_two_texts "
-                "tilts_tool wait_half_a_second where"
+                "show_base tilts_tool wait_half_a_second where"
             ),
             "_statements": (
                 "MAX_STATEMENT Statement clear_tool go move power_high power_low "
@@ -90,6 +92,6 @@ else:
                 "Layout PrintedPoint decimal format_point format_tool_listing parse_boolean "
                 "parse_integer parse_number parse_point parse_tool_listing posture_marks"
             ),
-            "_where": "PrintedWhere format_where parse_where",
+            "_where": "PrintedWhere format_where parse_base parse_where",
         },
     )

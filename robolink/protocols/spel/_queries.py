@@ -172,6 +172,11 @@ def where() -> Statement:
     return Statement("Where")
 
 
+def show_base() -> Statement:
+    """Where the base stands that positions count from (docs/reference/spel.md 5.4)."""
+    return Statement("Base")
+
+
 def _tool(tool: int) -> int:
     check_range(tr("A tool that can be defined"), tool, 1, LAST_TOOL)
     return tool

@@ -20,6 +20,9 @@ _AXES: Final = ("X", "Y", "Z", "U", "V", "W")
 _LABELS: Final = ("WORLD:", "JOINT:", "PULSE:")
 _ENTRY: Final = re.compile(rf"\s*([XYZUVW1-9]):\s*({NUMBER})\s+(mm|deg|pls)(?=\s|$)", re.ASCII)
 
+_IN_THE_LISTING: Final = re.compile(NUMBER, re.ASCII)
+_COUNTS_OF_A_BASE: Final = (4, 6)
+
 _World = tuple[float, float, float, float, float, float]
 
 
@@ -120,3 +123,15 @@ def _is_pulses(entries: list[_Entry], count: int) -> bool:
 def _is_numbered(entries: list[_Entry]) -> bool:
     expected = [str(number) for number in range(1, len(entries) + 1)]
     return bool(entries) and [entry.label for entry in entries] == expected
+
+
+def parse_base(text: str) -> tuple[float, ...] | None:
+    """Read where the base stands that positions count from: X, Y, Z in mm and U, V, W in degrees.
+
+    No page shows how a controller lists it (docs/reference/spel.md 5.4), so six numbers alone are
+    taken for it, or four for a base that does not lean; ``None`` for anything else.
+    """
+    numbers = [float(number) for number in _IN_THE_LISTING.findall(text)]
+    if len(numbers) not in _COUNTS_OF_A_BASE:
+        return None
+    return (*numbers, 0.0, 0.0)[:6]

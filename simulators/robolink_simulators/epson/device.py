@@ -173,6 +173,7 @@ class EpsonSimulator(RequestTaking):
             messages=self.card.messages,
         )
         self._session = interpreter.session
+        self._session.project_name = self.card.project
         self.program = None
         self._window = SpelWindow(interpreter, self.condition, self.options)
         self._slot = ClientSlot(self.options.remote_timeout_s, self.wire_time)

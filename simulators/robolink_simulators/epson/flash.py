@@ -130,6 +130,7 @@ def put_back(
         robot.points = deepcopy(held["points"][number])
         robot.locals = deepcopy(held["locals"][number])
         robot.switch_motors(held["motors"][number])
+        robot.latch.forget()
         robot.arm.place(held["joints"][number], now_ns)
     machine.robot_number = held["robot"]
     variables.put_back(held["variables"])

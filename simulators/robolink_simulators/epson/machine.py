@@ -11,12 +11,11 @@ from robolink_simulators.epson.arm.motion_parameters import MotionParameters
 from robolink_simulators.epson.arm.robot_settings import RobotSettings
 from robolink_simulators.epson.arm.robots import RobotModel
 from robolink_simulators.epson.definitions.kept import KeptDefinitions
-from robolink_simulators.epson.memory.bits import IO_BITS, MEMORY_BITS, BitBank
+from robolink_simulators.epson.memory.bits import IO_BITS, MEMORY_BITS, BitBank, IOLabel
 from robolink_simulators.epson.memory.control_points import ControlPoints
 from robolink_simulators.epson.memory.driven_robot import DrivenRobot
 from robolink_simulators.epson.memory.image_calibrations import ImageCalibrations
 from robolink_simulators.epson.memory.input_bits import InputBits
-from robolink_simulators.epson.memory.io_labels import IOLabel
 from robolink_simulators.epson.memory.pallets import PalletTable
 from robolink_simulators.epson.memory.points import LocalTable, Point, PointTable
 from robolink_simulators.epson.memory.timed_bits import TimedBits
@@ -105,6 +104,8 @@ class Machine:
         self.robots = (first, *more)
         self.robot_number = 1
         self.inputs = InputBits(IO_BITS)
+        for robot in self.robots:
+            robot.latch.listen(self.inputs)
         self.outputs = BitBank(IO_BITS)
         self.memory = BitBank(
             MEMORY_BITS, no_bit=RefusalKind.MEMORY_BIT, no_byte=RefusalKind.MEMORY_BYTE
@@ -203,6 +204,12 @@ class Machine:
         """Stop every arm where it is."""
         for robot in self.robots:
             robot.arm.halt(now_ns)
+
+    def keep_places(self, now_ns: int) -> None:
+        """Stop every arm, and keep where it is for Recover (documented for the safeguard)."""
+        self.halt(now_ns)
+        for robot in self.robots:
+            robot.recovers_to = robot.arm.joints
 
     def switch_motors(self, on: bool) -> None:
         """Switch the motors of the robot in force ."""

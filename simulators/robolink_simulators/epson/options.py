@@ -67,6 +67,7 @@ class SpelNumbers:
     calibration_pulses: int = 2197
     motors_on: int = 4029
     not_reserved: int = 2198
+    latch_unset: int = 2196
     serious: int = 9001
     no_such_file: int = 7213  # docs/reference/spel.md 10, path not found
     task_gone: int = 2261  # docs/reference/spel.md 10

@@ -66,6 +66,7 @@ class EpsonPanel:
         """Open the safety door: as the emergency stop, but a task pauses (motors assumed)."""
         with self._acting() as now_ns:
             self._condition.open_guard()
+            self._machine.keep_places(now_ns)
             self._cut_power(self._numbers.guard_open, "Safeguard open", now_ns)
 
     def close_guard(self) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from robolink_cli.wizard.choices import ChoiceSubject
-from robolink_cli.wizard.happenings import HasEnded, Reading, WasRead, WasRegarded
+from robolink_cli.wizard.happenings import HasEnded, Reading, TaughtPoints, WasRead, WasRegarded
 from robolink_cli.wizard.screens.drawing import screen_of
 from robolink_cli.wizard.screens.ending import ended_of
 from robolink_cli.wizard.screens.told import told_before, told_question
@@ -14,7 +14,7 @@ from robolink_cli.wizard.state import Header
 from wcwidth import wcswidth
 
 from robolink import messages
-from robolink.calibration import Drift, VerifyResult
+from robolink.calibration import Drift, VerifyResult, impact_on
 from robolink.errors import DeclinedError
 from robolink.locale.languages import translator
 from robolink.model import Path as Way
@@ -69,6 +69,14 @@ def done():
     return ended(header, report=ChangeReport("7f3a5c1200", (tool,)))
 
 
+def taught():
+    """What the proposal does at fifteen points."""
+    (proposal,) = write_subject(1).proposals
+    points: dict[int, Pose | None] = {n: Pose(20.0 * n, 200.0, -50.0, 0.0) for n in range(1, 16)}
+    assert proposal.before is not None
+    return impact_on(points, old=proposal.before, new=proposal.offset)
+
+
 def stopped():
     error = DeclinedError("You stopped it.", remedy="Nothing was written.")
     note_standing(error, Standing(moved=True, selected=1, selected_before=1))
@@ -111,6 +119,11 @@ SCREENS = {
     "touch again": lambda: Sitting().asked(touch_subject(number=3, retakes=True, types=True)),
     "touch typed": lambda: (
         Sitting().asked(touch_subject(types=True)).keys(".").keys(*"250.112 199.954")
+    ),
+    "values taught": lambda: (
+        Sitting()
+        .happens(WasRegarded(TaughtPoints(taught())))
+        .asked(replace(write_subject(1), stations={1: ("PIN-07",)}), Question.YES_NO)
     ),
     "two tools": lambda: Sitting().asked(write_subject(1, 2), Question.YES_NO),
     "question": lambda: Sitting().asked(None, Question.YES_NO, "Is the valve shut?"),

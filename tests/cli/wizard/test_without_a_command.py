@@ -1,9 +1,12 @@
 """Whoever types no command, or a command and no cell, is led on; and reads whole words."""
 
 import re
+import tomllib
 
 import pytest
 from robolink_cli.console.columns import columns, within
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 
 from tests.cli.wizard._screen import ScreenHand
 
@@ -49,3 +52,61 @@ def test_a_recovery_takes_the_only_cell_there_is(tmp_path, monkeypatch):
         assert "127.0.0.1:1 refuses" in hand.text
     finally:
         hand.close()
+
+
+TWO_TOUCHES = """
+schema = "robolink/recipe/1"
+name = "needle"
+basis = "absolute"
+z = "kept"
+[source]
+kind = "two-pose"
+[station]
+id = "PIN-07"
+[[tools]]
+number = 1
+[[prompts]]
+at = "before_measure"
+text = "Id of the new needle?"
+answer = "nozzle"
+"""
+
+
+def test_the_id_is_asked_before_anything_moves_and_the_row_says_that_it_is_simulated(tmp_path):
+    simulator, recipe = EpsonSimulator(seed=7), tmp_path / "needle.toml"
+    recipe.write_text(TWO_TOUCHES)
+    with serve_tcp(simulator) as host:
+        hand = ScreenHand(["-c", host.url, "change", str(recipe)], simulator)
+        try:
+            hand.see("Id of the new needle")
+            assert hand.screen.display[0].endswith("SIMULATED"), hand.text
+            hand.rest(0.4)
+            hand.press([*"N-0418", "\r"])
+            hand.see(r"Start moving \(2 open\)")
+            assert simulator.machine.arm.moves_started == 0
+            hand.rest(0.4)
+            hand.press(["0"])
+            assert hand.end() == 9
+        finally:
+            hand.close()
+
+
+@pytest.mark.parametrize("tools", [1, 2])
+def test_each_id_is_asked_once_and_not_again_at_its_moment(tools):
+    from robolink.recipe import Answers
+    from robolink.recipe.file.recipe import Recipe
+
+    more = "".join(f"[[tools]]\nnumber = {number}\n" for number in range(2, tools + 1))
+    prompts = [("before_measure", "nozzle", "N?"), ("start", "lot", "L?"), ("start", "yes", "Y?")]
+    text = TWO_TOUCHES[: TWO_TOUCHES.index("[[prompts]]")] + more
+    for at, answer, question in prompts:
+        text += f'[[prompts]]\nat = "{at}"\ntext = "{question}"\nanswer = "{answer}"\n'
+    recipe = Recipe.model_validate(tomllib.loads(text))
+    wanted = list(Answers().ids_wanted(recipe))
+    assert [(prompt.text, tool) for _, prompt, tool in wanted] == [
+        *[("N?", tool) for tool in range(1, tools + 1)],
+        ("L?", None),
+    ]
+    early = {(number, tool): "x" for number, _, tool in wanted}
+    assert list(Answers(early=early).ids_wanted(recipe)) == []
+    assert len(list(Answers(nozzle="N").ids_wanted(recipe))) == 1

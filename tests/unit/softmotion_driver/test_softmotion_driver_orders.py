@@ -7,6 +7,7 @@ import pytest
 from robolink.errors import (
     ConfigError,
     ControllerFaultError,
+    NotReadyError,
     OutcomeUnknownError,
     RejectedError,
     RemoteProtocolError,
@@ -15,6 +16,7 @@ from robolink.errors import (
 )
 from robolink.model import Act, Verdict
 from robolink.protocols.mailbox import (
+    Bits,
     Command,
     CommandState,
     ErrorClass,
@@ -235,6 +237,14 @@ def test_a_held_stop_is_released_by_the_reset(plc, controller):
     controller.reset_fault()
     assert controller.status().ready
     assert [command.operands[0] for command in plc.executed] == [0, 0, 1]
+
+
+def test_a_held_stop_is_not_released_without_the_machines_permit(plc, controller):
+    controller.stop()
+    plc.now = replace(plc.now, bits=plc.now.bits & ~Bits.PERMITTED)
+    with pytest.raises(NotReadyError, match="does not permit"):
+        controller.reset_fault()
+    assert [command.operands[0] for command in plc.executed] == [0]
 
 
 def test_stopping_needs_no_ownership(cell, plc):

@@ -1,8 +1,13 @@
 """Torques of the drives in programs (docs/reference/spel.md 7.4). Pages are the reference's."""
 
+import random
 from dataclasses import replace
 
 import pytest
+from robolink_simulators.epson import EpsonOptions
+from robolink_simulators.epson.condition import Task
+from robolink_simulators.epson.drives.observer import DriveQuantity
+from robolink_simulators.epson.spel import Interpreter
 
 
 @pytest.fixture
@@ -92,6 +97,70 @@ def test_a_limit_lower_than_the_load_moves_nothing(plate):
         "Print Dist(Here, P1) < 1",
     )
     assert made.run() == ["-1"]
+
+
+def test_a_motion_that_goes_over_into_the_next_is_stopped_as_well(plate):
+    made = plate(
+        "CP On",
+        "P1 = Here",
+        "LimitTorqueLP 25; LimitTorqueStopLP On",
+        "Go P1 -Z(12)",
+        "Go P1 -Z(13)",
+        "Print 1",
+    )
+    assert made.run() == []
+    assert made.runner.failure.number == 5041
+    assert 0.5 < inside_mm(made) < 4
+
+
+def test_a_motion_that_till_ends_before_its_limit_is_no_error(plate):
+    made = plate(
+        "LimitTorqueLP 25; LimitTorqueStopLP On",
+        "Go Here -Z(12) Till Sw(5) = On",
+        "Print TillOn",
+    )
+    world = made.simulator.world
+    world.set_up(replace(world.parameters, contact_input=5))
+    assert made.run() == ["-1"]
+    assert 0 <= inside_mm(made) < 2
+    assert made.runner.failure is None
+
+
+def test_an_aborted_motion_leaves_no_error_to_what_follows(plate):
+    made = plate("Print 1")
+    machine = made.simulator.machine
+    window = Interpreter(machine, EpsonOptions(), random.Random(1))
+    execution = window.start("LimitTorqueLP 25; LimitTorqueStopLP On; Go Here -Z(12)", 0)
+    execution.advance(50_000_000)
+    assert machine.arm.moving
+    execution.abort(60_000_000)
+    after = window.start("Print 1", 5_000_000_000)
+    assert (after.error, after.output) == (None, "1\r\n")
+
+
+def test_a_paused_motion_meets_its_limit_when_it_goes_on(plate):
+    made = plate("TCLim -1, -1, 30, -1; TC On", "P1 = Here", "Go P1 -Z(20)", "Print 1")
+    simulator = made.simulator
+    made.runner.start("main", simulator.now_ns)
+    simulator.advance(simulator.now_ns + 60_000_000)
+    assert simulator.machine.arm.moving
+    made.runner.turn_to(Task.PAUSED)
+    simulator.advance(simulator.now_ns + 1_000_000_000)
+    assert not simulator.machine.arm.moving
+    assert inside_mm(made) < 0
+    made.runner.turn_to(Task.RUNNING)
+    simulator.advance(simulator.now_ns + 20_000_000_000)
+    assert list(made.runner.console) == ["1\r\n"]
+    assert 0.5 < inside_mm(made) < 5
+
+
+def test_nothing_is_measured_any_more_after_a_power_cycle(plate):
+    made = plate("PTCLR", "Go Here -Y(50)", "Print PTRQ(1) > 0")
+    assert made.run() == ["-1"]
+    made.simulator.restart()
+    observer = made.simulator.machine.robot.observer
+    assert observer.value(DriveQuantity.PEAK_TORQUE, 1) == 0
+    assert observer.overload(1) == pytest.approx(0, abs=1e-9)
 
 
 def test_tcspeed_holds_the_speed_under_torque_control_alone(plate):

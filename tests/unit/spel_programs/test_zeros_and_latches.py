@@ -23,3 +23,28 @@ Fend
     made = cell(text)
     made.run()
     assert made.runner.failure.number == made.simulator.options.numbers.not_in_this_task
+
+
+LATCHING = """Function main
+  Motor On
+  SetLatch 24, SETLATCH_TRIGGERMODE_LEADINGEDGE, 2
+  LatchEnable On
+  Xqt switch
+  Move Here -X(60) CP
+  Wait LatchState = True
+  Print Dist(LatchPos(WithToolArm, 1), LatchPos(WithToolArm, 2)) > 1
+  Print Dist(LatchPos, Here) > 1
+  LatchEnable Off
+Fend
+Function switch
+  Wait 0.3
+  SetSw 24, 1
+  SetSw 24, 0
+  Wait 0.2
+  SetSw 24, 1
+Fend
+"""
+
+
+def test_a_program_waits_for_the_latch_and_asks_where_it_was(cell):
+    assert cell(LATCHING, virtual_io=True).run() == ["-1", "-1"]

@@ -6,6 +6,8 @@ from typing import Any
 from robolink.protocols.mailbox import (
     COMMAND_WORDS,
     Bits,
+    CommandState,
+    CoordinateSystem,
     GroupState,
     Opcode,
     crc16,
@@ -78,6 +80,8 @@ def drawn_commands(seed: int, commands: int):
                 if client.now().group_state != GroupState.MOVING:
                     break
                 client.wait(0.5)
+            else:
+                _back_to(client, now.axes)
             bench.note(0.4)
             bench.plc.panel.give_permit()
             words = bench.taken[-1]
@@ -90,6 +94,17 @@ def drawn_commands(seed: int, commands: int):
                 _bring_back(bench)
 
     return behaviour
+
+
+def _back_to(client, axes):
+    """End a movement that goes on and on, and return to where it began.
+
+    Where it is at any moment hangs on the cycle in which it began, which is not what is compared.
+    """
+    client.settled(client.tell(Opcode.HALT))
+    began = (0, 0, CoordinateSystem.ACS, 0)
+    told = client.tell(Opcode.MOVE_DIRECT, *began, pose=axes, dynamics=FACTORS)
+    assert client.end_of(told.ack_head).state == CommandState.DONE
 
 
 def _bring_back(bench):

@@ -12,7 +12,7 @@ SCARA = "Kin_Scara3_Z"
 @pytest.mark.timeout(200)
 @pytest.mark.parametrize(
     ("seed", "commands"),
-    [(0, 15), *(pytest.param(seed, 40, marks=pytest.mark.soak) for seed in range(1, 13))],
+    [(0, 15), *(pytest.param(seed, 40, marks=pytest.mark.soak) for seed in range(1, 61))],
 )
 def test_drawn_commands_give_the_same_words(tmp_path, seed, commands):
     behaviour = drawn_commands(seed, commands)

@@ -15,7 +15,7 @@ from robolink_cli.console.render import note, say
 from robolink_cli.prompts.operator import operator_at
 from robolink_cli.prompts.present import present_desk
 from robolink_cli.prompts.questions import asked, on_terminal
-from robolink_cli.session.check_before_start import check_before_start
+from robolink_cli.session.check_before_start import check_before_start, name_the_needle
 from robolink_cli.session.context import CliContext
 from robolink_cli.session.motion_consent import agree_to_motion, motion_question
 from robolink_cli.session.opening import open_controller
@@ -153,6 +153,7 @@ class Recalibration:
         if question is not None:
             agree_to_motion(question, yes=self._answers.yes)
             return
+        name_the_needle(controller, run.ask_ids)
         steps = preview(controller, run.plan)
         check_before_start(
             controller,

@@ -1,14 +1,18 @@
 """Screen (f): the new values, and the question before they are written."""
 
 import math
+from typing import TYPE_CHECKING
 
 from robolink.messages import tr
 from robolink.model import ToolOffset
 from robolink.nozzle_change import LimitVerdict, Proposal, WriteSubject
 from robolink_cli.console.columns import padded
-from robolink_cli.wizard.screens.layout import Screen, broken, row_of
+from robolink_cli.wizard.screens.layout import BODY, Screen, broken, row_of
 from robolink_cli.wizard.screens.rows import mm, signed, title_row
 from robolink_cli.wizard.state import WizardState
+
+if TYPE_CHECKING:
+    from robolink.calibration import Impact  # numpy, which a touch does without
 
 _HEAD = 18
 
@@ -20,9 +24,57 @@ def values_screen(state: WizardState, subject: WriteSubject) -> Screen:
     )
     return Screen(
         title_row(state, tr("New values")),
-        (*value_lines(subject), "", typed),
+        (*_shown(state, subject), "", typed),
         (("*", tr("Write")), *_further(subject), ("Esc", tr("Do not write"))),
         message=state.message,
+    )
+
+
+def _shown(state: WizardState, subject: WriteSubject) -> list[str]:
+    """Return what stands above the field, as much as leaves room for it and a message."""
+    lines = [*value_lines(subject), *_taught(state, subject)]
+    rows = [row for line in lines for row in broken(line)]
+    return rows[: BODY - 3]
+
+
+def _taught(state: WizardState, subject: WriteSubject) -> list[str]:
+    """Return what the write does where a program goes, and what was found with the tool."""
+    lines = [
+        tr(
+            "Stations found with tool {t}: {n} ({names}).",
+            t=tool,
+            n=len(names),
+            names=", ".join(names),
+        )
+        for tool, names in subject.stations.items()
+        if names
+    ]
+    if len(subject.proposals) > 1:
+        return lines
+    (proposal,) = subject.proposals
+    if proposal.before is None:
+        return lines
+    return ["", *broken(_at_points(state.impact, proposal)), *lines]
+
+
+def _at_points(impact: "Impact | None", proposal: Proposal) -> str:
+    moved = math.dist(
+        (proposal.before or ToolOffset()).components()[:3], proposal.offset.components()[:3]
+    )
+    if impact is None or impact.largest is None:
+        return tr(
+            "Where a program goes with tool {t}, the tip will be {d} mm from where the old value "
+            "puts it: that is the error this write removes.",
+            t=proposal.tool,
+            d=mm(moved),
+        )
+    return tr(
+        "{n} taught points use tool {t}. There the tip will be up to {d} mm (P{p}) from where the "
+        "old value puts it: that is the error this write removes.",
+        n=len(impact.entries),
+        t=proposal.tool,
+        d=mm(impact.largest.distance_mm),
+        p=impact.largest.number,
     )
 
 

@@ -17,7 +17,7 @@ from robolink.controllers.epson.motion.until_input import (
 )
 from robolink.controllers.motion_group import MotionGroupCore
 from robolink.errors import NotReadyError, NotReadyReason, StoppedError
-from robolink.messages import tr
+from robolink.messages import joined, tr
 from robolink.model import InputEdge, MotionProfile, MotionTerms, Path, Pose, WorkBox
 from robolink.protocols import spel
 from robolink.ways import Way, way
@@ -115,13 +115,30 @@ class EpsonGroup(MotionGroupCore):
     def terms(self) -> MotionTerms:
         """Read what a person must know before the robot moves."""
         (number,) = self._link.session.exchange("GetCurRobot").fields
-        return MotionTerms(
-            tr("Robot {number}, in Power Low,", number=spel.parse_integer(number)),
-            tr(
-                "The controller stops when this PC is silent for {timeout:g} s.",
-                timeout=self._remote_timeout_s,
-            ),
+        watch = tr(
+            "The controller stops when this PC is silent for {timeout:g} s.",
+            timeout=self._remote_timeout_s,
         )
+        base = self.base()
+        if base is not None and any(base):
+            moved = tr(
+                "Its positions count from a base (Base) that stands at {place} in the robot: what "
+                "was taught or learned while the base stood elsewhere is another place now.",
+                place=" ".join(f"{axis} {at:g}" for axis, at in zip("XYZUVW", base, strict=True)),
+            )
+            watch = joined(" ", (watch, moved))
+        return MotionTerms(
+            tr("Robot {number}, in Power Low,", number=spel.parse_integer(number)), watch
+        )
+
+    def base(self) -> tuple[float, ...] | None:
+        """Read where the base stands that positions count from.
+
+        Returns:
+            X, Y, Z in mm and U, V, W in degrees, seen from the robot; ``None`` where the
+            controller shows something else than such numbers.
+        """
+        return spel.parse_base(self._link.window.printed(spel.show_base()))
 
     def axes(self) -> dict[str, tuple[float, ...]]:
         """Read the commanded joints and pulses."""

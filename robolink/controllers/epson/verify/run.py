@@ -98,6 +98,7 @@ def _found_out(
         text.point_coordinates(interview),
         text.point_flags(interview),
         text.where_width(interview),
+        text.base(interview),
         text.comma_blank(interview),
         *text.tool_facts(interview),
         _while_executing(interview),

@@ -81,6 +81,18 @@ def where_width(interview: Interview) -> Fact:
     return _fact(interview, spel.where(), tr("width of a value in Where"), "where_width", read)
 
 
+def base(interview: Interview) -> Fact:
+    """Where the base stands that positions count from (docs/reference/spel.md 5.4)."""
+
+    def read(text: str) -> tuple[str, OptionValue] | None:
+        place = spel.parse_base(text)
+        if place is None:
+            return None
+        return (" ".join(f"{at:g}" for at in place) if any(place) else tr("that of the robot")), ""
+
+    return _fact(interview, spel.show_base(), tr("base of positions (Base)"), "", read)
+
+
 def comma_blank(interview: Interview) -> Fact:
     """What a comma in Print leaves between two texts (docs/reference/spel.md 3.2)."""
 

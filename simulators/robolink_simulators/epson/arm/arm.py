@@ -129,6 +129,8 @@ class Arm:
     Attributes:
         motions: Those begun since the arm was made.
         backlash_mm: Play of a SCARA's joint 3, likewise; none at first.
+        travelled_until_ns: Until when the motion under way has gone, or the last one went.
+        followed: Told of each part of a motion, from when to when, before its end is forgotten.
         added_in_force: Whether motions are of an added arm; what is mounted stays on the own one.
         on_travelled: Told of each motion when it is over.
         guard: Cuts the legs of a motion short where the drives would stop it.
@@ -144,12 +146,14 @@ class Arm:
         self.motions = MotionLog()
         self.backlash_deg = backlash_deg
         self.backlash_mm = 0.0
+        self.followed: Callable[[int, int], None] | None = None
         self.added_in_force = False
         self.on_travelled: Callable[[Travelled], None] = _heedless
         self.guard: Callable[[Sequence[Leg]], Sequence[Leg]] = _whole
         self.origin_errors: tuple[float, ...] = (0.0,) * model.axes
         self._joints = joints
         self._now_ns = 0
+        self.travelled_until_ns = 0
         self._travel: _Travel | None = None
         self._seen: tuple[_Travel, int, Pose] | None = None
         self._turned: _Ways = (0.0,) * model.axes
@@ -265,6 +269,9 @@ class Arm:
         since_ns, self._now_ns = self._now_ns, max(self._now_ns, now_ns)
         if self._travel is None:
             return
+        self.travelled_until_ns = min(self._now_ns, self._travel.end_ns)
+        if self.followed is not None:
+            self.followed(since_ns, self.travelled_until_ns)
         for instant_ns in self._travel.looks(since_ns, self._now_ns):
             self._take_up(self._travel.joints_at(instant_ns))
         if self._now_ns >= self._travel.end_ns:

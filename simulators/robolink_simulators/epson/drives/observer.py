@@ -79,6 +79,11 @@ class DriveObserver:
         self._seen_ns = 0
         self._last: deque[Travelled] = deque(maxlen=_KEPT)
 
+    def forget(self) -> None:
+        """Forget all that was measured, and the motions of the last minute."""
+        self._measured.clear()
+        self._last.clear()
+
     def clear(self, quantity: DriveQuantity, joints: Iterable[int]) -> None:
         """Begin to measure a quantity of some joints, by their numbers."""
         self._catch_up()

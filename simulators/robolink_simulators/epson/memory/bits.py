@@ -1,7 +1,10 @@
-"""A row of input, output or memory bits, read by bit or by byte."""
+"""A row of input, output or memory bits, read by bit or by byte, and the names of such bits.
+
+Source: docs/reference/spel.md 8.
+"""
 
 import struct
-from typing import Final
+from typing import Final, NamedTuple
 
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
@@ -13,6 +16,31 @@ MEMORY_BITS: Final = 1024
 used)."""
 
 _REAL: Final = struct.Struct("<f")
+
+
+INPUT: Final = 0
+OUTPUT: Final = 1
+MEMORY: Final = 2
+
+BIT: Final = 1
+BYTE: Final = 8
+WORD: Final = 16
+
+
+class IOLabel(NamedTuple):
+    """What a name stands for that a project gives inputs, outputs or memory bits.
+
+    Attributes:
+        kind: Input, output or memory (IOTYPE_INPUT, IOTYPE_OUTPUT, IOTYPE_MEMORY).
+        width: Bits of the port: 1, 8 or 16 (IOSIZE_BIT, IOSIZE_BYTE, IOSIZE_WORD).
+        number: Its number among those of its kind and width.
+        name: As it is written.
+    """
+
+    kind: int
+    width: int
+    number: int
+    name: str
 
 
 class BitBank:

@@ -33,6 +33,7 @@ from robolink_simulators.epson.drives.torque import CarriedLoad
 from robolink_simulators.epson.memory.control_points import ControlPoints
 from robolink_simulators.epson.memory.pallets import PalletTable
 from robolink_simulators.epson.memory.points import LocalTable, Point, PointTable
+from robolink_simulators.epson.memory.position_latch import PositionLatch
 from robolink_simulators.epson.memory.tools import ToolMemory
 
 
@@ -76,6 +77,9 @@ class DrivenRobot:
         found: Where the last Find met its condition, the selected tool's tip.
         motors_on: Whether the motors are on.
         power_high: Whether power is high; low after anything that resets the parameters.
+        jump: When the last Jump began, and how long its three parts were to take, in ns.
+        recovers_to: Where it was when the safeguard opened, until it is back there.
+        latch: Takes its position at edges of an input.
         reservation: The motion that waits for SyncRobots, if whoever gave it still does.
         opened_brakes: Joints whose brake was opened by hand while the motors are off.
     """
@@ -103,6 +107,9 @@ class DrivenRobot:
         self.kept = KeptDefinitions(model.arm_values, ranges, base, origins)
         self.opened_brakes = set[int]()
         self.reservation: ReservedMotion | None = None
+        self.latch = PositionLatch(self.arm)
+        self.jump: tuple[int, tuple[int, ...]] | None = None
+        self.recovers_to: Joints | None = None
         self.drives = DriveSettings(model.axes)
         limits = TorqueLimits(lambda: self.drives, lambda: self.power_high)
         self.observer = DriveObserver(self.arm, self._load, limits.shares)
@@ -315,6 +322,9 @@ class DrivenRobot:
         """Forget what a power cycle takes: all but tools, HomeSet and its place."""
         self.arm.halt(now_ns)
         self.reservation = None
+        self.observer.forget()
+        self.latch.forget()
+        self.jump = self.recovers_to = None
         self.switch_motors(False)
         self.reset_motion_parameters()
         home, order = self.settings.home_pulses, self.settings.home_order

@@ -19,7 +19,11 @@ InputsAsked = dict[int, bool]
 
 
 class InputBits(BitBank):
-    """Inputs of a controller."""
+    """Inputs of a controller.
+
+    Attributes:
+        listeners: Told of each input that is switched by hand, and whether it is on now.
+    """
 
     def __init__(self, size: int) -> None:
         super().__init__(size)
@@ -27,6 +31,7 @@ class InputBits(BitBank):
         self._instant_ns: int | None = None
         self._asked: InputsAsked | None = None
         self._counts: dict[int, int] = {}
+        self.listeners = list[Callable[[int, bool], None]]()
 
     @property
     def connected(self) -> bool:
@@ -37,6 +42,10 @@ class InputBits(BitBank):
     def instant_ns(self) -> int | None:
         """The instant that is looked at inside :meth:`as_at`, ``None`` for the present."""
         return self._instant_ns
+
+    def follows(self, number: int) -> bool:
+        """Tell whether an input follows what the robot meets."""
+        return number in self._senses
 
     def connect(self, number: int, sense: Sense) -> None:
         """Let an input follow something whose state depends on where the robot is.
@@ -62,6 +71,8 @@ class InputBits(BitBank):
         self._senses.pop(number, None)
         if rises and number in self._counts:
             self._counts[number] = min(self._counts[number] + 1, _HIGHEST_COUNT)
+        for listener in self.listeners:
+            listener(number, on)
 
     def set_byte(self, port: int, value: int) -> None:
         """Switch eight bits by hand."""
@@ -107,3 +118,14 @@ class InputBits(BitBank):
             yield asked
         finally:
             self._asked = None
+
+
+def first_between(before_ns: int, after_ns: int, holds: Callable[[int], bool]) -> int:
+    """Return the first instant at which something holds, to the nanosecond."""
+    while after_ns - before_ns > 1:
+        middle_ns = (before_ns + after_ns) // 2
+        if holds(middle_ns):
+            after_ns = middle_ns
+        else:
+            before_ns = middle_ns
+    return after_ns

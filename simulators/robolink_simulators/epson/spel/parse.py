@@ -36,9 +36,9 @@ _WORDS_NOT_SIMULATED = """
     areacorrectionclr areacorrectionset chdisk
     dispdev enctemper msgbox opencom opennet parsestr shutdown
     taskstate closecom closenet close cls eresume error flush fmtstr
-    input inputbox latchenable line randomize read redim
-    resetelapsedtime setcom setlatch setnet signal simset taskwait tmreset toff ton vcal
-    vcalpoints waitnet waitsig write writebin cont restart recover vdefgetmotionrange
+    input inputbox line randomize read redim
+    resetelapsedtime setcom setnet signal simset taskwait tmreset toff ton vcal
+    vcalpoints waitnet waitsig write writebin cont restart vdefgetmotionrange
     vdefsetmotionrange vshowmodel vtrain sysconfig workque_list cnv_quelist history clearhistory
 """
 
@@ -72,9 +72,9 @@ _OF_PROGRAMS_ALONE = """
 
 _UNSIMULATED_FUNCTIONS = """
     opencom chkcom currobot sense till vxcalinfo vxcalpoints
-    hand_on hand_off aio_in aio_inw aio_out aio_outw recover latchpos recoverpos lookup alignecp
+    hand_on hand_off aio_in aio_inw aio_out aio_outw lookup
     areacorrection areacorrectiondef
-    rotok taskstate tmout dispdev windowsstatus loadtype projectname$
+    taskstate tmout dispdev loadtype
     robotname joint restart setcom here eval
 """
 

@@ -59,6 +59,7 @@ class Session:
         memory: What earlier statements have set.
         files: The folder that file statements reach.
         point_files: The point files of the project, by their names in lower case.
+        project_name: What the project is called.
     """
 
     machine: Machine
@@ -70,3 +71,4 @@ class Session:
     memory: WindowMemory = field(default_factory=WindowMemory)
     files: FileFolder = field(default_factory=FileFolder)
     point_files: dict[str, PointFile] = field(default_factory=dict)
+    project_name: str = ""

@@ -5,6 +5,7 @@ from robolink.model import Controller, Pose, ToolReceipt
 from robolink.nozzle_change import AcceptanceCriteria, Listener, Proposal
 from robolink_cli.options.impact import ImpactRequest, judge
 from robolink_cli.options.report import ReportDraft
+from robolink_cli.prompts.present import present_desk
 from robolink_cli.views.calibration import show_proposal, show_verdicts
 
 
@@ -40,6 +41,11 @@ class CalibrationListener(Listener):
     def propose(self, proposal: Proposal, *, source: str, warnings: tuple[str, ...]) -> None:
         """Show the proposal, the verdict, and what it means for taught points."""
         self.impact = judge(self._points, old=proposal.before, new=proposal.offset)
+        desk = present_desk()
+        if desk is not None and self.impact is not None:
+            from robolink_cli.wizard.happenings import TaughtPoints
+
+            desk.regard(TaughtPoints(self.impact))
         self._draft.propose(proposal, source=source, warnings=warnings, impact=self.impact)
         show_proposal(proposal)
         show_verdicts(self._criteria.verdicts(proposal))

@@ -26,7 +26,6 @@ from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
 _STEPS_A_SPAN: Final = 20
 _SAME: Final = 1e-9
-_WITH_QUATERNION: Final = 7
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +57,9 @@ class SmoothWay:
         """
         first_deg = self.places[0][3]
         pairs = zip(self.places, self.turns_deg(), strict=True)
-        return replace(self, places=tuple((*at[:3], first_deg + turn) for at, turn in pairs))
+        return replace(
+            self, places=tuple((*at[:3], first_deg + turn, *at[4:]) for at, turn in pairs)
+        )
 
     def turns_deg(self) -> list[float]:
         """Return how far the direction in the plane has turned at each place, whole turns too."""
@@ -96,23 +97,16 @@ def through(places: Sequence[Place], *, closed: bool) -> SmoothWay:
     return SmoothWay(shares, tuple(fine), lengths[-1])
 
 
-def same_sign(turn: Place, like: Place) -> Place:
-    """Return a place with the quaternion that is nearer to another's; both signs are one turn.
-
-    Places without a quaternion stay.
-    """
-    if len(turn) != _WITH_QUATERNION:
-        return turn
-    if sum(a * b for a, b in zip(turn[3:], like[3:], strict=True)) >= 0:
-        return turn
-    return (*turn[:3], *(-value for value in turn[3:]))
+def _on_by(place: Place, around: Sequence[float], rounds: int) -> Place:
+    """Return a place of a closed curve as it is met a round later, or before."""
+    return tuple(value + rounds * on for value, on in zip(place, around, strict=True))
 
 
 def _slopes(places: Sequence[Place], *, closed: bool) -> list[Place]:
     line = list(places)
+    around = [last - first for first, last in zip(places[0], places[-1], strict=True)]
     if closed:
-        before, after = same_sign(places[-2], places[0]), same_sign(places[1], places[-1])
-        line = [before, *places, after]
+        line = [_on_by(places[-2], around, -1), *places, _on_by(places[1], around, 1)]
     chords = [math.dist(a[:3], b[:3]) for a, b in pairwise(line)]
     rises = [
         tuple((b - a) / chord for a, b in zip(p, q, strict=True))

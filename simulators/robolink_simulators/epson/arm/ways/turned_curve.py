@@ -1,17 +1,14 @@
 """A smooth way on which more than U turns: of six axes, or past an external control point.
 
-Places have the position, in mm, and the orientation of the tip: U in degrees on four axes, a unit
-quaternion on six. With an external control point the position is that of the point as the workpiece
-sees it. How position and orientation run between the points is assumed: each number by the cubics
-of :func:`curve.through`, the quaternion brought back to length 1
-(docs/reference/spel.md 7.1).
+Places have the position, in mm, and the orientation of the tip: U in degrees on four axes, U, V and
+W on six. With an external control point the position is that of the point as the workpiece sees it.
+Each number runs by cubics of its own (documented; docs/reference/spel.md 7.1), from point to point
+by the nearest turn (assumed).
 """
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import accumulate, pairwise
-from typing import Final
 
 from robolink.model import Pose, ToolOffset
 from robolink_simulators.cell.frames import (
@@ -21,21 +18,19 @@ from robolink_simulators.cell.frames import (
     about,
     axis_and_angle,
     product,
-    scale,
     subtract,
     transposed,
     turned,
+    zyx,
 )
-from robolink_simulators.epson.arm.joints import Joints
+from robolink_simulators.epson.arm.joints import Joints, nearest_turn
 from robolink_simulators.epson.arm.kinematics import frame_of
 from robolink_simulators.epson.arm.robot_settings import SingularSurroundings
 from robolink_simulators.epson.arm.robots import RobotModel
 from robolink_simulators.epson.arm.tilted_legs import TiltedLeg, carried_by, plan_course
 from robolink_simulators.epson.arm.trajectory import LinePace
-from robolink_simulators.epson.arm.ways.curve import SmoothWay, same_sign, through
+from robolink_simulators.epson.arm.ways.curve import SmoothWay, through
 from robolink_simulators.epson.definitions.curves import Place
-
-_STILL: Final = 1e-12
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,28 +71,9 @@ def smooth_course_through(
         Refusal: Two neighbours are one place, of the tip or of the point over the workpiece.
     """
     places = [_place(model, tip, point) for tip in tips]
-    return through(list(accumulate(places, lambda a, b: same_sign(b, a))), closed=closed)
-
-
-def following(way: SmoothWay) -> SmoothWay:
-    """Return a way of six axes on which the tool turns about the base's Z with the way's direction.
-
-    Tangential correction keeps the tool along the curve in the XY plane (documented). The
-    quaternions of ``way`` are those of the points with the U of the first.
-    """
-    places = list[Place]()
-    for at, turn_deg in zip(way.places, way.turns_deg(), strict=True):
-        half_rad = math.radians(turn_deg) / 2
-        cos, sin = math.cos(half_rad), math.sin(half_rad)
-        real, x, y, z = at[3:]
-        turned_about_z = (
-            cos * real - sin * z,
-            cos * x - sin * y,
-            cos * y + sin * x,
-            cos * z + sin * real,
-        )
-        places.append((*at[:3], *turned_about_z))
-    return replace(way, places=tuple(places))
+    if model.six_axes:
+        places = list(accumulate(places, _turned_on))
+    return through(places, closed=closed)
 
 
 def plan_turned_curve(
@@ -130,17 +106,16 @@ def _place(model: RobotModel, tip: Pose, point: Frame | None) -> Place:
     shift = frame.shift_mm if point is None else (frame.inverse() @ point).shift_mm
     if not model.six_axes:
         return (*shift, tip.u_deg)
-    axis, angle_deg = axis_and_angle(frame.rotation)
-    half_rad = math.radians(angle_deg) / 2
-    return (*shift, math.cos(half_rad), *scale(axis, math.sin(half_rad)))
+    return (*shift, tip.u_deg, tip.v_deg, tip.w_deg)
+
+
+def _turned_on(before: Place, place: Place) -> Place:
+    """Return a place whose angles are those nearest to another's."""
+    angles = (nearest_turn(new, old) for old, new in zip(before[3:], place[3:], strict=True))
+    return (*place[:3], *angles)
 
 
 def _rotation(orientation: Sequence[float]) -> Matrix:
     if len(orientation) == 1:
         return about(Z_AXIS, orientation[0])
-    real, x, y, z = orientation
-    across = math.hypot(x, y, z)
-    if across < _STILL:
-        return about(Z_AXIS, 0.0)
-    axis = (x / across, y / across, z / across)
-    return about(axis, math.degrees(2 * math.atan2(across, real)))
+    return zyx(*orientation)

@@ -43,10 +43,14 @@ def begin_motion(evaluator: Evaluator, motion: MotionStatement, start_ns: int) -
     legs, until = plan(evaluator, motion), motion.options.until
     machine.till_met = machine.sensed = False
     way_ns = _travelled_ns(motion, legs)
+    if motion.verb.startswith("jump"):
+        machine.robot.jump = start_ns, tuple(leg.duration_ns for leg in legs)
     if evaluator.blends and blends(machine, motion):
-        end_ns = machine.arm.start(legs, start_ns)
-        outcome = StatementOutcome(duration_ns=end_ns - start_ns - fall_ns(legs[-1]))
-        return MotionStart(outcome, legs[-1], travelled_ns=way_ns)
+        lasts_ns = machine.arm.start(legs, start_ns) - start_ns
+        if lasts_ns >= sum(leg.duration_ns for leg in legs):
+            # What the drives cut short does not slow down before it rests.
+            lasts_ns -= fall_ns(legs[-1])
+        return MotionStart(StatementOutcome(duration_ns=lasts_ns), legs[-1], travelled_ns=way_ns)
     if until is None:
         return MotionStart(StatementOutcome(legs=legs), travelled_ns=way_ns)
     if until.word == "sense":

@@ -9,15 +9,17 @@ from typing import Final
 
 from robolink.timing import NS_PER_S
 from robolink_simulators.epson.arm.trajectory import Leg
+from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.execution.instant_effects import effect
 from robolink_simulators.epson.spel.execution.motion_start import begin_motion
+from robolink_simulators.epson.spel.execution.recovering import recover
 from robolink_simulators.epson.spel.execution.settling import settling_ns
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.values import truth
 from robolink_simulators.epson.spel.statements.blending import rest_of_way
 from robolink_simulators.epson.spel.statements.keywords import StatementOutcome
-from robolink_simulators.epson.spel.statements.motion import plan
+from robolink_simulators.epson.spel.statements.motion import plan, require_drives
 from robolink_simulators.epson.spel.statements.until import DescentWatch, Watch
 from robolink_simulators.epson.spel.statements.waiting import (
     NEVER_NS,
@@ -130,7 +132,7 @@ class StatementExecution:
             self._held = True
         elif self.travels:
             self._evaluator.session.machine.arm.halt(now_ns)
-        else:
+        elif now_ns >= self._busy_until_ns:  # else the safeguard has stopped it just now
             self._aim = None
 
     def go_on(self, now_ns: int) -> None:
@@ -141,11 +143,18 @@ class StatementExecution:
         """
         machine = self._evaluator.session.machine
         self._seen_ns = now_ns
+        try:
+            self._resume(machine, now_ns)
+        except SpelRefusal as refusal:
+            self.refuse(refusal)
+
+    def _resume(self, machine: Machine, now_ns: int) -> None:
         if self._reserved is not None:
             self._held = False
             if self._released:
                 self.start_reserved(now_ns)
         elif self._aim is not None:
+            require_drives(machine)
             self._busy_until_ns = machine.arm.start([rest_of_way(machine, self._aim)], now_ns)
         elif self._waiting is not None:
             self._waiting.restart(now_ns)
@@ -193,7 +202,7 @@ class StatementExecution:
     def due_ns(self, seen_ns: int) -> int:
         """Return when it has to be looked at again."""
         self.saw(seen_ns)
-        return NEVER_NS if self._done else self._change_ns
+        return seen_ns + 1 if self._done else self._change_ns
 
     def _go_on_meanwhile(self, now_ns: int) -> None:
         """Carry out what is due of that which stands inside ``!...!``."""
@@ -341,6 +350,8 @@ class StatementExecution:
         match statement:
             case KeywordStatement("wait"):
                 return self._wait(statement)
+            case KeywordStatement("recover"):
+                return StatementOutcome(duration_ns=recover(self._evaluator, statement))
             case If():
                 return self._branch(statement)
             case MotionStatement(verb) if verb != "curve":

@@ -14,7 +14,10 @@ _NUMBERS = """
     iotype_input=0 iotype_output=1 iotype_memory=2 iosize_bit=1 iosize_byte=8 iosize_word=16
     langid_english=0 langid_japanese=1 langid_german=2 langid_french=3 langid_simplified_chinese=4
     langid_traditional_chinese=5 withmove=0 withoutmove=1 shutdown_all=0 shutdown_restart=1
-    shutdown_epsonrc2=2 mode_standard=0 mode_boost=1 mode_low=2 devid_self=21 devid_tp=24
+    setlatch_port_cu_0=24 setlatch_port_cu_1=25 setlatch_port_cu_2=26 setlatch_port_cu_3=27
+    setlatch_triggermode_trailingedge=0 setlatch_triggermode_leadingedge=1 withtoolarm=0
+    withouttoolarm=1 shutdown_epsonrc2=2
+    mode_standard=0 mode_boost=1 mode_low=2 devid_self=21 devid_tp=24
 """
 
 CONSTANTS: Final[dict[str, Value]] = {

@@ -24,12 +24,20 @@ from robolink_simulators.epson.spel.expressions.defined.differences import (
     turned_tool,
 )
 from robolink_simulators.epson.spel.expressions.defined.drive_settings import DRIVE_FUNCTIONS
+from robolink_simulators.epson.spel.expressions.defined.orientations import (
+    ORIENTATION_FUNCTIONS,
+    aligned,
+)
 from robolink_simulators.epson.spel.expressions.defined.origins import (
     NS_PER_HOUR,
     ORIGIN_FUNCTIONS,
 )
 from robolink_simulators.epson.spel.expressions.defined.torques import TORQUE_FUNCTIONS
 from robolink_simulators.epson.spel.expressions.defined.travel_times import TRAVEL_FUNCTIONS
+from robolink_simulators.epson.spel.expressions.defined.unfinished import (
+    UNFINISHED_FUNCTIONS,
+    place_to_recover,
+)
 from robolink_simulators.epson.spel.expressions.defined.xy_limits import (
     LIMIT_FUNCTIONS,
     corner_of_limits,
@@ -188,6 +196,8 @@ MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     **TORQUE_FUNCTIONS,
     **TRAVEL_FUNCTIONS,
     **ORIGIN_FUNCTIONS,
+    **ORIENTATION_FUNCTIONS,
+    **UNFINISHED_FUNCTIONS,
     "pagl": (range(2, 3), joint_of_point),
     "ppls": (range(2, 3), pulses_of_point),
     "avoidsingularity": (range(1), lambda s, _: s.machine.settings.avoid_singularity),
@@ -255,6 +265,7 @@ MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     "iodef": (range(1, 2), lambda s, a: as_text(a[0]).lower() in s.machine.io_labels),
     "pnumber": (range(1, 2), _point_number),
     "vxcalinfo": (range(2, 3), _calibration_information),
+    "latchstate": (range(1), lambda s, _: s.machine.robot.latch.complete),
     "syncrobots": (range(1), _reserved),
     "ctrldev": (range(1), lambda s, _: s.machine.control_device),
 }
@@ -330,6 +341,16 @@ def _found_position(session: Session, _: Arguments) -> Point:
     return session.machine.found
 
 
+def _latched_position(session: Session, arguments: Arguments) -> Point:
+    """LatchPos([WithToolArm | WithoutToolArm[, number]]): of the tool in force, or Tool 0."""
+    robot, numbers = session.machine.robot, [as_integer(argument) for argument in arguments]
+    bare, number = (*numbers, 0, 1)[:2] if len(numbers) != 1 else (numbers[0], 1)
+    if bare not in (0, 1):
+        raise out_of_range(f"LatchPos({bare})")
+    joints = robot.latch.position(number)
+    return robot.point_at(forward(robot.model, joints) if bare else robot.tip_at(joints))
+
+
 def _tool_point(session: Session, arguments: Arguments) -> Point:
     tool = as_integer(arguments[0])
     offset = session.machine.tools.get(tool)
@@ -361,6 +382,10 @@ POINT_FUNCTIONS: Final[dict[str, tuple[range, PointFunction]]] = {
     "curpos": (range(1), _here),
     "realpos": (range(1), _real_position),
     "findpos": (range(1), _found_position),
+    "latchpos": (range(3), _latched_position),
+    "recoverpos": (range(2), place_to_recover),
+    "align": (range(1, 4), aligned),
+    "alignecp": (range(2, 3), aligned),
     "tlset": (range(1, 2), _tool_point),
     "local": (range(1, 2), _local_point),
     "xylim": (range(1, 2), corner_of_limits),

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 from typing import Final
 
-from robolink_simulators.epson.memory.io_labels import (
+from robolink_simulators.epson.memory.bits import (
     BIT,
     BYTE,
     INPUT,

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
-from robolink_simulators.epson.memory.io_labels import IOLabel
+from robolink_simulators.epson.memory.bits import IOLabel
 from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.epson.spel.programs.io_label_file import read_io_labels

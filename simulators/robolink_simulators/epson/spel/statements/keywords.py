@@ -35,7 +35,7 @@ from robolink_simulators.epson.spel.statements.defined.sync import SYNC_STATEMEN
 from robolink_simulators.epson.spel.statements.defined.xy_limits import require_within_limits
 from robolink_simulators.epson.spel.statements.motion import require_drives
 from robolink_simulators.epson.spel.statements.points import POINT_STATEMENTS, point_argument
-from robolink_simulators.epson.spel.statements.ports_and_bits import BIT_STATEMENTS
+from robolink_simulators.epson.spel.statements.ports_and_bits import BIT_STATEMENTS, set_latch
 from robolink_simulators.epson.spel.statements.robot import ROBOT_SETTINGS
 from robolink_simulators.epson.spel.statements.settings import SETTINGS, accel
 from robolink_simulators.epson.spel.statements.waiting import (
@@ -44,6 +44,9 @@ from robolink_simulators.epson.spel.statements.waiting import (
     shown_condition,
 )
 from robolink_simulators.epson.spel.tree import Expression, KeywordStatement
+
+LATCH_SETTING_NS: Final = 40_000_000
+"""How long SetLatch takes (documented, p. 721)."""
 
 SHORTEST_PULSE_S: Final = 0.01
 LONGEST_PULSE_S: Final = 10.0
@@ -319,6 +322,11 @@ def _reset(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
     return StatementOutcome()
 
 
+def _set_latch(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
+    set_latch(evaluator, command)
+    return StatementOutcome(duration_ns=LATCH_SETTING_NS)
+
+
 _MAY_END_OPEN: Final = frozenset({"plist", "plane"})
 
 _AT_ONCE: Final = {
@@ -360,4 +368,5 @@ _HANDLERS: Final[dict[str, Callable[[Evaluator, KeywordStatement], StatementOutc
     "find": _keep_condition,
     "sense": _keep_condition,
     "reset": _reset,
+    "setlatch": _set_latch,
 }

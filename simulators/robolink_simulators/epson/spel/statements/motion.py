@@ -5,9 +5,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
-from robolink.model import Pose, rotate_xy
-from robolink_simulators.cell.frames import Frame, add, axis_and_angle, product, transposed
-from robolink_simulators.epson.arm.kinematics import frame_of
+from robolink.model import rotate_xy
+from robolink_simulators.cell.frames import Frame, add, product
 from robolink_simulators.epson.arm.trajectory import Leg
 from robolink_simulators.epson.definitions.arches import GATE, Arch
 from robolink_simulators.epson.definitions.local_frames import (
@@ -18,6 +17,10 @@ from robolink_simulators.epson.definitions.local_frames import (
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+from robolink_simulators.epson.spel.expressions.defined.orientations import (
+    LEAST_TURN_DEG,
+    turn_deg,
+)
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.joint_functions import least_motion
 from robolink_simulators.epson.spel.expressions.values import out_of_range
@@ -34,7 +37,6 @@ from robolink_simulators.epson.spel.tree import (
 )
 
 _SAME_MM = 0.001
-_SAME_DEG = 0.001
 
 # LJM leaves a SCARA's point unchanged (documented); TGo and BGo move six axes
 # the least. An arch rounds Jump; Jump3 comes to rest at its corners under each (assumed).
@@ -222,16 +224,9 @@ def _line(machine: Machine, target: Point, *, rot: bool) -> Leg:
     """
     end, tip = machine.pose_of(target), machine.tip()
     travels = math.dist(end.coordinates()[:3], tip.coordinates()[:3]) > _SAME_MM
-    turns = _turn_deg(machine, tip, end) > _SAME_DEG
+    turns = turn_deg(machine, tip, end) > LEAST_TURN_DEG
     if turns and not travels and not rot:
         raise out_of_range("The motion only turns the tool: ROT is needed")
     if rot and travels and not turns:
         raise out_of_range("ROT, but the tool does not turn")
     return line_leg(machine, tip, end, near=machine.arm.joints)
-
-
-def _turn_deg(machine: Machine, start: Pose, end: Pose) -> float:
-    if not machine.model.six_axes:
-        return abs(end.u_deg - start.u_deg)
-    before, after = frame_of(start).rotation, frame_of(end).rotation
-    return axis_and_angle(product(after, transposed(before)))[1]

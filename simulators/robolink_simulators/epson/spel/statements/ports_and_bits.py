@@ -1,16 +1,21 @@
-"""Statements that set virtual inputs and ports in decimal code (docs/reference/spel.md 8)."""
+"""Statements of virtual inputs, ports in decimal code, and inputs that latch a position.
+
+Source: docs/reference/spel.md 7.1, 8.
+"""
 
 from collections.abc import Callable
 from typing import Final
 
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
+from robolink_simulators.epson.spel.expressions.printing import CRLF
 from robolink_simulators.epson.spel.expressions.values import out_of_range
 from robolink_simulators.epson.spel.tree import KeywordStatement
 
 _HIGHEST_BYTE: Final = 0xFF
 _HIGHEST_WORD: Final = 0xFFFF
 _HIGHEST_DECIMAL: Final = 99
+_FEWEST_OF_A_LATCH: Final = 2
 
 
 def _two(evaluator: Evaluator, command: KeywordStatement) -> tuple[int, int]:
@@ -81,6 +86,29 @@ def _reset_counter(evaluator: Evaluator, command: KeywordStatement) -> str:
     return ""
 
 
+def set_latch(evaluator: Evaluator, command: KeywordStatement) -> None:
+    """SetLatch input, edge[, times]: what LatchEnable looks out for."""
+    numbers = [evaluator.integer(argument) for argument in command.arguments]
+    if not _FEWEST_OF_A_LATCH <= len(numbers) <= _FEWEST_OF_A_LATCH + 1:
+        raise SpelRefusal(RefusalKind.SYNTAX, "SetLatch takes an input, an edge and a number")
+    port, edge, *times = numbers
+    if edge not in (0, 1):
+        raise out_of_range(f"There is no edge {edge}")
+    latch = evaluator.session.machine.robot.latch
+    latch.set(port, rising=bool(edge), times=times[0] if times else 1)
+
+
+def _enable_latch(evaluator: Evaluator, command: KeywordStatement) -> str:
+    """LatchEnable On or Off, or what it is; how that is shown is assumed."""
+    latch = evaluator.session.machine.robot.latch
+    if not command.arguments:
+        return ("ON" if latch.enabled else "OFF") + CRLF
+    if len(command.arguments) > 1:
+        raise SpelRefusal(RefusalKind.SYNTAX, "LatchEnable takes On or Off")
+    latch.enable(bool(evaluator.integer(command.arguments[0])))
+    return ""
+
+
 BIT_STATEMENTS: Final[dict[str, Callable[[Evaluator, KeywordStatement], str]]] = {
     "setsw": _set_switch,
     "setin": _set_byte,
@@ -89,5 +117,6 @@ BIT_STATEMENTS: Final[dict[str, Callable[[Evaluator, KeywordStatement], str]]] =
     "outreal": _set_real,
     "opbcd": _decimal,
     "ctreset": _reset_counter,
+    "latchenable": _enable_latch,
 }
 """Keyword to what carries it out."""

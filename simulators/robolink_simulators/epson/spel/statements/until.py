@@ -7,10 +7,9 @@ motion starts, because the motion is; an input that is switched by hand is seen 
 brakes with the motion's own deceleration (documented).
 """
 
-from collections.abc import Callable
 from typing import Final
 
-from robolink_simulators.epson.memory.input_bits import InputsAsked
+from robolink_simulators.epson.memory.input_bits import InputsAsked, first_between
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.values import truth
 from robolink_simulators.epson.spel.statements.waiting import follows_robot
@@ -65,7 +64,7 @@ class Watch:
         while before_ns < end_ns:
             after_ns = min(before_ns + _SAMPLE_NS, end_ns)
             if scan.holds(after_ns):
-                self._edge_ns = _first_between(before_ns, after_ns, scan.holds)
+                self._edge_ns = first_between(before_ns, after_ns, scan.holds)
                 return
             before_ns = after_ns
 
@@ -157,17 +156,6 @@ class DescentWatch:
             return None
         session.machine.arm.halt(instant_ns)
         return instant_ns
-
-
-def _first_between(before_ns: int, after_ns: int, holds: Callable[[int], bool]) -> int:
-    """Return the first instant at which something holds, to the nanosecond."""
-    while after_ns - before_ns > 1:
-        middle_ns = (before_ns + after_ns) // 2
-        if holds(middle_ns):
-            after_ns = middle_ns
-        else:
-            before_ns = middle_ns
-    return after_ns
 
 
 def _inputs_alone(expression: Expression) -> bool:

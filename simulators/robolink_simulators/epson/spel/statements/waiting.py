@@ -41,7 +41,7 @@ LOOK_NS: Final = 2_000_000
 
 _OF_THE_PLACE = """
     getrobotinsidebox getrobotinsideplane insidebox insideplane athome inpos here curpos realpos
-    agl pls realpls tcpspeed stat robotinfo
+    agl pls realpls tcpspeed stat robotinfo latchstate
 """
 _OF_THE_ROBOT: Final = frozenset(_OF_THE_PLACE.split())
 _OF_INPUTS: Final = frozenset({"sw", "in", "inw", "inbcd", "inreal"})

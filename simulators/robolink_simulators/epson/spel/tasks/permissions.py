@@ -14,7 +14,7 @@ _WORDS = """
     tlclr tool weight till find sense jtran arch armclr xylim xylimclr xylimmode limzmargin
     finedist performmode ptpboost qpdecelr qpdecels tclim tcspeed limittorque qp olaccel softcp
     speedrlimitation tc jrange ptran hordr finedist calib mcal mcordr homeclr
-    syncrobots
+    syncrobots latchenable setlatch
 """
 FORBIDDEN: Final = frozenset(_WORDS.split())
 _ALONE: Final = frozenset({"home", "slock", "xylimclr", "mcal", "homeclr"})

@@ -24,7 +24,7 @@ from robolink_simulators.epson.spel.tasks.waits import (
     StatementWaiting,
     TaskWaiting,
 )
-from robolink_simulators.epson.spel.tree import ByReference, Expression, Name
+from robolink_simulators.epson.spel.tree import ByReference, Expression, KeywordStatement, Name
 
 
 def _plain(item: Expression) -> Expression:
@@ -149,6 +149,22 @@ def evaluated(emitter: Emitter, arguments: Sequence[Expression], slot: int) -> O
     return go
 
 
+def recovered(_: Emitter, arguments: Sequence[Expression], slot: int) -> Operation:
+    """Recover([robot | All[, way]]) as a function: carried out, and whether it came to its end."""
+    command = KeywordStatement("recover", tuple(arguments), open_ended=False)
+
+    def carrying_out(t: SpelTask, running: StatementWaiting) -> Iterator[TaskWaiting]:
+        yield running
+        t.now_ns = max(t.now_ns, running.execution.ended_ns)
+        t.results[slot] = running.execution.error is None
+
+    def go(t: SpelTask) -> TaskWaiting:
+        running = StatementWaiting(t.runner.steps.carried_out(t, command))
+        return OneAfterAnother(carrying_out(t, running))
+
+    return go
+
+
 def _evaluate(emitter: Emitter, node: Call) -> Operation:
     return evaluated(emitter, node.arguments, emitter.slot())
 
@@ -170,6 +186,7 @@ PROCEDURES: Final[dict[str, Callable[[Emitter, Call], Operation]]] = {
 FUNCTIONS_OF_ARRAYS: Final[dict[str, Callable[[Emitter, Sequence[Expression], int], Operation]]] = {
     "parsestr": parse_text,
     "eval": evaluated,
+    "recover": recovered,
     "ubound": upper_bound,
 }
 """Functions that take a variable itself, and not what it holds."""

@@ -15,7 +15,6 @@ from robolink_simulators.epson.arm.tilted_legs import TiltedLeg, require_same_po
 from robolink_simulators.epson.arm.trajectory import Leg
 from robolink_simulators.epson.arm.ways.curve import CurveLeg, SmoothWay, plan_curve, through, when
 from robolink_simulators.epson.arm.ways.turned_curve import (
-    following,
     plan_turned_curve,
     smooth_course_through,
 )
@@ -128,12 +127,9 @@ def _smooth_way(machine: Machine, curve: FreeCurve) -> SmoothWay:
     if not machine.model.six_axes and point is None:
         way = through(curve.places, closed=closed)
         return way.along_itself() if curve.tangential else way
-    places = curve.places
-    if curve.tangential:
-        places = tuple((*place[:3], places[0][3], *place[4:]) for place in places)
-    tips = [_pose(place) for place in places]
+    tips = [_pose(place) for place in curve.places]
     way = smooth_course_through(machine.model, tips, point=point, closed=closed)
-    return following(way) if curve.tangential else way
+    return way.along_itself() if curve.tangential else way
 
 
 def curve_leg(evaluator: Evaluator, motion: MotionStatement) -> Leg:

@@ -238,6 +238,15 @@ class Controller(Protocol):
         Raises:
             ConfigError: That is impossible; nothing may be sent.
             BusyError: Another process has the controller.
+
+        Example:
+            >>> import robolink
+            >>> from robolink.model import MarkerKind
+            >>> with robolink.connect("epson+sim://begin-example") as controller:
+            ...     marker = controller.begin(MarkerKind.CHANGE, "change of tool 1", {"tools": {}})
+            ...     controller.finish(marker)
+            >>> marker.request
+            'change of tool 1'
         """
 
     def finish(self, marker: Marker, *entries: NewEntry) -> None:

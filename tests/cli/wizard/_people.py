@@ -48,7 +48,7 @@ def write_subject(*tools):
     old = ToolOffset(11.998, -3.502, -20.0)
     result = solve_two_pose(first, second, stored=old)
     proposals = tuple(Proposal(tool, old, result) for tool in tools)
-    verdict = LimitVerdict("implausible_change", "Change of the tip", 0.65, 2.0)
+    verdict = LimitVerdict("implausible_change", tr("Change of the tip"), 0.65, 2.0)
     return WriteSubject(proposals, ((verdict,),) * len(tools))
 
 

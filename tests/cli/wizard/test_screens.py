@@ -230,3 +230,11 @@ def test_the_pictures_of_the_pages_are_those_of_the_screens(language_of_page):
     for name in SHOWN:
         path, text = picture(name, language_of_page)
         assert path.read_text(encoding="utf-8") == text, "python -m tests.cli.wizard.pictures"
+
+
+def test_keys_of_a_list_stand_at_the_right_edge_in_every_language(language):
+    hand = checking()
+    rows = screen_of(hand.state, hand.now).rows()
+    keyed = [row for row in rows[3:12] if "[7]" in row or "[3]" in row]
+    assert len(keyed) == 2
+    assert {wcswidth(row) for row in keyed} == {79}, language

@@ -87,7 +87,7 @@ def test_startmain_starts_a_program_from_the_background_once(cell):
     assert made.runner.tasks[1].kind is TaskKind.NORMAL
     made.simulator.advance(3_000_000_000)
     assert "".join(made.runner.console).splitlines() == ["main 1", "2295"]
-    assert made.simulator.condition.task is Task.NONE
+    assert made.simulator.condition.flags().ready
 
 
 def test_startmain_is_refused_from_a_normal_task(cell):

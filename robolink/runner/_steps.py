@@ -185,6 +185,7 @@ class TouchedAt(Pose):
             pose: Where the frame was.
             seconds: How long after the question the person answered, where that is known.
             contact: Whether a contact input was seen off and then on.
+            typed: Whether a person typed the pose.
 
         Example:
             >>> from robolink import Pose

@@ -69,10 +69,14 @@ class Figure:
             self.against or "-",
             "-" if self.floor is None else str(self.floor),
             str(self.ours),
-            "-" if self.ratio is None else f"{self.ratio:.2f}",
+            "-" if self.ratio is None else _short(self.ratio),
             "-" if self.goal is None else f"<= {self.goal:.2f}",
             {True: "met", False: "missed", None: ""}[self.met],
         )
+
+
+def _short(ratio: float) -> str:
+    return f"{ratio:.{2 if ratio >= 0.1 else 3}f}"
 
 
 HEAD = ("what", "floor or peer", "its figure", "robolink", "ratio", "goal", "")

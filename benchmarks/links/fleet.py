@@ -61,7 +61,7 @@ def measure_fleet() -> Iterator[Figure]:
     rate = (Amount(load.per_s, "/s"), wanted, Amount(WANTED_PER_S, "/s"))
     yield Figure(f"exchanges over {ASKED} connections", *rate, WANTED_PER_S / load.per_s, 1.0)
     p99 = (Amount(load.p99_ms, "ms"), wanted, Amount(WANTED_P99_MS, "ms"))
-    yield Figure("   99 of 100 answered within", *p99, load.p99_ms / WANTED_P99_MS, 1.0)
+    yield Figure("99 of 100 of these answered within", *p99, load.p99_ms / WANTED_P99_MS, 1.0)
 
 
 def opened_fleet(count: int) -> dict[str, float]:

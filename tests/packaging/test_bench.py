@@ -65,7 +65,7 @@ def test_the_page_says_what_was_missed_and_whether_the_machine_was_busy(
 
 def test_a_picture_is_well_formed_and_shows_every_point():
     drawn = ElementTree.fromstring(picture(GROWTH))
-    circles = [float(at.get("cy")) for at in drawn.iter("{http://www.w3.org/2000/svg}circle")]
+    circles = [float(at.attrib["cy"]) for at in drawn.iter("{http://www.w3.org/2000/svg}circle")]
     assert len(circles) == 2
     assert circles[0] > circles[1]
 

@@ -68,6 +68,18 @@ def kept_on_site(
         ConfigError: The tool is the selected one, or is not there.
         OutcomeUnknownError: Something earlier is unsettled; or it could not be put back, and
             stays open for ``recover``.
+
+    Example:
+        >>> from robolink import ANY, ToolOffset, connect
+        >>> from robolink.testing import kept_on_site
+        >>> def reach():
+        ...     return connect("epson+sim://site-example")
+        >>> with kept_on_site(reach, "a trial of tool 2", tool=2, agree=lambda controller: None):
+        ...     with reach() as controller:
+        ...         receipt = controller.tools.write(2, ToolOffset(5, 6, -70), expected=ANY)
+        >>> with reach() as controller:
+        ...     print(controller.tools.read(2))
+        None
     """
     with connect(leaves=True) as controller:
         controller.require_settled(reason)

@@ -36,6 +36,21 @@ def test_a_controller_that_keeps_its_promises_is_only_looked_at(run, simulator):
     assert "All 8 promises" in out
 
 
+def test_the_controller_may_stand_behind_the_command_and_is_named_once(simulator, capsys):
+    named = ["check-contract", simulator.url]
+    for line in (named, ["-c", simulator.url, *named]):
+        assert main.run(["--json", *line]) == 0
+        assert json.loads(capsys.readouterr().out)["kept"]
+    other = "sim://epson"
+    for line in (
+        ["-c", other, *named],
+        [*named, "-c", other],
+        ["check-contract", "-c", other, simulator.url],
+    ):
+        assert main.run(line) == 2
+        assert "Two controllers are named" in capsys.readouterr().err
+
+
 class Drifting(dict[int, ToolOffset]):
     """Tools that are others whenever somebody looks."""
 

@@ -12,6 +12,7 @@ from robolink.errors import ConfigError, DeclinedError
 from robolink.messages import declared, tr
 from robolink_cli.console.render import note, say, table
 from robolink_cli.options.consent import yes_option
+from robolink_cli.options.shared import controller_argument
 from robolink_cli.session.context import CliContext, controller_options, emit
 
 if TYPE_CHECKING:
@@ -83,6 +84,7 @@ class _Asked:
     metavar="FILE",
     help=declared("Also write the findings as JUnit XML, for pipelines."),
 )
+@controller_argument
 @controller_options
 @yes_option
 def check_contract(

@@ -286,7 +286,7 @@ class EpsonSimulator(RequestTaking):
         }
 
     def motions(self, after: int = 0) -> Iterator[StartedMotion]:
-        """See :meth:`~robolink_simulators.device.hosted.HostedDevice.motions`; of the robot in force."""
+        """See ``HostedDevice.motions``; those of the robot in force."""
         return self.machine.arm.motions.motions(after)
 
     def restart(self) -> None:

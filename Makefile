@@ -75,9 +75,12 @@ check: $(VENV)/.installed-dev ## Check style, types and who imports whom.
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+# ONLY="fleet solvers" runs some parts. NOISY=yes publishes from a busy machine, and the page says so.
+ONLY :=
+NOISY :=
 .PHONY: bench
-bench: $(VENV)/.installed-dev $(PEER) ## Measure against a raw client and print the ratios.
-	PYTHONPATH=$(PEER) $(BIN)/python -m benchmarks
+bench: $(VENV)/.installed-dev $(PEER) ## Measure against floors and peers, write docs/performance.md; ONLY=fleet prints one part.
+	PYTHONPATH=$(PEER) $(BIN)/python -m benchmarks $(or $(ONLY),--publish $(if $(NOISY),--noisy))
 
 # It asks for some ninety packages; what is measured needs none of them. So it stands beside the
 # others, where only the benchmark sees it. Without it that one figure is left out.

@@ -1,37 +1,119 @@
-"""Print the table of ratios."""
+"""Measure, print the table, write build/bench.json; a whole run on a quiet machine is published.
 
-from benchmarks.exchange import measure_exchange
-from benchmarks.journal import measure_journal
-from benchmarks.kinematics import measure_kinematics
-from benchmarks.mailbox import measure_mailbox
-from benchmarks.nozzle_change import measure_nozzle_change
-from benchmarks.plc_program import measure_plc_program
-from benchmarks.solvers import measure_solvers
-from benchmarks.spel_programs import measure_spel_programs
-from benchmarks.start_up import measure_start_up
-from benchmarks.stopping import measure_stopping
-from benchmarks.table import print_table
-from benchmarks.transaction import measure_transaction
+python -m benchmarks [CASE ...] [--publish [--noisy]]
+"""
+
+import argparse
+import json
+import os
+import platform
+import sys
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+from time import perf_counter
+from typing import Any, Final
+
+from benchmarks.cases import CASES, measure
+from benchmarks.growth import measured_growth
+from benchmarks.page import PAGE, ROOT, publish
+from benchmarks.quiet import SPREAD, Floors, load_average
+from benchmarks.table import Figure, print_table
+
+JSON: Final = ROOT / "build" / "bench.json"
+SCHEMA: Final = "robolink/bench/1"
+TOO_NOISY: Final = 3
+
+_PACKAGES: Final = ("numpy", "scipy", "pymodbus", "canopen", "SQLAlchemy", "click", "lark")
 
 
-def main() -> None:
-    """Run every measurement."""
-    print_table(
-        [
-            *measure_exchange(),
-            *measure_transaction(),
-            *measure_mailbox(),
-            *measure_journal(),
-            *measure_nozzle_change(),
-            *measure_start_up(),
-            *measure_stopping(),
-            *measure_solvers(),
-            *measure_kinematics(),
-            *measure_spel_programs(),
-            *measure_plc_program(),
-        ]
-    )
+def main() -> int:
+    """Run what was asked for; return the exit code."""
+    asked = _arguments()
+    floors, cases, seconds = Floors(), dict[str, list[Figure]](), dict[str, float]()
+    floors.look()
+    for name in asked.cases or CASES:
+        began = perf_counter()
+        cases[name] = list(measure(name))
+        seconds[name] = perf_counter() - began
+        floors.look()
+        print(f"\n{name}: {seconds[name]:.0f} s")
+        print_table(cases[name])
+    growth = list(measured_growth()) if asked.publish else []
+    floors.look()
+    about = {**_circumstances(), "floors_us": floors.taken_us}
+    about |= {"spread": floors.spread, "quiet": floors.quiet, "noise": str(floors)}
+    _write(about, cases, seconds, growth)
+    print(f"\n{about['machine']}; load {about['load']}; {floors}; {JSON}")
+    if not asked.publish:
+        return 0
+    if not (floors.quiet or asked.noisy):
+        return refuse_to_publish()
+    publish(about, cases, growth)
+    print(f"Written: {PAGE} and its pictures.")
+    return 0
+
+
+def refuse_to_publish() -> int:
+    """Say that the figures are not to be believed; return the exit code."""
+    said = f"Not published: the machine did something else meanwhile (spread over {SPREAD:g})."
+    print(said, file=sys.stderr)
+    return TOO_NOISY
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument("cases", nargs="*", metavar="CASE", help=f"of: {', '.join(CASES)}")
+    parser.add_argument("--publish", action="store_true", help="write docs/performance.md")
+    parser.add_argument("--noisy", action="store_true", help="publish all the same, and say so")
+    asked = parser.parse_args()
+    if unknown := [name for name in asked.cases if name not in CASES]:
+        parser.error(f"there is no case {unknown[0]!r}; known are {', '.join(CASES)}")
+    if asked.cases and asked.publish:
+        parser.error("only a whole run is published")
+    return asked
+
+
+def _circumstances() -> dict[str, Any]:
+    return {
+        "schema": SCHEMA,
+        "date": datetime.now(UTC).strftime("%d %B %Y").lstrip("0"),
+        "machine": _machine(),
+        "load": load_average(),
+        "versions": {
+            "Python": platform.python_version(),
+            **{name: metadata.version(name) for name in ("robolink", *_PACKAGES)},
+        },
+    }
+
+
+def _machine() -> str:
+    """Return processor, how many, and system."""
+    cpu = platform.processor() or platform.machine()
+    told = Path("/proc/cpuinfo")
+    if told.exists():
+        models = [line for line in told.read_text().splitlines() if line.startswith("model name")]
+        cpu = models[0].partition(":")[2].strip() if models else cpu
+    return f"{os.cpu_count()} CPUs, {cpu}, {platform.system()} {platform.release()}"
+
+
+def _write(
+    about: dict[str, Any],
+    cases: dict[str, list[Figure]],
+    seconds: dict[str, float],
+    growth: list[Any],
+) -> None:
+    JSON.parent.mkdir(exist_ok=True)
+    document = {
+        **about,
+        "cases": {
+            name: {"seconds": seconds[name], "figures": [one.document() for one in figures]}
+            for name, figures in cases.items()
+        },
+        "growth": {one.name: one.points for one in growth},
+    }
+    JSON.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

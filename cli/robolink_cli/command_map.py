@@ -71,13 +71,14 @@ SECTIONS: Final = {
 
 SHORT_NAMES: Final = {
     "check": f"{COMPUTER}.cell_check:check",
+    "check-contract": f"{CONTROLLER}.check_contract:check_contract",
     "config": f"{GROUPS}:config",
     "docs": f"{SHIPPED}.docs:docs",
     "expert": f"{GROUPS}:expert",
     "recipe": f"{SHIPPED}.recipe:recipe",
 }
-"""Names that work and stand in no list. ``check``, ``docs`` and ``recipe`` are short for
-what ``cell`` and ``expert`` list; what ``config`` held says itself how it is called now."""
+"""Names that work and stand in no list. ``check``, ``check-contract``, ``docs`` and ``recipe`` are
+short for what ``cell`` and ``expert`` list; what ``config`` held says itself how it is called now."""
 
 RENAMED: Final = {
     "backup": (f"{CONTROLLER}.backup:backup", "tool backup"),

@@ -129,6 +129,16 @@ def compare(
         tolerance: What counts as alike.
         selection_counts: Whether another tool in force is a difference. While a program runs
             it selects tools by itself.
+
+    Example:
+        >>> from dataclasses import replace
+        >>> import robolink
+        >>> from robolink.backup import compare, read_tools
+        >>> with robolink.connect("epson+sim://compare-example") as controller:
+        ...     kept = read_tools(controller)
+        >>> now = replace(kept, tools={**kept.tools, 2: robolink.ToolOffset(5, 6, -70)})
+        >>> [one.tool for one in compare(kept, now).differing]
+        [2]
     """
     limits = tolerance or ComparisonTolerance()
     return Comparison(

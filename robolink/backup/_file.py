@@ -27,9 +27,23 @@ _FAMILY: Final = "robolink/backup/"
 def save(backup: Backup, path: Path, *, replace: bool = False) -> None:
     """Write ``backup``; the file is whole and on the disk when this returns.
 
+    Args:
+        backup: What is kept.
+        path: Where.
+        replace: Whether a file that is there may go.
+
     Raises:
         ConfigError: A file is there already and ``replace`` is not set, or it cannot be
             written. What was there is unchanged.
+
+    Example:
+        >>> from pathlib import Path
+        >>> import robolink
+        >>> from robolink.backup import load, save, take_backup
+        >>> with robolink.connect("epson+sim://save-example") as controller:
+        ...     save(take_backup(controller), Path("cell-5.json"))
+        >>> load(Path("cell-5.json")).state.selected
+        1
     """
     save_named(path, backup_to_text(backup).encode("ascii"), replace=replace)
 

@@ -68,8 +68,20 @@ def require_same_controller(backup: Backup, identity: str, facts: ControllerFact
 
     Serial numbers decide where both sides know one; where they do not, the URL does.
 
+    Args:
+        backup: What is to be restored.
+        identity: Of the controller at hand.
+        facts: What it says of itself.
+
     Raises:
         ConfigError: It is another one, or that cannot be told.
+
+    Example:
+        >>> import robolink
+        >>> from robolink.backup import require_same_controller, take_backup
+        >>> with robolink.connect("epson+sim://same-example") as controller:
+        ...     kept = take_backup(controller)
+        ...     require_same_controller(kept, controller.identity, controller.facts())
     """
     saved = backup.facts
     pairs = (
@@ -110,6 +122,17 @@ def plan_restore(
         ToolIndexError, ReservedToolError: No such tool to restore.
         ToolError: The tool in force would lose its definition.
         UndefinedToolError: The tool to select would have none.
+
+    Example:
+        >>> import robolink
+        >>> from robolink.backup import plan_restore, read_tools, take_backup
+        >>> with robolink.connect("epson+sim://plan-example") as controller:
+        ...     kept = take_backup(controller)
+        ...     new = robolink.ToolOffset(5, 6, -70)
+        ...     receipt = controller.tools.write(2, new, expected=None)
+        ...     plan = plan_restore(kept, read_tools(controller))
+        >>> [change.tool for change in plan.clears]
+        [2]
     """
     wanted = sorted(set(tools)) or list(TOOLS)
     for tool in wanted:
@@ -135,6 +158,17 @@ def restore(
 
     Raises:
         RobolinkError: A step failed. Its remedy says which tools are restored and which not.
+
+    Example:
+        >>> import robolink
+        >>> from robolink.backup import plan_restore, read_tools, restore, take_backup
+        >>> with robolink.connect("epson+sim://restore-example") as controller:
+        ...     kept = take_backup(controller)
+        ...     new = robolink.ToolOffset(5, 6, -70)
+        ...     receipt = controller.tools.write(2, new, expected=None)
+        ...     receipts = restore(controller.tools, plan_restore(kept, read_tools(controller)))
+        ...     print(controller.tools.read(2))
+        None
     """
     receipts: list[ToolReceipt] = []
     try:

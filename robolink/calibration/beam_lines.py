@@ -141,6 +141,18 @@ def find_beams(
         CalibrationError: ``too_few_poses``, ``short_beam``, ``parallel_beams``,
             ``no_crossing``, ``tool_pose``, ``local_pose``, ``tilted_pose``, or those of
             :func:`check_crossings`.
+
+    Example:
+        >>> from robolink import Pose
+        >>> from robolink.calibration import Crossing, find_beams
+        >>> def passed(beam, x_mm, y_mm, dx_mm, dy_mm):  # by a tip at 12, -3.5 of the flange
+        ...     entry = Pose(x_mm - dx_mm - 12, y_mm - dy_mm + 3.5, -60, 0)
+        ...     return Crossing(beam, entry, Pose(x_mm + dx_mm - 12, y_mm + dy_mm + 3.5, -60, 0))
+        >>> along_x = [passed(0, 300 + at, 80, 0, way) for at in (-8, 8) for way in (0.5, -0.5)]
+        >>> along_y = [passed(1, 300, 80 + at, way, 0) for at in (-8, 8) for way in (0.5, -0.5)]
+        >>> first, second = find_beams([*along_x, *along_y], (12, -3.5))
+        >>> round(first.y_mm, 3), round(second.x_mm, 3)
+        (80.0, 300.0)
     """
     check_crossings(crossings, minimum=4)
     entries = [crossing.entry for crossing in crossings]

@@ -81,6 +81,20 @@ def solve_crossed_beams(
             ``no_crossing``, ``turned_in_crossing``, ``implausible_offset``, ``tool_pose``,
             ``local_pose``, ``tilted_pose``, and those of ``pose_checks.check_poses``.
         ConfigError: ``sigma_mm`` is not positive.
+
+    Example:
+        >>> from robolink import Pose
+        >>> from robolink.calibration import Beam, Crossing, solve_crossed_beams
+        >>> beams = Beam(300, 80, 0), Beam(300, 80, 90)
+        >>> crossings = [
+        ...     Crossing(0, Pose(288, 83.0, -60, 0), Pose(288, 84.0, -60, 0)),
+        ...     Crossing(0, Pose(288, 84.0, -60, 0), Pose(288, 83.0, -60, 0)),
+        ...     Crossing(1, Pose(287.5, 83.5, -60, 0), Pose(288.5, 83.5, -60, 0)),
+        ...     Crossing(1, Pose(288.5, 83.5, -60, 0), Pose(287.5, 83.5, -60, 0)),
+        ... ]
+        >>> found = solve_crossed_beams(crossings, beams)
+        >>> round(found.offset.x_mm, 3), round(found.offset.y_mm, 3)
+        (12.0, -3.5)
     """
     warnings = check_crossings(crossings, minimum=1)
     require_flange_in_base([crossing.entry for crossing in crossings])
@@ -138,6 +152,24 @@ def crossing_sigma_gain(
     """Return the standard deviation of X or Y, the larger, as a multiple of one crossing's.
 
     Only the directions and angles of the crossings count; see :func:`solve_crossed_beams`.
+
+    Args:
+        crossings: The crossings that are planned; where they are does not count.
+        beams: Where the beams are.
+        beams_may_have_moved: As for :func:`solve_crossed_beams`.
+
+    Example:
+        >>> from robolink import Pose
+        >>> from robolink.calibration import Beam, Crossing, crossing_sigma_gain
+        >>> beams = Beam(300, 80, 0), Beam(300, 80, 90)
+        >>> once = [
+        ...     Crossing(0, Pose(288, 83.0, -60, 0), Pose(288, 84.0, -60, 0)),
+        ...     Crossing(1, Pose(287.5, 83.5, -60, 0), Pose(288.5, 83.5, -60, 0)),
+        ... ]
+        >>> round(crossing_sigma_gain(once, beams), 3)
+        1.0
+        >>> round(crossing_sigma_gain(once * 4, beams), 3)
+        0.5
     """
     # Height 0 will do: the gain depends on no right side.
     a, b, _ = _system(

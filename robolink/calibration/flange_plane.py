@@ -74,13 +74,39 @@ class FlangePlane:
         return math.degrees(math.atan2(yx - sign * xy, xx + sign * yy))
 
     def in_flange(self, dx_mm: float, dy_mm: float, z_mm: float = 0.0) -> tuple[float, float]:
-        """Return (t_x, t_y) of what lies ``dx_mm, dy_mm`` from the flange, at ``z_mm`` of its Z."""
+        """Return (t_x, t_y) of what lies ``dx_mm, dy_mm`` from the flange, at ``z_mm`` of its Z.
+
+        Args:
+            dx_mm: X of the place in the base, less that of the flange.
+            dy_mm: Y likewise.
+            z_mm: Z of the place in the axes of the flange; counts where the flange leans.
+
+        Example:
+            >>> from robolink import Pose
+            >>> from robolink.calibration import FlangePlane
+            >>> plane = FlangePlane.of(Pose(300, 100, -60, 90))
+            >>> [round(value, 3) for value in plane.in_flange(3.5, 12)]
+            [12.0, -3.5]
+        """
         (xx, yx), (xy, yy) = self.columns
         dx, dy = dx_mm - self.axis[0] * z_mm, dy_mm - self.axis[1] * z_mm
         return (yy * dx - xy * dy) / self.r33, (xx * dy - yx * dx) / self.r33
 
     def in_base(self, x_mm: float, y_mm: float, z_mm: float = 0.0) -> tuple[float, float]:
-        """Return how far from the flange, in X and Y of the base, a point of its axes lies."""
+        """Return how far from the flange, in X and Y of the base, a point of its axes lies.
+
+        Args:
+            x_mm: X of the point in the axes of the flange.
+            y_mm: Y likewise.
+            z_mm: Z likewise; counts where the flange leans.
+
+        Example:
+            >>> from robolink import Pose
+            >>> from robolink.calibration import FlangePlane
+            >>> plane = FlangePlane.of(Pose(300, 100, -60, 90))
+            >>> [round(value, 3) for value in plane.in_base(12, -3.5)]
+            [3.5, 12.0]
+        """
         (xx, yx), (xy, yy) = self.columns
         cx, cy = self.axis
         return xx * x_mm + xy * y_mm + cx * z_mm, yx * x_mm + yy * y_mm + cy * z_mm
@@ -97,6 +123,13 @@ def carrying(frame: Pose, tip: ToolOffset, place_mm: tuple[float, float, float])
         frame: Its angles, hand, local and tool.
         tip: X, Y and Z count.
         place_mm: The place.
+
+    Example:
+        >>> from robolink import Pose, ToolOffset
+        >>> from robolink.calibration import carrying
+        >>> flange = carrying(Pose(0, 0, 0, 90), ToolOffset(12, -3.5, -20), (300, 100, -80))
+        >>> round(flange.x_mm, 3), round(flange.y_mm, 3), round(flange.z_mm, 3), flange.u_deg
+        (296.5, 88.0, -60.0, 90)
     """
     plane = FlangePlane.of(frame)
     dx, dy = plane.in_base(tip.x_mm, tip.y_mm, tip.z_mm)

@@ -101,6 +101,14 @@ def solve_z_touch(
         CalibrationError: ``too_few_poses``, ``one_speed``, ``implausible_latency``,
             ``tilted_pose``, ``non_finite`` or ``implausible_offset``.
         ConfigError: ``sigma_mm`` is not positive.
+
+    Example:
+        >>> from robolink import ToolOffset
+        >>> from robolink.calibration import Touch, solve_z_touch
+        >>> touches = [Touch(z, v) for z, v in ((-60.02, 2), (-60.05, 5), (-60.02, 2), (-60.05, 5))]
+        >>> found = solve_z_touch(touches, -80, stored=ToolOffset(12, -3.5, -19))
+        >>> round(found.offset.z_mm, 2)
+        -20.0
     """
     require_poses(len(touches), 1 if latency_s is not None else 2)
     require_finite(surface_z_mm=surface_z_mm, latency_s=latency_s or 0.0)

@@ -139,6 +139,12 @@ def remember_reach(name: str, origin: Path, reach: Reach) -> None:
         name: The cell.
         origin: The file that gave its URL; the same name may mean another cell elsewhere.
         reach: How it was reached. Nothing secret is in it.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from robolink.config import Reach, reach_cell, remember_reach
+        >>> reach = Reach("epson+tcp://192.168.0.1:5000")
+        >>> remember_reach("line3", Path("robolink.toml").resolve(), reach)
     """
     kept = asdict(reach) | {"doubt": ""}
     path = _copy_of(name, origin)

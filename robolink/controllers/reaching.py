@@ -46,6 +46,14 @@ def connect_when_reachable(
         ConfigError: ``within_s`` is negative or no number.
         ConnectError, TransportBrokenError, TransportTimeoutError: The last attempt failed so.
         RobolinkError: As ``connect`` raised it, where waiting is no remedy.
+
+    Example:
+        >>> import robolink
+        >>> from robolink.controllers import connect_when_reachable
+        >>> url = "epson+sim://reach-example"
+        >>> with connect_when_reachable(lambda: robolink.connect(url), within_s=60) as controller:
+        ...     controller.status().state.value
+        'ready'
     """
     if not within_s >= 0:
         raise ConfigError(

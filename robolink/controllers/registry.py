@@ -169,6 +169,12 @@ def connect(
             map differs.
         LoginRefusedError: Wrong or missing password.
         LeaseHeldError: Nobody answers the login, and somebody else has the controller.
+
+    Example:
+        >>> import robolink
+        >>> with robolink.connect("epson+sim://connect-example?seed=1") as controller:
+        ...     print(controller.status().state, controller.tools.selected())
+        ready 1
     """
     if not isinstance(url, str):
         return url

@@ -64,6 +64,11 @@ def stop_now(
         RejectedError: It takes no stop from here.
         OutcomeUnknownError: It was told to stop and does not come to rest.
         TransportError, RemoteProtocolError: Whether it stops is not known.
+
+    Example:
+        >>> from robolink.controllers import stop_now
+        >>> stop_now("epson+sim://stop-example").state.value
+        'ready'
     """
     if not isinstance(url, str):
         url.stop()

@@ -49,6 +49,12 @@ def drift_of(
 
     Raises:
         ConfigError: ``baseline`` is less than 2.
+
+    Example:
+        >>> from robolink.drift import drift_of
+        >>> cell = drift_of("cell-a", [], finds_pin=lambda method: True)
+        >>> cell.charts, cell.findings
+        ((), ())
     """
     changes = tuple(
         change

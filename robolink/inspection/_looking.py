@@ -42,6 +42,15 @@ def inspect(
     Raises:
         JournalError: The record cannot be read.
         RobolinkError: The controller cannot be asked how it is.
+
+    Example:
+        >>> import robolink
+        >>> from robolink.backup import read_tools
+        >>> from robolink.inspection import inspect
+        >>> with robolink.connect("epson+sim://inspect-example") as controller:
+        ...     found = inspect(controller, read_tools(controller))
+        >>> found.findings
+        ()
     """
     outcomes = controller.outcomes
     stations = find_stations(cell, outcomes.recorded(kinds=(EntryKind.STATION,)))

@@ -70,6 +70,14 @@ class Journal:
             holder: Who holds the lease; by default this process.
             clock: In which signs of life are stamped and watched; by default the time since
                 the start of the system. All logs of a controller must share it.
+
+        Example:
+            >>> from robolink.journal import memory_journal
+            >>> from robolink.model import EntryKind, NewEntry
+            >>> log = memory_journal("log-example").log("cell-a")
+            >>> log.append(NewEntry(EntryKind.DECISION, tool=1, verdict="the first part was good"))
+            >>> [entry.verdict for entry in log.recorded(tool=1)]
+            ['the first part was good']
         """
         return JournalOutcomeLog(
             self,
@@ -107,6 +115,15 @@ class Journal:
 
         Raises:
             JournalError: It cannot be read.
+
+        Example:
+            >>> from robolink.journal import memory_journal
+            >>> from robolink.model import EntryKind, NewEntry
+            >>> journal = memory_journal("entries-example")
+            >>> for tool in (1, 2, 1):
+            ...     journal.log("cell-a").append(NewEntry(EntryKind.DECISION, tool=tool))
+            >>> [entry.tool for entry in journal.entries(controller="cell-a", limit=2)]
+            [1, 2]
         """
         names = () if controller is None else self.names_of(controller)
         wanted = Filter(names, tool, change, tuple(kinds), newest_first=newest_first)

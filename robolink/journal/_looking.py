@@ -17,6 +17,8 @@ class LookingLog:
     What is on record shows as far as it can be read. Whatever would have to be recorded raises
     what is wrong with the journal, so nothing that changes a controller leaves this process.
 
+    Made by :func:`open_log`.
+
     Attributes:
         signature: Who works here, and with what.
         change: Id of the tool change under way; there is none.

@@ -63,6 +63,13 @@ def open_log(address: str, *, durable: bool, signature: Signature) -> OutcomeLog
         address: How the controller is reached.
         durable: Whether it outlives this process, so that its record must too.
         signature: Who works here.
+
+    Example:
+        >>> from robolink.journal import open_log, signature_here
+        >>> here = signature_here("1.0")
+        >>> log = open_log("epson+sim://log-example", durable=False, signature=here)
+        >>> log.durable, log.trouble
+        (False, None)
     """
     if not durable:
         return memory_journal(address).log(address, signature=signature)

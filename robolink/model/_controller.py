@@ -94,11 +94,16 @@ class Capabilities:
     """What this kind of controller can be asked for.
 
     The last four say that the controller's attribute of that name is there.
+
+    Attributes:
+        pose_while_moving: Whether a position can be read while a movement is under way; else the
+            one line to the controller is waited on.
     """
 
     tool_write: bool = False
     motion: bool = False
     motors: bool = False
+    pose_while_moving: bool = False
     io: bool = False
     points: bool = False
     variables: bool = False
@@ -233,6 +238,15 @@ class Controller(Protocol):
         Raises:
             ConfigError: That is impossible; nothing may be sent.
             BusyError: Another process has the controller.
+
+        Example:
+            >>> import robolink
+            >>> from robolink.model import MarkerKind
+            >>> with robolink.connect("epson+sim://begin-example") as controller:
+            ...     marker = controller.begin(MarkerKind.CHANGE, "change of tool 1", {"tools": {}})
+            ...     controller.finish(marker)
+            >>> marker.request
+            'change of tool 1'
         """
 
     def finish(self, marker: Marker, *entries: NewEntry) -> None:

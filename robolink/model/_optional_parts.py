@@ -65,10 +65,44 @@ class VariableTable(Protocol):
         """Read one variable."""
 
     def write(self, name: str, value: Value, kind: str) -> ValueReceipt[Value]:
-        """Set one variable and read it back; raises like :meth:`DigitalIo.set_output`."""
+        """Set one variable and read it back; raises like :meth:`DigitalIo.set_output`.
+
+        Args:
+            name: Name of the variable, as the project of the controller has it.
+            value: What it is to hold.
+            kind: Its type, such as ``Real``.
+
+        Example:
+            >>> import robolink
+            >>> from robolink.protocols.epson_text import VariableType
+            >>> from robolink_simulators.epson import EpsonSimulator
+            >>> from robolink_simulators.hosting.in_process.epson import register
+            >>> simulator = EpsonSimulator()
+            >>> simulator.variables.declare("g_height", VariableType.REAL)
+            >>> with robolink.connect(register("variable-example", simulator)) as controller:
+            ...     receipt = controller.variables.write("g_height", 2.5, "Real")
+            >>> receipt.before, receipt.read_back
+            (0.0, 2.5)
+        """
 
     def preview_write(self, name: str, value: Value, kind: str) -> tuple[str, ...]:
-        """Return what :meth:`write` would send besides its reads; reads only."""
+        """Return what :meth:`write` would send besides its reads; reads only.
+
+        Args:
+            name: Name of the variable.
+            value: What it would hold.
+            kind: Its type.
+
+        Example:
+            >>> import robolink
+            >>> from robolink_simulators.epson import EpsonSimulator
+            >>> from robolink_simulators.hosting.in_process.epson import register
+            >>> simulator = EpsonSimulator()
+            >>> simulator.variables.declare("g_height", "real")
+            >>> with robolink.connect(register("preview-example", simulator)) as controller:
+            ...     controller.variables.preview_write("g_height", 2.5, "real")
+            ('$SetVariable,g_height,2.5,Real',)
+        """
 
 
 class AlarmList(Protocol):

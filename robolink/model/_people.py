@@ -33,6 +33,12 @@ def require_engineer(outcomes: OutcomeLog, act: str, **details: object) -> None:
     Raises:
         NotAllowedError: The person is an operator.
         ConfigError: It cannot be recorded.
+
+    Example:
+        >>> import robolink
+        >>> from robolink.model import require_engineer
+        >>> with robolink.connect("epson+sim://engineer-example") as controller:
+        ...     require_engineer(controller.outcomes, "accept a jump", tool=1)  # nobody is named
     """
     signature = outcomes.signature
     if signature.role == PersonRole.OPERATOR:

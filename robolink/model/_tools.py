@@ -142,7 +142,22 @@ def tool_changed(
     controller: str = "",
     request: str = "",
 ) -> ToolChangedError:
-    """Return the error for a tool that holds something else than its writer believes."""
+    """Return the error for a tool that holds something else than its writer believes.
+
+    Args:
+        tool: Number of the tool.
+        found: What it holds, ``None`` for undefined.
+        expected: What its writer believes.
+        controller: The controller's identity, for the error.
+        request: What was asked, for the error.
+
+    Example:
+        >>> from robolink import ToolOffset
+        >>> from robolink.model import tool_changed
+        >>> error = tool_changed(2, found=ToolOffset(5, 6, -70), expected=None)
+        >>> type(error).__name__
+        'ToolChangedError'
+    """
     return ToolChangedError(
         tr(
             "Tool {tool} holds {found}, not the expected {expected}; nothing was written.",
@@ -204,6 +219,11 @@ class ToolTable(Protocol):
     def write(self, tool: int, offset: ToolOffset, *, expected: Expected) -> ToolReceipt:
         """Write ``offset`` if the stored value is ``expected``, then read it back.
 
+        Args:
+            tool: Its number, 1 and more.
+            offset: What it is to hold, mm and degrees; rounded to what the controller keeps.
+            expected: What is believed to be stored, ``None`` for undefined, ``ANY`` for anything.
+
         Raises:
             ReservedToolError: Tool 0.
             ToolIndexError: There is no such tool.
@@ -211,6 +231,14 @@ class ToolTable(Protocol):
             ReadBackError: Another value came back.
             NotReadyError: The state would not allow a write; nothing was written.
             OutcomeUnknownError: No answer came to the write.
+
+        Example:
+            >>> import robolink
+            >>> new = robolink.ToolOffset(12.3, -3.7, -20)
+            >>> with robolink.connect("epson+sim://write-example") as controller:
+            ...     receipt = controller.tools.write(1, new, expected=controller.tools.read(1))
+            >>> receipt.read_back.x_mm, receipt.skipped
+            (12.3, False)
         """
 
     def preview_write(self, tool: int, offset: ToolOffset) -> tuple[str, ...]:
@@ -239,6 +267,15 @@ class ToolTable(Protocol):
         Raises:
             SelectedToolError: The tool is in force and no other one is named; nothing was sent.
             UndefinedToolError: The tool named has no definition; nothing was cleared.
+
+        Example:
+            >>> import robolink
+            >>> new = robolink.ToolOffset(5, 6, -70)
+            >>> with robolink.connect("epson+sim://clear-example") as controller:
+            ...     held = controller.tools.write(2, new, expected=None).read_back
+            ...     receipt = controller.tools.clear(2, expected=held)
+            ...     print(controller.tools.read(2))
+            None
         """
 
     def selected(self) -> int | None:

@@ -127,9 +127,10 @@ def require_inside(controller: Controller, steps: Sequence[PlannedStep]) -> None
             raise LimitError(
                 tr("{step} {refusal}", step=step.text, refusal=step.refusal),
                 remedy=tr(
-                    "Nothing moved. The allowed area lies about where the robot stands at "
-                    "the start: jog closer to the pin, or widen the area. Where the arm "
-                    "cannot reach, put the station elsewhere, or turn the tool another way."
+                    "The allowed area lies about where the robot stands at the start: jog "
+                    "closer to the pin ('robolink robot jog'), or widen the area. Where the "
+                    "arm cannot reach, put the station elsewhere, or turn the tool another "
+                    "way."
                 ),
                 controller=controller.identity,
             )
@@ -229,5 +230,5 @@ def _refusal(target: Pose, settings: RunSettings, *, aside_mm: float = 0.0) -> s
             beside = replace(target, x_mm=target.x_mm + dx_mm, y_mm=target.y_mm + dy_mm)
             settings.box.check(beside)
     except LimitError as error:
-        return str(error)
+        return error.what
     return ""

@@ -53,6 +53,16 @@ def read_poses(
         AmbiguousPosesError: The file can be read in more than one way; says what has to be named.
         ConfigError: It cannot be read, or is no list of poses; says the line.
         CalibrationError: ``non_finite`` for a value that is not a finite number.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from robolink.pose_tables import read_poses
+        >>> with open("touches.csv", "w") as file:
+        ...     for line in ("x;y;z;u", "287,5;103,25;-60;0", "312,5;96,75;-60;180"):
+        ...         print(line, file=file)
+        >>> table = read_poses(Path("touches.csv"), needs=["z_mm"])
+        >>> [entry.pose.x_mm for entry in table.entries]
+        [287.5, 312.5]
     """
     try:
         data = read_named(path, most_bytes=MOST_BYTES)

@@ -47,7 +47,18 @@ _FIRST_DIGITS: Final = {
 
 
 def describe_place(table: RegisterTable, address: int, bit: int | None = None) -> str:
-    """Return a place as a person reads it, its number given both ways."""
+    """Return a place as a person reads it, its number given both ways.
+
+    Args:
+        table: Which table of the PLC.
+        address: Number of the register or coil, counted from 0.
+        bit: Number of a bit in a register.
+
+    Example:
+        >>> from robolink.register_maps import RegisterTable, describe_place
+        >>> describe_place(RegisterTable.HOLDING, 100)
+        '40101 (address 100)'
+    """
     reference = table.reference(address)
     if bit is None:
         return tr("{reference} (address {address})", reference=reference, address=address)

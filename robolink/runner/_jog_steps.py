@@ -39,9 +39,22 @@ _DECIMAL: Final = re.compile(r"[+-]?[0-9]{1,5}(?:\.[0-9]{1,6})?", re.ASCII)
 def jog_target(here: Pose, steps: str, settings: RunSettings) -> tuple[Pose, Path]:
     """Return where typed ``steps`` lead from ``here``, and how to go there.
 
+    Args:
+        here: Where the frame is.
+        steps: As they are typed, such as ``x+0.1 z-0.5``.
+        settings: How large a step may be.
+
     Raises:
         ConfigError: The text is not a list of steps.
         LimitError: A step is too large.
+
+    Example:
+        >>> from robolink import Pose
+        >>> from robolink.model import WorkBox
+        >>> from robolink.runner import RunSettings, jog_target
+        >>> target, _ = jog_target(Pose(300, 100, -60, 0), "x+0.1 z-0.5", RunSettings(WorkBox()))
+        >>> round(target.x_mm, 3), round(target.z_mm, 3)
+        (300.1, -60.5)
     """
     deltas = parse_steps(steps)
     for axis, delta in deltas.items():

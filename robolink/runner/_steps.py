@@ -130,7 +130,20 @@ class SeenAt(Pose):
 
     @classmethod
     def of(cls, pose: Pose, spot: Spot, unit: SpotUnit) -> "SeenAt":
-        """Return what was seen from ``pose``."""
+        """Return what was seen from ``pose``.
+
+        Args:
+            pose: Where the flange was.
+            spot: What the camera saw.
+            unit: The unit of that.
+
+        Example:
+            >>> from robolink import Pose, Spot, SpotUnit
+            >>> from robolink.runner import SeenAt
+            >>> seen = SeenAt.of(Pose(300, 100, -60, 0), Spot(312.3, 96.3), SpotUnit.BASE_MM)
+            >>> seen.x_mm, seen.spot.x
+            (300, 312.3)
+        """
         return cls(**_as_it_is(pose), spot=spot, unit=unit)
 
 
@@ -166,7 +179,20 @@ class TouchedAt(Pose):
         contact: bool | None = None,
         typed: bool = False,
     ) -> "TouchedAt":
-        """Return what was shown at ``pose``; as it is where that is known already."""
+        """Return what was shown at ``pose``; as it is where that is known already.
+
+        Args:
+            pose: Where the frame was.
+            seconds: How long after the question the person answered, where that is known.
+            contact: Whether a contact input was seen off and then on.
+            typed: Whether a person typed the pose.
+
+        Example:
+            >>> from robolink import Pose
+            >>> from robolink.runner import TouchedAt
+            >>> TouchedAt.of(Pose(300, 100, -60, 0), seconds=4.5).seconds
+            4.5
+        """
         if isinstance(pose, cls):
             return pose
         return cls(**_as_it_is(pose), seconds=seconds, contact=contact, typed=typed)

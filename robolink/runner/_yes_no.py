@@ -33,6 +33,17 @@ def ask_yes_no(operator: Operator, question: str, answer: Callable[[], str]) -> 
         operator: Who is asked.
         question: What a yes agrees to.
         answer: Fetches the next line that the person types.
+
+    Example:
+        >>> from robolink.runner import ask_yes_no
+        >>> class Person:
+        ...     def ask(self, question, kind):
+        ...         print(question)
+        ...     def tell(self, text):
+        ...         print(text)
+        >>> ask_yes_no(Person(), "Write tool 1?", lambda: "y")
+        Write tool 1?
+        True
     """
     return ask_yes_no_or(operator, question, answer, also=()) is True
 

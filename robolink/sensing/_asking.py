@@ -14,11 +14,26 @@ def seen_once(sensor: TipSensor, mark: int, *, pictures: int) -> Spot:
 
     The median, because one false detection among three pictures does not shift it far.
 
+    Args:
+        sensor: The camera.
+        mark: What is looked for: ``TIP``, or the number of a fiducial.
+        pictures: How many are taken.
+
     Raises:
         CalibrationError: ``tip_not_seen`` or ``fiducial_not_seen``: not in most of the pictures;
             ``several_tips_seen`` or ``several_fiducials_seen``: more than one at a time;
             ``non_finite``: the camera answers with something that is no place;
             ``sensor_failed``: it does not answer.
+
+    Example:
+        >>> from types import SimpleNamespace
+        >>> from robolink import Spot
+        >>> from robolink.model import TIP
+        >>> from robolink.sensing import seen_once
+        >>> answers = iter([Spot(312.3, 96.3), Spot(312.4, 96.3), Spot(340.0, 96.3)])
+        >>> camera = SimpleNamespace(see=lambda mark: [next(answers)], identity="a camera")
+        >>> seen_once(camera, TIP, pictures=3)
+        Spot(x=312.4, y=96.3)
     """
     spots = list[Spot]()
     for _ in range(pictures):

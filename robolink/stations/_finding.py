@@ -59,6 +59,15 @@ def find_station(
 
     Raises:
         ConfigError: There is none of that name, or it is something else.
+
+    Example:
+        >>> from robolink.stations import find_station
+        >>> from robolink.errors import ConfigError
+        >>> try:
+        ...     find_station(None, [], "PIN-07")
+        ... except ConfigError as error:
+        ...     print(type(error).__name__)
+        ConfigError
     """
     stations = find_stations(cell, entries)
     found = stations.get(name)

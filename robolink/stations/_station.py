@@ -86,6 +86,18 @@ class Station:
         """Return the same station at another place, base; it then rests on no entry.
 
         A camera's entry says what its pixels mean, wherever a tip is brought before it.
+
+        Args:
+            x_mm: Where it is, base; ``None`` where nobody knows.
+            y_mm: Likewise.
+            z_mm: Likewise.
+            sigma_mm: Standard deviation of each of them, where it is known.
+
+        Example:
+            >>> from robolink.stations import Station, StationKind
+            >>> pin = Station(id="PIN-07", kind=StationKind.PIN).at(300, 100, -80, sigma_mm=0.02)
+            >>> pin.x_mm, pin.sigma_mm
+            (300, 0.02)
         """
         moved = (x_mm, y_mm, z_mm) != (self.x_mm, self.y_mm, self.z_mm)
         told = moved and self.kind is not StationKind.CAMERA

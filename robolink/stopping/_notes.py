@@ -87,6 +87,13 @@ def leave_note(
 
     Raises:
         OSError: It cannot be kept.
+
+    Example:
+        >>> from robolink.stopping import find_note, leave_note
+        >>> keys, url = {"192.168.0.1:5000"}, "epson+tcp://192.168.0.1:5000"
+        >>> leave_note(keys, url, "mei", confirmed=True)
+        >>> find_note(keys).who
+        'mei'
     """
     all_keys = sorted({*keys, *filter(None, (controller, last_known))})
     note = StopNote(url, who, wall_label(), confirmed, controller, tuple(all_keys))

@@ -175,6 +175,14 @@ class MemoryController(ControllerCore):
         identity: Its URL, which is who it is as well.
         outcomes: Where its record is kept; by default in memory.
         clock: On which its time passes; by default that of this computer.
+
+    Example:
+        >>> from robolink import ToolOffset
+        >>> from robolink.testing import MemoryController, MemoryMachine
+        >>> machine = MemoryMachine(tools={1: ToolOffset(12, -3.5, -20)})
+        >>> with MemoryController(machine) as controller:
+        ...     controller.tools.read(1).x_mm
+        12
     """
 
     def __init__(

@@ -10,6 +10,7 @@ ends the process in between, ``robolink recover`` finds the two and does the sam
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
+from typing import Protocol
 
 from robolink.errors import ConfigError, OutcomeUnknownError, RobolinkError
 from robolink.messages import joined, tr
@@ -25,8 +26,12 @@ from robolink.model import (
 )
 from robolink.testing.tool_checks import another_offset
 
-Connect = Callable[[], AbstractContextManager[Controller]]
-"""Connects to the controller, with its own record."""
+
+class Connect(Protocol):
+    """Connects to the controller, with its own record."""
+
+    def __call__(self, *, leaves: bool) -> AbstractContextManager[Controller]:
+        """Connect for a block that leaves begun what a later one settles, or for that one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,8 +68,20 @@ def kept_on_site(
         ConfigError: The tool is the selected one, or is not there.
         OutcomeUnknownError: Something earlier is unsettled; or it could not be put back, and
             stays open for ``recover``.
+
+    Example:
+        >>> from robolink import ANY, ToolOffset, connect
+        >>> from robolink.testing import kept_on_site
+        >>> def reach():
+        ...     return connect("epson+sim://site-example")
+        >>> with kept_on_site(reach, "a trial of tool 2", tool=2, agree=lambda controller: None):
+        ...     with reach() as controller:
+        ...         receipt = controller.tools.write(2, ToolOffset(5, 6, -70), expected=ANY)
+        >>> with reach() as controller:
+        ...     print(controller.tools.read(2))
+        None
     """
-    with connect() as controller:
+    with connect(leaves=True) as controller:
         controller.require_settled(reason)
         if tool is not None:
             _require_spare(controller, tool)
@@ -114,7 +131,7 @@ def _put_on_record(controller: Controller, reason: str, tool: int | None) -> _Ke
 
 def _put_back(connect: Connect, kept: _Kept, tool: int | None) -> None:
     try:
-        with connect() as controller, controller.uninterrupted():
+        with connect(leaves=False) as controller, controller.uninterrupted():
             controller.release_stop()
             if kept.change is not None and tool is not None:
                 _restore_tool(controller, kept, tool)

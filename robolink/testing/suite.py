@@ -57,6 +57,11 @@ def check_controller(subject: Subject, *, writes: bool = True, moves: bool = Tru
 
     Raises:
         ContractBrokenError: Names every promise that is broken, a line each.
+
+    Example:
+        >>> from robolink.testing import MemoryController, MemoryMachine, Subject, check_controller
+        >>> machine = MemoryMachine()
+        >>> check_controller(Subject(lambda: MemoryController(machine), tool=2), moves=False)
     """
     with subject.connect() as controller:
         able = controller.capabilities

@@ -42,7 +42,7 @@ from robolink.model import (
 )
 from robolink.standing import note_standing
 from robolink.transaction._orders import Describe, Order, OrderedChange, plain_result
-from robolink.transaction._put_back import PutBack, Step, put_back
+from robolink.transaction._put_back import PutBack, Step, left_unverified, put_back
 from robolink.transaction._wanted import Wanted
 
 _OUT_OF_REACH = (OutcomeUnknownError, TransportError, RemoteProtocolError, LeaseLostError)
@@ -63,6 +63,15 @@ class ToolChange:
         tell: Told, in sentences, what was put back.
         order: The order that it carries out; with the values it is kept that this is done.
         describe: Makes the result of the order from what was written.
+
+    Example:
+        >>> from robolink import ToolOffset, connect
+        >>> from robolink.transaction import ToolChange, Wanted
+        >>> controller = connect("epson+sim://change-example")
+        >>> wanted = Wanted(1, ToolOffset(12.3, -3.7, -20), controller.tools.read(1))
+        >>> with ToolChange(controller, [wanted], verify=True) as change:
+        ...     receipts = change.write()
+        ...     change.keep("the first part was good")
     """
 
     def __init__(
@@ -327,19 +336,7 @@ class ToolChange:
         stand = [number for number, tool in tools.items() if tool.differs or not tool.known]
         if not stand:
             return
-        numbers = ", ".join(map(str, stand))
-        if self._marker is None:
-            sentence = tr(
-                "Tool {numbers} may hold the new value, which nobody verified; 'robolink recover' "
-                "reads what it holds.",
-                numbers=numbers,
-            )
-        else:
-            sentence = tr(
-                "Tool {numbers} may hold the new value, which nobody verified; 'robolink recover' "
-                "puts the old one back.",
-                numbers=numbers,
-            )
+        sentence = left_unverified(stand, marked=self._marker is not None)
         self._tell(sentence)
         error.remedy = f"{error.remedy} {sentence}".strip()
 
@@ -387,6 +384,14 @@ def change_tools(
     Raises:
         RobolinkError: As :meth:`ToolChange.write`; the old values are back, or the error says
             that they are not.
+
+    Example:
+        >>> from robolink import ToolOffset, connect
+        >>> from robolink.transaction import Wanted, change_tools
+        >>> with connect("epson+sim://tools-example") as controller:
+        ...     receipts = change_tools(controller, [Wanted(2, ToolOffset(5, 6, -70), None)])
+        ...     print(controller.tools.read(2).x_mm)
+        5.0
     """
     change = ToolChange(controller, wanted, tell=tell, order=order, describe=describe)
     with controller.latch.watching(change.request), change:

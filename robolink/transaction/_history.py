@@ -79,6 +79,14 @@ def changed_since(controller: Controller, tool: int, now: ToolOffset | None) -> 
 
     Returns:
         ``None`` when it agrees, or was never written with this software.
+
+    Example:
+        >>> import robolink
+        >>> from robolink.transaction import changed_since
+        >>> with robolink.connect("epson+sim://since-example") as controller:
+        ...     now = controller.tools.read(1)
+        ...     print(changed_since(controller, 1, now))  # it was never written from here
+        None
     """
     last = last_proof(controller, tool)
     if last is None:

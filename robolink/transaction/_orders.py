@@ -149,6 +149,20 @@ def carrying_out(controller: Controller, order: str, job: Mapping[str, object]) 
         ToolChangedError: A tool that it wrote holds another value since.
         OutcomeUnknownError: Something earlier is unsettled, perhaps this very order, or what was
             in force before it and is not put back.
+
+    Example:
+        >>> import robolink
+        >>> from robolink import ToolOffset
+        >>> from robolink.transaction import Wanted, carrying_out, change_tools
+        >>> wanted = [Wanted(2, ToolOffset(5, 6, -70), None)]
+        >>> with robolink.connect("epson+sim://order-example") as controller:
+        ...     for delivery in (1, 2):
+        ...         with carrying_out(controller, "J-1007", {"tool": 2}) as order:
+        ...             if order.done is None:
+        ...                 _ = change_tools(controller, wanted, order=order)
+        ...             print(delivery, order.done is not None)
+        1 False
+        2 True
     """
     require_order_id(order)
     outcomes, purpose = controller.outcomes, tr("order {order}", order=order)

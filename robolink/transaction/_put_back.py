@@ -145,3 +145,24 @@ def _entry(kind: EntryKind, step: Step, now: ToolOffset | None, sentence: str) -
     if kind is not EntryKind.UNKNOWN:
         details["value"] = plain_offset(now)
     return NewEntry(kind, tool=step.tool, verdict=sentence, details=details)
+
+
+def left_unverified(tools: Sequence[int], *, marked: bool) -> str:
+    """Return the sentence for tools that could not be put back, since the link is gone.
+
+    Args:
+        tools: Their numbers.
+        marked: Whether the change left a marker, so that ``recover`` puts the old values back.
+    """
+    numbers = ", ".join(map(str, tools))
+    if not marked:
+        return tr(
+            "Tool {numbers} may hold the new value, which nobody verified; 'robolink recover' "
+            "reads what it holds.",
+            numbers=numbers,
+        )
+    return tr(
+        "Tool {numbers} may hold the new value, which nobody verified; 'robolink recover' "
+        "puts the old one back.",
+        numbers=numbers,
+    )

@@ -59,6 +59,13 @@ def recover(
     Raises:
         BusyError: Somebody else is changing this controller just now.
         RobolinkError: A step failed; the rest stays open.
+
+    Example:
+        >>> import robolink
+        >>> from robolink.transaction import recover
+        >>> with robolink.connect("epson+sim://recover-example") as controller:
+        ...     print(recover(controller).left)
+        ()
     """
     with controller.outcomes.hold(tr("recover")):
         markers = _in_order(controller.outcomes.open_markers())
@@ -76,7 +83,20 @@ def look(
     keep: bool = False,
     tell: Callable[[Finding], None] = lambda _finding: None,
 ) -> tuple[Finding, ...]:
-    """Return what :func:`recover` would find, and tell what it would; reads only."""
+    """Return what :func:`recover` would find, and tell what it would; reads only.
+
+    Args:
+        controller: The controller, connected.
+        keep: Whether new values that nobody verified would stay.
+        tell: Told of each finding.
+
+    Example:
+        >>> import robolink
+        >>> from robolink.transaction import look
+        >>> with robolink.connect("epson+sim://look-example") as controller:
+        ...     look(controller)
+        ()
+    """
     settler = Settler(controller, keep=keep)
     markers = _in_order(controller.outcomes.open_markers())
     findings = tuple(_examined(settler, marker) for marker in markers)

@@ -80,6 +80,16 @@ def plan_undo(
     Raises:
         ConfigError: Nothing of that kind is on record about this controller.
         ToolChangedError: A tool does not hold what was proved last.
+
+    Example:
+        >>> import robolink
+        >>> from robolink.transaction import Wanted, change_tools, plan_undo
+        >>> with robolink.connect("epson+sim://undo-plan-example") as controller:
+        ...     new = robolink.ToolOffset(5, 6, -70)
+        ...     receipts = change_tools(controller, [Wanted(2, new, None)])
+        ...     plan = plan_undo(controller)
+        >>> [(step.tool, step.requested) for step in plan.steps]
+        [(2, None)]
     """
     if to is not None:
         return _plan_to(controller, to, tool)
@@ -118,6 +128,16 @@ def undo(
         NotAllowedError: It takes an engineer; nothing was sent.
         SelectedToolError: The tool in force would become undefined; nothing was sent.
         RobolinkError: As :func:`robolink.transaction.change_tools`.
+
+    Example:
+        >>> import robolink
+        >>> from robolink import ToolOffset
+        >>> from robolink.transaction import Wanted, change_tools, plan_undo, undo
+        >>> with robolink.connect("epson+sim://undo-example") as controller:
+        ...     _ = change_tools(controller, [Wanted(2, ToolOffset(5, 6, -70), None)])
+        ...     _ = undo(controller, plan_undo(controller))
+        ...     print(controller.tools.read(2))
+        None
     """
     if not plan.steps:
         return Undone("", ())

@@ -1,12 +1,20 @@
 """check-contract: what a controller promises, looked at and changed by nothing."""
 
 import json
+import os
+import subprocess
+import sys
 from itertools import count
+from pathlib import Path
 from typing import cast
+from xml.etree import ElementTree
 
+import pytest
 from robolink_cli import main
 
-from robolink.model import Controller, ToolOffset
+import robolink
+from robolink.journal import memory_journal
+from robolink.model import Controller, EntryKind, ToolOffset
 from robolink.testing import MemoryController, MemoryMachine, Subject, outcomes
 from tests.contract.test_third_kind import install
 from tests.contract.third_kind.bench_server import BenchServer
@@ -25,6 +33,21 @@ def test_a_controller_that_keeps_its_promises_is_only_looked_at(run, simulator):
     assert simulator.counters()["moves_started"] == 0
     code, out, _ = run("expert", "check-contract")
     assert "All 8 promises" in out
+
+
+def test_the_controller_may_stand_behind_the_command_and_is_named_once(simulator, capsys):
+    named = ["check-contract", simulator.url]
+    for line in (named, ["-c", simulator.url, *named]):
+        assert main.run(["--json", *line]) == 0
+        assert json.loads(capsys.readouterr().out)["kept"]
+    other = "sim://epson"
+    for line in (
+        ["-c", other, *named],
+        [*named, "-c", other],
+        ["check-contract", "-c", other, simulator.url],
+    ):
+        assert main.run(line) == 2
+        assert "Two controllers are named" in capsys.readouterr().err
 
 
 class Drifting(dict[int, ToolOffset]):
@@ -61,3 +84,112 @@ def test_each_promise_is_told_how_it_was_found():
     assert [name for name, one in found.items() if one.broken] == [
         "who_it_is_is_the_same_each_time"
     ]
+
+
+TOLD = ("--write", "--tool", "2", "--move", "--yes")
+
+
+@pytest.mark.parametrize("kind", ["epson", "softmotion"])
+def test_told_to_it_writes_and_moves_and_puts_everything_back(
+    kind, request, robolink_state, tmp_path, capsys
+):
+    cell = request.getfixturevalue(f"{kind}_sim")
+    before = cell.truth()
+    report = tmp_path / "contract.xml"
+    line = ["-c", cell.url, "--json", "expert", "check-contract", *TOLD, "--junit", str(report)]
+    assert main.run(line) == 0
+    told = capsys.readouterr()
+    document = json.loads(told.out)
+    assert (document["kept"], len(document["checks"])) == (True, 24)
+    assert "recover" not in told.err
+    suite = ElementTree.fromstring(report.read_bytes())
+    assert (suite.get("tests"), suite.get("failures"), len(suite)) == ("24", "0", 24)
+    after = cell.truth()
+    assert (after["stored"], after["selected_tool"]) == (before["stored"], before["selected_tool"])
+    cell.wire.assert_sent("TLSet 2, XY" if kind == "epson" else "WRITE_TOOL")
+    assert cell.motions.count > 0
+    with robolink.connect(cell.url) as controller:
+        assert not controller.outcomes.open_markers()
+        journal = memory_journal(controller.identity)
+        found = [entry for entry in journal.entries() if entry.tool == 2]
+        # The checks' own writes are on no record but that of the whole.
+        assert [entry.kind for entry in found] in ([EntryKind.NOT_APPLIED], [EntryKind.ROLLED_BACK])
+
+
+@pytest.mark.parametrize(
+    ("told", "code", "words"),
+    [
+        (("--write", "--tool", "2"), 9, "nobody to ask"),
+        (("--move",), 9, "nobody to ask"),
+        (("--write", "--tool", "1", "--yes"), 2, "Tool 1 is selected"),
+        (("--write", "--yes"), 2, "--write and --tool go together"),
+        (("--tool", "2", "--yes"), 2, "--write and --tool go together"),
+        (("--driver", "nowhere"), 2, "names no driver"),
+        (("--driver", "no_such_module:x"), 2, "cannot be loaded"),
+    ],
+)
+def test_what_nobody_agreed_to_is_neither_written_nor_moved(run, simulator, told, code, words):
+    ended, _, err = run("expert", "check-contract", *told)
+    assert (ended, words in err) == (code, True)
+    assert simulator.counters()["tool_writes"] == 0
+    assert simulator.counters()["moves_started"] == 0
+    assert run("recover")[0] == 0
+
+
+DRIVER = """
+from robolink.model import ToolOffset
+from robolink.testing import MemoryController, MemoryMachine
+
+machine = MemoryMachine()
+
+def good():
+    return MemoryController(machine, identity="memory+object://good")
+
+class Deaf(MemoryMachine):
+    def store(self, tool, offset):
+        pass
+
+def deaf():
+    return MemoryController(Deaf(), identity="memory+object://deaf")
+"""
+
+
+def test_a_driver_in_the_present_folder_is_held_to_it(monkeypatch, tmp_path, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "drv_of_mine.py").write_text(DRIVER, encoding="utf-8")
+    line = ["--json", "expert", "check-contract", "--yes", "--write", "--tool", "3", "--driver"]
+    assert main.run([*line, "drv_of_mine:good"]) == 0
+    assert json.loads(capsys.readouterr().out)["kept"] is True
+    assert main.run([*line, "drv_of_mine:deaf", "--junit", "deaf.xml"]) == 5
+    assert "a write is read back: Tool 3 was written" in capsys.readouterr().err
+    suite = ElementTree.fromstring(Path("deaf.xml").read_bytes())
+    assert (suite.get("errors"), suite[-1].get("name")) == ("1", "a_write_is_read_back")
+    sys.path.remove(str(tmp_path))
+    sys.modules.pop("drv_of_mine", None)
+
+
+@pytest.mark.soak
+@pytest.mark.skipif(os.name == "nt", reason="needs signals")
+def test_killed_in_the_middle_recover_gives_the_tool_back(epson_factory, robolink_state):
+    cell = epson_factory(medium="tcp")
+    with robolink.connect(cell.url) as controller:
+        controller.tools.write(2, ToolOffset(1, 2, 3), expected=robolink.ANY)
+    arguments = ["-c", cell.url, "expert", "check-contract", "--write", "--tool", "2", "--yes"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "robolink_cli", *arguments],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+    )
+    cell.simulator.on_reply = lambda _n, text: process.kill() if written(cell) else None
+    process.wait(timeout=60)
+    cell.simulator.on_reply = None
+    assert cell.truth()["stored"]["2"]["x_mm"] == 1.5
+    assert main.run(["-c", cell.url, "status"]) == 0
+    assert main.run(["-c", cell.url, "tool", "set", "3", "--x", "1", "--yes"]) == 6
+    assert main.run(["-c", cell.url, "recover", "--yes"]) == 0
+    assert cell.truth()["stored"]["2"]["x_mm"] == 1.0
+    assert cell.truth()["selected_tool"] == 1
+
+
+def written(cell):
+    """Tell whether the first value of the checks stands there."""
+    return cell.simulator.truth()["stored"]["2"]["x_mm"] == 1.5

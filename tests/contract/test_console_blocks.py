@@ -7,9 +7,11 @@ with 9. Then it is typed with ``--yes``, which is the answer of the person at th
 """
 
 import json
+import os
 import re
 import shlex
 import shutil
+import subprocess
 import sys
 from contextlib import contextmanager
 from pathlib import Path
@@ -32,7 +34,7 @@ pytestmark = pytest.mark.simulator_only
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", ROOT / "README.zh.md", *sorted(ROOT.glob("docs/*.md"))]
-BLOCK = re.compile(r"^```(?:console|sh)\n(.*?)^```", re.M | re.S)
+BLOCK = re.compile(r"^```console\n(.*?)^```", re.M | re.S)
 URL = "epson+sim://pages"
 
 NOT_RUN = {
@@ -43,6 +45,7 @@ NOT_RUN = {
     "fault-plans.md 1": "serves until Ctrl-C; tests/cli/test_sim_faults_option.py does",
     "journal.md 1": "a server of PostgreSQL; tests/contract/journal starts one",
     "poses.md 5, 1": "steps are typed one by one; tests/contract/test_typed_answers.py types",
+    "simulated-fleet.md 1, 2": "serves until Ctrl-C; tests/cli/test_sim_run.py does",
     "poses.md 6": "held keys on a terminal; tests/contract/test_jog_keys.py holds them",
 }
 """Blocks, and single commands of blocks, that need what is not here; which test does it instead."""
@@ -52,8 +55,12 @@ def page_name(page):
     return page.relative_to(ROOT).as_posix().removeprefix("docs/")
 
 
+def text_of(page):
+    return page.read_text(encoding="utf-8")
+
+
 def blocks(page):
-    return BLOCK.findall(page.read_text(encoding="utf-8"))
+    return BLOCK.findall(text_of(page))
 
 
 def commands(page):
@@ -111,6 +118,7 @@ def cell(tmp_path, monkeypatch):
     simulator.machine.motors_on = True
     for name in ("needle.toml", "scara-pin.toml"):
         shutil.copy(ROOT / "examples" / "recipes" / "scara-pin.toml", name)
+    shutil.copy(ROOT / "examples" / "ci" / "cells.toml", "cells.toml")
     Path("poses.csv").write_text(POSES)
     Path("touches.csv").write_text(TOUCHES)
     Path("robot1.pts").write_text(pts(point(1, 1, X=250, Y=200, Z=-30)))
@@ -126,8 +134,10 @@ def served(cell, page):
             yield host.url, assist.url
         return
     register("pages", cell)
-    yield URL, URL
-    unregister("pages")
+    try:
+        yield URL, URL
+    finally:
+        unregister("pages")
 
 
 def ended(words, capsys):
@@ -198,3 +208,31 @@ def test_a_block_that_is_not_run_is_there_and_says_why(place):
     (test,) = re.findall(r"tests/[\w/.]+", NOT_RUN[place])
     assert (ROOT / test).exists()
     pytest.skip(f"{place} is not run: {NOT_RUN[place]}")
+
+
+SCRIPTS = {
+    f"{page_name(page)} {number}": script
+    for page in PAGES
+    for number, script in enumerate(re.findall(r"^```sh\n(.*?)^```", text_of(page), re.M | re.S), 1)
+}
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("place", SCRIPTS)
+def test_a_script_runs_in_a_shell(place, tmp_path):
+    """Whatever it leaves in the background ends with it; it gets a port that is free."""
+    shutil.copy(ROOT / "examples" / "ci" / "cells.toml", tmp_path)
+    (tmp_path / "robolink").symlink_to(Path(sys.executable).with_name("robolink"))
+    script = SCRIPTS[place].replace("127.0.0.1:5000", "127.0.0.1:0")
+    done = subprocess.run(
+        ["bash", "-euc", f"{script}\nkill $(jobs -p) || true\nwait || true\n"],
+        cwd=tmp_path,
+        env=os.environ
+        | {"PATH": f"{tmp_path}:{os.environ['PATH']}", "ROBOLINK_STATE_DIR": str(tmp_path / "s")},
+        capture_output=True,
+        text=True,
+        timeout=50,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "epson" in (tmp_path / "sim.json").read_text()

@@ -25,14 +25,14 @@ CELL = '[cells.line3]\nurl = "epson+tcp://192.168.0.1:5000"\n'
 RECIPES = {"line-computer": "needle-beams", "ci": "needle-beams"}
 """The recipe that a page calls needle.toml without saying where it is from."""
 
-TYPED: dict[str, pytest.MarkDecorator | tuple[()]] = {
+TYPED: dict[str, tuple[pytest.MarkDecorator, ...]] = {
     "tutorial": (),
     "after-a-crash": (),
     "people": (),
     "nightly-check": (),
     "epson-controller": (),
-    "first-hardware": pytest.mark.soak,
-    "line-computer": pytest.mark.soak,
+    "first-hardware": (pytest.mark.soak,),
+    "line-computer": (pytest.mark.soak,),
     "ci": (),
 }
 """The pages that are typed here, with their marks."""

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterable
 
-_READ = re.compile(r'\$(Get\w+(,.*)?|Login,.*|Logout|Execute,"(Print .*|TLSet|Where)")')
+_READ = re.compile(r'\$(Get\w+(,.*)?|Login,.*|Logout|Execute,"(Print .*|TLSet|Where|Base)")')
 
 
 def changes(requests: Iterable[str]) -> list[str]:

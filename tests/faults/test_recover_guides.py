@@ -2,6 +2,7 @@
 
 import json
 import re
+from contextlib import nullcontext
 
 import pytest
 from robolink_cli.prompts.present import sitting_at
@@ -188,6 +189,9 @@ class Sits:
 
     def tell(self, text):
         pass
+
+    def following(self, look):
+        return nullcontext()
 
     def regard(self, subject):
         self.subject = subject

@@ -71,6 +71,7 @@ def test_the_pipeline_runs_the_script_that_is_shipped():
 
 
 @pytest.mark.soak
+@pytest.mark.timeout(600)
 @pytest.mark.skipif(os.name == "nt", reason="needs a POSIX shell")
 def test_what_the_container_runs_works_in_a_plain_shell(environment):
     (checked,) = [rest for name, rest in instructions() if name == "RUN" and "robolink sim" in rest]
@@ -102,6 +103,7 @@ def test_what_the_container_runs_works_in_a_plain_shell(environment):
 
 
 @pytest.mark.soak
+@pytest.mark.timeout(600)
 @pytest.mark.skipif(os.name == "nt", reason="needs a POSIX shell")
 def test_the_pipeline_is_through_in_a_plain_shell(environment, tmp_path):
     for name in ("cells.toml", "pipeline.sh"):

@@ -137,6 +137,8 @@ def test_closing_a_link_waits_for_the_stop_that_uses_it(latch):
         ("Print RealPos", LOOK),
         ("Where", LOOK),
         ("TLSet", LOOK),
+        ("Base", LOOK),
+        ("Base XY(1, 0, 0, 0)", ACT),
         ("Tool 0", RESTORE),
         ("Power Low", RESTORE),
         ("Speed 5, 5, 5", RESTORE),

@@ -26,7 +26,8 @@ def nothing_named() -> ConfigError:
             tr("No controller is named."),
             remedy=tr(
                 "Give -c CELL from a cell file, or -c URL, for example "
-                "-c epson+tcp://192.168.0.1:5000, or set ROBOLINK_CONTROLLER."
+                "-c epson+tcp://192.168.0.1:5000, or set ROBOLINK_CONTROLLER. To practise on a "
+                "simulated robot: robolink docs tutorial"
             ),
         )
     if len(names) == 1:

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from robolink.interrupts import Interrupted, output_closed
-from robolink_cli.console.columns import within
+from robolink_cli.console.columns import filled, within
 from robolink_cli.console.tolerance import PLAINLY
 
 if TYPE_CHECKING:
@@ -105,6 +105,20 @@ def sentences(text: str) -> str:
         width = 0
     # One that is not told its size says 0.
     return text if width < _NARROWEST else within(text, width)
+
+
+def beside(text: str, taken: int) -> str:
+    """Return a text for stdout, broken to what a terminal has left beside a column of names.
+
+    Args:
+        text: One paragraph.
+        taken: Columns of the names.
+    """
+    try:
+        width = os.get_terminal_size(sys.stdout.fileno()).columns if sys.stdout.isatty() else 0
+    except (OSError, ValueError, AttributeError):
+        width = 0
+    return text if width - taken < _NARROWEST else filled(text, width - taken)
 
 
 def hand_over(document: str) -> None:

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import click
 
-from robolink_cli.console.output import drawn_elsewhere, hand_over, sentences, show, visible
+from robolink_cli.console.output import beside, drawn_elsewhere, hand_over, sentences, show, visible
 
 _JSON = "robolink.json"
 _DOCUMENT = "robolink.document"
@@ -34,9 +34,10 @@ def say(text: str = "") -> None:
 
 def say_listed(texts: Mapping[str, str]) -> None:
     """Show a name and a text in each line, the texts below each other."""
-    width = max(map(len, texts), default=0)
+    width = max(map(len, texts), default=0) + 2
     for name, text in texts.items():
-        say(f"{name:{width}}  {text}")
+        first, *more = beside(text, width).split("\n")
+        say("\n".join([f"{name:{width}}{first}", *(" " * width + line for line in more)]))
 
 
 def note(text: str) -> None:

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 CommandT = TypeVar("CommandT", bound=Callable[..., Any])
 
+_CELL_OR_URL = "CELL|URL"
+
 GIVEN = "robolink.given"
 """Where the options of all levels are collected."""
 
@@ -87,6 +89,18 @@ def lang_option(command: CommandT) -> CommandT:
     )(command)
 
 
+def controller_argument(command: CommandT) -> CommandT:
+    """Let a command also take the controller as its argument: the same as ``-c``."""
+    return click.argument(
+        "named",
+        metavar=f"[{_CELL_OR_URL}]",
+        required=False,
+        expose_value=False,
+        callback=_keep_named,
+        shell_complete=complete_cell,
+    )(command)
+
+
 def origin_of(option: str) -> str | None:
     """Return the option or variable by which a person gave ``option``, None when nobody did."""
     origins: dict[str, str] = click.get_current_context().meta.get(_ORIGINS, {})
@@ -99,7 +113,7 @@ def _link_options(command: CommandT) -> CommandT:
             "-c",
             "--controller",
             "url",
-            metavar="CELL|URL",
+            metavar=_CELL_OR_URL,
             envvar="ROBOLINK_CONTROLLER",
             show_envvar=True,
             expose_value=False,
@@ -167,9 +181,24 @@ def _keep(context: click.Context, parameter: click.Parameter, value: object) -> 
     # was written at an earlier one.
     typed = context.get_parameter_source(name) is ParameterSource.COMMANDLINE
     if value is not None and (typed or name not in given):
-        given[name] = value
         origin = parameter.opts[-1] if typed else str(parameter.envvar)
+        _require_one_controller(context, origin, value)
+        given[name] = value
         context.meta.setdefault(_ORIGINS, {})[name] = origin
+
+
+def _keep_named(context: click.Context, parameter: click.Parameter, value: str | None) -> None:  # noqa: ARG001 - click's form
+    if value is not None:
+        _require_one_controller(context, _CELL_OR_URL, value)
+        context.meta.setdefault(GIVEN, {})["url"] = value
+        context.meta.setdefault(_ORIGINS, {})["url"] = _CELL_OR_URL
+
+
+def _require_one_controller(context: click.Context, origin: str, value: object) -> None:
+    """Refuse two names that a person typed, in whatever order they stand."""
+    named = {origin, context.meta.get(_ORIGINS, {}).get("url")}
+    if named == {"--controller", _CELL_OR_URL} and context.meta[GIVEN]["url"] != value:
+        raise click.UsageError(tr("Two controllers are named: name one, with -c or behind it."))
 
 
 def _note_json(context: click.Context, parameter: click.Parameter, value: bool) -> None:  # noqa: ARG001 - click's form

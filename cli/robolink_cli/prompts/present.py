@@ -1,7 +1,7 @@
 """The desk at which the person of this process sits, while a wizard shows it."""
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from typing import Any, Protocol
 
 from robolink.runner import Question
@@ -24,6 +24,9 @@ class AskingDesk(Protocol):
 
     def ask(self, question: str, kind: Question) -> None:
         """Ask."""
+
+    def following(self, look: Callable[[], Any]) -> AbstractContextManager[None]:
+        """Look at the controller while it moves, for the block."""
 
     def poll(self, wait_s: float) -> str | None:
         """Return the answer, ``None`` if none came within ``wait_s``."""

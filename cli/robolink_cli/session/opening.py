@@ -41,6 +41,7 @@ def open_controller(
     looks: bool = False,
     calms: bool = False,
     changes: bool = False,
+    leaves: bool = False,
 ) -> "Iterator[Controller]":
     """Connect to the controller and, unless ``quiet``, say what was left unfinished there.
 
@@ -52,6 +53,8 @@ def open_controller(
         calms: Whether it calms, so that it goes on as one that looks, and asks nothing.
         changes: Whether it may change something, so that a badge is asked for where the cell
             names people.
+        leaves: Whether what it begins is settled by a later connection of the same command, so
+            that nothing is said about it where all went well.
 
     Raises:
         ConfigError: No controller is named, the URL or password file is wrong, or the robot is
@@ -92,7 +95,9 @@ def open_controller(
         with (
             watched_at_desk(controller),
             listening_for_stop(controller, context, looks=unhindered),
-            _saying_what_is_left(controller, context, quiet=quiet, looks=looks, calms=calms),
+            _saying_what_is_left(
+                controller, context, quiet=quiet, looks=looks, calms=calms, leaves=leaves
+            ),
         ):
             yield controller
     if not unhindered:
@@ -103,7 +108,13 @@ def open_controller(
 
 @contextmanager
 def _saying_what_is_left(
-    controller: "Controller", context: CliContext, *, quiet: bool, looks: bool, calms: bool
+    controller: "Controller",
+    context: CliContext,
+    *,
+    quiet: bool,
+    looks: bool,
+    calms: bool,
+    leaves: bool,
 ) -> Iterator[None]:
     """Say before the work what others left on the controller, and after it what this left.
 
@@ -125,8 +136,10 @@ def _saying_what_is_left(
         _check_robot(controller, context.expected, looks=looks)
     if found and not (quiet or calms or beside):
         _offer_to_restore(controller, found)
+    told = True
     try:
         yield
+        told = not leaves
     except KeyboardInterrupt:
         # The last line says which tool is selected: as it is now, not as it was once.
         with suppress(RobolinkError):
@@ -135,7 +148,7 @@ def _saying_what_is_left(
         raise
     finally:
         left = _open_markers(controller, lenient=lenient)
-        known = {marker.operation for marker in found}
+        known = {marker.operation for marker in (found if told else left)}
         note_unsettled(controller, [m for m in left if m.operation not in known], named)
         if trouble is not None:
             # After the work: nothing that the journal has to say stands before it.

@@ -5,14 +5,16 @@ and keys reach it whatever the work is doing. They share two queues and nothing 
 """
 
 import queue
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Final
 
-from robolink.errors import DeclinedError
+from robolink.errors import DeclinedError, RobolinkError
 from robolink.interrupts import heed
 from robolink.messages import tr
-from robolink.runner import Question
+from robolink.runner import MoveSubject, Question
 from robolink_cli.wizard.happenings import (
     Happening,
     Reading,
@@ -23,6 +25,9 @@ from robolink_cli.wizard.happenings import (
     WasRegarded,
     WasTold,
 )
+
+FOLLOW_S: Final = 0.4
+"""Between two looks while the robot moves."""
 
 GLANCE_S: Final = 0.3
 """Between two looks at the controller while a person is asked."""
@@ -43,6 +48,7 @@ class Desk:
         self._told_waiting = False
         self._gone = False
         self._looked_s = 0.0
+        self._moves = threading.Event()
         self.glance: Callable[[], Reading | None] = lambda: None
 
     def tell(self, text: str) -> None:
@@ -51,10 +57,13 @@ class Desk:
 
     def regard(self, subject: object) -> None:
         """Take what comes next to be about ``subject``."""
+        if isinstance(subject, MoveSubject):
+            self._moves.set()
         self._happened.put(WasRegarded(subject))
 
     def ask(self, question: str, kind: Question) -> None:
         """Ask; what was answered before counts for nothing."""
+        self._moves.clear()
         self._number += 1
         self._told_waiting = False
         self._happened.put(WasAsked(self._number, question, kind, self._now_s()))
@@ -90,6 +99,34 @@ class Desk:
             if answer.number == self._number:
                 self._told_waiting = False
                 return answer.text
+
+    @contextmanager
+    def following(self, look: Callable[[], Reading | None]) -> Iterator[None]:
+        """Look at the controller while it moves, from a thread of its own, for the block.
+
+        A look that fails ends this alone: whoever waits for the movement is told of it.
+        """
+        over = threading.Event()
+
+        def follow() -> None:
+            while not over.wait(FOLLOW_S):
+                if not self._moves.is_set():
+                    continue
+                try:
+                    reading = look()
+                except (RobolinkError, OSError):
+                    self._moves.clear()
+                    continue
+                if reading is not None and self._moves.is_set():
+                    self._happened.put(WasRead(reading))
+
+        thread = threading.Thread(target=follow, name="following", daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            over.set()
+            thread.join()
 
     def happened(self) -> list[Happening]:
         """Return what happened since the last call; for the face."""

@@ -19,6 +19,7 @@ from robolink_cli.wizard.happenings import (
     HasEnded,
     KeyPressed,
     LineTyped,
+    Reading,
     SendAnswer,
     TaughtPoints,
     TooFast,
@@ -54,7 +55,7 @@ def advance(state: WizardState, happening: Happening) -> Advanced:
             remarks = (*state.remarks, text)[-_MOST_REMARKS:]
             return replace(state, remarks=remarks, fresh=(*state.fresh, text), message=text), []
         case WasRead(reading=reading):
-            return replace(state, reading=reading), []
+            return replace(state, reading=_as_far_as_known(state, reading)), []
         case WasRegarded(subject=subject):
             return _regarding(state, subject), []
         case WasAsked():
@@ -129,6 +130,15 @@ def _regarding(state: WizardState, subject: object) -> WizardState:
     if isinstance(subject, FitSubject):
         return replace(state, subject=subject, fit=subject)
     return replace(state, subject=subject)
+
+
+def _as_far_as_known(state: WizardState, reading: Reading) -> Reading:
+    """Return a reading during a movement with the pose at which that began, where none is read."""
+    before = state.reading
+    moving = state.question is None and isinstance(state.subject, MoveSubject)
+    if reading.pose is not None or before is None or not moving or reading.halted:
+        return reading
+    return replace(reading, pose=before.pose, axes=before.axes, follows=False)
 
 
 def _known(state: WizardState, simulated: bool, needle: str) -> WizardState:

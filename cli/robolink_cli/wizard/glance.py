@@ -31,6 +31,23 @@ def glancing_at(controller: Controller) -> Callable[[], Reading | None]:
     return look
 
 
+def following(controller: Controller) -> Callable[[], Reading | None]:
+    """Return what looks at a controller while a movement is under way, beside whoever waits for it.
+
+    Status can be asked meanwhile on every kind; the position only where the kind says so.
+    """
+    group = controller.groups[0]
+    tells = controller.capabilities.pose_while_moving
+
+    def look() -> Reading | None:
+        status = controller.status()
+        pose = group.pose() if tells else None
+        axes = _joints(group.axes()) if tells else ()
+        return Reading(time.monotonic(), status.state, pose=pose, axes=axes)
+
+    return look
+
+
 def _joints(axes: object) -> tuple[float, ...]:
     found = axes.get("joints") or axes.get("axes") or () if isinstance(axes, dict) else ()
     return tuple(found)

@@ -21,6 +21,7 @@ class Reading:
         halted: Whether an emergency stop, an open guard or an error shows.
         pose: Where the frame in force is, ``None`` where it was not read.
         axes: Joint angles, in degrees, where they were read.
+        follows: Whether the pose is that of now; else it is where a movement began.
     """
 
     at_s: float
@@ -28,6 +29,7 @@ class Reading:
     halted: bool = False
     pose: Pose | None = None
     axes: tuple[float, ...] = ()
+    follows: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from robolink_cli.prompts.present import sitting_at
 from robolink_cli.wizard.desk import Desk
 from robolink_cli.wizard.screens.ending import ended_of, kept_lines
 from robolink_cli.wizard.state import Header, WizardState
-from robolink_cli.wizard.work import Work
+from robolink_cli.wizard.work import Face, Work
 
 T = TypeVar("T")
 
@@ -31,13 +31,36 @@ def guided(header: Header, do: Callable[[], T]) -> T:
         desk, work = Desk(), Work(do)
         with sitting_at(desk), shown_by(lambda text, _beside: desk.tell(text)):  # noqa: B023 - used inside the turn
             work.start()
-            state = face.run(desk, WizardState(header), work)
+            state = _shown(face, desk, WizardState(header), work)
         _leave(state, work.error)
         if not state.begins_again:
             break
     if work.error is not None:
         raise work.error
     return work.result  # type: ignore[return-value]
+
+
+def _shown(face: Face, desk: Desk, state: WizardState, work: "Work[T]") -> WizardState:
+    """Show the work until it has ended, also where that cannot be shown any more.
+
+    The work is in a thread that would end with the process in the middle of a measurement. So it
+    is told that nobody answers, and awaited: tool, power and speed are put back then, and the
+    controller is logged out.
+    """
+    try:
+        return face.run(desk, state, work)
+    except (EOFError, OSError):  # the window was closed, or the line to it is gone
+        _ends_alone(desk, work)
+        return state
+    except BaseException:
+        _ends_alone(desk, work)
+        raise
+
+
+def _ends_alone(desk: Desk, work: "Work[T]") -> None:
+    desk.leave()
+    while not work.wait(1.0):
+        pass
 
 
 def _leave(state: WizardState, error: BaseException | None) -> None:

@@ -56,6 +56,16 @@ def solve_board(
             ``suspect_units``, ``mixed_hand``, ``mixed_local``, ``mixed_tool``, ``tool_pose``,
             ``local_pose``, ``tilted_pose`` or ``implausible_offset``.
         ConfigError: ``sigma_mm`` is not positive.
+
+    Example:
+        >>> from robolink import Pose
+        >>> from robolink.calibration import Sighting, solve_board
+        >>> flange = Pose(300, 100, -60, 0)
+        >>> fiducials = Sighting(flange, 312, 96.5), Sighting(flange, 352, 96.5)
+        >>> found = solve_board(*fiducials, spacing_mm=40)
+        >>> offset = found.offset
+        >>> [round(value, 3) for value in (offset.x_mm, offset.y_mm, offset.u_deg)]
+        [32.0, -3.5, 180.0]
     """
     warnings = check_sightings((first, second), allow_mixed_hand=allow_mixed_hand)
     height = height_of(stored, height)

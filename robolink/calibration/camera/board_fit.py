@@ -60,6 +60,17 @@ def solve_board_fit(
             ``pose_checks.check_poses``.
         ConfigError: ``sigma_mm`` is not positive.
         ValueError: The lists differ in length.
+
+    Example:
+        >>> from robolink import Pose
+        >>> from robolink.calibration import Sighting, solve_board_fit
+        >>> drawing_mm = [(0, 0), (40, 0), (0, 30)]
+        >>> flange = Pose(300, 100, -60, 0)
+        >>> seen = [Sighting(flange, 312 + x_mm, 96.5 + y_mm) for x_mm, y_mm in drawing_mm]
+        >>> found = solve_board_fit(seen, drawing_mm)
+        >>> offset = found.offset
+        >>> [round(value, 3) + 0.0 for value in (offset.x_mm, offset.y_mm, offset.u_deg)]
+        [12.0, -3.5, 0.0]
     """
     if len(sightings) != len(drawing_mm):
         raise ValueError(f"{len(sightings)} sightings for {len(drawing_mm)} places in the drawing")

@@ -62,6 +62,21 @@ def solve_board_round(
     Raises:
         CalibrationError: As :func:`solve_board_fit`.
         ConfigError: ``sigma_mm`` is not positive.
+
+    Example:
+        >>> from robolink import Pose
+        >>> from robolink.calibration import Sighting, solve_board_round
+        >>> from robolink.model import rotate_xy
+        >>> drawing_mm, looks, drawn = [(0, 0), (40, 0), (0, 30)], [], []
+        >>> for u_deg in (0, 90, 180):
+        ...     for x_mm, y_mm in drawing_mm:
+        ...         dx_mm, dy_mm = rotate_xy(12 + x_mm, -3.5 + y_mm, u_deg)
+        ...         looks.append(Sighting(Pose(300, 100, -60, u_deg), 300 + dx_mm, 100 + dy_mm))
+        ...         drawn.append((x_mm, y_mm))
+        >>> found = solve_board_round(looks, drawn)
+        >>> offset = found.offset
+        >>> [round(value, 3) + 0.0 for value in (offset.x_mm, offset.y_mm, offset.u_deg)]
+        [12.0, -3.5, 0.0]
     """
     height = height_of(stored, height)
     planes = [FlangePlane.of(sighting.flange) for sighting in sightings]

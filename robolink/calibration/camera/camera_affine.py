@@ -105,6 +105,21 @@ def solve_camera_affine(
             ``camera_changed``, ``implausible_offset``, ``tool_pose``, ``local_pose``,
             ``tilted_pose``, and those of ``pose_checks.check_poses``.
         ConfigError: ``sigma_mm`` is not positive.
+
+    Example:
+        >>> from robolink import Pose
+        >>> from robolink.calibration import PixelSighting, solve_camera_affine
+        >>> from robolink.model import rotate_xy
+        >>> def seen(x_mm, y_mm, u_deg):  # 0.02 mm a pixel, pixel (0, 0) at 290, 80
+        ...     dx_mm, dy_mm = rotate_xy(12.3, -3.7, u_deg)
+        ...     px, py = (x_mm + dx_mm - 290) / 0.02, (y_mm + dy_mm - 80) / 0.02
+        ...     return PixelSighting(Pose(x_mm, y_mm, -60, u_deg), px, py)
+        >>> places = [(300, 100, 0), (303, 100, 0), (300, 103, 0), (300, 100, 90), (300, 100, 180)]
+        >>> found = solve_camera_affine([seen(*place) for place in places])
+        >>> round(found.offset.x_mm, 3), round(found.offset.y_mm, 3)
+        (12.3, -3.7)
+        >>> [round(scale, 4) for scale in found.camera.scale_mm_per_px]
+        [0.02, 0.02]
     """
     require_poses(len(sightings), UNKNOWNS // 2)
     for number, sighting in enumerate(sightings, start=1):

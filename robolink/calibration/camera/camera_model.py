@@ -112,8 +112,19 @@ def require_same_camera(
 ) -> None:
     """Refuse a camera that is not as it was; where it looks may have moved.
 
+    Args:
+        now: The camera as it was found.
+        before: The camera as it was at its last calibration.
+        limits: How much may differ.
+
     Raises:
         CalibrationError: ``camera_changed``.
+
+    Example:
+        >>> from robolink.calibration import CameraModel, require_same_camera
+        >>> before = CameraModel(((0.02, 0), (0, 0.02)), origin_mm=(290, 80))
+        >>> moved = CameraModel(((0.02, 0), (0, 0.02)), origin_mm=(291, 80))
+        >>> require_same_camera(moved, before)
     """
     changes = [
         abs(a / b - 1) for a, b in zip(now.scale_mm_per_px, before.scale_mm_per_px, strict=True)

@@ -86,6 +86,20 @@ def solve_camera_round(
         CalibrationError: As :func:`solve_up_camera`, and for several looks as
             :func:`solve_n_angle`.
         ConfigError: ``sigma_mm`` is not positive.
+
+    Example:
+        >>> from robolink import Pose
+        >>> from robolink.calibration import Sighting, solve_camera_round
+        >>> from robolink.model import rotate_xy
+        >>> looks = []
+        >>> for u_deg in (0, 90, 180, -90):  # the camera says 0.2 mm too much in X
+        ...     dx_mm, dy_mm = rotate_xy(12.3, -3.7, u_deg)
+        ...     looks.append(Sighting(Pose(300, 100, -60, u_deg), 300.2 + dx_mm, 100 + dy_mm))
+        >>> found = solve_camera_round(looks)
+        >>> round(found.offset.x_mm, 3), round(found.offset.y_mm, 3)
+        (12.3, -3.7)
+        >>> [round(part, 3) + 0.0 for part in found.camera_error_mm]
+        [0.2, 0.0]
     """
     require_poses(len(sightings), 1)
     check_sightings(tuple(sightings))

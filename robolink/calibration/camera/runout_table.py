@@ -135,6 +135,18 @@ def solve_runout_table(
         CalibrationError: ``too_few_poses``, ``angles_too_far_apart``, and those of
             :func:`runout_report`.
         ConfigError: ``sigma_mm`` is not positive.
+
+    Example:
+        >>> from robolink import Pose
+        >>> from robolink.calibration import Sighting, solve_runout_table
+        >>> from robolink.model import rotate_xy
+        >>> looks = []
+        >>> for u_deg in range(-180, 180, 30):
+        ...     dx_mm, dy_mm = rotate_xy(12.3, -3.7, u_deg)
+        ...     looks.append(Sighting(Pose(300, 100, -60, u_deg), 300 + dx_mm, 100 + dy_mm))
+        >>> found = solve_runout_table(looks, sigma_mm=0.01)
+        >>> round(found.offset.x_mm, 3), round(found.offset.y_mm, 3), found.wobble
+        (12.3, -3.7, False)
     """
     require_poses(len(sightings), LEAST_LOOKS)
     report = runout_report(sightings, sigma_mm=sigma_mm)

@@ -74,6 +74,13 @@ def solve_up_camera(
         CalibrationError: ``non_finite``, ``suspect_units``, ``tool_pose``, ``local_pose``,
             ``tilted_pose`` or ``implausible_offset``.
         ConfigError: ``sigma_mm`` is not positive.
+
+    Example:
+        >>> from robolink import Pose
+        >>> from robolink.calibration import Sighting, solve_up_camera
+        >>> found = solve_up_camera(Sighting(Pose(300, 100, -60, 0), 312.3, 96.3))
+        >>> round(found.offset.x_mm, 3), round(found.offset.y_mm, 3)
+        (12.3, -3.7)
     """
     check_sightings((sighting,))
     if sighting.z_mm is not None:

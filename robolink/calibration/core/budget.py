@@ -70,7 +70,20 @@ class UncertaintyBudget:
         not_assessed: Iterable[str] = (),
         probability: float = 0.95,
     ) -> Self:
-        """Return the budget of some rows."""
+        """Return the budget of some rows.
+
+        Args:
+            rows: What is uncertain, a row each.
+            not_assessed: What nobody stated, by name.
+            probability: How much the expanded uncertainty covers.
+
+        Example:
+            >>> from robolink.calibration import BudgetRow, UncertaintyBudget
+            >>> rows = [BudgetRow("touches", 0.03, nu=5, kind="A"), BudgetRow("pin", 0.04)]
+            >>> budget = UncertaintyBudget.of(rows)
+            >>> round(budget.u_c_mm, 3), round(budget.expanded_mm, 3)
+            (0.05, 0.101)
+        """
         return cls(tuple(rows), tuple(not_assessed), probability)
 
     @classmethod

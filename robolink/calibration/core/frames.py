@@ -80,6 +80,14 @@ def flange_poses(
         poses: Poses with the tool and the local in which they were taken.
         tools: Values of tools, by number.
         local_frames: Where locals lie in the base, by number.
+
+    Example:
+        >>> from robolink import Pose, ToolOffset
+        >>> from robolink.calibration import flange_poses
+        >>> taught = Pose(312, 96.5, -80, 0, tool=1)
+        >>> (flange,) = flange_poses([taught], tools={1: ToolOffset(12, -3.5, -20)})
+        >>> flange.x_mm, flange.y_mm, flange.z_mm, flange.tool
+        (300.0, 100.0, -60, 0)
     """
     return tuple(_converted(pose, tools, local_frames) for pose in poses)
 
@@ -125,6 +133,18 @@ def tip_pose(flange: Pose, offset: ToolOffset, *, tool: int | None) -> Pose:
     """Return where a tool's tip is under a flange, on four axes and on more.
 
     Undoes :func:`flange_of`; ``tool`` is the number that the pose gets.
+
+    Args:
+        flange: Pose of the flange.
+        offset: Where the tip is in the axes of the flange.
+        tool: The number that the pose of the tip gets.
+
+    Example:
+        >>> from robolink import Pose, ToolOffset
+        >>> from robolink.calibration import tip_pose
+        >>> tip = tip_pose(Pose(300, 100, -60, 0), ToolOffset(12, -3.5, -20), tool=1)
+        >>> tip.x_mm, tip.y_mm, tip.z_mm, tip.tool
+        (312.0, 96.5, -80, 1)
     """
     angles = (flange.v_deg, flange.w_deg, offset.v_deg, offset.w_deg)
     if angles == (0.0, 0.0, 0.0, 0.0):

@@ -79,6 +79,15 @@ def suggest_poses(
     Raises:
         ConfigError: ``count`` or the limits make no sense.
         CalibrationError: ``insufficient_rotation`` when the limits leave too few poses.
+
+    Example:
+        >>> from robolink import ToolOffset
+        >>> from robolink.calibration import PoseLimits, suggest_poses
+        >>> guess = ToolOffset(12, -3.5, -20)
+        >>> limits = PoseLimits(u_min_deg=-90, u_max_deg=90)
+        >>> plan = suggest_poses(3, guess=guess, point_mm=(300, 100, -80), limits=limits)
+        >>> sorted(round(pose.u_deg) for pose in plan.poses)
+        [-90, -75, 90]
     """
     if count < 1:
         raise ConfigError(
@@ -156,6 +165,16 @@ def select_poses(turned: Floats, before: Floats, count: int) -> list[int]:
         turned: What there is to choose from, N x 3 x 3, or N x 2 x 2 in the plane.
         before: Orientations that are taken anyway, of the same size; may be none.
         count: How many are chosen.
+
+    Example:
+        >>> import numpy as np
+        >>> from robolink.calibration import select_poses
+        >>> def turn(deg):
+        ...     c, s = np.cos(np.radians(deg)), np.sin(np.radians(deg))
+        ...     return np.array([[c, -s], [s, c]])
+        >>> choice = np.array([turn(deg) for deg in (5, 90, 180)])
+        >>> select_poses(choice, np.array([turn(0)]), 1)
+        [2]
     """
     chosen = _exchanged(turned, before, _greedy(turned, before, range(len(turned)), count))
     return _greedy(turned, before, chosen, count)

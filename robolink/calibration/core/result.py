@@ -147,6 +147,13 @@ def judge_drift(drift_mm: float, u_mm: float, tolerance_mm: float) -> DriftVerdi
         drift_mm: The drift that was found.
         u_mm: Its standard uncertainty.
         tolerance_mm: What is allowed.
+
+    Example:
+        >>> from robolink.calibration import judge_drift
+        >>> str(judge_drift(0.08, u_mm=0.01, tolerance_mm=0.2))
+        'DriftVerdict.PASSED'
+        >>> str(judge_drift(0.19, u_mm=0.02, tolerance_mm=0.2))
+        'DriftVerdict.UNDECIDED'
     """
     guard_mm = GUARD_FACTOR * u_mm
     if drift_mm + guard_mm <= tolerance_mm:

@@ -47,6 +47,17 @@ def with_approach_bias(
 
     Raises:
         ValueError: There is not one standoff for each input.
+
+    Example:
+        >>> from robolink import Pose, ToolOffset
+        >>> from robolink.calibration import carrying, solve_n_angle, with_approach_bias
+        >>> tip, pin_mm = ToolOffset(12.5, -3.25, -20), (300, 100, -80)
+        >>> angles = range(-180, 180, 45)
+        >>> poses = [carrying(Pose(0, 0, 0, u_deg), tip, pin_mm) for u_deg in angles]
+        >>> standoffs = [(1, 0), (-1, 0), (0, 1), (0, -1)] * 2
+        >>> found = with_approach_bias(solve_n_angle(poses, sigma_mm=0.02), standoffs)
+        >>> "approach_bias" in found.warnings
+        False
     """
     if len(standoffs_mm) != len(result.inputs):
         raise ValueError(f"{len(standoffs_mm)} standoffs for {len(result.inputs)} touches")

@@ -30,6 +30,13 @@ def axis_displacement(start: Pose, end: Pose, *, wanted_mm: float | None = None)
 
     Raises:
         CalibrationError: ``turned_on_the_way``, ``short_axis``.
+
+    Example:
+        >>> from robolink import Pose
+        >>> from robolink.calibration import axis_displacement
+        >>> way = axis_displacement(Pose(300, 100, -60, 90), Pose(300, 150, -60, 90))
+        >>> [round(float(part), 3) for part in way]
+        [50.0, 0.0, 0.0]
     """
     require_unturned(start, end)
     way: Floats = rotation_of(start).T @ np.subtract(end.coordinates()[:3], start.coordinates()[:3])

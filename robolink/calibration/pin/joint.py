@@ -107,6 +107,21 @@ def solve_joint(
         CalibrationError: ``too_few_poses``, ``rank_deficient``, ``insufficient_rotation``,
             ``implausible_offset``, and those of ``pose_checks.check_poses``.
         ConfigError: ``sigma_mm`` is not positive.
+
+    Example:
+        >>> from robolink import Pose, ToolOffset
+        >>> from robolink.calibration import JointTouch, carrying, solve_joint
+        >>> tips = {1: ToolOffset(12.5, -3.25, -20), 2: ToolOffset(-30, 8, -20)}
+        >>> pins = {0: (300, 100, -80), 1: (250, 180, -80)}
+        >>> touches = [
+        ...     JointTouch(carrying(Pose(0, 0, 0, u_deg), tips[tool], pins[pin]), tool, pin)
+        ...     for tool in tips
+        ...     for pin in pins
+        ...     for u_deg in (0, 120, 240)
+        ... ]
+        >>> found = solve_joint(touches)
+        >>> round(found.tools[2].offset.x_mm, 3), round(found.tools[2].offset.y_mm, 3)
+        (-30.0, 8.0)
     """
     poses = [touch.flange for touch in touches]
     require_poses(len(poses), 2)

@@ -76,6 +76,15 @@ def solve_n_angle(
             ``mixed_local``, ``mixed_tool``, ``tool_pose``, ``robust_too_few``,
             ``robust_unstable``, ``too_many_outliers`` or ``implausible_offset``.
         ConfigError: ``sigma_mm``, ``grid_mm`` or the threshold is not positive.
+
+    Example:
+        >>> from robolink import Pose, ToolOffset
+        >>> from robolink.calibration import carrying, solve_n_angle
+        >>> tip, pin_mm = ToolOffset(12.5, -3.25, -20), (300, 100, -80)
+        >>> poses = [carrying(Pose(0, 0, 0, u_deg), tip, pin_mm) for u_deg in (0, 90, 180, -90)]
+        >>> found = solve_n_angle(poses, sigma_mm=0.02)
+        >>> round(found.offset.x_mm, 3), round(found.offset.y_mm, 3)
+        (12.5, -3.25)
     """
     require_poses(len(poses), 2)
     table, doubts = checked_table(poses, allow_mixed_hand=allow_mixed_hand)

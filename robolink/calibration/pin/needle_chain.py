@@ -71,6 +71,13 @@ def chain_sigma_mm(
 
     Raises:
         ConfigError: A standard deviation is not positive.
+
+    Example:
+        >>> from robolink.calibration import chain_sigma_mm
+        >>> round(chain_sigma_mm(0.02, 0.03, changes=4, shared_touch=False), 3)
+        0.087
+        >>> round(chain_sigma_mm(0.02, 0.03, changes=4, shared_touch=True), 3)
+        0.047
     """
     require_positive(full_sigma_mm, "u0_mm")
     require_positive(touch_sigma_mm, "sigma_mm")

@@ -75,6 +75,20 @@ def solve_needle_change(
             ``tool_pose``, ``local_pose``, ``tilted_pose`` or ``implausible_offset``.
         ConfigError: A standard deviation or limit is not positive.
         ValueError: The two places do not have two or three coordinates each.
+
+    Example:
+        >>> from robolink import Pose, ToolOffset
+        >>> from robolink.calibration import NeedleChain, solve_needle_change
+        >>> found = solve_needle_change(
+        ...     Pose(300, 100, -60, 0),
+        ...     before_mm=(312.0, 96.5),
+        ...     after_mm=(312.3, 96.3),
+        ...     stored=ToolOffset(12, -3.5, -20),
+        ...     chain=NeedleChain(sigma_mm=0.02),
+        ...     sigma_mm=0.01,
+        ... )
+        >>> round(found.offset.x_mm, 3), round(found.offset.y_mm, 3)
+        (12.3, -3.7)
     """
     _check_places(before_mm, after_mm)
     require_positive(limits.tolerance_mm, "tolerance_mm")

@@ -52,7 +52,20 @@ class Pin:
 
 
 def pin_touched(flange: Pose, offset: ToolOffset, *, sigma_mm: float = 0.0) -> Pin:
-    """Return where the pin is when ``offset`` is right and touched it in this flange pose."""
+    """Return where the pin is when ``offset`` is right and touched it in this flange pose.
+
+    Args:
+        flange: Flange pose (Tool 0) at the touch.
+        offset: The offset of the tip that touched.
+        sigma_mm: Standard deviation of one coordinate of that touch.
+
+    Example:
+        >>> from robolink import Pose, ToolOffset
+        >>> from robolink.calibration import pin_touched
+        >>> pin = pin_touched(Pose(300, 100, -60, 90), ToolOffset(12, -3.5, -20))
+        >>> [round(value, 3) for value in (pin.x_mm, pin.y_mm, pin.z_mm)]
+        [303.5, 112.0, -80.0]
+    """
     x, y, z = (rotation_of(flange) @ offset.components()[:3]).tolist()
     return Pin(flange.x_mm + x, flange.y_mm + y, flange.z_mm + z, sigma_mm)
 
@@ -81,6 +94,14 @@ def solve_one_touch(
         CalibrationError: ``non_finite``, ``suspect_units``, ``tool_pose``, ``local_pose`` or
             ``implausible_offset``.
         ConfigError: ``sigma_mm`` is not positive.
+
+    Example:
+        >>> from robolink import Pose, ToolOffset
+        >>> from robolink.calibration import pin_touched, solve_one_touch
+        >>> pin = pin_touched(Pose(300, 100, -60, 0), ToolOffset(12, -3.5, -20))  # the last touch
+        >>> found = solve_one_touch(Pose(299.7, 100.2, -60.1, 0), pin)
+        >>> [round(value, 3) for value in (found.offset.x_mm, found.offset.y_mm, found.offset.z_mm)]
+        [12.3, -3.7, -19.9]
     """
     check_poses((flange,), allow_mixed_hand=False)
     require_flange_in_base((flange,))

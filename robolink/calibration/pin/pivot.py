@@ -85,6 +85,16 @@ def solve_pivot(
             ``mixed_tool``, ``tool_pose``, ``robust_too_few``, ``robust_unstable``,
             ``too_many_outliers`` or ``implausible_offset``.
         ConfigError: ``sigma_mm``, ``grid_mm`` or the threshold is not positive.
+
+    Example:
+        >>> from robolink import Pose, ToolOffset
+        >>> from robolink.calibration import carrying, solve_pivot
+        >>> tip, pin_mm = ToolOffset(12.5, -3.25, 80), (300, 100, -80)
+        >>> angles = [(0, 0, 180), (90, 20, 180), (180, 0, 160), (-90, -20, 180), (45, 0, 200)]
+        >>> poses = [carrying(Pose(0, 0, 0, *uvw), tip, pin_mm) for uvw in angles]
+        >>> found = solve_pivot(poses)
+        >>> [round(value, 3) for value in (found.offset.x_mm, found.offset.y_mm, found.offset.z_mm)]
+        [12.5, -3.25, 80.0]
     """
     require_poses(len(poses), MINIMAL)
     table, warnings = checked_table(poses, allow_mixed_hand=allow_mixed_hand)

@@ -108,6 +108,15 @@ def fit_pivot(
         condition_number: As :func:`pivot_design` tells it; decides how it is solved.
         kept: Which poses count.
         mean: Of their rotations, where :func:`pivot_design` told it.
+
+    Example:
+        >>> import numpy as np
+        >>> from robolink.calibration import fit_pivot
+        >>> rotations = np.array([np.eye(3), np.diag([1, -1, -1]), np.diag([-1, 1, -1])])
+        >>> tip, point = np.array([12.5, -3.25, 80.0]), np.array([300.0, 100.0, -80.0])
+        >>> fit = fit_pivot(point - rotations @ tip, rotations, condition_number=2.0)
+        >>> [round(float(value), 3) for value in fit.tip]
+        [12.5, -3.25, 80.0]
     """
     p, r = (positions, rotations) if kept is None else (positions[kept], rotations[kept])
     solve = _by_qr if condition_number > QR_ABOVE_CONDITION else _by_normal_equations
@@ -153,8 +162,26 @@ def fit_pivot_robust(
 ) -> tuple[PivotFit, Mask]:
     """Return the fit of the poses that belong together, and which these are.
 
+    Args:
+        positions: N x 3, mm.
+        rotations: N x 3 x 3.
+        robust: How outliers are looked for.
+        sigma_mm: Standard deviation of one coordinate of one placement, where it is known.
+
     Raises:
         CalibrationError: ``too_many_outliers``.
+
+    Example:
+        >>> import numpy as np
+        >>> from robolink.calibration import Robust, fit_pivot_robust
+        >>> turns = [np.eye(3), np.diag([1, -1, -1]), np.diag([-1, 1, -1]), np.diag([-1, -1, 1])]
+        >>> rotations = np.array(turns * 3, dtype=float)
+        >>> tip, point = np.array([12.5, -3.25, 80.0]), np.array([300.0, 100.0, -80.0])
+        >>> positions = point - rotations @ tip
+        >>> positions[5] += 1.0  # a touch that was none
+        >>> fit, kept = fit_pivot_robust(positions, rotations, Robust(), sigma_mm=0.02)
+        >>> [round(float(value), 3) for value in fit.tip], np.flatnonzero(~kept).tolist()
+        ([12.5, -3.25, 80.0], [5])
     """
     kept = pivot_consensus(positions, rotations, robust, sigma_mm=sigma_mm).kept
     condition = pivot_design(rotations[kept]).condition_number

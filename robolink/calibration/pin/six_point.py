@@ -110,6 +110,18 @@ def solve_six_point(
         CalibrationError: ``short_axis``, ``axes_not_square``, ``turned_on_the_way``, and
             those of :func:`solve_pivot`.
         ConfigError: ``sigma_mm`` is not positive.
+
+    Example:
+        >>> from robolink import Pose, ToolOffset
+        >>> from robolink.calibration import carrying, solve_six_point
+        >>> tip, pin_mm = ToolOffset(12.5, -3.25, 80), (300, 100, -80)
+        >>> angles = [(90, 20, 180), (180, 0, 160), (-90, -20, 180), (0, 0, 180)]
+        >>> poses = [carrying(Pose(0, 0, 0, *uvw), tip, pin_mm) for uvw in angles]
+        >>> along_x = carrying(Pose(0, 0, 0, 0, 0, 180), tip, (350, 100, -80))  # Z points down
+        >>> along_z = carrying(Pose(0, 0, 0, 0, 0, 180), tip, (300, 100, -130))
+        >>> found = solve_six_point(poses, along_x, along_z)
+        >>> [round(value, 3) + 0.0 for value in (found.offset.z_mm, found.offset.u_deg)]
+        [80.0, 0.0]
     """
     pivot = solve_pivot(pivot_poses, tolerance=tolerance)
     ways = (along_x, second) if start is None else (start, along_x, second)
@@ -169,6 +181,13 @@ def solve_tool_axis(first: Pose, second: Pose, *, sigma_mm: float | None = None)
         CalibrationError: ``short_axis``, ``turned_on_the_way``, and those of
             ``pose_checks.check_poses``.
         ConfigError: ``sigma_mm`` is not positive.
+
+    Example:
+        >>> from robolink import Pose
+        >>> from robolink.calibration import solve_tool_axis
+        >>> axis = solve_tool_axis(Pose(300, 100, -60, 90), Pose(300, 150, -60, 90))
+        >>> [round(float(part), 3) for part in axis.direction]
+        [1.0, 0.0, 0.0]
     """
     check_poses((first, second), allow_mixed_hand=False)
     way = axis_displacement(first, second)

@@ -62,6 +62,13 @@ def solve_two_pose(
             ``suspect_units``, ``mixed_hand``, ``mixed_local``, ``mixed_tool``, ``tool_pose``,
             ``implausible_offset`` or ``tilted_pose``.
         ConfigError: ``sigma_mm`` or ``grid_mm`` is not positive.
+
+    Example:
+        >>> from robolink import Pose
+        >>> from robolink.calibration import solve_two_pose
+        >>> found = solve_two_pose(Pose(287.5, 103.25, -60, 0), Pose(312.5, 96.75, -60, 180))
+        >>> round(found.offset.x_mm, 3), round(found.offset.y_mm, 3)
+        (12.5, -3.25)
     """
     warnings = check_planar(
         (first, second),

@@ -76,6 +76,13 @@ def control_chart(
     Raises:
         CalibrationError: ``too_few_values``: fewer than two in the baseline; ``non_finite``.
         ConfigError: ``weight`` is not above 0 and at most 1, or ``ewma_width`` not positive.
+
+    Example:
+        >>> from robolink.calibration import control_chart
+        >>> baseline = [0.01, -0.02, 0.00, 0.02, -0.01, 0.01, 0.00, -0.01] * 3
+        >>> chart = control_chart(baseline, [0.00, 0.01, 0.35])
+        >>> chart.points_out, chart.warnings
+        ((2,), ('chart_point_out', 'chart_drift'))
     """
     _check(baseline_mm, values_mm, weight, ewma_width)
     centre = math.fsum(baseline_mm) / len(baseline_mm)

@@ -84,6 +84,15 @@ def impact_on(points: Mapping[int, Pose | None], *, old: ToolOffset, new: ToolOf
         new: The offset that is to be written.
 
     Whether a program drives a point with this tool at all is not stored in the point.
+
+    Example:
+        >>> from robolink import Pose, ToolOffset
+        >>> from robolink.calibration import impact_on
+        >>> points = {1: Pose(250, 200, -30, 0), 2: None}
+        >>> old, new = ToolOffset(12, -3.5, -20), ToolOffset(12.3, -3.9, -20)
+        >>> impact = impact_on(points, old=old, new=new)
+        >>> impact.largest.number, round(impact.largest.distance_mm, 3)
+        (1, 0.5)
     """
     taught = {number: pose for number, pose in points.items() if pose is not None}
     return Impact(

@@ -53,6 +53,14 @@ def tool_fits(
         stored: The defined tools with their offsets; Tool 0 is added.
         calibrated: The tool that ``result`` is for; without a stored value of it nothing can
             be judged and nothing is returned.
+
+    Example:
+        >>> from robolink import Pose, ToolOffset
+        >>> from robolink.calibration import solve_two_pose, tool_fits
+        >>> found = solve_two_pose(Pose(287.5, 103.25, -60, 0), Pose(312.5, 96.75, -60, 180))
+        >>> stored = {1: ToolOffset(12.3, -3.3, -20)}
+        >>> [fit.tool for fit in tool_fits(found, taught=0, stored=stored, calibrated=1)]
+        [0, 1]
     """
     reference = stored.get(calibrated)
     tools = {0: ToolOffset(), **stored}
@@ -78,6 +86,16 @@ def better_fit(fits: Sequence[ToolFit], *, taught: int, plausible_mm: float) -> 
     It has to make the change plausible (at most ``plausible_mm``), and at least
     :data:`MUCH_NEARER` times smaller than ``taught`` makes it; a change that is ordinary
     with ``taught`` (:data:`UNSUSPICIOUS_MM`) is never doubted.
+
+    Args:
+        fits: What :func:`tool_fits` returned.
+        taught: The tool that a person named; 0 for the flange.
+        plausible_mm: Largest change that is believed.
+
+    Example:
+        >>> from robolink.calibration import ToolFit, better_fit
+        >>> better_fit([ToolFit(2, 0.1), ToolFit(0, 12.6)], taught=0, plausible_mm=2)
+        ToolFit(tool=2, change_mm=0.1)
     """
     declared = next((fit for fit in fits if fit.tool == taught), None)
     if declared is None or declared.change_mm <= UNSUSPICIOUS_MM:

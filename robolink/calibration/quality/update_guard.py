@@ -79,6 +79,13 @@ def update_guard(
 
     Raises:
         CalibrationError: ``implausible_change`` or ``diverging``.
+
+    Example:
+        >>> from robolink import ToolOffset
+        >>> from robolink.calibration import update_guard
+        >>> found = update_guard(ToolOffset(12.3, -3.9, -20), stored=ToolOffset(12, -3.5, -20))
+        >>> round(found.distance_mm, 3)
+        0.5
     """
     changes = (new.x_mm - stored.x_mm, new.y_mm - stored.y_mm, new.z_mm - stored.z_mm)
     length = math.hypot(*changes)
@@ -111,6 +118,11 @@ def require_shrinking(
 
     Raises:
         CalibrationError: ``diverging``.
+
+    Example:
+        >>> from robolink.calibration import require_shrinking
+        >>> require_shrinking(0.1, earlier_mm=[0.4])
+        >>> require_shrinking(0.04, earlier_mm=[0.01])  # less than what touches scatter
     """
     if not earlier_mm or now_mm <= max(earlier_mm[-1], noise_mm):
         return

@@ -45,6 +45,16 @@ def verify_drift(
         CalibrationError: ``too_few_poses``, ``insufficient_rotation``, ``non_finite``,
             ``suspect_units``, ``mixed_hand``, ``mixed_local`` or ``mixed_tool``.
         ConfigError: ``tolerance_mm`` is not positive.
+
+    Example:
+        >>> from robolink import Pose, ToolOffset
+        >>> from robolink.calibration import carrying, verify_drift
+        >>> true, pin_mm = ToolOffset(12.5, -3.25, -20), (300, 100, -80)
+        >>> poses = [carrying(Pose(0, 0, 0, u_deg), true, pin_mm) for u_deg in (0, 90, 180)]
+        >>> verify_drift(poses, true).passed
+        True
+        >>> verify_drift(poses, ToolOffset(12.4, -3.25, -20)).passed  # 0.1 mm off shows as 0.2 mm
+        False
     """
     require_positive(tolerance_mm, "tolerance_mm")
     require_poses(len(poses), 2)

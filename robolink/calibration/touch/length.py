@@ -105,6 +105,12 @@ def length_change(
         CalibrationError: ``length_not_observable``: the pin moved; ``too_few_poses``: a run has no
             touch; ``touch_heights_differ``: a run contradicts itself; ``non_finite``.
         ConfigError: ``sigma_z_mm`` is not positive.
+
+    Example:
+        >>> from robolink.calibration import length_change
+        >>> found = length_change([-60.00, -60.01], [-59.61, -59.60], stored_z_mm=-20)
+        >>> found.changed, round(found.longer_mm, 3)
+        (True, 0.4)
     """
     require_positive(sigma_z_mm, "sigma_z_mm")
     require_finite(stored_z_mm=stored_z_mm, v_deg=v_deg, w_deg=w_deg)

@@ -97,6 +97,19 @@ def solve_plane_touch(
             ``ambiguous_tip``, ``diverging``, ``implausible_offset``, ``tool_pose``,
             ``local_pose``, and those of ``pose_checks.check_poses``.
         ConfigError: ``sigma_mm`` is not positive.
+
+    Example:
+        >>> from robolink import Pose, ToolOffset
+        >>> from robolink.calibration import TouchedPlane, carrying, solve_plane_touch
+        >>> tip, plane = ToolOffset(12.5, -3.25, 80), TouchedPlane((0, 0, 1), -80)
+        >>> angles = [(0, 0, 180), (90, 20, 180), (180, 0, 160), (-90, -20, 180), (0, 20, 180)]
+        >>> poses = [
+        ...     carrying(Pose(0, 0, 0, *uvw), tip, (300 + 7 * at, 100 - at * at, -80))
+        ...     for at, uvw in enumerate(angles)
+        ... ]
+        >>> found = solve_plane_touch(poses, plane=plane)
+        >>> [round(value, 3) for value in (found.offset.x_mm, found.offset.y_mm, found.offset.z_mm)]
+        [12.5, -3.25, 80.0]
     """
     poses, warnings = distinct_touches(poses, LEAST_ON_A_KNOWN_PLANE if plane else LEAST_TOUCHES)
     p, r = pose_arrays(poses)
@@ -137,6 +150,16 @@ def plane_columns(
         poses: Flange poses.
         tip: About where the tip is.
         normal: About how the plane lies; of any length.
+
+    Example:
+        >>> from robolink import Pose, ToolOffset
+        >>> from robolink.calibration import plane_columns
+        >>> upright = [Pose(300, 100, -60, 0), Pose(340, 100, -60, 90)]
+        >>> columns = plane_columns(upright, ToolOffset(12, -3.5, -20), (0, 0, 1))
+        >>> columns.shape
+        (2, 6)
+        >>> [float(value) for value in columns[0, :3]]  # upright, only Z of the tip counts
+        [0.0, 0.0, 1.0]
     """
     p, r = pose_arrays(poses)
     unit = np.array(normal) / math.hypot(*normal)

@@ -77,6 +77,22 @@ def solve_sphere_touch(
             ``radius_contradicted``, ``diverging``, ``implausible_offset``, ``tool_pose``,
             ``local_pose``, and those of ``pose_checks.check_poses``.
         ConfigError: ``sigma_mm`` or ``radius_mm`` is not positive.
+
+    Example:
+        >>> from robolink import Pose, ToolOffset
+        >>> from robolink.calibration import carrying, solve_sphere_touch
+        >>> tip = ToolOffset(12.5, -3.25, 80)
+        >>> angles = [(0, 0, 180), (90, 20, 180), (180, 0, 160)]
+        >>> angles += [(-90, -20, 180), (0, 20, 180), (90, 0, 200)]
+        >>> sides = [(0, 0, 1), (0.6, 0, 0.8), (-0.6, 0, 0.8), (0, 0.6, 0.8), (0, -0.6, 0.8)]
+        >>> poses = [
+        ...     carrying(Pose(0, 0, 0, *uvw), tip, (300 + 10 * x, 100 + 10 * y, -80 + 10 * z))
+        ...     for uvw in angles
+        ...     for x, y, z in sides
+        ... ]
+        >>> found = solve_sphere_touch(poses, radius_mm=10)
+        >>> [round(value, 3) for value in (found.offset.x_mm, found.offset.y_mm, found.offset.z_mm)]
+        [12.5, -3.25, 80.0]
     """
     if radius_mm is not None:
         require_positive(radius_mm, "radius_mm")
@@ -115,6 +131,14 @@ def sphere_columns(
         poses: Flange poses.
         tip: About where the tip is.
         centre_mm: About where the centre is.
+
+    Example:
+        >>> from robolink import Pose, ToolOffset
+        >>> from robolink.calibration import sphere_columns
+        >>> on_top = Pose(288, 103.5, -50, 0)  # its tip is 10 mm above the centre
+        >>> columns = sphere_columns([on_top], ToolOffset(12, -3.5, -20), (300, 100, -80))
+        >>> [round(float(value), 3) + 0.0 for value in columns[0]]
+        [0.0, 0.0, 1.0, 0.0, 0.0, -1.0, -1.0]
     """
     p, r = pose_arrays(poses)
     places = p + r @ np.array(tip.components()[:3]) - np.array(centre_mm)

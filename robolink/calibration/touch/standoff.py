@@ -52,6 +52,14 @@ class StandoffSeries:
         sideways: Whether the tip also stops beside the pin; a contact input does without.
         planar: Whether the tool stands upright in all touches, so that heights are compared as
             they are.
+
+    Example:
+        >>> from robolink import Pose
+        >>> from robolink.calibration import StandoffSeries
+        >>> series = StandoffSeries(seed=7, clearance_mm=2)
+        >>> standoff = series.next([], Pose(0, 0, 0, 90))
+        >>> standoff.z_mm >= 2
+        True
     """
 
     def __init__(

@@ -62,6 +62,15 @@ def judge_surface_touches(
         misses_mm: Distance of each touch from the surface that was found.
         standoffs_mm: How far from the surface the robot had stopped, 0 where the person brought
             the tip from wherever it was.
+
+    Example:
+        >>> import numpy as np
+        >>> from robolink.calibration import judge_surface_touches
+        >>> columns = np.column_stack([np.ones(8), np.linspace(-1, 1, 8)])
+        >>> misses = np.array([0.01, -0.01, 0.0, 0.01, -0.01, 0.0, 0.01, -0.01])
+        >>> standoffs_mm = [2.0, 3.1, 2.4, 3.7, 2.2, 3.3, 2.9, 2.6]
+        >>> judge_surface_touches(columns, misses, standoffs_mm).codes
+        ()
     """
     standing = np.array(standoffs_mm)
     worst_mm = float(np.abs(misses_mm).max())

@@ -32,6 +32,12 @@ class SurfaceStandoffs:
             columns: Derivatives of the distances by tip and surface, one row for each of those
                 touches and one for the next; ``None`` while the surface is not known.
             further_mm: How much more than the clearance it is at least.
+
+        Example:
+            >>> from robolink.calibration import SurfaceStandoffs
+            >>> standoffs = SurfaceStandoffs(seed=7, clearance_mm=2)
+            >>> standoffs.next([]) >= 2
+            True
         """
         levels = self._random.sample(LEVELS_MM, len(LEVELS_MM))
         free = [level for level in levels if level != self._last_mm]

@@ -139,6 +139,13 @@ def judge_touches(
         touches: In the order in which they were made.
         resolution_mm: Last digit that the controller prints.
         sigma_z_mm: Standard deviation of a touch in height.
+
+    Example:
+        >>> from robolink import Pose
+        >>> from robolink.calibration import WitnessedTouch, judge_touches
+        >>> where_it_stopped = Pose(300, 100, -60, 0)
+        >>> judge_touches([WitnessedTouch(where_it_stopped, arrival=where_it_stopped)]).not_touched
+        (0,)
     """
     poses = [touch.captured for touch in touches]
     planar = stand_upright(poses)

@@ -88,7 +88,11 @@ class SoftMotionController(ControllerCore):
         able = mailbox.snapshots.met.capabilities
         moves = Capability.MOTION in able
         offered = Capabilities(
-            tool_write=Capability.TOOLS in able, motion=moves, motors=moves, io=True
+            pose_while_moving=True,
+            tool_write=Capability.TOOLS in able,
+            motion=moves,
+            motors=moves,
+            io=True,
         )
         tools = SoftMotionToolTable(mailbox, images)
         super().__init__(mailbox, capabilities=offered, tools=tools)

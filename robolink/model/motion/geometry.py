@@ -94,7 +94,18 @@ def angle_difference_deg(a_deg: float, b_deg: float) -> float:
 
 
 def rotate_xy(x: float, y: float, angle_deg: float) -> tuple[float, float]:
-    """Turn the vector (x, y) by ``angle_deg``, counter-clockwise seen from +Z."""
+    """Turn the vector (x, y) by ``angle_deg``, counter-clockwise seen from +Z.
+
+    Args:
+        x: X of the vector; in any unit.
+        y: Y of the vector.
+        angle_deg: How far it is turned.
+
+    Example:
+        >>> from robolink.model import rotate_xy
+        >>> [round(value, 6) + 0.0 for value in rotate_xy(12, -3.5, 90)]
+        [3.5, 12.0]
+    """
     angle = math.radians(angle_deg)
     c, s = math.cos(angle), math.sin(angle)
     return c * x - s * y, s * x + c * y

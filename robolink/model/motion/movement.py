@@ -48,12 +48,38 @@ class WorkBox:
 
     @classmethod
     def reaching(cls, sideways_mm: float, *, down_mm: float, up_mm: float) -> "WorkBox":
-        """Return the box that reaches so far from a place that is not known yet."""
+        """Return the box that reaches so far from a place that is not known yet.
+
+        Args:
+            sideways_mm: In X and Y, to either side.
+            down_mm: Below the place.
+            up_mm: Above it.
+
+        Example:
+            >>> from robolink.model import WorkBox
+            >>> box = WorkBox.reaching(30, down_mm=2, up_mm=50)
+            >>> box.height_mm, box.x_max_mm
+            (52, 30)
+        """
         return cls(-sideways_mm, sideways_mm, -sideways_mm, sideways_mm, -down_mm, up_mm)
 
     @classmethod
     def around(cls, pose: Pose, *, xy_mm: float, below_mm: float, above_mm: float) -> "WorkBox":
-        """Return the box that reaches ``xy_mm`` sideways, down and up from ``pose``."""
+        """Return the box that reaches ``xy_mm`` sideways, down and up from ``pose``.
+
+        Args:
+            pose: The place in its middle.
+            xy_mm: Reach in X and Y, to either side.
+            below_mm: Reach below the place.
+            above_mm: Reach above it.
+
+        Example:
+            >>> from robolink import Pose
+            >>> from robolink.model import WorkBox
+            >>> box = WorkBox.around(Pose(300, 100, -60, 0), xy_mm=30, below_mm=2, above_mm=50)
+            >>> box.x_max_mm, box.z_min_mm
+            (330, -62)
+        """
         return cls.reaching(xy_mm, down_mm=below_mm, up_mm=above_mm).about(pose)
 
     @property
@@ -164,10 +190,29 @@ class MotionGroup(Protocol):
     def move_to(self, target: Pose, profile: MotionProfile, *, box: WorkBox) -> Motion:
         """Start one movement of the frame ``target.tool``; sent at most once.
 
+        Args:
+            target: Where the frame ``target.tool`` is brought, base, mm and degrees.
+            profile: How: path, speed and accelerations.
+            box: Where it may go.
+
         Raises:
             LimitError: The target lies outside ``box``.
             NotReadyError: The state, the motors or the tool in force forbid it.
             OutcomeUnknownError: An earlier command on this controller is unresolved.
+
+        Example:
+            >>> import robolink
+            >>> from dataclasses import replace
+            >>> from robolink.model import MotionProfile, WorkBox
+            >>> with robolink.connect("epson+sim://move-example") as controller:
+            ...     controller.motors(on=True)
+            ...     group = controller.groups[0]
+            ...     here = group.pose()
+            ...     box = WorkBox.around(here, xy_mm=5, below_mm=5, above_mm=5)
+            ...     up = replace(here, z_mm=here.z_mm + 2)
+            ...     motion = group.move_to(up, MotionProfile(), box=box)
+            ...     print(motion.wait(timeout_s=30), round(group.pose().z_mm - here.z_mm, 1))
+            MotionOutcome.ARRIVED 2.0
         """
 
     def move_until_input(
@@ -177,15 +222,50 @@ class MotionGroup(Protocol):
 
         Sent at most once, and not at all when the input shows already what is waited for.
 
+        Args:
+            target: Where it ends when the input does not switch.
+            edge: The input that ends it.
+            speed_mm_s: Speed of the tip.
+            box: Where it may go.
+
         Raises:
             ConfigError: There is no such input or speed.
             LimitError, NotReadyError, OutcomeUnknownError: As :meth:`move_to`.
+
+        Example:
+            >>> import robolink
+            >>> from dataclasses import replace
+            >>> from robolink.model import InputEdge, WorkBox
+            >>> with robolink.connect("epson+sim://until-example") as controller:
+            ...     controller.motors(on=True)
+            ...     group = controller.groups[0]
+            ...     here = group.pose()
+            ...     box = WorkBox.around(here, xy_mm=5, below_mm=5, above_mm=5)
+            ...     target = replace(here, z_mm=here.z_mm - 2)
+            ...     motion = group.move_until_input(target, InputEdge(3), speed_mm_s=5, box=box)
+            ...     print(motion.wait(timeout_s=30))  # nothing switches input 3 here
+            None
         """
 
     def requests_until(
         self, target: Pose, edge: InputEdge, *, speed_mm_s: float
     ) -> tuple[str, ...]:
-        """Return what :meth:`move_until_input` would send besides its reads."""
+        """Return what :meth:`move_until_input` would send besides its reads.
+
+        Args:
+            target: Where it would end.
+            edge: The input that would end it.
+            speed_mm_s: Speed of the tip.
+
+        Example:
+            >>> import robolink
+            >>> from robolink.model import InputEdge
+            >>> with robolink.connect("epson+sim://requests-example") as controller:
+            ...     group = controller.groups[0]
+            ...     requests = group.requests_until(group.pose(), InputEdge(3), speed_mm_s=5)
+            >>> any("Till" in request for request in requests)
+            True
+        """
 
     def requests_for(self, target: Pose, profile: MotionProfile) -> tuple[str, ...]:
         """Return what :meth:`move_to` would send besides its reads, as it stands on the wire."""
@@ -201,6 +281,14 @@ class MotionGroup(Protocol):
             path: How.
             start: Where from, ``None`` where nobody knows; of a straight way only the end is looked
                 at then.
+
+        Example:
+            >>> import robolink
+            >>> from robolink.model import Path
+            >>> with robolink.connect("epson+sim://obstacle-example") as controller:
+            ...     group = controller.groups[0]
+            ...     print(repr(group.obstacle(group.pose(), Path.STRAIGHT)))
+            ''
         """
 
     def deceleration_mm_s2(self) -> float | None:

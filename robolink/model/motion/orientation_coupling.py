@@ -60,6 +60,14 @@ def combined_space(
 
     Raises:
         NotReachable: No member of the space is nearest to the programmed orientation.
+
+    Example:
+        >>> from robolink.model import CsTool, OrientationImage, OrientationSpace, combined_space
+        >>> upright = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+        >>> turned = OrientationSpace.directed((0.0, 0.0, 1.0), (0.0, 0.0, 1.0))
+        >>> c_axis = OrientationImage(CsTool.FLANGE, turned, b_active=True)
+        >>> combined_space(OrientationSpace.known(upright), c_axis, upright).dof.name
+        'ZERO'
     """
     turns = image.ori_info
     space = turns if image.cs_tool is CsTool.MCS else _one_behind_the_other(base, turns)

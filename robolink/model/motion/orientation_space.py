@@ -84,6 +84,12 @@ class OrientationSpace:
 
         Raises:
             NotReachable: All members are equally far from ``near``.
+
+        Example:
+            >>> from robolink.model import OrientationSpace
+            >>> down = OrientationSpace.directed((0.0, 0.0, 1.0), (0.0, 0.0, 1.0))
+            >>> down.holds(((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
+            True
         """
         return cls(OrientationDof.ONE, projected(near, v_u, v_rot), v_u, v_rot)
 

@@ -40,6 +40,10 @@ class InputEdge:
 
         Raises:
             NotReadyError: Names the input.
+
+        Example:
+            >>> from robolink.model import InputEdge
+            >>> InputEdge(3).require_ahead(False, controller="cell-a", request="move until input 3")
         """
         if self.awaited(on):
             raise NotReadyError(

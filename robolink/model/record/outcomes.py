@@ -163,6 +163,16 @@ class OutcomeLog(Protocol):
 
         Raises:
             ConfigError: The record cannot be read.
+
+        Example:
+            >>> import robolink
+            >>> from robolink.model import EntryKind
+            >>> with robolink.connect("epson+sim://recorded-example") as controller:
+            ...     new = robolink.ToolOffset(5, 6, -70)
+            ...     receipt = controller.tools.write(2, new, expected=None)
+            ...     [done] = controller.outcomes.recorded(tool=2, kinds=[EntryKind.DONE])
+            >>> done.tool
+            2
         """
 
     def close(self) -> None:

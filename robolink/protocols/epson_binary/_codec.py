@@ -34,6 +34,11 @@ class EpsonBinaryCodec(EpsonCodec):
         role: HOST sends requests, DEVICE answers them.
         dialect: What the manuals leave open.
         max_frame: Most bytes of one received frame.
+
+    Example:
+        >>> from robolink.protocols.epson_binary import EpsonBinaryCodec, Role
+        >>> EpsonBinaryCodec(Role.HOST).carries("GetStatus")
+        True
     """
 
     __slots__ = ("_buffer", "_dialect")

@@ -190,6 +190,13 @@ class EpsonTextCodec(EpsonCodec):
 
     Raises:
         ConfigError: An argument is none of these.
+
+    Example:
+        >>> from robolink.protocols.epson_text import EpsonTextCodec, Role
+        >>> device = EpsonTextCodec(Role.DEVICE, terminator=bytes([13]))
+        >>> device.receive_data("$GetStatus".encode() + bytes([13, 10]))
+        >>> device.next_event().name
+        'GetStatus'
     """
 
     __slots__ = ("_blank_allowed", "_buffer", "_encoding", "_terminator", "_unterminated")

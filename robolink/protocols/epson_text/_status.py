@@ -66,8 +66,18 @@ def status_fields(flags: StatusFlags, code: int, digits: Literal[10, 11] = 11) -
 
     With ten digits Test is left out: RC+ 5 does not know it.
 
+    Args:
+        flags: What the device shows.
+        code: Its error or warning, 0 for none.
+        digits: How many flags it sends.
+
     Raises:
         LocalProtocolError: ``code`` does not fit into four digits.
+
+    Example:
+        >>> from robolink.protocols.epson_text import StatusFlags, status_fields
+        >>> status_fields(StatusFlags(auto=True, ready=True), 0)
+        ('00100000001', '0000')
     """
     if not 0 <= code <= _MAX_CODE:
         raise LocalProtocolError(

@@ -59,6 +59,12 @@ def frames_match(one: Six, other: Six, *, tolerance: float) -> bool:
         other: The same.
         tolerance: Of each length in user units, and of each element of the rotation
             matrix: which triple of angles a PLC gives for a rotation is its own choice.
+
+    Example:
+        >>> from robolink.protocols.mailbox import frames_match
+        >>> one, other = (12.3, -3.7, 60.0, 0.0, 0.0, 30.0), (12.3, -3.7, 60.0, 30.0, 0.0, 0.0)
+        >>> frames_match(one, other, tolerance=1e-9)  # with B = 0 only A + C counts
+        True
     """
     lengths = zip(one[:3], other[:3], strict=True)
     rows = zip(_of_zyz(*one[3:]), _of_zyz(*other[3:]), strict=True)

@@ -32,8 +32,19 @@ def set_tool(tool: int, offset: ToolOffset, *, six_axes: bool) -> Statement:
 
     Source: docs/reference/epson.md 3.1.
 
+    Args:
+        tool: Number of the tool, 1 to 15.
+        offset: What it is to hold, mm and degrees.
+        six_axes: Whether the robot has six axes, so that V and W are sent.
+
     Raises:
         LocalProtocolError: No such tool, or V or W on a robot of four axes.
+
+    Example:
+        >>> from robolink import ToolOffset
+        >>> from robolink.protocols.spel import set_tool
+        >>> set_tool(1, ToolOffset(12.3, -3.7, -20), six_axes=False)
+        'TLSet 1, XY(12.300, -3.700, -20.000, 0.000)'
     """
     check_range(tr("A tool that can be set"), tool, 1, LAST_TOOL)
     return Statement(f"TLSet {tool}, {_xy(offset.components(), six_axes=six_axes)}")
@@ -90,8 +101,18 @@ def power_high() -> Statement:
 def speed(percent: int, depart: int | None = None, approach: int | None = None) -> Statement:
     """``Speed 5``: joint speed in percent; Jump's departure and approach follow it if left out.
 
+    Args:
+        percent: Of the largest joint speed.
+        depart: The same for the departure of Jump.
+        approach: The same for its approach.
+
     Raises:
         LocalProtocolError: Not 1 to 100 (docs/reference/spel.md 7.2), or only one of the two given.
+
+    Example:
+        >>> from robolink.protocols.spel import speed
+        >>> speed(5), speed(5, 3, 2)
+        ('Speed 5', 'Speed 5, 3, 2')
     """
     values = _three(percent, depart, approach)
     for value in values:
@@ -102,9 +123,19 @@ def speed(percent: int, depart: int | None = None, approach: int | None = None) 
 def speed_s(mm_s: float, depart: float | None = None, approach: float | None = None) -> Statement:
     """``SpeedS 20.000``: straight-line speed in mm/s; the other two follow it if left out.
 
+    Args:
+        mm_s: Speed of the tool on a straight line.
+        depart: The same for the departure of Jump.
+        approach: The same for its approach.
+
     Raises:
         LocalProtocolError: Not 0.1 to 2000 mm/s (docs/reference/spel.md 7.2), or only one of the
             two given.
+
+    Example:
+        >>> from robolink.protocols.spel import speed_s
+        >>> speed_s(20)
+        'SpeedS 20.000'
     """
     values = _three(mm_s, depart, approach)
     written = ", ".join(decimal(value) for value in values)
@@ -161,8 +192,19 @@ def print_reachable(target: Pose, *, six_axes: bool) -> Statement:
 def print_joint_of(target: Pose, joint: int, *, six_axes: bool) -> Statement:
     """The value of one joint at a point, in degrees or mm (docs/reference/spel.md 5.3).
 
+    Args:
+        target: The point.
+        joint: Number of the joint, from 1.
+        six_axes: Whether the robot has six axes, so that V and W are sent.
+
     Raises:
         LocalProtocolError: As :func:`go`, or no such joint.
+
+    Example:
+        >>> from robolink import Pose
+        >>> from robolink.protocols.spel import print_joint_of
+        >>> print_joint_of(Pose(300, 100, -60, 0), 2, six_axes=False)
+        'Print PAgl(XY(300.000, 100.000, -60.000, 0.000) /0, 2)'
     """
     check_range(tr("A joint"), joint, 1, 6)
     return Statement(f"Print PAgl({_target(target, six_axes=six_axes)}, {joint})")

@@ -19,8 +19,20 @@ hardware."""
 def move_till(target: Pose, bit: int, *, on: bool, six_axes: bool) -> Statement:
     """``Move XY(...) Till Sw(3) = On``: stop where the input switches.
 
+    Args:
+        target: Where the movement ends when the input does not switch.
+        bit: Number of the input.
+        on: Whether it is waited for until it is on, or off.
+        six_axes: Whether the robot has six axes, so that V and W are sent.
+
     Raises:
         LocalProtocolError: As :func:`move`, or no such input.
+
+    Example:
+        >>> from robolink import Pose
+        >>> from robolink.protocols.spel import move_till
+        >>> move_till(Pose(300, 100, -60, 0), 3, on=True, six_axes=False)
+        'Move XY(300.000, 100.000, -60.000, 0.000) /0 Till Sw(3) = On'
     """
     return _move_with("Till", target, bit, on=on, six_axes=six_axes)
 
@@ -28,8 +40,20 @@ def move_till(target: Pose, bit: int, *, on: bool, six_axes: bool) -> Statement:
 def move_find(target: Pose, bit: int, *, on: bool, six_axes: bool) -> Statement:
     """``Move XY(...) Find Sw(3) = On``: note where the input switches, and go on.
 
+    Args:
+        target: Where the movement ends.
+        bit: Number of the input.
+        on: Whether it is waited for until it is on, or off.
+        six_axes: Whether the robot has six axes, so that V and W are sent.
+
     Raises:
         LocalProtocolError: As :func:`move`, or no such input.
+
+    Example:
+        >>> from robolink import Pose
+        >>> from robolink.protocols.spel import move_find
+        >>> move_find(Pose(300, 100, -60, 0), 3, on=True, six_axes=False)
+        'Move XY(300.000, 100.000, -60.000, 0.000) /0 Find Sw(3) = On'
     """
     return _move_with("Find", target, bit, on=on, six_axes=six_axes)
 

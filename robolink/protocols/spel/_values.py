@@ -151,6 +151,19 @@ class PrintedPoint:
         """Return a point with its flags: hand, those of the posture, then local.
 
         What a six-axis robot prints besides the hand was seen nowhere (assumed).
+
+        Args:
+            coordinates: X, Y, Z, U, and V, W where there are six, mm and degrees.
+            hand: Hand of the arm, where it is known.
+            local: Number of the local.
+            posture: The other flags of the arm.
+            six_axes: Whether the robot has six axes.
+
+        Example:
+            >>> from robolink.model import Hand
+            >>> from robolink.protocols.spel import PrintedPoint
+            >>> PrintedPoint.of((300.0, 100.0, -60.0, 0.0), hand=Hand.RIGHT).flags
+            ('R', '0')
         """
         marks: tuple[str, ...] = () if hand is None else (_MARKS[hand],)
         if posture is not None:
@@ -246,6 +259,13 @@ def format_point(
             them out.
         width: Columns of a value: 9 in the real capture, 8 in one sample
             (docs/reference/spel.md 5.6).
+
+    Example:
+        >>> from robolink.model import Hand
+        >>> from robolink.protocols.spel import PrintedPoint, format_point
+        >>> point = PrintedPoint.of((300.0, 100.0, -60.0, 0.0), hand=Hand.RIGHT)
+        >>> format_point(point, coordinates="four").split()
+        ['X:', '300.000', 'Y:', '100.000', 'Z:', '-60.000', 'U:', '0.000', '/R', '/0']
     """
     shown = (*point.coordinates, 0.0, 0.0)[: 6 if coordinates == "six" else 4]
     values = zip(_AXES, shown, strict=False)

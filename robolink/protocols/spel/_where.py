@@ -80,6 +80,13 @@ def format_where(
         width: Columns of a value: 9 as read in the field, 8 in one sample
             (docs/reference/spel.md 5.6).
         linear_joints: Numbers of the joints in mm: the third on a SCARA, none on six axes.
+
+    Example:
+        >>> from robolink.protocols.spel import PrintedWhere, format_where, parse_where
+        >>> world, joints = (300.0, 100.0, -60.0, 0.0, 0.0, 0.0), (18.4, 36.9, -60.0, -55.3)
+        >>> where = PrintedWhere(world, joints, (1000, 2000, -3000, 400))
+        >>> parse_where(format_where(where)) == where
+        True
     """
     world = zip(_AXES, map(decimal, where.world), ("mm",) * 3 + ("deg",) * 3, strict=True)
     joints = (

@@ -100,8 +100,10 @@ class Workplace(ABC):
         self._random = late_random(f"nozzles {seed}")
         self._replaced = replaced
         self.parameters = WorldParameters()
-        rng = random.Random(f"camera {seed}")
-        self.camera = CameraTruth(camera_beside(self.tip_mm(), rng), parameters.optics, rng)
+        tip_mm = self.tip_mm()
+        middle_mm = camera_beside(tip_mm, random.Random(f"camera {seed}"))
+        rng = late_random(f"camera {seed}", first=lambda drawn: camera_beside(tip_mm, drawn))
+        self.camera = CameraTruth(middle_mm, parameters.optics, rng)
         self.set_up(parameters)
 
     def set_up(self, parameters: WorldParameters) -> None:

@@ -4,6 +4,7 @@ from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice
+from sys import intern
 from typing import Final
 
 MOST_LINES: Final = 2000
@@ -43,7 +44,9 @@ class WireRecord(deque[tuple[int, str, str]]):
     def append(self, line: tuple[int, str, str]) -> None:
         """Add what crossed the wire just now."""
         self.added += 1
-        super().append(line)
+        now_ns, direction, text = line
+        # Thousands of controllers are asked the same: each text is held once in a process.
+        super().append((now_ns, direction, intern(text)))
 
     def clear(self) -> None:
         """Forget all of it, and count from 1 again."""

@@ -1,6 +1,7 @@
 """Planned emergency stops, opened guards and errors, at once or some seconds from now."""
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 
 from robolink.timing import NS_PER_S
 from robolink_simulators.epson.panel import EpsonPanel
@@ -18,13 +19,19 @@ class EpsonMishaps:
     def __init__(self, panel: EpsonPanel, restart: Callable[[], None]) -> None:
         self._panel = panel
         self._planned: list[tuple[int, Callable[[], None]]] = []
-        self._acts: Mapping[FaultAction, Callable[[], None]] = {
+        self._restart = restart
+
+    @cached_property
+    def _acts(self) -> Mapping[FaultAction, Callable[[], None]]:
+        """What hands do; made when something first goes wrong."""
+        panel = self._panel
+        return {
             FaultAction.ESTOP: panel.press_estop,
             FaultAction.GUARD_OPEN: panel.open_guard,
             FaultAction.SERIOUS_ERROR: panel.raise_serious_error,
             FaultAction.LOSE_LOGIN: panel.lose_login,
             FaultAction.TEACH_MODE: panel.teach,
-            FaultAction.RESTART: restart,
+            FaultAction.RESTART: self._restart,
         }
 
     def strike(self, faults: Sequence[Fault], now_ns: int) -> None:

@@ -1,6 +1,5 @@
 """The replies of one link on their way out: late, held back, or stuck on a dead link."""
 
-from collections import deque
 from collections.abc import Sequence
 
 from robolink.timing import NS_PER_S
@@ -16,7 +15,8 @@ class DepartingReplies:
     """
 
     def __init__(self) -> None:
-        self._waiting: deque[tuple[int, bytes | LinkEnd | None]] = deque()
+        # Mostly one or none: an empty deque would take 760 bytes of each connection.
+        self._waiting: list[tuple[int, bytes | LinkEnd | None]] = []
         self._held: list[HeldBack] = []
         self.half_open = False
         self.stalled_until_ns = 0
@@ -45,7 +45,7 @@ class DepartingReplies:
         ready = b""
         while self._due(now_ns) and isinstance(data := self._waiting[0][1], bytes):
             ready += data
-            self._waiting.popleft()
+            del self._waiting[0]
         return ready
 
     def ended(self, now_ns: int) -> bool:

@@ -18,6 +18,7 @@ from robolink_cli.wizard.happenings import (
 from robolink_cli.wizard.state import Header, WizardState
 
 from robolink.calibration import solve_two_pose
+from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
 from robolink.nozzle_change import LimitVerdict, Proposal, WriteSubject
 from robolink.runner import FitRow, FitSubject, JogSubject, Question, TouchSubject
@@ -32,7 +33,11 @@ def touch_subject(**more):
 
 def fit_subject(*off_mm, worst=None):
     rows = tuple(
-        FitRow(number, f"Pose {number}, at U {90.0 * number:.1f}", (off, 0.0))
+        FitRow(
+            number,
+            tr("Pose {number}, at {where}", number=number, where=tr("U {u:.1f}", u=90.0 * number)),
+            (off, 0.0),
+        )
         for number, off in enumerate(off_mm, start=1)
     )
     return FitSubject(rows, 0.016, half95_mm=0.021, next_mm=0.015, worst=worst, limit_mm=0.15)
@@ -43,7 +48,7 @@ def write_subject(*tools):
     old = ToolOffset(11.998, -3.502, -20.0)
     result = solve_two_pose(first, second, stored=old)
     proposals = tuple(Proposal(tool, old, result) for tool in tools)
-    verdict = LimitVerdict("implausible_change", "Change of the tip", 0.65, 2.0)
+    verdict = LimitVerdict("implausible_change", tr("Change of the tip"), 0.65, 2.0)
     return WriteSubject(proposals, ((verdict,),) * len(tools))
 
 

@@ -255,6 +255,18 @@ def test_each_end_restores_terminal_and_tool(hand, simulator, how):
 
 
 @pytest.mark.soak
+def test_a_window_that_is_closed_ends_the_work_in_order(hand, simulator):
+    hand.start()
+    hand.see("Touch 1 of 2")
+    hand.rest(0.4)
+    assert simulator.machine.tools.selected == 0
+    os.close(hand.master)
+    hand.master = -1
+    assert hand.command.wait(30.0) == 129
+    assert simulator.machine.tools.selected == 1
+
+
+@pytest.mark.soak
 def test_a_window_that_becomes_too_small_goes_on_as_lines(hand):
     hand.start()
     hand.see("Touch 1 of 2")

@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from robolink_cli.wizard.check_list import CheckPoint, CheckSubject, Mark
 from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.happenings import HasEnded, Reading, TaughtPoints, WasRead, WasRegarded
 from robolink_cli.wizard.screens.drawing import screen_of
@@ -17,6 +18,7 @@ from robolink import messages
 from robolink.calibration import Drift, VerifyResult, impact_on
 from robolink.errors import DeclinedError
 from robolink.locale.languages import translator
+from robolink.messages import tr
 from robolink.model import Path as Way
 from robolink.model import Pose, ToolReceipt, WorkBox
 from robolink.nozzle_change import ChangeReport, ToolReport
@@ -69,6 +71,44 @@ def done():
     return ended(header, report=ChangeReport("7f3a5c1200", (tool,)))
 
 
+def checking():
+    """The list as the commands make it."""
+    plan = tr(
+        "The robot will move by itself {n} times: power LOW, up to {v} mm/s, at most {d} mm from "
+        "here.",
+        n=6,
+        v=20,
+        d=150,
+    )
+    points = (
+        CheckPoint(Mark.OK, tr("Controller answers: {name}", name="T6-602S, T6S0012345, 7.5.4")),
+        CheckPoint(Mark.OK, tr("Emergency stop released, guard closed, no program running")),
+        CheckPoint(Mark.TO_DO, tr("Motors are off"), "7", tr("Switch them on")),
+        CheckPoint(Mark.YOU, tr("Nobody in the cell, hoses free"), "3", tr("Yes")),
+    )
+    return Sitting().asked(CheckSubject(points, plan), Question.YES_NO).keys("3")
+
+
+def recovering():
+    """What was written and never tested; reading alone decides nothing."""
+    options = (
+        tr("The old one. Put the old value back."),
+        tr("The new one. Keep the new value; nobody has tested it."),
+        tr("I cannot tell. Stay blocked; call an engineer."),
+    )
+    found = tr("What we read: {sentence}", sentence="Tool 1 = X 12.324 Y -3.729 Z -20.512")
+    subject = ChoiceSubject(
+        tr("Recover"),
+        (found, tr("Tool {t} is selected.", t=0)),
+        options,
+        marked=None,
+        does=tr("Do it"),
+        leaves=tr("Leave it blocked"),
+    )
+    question = tr("Look at the robot: which needle is mounted?")
+    return Sitting().asked(subject, Question.TEXT, question)
+
+
 def taught():
     """What the proposal does at fifteen points."""
     (proposal,) = write_subject(1).proposals
@@ -78,7 +118,7 @@ def taught():
 
 
 def stopped():
-    error = DeclinedError("You stopped it.", remedy="Nothing was written.")
+    error = DeclinedError(tr("You stopped it."), remedy=tr("Nothing was written."))
     note_standing(error, Standing(moved=True, selected=1, selected_before=1))
     command = "robolink -c line3 change needle-22g.toml"
     return ended(Header("line3", "Change needle", command=command), error)
@@ -110,6 +150,8 @@ SCREENS = {
         fit_subject(0.006, 0.004, 0.131, 0.007, worst=2), Question.YES_NO
     ),
     "values": lambda: Sitting().asked(write_subject(1), Question.YES_NO).keys("1"),
+    "recover": recovering,
+    "check list": checking,
     "values again": lambda: Sitting().asked(
         replace(write_subject(1), again=3, adds_touch=True), Question.YES_NO
     ),
@@ -179,3 +221,20 @@ def test_the_picture_finds_the_elbow_by_angles_alone():
     assert elbow_of(ARRIVAL, ()) is None
     assert elbow_of(ARRIVAL, (0.0, 0.5, 0.0)) is None
     assert elbow_of(ARRIVAL, (170.0, 120.0)) is None
+
+
+@pytest.mark.parametrize("language_of_page", ["en", "zh"])
+def test_the_pictures_of_the_pages_are_those_of_the_screens(language_of_page):
+    from tests.cli.wizard.pictures import SHOWN, picture
+
+    for name in SHOWN:
+        path, text = picture(name, language_of_page)
+        assert path.read_text(encoding="utf-8") == text, "python -m tests.cli.wizard.pictures"
+
+
+def test_keys_of_a_list_stand_at_the_right_edge_in_every_language(language):
+    hand = checking()
+    rows = screen_of(hand.state, hand.now).rows()
+    keyed = [row for row in rows[3:12] if "[7]" in row or "[3]" in row]
+    assert len(keyed) == 2
+    assert {wcswidth(row) for row in keyed} == {79}, language

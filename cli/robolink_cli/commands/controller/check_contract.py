@@ -12,6 +12,7 @@ from robolink.errors import ConfigError, DeclinedError
 from robolink.messages import declared, tr
 from robolink_cli.console.render import note, say, table
 from robolink_cli.options.consent import yes_option
+from robolink_cli.options.shared import controller_argument
 from robolink_cli.session.context import CliContext, controller_options, emit
 
 if TYPE_CHECKING:
@@ -83,6 +84,7 @@ class _Asked:
     metavar="FILE",
     help=declared("Also write the findings as JUnit XML, for pipelines."),
 )
+@controller_argument
 @controller_options
 @yes_option
 def check_contract(
@@ -110,11 +112,11 @@ def check_contract(
         identity, found = _of_a_driver(driver, asked)
     else:
         identity, found = _of_a_cell(context, asked)
+    if junit is not None:
+        _write_junit(junit, identity, found)
     for one in found:
         if one.error is not None:
             raise one.error
-    if junit is not None:
-        _write_junit(junit, identity, found)
     broken = [one for one in found if one.broken]
 
     def show() -> None:
@@ -148,16 +150,18 @@ def _of_a_cell(context: CliContext, asked: _Asked) -> "tuple[str, list[CheckOutc
         if asked.changes:
             stack.enter_context(
                 kept_on_site(
-                    lambda: open_controller(context, quiet=True, changes=True),
+                    lambda *, leaves: open_controller(
+                        context, quiet=True, changes=True, leaves=leaves
+                    ),
                     tr("checks of the contract"),
                     tool=asked.tool,
                     agree=lambda controller: _agree(controller, asked),
                 )
             )
         stack.callback(trials.close)
-        identity, tool, able = _looked_at(trials.connect, asked)
+        identity, tool = _looked_at(trials.connect, asked)
         subject = Subject(trials.connect, tool=tool, step_mm=asked.step_mm or 1.0)
-        return identity, _found(subject, asked, able)
+        return identity, _found(subject, asked)
 
 
 def _of_a_driver(name: str, asked: _Asked) -> "tuple[str, list[CheckOutcome]]":
@@ -169,13 +173,13 @@ def _of_a_driver(name: str, asked: _Asked) -> "tuple[str, list[CheckOutcome]]":
     if asked.changes:
         with made() as controller:
             _agree(controller, asked)
-    identity, tool, able = _looked_at(made, asked)
+    identity, tool = _looked_at(made, asked)
     subject = Subject(made, tool=tool, step_mm=asked.step_mm or 1.0)
-    return identity, _found(subject, asked, able)
+    return identity, _found(subject, asked)
 
 
-def _looked_at(connect: "Callable[[], Controller]", asked: _Asked) -> tuple[str, int, Any]:
-    """Return who it is, which tool is looked at, and what it is able to do.
+def _looked_at(connect: "Callable[[], Controller]", asked: _Asked) -> tuple[str, int]:
+    """Return who it is, and which tool is looked at.
 
     Raises:
         ConfigError: It cannot do what was asked for.
@@ -188,10 +192,10 @@ def _looked_at(connect: "Callable[[], Controller]", asked: _Asked) -> tuple[str,
                     tr("This controller cannot be held to that: it is not able to do it."),
                     remedy=tr("Leave --write or --move out."),
                 )
-        return controller.outcomes.identity, tool, able
+        return controller.outcomes.identity, tool
 
 
-def _found(subject: "Subject", asked: _Asked, _able: object) -> "list[CheckOutcome]":
+def _found(subject: "Subject", asked: _Asked) -> "list[CheckOutcome]":
     """Make the checks that were asked for, and tell of each on the way."""
     from robolink.testing import MOVING_CHECKS, READING_CHECKS, WRITING_CHECKS, outcomes
 
@@ -247,13 +251,15 @@ def _write_junit(path: Path, identity: str, found: "Sequence[CheckOutcome]") -> 
     """Write the findings as pipelines read them: one case a promise."""
     from xml.etree import ElementTree as Xml
 
-    broken = sum(bool(one.broken) for one in found)
-    counts = {"tests": str(len(found)), "failures": str(broken), "errors": "0"}
-    suite = Xml.Element("testsuite", name=f"contract of {identity}", **counts)
+    errors = sum(one.error is not None for one in found)
+    broken = sum(bool(one.broken) for one in found) - errors
+    counts = {"tests": str(len(found)), "failures": str(broken), "errors": str(errors)}
+    suite = Xml.Element("testsuite", {"name": f"contract of {identity}", **counts})
     for one in found:
         case = Xml.SubElement(suite, "testcase", classname="robolink.contract", name=one.name)
         if one.broken:
-            Xml.SubElement(case, "failure", message=one.broken).text = one.promise
+            kind = "failure" if one.error is None else "error"
+            Xml.SubElement(case, kind, message=one.broken).text = one.promise
     Xml.indent(suite)
     try:
         path.write_bytes(Xml.tostring(suite, encoding="utf-8", xml_declaration=True))

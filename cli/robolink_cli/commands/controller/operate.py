@@ -159,7 +159,11 @@ def motors(context: CliContext, switch: str, dry_run: bool, yes: bool) -> None:
             agree(tr("Switch the motors on? Nobody may be in the cell."), yes=yes)
         controller.motors(on)
     payload: dict[str, object] = {"motors_on": on}
-    context.emit("motors", payload, lambda: say(tr("The motors are {switch}.", switch=switch)))
+    context.emit(
+        "motors",
+        payload,
+        lambda: say(tr("The motors are {switch}.", switch=tr("on") if on else tr("off"))),
+    )
 
 
 @click.command()

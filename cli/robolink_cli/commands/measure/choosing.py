@@ -61,8 +61,8 @@ def choose_cell(desk: AskingDesk) -> "Cell":
         raise ConfigError(
             tr("No cell is set up on this computer."),
             remedy=tr(
-                "'robolink cell files' shows which file describes cells. To try it on a simulated "
-                "robot: robolink demo"
+                "To set one up: robolink docs cell-files. To practise on a simulated robot: "
+                "robolink docs tutorial"
             ),
         )
     if len(cells) == 1:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from robolink.messages import tr
+from robolink.messages import spoken, tr
 from robolink_cli.console.render import emit_json, json_is_on, say, say_listed
 from robolink_cli.session.completing import complete_recipe
 from robolink_cli.session.context import json_option
@@ -24,12 +24,14 @@ def _complete_model(_: click.Context, __: click.Parameter, start: str) -> list[s
 @json_option
 def list_models() -> None:
     """List the recipes that come with robolink, to begin with."""
-    purposes = {name: _purpose(path) for name, path in _models().items()}
+    from robolink_cli.commands.shipped.recipe_purposes import PURPOSES
+
+    purposes = {name: PURPOSES.get(name) or _purpose(path) for name, path in _models().items()}
     if json_is_on():
         entries = [{"name": name, "purpose": text} for name, text in purposes.items()]
         emit_json("robolink/recipes/1", {"recipes": entries})
         return
-    say_listed(purposes)
+    say_listed({name: spoken(text) for name, text in purposes.items()})
     say(tr("To begin with one: robolink recipe new NAME FILE"))
 
 

@@ -1,7 +1,7 @@
 """Screen (b): what is looked at before the robot starts."""
 
 from robolink.messages import tr
-from robolink_cli.console.columns import padded
+from robolink_cli.console.columns import columns, padded
 from robolink_cli.wizard.check_list import CheckPoint, CheckSubject, Mark
 from robolink_cli.wizard.screens.layout import Screen, broken
 from robolink_cli.wizard.screens.rows import status_row, title_row
@@ -32,6 +32,6 @@ def mark_of(point: CheckPoint, checked: frozenset[str]) -> str:
 def point_rows(point: CheckPoint, checked: frozenset[str]) -> list[str]:
     """Return a point, broken to two rows where it is long."""
     key = f"[{point.key}] {point.does}" if point.key else ""
-    first, *rest = broken(point.text, 71 - (len(key) + 2 if key else 0))
-    row = padded(f" {padded(mark_of(point, checked), 7)}{first}", 79 - len(key)) + key
+    first, *rest = broken(point.text, 71 - (columns(key) + 2 if key else 0))
+    row = padded(f" {padded(mark_of(point, checked), 7)}{first}", 79 - columns(key)) + key
     return [row, *(f"         {more}" for more in rest)]

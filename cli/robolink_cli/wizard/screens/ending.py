@@ -79,10 +79,11 @@ def ended_of(state: WizardState, error: BaseException | None, at_s: float) -> La
 
 def stopped_lines(state: WizardState, error: RobolinkError) -> list[str]:
     """Return why it ended, where, what stands on the controller, and the one command to go on."""
-    said = [one for one in (error.what, error.remedy) if one]
     standing = standing_after(error)
-    if standing is not UNTOUCHED:
-        said.append(describe_standing(standing))
+    stands = "" if standing is UNTOUCHED else describe_standing(standing)
+    # What stands says best that nothing was written.
+    remedy = "" if error.remedy in stands else error.remedy
+    said = [one for one in (error.what, remedy, stands) if one]
     return [*_where(state), *said, "", *_next(state, error)]
 
 

@@ -32,9 +32,11 @@ def moving_screen(state: WizardState, now_s: float) -> Screen:
         for left, right in zip(drawn, [*told, *[""] * (ROWS - len(told))], strict=True)
     ]
     legend = tr("# base   O elbow   @ flange and its U direction   * where it goes")
+    follows = state.reading is None or state.reading.follows
+    unknown = tr("Drawn where it began: this controller tells no position while it moves.")
     return Screen(
         title_row(state, tr("On the way")),
-        (" " + tr("From above"), *lines, "", " " + legend),
+        (" " + tr("From above"), *lines, "", " " + legend, *([] if follows else [" " + unknown])),
         (("0", tr("STOP")), ("Esc", tr("STOP"))),
         status=status_row(state, now_s),
         message=tr("The robot is moving."),

@@ -15,7 +15,7 @@ from robolink.stop_latch import CommandClass
 _CALM: Final = frozenset({"stop", "abort", "pause", "reset", "resetalm", "setmotorsoff"})
 _SESSION: Final = frozenset({"login", "logout"})
 
-_LOOKS: Final = re.compile(r"(Print .*|Where|TLSet|Here|RealPos)", re.ASCII)
+_LOOKS: Final = re.compile(r"(Print .*|Where|TLSet|Base|Here|RealPos)", re.ASCII)
 _RESTORES: Final = re.compile(r"(Tool [0-9]+|Power (Low|High)|SpeedS? [0-9., ]+)", re.ASCII)
 _WRITES: Final = re.compile(r"(TLSet [0-9]+, XY\([^()]*\)|TLClr [0-9]+)", re.ASCII)
 

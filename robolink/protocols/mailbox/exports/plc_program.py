@@ -41,6 +41,12 @@ def program_texts(
             and that of the movement commanded last. With them the program reads the tool by
             SMC_GroupReadTool; without, since no document names them, it remembers the one that
             it set last.
+
+    Example:
+        >>> from robolink.protocols.mailbox import ExportProfile, program_texts
+        >>> texts = program_texts(ExportProfile.TOOLS, kinematics="Kin_Scara3_Z")
+        >>> "robolink_core.st" in texts
+        True
     """
     folder = files(__package__) / "program_sources"
     code = find_kinematics_word(kinematics) or 0

@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cached_property
 from typing import Final
 
 from robolink.timing import NS_PER_S
@@ -77,7 +78,11 @@ class DriveObserver:
         self._arm, self._load, self._limits = arm, load, limits
         self._measured: dict[DriveQuantity, dict[int, _Measured]] = {}
         self._seen_ns = 0
-        self._last: deque[Travelled] = deque(maxlen=_KEPT)
+
+    @cached_property
+    def _last(self) -> deque[Travelled]:
+        """The motions of the last minute; most robots of a process never move."""
+        return deque(maxlen=_KEPT)
 
     def forget(self) -> None:
         """Forget all that was measured, and the motions of the last minute."""

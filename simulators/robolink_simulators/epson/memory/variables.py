@@ -5,7 +5,7 @@ Source: docs/reference/epson.md 1.2 note 4.
 
 import math
 import re
-from collections.abc import Mapping, MutableSequence, Sequence
+from collections.abc import Callable, Mapping, MutableSequence, Sequence
 from typing import Any, Final
 
 from robolink.errors import ConfigError
@@ -99,11 +99,24 @@ class Variables:
 
     Args:
         true_text: How a True Boolean is shown (open, see ``EpsonOptions.true_value``).
+        project: Declares what the project declares, when somebody first asks for a variable.
     """
 
-    def __init__(self, true_text: str) -> None:
+    def __init__(
+        self, true_text: str, project: "Callable[[Variables], None] | None" = None
+    ) -> None:
         self._true_text = true_text
-        self._variables: dict[str, _Variable] = {}
+        self._project = project
+        self._declared: dict[str, _Variable] = {}
+
+    @property
+    def _variables(self) -> dict[str, _Variable]:
+        if self._project is not None:
+            declare, self._project = self._project, None
+            early, self._declared = self._declared, {}
+            declare(self)
+            self._declared |= early
+        return self._declared
 
     def declare(
         self, name: str, kind: VariableType, *bounds: int, value: Value | None = None
@@ -121,7 +134,7 @@ class Variables:
                     remedy=tr("Declare it without a value and set its elements."),
                 )
             variable.set((), value)
-        self._variables[name.lower()] = variable
+        self._declared[name.lower()] = variable
 
     def adopt(
         self, name: str, type_name: str, bounds: tuple[int, ...], values: MutableSequence[Any]
@@ -235,10 +248,12 @@ def _parsed(kind: VariableType, text: str) -> Value:
 
 def project_variables(true_text: str) -> Variables:
     """Return what the project in the simulated controller declares: one of each kind."""
-    variables = Variables(true_text)
+    return Variables(true_text, _declare_project)
+
+
+def _declare_project(variables: Variables) -> None:
     variables.declare("VERSION$", VariableType.STRING, value="SIMULATED")
     for kind in VariableType:
         if kind is not VariableType.STRING:
             variables.declare(f"g_{kind}", kind)
             variables.declare(f"g_{kind}_table", kind, 15, 5)
-    return variables

@@ -39,7 +39,7 @@ _WORDS_NOT_SIMULATED = """
     input inputbox line randomize read redim
     resetelapsedtime setcom setnet signal simset taskwait tmreset toff ton vcal
     vcalpoints waitnet waitsig write writebin cont restart vdefgetmotionrange
-    vdefsetmotionrange vshowmodel vtrain sysconfig workque_list cnv_quelist history clearhistory
+    vdefsetmotionrange vshowmodel vtrain workque_list cnv_quelist history clearhistory
 """
 
 NOT_SIMULATED: Final = frozenset(_WORDS_NOT_SIMULATED.split())

@@ -3,6 +3,7 @@
 import random
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cache
 
 from robolink_simulators.epson.condition import Condition
 from robolink_simulators.epson.machine import Machine
@@ -16,6 +17,7 @@ PointFile = tuple[dict[int, Point], dict[str, int]]
 """Points by their numbers, and the numbers of labels."""
 
 
+@cache
 def _at_power_on() -> Expression:
     """Return the condition of a bare Till, Find or Sense: ``Sw(0) = On``.
 

@@ -43,6 +43,7 @@ from robolink_simulators.epson.spel.statements.waiting import (
     seconds_of,
     shown_condition,
 )
+from robolink_simulators.epson.spel.system_listing import SYSTEM_COMMANDS
 from robolink_simulators.epson.spel.tree import Expression, KeywordStatement
 
 LATCH_SETTING_NS: Final = 40_000_000
@@ -338,6 +339,7 @@ _AT_ONCE: Final = {
     **SYNC_STATEMENTS,
     **FILE_COMMANDS,
     **POINT_FILE_COMMANDS,
+    **SYSTEM_COMMANDS,
 }
 """Statements that take no time: keyword to what carries it out and returns what it prints."""
 

@@ -2,7 +2,7 @@
 
 That is two durable commits and three exchanges: the intent before the write, its end after
 it; read, write and read back. The floor is the same on bare ``sqlite3`` (WAL, FULL, one row
-a commit) and on a raw blocking socket. As in :mod:`benchmarks.exchange` the simulator has a
+a commit) and on a raw blocking socket. As in :mod:`benchmarks.links.exchange` the simulator has a
 process, and where there are two a CPU, of its own.
 """
 
@@ -18,8 +18,8 @@ from time import perf_counter_ns
 from urllib.parse import urlsplit
 
 import robolink
-from benchmarks.exchange import served_simulator
-from benchmarks.table import Figure
+from benchmarks.links.exchange import served_simulator
+from benchmarks.table import Amount, Figure
 from robolink.journal import open_journal
 from robolink.model import ToolOffset
 from robolink.transaction import Wanted, change_tools
@@ -51,11 +51,13 @@ def _compare(simulator_cpu: int | None) -> Iterator[Figure]:
             for _ in range(ROUNDS)
         ]
     floor, write, change = (median(column) for column in zip(*rounds, strict=True))
-    yield Figure("two commits of bare SQLite and three raw exchanges", f"{floor:.0f} us")
+    against, bare_us = "two bare SQLite commits, three raw exchanges", Amount(floor, "us")
     ratio = median(ours / bare for bare, ours, _ in rounds)
-    yield Figure("transactional tool write, robolink", f"{write:.0f} us", ratio, GOAL)
+    ours_us = Amount(write, "us")
+    yield Figure("transactional tool write", ours_us, against, bare_us, ratio, GOAL)
     ratio = median(ours / bare for bare, _, ours in rounds)
-    yield Figure("the same as a change that compares beforehand", f"{change:.0f} us", ratio)
+    ours_us = Amount(change, "us")
+    yield Figure("the same as a change that compares first", ours_us, against, bare_us, ratio)
 
 
 def _floor_round(url: str, folder: Path) -> float:

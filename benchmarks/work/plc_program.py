@@ -12,7 +12,7 @@ from robolink_simulators.softmotion.program.structured_plc import (
 )
 from robolink_simulators.structured_text import SourceText
 
-from benchmarks.table import Figure
+from benchmarks.table import Amount, Figure
 from robolink.protocols.mailbox import program_texts
 
 CYCLES = 250
@@ -37,8 +37,10 @@ def measure_plc_program() -> Iterator[Figure]:
         times_ms.append((process_time() - began) / CYCLES * 1000)
     scan_ms = median(times_ms)
     yield Figure(
-        "exported PLC program, one cycle over the period of its task",
-        f"{scan_ms:.2f} ms",
+        "exported PLC program, one cycle",
+        Amount(scan_ms, "ms"),
+        "the period of its task",
+        Amount(PERIOD_MS, "ms"),
         scan_ms / PERIOD_MS,
         1.0,
     )

@@ -8,7 +8,7 @@ from pathlib import Path
 from statistics import median
 from time import perf_counter_ns
 
-from benchmarks.table import Figure
+from benchmarks.table import Amount, Figure
 
 ROUNDS = 15
 
@@ -20,10 +20,11 @@ def measure_start_up() -> Iterator[Figure]:
     floor, ours = [sys.executable, "-c", "import click"], [robolink, "--help"]
     _run(floor), _run(ours)
     pairs = [(_run(floor), _run(ours)) for _ in range(ROUNDS)]
-    yield Figure('python -c "import click"', f"{median(a for a, _ in pairs):.1f} ms")
     yield Figure(
         "robolink --help",
-        f"{median(b for _, b in pairs):.1f} ms",
+        Amount(median(b for _, b in pairs), "ms"),
+        'python -c "import click"',
+        Amount(median(a for a, _ in pairs), "ms"),
         median(b / a for a, b in pairs),
         1.30,
     )

@@ -15,7 +15,7 @@ from time import perf_counter_ns
 from robolink_simulators.hosting.in_process.epson import unregister
 
 import robolink
-from benchmarks.table import Figure
+from benchmarks.table import Amount, Figure
 from robolink.journal import Journal, open_journal
 from robolink.model import EntryKind, NewEntry, ToolOffset, plain_offset
 from robolink.transaction import Wanted, change_tools, plan_undo, undo
@@ -37,19 +37,18 @@ _OFFSETS = (ToolOffset(12.0, -3.5, -20.0), ToolOffset(12.125, -3.25, -20.0))
 def measure_journal() -> Iterator[Figure]:
     """Yield the figures of a large journal."""
     with ExitStack() as stack:
-        small = stack.enter_context(_Bench(PAGE).opened())
-        large = stack.enter_context(_Bench(ENTRIES).opened())
+        small = stack.enter_context(JournalBench(PAGE).opened())
+        large = stack.enter_context(JournalBench(ENTRIES).opened())
         yield from _compare(f"the newest {PAGE} entries", small.newest, large.newest)
         yield from _compare("the newest of one tool", small.of_a_tool, large.of_a_tool)
         yield from _compare("undo of a change, with its proof", small.undo, large.undo)
         start = perf_counter_ns()
         checked = large.journal.verify().checked
         passed_us = (perf_counter_ns() - start) / 1000
-    yield Figure(f"journal verify, {checked} entries", f"{passed_us / 1e6:.2f} s")
-    yield Figure("   the same for one entry", f"{passed_us / checked:.1f} us")
+    yield Figure(f"journal verify, {checked} entries, for each", Amount(passed_us / checked, "us"))
 
 
-class _Bench:
+class JournalBench:
     """A journal and a simulated controller that it knows."""
 
     journal: Journal
@@ -59,7 +58,7 @@ class _Bench:
         self._name = f"bench-journal-{entries}"
 
     @contextmanager
-    def opened(self) -> Iterator["_Bench"]:
+    def opened(self) -> Iterator["JournalBench"]:
         """Fill the journal and connect the controller."""
         url = f"epson+sim://{self._name}"
         with TemporaryDirectory() as folder:
@@ -95,9 +94,9 @@ def _compare(name: str, small: Callable[[], float], large: Callable[[], float]) 
     small(), large()
     rounds = [(small(), large()) for _ in range(ROUNDS)]
     few, many = (median(column) for column in zip(*rounds, strict=True))
-    yield Figure(f"journal of {PAGE} entries: {name}", f"{few:.0f} us")
     ratio = median(b / a for a, b in rounds)
-    yield Figure(f"journal of {ENTRIES} entries: {name}", f"{many:.0f} us", ratio, GOAL)
+    what, against = f"journal of {ENTRIES} entries: {name}", f"one of {PAGE} entries"
+    yield Figure(what, Amount(many, "us"), against, Amount(few, "us"), ratio, GOAL)
 
 
 def _entry(number: int) -> NewEntry:

@@ -8,7 +8,7 @@ from time import perf_counter
 
 from robolink_simulators.epson import EpsonOptions, EpsonSimulator
 
-from benchmarks.table import Figure
+from benchmarks.table import Amount, Figure
 
 PASSES = 20_000
 STATEMENTS = 5 * PASSES
@@ -49,8 +49,10 @@ def measure_spel_programs() -> Iterator[Figure]:
             raise AssertionError(runner.failure)
     rate = median(rates)
     yield Figure(
-        "SPEL+ program, statements a second, wanted over reached",
-        f"{rate:.0f} /s",
+        "SPEL+ program, statements",
+        Amount(rate, "/s"),
+        "wanted",
+        Amount(WANTED_PER_S, "/s"),
         WANTED_PER_S / rate,
         1.0,
     )

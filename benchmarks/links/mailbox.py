@@ -5,7 +5,7 @@ the command block leaves, the head until it acknowledges, the response (how did 
 the slot (what is there now?). The floor makes them with pymodbus, or with canopen's SDO client
 and its subscription of TPDO1, and decodes nothing; its command blocks are encoded beforehand.
 The driver keeps its journal in memory, so that only the link is compared. As in
-:mod:`benchmarks.exchange` the simulator has a process, and where there are two a CPU, of its
+:mod:`benchmarks.links.exchange` the simulator has a process, and where there are two a CPU, of its
 own; its program looks at the mailbox every 4 ms, as a PLC does, and both sides wait for that.
 
 Each write begins at another point of that cycle, as a lone write does. Back to back both sides
@@ -23,9 +23,9 @@ from time import perf_counter_ns
 from typing import Final
 
 import robolink
-from benchmarks.bare_links import ACK, SLOT, Bare, bare_can, bare_modbus, free_port
-from benchmarks.exchange import served_simulator
-from benchmarks.table import Figure
+from benchmarks.links.bare_links import ACK, SLOT, Bare, bare_can, bare_modbus, free_port
+from benchmarks.links.exchange import served_simulator
+from benchmarks.table import Amount, Figure
 from robolink.journal import memory_journal
 from robolink.model import ToolOffset
 from robolink.protocols.mailbox import (
@@ -72,10 +72,11 @@ def _compare(
     with served_simulator(simulator_cpu, serving) as url:
         rounds = [(_floor_round(url, bare), _driver_round(url)) for _ in range(ROUNDS)]
     floor, driver = (_typical_us(side) for side in zip(*rounds, strict=True))
-    yield Figure(f"mailbox tool write over {link}, bare {library}", f"{floor:.0f} us")
     yield Figure(
-        f"mailbox tool write over {link}, robolink (journal in memory)",
-        f"{driver:.0f} us",
+        f"mailbox tool write over {link}, journal in memory",
+        Amount(driver, "us"),
+        f"the same calls by bare {library}",
+        Amount(floor, "us"),
         driver / floor,
         GOAL,
     )

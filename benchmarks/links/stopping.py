@@ -26,7 +26,7 @@ from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
-from benchmarks.table import Figure
+from benchmarks.table import Amount, Figure
 
 ROUNDS = 15
 _WHOLE = """
@@ -188,8 +188,9 @@ def _over_canopen(robolink: str, floor: list[str]) -> Iterator[Figure]:
 
 
 def _figure(what: str, pairs: list[tuple[float, float]], goal: float) -> Figure:
-    ours = median(ours for _, ours in pairs)
-    return Figure(what, f"{ours:.1f} ms", median(ours / floor for floor, ours in pairs), goal)
+    floor, ours = (Amount(median(column), "ms") for column in zip(*pairs, strict=True))
+    ratio = median(one / bare for bare, one in pairs)
+    return Figure(what, ours, 'python -c "import click"', floor, ratio, goal)
 
 
 def _to_frame(command: list[str], tap: Tap) -> float:

@@ -22,7 +22,7 @@ from time import perf_counter_ns
 from urllib.parse import urlsplit
 
 import robolink
-from benchmarks.table import Figure
+from benchmarks.table import Amount, Figure
 from robolink.journal import memory_journal
 
 ROUNDS = 15
@@ -50,10 +50,11 @@ def _compare(
     with served_simulator(simulator_cpu) as url:
         rounds = [(_raw_round(url), _driver_round(url)) for _ in range(ROUNDS)]
     raw, driver = (median(column) for column in zip(*rounds, strict=True))
-    yield Figure(f"status exchange, raw blocking socket ({placed})", f"{raw:.1f} us")
     yield Figure(
-        f"status exchange, robolink ({placed})",
-        f"{driver:.1f} us",
+        f"status exchange ({placed})",
+        Amount(driver, "us"),
+        "raw blocking socket",
+        Amount(raw, "us"),
         median(ours / floor for floor, ours in rounds),
         goal,
     )

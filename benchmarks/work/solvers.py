@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 from scipy.optimize import least_squares
 
-from benchmarks.table import Figure
+from benchmarks.table import Amount, Figure
 from robolink.calibration import (
     Robust,
     fit_pivot,
@@ -49,8 +49,6 @@ def measure_solvers() -> Iterator[Figure]:
     for count in SIZES:
         if count != 20:
             yield from _robust(count, peer)
-    if not peer:
-        yield Figure(f"robust pivot, {PEER}", "not installed")
 
 
 def _plain(count: int) -> Iterator[Figure]:
@@ -62,12 +60,16 @@ def _plain(count: int) -> Iterator[Figure]:
     quick = _median_us(lambda: by_scipy(positions, turned, "lm"))
     floor = _median_us(lambda: by_lstsq(positions, turned))
     name = f"pivot of {count} poses,"
-    yield Figure(f"{name} robolink, with covariance and residuals", f"{ours:.0f} us")
-    goal = 1 / 20 if count == 20 else None
-    yield Figure(f"{name} robolink over scipy least_squares", f"{scipy:.0f} us", ours / scipy, goal)
-    yield Figure(f"{name} robolink over scipy with method lm", f"{quick:.0f} us", ours / quick)
-    yield Figure(f"{name} robolink over numpy lstsq alone", f"{floor:.0f} us", ours / floor)
-    yield Figure(f"{name} robolink from poses, with every check", f"{whole:.0f} us", whole / scipy)
+    goal, us = 1 / 20 if count == 20 else None, Amount(ours, "us")
+    for against, peer_us, wanted in (
+        ("scipy least_squares", scipy, goal),
+        ("scipy least_squares, lm", quick, None),
+        ("numpy lstsq alone", floor, None),
+    ):
+        figures = (Amount(peer_us, "us"), ours / peer_us, wanted)
+        yield Figure(f"{name} covariance and residuals", us, against, *figures)
+    checked = (Amount(whole, "us"), "scipy least_squares", Amount(scipy, "us"))
+    yield Figure(f"{name} every check", *checked, whole / scipy)
     if count >= 1_000:
         yield from _from_poses(name, whole, _median_us(lambda: with_covariance(positions, turned)))
         level = [Pose(p.x_mm, p.y_mm, p.z_mm, 360.0 * k / count) for k, p in enumerate(poses)]
@@ -79,8 +81,10 @@ def _plain(count: int) -> Iterator[Figure]:
 
 def _from_poses(name: str, whole_us: float, floor_us: float) -> Iterator[Figure]:
     yield Figure(
-        f"{name} every check ({whole_us:.0f} us), over lstsq with covariance",
-        f"{floor_us:.0f} us",
+        f"{name} every check",
+        Amount(whole_us, "us"),
+        "lstsq with covariance",
+        Amount(floor_us, "us"),
         whole_us / floor_us,
         3.0,
     )
@@ -94,8 +98,9 @@ def _robust(count: int, peer: bool) -> Iterator[Figure]:
     wrong = float(np.linalg.norm(fit.tip - TIP))
     ours = _median_us(lambda: fit_pivot_robust(positions, turned, robust, sigma_mm=None))
     name = f"robust pivot of {count} poses, 20 % outliers,"
-    yield Figure(f"{name} robolink ({wrong:.3f} mm off, {int(kept.sum())} kept)", f"{ours:.0f} us")
+    found = f"{name} {wrong:.3f} mm off, {int(kept.sum())} kept"
     if not peer:
+        yield Figure(found, Amount(ours, "us"), f"{PEER} is not installed")
         return
     from sksurgerycalibration.algorithms.pivot import pivot_calibration_with_ransac
 
@@ -110,9 +115,15 @@ def _robust(count: int, peer: bool) -> Iterator[Figure]:
     off = float(np.linalg.norm(theirs().ravel() - fit.tip))
     them = _median_us(theirs)
     goal = 1 / 50 if count == 100 else None
-    yield Figure(
-        f"{name} robolink over {PEER} ({off:.3f} mm apart)", f"{them:.0f} us", ours / them, goal
-    )
+    against = f"{PEER}, {off:.3f} mm apart"
+    yield Figure(found, Amount(ours, "us"), against, Amount(them, "us"), ours / them, goal)
+
+
+def whole_pivot_us(count: int) -> float:
+    """Return the microseconds of a pivot of so many poses, with every check."""
+    positions, turned = _data(count, outliers=0.0)
+    poses = [_pose(*row) for row in zip(positions.tolist(), turned, strict=True)]
+    return _median_us(lambda: solve_pivot(poses))
 
 
 def pivot(positions: Floats, turned: Floats) -> tuple[Floats, Floats, Floats]:

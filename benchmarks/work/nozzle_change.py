@@ -9,7 +9,7 @@ from robolink_simulators.assist.port import InProcessEyes
 from robolink_simulators.hosting.in_process.epson import simulator_named, unregister
 
 import robolink
-from benchmarks.table import Figure
+from benchmarks.table import Amount, Figure
 from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
 
 ROUNDS = 9
@@ -20,9 +20,13 @@ def measure_nozzle_change() -> Iterator[Figure]:
     runs = [_change(seed) for seed in range(ROUNDS + 1)][1:]
     wall_s = median(wall for wall, _ in runs)
     simulated_s = median(simulated for _, simulated in runs)
-    yield Figure("two-pose nozzle change on sim://, wall time", f"{wall_s * 1000:.0f} ms")
-    yield Figure("   the same in simulated time", f"{simulated_s:.1f} s")
-    yield Figure("   time-warp factor (simulated over wall)", f"{simulated_s / wall_s:.0f} x")
+    yield Figure(
+        "two-pose nozzle change on sim://",
+        Amount(wall_s * 1000, "ms"),
+        "its simulated time",
+        Amount(simulated_s * 1000, "ms"),
+        wall_s / simulated_s,
+    )
 
 
 def _change(seed: int) -> tuple[float, float]:

@@ -1,0 +1,1 @@
+"""What crosses a link, a process or a disk."""

@@ -1,0 +1,110 @@
+"""Writes docs/performance.md and its pictures from one whole run."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from benchmarks.pictures import Growth, picture
+from benchmarks.quiet import SPREAD
+from benchmarks.table import HEAD, Figure
+
+ROOT: Final = Path(__file__).parents[1]
+PAGE: Final = ROOT / "docs" / "performance.md"
+PICTURES: Final = ROOT / "docs" / "pictures"
+
+TITLES: Final = {
+    "exchange": "One exchange",
+    "transaction": "A tool write that is recorded and read back",
+    "mailbox": "A tool write through a PLC's mailbox",
+    "fleet": "Thousands of simulated controllers",
+    "start-up": "Start of the command line",
+    "stopping": "A stop, and a look",
+    "journal": "A large journal",
+    "nozzle-change": "A nozzle change in process",
+    "virtual-time": "Cells in virtual time",
+    "solvers": "Solvers",
+    "kinematics": "Kinematics of the simulated robot",
+    "spel-programs": "SPEL+ programs",
+    "plc-program": "The PLC program",
+}
+
+NOTES: Final = {
+    "fleet": "Controllers are made when they are first used, so opening them is cheap; both states"
+    "\nare shown. The client is a bare selector in a process of its own.",
+    "virtual-time": "The real driver, every check, a record in memory: a change is some 550"
+    "\nexchanges with the simulated controller and 23 movements, of which each is announced,"
+    "\nlimited, watched and recorded as on a real robot. The wanted figures come from toy cells"
+    "\nthat ask once a simulated second; the time of a change is spread over driver, protocol,"
+    "\nsimulator and record, and no part of it stands out.",
+}
+"""What has to be known to read the figures of a case."""
+
+_TOP: Final = """# Performance
+
+`make bench` measures all of this and writes this page; `make bench ONLY=fleet` runs one part and
+prints it. Figures with their numbers stand in `build/bench.json` afterwards. Each figure is a
+median and stands beside a floor (the least that the work cannot do without), a peer (what others
+offer) or what is wanted; both were measured in the same run, in turn, and the ratio is ours over
+theirs, so less is better everywhere. Where a rate is wanted, the ratio is the wanted one over the
+reached one. Ratios compare within a run, microseconds with nothing.
+
+Before and after each part the same small work is timed. When it ever took more than {spread:g}
+times as long as at its fastest, the machine did something else meanwhile: nothing is published,
+and `make bench` ends with 3. `NOISY=yes` publishes all the same, and this page says so.
+"""
+
+_GROWTH: Final = """
+## How it grows
+
+Both axes by powers of ten.
+"""
+
+
+def publish(
+    about: Mapping[str, Any], cases: Mapping[str, Sequence[Figure]], growth: Sequence[Growth]
+) -> None:
+    """Write the page and its pictures.
+
+    Args:
+        about: When, where, with what versions, and how noisy it was.
+        cases: The figures, by the names of their cases.
+        growth: What is drawn.
+    """
+    for one in growth:
+        (PICTURES / f"{one.name}.svg").write_text(picture(one), encoding="utf-8")
+    PAGE.write_text("\n".join(_lines(about, cases, growth)) + "\n", encoding="utf-8")
+
+
+def _lines(
+    about: Mapping[str, Any], cases: Mapping[str, Sequence[Figure]], growth: Sequence[Growth]
+) -> Iterator[str]:
+    yield _TOP.format(spread=SPREAD)
+    yield from _circumstances(about)
+    missed = [one for figures in cases.values() for one in figures if one.met is False]
+    met = sum(one.met is True for figures in cases.values() for one in figures)
+    yield f"\nGoals met: {met} of {met + len(missed)}."
+    for one in missed:
+        yield f"Missed: {one.name} ({one.ratio:.2f}, goal {one.goal:.2f})."
+    for name, figures in cases.items():
+        yield f"\n## {TITLES[name]}\n"
+        if name in NOTES:
+            yield f"{NOTES[name]}\n"
+        yield _row(HEAD)
+        yield "|---|---|---:|---:|---:|---:|---|"
+        yield from (_row(figure.cells()) for figure in figures)
+    yield _GROWTH
+    yield from (f"![{one.title}](pictures/{one.name}.svg)" for one in growth)
+
+
+def _circumstances(about: Mapping[str, Any]) -> Iterator[str]:
+    yield f"Measured on {about['date']}: {about['machine']}."
+    yield f"Versions: {', '.join(f'{name} {it}' for name, it in about['versions'].items())}."
+    if about["quiet"]:
+        yield f"Between the parts {about['noise']}."
+    else:
+        yield f"**The machine was busy with other work**: between the parts {about['noise']}; load"
+        yield f"{about['load']}. The figures are worse than on a quiet one, and goals are missed."
+
+
+def _row(cells: Sequence[str]) -> str:
+    return f"| {' | '.join(cell.replace('|', '/') for cell in cells)} |"

@@ -1,0 +1,1 @@
+"""What is computed: solvers, simulators, whole procedures."""

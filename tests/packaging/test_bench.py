@@ -1,0 +1,84 @@
+"""The figures that are published: each by its case, and none from a busy machine."""
+
+import json
+import sys
+from xml.etree import ElementTree
+
+import pytest
+
+from benchmarks import __main__ as bench
+from benchmarks import page
+from benchmarks.cases import CASES
+from benchmarks.pictures import Growth, picture
+from benchmarks.quiet import SPREAD, Floors
+from benchmarks.table import Amount, Figure
+
+SLOW = Figure("a stop", Amount(30.0, "ms"), "a floor", Amount(10.0, "ms"), 3.0, 2.5)
+QUICK = Figure("a look", Amount(1.234, "us"), "a floor", Amount(1.0, "us"), 1.234, 1.3)
+GROWTH = Growth("growth-test", "A < B", "poses", "us", ((10, 3.0), (1_000, 250.0)))
+ABOUT = {
+    "schema": bench.SCHEMA,
+    "date": "1 January 2026",
+    "machine": "a machine",
+    "load": "9.00",
+    "versions": {"Python": "3.11"},
+    "noise": "the same work took 1 to 3 us, 3.00 times its fastest",
+}
+
+
+def test_each_case_is_there_and_has_its_title_on_the_page():
+    written = page.PAGE.read_text(encoding="utf-8")
+    assert list(page.TITLES) == list(CASES)
+    for name, where in CASES.items():
+        source = (page.ROOT / "benchmarks" / f"{where.replace('.', '/')}.py").read_text()
+        assert f"def measure_{where.rpartition('.')[2]}(" in source
+        assert f"\n## {page.TITLES[name]}\n" in written
+
+
+def test_a_ratio_over_its_goal_is_missed_and_without_a_goal_neither():
+    assert (SLOW.met, QUICK.met, Figure("x", Amount(1, "s")).met) == (False, True, None)
+    assert SLOW.cells()[3:] == ("30.0 ms", "3.00", "<= 2.50", "missed")
+    assert json.loads(json.dumps(QUICK.document()))["ours"] == {"value": 1.234, "unit": "us"}
+
+
+def test_a_machine_that_was_slow_once_is_not_quiet():
+    floors = Floors([100.0, 110.0], best_us=95.0)
+    assert floors.quiet
+    floors.taken_us.append(95.0 * SPREAD * 1.05)
+    assert not floors.quiet
+
+
+@pytest.mark.parametrize("quiet", [True, False])
+def test_the_page_says_what_was_missed_and_whether_the_machine_was_busy(
+    tmp_path, monkeypatch, quiet
+):
+    monkeypatch.setattr(page, "PAGE", tmp_path / "performance.md")
+    monkeypatch.setattr(page, "PICTURES", tmp_path)
+    page.publish({**ABOUT, "quiet": quiet}, {"stopping": [SLOW, QUICK]}, [GROWTH])
+    written = (tmp_path / "performance.md").read_text()
+    assert "Goals met: 1 of 2." in written
+    assert "Missed: a stop (3.00, goal 2.50)." in written
+    assert ("busy with other work" in written) is not quiet
+    assert "| a look | a floor | 1.00 us | 1.23 us | 1.23 | <= 1.30 | met |" in written
+    assert (tmp_path / "growth-test.svg").exists()
+
+
+def test_a_picture_is_well_formed_and_shows_every_point():
+    drawn = ElementTree.fromstring(picture(GROWTH))
+    circles = [float(at.attrib["cy"]) for at in drawn.iter("{http://www.w3.org/2000/svg}circle")]
+    assert len(circles) == 2
+    assert circles[0] > circles[1]
+
+
+@pytest.mark.parametrize("asked", [["nothing"], ["fleet", "--publish"]])
+def test_what_is_no_case_and_a_part_of_a_run_are_refused(monkeypatch, capsys, asked):
+    monkeypatch.setattr(sys, "argv", ["benchmarks", *asked])
+    with pytest.raises(SystemExit) as ended:
+        bench.main()
+    assert ended.value.code == 2
+    assert ("no case" if asked == ["nothing"] else "whole run") in capsys.readouterr().err
+
+
+def test_a_busy_machine_publishes_nothing_and_says_so(capsys):
+    assert bench.refuse_to_publish() == bench.TOO_NOISY
+    assert "Not published" in capsys.readouterr().err

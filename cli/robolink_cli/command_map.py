@@ -77,8 +77,9 @@ SHORT_NAMES: Final = {
     "expert": f"{GROUPS}:expert",
     "recipe": f"{SHIPPED}.recipe:recipe",
 }
-"""Names that work and stand in no list. ``check``, ``check-contract``, ``docs`` and ``recipe`` are
-short for what ``cell`` and ``expert`` list; what ``config`` held says itself how it is called now."""
+"""Names that work and stand in no list. ``check``, ``check-contract``, ``docs`` and ``recipe``
+are short for what ``cell`` and ``expert`` list; what ``config`` held says itself how it is called
+now."""
 
 RENAMED: Final = {
     "backup": (f"{CONTROLLER}.backup:backup", "tool backup"),

@@ -68,6 +68,12 @@ $(JUDGES): $(VENV)/.installed-dev
 windows: $(VENV)/.installed-dev ## Run the wheel on a Windows CPython under wine, as far as that goes.
 	@$(BIN)/python -m tests.windows
 
+# Each in an environment of its own, made anew. RUNS="lowest-3.11 newest-3.13" takes some of them.
+RUNS :=
+.PHONY: versions
+versions: $(VENV)/.installed-dev ## Run with the lowest versions of packages, and the newest on each Python.
+	@$(BIN)/python -m tests.versions $(RUNS)
+
 .PHONY: check
 check: $(VENV)/.installed-dev ## Check style, types and who imports whom.
 	$(BIN)/ruff check .
@@ -101,6 +107,10 @@ messages: $(VENV)/.installed-dev ## Collect every sentence shown to a person, ke
 		robolink cli/robolink_cli simulators/robolink_simulators
 	@$(BIN)/python tools/translations.py || true
 
+# HOME_URL= and PAGES_URL= say where robolink is published: tools/package_page.py.
+HOME_URL :=
+PAGES_URL :=
+export HOME_URL PAGES_URL
 .PHONY: build
 build: $(VENV)/.installed-dev ## Build wheel, source archive, bill of materials, licences: dist/.
 	$(BIN)/python -m hatchling build -t sdist -t wheel

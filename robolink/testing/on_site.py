@@ -72,7 +72,7 @@ def kept_on_site(
     Example:
         >>> from robolink import ANY, ToolOffset, connect
         >>> from robolink.testing import kept_on_site
-        >>> def reach():
+        >>> def reach(*, leaves=False):
         ...     return connect("epson+sim://site-example")
         >>> with kept_on_site(reach, "a trial of tool 2", tool=2, agree=lambda controller: None):
         ...     with reach() as controller:

@@ -1,56 +1,21 @@
-"""Each run-time dependency has a lowest and a highest version, and the lowest really serves."""
+"""Each run-time dependency has a lowest and a highest version, and these are what was tried.
 
-import os
+``make versions`` runs robolink with them and writes what it saw into ``tests/versions/tried.json``.
+"""
+
 import re
-import subprocess
 import sys
-import tomllib
 from importlib import metadata
-from pathlib import Path
 
 import pytest
 from packaging.requirements import Requirement
 from packaging.version import Version
 
-ROOT = Path(__file__).parents[2]
+from tests.versions._beneath import FAILING, REASONS
+from tests.versions._declared import ROOT, lowest, project, pythons, run_time_dependencies, tried
+from tests.versions._runs import runs
 
 IMPORT = re.compile(r"^ *(?:from (\w+)[\w.]* import |import (\w+)[\w.]*(?: as \w+)?$)", re.M)
-
-NEVER = ("dev", "docs")
-"""Extras for people who work on robolink; nothing of them is needed to use it."""
-
-CHOSEN = (
-    "tests/contract/journal/test_journal_files.py",
-    "tests/contract/journal/test_journal_databases.py",
-    "tests/contract/test_epson_tools.py",
-    "tests/contract/test_plc_map.py",
-    "tests/contract/test_recalibrate.py",
-    "tests/contract/test_sim_softmotion_hosts.py",
-    "tests/contract/test_softmotion_tools.py",
-    "tests/cli/test_cli_frame.py",
-    "tests/cli/test_cli_output.py",
-    "tests/cli/test_commands_bad_input.py",
-    "tests/cli/test_completion.py",
-    "tests/cli/test_doctor.py",
-    "tests/cli/test_refusals_of_every_command.py",
-    "tests/unit/test_config_files.py",
-    "tests/unit/test_recipe_files.py",
-    "tests/unit/test_sim_spel_expressions.py",
-)
-"""What uses each dependency: files, prompts, tables, grammars, buses, the database."""
-
-
-def run_time_dependencies():
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    extras = project["optional-dependencies"]
-    lines = [*project["dependencies"]]
-    lines += [line for extra, wanted in extras.items() if extra not in NEVER for line in wanted]
-    return [Requirement(line) for line in lines]
-
-
-def lowest(requirement):
-    (version,) = (part.version for part in requirement.specifier if part.operator == ">=")
-    return Version(version)
 
 
 def version_of(name):
@@ -88,56 +53,38 @@ def test_each_package_that_the_sources_import_is_a_dependency_or_an_extra():
     assert {"click", "python_can", "sqlalchemy"} <= found
 
 
+def test_the_lowest_versions_are_those_that_were_tried():
+    (run,) = (found for name, found in tried().items() if name.startswith("lowest-"))
+    wanted = {one.name: lowest(one) for one in run_time_dependencies()}
+    assert {name: Version(run["versions"][name]) for name in wanted} == wanted
+    assert run["versions"]["python"].startswith(f"{pythons()[0]}.")
+    assert set(run["versions"]) == {"python", *wanted}
+
+
+def test_each_python_of_the_classifiers_was_tried_with_versions_that_are_allowed():
+    newest = {name: run for name, run in tried().items() if name.startswith("newest-")}
+    assert {f"newest-{version}" for version in pythons()} <= newest.keys()
+    assert newest.keys() <= {run.name for run in runs()}
+    for name, run in newest.items():
+        python = run["versions"]["python"]
+        assert python.startswith(f"{name.removeprefix('newest-')}.")
+        assert Version(python) in Requirement(f"python{project()['requires-python']}").specifier
+        for wanted in run_time_dependencies():
+            assert run["versions"][wanted.name] in wanted.specifier, (name, wanted.name)
+
+
+def test_for_each_dependency_it_is_known_why_it_is_not_lower():
+    names = [wanted.name for wanted in run_time_dependencies()]
+    assert sorted(names) == sorted([*FAILING, *REASONS])
+    declared = {wanted.name: lowest(wanted) for wanted in run_time_dependencies()}
+    for name, (version, _) in FAILING.items():
+        run = tried()[f"beneath-{name}"]
+        assert (run["version"], bool(run["failed"])) == (version, True)
+        assert Version(version) < declared[name]
+
+
 @pytest.mark.soak
 @pytest.mark.timeout(1800)
 def test_with_the_lowest_version_of_each_the_chosen_tests_pass(tmp_path):
-    python = str(tmp_path / "venv" / "bin" / "python")
-    # In the folder of the sources, so that "python -m pytest" runs these; state and caches apart.
-    environment = {
-        name: value
-        for name, value in os.environ.items()
-        if not name.startswith(("ROBOLINK", "PYTEST", "PYTHONPATH"))
-    } | {"ROBOLINK_STATE_DIR": str(tmp_path / "state"), "PYTHONDONTWRITEBYTECODE": "1"}
-
-    def run(*command):
-        done = subprocess.run(
-            command,
-            cwd=ROOT,
-            env=environment,
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            timeout=1500,
-            check=False,
-        )
-        assert done.returncode == 0, done.stdout[-5000:] + done.stderr[-5000:]
-        return done.stdout
-
-    run(sys.executable, "-m", "venv", str(tmp_path / "venv"))
-    pinned = [
-        f"{wanted.name}{'[binary]' if wanted.extras else ''}=={lowest(wanted)}"
-        for wanted in run_time_dependencies()
-    ]
-    tools = ["editables", "hatchling", "hypothesis", "pytest", "pytest-timeout"]
-    run(python, "-m", "pip", "install", "--quiet", "--no-compile", *pinned, *tools)
-    run(
-        python,
-        "-m",
-        "pip",
-        "install",
-        "--quiet",
-        "--no-deps",
-        "--no-build-isolation",
-        "-e",
-        str(ROOT),
-    )
-    program = "import importlib.metadata as m, sys; print(*map(m.version, sys.argv[1:]))"
-    names = [wanted.name for wanted in run_time_dependencies()]
-    installed = run(python, "-c", program, *names).split()
-    assert [Version(text) for text in installed] == [lowest(w) for w in run_time_dependencies()]
-    run(python, "-m", "robolink_cli", "demo", "--speed", "20")
-    shown = run(
-        *(python, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist"), *CHOSEN
-    )
-    assert " passed" in shown
-    assert " failed" not in shown
+    (run,) = (run for run in runs() if run.name.startswith("lowest-"))
+    assert " passed" in run.carry_out(tmp_path / "venv")["tests"]

@@ -4,16 +4,20 @@ import configparser
 import gettext
 import io
 import os
+import posixpath
+import re
 import subprocess
 import sys
 import tomllib
 import zipfile
+from email.parser import HeaderParser
 from pathlib import Path
 
 import pytest
 from robolink_cli import main
 
 import robolink
+from tools.package_page import package_page, urls
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = {
@@ -43,6 +47,12 @@ def wheel(tmp_path_factory):
 @pytest.fixture(scope="module")
 def names(wheel):
     return set(wheel.namelist())
+
+
+@pytest.fixture(scope="module")
+def description(wheel, names):
+    (path,) = (name for name in names if name.endswith(".dist-info/METADATA"))
+    return wheel.read(path).decode().partition("\n\n")[2]
 
 
 def test_the_wheel_brings_three_packages_and_nothing_else(names):
@@ -87,7 +97,7 @@ def test_the_wheel_brings_the_programs_for_controllers_and_their_licence(wheel, 
 def test_the_wheel_brings_the_pages_and_the_recipes_to_begin_with(wheel, names):
     shipped = {
         f"robolink_cli/docs/{path.relative_to(ROOT / 'docs').as_posix()}": path
-        for pattern in ("*.md", "reference/*.md", "pictures/*.svg")
+        for pattern in ("*.md", "reference/*.md", "decisions/*.md", "pictures/*.svg")
         for path in (ROOT / "docs").glob(pattern)
     }
     shipped |= {
@@ -99,6 +109,55 @@ def test_the_wheel_brings_the_pages_and_the_recipes_to_begin_with(wheel, names):
         name for name, path in shipped.items() if wheel.read(name) != path.read_bytes()
     } == set()
     assert not [name for name in names if name.startswith("robolink_cli/docs/site")]
+
+
+def test_a_link_of_a_shipped_page_leads_to_a_file_of_the_wheel(wheel, names):
+    pages = [name for name in names if name.startswith("robolink_cli/") and name.endswith(".md")]
+    lost = [
+        f"{page}: {target}"
+        for page in pages
+        for target in re.findall(r"\]\((?!https?://|#)([^)#\s]+)", wheel.read(page).decode())
+        if posixpath.normpath(posixpath.join(posixpath.dirname(page), target)) not in names
+    ]
+    assert len(pages) > 100
+    assert lost == []
+
+
+def test_the_page_of_the_package_has_no_link_that_leads_nowhere(description):
+    assert re.findall(r"\]\((?!https?://|#)[^)]*\)", description) == []
+    commands = re.findall(r"`robolink docs ([\w/-]+)`", description)
+    assert len(commands) > 30
+    assert [name for name in commands if not (ROOT / "docs" / f"{name}.md").is_file()] == []
+
+
+def test_a_published_package_links_to_where_its_files_are_and_names_its_home():
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    base = "https://example.org/robolink/blob/v1"
+    page = package_page(readme, f"{base}/")
+    links = re.findall(r"\]\(([^)]*)\)", page)
+    assert len(links) > 50
+    assert {link[: len(base) + 1] for link in links if "example" in link} == {f"{base}/"}
+    assert all(link.startswith("https://") for link in links)
+    assert all(
+        (ROOT / link.removeprefix(f"{base}/").partition("#")[0]).exists()
+        for link in links
+        if link.startswith(base)
+    )
+    assert urls("", "") == {}
+    assert urls("https://example.org", base)["Changelog"] == f"{base}/CHANGELOG.md"
+    with pytest.raises(ValueError, match="https://"):
+        package_page(readme, "example.org")
+
+
+def test_the_metadata_say_what_an_index_sorts_by(wheel, names):
+    (path,) = (name for name in names if name.endswith(".dist-info/METADATA"))
+    found = HeaderParser().parsestr(wheel.read(path).decode())
+    assert found["License-Expression"] == "Apache-2.0 AND 0BSD"
+    assert set(found.get_all("License-File", [])) == {"LICENSE", "NOTICE", "companions/LICENSE"}
+    classifiers = found.get_all("Classifier", [])
+    assert len(classifiers) > 10
+    assert not [line for line in classifiers if line.startswith("License ::")]
+    assert found["Description-Content-Type"] == "text/markdown"
 
 
 def test_the_wheel_installs_the_command_and_the_simulator(wheel, names):

@@ -1,0 +1,36 @@
+"""Why no lower version of a dependency is declared: the release beneath fails, or a reason."""
+
+from collections.abc import Mapping
+from typing import Final
+
+FAILING: Final[Mapping[str, tuple[str, str]]] = {
+    "annotated-types": ("0.5.0", "tests/unit/test_recipe_files.py"),
+    "click": ("8.4.2", "tests/cli/test_completion.py"),
+    "pydantic": ("2.8.2", "tests/unit/test_recipe_files.py"),
+    "sqlalchemy": ("2.0.41", "tests/contract/journal/test_journal_files.py"),
+}
+"""The release beneath the lowest, and tests that do not pass with it."""
+
+_OLDER: Final = "the releases beneath are older than Python 3.11"
+
+REASONS: Final[Mapping[str, str]] = {
+    "canopen": _OLDER,
+    "jinja2": "the releases beneath have a published way out of the sandbox (CVE-2025-27516)",
+    "keyring": _OLDER,
+    "lark": _OLDER,
+    "markupsafe": _OLDER,
+    "msgpack": _OLDER,
+    "numpy": _OLDER,
+    "platformdirs": _OLDER,
+    "prompt_toolkit": _OLDER,
+    "psycopg": _OLDER,
+    "pymodbus": "each minor release changes what we call: one at a time is taken in",
+    "pyserial": "it is the last release; the one before is of 2017",
+    "python-can": "4.2 imports pkg_resources, which an environment of today need not have",
+    "rich": _OLDER,
+}
+"""Why a lower one was not asked for where the tests might pass with it.
+
+A release that is older than Python 3.11 (24 October 2022) was never tried by its authors on any
+Python that robolink runs on.
+"""

@@ -1,0 +1,57 @@
+"""What pyproject.toml declares, and what was tried."""
+
+import json
+import tomllib
+from pathlib import Path
+from typing import Any, Final
+
+from packaging.requirements import Requirement
+from packaging.version import Version
+
+ROOT: Final = Path(__file__).parents[2]
+TRIED: Final = Path(__file__).with_name("tried.json")
+
+NEVER: Final = ("dev", "docs")
+"""Extras for people who work on robolink; nothing of them is needed to use it."""
+
+PYTHONS: Final = ("3.11", "3.12", "3.13")
+"""The versions of Python that ``make versions`` looks for, the lowest first."""
+
+_CLASSIFIER: Final = "Programming Language :: Python :: 3."
+
+
+def project() -> dict[str, Any]:
+    """Return the table ``[project]``."""
+    document = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    found: dict[str, Any] = document["project"]
+    return found
+
+
+def run_time_dependencies() -> list[Requirement]:
+    """Return what a user installs, extras included."""
+    declared = project()
+    lines = [*declared["dependencies"]]
+    for extra, wanted in declared["optional-dependencies"].items():
+        lines += wanted if extra not in NEVER else []
+    return [Requirement(line) for line in lines]
+
+
+def lowest(requirement: Requirement) -> Version:
+    """Return the lowest version that a requirement allows."""
+    (version,) = (part.version for part in requirement.specifier if part.operator == ">=")
+    return Version(version)
+
+
+def pythons() -> list[str]:
+    """Return the versions of Python that the classifiers name, such as ``3.11``."""
+    return [
+        f"3.{line.removeprefix(_CLASSIFIER)}"
+        for line in project()["classifiers"]
+        if line.startswith(_CLASSIFIER)  # "3 :: Only" has no dot
+    ]
+
+
+def tried() -> dict[str, Any]:
+    """Return what ``make versions`` wrote when a run of it passed."""
+    found: dict[str, Any] = json.loads(TRIED.read_text(encoding="utf-8"))
+    return found

@@ -84,7 +84,7 @@ def _lines(
     met = sum(one.met is True for figures in cases.values() for one in figures)
     yield f"\nGoals met: {met} of {met + len(missed)}."
     for one in missed:
-        yield f"Missed: {one.name} ({one.ratio:.2f}, goal {one.goal:.2f})."
+        yield f"* missed: {one.name} ({one.ratio:.2f}, goal {one.goal:.2f})."
     for name, figures in cases.items():
         yield f"\n## {TITLES[name]}\n"
         if name in NOTES:

@@ -10,6 +10,7 @@ from robolink.calibration import rotation_of
 from robolink.errors import CalibrationError
 from robolink.methods import SphereSurvey, measure_sphere_touch
 from robolink.methods.sphere_touch.proof import verify_on_sphere
+from robolink.methods.sphere_touch.survey import LEAST_COUNT
 from robolink.model import Pose, ToolOffset
 from tests.calibration._surface_person import PLAN, STORED, TIP, Ball, SurfacePerson, slips
 
@@ -61,6 +62,16 @@ def test_the_interval_of_a_sphere_holds_the_truth_about_as_often_as_it_says():
             held += int((errors <= result.half_width95).sum())
             total += 3
     assert 0.92 < held / total < 0.98
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(600)
+def test_with_the_least_number_of_touches_no_good_run_is_refused():
+    """With one touch fewer 27 of these 60 were."""
+    ball = Ball(10.0)
+    for seed in range(60):
+        person = SurfacePerson(ball, start=over_top(ball), seed=seed, sigma_mm=0.05)
+        measured(person, count=LEAST_COUNT)
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import time
 from itertools import count
 from pathlib import Path
 from typing import cast
@@ -168,6 +169,38 @@ def test_a_driver_in_the_present_folder_is_held_to_it(monkeypatch, tmp_path, cap
     sys.modules.pop("drv_of_mine", None)
 
 
+def checking(cell):
+    """Begin the checks that write in a process of its own, and wait until they have written."""
+    arguments = ["-c", cell.url, "expert", "check-contract", "--write", "--tool", "2", "--yes"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "robolink_cli", *arguments],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+    )
+    deadline = time.monotonic() + 60
+    while not written(cell):
+        assert process.poll() is None, "it has ended already"
+        assert time.monotonic() < deadline, "nothing was written"
+        time.sleep(0.002)
+    return process
+
+
+@pytest.mark.soak
+@pytest.mark.skipif(os.name == "nt", reason="needs signals")
+@pytest.mark.parametrize("medium", ["epson", "softmotion"])
+def test_a_stop_from_another_terminal_ends_the_checks(medium, request, robolink_state):
+    make = request.getfixturevalue(f"{medium}_factory")
+    cell = make(medium="tcp" if medium == "epson" else "modbus-tcp")
+    with robolink.connect(cell.url) as controller:
+        controller.tools.write(2, ToolOffset(1, 2, 3), expected=robolink.ANY)
+    process = checking(cell)
+    assert main.run(["-c", cell.url, "stop"]) == 0
+    assert process.wait(timeout=60) == 10
+    truth = cell.truth()
+    assert (truth["stored"]["2"]["x_mm"], truth["selected_tool"]) == (pytest.approx(1.0), 1)
+    with robolink.connect(cell.url) as controller:
+        assert not controller.outcomes.open_markers()
+
+
 @pytest.mark.soak
 @pytest.mark.skipif(os.name == "nt", reason="needs signals")
 def test_killed_in_the_middle_recover_gives_the_tool_back(epson_factory, robolink_state):
@@ -192,4 +225,4 @@ def test_killed_in_the_middle_recover_gives_the_tool_back(epson_factory, robolin
 
 def written(cell):
     """Tell whether the first value of the checks stands there."""
-    return cell.simulator.truth()["stored"]["2"]["x_mm"] == 1.5
+    return cell.simulator.truth()["stored"]["2"]["x_mm"] == pytest.approx(1.5)

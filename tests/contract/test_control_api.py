@@ -75,6 +75,15 @@ def raw(cells, method, path, body=b"", headers=()):
         connection.close()
 
 
+def test_an_act_that_several_kinds_have_takes_the_same_at_each():
+    kinds: dict[str, set[object]] = {}
+    for acts in ACTS.values():
+        for name, act in acts.items():
+            kinds.setdefault(name, set()).add((act.takes, act.reads))
+    assert {name for name, forms in kinds.items() if len(forms) > 1} == set()
+    assert set(ACTS["plc"]) <= set(ACTS["softmotion"])
+
+
 @pytest.mark.parametrize("name", ["a", "b"])
 def test_both_kinds_are_looked_at_and_pushed_alike(at, name):
     control, simulator = at(name)

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from robolink_simulators.faults import sqlite_vfs
 from robolink_simulators.faults.disk import DiskFault, FaultyDisk, bend_page, cut_short
 
 from robolink.errors import JournalError
@@ -37,6 +38,29 @@ def operations(place):
 
 def expected(count):
     return [f"op {number}" for number in range(count)]
+
+
+def test_disks_one_after_the_other_leave_nothing_behind_in_the_process(tmp_path):
+    kept = []
+    for number in range(4):
+        with FaultyDisk(tmp_path) as disk:
+            added(open_journal(str(tmp_path / f"{number}.db")), 0, 1)
+            close_files()
+            assert disk.writes > 0
+        kept.append(len(sqlite_vfs._ALIVE))
+    assert kept == [kept[0]] * 4
+
+
+def test_a_journal_that_outlives_its_disk_is_not_the_next_ones(tmp_path):
+    with FaultyDisk(tmp_path) as one:
+        journal = open_journal(str(tmp_path / "journal.db"))
+        added(journal, 0, 1)
+    before = one.writes
+    with FaultyDisk(tmp_path) as other:
+        added(journal, 1, 1)
+        assert (one.writes > before, other.writes) == (True, 0)
+        close_files()
+    assert operations(tmp_path / "journal.db") == expected(2)
 
 
 @pytest.mark.parametrize("fault", list(DiskFault)[:3], ids=lambda fault: fault.name)

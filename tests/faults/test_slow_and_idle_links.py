@@ -187,7 +187,7 @@ def test_f75_a_link_that_is_reset_while_idle_leaves_nothing_in_doubt(far_end):
             firewall.reset()
             with pytest.raises(TransportBrokenError) as broken:
                 controller.tools.read(1)
-            assert "onnect again" in broken.value.remedy
+            assert "ry again" in broken.value.remedy
             assert controller.outcomes.open_markers() == ()
             # A PLC is looked at once more, to tell its start from a broken link; no more than that.
             assert firewall.opened <= 2

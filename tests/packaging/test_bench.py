@@ -57,7 +57,7 @@ def test_the_page_says_what_was_missed_and_whether_the_machine_was_busy(
     page.publish({**ABOUT, "quiet": quiet}, {"stopping": [SLOW, QUICK]}, [GROWTH])
     written = (tmp_path / "performance.md").read_text()
     assert "Goals met: 1 of 2." in written
-    assert "Missed: a stop (3.00, goal 2.50)." in written
+    assert "* missed: a stop (3.00, goal 2.50)." in written
     assert ("busy with other work" in written) is not quiet
     assert "| a look | a floor | 1.00 us | 1.23 us | 1.23 | <= 1.30 | met |" in written
     assert (tmp_path / "growth-test.svg").exists()

@@ -60,3 +60,13 @@ def test_a_request_that_silence_ends_is_waited_for(login, silence):
     client.link.receive(b"$GetStatus", 1_000_000_000)
     expected = 1_100_000_000 if silence else 60_000_000_000
     assert simulator.next_change() == expected
+
+
+def test_nothing_is_waited_for_once_the_client_has_gone(login):
+    simulator = EpsonSimulator()
+    client = login(simulator)
+    simulator.advance(1_000_000_000)
+    assert simulator.next_change() == 60_000_000_000
+    client.link.receive(b"", 1_000_000_000)
+    simulator.advance(1_000_000_000)
+    assert simulator.next_change() is None

@@ -106,6 +106,13 @@ class Condition:
         self.code = 0
         self.failure = None
 
+    def reset_error(self) -> None:
+        """Clear an error that can be cleared; an emergency stop stays (Reset Error)."""
+        if not self._serious:
+            self._error = self._warning = False
+            self.code = 0
+            self.failure = None
+
     def restart(self) -> None:
         """Switch off and on: only what stands outside the controller stays as it is."""
         self._estop_latched = self.estop_pressed

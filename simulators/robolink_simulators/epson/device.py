@@ -272,11 +272,11 @@ class EpsonSimulator(RequestTaking):
 
     @property
     def machine_name(self) -> str:
-        """See :attr:`HostedDevice.machine_name`."""
+        """See :attr:`~robolink_simulators.device.hosted.HostedDevice.machine_name`."""
         return " ".join((self.kind, *(model.name for model in self._models)))
 
     def counters(self) -> dict[str, int]:
-        """See :meth:`HostedDevice.counters`."""
+        """See :meth:`~robolink_simulators.device.hosted.HostedDevice.counters`."""
         return {
             "exchanges": self.exchanges,
             "moves_started": sum(robot.arm.moves_started for robot in self.machine.robots),
@@ -286,7 +286,7 @@ class EpsonSimulator(RequestTaking):
         }
 
     def motions(self, after: int = 0) -> Iterator[StartedMotion]:
-        """See :meth:`HostedDevice.motions`; those of the robot in force."""
+        """See ``HostedDevice.motions``; those of the robot in force."""
         return self.machine.arm.motions.motions(after)
 
     def restart(self) -> None:
@@ -313,7 +313,7 @@ class EpsonSimulator(RequestTaking):
 
     @property
     def executes_program(self) -> bool:
-        """See :attr:`HostedDevice.executes_program`."""
+        """See :attr:`~robolink_simulators.device.hosted.HostedDevice.executes_program`."""
         return self.program is not None
 
     def _renew(self) -> None:

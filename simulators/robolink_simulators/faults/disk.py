@@ -36,6 +36,7 @@ from robolink_simulators.faults.sqlite_vfs import (
     READ_WRITE,
     SqliteFiles,
     WatchedFile,
+    files_for,
 )
 
 _SECTOR: Final = 512
@@ -80,20 +81,21 @@ class FaultyDisk:
             is copied then is what a kill or a power cut at that moment leaves. It must not raise.
 
     Raises:
-        ConfigError: This Python hides SQLite's functions.
+        ConfigError: On entering: this Python hides SQLite's functions.
     """
 
     def __init__(self, folder: Path) -> None:
         self._folder = str(folder.resolve())
         self._faults: dict[DiskFault, int] = {}
         self._unsynced: dict[str, list[_Change]] = {}
-        self._files = SqliteFiles(self)
+        self._files: SqliteFiles
         self.writes = 0
         self.syncs = 0
         self.failed = 0
         self.on_step: Callable[[str, str], None] | None = None
 
     def __enter__(self) -> Self:
+        self._files = files_for(self)
         self._files.begin()
         return self
 

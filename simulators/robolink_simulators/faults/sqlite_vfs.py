@@ -10,6 +10,8 @@ pyenv and conda do.
 import ctypes
 from collections.abc import Callable
 from ctypes import CFUNCTYPE, POINTER, Structure, byref, c_char_p, c_int, c_int64, c_void_p, cast
+from functools import cache
+from threading import Lock
 from typing import Any, Final, Protocol
 
 from robolink.errors import ConfigError
@@ -129,8 +131,14 @@ class SqliteFiles:
         self._files: dict[int, WatchedFile] = {}
         self._tables: dict[int, tuple[_FileTable, _FileTable]] = {}
         self._kept: list[Any] = []
-        # What was opened may outlive whoever wanted it, and calls back until it is closed.
-        _ALIVE.append(self)
+        self._taken = True
+
+    def serves(self, watcher: SqliteWatcher) -> bool:
+        """Serve another watcher from here on, unless the one of before still needs it."""
+        if self._taken or self._files:
+            return False
+        self._watcher, self._taken = watcher, True
+        return True
 
     def begin(self) -> None:
         """Have all that is opened from now on pass here."""
@@ -140,6 +148,7 @@ class SqliteFiles:
         """Leave the files that are opened from now on alone."""
         self._library.sqlite3_vfs_register(self._usual, 1)
         self._library.sqlite3_vfs_unregister(byref(self._vfs))
+        self._taken = False
 
     def _opened(self, vfs: int, name: int, handle: int, flags: int, told: Any) -> int:  # noqa: ANN401 - a pointer
         path = ctypes.string_at(name).decode() if name else ""
@@ -183,8 +192,27 @@ class SqliteFiles:
 
 _VFS_BYTES: Final = ctypes.sizeof(_VfsTable)
 _ALIVE: Final[list[SqliteFiles]] = []
+_MAKING: Final = Lock()
 
 
+def files_for(watcher: SqliteWatcher) -> SqliteFiles:
+    """Return the files of a watcher: those of one before that needs them no longer, or new ones.
+
+    A database may outlive whoever wanted it, and opens its files by the same functions until it is
+    closed; so no function is ever freed, and each is used again.
+
+    Raises:
+        ConfigError: This Python hides SQLite's functions.
+    """
+    with _MAKING:
+        for files in _ALIVE:
+            if files.serves(watcher):
+                return files
+        _ALIVE.append(SqliteFiles(watcher))
+        return _ALIVE[-1]
+
+
+@cache
 def _library() -> Any:  # noqa: ANN401 - a library has no type
     import _sqlite3
 

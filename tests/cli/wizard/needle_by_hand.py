@@ -109,18 +109,21 @@ def by_screen(words, simulator, pictures):
     hand = ScreenHand(words, simulator)
     shots: dict[str, str] = {}
     began = time.monotonic()
-    hand.start()
     touched = 0
     while True:
         found = hand.see(
             r"Jog the tip onto the pin|To write, type|\[1\] Yes +\[3\] No|\[Enter\] Done|DONE"
+            r"|Start moving \(2 open\)"
         )[0]
         if pictures:
             hand.rest(0.6)
         shots[f"{len(shots)}-{found[:8]}"] = hand.text
         if found == "DONE":
             break
-        if found.startswith("Jog"):
+        if found.startswith("Start"):
+            hand.start()
+            hand.see("moving|Please wait|Jog the tip")
+        elif found.startswith("Jog"):
             hand.touch()
             touched += 1
             hand.see("moving|Please wait|To write|DONE|New values")

@@ -7,7 +7,7 @@ from robolink_cli.prompts.present import sitting_at
 from robolink_cli.session.desk_watch import watched_at_desk
 from robolink_cli.wizard.desk import Desk
 from robolink_cli.wizard.flow import advance
-from robolink_cli.wizard.happenings import Reading, WasRead, WasRegarded
+from robolink_cli.wizard.happenings import CellIs, Reading, WasRead, WasRegarded
 from robolink_cli.wizard.screens.drawing import screen_of
 from robolink_cli.wizard.state import WizardState
 from robolink_simulators.cell.clock import ScaledClock
@@ -34,7 +34,8 @@ def followed(url):
         here = group.pose()
         box = WorkBox.around(here, xy_mm=60.0, below_mm=60.0, above_mm=60.0)
         target = replace(here, z_mm=here.z_mm - 25.0)
-        desk.happened()
+        known = [one.subject for one in desk.happened() if isinstance(one, WasRegarded)]
+        assert CellIs(simulated=True) in known, "its serial number, or its mailbox, says so"
         desk.regard(MoveSubject(target, Path.STRAIGHT, 20.0, "Lowering."))
         profile = MotionProfile(Path.STRAIGHT, 5, 20.0)
         group.move_to(target, profile, box=box).wait(timeout_s=30.0)

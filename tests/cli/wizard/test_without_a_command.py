@@ -72,6 +72,7 @@ answer = "nozzle"
 """
 
 
+@pytest.mark.soak
 def test_the_id_is_asked_before_anything_moves_and_the_row_says_that_it_is_simulated(tmp_path):
     simulator, recipe = EpsonSimulator(seed=7), tmp_path / "needle.toml"
     recipe.write_text(TWO_TOUCHES)

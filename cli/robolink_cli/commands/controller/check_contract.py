@@ -222,7 +222,11 @@ def _agree(controller: "Controller", asked: _Asked) -> None:
         NotReadyError: Nothing can move now.
     """
     from robolink_cli.prompts import questions
-    from robolink_cli.session.motion_consent import agree_to_motion, motion_question
+    from robolink_cli.session.motion_consent import (
+        agree_to_motion,
+        heed_what_was_left,
+        motion_question,
+    )
 
     said = []
     if asked.step_mm is not None:
@@ -238,7 +242,9 @@ def _agree(controller: "Controller", asked: _Asked) -> None:
     )
     if asked.step_mm is not None:
         agree_to_motion(" ".join(said), yes=asked.yes)
-    elif not asked.yes:
+        return
+    heed_what_was_left(yes=asked.yes, in_tool=False)
+    if not asked.yes:
         if not questions.on_terminal():
             raise DeclinedError(
                 tr("A tool would be written for the checks, but there is nobody to ask."),

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import robolink
 from robolink.errors import ConfigError, StoppedError
 from robolink.messages import tr
+from robolink.stopping import far_end_of, find_note
 from robolink_cli.session.context import CliContext
 from robolink_cli.session.opening import password_of
 
@@ -46,6 +47,9 @@ class TrialConnections:
             RobolinkError: The controller is not reached.
         """
         self._listening.close()
+        if (note := find_note(far_end_of(self._url), "")) is not None:
+            # It came while no check had the controller, and went there by itself.
+            raise StoppedError(note.sentence, remedy=tr("Find out why, then begin them again."))
         if self._stopped_by is not None:
             raise StoppedError(
                 tr("{who} stopped the checks.", who=self._stopped_by),

@@ -266,6 +266,8 @@ class FunctionCompiler:
                     tr("{word} is for the command window only", word=statement.name)
                 )
             statement = without_forced(statement)
+            if statement.name == "reset" and statement.arguments == (Name("error"),):
+                emitter.emit(lambda t: t.runner.end_others(t))
         prepared = emitter.hoisted(statement)
         self._check(prepared)
         emitter.emit(carry_out(prepared))

@@ -44,7 +44,7 @@ from robolink_simulators.epson.spel.statements.waiting import (
     shown_condition,
 )
 from robolink_simulators.epson.spel.system_listing import SYSTEM_COMMANDS
-from robolink_simulators.epson.spel.tree import Expression, KeywordStatement
+from robolink_simulators.epson.spel.tree import Expression, KeywordStatement, Name
 
 LATCH_SETTING_NS: Final = 40_000_000
 """How long SetLatch takes (documented, p. 721)."""
@@ -311,12 +311,16 @@ def _line_of_where(evaluator: Evaluator, line: int) -> str:
 
 
 def _reset(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
-    """Reset parameters and outputs; errors are the device's to clear.
+    """Reset parameters and outputs; errors are the device's to clear, but with Reset Error.
 
     Source: docs/reference/spel.md 6.3.
     """
-    _expect(command, 0)
     session = evaluator.session
+    if command.arguments == (Name("error"),):
+        session.condition.reset_error()
+        session.machine.reset_motion_parameters()
+        return StatementOutcome()
+    _expect(command, 0)
     session.machine.reset_motion_parameters()
     if session.options.reset_outputs_off:
         session.machine.clear_outputs()

@@ -74,6 +74,8 @@ class ProgramRunner:
         self.traps = Traps(self)
         self.vision: VisionSystem | None = None
         self._condition = condition
+        self._main: CompiledFunction | None = None
+        self._stopped_by: str | None = None
         self._seen_ns = 0
 
     @property
@@ -97,7 +99,15 @@ class ProgramRunner:
         if self.session.options.globals_at_start == "cleared":
             self.project.clear_globals()
         self.advance(now_ns)
-        self.failure = None
+        return self.begin_main(function, now_ns)
+
+    def begin_main(self, function: CompiledFunction, now_ns: int) -> SpelTask:
+        """Begin the tasks of a program by its first; Restart takes it again.
+
+        Raises:
+            Refusal: No task is free.
+        """
+        self._main, self.failure = function, None
         self._condition.task = Task.RUNNING
         return self.begin(function, [], TaskKind.NORMAL, None, now_ns)
 
@@ -167,9 +177,12 @@ class ProgramRunner:
         task.ended = True
         self.failure = failure
         self.session.machine.halt(task.now_ns)
+        stood = self._condition.task is Task.NONE
         self._condition.raise_error(failure.number)
         self._condition.failure = (failure.number % 10_000, str(failure))
-        self.traps.happen("error", task.now_ns)
+        self._stopped_by = "abort"
+        if not stood:  # a task of Trap Abort that fails starts none (documented)
+            self.traps.happen("error", task.now_ns)
         self._stop(background=True)
 
     def end(self, task: SpelTask) -> None:
@@ -192,17 +205,45 @@ class ProgramRunner:
                 self.end(task)
         self.session.machine.reset_motion_parameters()
 
+    def end_others(self, task: SpelTask) -> None:
+        """End all but background tasks and the one that asks for it (Reset Error)."""
+        for other in self.tasks.values():
+            if other is not task and other.kind is not TaskKind.BACKGROUND:
+                self.end(other)
+
+    def start_again(self, now_ns: int) -> None:
+        """End all but background tasks, without Trap Abort, and begin what ran last (Restart).
+
+        Raises:
+            Refusal: The emergency stop or an error stands, or nothing has run yet.
+        """
+        if self._condition.flags().emergency_stop or self._condition.error:
+            raise SpelRefusal(RefusalKind.EMERGENCY_STOP, "Reset it first")
+        if self._main is None:
+            raise SpelRefusal(RefusalKind.NO_SUCH_FUNCTION, "No program has run")
+        self.quit_all()
+        self.traps.clear()
+        self._condition.task, self.table.paused = Task.NONE, False
+        self._tidy()
+        if self.session.options.globals_at_start == "cleared":
+            self.project.clear_globals()
+        self.begin_main(self._main, now_ns)
+
     def _heed(self) -> None:
         """Do what the controller's state asks for since it was looked at last."""
         state, now_ns = self._condition.task, self._seen_ns
+        if state is not Task.NONE or not self.tasks:
+            self._stopped_by = None
         if not self.tasks:
             self.table.paused = False
             return
         if state is Task.NONE and not self.table.only_background:
             event = "emergency" if self._condition.flags().emergency_stop else "abort"
-            self._stop(background=event == "emergency" or self._condition.error)
-            self.traps.happen(event, now_ns)
-            self._tidy()
+            before, self._stopped_by = self._stopped_by, event
+            if event != before and (before is None or event == "emergency"):
+                self._stop(background=event == "emergency" or self._condition.error)
+                self.traps.happen(event, now_ns)
+                self._tidy()
         elif state is Task.PAUSED and not self.table.paused:
             self.table.pause(now_ns)
             self.traps.happen("sgopen" if self._condition.guard_open else "pause", now_ns)
@@ -236,5 +277,6 @@ class ProgramRunner:
         self.tasks.clear()
         self.sharing = TaskSharing()
         self.traps.clear()
+        self._main = None
         self.channels.close_all()
         self.table.paused = False

@@ -3,6 +3,7 @@
 Source: docs/reference/spel.md 4.4, 4.5.
 """
 
+import re
 from collections.abc import Callable
 from typing import Final
 
@@ -25,6 +26,7 @@ _KINDS: Final = {
     "nopause": TaskKind.NO_PAUSE,
     "noemgabort": TaskKind.NO_ABORT,
 }
+_MAIN: Final = re.compile("main([1-9]|[1-5][0-9]|6[0-3])?")
 _MAY_NOT_START: Final = frozenset({TaskKind.NO_ABORT, TaskKind.TRAP})
 
 
@@ -269,9 +271,29 @@ def _continue(emitter: Emitter, node: TaskStatement) -> Operation:  # noqa: ARG0
     return lambda t: t.runner.turn_to(Task.RUNNING)
 
 
-def _unsimulated(emitter: Emitter, node: TaskStatement) -> Operation:  # noqa: ARG001
-    def go(_: SpelTask) -> None:
-        raise SpelRefusal(RefusalKind.NOT_SIMULATED, f"{node.word} is not simulated")
+def _restart(emitter: Emitter, node: TaskStatement) -> Operation:
+    if node.items:
+        raise emitter.fault(tr("{word} takes no arguments", word=node.word))
+
+    def go(t: SpelTask) -> object:
+        t.runner.start_again(t.now_ns)
+        return t.turn()
+
+    return go
+
+
+def _start_main(emitter: Emitter, node: TaskStatement) -> Operation:
+    """StartMain main to main63: from a background task, while no program runs."""
+    item = _one(emitter, node)
+    name = item.name if isinstance(item, Name) and _MAIN.fullmatch(item.name) else ""
+    function = emitter.functions.get(name)
+    if function is None or function.parameters:
+        raise emitter.fault(tr("{word} needs main to main63", word=node.word))
+
+    def go(t: SpelTask) -> None:
+        if t.kind is not TaskKind.BACKGROUND or not t.runner.table.only_background:
+            raise SpelRefusal(RefusalKind.NOT_IN_THIS_TASK, "Background only, one program at once")
+        t.runner.begin_main(function, t.now_ns)
 
     return go
 
@@ -290,7 +312,7 @@ TASK_STATEMENTS: Final[dict[str, Callable[[Emitter, TaskStatement], Operation]]]
     "error": _raise,
     "pause": _pause,
     "cont": _continue,
-    "restart": _unsimulated,
-    "startmain": _unsimulated,
+    "restart": _restart,
+    "startmain": _start_main,
 }
 """Keyword to what compiles it."""

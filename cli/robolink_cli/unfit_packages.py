@@ -14,6 +14,7 @@ from robolink_cli.commands.computer.doctor_finding import Level, Remark
 from robolink_cli.commands.computer.requirements import check_versions
 from robolink_cli.console.language import speaking_for
 from robolink_cli.console.tolerance import tolerate_any_console
+from robolink_cli.console.visible import visible
 
 _FOUND = 1
 _NOT_RUNNABLE = 2
@@ -67,7 +68,7 @@ def answer_without_click(arguments: Sequence[str], error: Exception) -> int:
             document = {"schema": "robolink/error/1", "error": body, "exit_code": _NOT_RUNNABLE}
             sys.stdout.write(json.dumps(document, indent=2) + "\n")
         else:
-            sys.stderr.write("\n  ".join([f"robolink: {lines[0]}", *lines[1:]]) + "\n")
+            sys.stderr.write(visible("\n  ".join([f"robolink: {lines[0]}", *lines[1:]])) + "\n")
     return _NOT_RUNNABLE
 
 
@@ -82,5 +83,5 @@ def _examined(*, as_json: bool) -> int:
         checks = [asdict(remark) for remark in remarks]
         sys.stdout.write(json.dumps(document | {"checks": checks}, indent=2) + "\n")
     else:
-        sys.stdout.write("\n".join(in_words(remarks)) + "\n")
+        sys.stdout.write(visible("\n".join(in_words(remarks))) + "\n")
     return _FOUND

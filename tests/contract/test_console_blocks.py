@@ -45,6 +45,7 @@ NOT_RUN = {
     "fault-plans.md 1": "serves until Ctrl-C; tests/cli/test_sim_faults_option.py does",
     "journal.md 1": "a server of PostgreSQL; tests/contract/journal starts one",
     "poses.md 5, 1": "steps are typed one by one; tests/contract/test_typed_answers.py types",
+    "testing.md 2, 3": "a driver of one's own; tests/cli/test_check_contract.py names one",
     "simulated-fleet.md 1, 2": "serves until Ctrl-C; tests/cli/test_sim_run.py does",
     "poses.md 6": "held keys on a terminal; tests/contract/test_jog_keys.py holds them",
 }

@@ -10,8 +10,9 @@ if TYPE_CHECKING:
     from robolink.nozzle_change._change import Earlier as Earlier
     from robolink.nozzle_change._change import NozzleChange as NozzleChange
     from robolink.nozzle_change._length import known_height as known_height
-    from robolink.nozzle_change._listener import Listener as Listener
-    from robolink.nozzle_change._listener import Moment as Moment
+    from robolink.nozzle_change._open_turn_test import OpenTurnTest as OpenTurnTest
+    from robolink.nozzle_change._open_turn_test import finish_by_turn_test as finish_by_turn_test
+    from robolink.nozzle_change._open_turn_test import open_turn_tests as open_turn_tests
     from robolink.nozzle_change._plan import ChangePlan as ChangePlan
     from robolink.nozzle_change._plan import Limits as Limits
     from robolink.nozzle_change._plan import ToolPlan as ToolPlan
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
     from robolink.nozzle_change._preview import require_inside as require_inside
     from robolink.nozzle_change._proposal import ChangeReport as ChangeReport
     from robolink.nozzle_change._proposal import LimitVerdict as LimitVerdict
+    from robolink.nozzle_change._proposal import Listener as Listener
+    from robolink.nozzle_change._proposal import Moment as Moment
     from robolink.nozzle_change._proposal import Proposal as Proposal
     from robolink.nozzle_change._proposal import ToolReport as ToolReport
     from robolink.nozzle_change._proposal import WriteSubject as WriteSubject
@@ -40,11 +43,11 @@ __getattr__ = lazy_exports(
         "_acceptance": "AcceptanceCriteria",
         "_change": "DescribeReport Earlier NozzleChange",
         "_length": "known_height",
-        "_listener": "Listener Moment",
+        "_open_turn_test": "OpenTurnTest finish_by_turn_test open_turn_tests",
         "_plan": "ChangePlan Limits ToolPlan clearance_too_small require_contact_input "
         "require_ready usual_box",
         "_preview": "PlannedStep flange_now foresee preview require_inside",
-        "_proposal": "ChangeReport Proposal ToolReport LimitVerdict WriteSubject",
+        "_proposal": "ChangeReport LimitVerdict Listener Moment Proposal ToolReport WriteSubject",
         "_records": "touches_made",
         "_seating": "height_is_known tip_sigma_mm touching_as_recorded",
     },

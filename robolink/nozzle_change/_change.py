@@ -16,7 +16,6 @@ from robolink.messages import tr
 from robolink.model import Controller, ToolReceipt, new_operation, require_engineer
 from robolink.nozzle_change._acceptance import AcceptanceCriteria, require_proved
 from robolink.nozzle_change._length import settle_lengths
-from robolink.nozzle_change._listener import Listener, Moment
 from robolink.nozzle_change._measuring import (
     MOST_FURTHER,
     FurtherOffer,
@@ -24,6 +23,7 @@ from robolink.nozzle_change._measuring import (
     Measuring,
     offer_of,
 )
+from robolink.nozzle_change._open_turn_test import marked_turn_tests
 from robolink.nozzle_change._plan import (
     ChangePlan,
     ToolPlan,
@@ -34,6 +34,8 @@ from robolink.nozzle_change._plan import (
 )
 from robolink.nozzle_change._proposal import (
     ChangeReport,
+    Listener,
+    Moment,
     Proposal,
     ToolReport,
     WriteSubject,
@@ -279,6 +281,7 @@ class NozzleChange:
             self._controller,
             wanted,
             verify=verify,
+            marked=marked_turn_tests(context, self._plan.limits, proposals),
             tell=self._tell,
             order=self._order,
             describe=describe,

@@ -10,9 +10,8 @@ from robolink.calibration import CalibrationResult
 from robolink.errors import CalibrationError, ConfigError, RobolinkError
 from robolink.messages import tr
 from robolink.model import EntryKind, NewEntry, Pose, ToolOffset
-from robolink.nozzle_change._listener import Listener, Moment
 from robolink.nozzle_change._plan import ToolPlan
-from robolink.nozzle_change._proposal import Proposal
+from robolink.nozzle_change._proposal import Listener, Moment, Proposal
 from robolink.nozzle_change._records import calibration_entry, decision_entry, refusal_entry
 from robolink.procedures import MeasurementContext, TouchesFurther, approach_path, touches_of
 from robolink.runner import AGAIN, BACK, MORE, Ask, Confirm, Look, Seek, StepDone

@@ -1,12 +1,16 @@
-"""What was measured, next to what is stored, what limits say of it, and what became of it."""
+"""What was measured, next to what is stored and what limits say; what became of it, and who hears."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from enum import StrEnum
 from typing import Literal
 
 from robolink.calibration import CalibrationResult, LengthChange, VerifyResult
+from robolink.errors import CalibrationError
 from robolink.model import ToolOffset, ToolReceipt
+from robolink.procedures import MeasurementContext
+from robolink.runner import StepDone
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,3 +157,45 @@ class ChangeReport:
 
     change: str
     tools: tuple[ToolReport, ...]
+
+
+class Moment(StrEnum):
+    """Between which phases something may be asked or switched."""
+
+    START = "start"
+    BEFORE_MEASURE = "before_measure"
+    AFTER_MEASURE = "after_measure"
+    BEFORE_WRITE = "before_write"
+    END = "end"
+
+
+class Listener:
+    """Told of everything; does nothing with it. Override what is of interest.
+
+    Whatever a method raises ends the change, as Ctrl-C would at that place.
+    """
+
+    def moment(self, moment: Moment, context: MeasurementContext, tool: int | None = None) -> None:
+        """Stand between two phases; ``tool`` where the moment belongs to one."""
+
+    def step(self, tool: int, done: StepDone) -> None:
+        """Hear of a step of a measurement or of a verification."""
+
+    def refused(self, tool: int, error: CalibrationError, *, again: bool) -> None:
+        """Hear that a measurement is not believed, and whether it is taken again."""
+
+    def adjusted(self, proposal: Proposal, context: MeasurementContext) -> Proposal:  # noqa: ARG002 - for overriding
+        """Return what is to be proposed instead of the bare measurement."""
+        return proposal
+
+    def proposed(self, proposals: Sequence[Proposal]) -> None:
+        """Show the proposals, before they are judged and before anything is written."""
+
+    def wrote(self, receipt: ToolReceipt) -> None:
+        """Hear of a write that was read back."""
+
+    def verified(self, tool: int, result: VerifyResult) -> None:
+        """Hear how a verification ended."""
+
+    def told(self, sentence: str) -> None:
+        """Hear something that a person must know."""

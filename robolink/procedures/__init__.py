@@ -51,6 +51,8 @@ if TYPE_CHECKING:
     from robolink.procedures.pin.touches import lift_off as lift_off
     from robolink.procedures.pin.touches import touch_again as touch_again
     from robolink.procedures.pin.touches import turned_touches as turned_touches
+    from robolink.procedures.pin.turn_test import TurnsAboutPin as TurnsAboutPin
+    from robolink.procedures.pin.turn_test import TurnTest as TurnTest
     from robolink.procedures.pose_method import PoseMethod as PoseMethod
     from robolink.procedures.sequential_sampling import TAKE_ALL as TAKE_ALL
     from robolink.procedures.sequential_sampling import Sampler as Sampler
@@ -90,6 +92,7 @@ __getattr__ = lazy_exports(
         ),
         "pin.touch_plan": "TouchPlan plain_pose",
         "pin.touches": "PinTouches lift_off touch_again turned_touches",
+        "pin.turn_test": "TurnTest TurnsAboutPin",
         "pose_method": "PoseMethod",
         "sequential_sampling": (
             "Sampler Samples SamplingPolicy SequentialSampler TAKE_ALL agreement finalize_samples "

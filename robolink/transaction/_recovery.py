@@ -5,7 +5,7 @@ that holds its old value is never written, and so one write per tool is the most
 takes effect.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 from robolink.errors import ConfigError, JournalError, RobolinkError
@@ -43,6 +43,7 @@ def recover(
     keep: bool = False,
     confirm: Callable[[Finding], bool] = lambda _finding: False,
     tell: Callable[[Finding, bool], None] = lambda _finding, _settled: None,
+    later: Collection[str] = (),
 ) -> Recovery:
     """Settle what an earlier process left open: by reading, and with a person's word.
 
@@ -55,6 +56,7 @@ def recover(
             looked and work may go on.
         tell: Told of each finding, and whether it is settled. A command that was part of a change
             or a procedure is told of with that, not by itself.
+        later: Operations of markers that are left alone: the caller settles them.
 
     Raises:
         BusyError: Somebody else is changing this controller just now.
@@ -68,7 +70,11 @@ def recover(
         ()
     """
     with controller.outcomes.hold(tr("recover")):
-        markers = _in_order(controller.outcomes.open_markers())
+        markers = [
+            marker
+            for marker in _in_order(controller.outcomes.open_markers())
+            if marker.operation not in later
+        ]
         if markers:
             requests = [marker.request for marker in markers]
             controller.outcomes.append(

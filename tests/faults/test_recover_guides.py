@@ -6,6 +6,7 @@ from contextlib import nullcontext
 
 import pytest
 from robolink_cli.prompts.present import sitting_at
+from robolink_cli.wizard.choices import ChoiceSubject
 
 from robolink.model import Marker, MarkerKind
 from tests.faults import _recipe_instants
@@ -184,7 +185,7 @@ class Sits:
     """A desk at which a person takes a row, or leaves."""
 
     def __init__(self, answer):
-        self.answer, self.subject, self.asked = answer, None, []
+        self.answer, self.pages, self.asked = answer, [], []
         self.glance = lambda: None
 
     def tell(self, text):
@@ -194,7 +195,7 @@ class Sits:
         return nullcontext()
 
     def regard(self, subject):
-        self.subject = subject
+        self.pages.append(subject)
 
     def ask(self, question, kind):
         self.asked.append(question)
@@ -204,7 +205,7 @@ class Sits:
 
 
 @pytest.mark.parametrize(
-    ("answer", "code", "changed"), [("1", 0, set()), ("2", 0, {1}), ("3", 9, {1}), ("q", 9, {1})]
+    ("answer", "code", "changed"), [("1", 0, set()), ("2", 9, {1}), ("3", 9, {1}), ("q", 9, {1})]
 )
 def test_at_a_desk_the_page_shows_what_is_read_and_marks_nothing(cell, answer, code, changed):
     desk = Sits(answer)
@@ -212,9 +213,13 @@ def test_at_a_desk_the_page_shows_what_is_read_and_marks_nothing(cell, answer, c
         ended = cell.run("recover")
     assert ended.code == code, ended.err
     assert cell.changed() == changed
-    assert desk.asked == ["Look at the robot: which needle is mounted?"]
-    page = desk.subject
-    assert page is not None
+    # Who wants the new value is asked before the robot moves, and "2" agrees to nothing.
+    listed = ["Start moving"] if answer == "2" else []
+    assert desk.asked == ["Look at the robot: which needle is mounted?", *listed]
+    page = next(one for one in desk.pages if isinstance(one, ChoiceSubject))
     assert page.marked is None
     assert any("Written, but nobody verified it." in row for row in page.above)
     assert len(page.options) == 3
+    assert page.options[1] == "The new one. Make the turn test, then keep the new value."
+    if listed:
+        assert kinds(cell) == {MarkerKind.CHANGE}, "nothing is lost, and nothing is kept"

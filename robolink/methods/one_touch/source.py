@@ -11,9 +11,9 @@ from robolink.model import Pose, ToolOffset
 from robolink.procedures import (
     MeasurementContext,
     TouchPlan,
+    TurnTest,
     contact_pose,
     drift_uncertainty_mm,
-    verify_by_turning,
 )
 from robolink.runner import Procedure
 
@@ -106,12 +106,20 @@ class OneTouchSource:
         tolerance_mm: float,
     ) -> VerifyResult:
         """Turn half a turn about the new tip; see :class:`~robolink.procedures.MovingSource`."""
+        context.controller.tools.select(tool)
+        test = self.turn_test(tool, result, tip=tip, tolerance_mm=tolerance_mm)
+        return context.run(test.steps(), tip=result.offset)
+
+    def turn_test(
+        self, tool: int, result: CalibrationResult, *, tip: ToolOffset, tolerance_mm: float
+    ) -> TurnTest:
+        """Return the test of what was measured; see :class:`~robolink.procedures.TurnsAboutPin`."""
         from robolink.calibration import toward_zero  # numpy, which a look does without
 
-        context.controller.tools.select(tool)
         measured_deg = tip_pose(result.inputs[-1], result.offset, tool=tool).u_deg
-        procedure = verify_by_turning(
-            self.touch,
+        return TurnTest(
+            tool=tool,
+            touch=self.touch,
             contact=contact_pose(result, tool=tool),
             angles_deg=(toward_zero(measured_deg, HALF_A_TURN_DEG),),
             tolerance_mm=tolerance_mm,
@@ -119,4 +127,3 @@ class OneTouchSource:
             written=result.offset,
             tip=tip,
         )
-        return context.run(procedure, tip=result.offset)

@@ -102,7 +102,7 @@ class _Turning:
 
     def shown(self, angle_deg: float) -> Procedure[tuple[Pose, TouchedAt]]:
         """Have the pin touched; returns where the tip should have been, and where it was."""
-        place = _place(self._contact, angle_deg, self._written, self._tip)
+        place = place_on_pin(self._contact, angle_deg, self._written, self._tip)
         found = yield from self._touches.again(
             place,
             key=self._count,
@@ -211,8 +211,15 @@ class DriftProof:
         return tuple(drifts)
 
 
-def _place(contact: Pose, angle_deg: float, written: ToolOffset, tip: ToolOffset) -> Pose:
-    """Return where the frame in force should be with the tip on the pin."""
+def place_on_pin(contact: Pose, angle_deg: float, written: ToolOffset, tip: ToolOffset) -> Pose:
+    """Return where the frame in force should be with the tip on the pin.
+
+    Args:
+        contact: Pose of the new tool's tip on the pin.
+        angle_deg: Tool angle U.
+        written: The offset in force.
+        tip: Where the tip was found.
+    """
     frame = replace(contact, u_deg=angle_deg)
     aside_x, aside_y = FlangePlane.of(flange_of(frame, written)).in_base(
         written.x_mm - tip.x_mm, written.y_mm - tip.y_mm, written.z_mm - tip.z_mm

@@ -9,12 +9,9 @@ from typing import Any, Protocol, Self, cast, runtime_checkable
 from robolink.calibration import CalibrationResult, VerifyResult, tip_pose
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
-from robolink.procedures.pin.proof import (
-    contact_pose,
-    drift_uncertainty_mm,
-    verify_by_turning,
-)
+from robolink.procedures.pin.proof import contact_pose, drift_uncertainty_mm
 from robolink.procedures.pin.touch_plan import TouchPlan
+from robolink.procedures.pin.turn_test import TurnTest
 from robolink.procedures.source import MeasurementContext
 from robolink.runner import Procedure, TouchedAt
 
@@ -110,10 +107,18 @@ class ManualPinSource(PinSource):
         tolerance_mm: float,
     ) -> VerifyResult:
         """Turn about the new tip; see :class:`~robolink.procedures.MovingSource`."""
-        angles = [tip_pose(pose, result.offset, tool=tool).u_deg for pose in result.inputs]
         context.controller.tools.select(tool)
-        procedure = verify_by_turning(
-            self.touch,
+        test = self.turn_test(tool, result, tip=tip, tolerance_mm=tolerance_mm)
+        return context.run(test.steps(), tip=result.offset)
+
+    def turn_test(
+        self, tool: int, result: CalibrationResult, *, tip: ToolOffset, tolerance_mm: float
+    ) -> TurnTest:
+        """Return the test of what was measured; see :class:`~robolink.procedures.TurnsAboutPin`."""
+        angles = [tip_pose(pose, result.offset, tool=tool).u_deg for pose in result.inputs]
+        return TurnTest(
+            tool=tool,
+            touch=self.touch,
             contact=contact_pose(result, tool=tool),
             angles_deg=(middles_of_gaps(angles)[0], angles[0]),
             tolerance_mm=tolerance_mm,
@@ -121,7 +126,6 @@ class ManualPinSource(PinSource):
             written=result.offset,
             tip=tip,
         )
-        return context.run(procedure, tip=result.offset)
 
 
 def middles_of_gaps(angles_deg: Sequence[float]) -> list[float]:

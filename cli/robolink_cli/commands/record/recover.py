@@ -8,7 +8,9 @@ from robolink.transaction import Recovery
 from robolink_cli.commands.measure.choosing import context_at_desk
 from robolink_cli.commands.record.recovery_choice import BLOCKED, NEW, OLD, chosen_at_desk
 from robolink_cli.commands.record.recovery_guide import Guide, show_end
+from robolink_cli.console.render import json_is_on
 from robolink_cli.options.consent import dry_run_option, plain_option, yes_option
+from robolink_cli.prompts.present import present_desk
 from robolink_cli.prompts.questions import on_terminal
 from robolink_cli.session.context import CliContext, controller_options, emit, optional_controller
 from robolink_cli.session.guidance import guided_if_alone
@@ -29,7 +31,8 @@ from robolink_cli.views.documents import finding_payload
     "--choose",
     type=click.Choice(["old", "new", "blocked"]),
     help=declared(
-        "Your word in one: old values back, new values kept, or everything left blocked as it is."
+        "Your word in one: old values back; new values kept, at a terminal after their turn test; "
+        "or everything left blocked as it is."
     ),
 )
 @click.option(
@@ -59,7 +62,8 @@ def recover(
     """Settle what was begun and not proved finished, by reading and with your word.
 
     It finishes or takes back each tool change, selects the cell's own tool again, and says how
-    far the robot came. Each tool is written once at most, and nothing moves. What only a person
+    far the robot came. Each tool is written once at most. Nothing moves, but for the turn test of
+    a new value that you choose at the terminal, when you have agreed to it. What only a person
     can judge is asked on a terminal; elsewhere it is left open, with exit code 6, unless --yes
     gives your word. It may be run again at any time.
     """
@@ -75,7 +79,12 @@ def recover(
             if take_over is not None and not dry_run:
                 controller.outcomes.take_over(take_over)
             word = choose or (None if forget else chosen_at_desk(controller))
-            guide = Guide(controller, keep=keep or word == NEW, word=yes or word in (OLD, NEW))
+            guide = Guide(
+                controller,
+                keep=keep or word == NEW,
+                word=yes or word in (OLD, NEW),
+                tests=word == NEW and not dry_run and _somebody_there(),
+            )
             if word == BLOCKED:
                 done, forgotten = guide.left_blocked(declined=choose is None), 0
             else:
@@ -106,6 +115,11 @@ def resolve(context: CliContext, dry_run: bool, yes: bool, forget: bool) -> int:
     }
     emit("resolve", document, lambda: None if dry_run else show_end(payload))
     return 0 if dry_run else guide.exit_code(done)
+
+
+def _somebody_there() -> bool:
+    """Whether a person can agree to movements, and bring the tip onto the pin."""
+    return present_desk() is not None or (on_terminal() and not json_is_on())
 
 
 def _gone_through(guide: Guide, *, forget: bool, yes: bool, dry_run: bool) -> tuple[Recovery, int]:

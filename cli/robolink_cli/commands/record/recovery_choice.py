@@ -22,6 +22,8 @@ def chosen_at_desk(controller: Controller) -> str | None:
     Raises:
         DeclinedError: The person leaves; everything stays as it is.
     """
+    from robolink.nozzle_change import open_turn_tests
+
     desk = present_desk()
     if desk is None:
         return None
@@ -33,7 +35,10 @@ def chosen_at_desk(controller: Controller) -> str | None:
     subject = ChoiceSubject(
         tr("Recover"),
         (*(row for one in findings for row in _rows(one)), *_selected(controller)),
-        tuple(_option(answer, written=bool(written)) for answer in answers),
+        tuple(
+            _option(answer, written=bool(written), tests=bool(open_turn_tests(controller)))
+            for answer in answers
+        ),
         marked=None,
         does=tr("Do it"),
         leaves=tr("Leave it blocked"),
@@ -69,11 +74,13 @@ def _selected(controller: Controller) -> list[str]:
     return [] if selected is None else [tr("Tool {t} is selected.", t=selected)]
 
 
-def _option(answer: str, *, written: bool) -> str:
+def _option(answer: str, *, written: bool, tests: bool) -> str:
     if answer == BLOCKED:
         return tr("I cannot tell. Stay blocked; call an engineer.")
     if not written:
         return tr("All is as it should be. Work may go on.")
     if answer == OLD:
         return tr("The old one. Put the old value back.")
+    if tests:
+        return tr("The new one. Make the turn test, then keep the new value.")
     return tr("The new one. Keep the new value; nobody has tested it.")

@@ -1,18 +1,27 @@
 """A recovery, told step by step: what is found, what is done, what takes a person's word."""
 
+from collections.abc import Collection, Iterator
 from contextlib import suppress
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from robolink.errors import ControllerError
 from robolink.messages import declared, spoken, tr
 from robolink.model import Controller, Finding, MarkerKind, Pose
 from robolink.transaction import Recovery, Settler, look, recover
 from robolink_cli.console.render import json_is_on, note, say
+from robolink_cli.prompts.operator import operator_at
 from robolink_cli.prompts.questions import agree, asked, on_terminal
+from robolink_cli.session.check_before_start import agree_to_procedure
 from robolink_cli.views.documents import finding_payload, pose_payload
+
+if TYPE_CHECKING:
+    from robolink.calibration import VerifyResult
+    from robolink.nozzle_change import OpenTurnTest
 
 DECLINED: Final = 9
 LEFT: Final = 6
+_MOVES_PER_ANGLE: Final = 3
+"""Over the pin, down beside it, off it again."""
 _NOTHING: Final = declared("Nothing is left unfinished on this controller.")
 
 
@@ -26,23 +35,45 @@ class Guide:
         controller: The controller, connected.
         keep: Whether new values that nobody verified stay.
         word: Whether a person's word is given beforehand for what reading cannot settle.
+        tests: Whether a new value is kept only after its turn test, where one can be made: a
+            person is at the robot who chose it.
     """
 
-    def __init__(self, controller: Controller, *, keep: bool, word: bool) -> None:
+    def __init__(
+        self, controller: Controller, *, keep: bool, word: bool, tests: bool = False
+    ) -> None:
         self._controller = controller
+        self._tests = tests
         self._keep = keep
         self._word = word
         self._where: Pose | None = None
         self.declined = False
 
     def run(self) -> Recovery:
-        """Settle what can be settled.
+        """Settle what can be settled; a turn test comes last, when nothing else is open.
 
         Raises:
             RobolinkError: A step failed; the rest stays open.
         """
-        done = recover(self._controller, keep=self._keep, confirm=self._confirmed, tell=self._ended)
-        if not done.settled and not done.left:
+        if not self._tests:
+            return self._settled()
+        with self._controller.outcomes.hold(tr("recover")):
+            tests = TurnTests(self._controller)
+            done = self._settled(later=tests.operations)
+            if not done.left:
+                return Recovery((*done.settled, *tests.made()), ())
+            findings = look(self._controller, keep=True)
+            return Recovery(done.settled, findings)
+
+    def _settled(self, *, later: Collection[str] = ()) -> Recovery:
+        done = recover(
+            self._controller,
+            keep=self._keep,
+            confirm=self._confirmed,
+            tell=self._ended,
+            later=later,
+        )
+        if not done.settled and not done.left and not later:
             note(spoken(_NOTHING))
         return done
 
@@ -167,3 +198,64 @@ def _foretell(finding: Finding) -> None:
 
 def _show(finding: Finding) -> None:
     note(f"{finding.marker.begun_at}  {finding.marker.request}\n  {finding.sentence}")
+
+
+class TurnTests:
+    """The turn tests that the open changes of a controller still lack.
+
+    Args:
+        controller: The controller, connected.
+    """
+
+    def __init__(self, controller: Controller) -> None:
+        from robolink.nozzle_change import open_turn_tests
+
+        self._controller = controller
+        self._tests = open_turn_tests(controller)
+
+    @property
+    def operations(self) -> tuple[str, ...]:
+        """Of the markers of those changes."""
+        return tuple(self._tests)
+
+    def made(self) -> Iterator[Finding]:
+        """Make one after the other when a person agrees; yields what is closed by it.
+
+        Raises:
+            DeclinedError: The answer was no; the change stays open.
+            VerifyError: One did not pass; the old values are back.
+            RobolinkError: Anything else that ended it.
+        """
+        from robolink.nozzle_change import finish_by_turn_test
+
+        for operation, tests in self._tests.items():
+            self._agreed(tests)
+            tool, clock = tests[0].test.tool, self._controller.clock
+            with operator_at(None, lambda: tool, clock) as person:  # noqa: B023 - used inside the turn
+                yield finish_by_turn_test(self._controller, operation, person, tell=_tell)
+
+    def _agreed(self, tests: "tuple[OpenTurnTest, ...]") -> None:
+        settings = tests[0].settings
+        box = settings.box
+        agree_to_procedure(
+            self._controller,
+            tr(
+                "to test tool {tool}, from the pin that you jog the tip onto",
+                tool=", ".join(str(one.test.tool) for one in tests),
+            ),
+            moves=sum(1 + _MOVES_PER_ANGLE * len(one.test.angles_deg) for one in tests),
+            speed_mm_s=settings.speed_mm_s,
+            box_mm=box.x_max_mm - box.x_min_mm,
+            yes=False,
+        )
+
+
+def _tell(tool: int, result: "VerifyResult") -> None:
+    note(
+        tr(
+            "Turn test of tool {tool}: {drift:.3f} mm off, limit {limit:.3f} mm.",
+            tool=tool,
+            drift=result.max_drift_mm,
+            limit=result.tolerance_mm,
+        )
+    )

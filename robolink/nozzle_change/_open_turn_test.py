@@ -1,0 +1,261 @@
+"""The turn test of a change that was cut off between its write and its proof.
+
+A change leaves in its durable marker what its turn test needs. Whoever finds the marker open later
+takes the change up again: its marker, and no other, then lets the robot move, and stays until the
+verdict. So a process that is killed in the test leaves what it found
+(docs/decisions/0060-a-change-is-taken-up-again-for-its-turn-test.md).
+"""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import astuple, dataclass
+from typing import TYPE_CHECKING, Final
+
+from robolink.calibration import VerifyResult
+from robolink.errors import (
+    CalibrationError,
+    LeaseLostError,
+    OutcomeUnknownError,
+    RemoteProtocolError,
+    RobolinkError,
+    TransportError,
+    VerifyError,
+)
+from robolink.messages import joined, tr
+from robolink.model import Controller, Finding, Marker, MarkerKind, Verdict
+from robolink.nozzle_change._acceptance import require_proved
+from robolink.nozzle_change._plan import Limits, ToolPlan
+from robolink.nozzle_change._proposal import Proposal
+from robolink.nozzle_change._records import verification_entry
+from robolink.procedures import (
+    TOUCH_CODES,
+    MeasurementContext,
+    TurnsAboutPin,
+    TurnTest,
+)
+from robolink.runner import Operator, Runner, RunSettings
+from robolink.transaction import Settler
+
+if TYPE_CHECKING:
+    from pydantic import TypeAdapter
+
+_KEY: Final = "turn_tests"
+_OUT_OF_REACH: Final = (OutcomeUnknownError, TransportError, RemoteProtocolError, LeaseLostError)
+"""After these nothing can be put back here: the link is gone, or the right to write."""
+
+
+@dataclass(frozen=True, slots=True)
+class OpenTurnTest:
+    """What a change keeps of the turn test of one tool until it is made.
+
+    Attributes:
+        test: The test.
+        settings: Limits and speeds, about where the flange was when the change began.
+    """
+
+    test: TurnTest
+    settings: RunSettings
+
+
+def marked_turn_tests(
+    context: MeasurementContext, limits: Limits, proposals: Sequence[tuple[ToolPlan, Proposal]]
+) -> dict[str, object]:
+    """Return what the marker of a change keeps of its turn tests, plain JSON.
+
+    Nothing, where one of its tools is proved in another way, or not at all.
+
+    Args:
+        context: Where the change began.
+        limits: Where and how fast the robot may go.
+        proposals: What is to be written.
+    """
+    tests: list[OpenTurnTest] = []
+    for plan, proposal in proposals:
+        source, start = plan.moving, context.start
+        if start is None or not plan.verify or not isinstance(source, TurnsAboutPin):
+            return {}
+        test = source.turn_test(
+            proposal.tool,
+            proposal.result,
+            tip=proposal.tip,
+            tolerance_mm=plan.criteria.drift_tolerance_mm,
+        )
+        settings = limits.settings(start, proposal.result.offset)
+        if not all(map(math.isfinite, astuple(settings.box))):
+            return {}
+        tests.append(OpenTurnTest(test, settings))
+    return {_KEY: _adapter().dump_python(tuple(tests), mode="json")}
+
+
+def open_turn_tests(controller: Controller) -> dict[str, tuple[OpenTurnTest, ...]]:
+    """Return the turn tests that open changes still lack, by the operations of their markers.
+
+    Only of changes whose tools all hold the new values now. Reads only.
+
+    Args:
+        controller: The controller, connected.
+
+    Raises:
+        RobolinkError: It cannot be read.
+    """
+    settler = Settler(controller, keep=True)
+    found = {}
+    for marker in controller.outcomes.open_markers():
+        tests = _tests_of(marker)
+        if tests and settler.examine(marker).verdict is Verdict.DONE:
+            found[marker.operation] = tests
+    return found
+
+
+def finish_by_turn_test(
+    controller: Controller,
+    operation: str,
+    operator: Operator,
+    *,
+    tell: Callable[[int, VerifyResult], None] = lambda _tool, _result: None,
+) -> Finding:
+    """Make the turn test of an open change, then keep its values or put the old ones back.
+
+    Whatever else ends it puts the old values back too, as it would have in the change itself;
+    only where the link or the lease is lost, or this process ends, the change stays open. Call it
+    under :meth:`robolink.model.OutcomeLog.hold`, when a person at the robot has agreed to the
+    movements.
+
+    Args:
+        controller: The controller, connected.
+        operation: Of the marker of the change.
+        operator: Who brings the tip onto the pin.
+        tell: Told of each tool how its test ended.
+
+    Returns:
+        What was found, closed: the new values are kept.
+
+    Raises:
+        VerifyError: It did not pass, or its touches were not made; the old values are back.
+        OutcomeUnknownError: Something else is unsettled, too, or the change has no test, or its
+            tools hold other values now; nothing moved.
+        RobolinkError: Anything else that ended it, with the state it left.
+    """
+    marker, finding = _open(controller, operation)
+    outcomes, request = controller.outcomes, marker.request
+    outcomes.change = str(marker.details.get("change", ""))
+    try:
+        # From here on this marker alone is that of a procedure of this process.
+        with controller.uninterrupted():
+            controller.begin(MarkerKind.CHANGE, request, marker.details, operation=marker.operation)
+        with (
+            controller.latch.watching(request),
+            controller.preserved(tr("turn test")),
+            _put_back_unless_kept(controller, marker),
+        ):
+            for one in _tests_of(marker):
+                _prove(controller, one, operator, tell)
+            Settler(controller, keep=True).settle(finding)
+    finally:
+        outcomes.change = ""
+    return finding
+
+
+def _open(controller: Controller, operation: str) -> tuple[Marker, Finding]:
+    """Return the open change and what its tools hold now.
+
+    Raises:
+        OutcomeUnknownError: There is nothing that could be tested.
+    """
+    for marker in controller.outcomes.open_markers():
+        if marker.operation == operation and _tests_of(marker):
+            finding = Settler(controller, keep=True).examine(marker)
+            if finding.verdict is Verdict.DONE:
+                return marker, finding
+    raise OutcomeUnknownError(
+        tr("There is no written value whose turn test could be made now."),
+        remedy=tr("Nothing moved. Next: 'robolink recover'."),
+        controller=controller.identity,
+    )
+
+
+def _prove(
+    controller: Controller,
+    one: OpenTurnTest,
+    operator: Operator,
+    tell: Callable[[int, VerifyResult], None],
+) -> None:
+    """Make one test.
+
+    Raises:
+        VerifyError: It did not pass.
+    """
+    tool = one.test.tool
+    controller.tools.select(tool)
+    runner = Runner(controller, controller.groups[0], operator, one.settings)
+    try:
+        result = runner.run(one.test.steps_after_a_break())
+    except CalibrationError as error:
+        if error.code not in TOUCH_CODES:
+            raise
+        raise VerifyError(
+            tr("The new tip was not tested. {cause}", cause=error.what),
+            remedy=error.remedy,
+            code=error.code,
+            controller=controller.identity,
+        ) from error
+    controller.outcomes.append(verification_entry(tool, result))
+    tell(tool, result)
+    require_proved(result, controller.identity)
+
+
+@contextmanager
+def _put_back_unless_kept(controller: Controller, marker: Marker) -> Iterator[None]:
+    """Put the old values back where the block ends early and the controller is within reach."""
+    try:
+        yield
+    except _OUT_OF_REACH:
+        raise
+    except BaseException as error:
+        with controller.uninterrupted():
+            told = _put_back(controller, marker)
+        if isinstance(error, RobolinkError):
+            error.remedy = joined(" ", filter(None, (error.remedy, told)))
+        raise
+
+
+def _put_back(controller: Controller, marker: Marker) -> str:
+    """Put the old values back with one write a tool; return what became of it, in words."""
+    still = [one.operation for one in controller.outcomes.open_markers()]
+    if marker.operation not in still:
+        return ""  # kept, or put back, already
+    try:
+        settler = Settler(controller)
+        finding = settler.examine(marker)
+        if finding.verdict not in (Verdict.NOT_FINISHED, Verdict.NOT_APPLIED):
+            return joined(" ", (finding.sentence, _stays_open()))
+        settler.settle(finding)
+    except RobolinkError as error:
+        return joined(" ", (error.what, _stays_open()))
+    finally:
+        controller.outcomes.change = str(marker.details.get("change", ""))
+    tools = ", ".join(str(one.test.tool) for one in _tests_of(marker))
+    return tr("The old value of tool {tool} is back.", tool=tools)
+
+
+def _stays_open() -> str:
+    return tr("The change stays open. Next: 'robolink recover'.")
+
+
+def _tests_of(marker: Marker) -> tuple[OpenTurnTest, ...]:
+    """Return what a marker keeps; nothing where it is not that of such a change, or unreadable."""
+    kept, tools = marker.details.get(_KEY), marker.details.get("tools")
+    if marker.kind is not MarkerKind.CHANGE or not kept or not isinstance(tools, dict):
+        return ()
+    try:
+        tests = _adapter().validate_python(kept)
+    except ValueError:
+        return ()
+    return tests if {str(one.test.tool) for one in tests} == set(tools) else ()
+
+
+def _adapter() -> "TypeAdapter[tuple[OpenTurnTest, ...]]":
+    from pydantic import TypeAdapter  # only a change that is open, or begins, needs it
+
+    return TypeAdapter(tuple[OpenTurnTest, ...])

@@ -1,0 +1,209 @@
+"""A new value that a person chose after a crash is kept when its turn test has passed."""
+
+import re
+from contextlib import contextmanager
+from dataclasses import replace
+
+import pytest
+from robolink_cli.prompts import operator as _operator
+from robolink_simulators.assist.port import open_eyes
+
+from robolink.model import EntryKind, MarkerKind
+from tests.faults import _recipe_instants
+from tests.faults._recipe_instants import Instants
+from tests.faults._what_stands import commits
+from tests.faults.test_recover_guides import cell, kinds
+
+__all__ = ["cell"]
+
+ANSWERS = 396  # of the controller, in a whole turn test
+TAKEN_OVER = ("--take-over", "its process is gone")
+MOVED = re.compile(r'\$Execute,"(Go|Move) ')
+
+
+@contextmanager
+def somebody(cell, answers=None):
+    """Let a person sit at the terminal, who jogs; yields what they are asked.
+
+    Args:
+        cell: Where.
+        answers: What they say at the numbered question in place of that.
+    """
+    asked = []
+
+    class Somebody(_operator.AssistedOperator):
+        def ask(self, question, kind):
+            asked.append(question)
+            super().ask(question, kind)
+
+        def poll(self, wait_s):
+            said = (answers or {}).get(len(asked))
+            return said or super().poll(wait_s)
+
+    with open_eyes(cell.url) as eyes, pytest.MonkeyPatch.context() as patch:
+
+        def person(instants):
+            return Somebody.with_eyes(eyes, lambda _text: None, clock=cell.clock)
+
+        patch.setattr(_recipe_instants, "Person", person)
+        yield asked
+
+
+def new_chosen(cell, *more, answers=None, instants=None):
+    with somebody(cell, answers) as asked:
+        ended = cell.run("recover", "--choose", "new", *more, instants=instants, asks=True)
+    return ended, asked
+
+
+class Killed(Instants):
+    """From one instant on nothing reaches the controller or the journal: the process is gone."""
+
+    def __init__(self, cell, matches):
+        super().__init__()
+        self.dead, self._cell, self._matches = False, cell, matches
+
+    def pass_by(self, kind, what=""):
+        super().pass_by(kind, what)
+        if not self.dead and self._matches(kind, what, self.passed):
+            self.dead = True
+            self._cell.simulator.panel.cut_link()
+
+
+def killed_at(cell, matches):
+    instants = Killed(cell, matches)
+    with commits(lambda _number: instants.dead):
+        ended, _ = new_chosen(cell, instants=instants)
+    assert instants.dead
+    cell.clock.sleep(60.0)
+    return ended
+
+
+def verified(cell):
+    """Return whether each turn test on record passed."""
+    log = cell.journal.log(cell.url)
+    return [entry.details["passed"] for entry in log.recorded(kinds=(EntryKind.VERIFY,))]
+
+
+def moves_asked(passed):
+    return sum(bool(MOVED.match(one.what)) for one in passed if one.kind == "request")
+
+
+def coming_down(kind, what, passed):
+    """The middle of the first way down to the pin that the robot goes by itself."""
+    downs = [one for one in passed if one.kind == "request" and "Move XY" in one.what]
+    return kind == "wait" and len(downs) > 4
+
+
+def test_killed_in_the_turn_test_nothing_is_lost_and_the_next_one_keeps_the_value(cell):
+    new = cell.tools()[1]
+    assert killed_at(cell, coming_down).code != 0
+    assert MarkerKind.CHANGE in kinds(cell)
+    assert verified(cell) == []
+    written = len(cell.writes())
+    # Nobody there: it stays as it was, and nothing moves.
+    asked = cell.moves_asked()
+    assert cell.run("recover", "--dry-run").code == 6
+    assert cell.moves_asked() == asked
+    ended, questions = new_chosen(cell, *TAKEN_OVER)
+    assert ended.code == 0, ended.err
+    assert "will move by itself to test tool 1" in questions[0]
+    assert questions[1] == "Jog the tip onto the pin."
+    assert len(questions) == 4
+    assert (cell.tools()[1], len(cell.writes()) - written) == (new, 0)
+    assert (cell.open_markers(), cell.selected, verified(cell)) == ((), 1, [True])
+    assert cell.settings() == cell.settings_before
+
+
+def test_a_tip_that_is_elsewhere_gets_the_old_value_back_with_one_write(cell):
+    tip = cell.simulator.world.tips[1]
+    cell.simulator.world.tips[1] = replace(tip, x_mm=tip.x_mm + 0.6)
+    written = len(cell.writes())
+    ended, questions = new_chosen(cell)
+    assert ended.code == 8, ended.err
+    assert "The old value of tool 1 is back." in ended.err
+    assert len(questions) > 2
+    assert (cell.changed(), cell.open_markers()) == (set(), ())
+    assert (len(cell.writes()) - written, cell.selected, verified(cell)) == (1, 1, [False])
+
+
+@pytest.mark.soak
+def test_a_first_touch_far_from_the_pin_of_the_measurement_ends_it_before_anything_turns(cell):
+    x_mm, y_mm, z_mm = cell.simulator.world.pin_mm
+    cell.simulator.world.pin_mm = (x_mm + 4.0, y_mm, z_mm)
+    instants = Instants()
+    ended, questions = new_chosen(cell, instants=instants)
+    assert ended.code == 8, ended.err
+    assert len(questions) == 2
+    assert not [one for one in instants.passed if one.what.startswith('$Execute,"Go ')]
+    assert (cell.changed(), cell.open_markers()) == (set(), ())
+
+
+@pytest.mark.soak
+def test_who_does_not_agree_moves_nothing_and_leaves_it_open(cell):
+    instants = Instants()
+    ended, _ = new_chosen(cell, answers={1: "n"}, instants=instants)
+    assert ended.code == 9, ended.err
+    assert moves_asked(instants.passed) == 0
+    assert (cell.changed(), kinds(cell)) == ({1}, {MarkerKind.CHANGE})
+    assert cell.run("jog", "z+0.5", "--yes").code == 6, "the robot stays blocked"
+
+
+@pytest.mark.soak
+def test_who_stops_in_the_middle_gets_the_old_value_back(cell):
+    ended, _ = new_chosen(cell, answers={3: "q"})
+    assert ended.code == 9, ended.err
+    assert (cell.changed(), cell.open_markers(), cell.selected) == (set(), (), 1)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("how", ["e-stop", "guard", "Ctrl-C"])
+def test_what_stops_the_robot_in_the_test_leaves_no_unproved_value_in_use(cell, how):
+    pressed = []
+
+    class Presses(Instants):
+        def pass_by(self, kind, what=""):
+            super().pass_by(kind, what)
+            if not pressed and coming_down(kind, what, self.passed):
+                pressed.append(moves_asked(self.passed))
+                cell.disturb(how)
+
+    instants = Presses()
+    ended, _ = new_chosen(cell, instants=instants)
+    assert pressed
+    assert ended.code in (6, 130), ended.err
+    assert moves_asked(instants.passed) == pressed[0], "nothing moves after it"
+    if cell.changed():
+        assert MarkerKind.CHANGE in kinds(cell), "it is blocked"
+    cell.clock.sleep(5.0)
+    if how != "Ctrl-C":
+        cell.make_ready(how)
+    assert cell.run("recover", "--choose", "old").code == 0
+    assert (cell.changed(), cell.open_markers(), cell.selected) == (set(), (), 1)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("part", range(12))
+def test_killed_anywhere_in_it_the_change_is_open_or_proved(cell, part):
+    at = 2 + part * ANSWERS // 12
+
+    def there(kind, _what, passed):
+        return kind == "answer" and sum(one.kind == "answer" for one in passed) == at
+
+    killed_at(cell, there)
+    assert cell.changed() == {1}
+    if MarkerKind.CHANGE not in kinds(cell):
+        assert verified(cell) == [True]
+        assert part == 11, "only at its end"
+        return
+    written = len(cell.writes())
+    ended, _ = new_chosen(cell, *TAKEN_OVER)
+    assert ended.code == 0, ended.err
+    assert (cell.changed(), cell.open_markers(), verified(cell)[-1]) == ({1}, (), True)
+    assert len(cell.writes()) == written
+
+
+def test_off_a_terminal_the_new_value_is_kept_on_a_word_and_nothing_moves(cell):
+    asked = cell.moves_asked()
+    assert cell.run("recover", "--choose", "new").code == 0
+    assert (cell.changed(), cell.open_markers(), verified(cell)) == ({1}, (), [])
+    assert cell.moves_asked() == asked

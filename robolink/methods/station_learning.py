@@ -114,7 +114,7 @@ def _require_same_place(one: Pose, other: Pose) -> None:
             "The two touches are {apart:.2f} mm apart: one of them was not on the pin.",
             apart=apart_mm,
         ),
-        remedy=tr("Nothing was recorded. Bring the tip onto the same point both times."),
+        remedy=tr("Nothing was recorded. Jog the tip onto the same point both times."),
     )
 
 

@@ -27,7 +27,7 @@ def require_known(given: Iterable[str], known: Sequence[str], *, kind: str) -> N
     if unknown:
         raise ConfigError(
             tr("The {kind} simulator has no option {name!r}.", kind=kind, name=unknown[0]),
-            remedy=tr("Known are: {names}.", names=", ".join(known)),
+            remedy=tr("These are known: {names}.", names=", ".join(known)),
         )
 
 

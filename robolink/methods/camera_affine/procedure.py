@@ -78,5 +78,5 @@ def _require_pattern(plan: CameraAffineParameters) -> None:
         raise CalibrationError(
             "insufficient_rotation",
             tr("The pattern turns the tool by {spread:.1f} degrees only.", spread=spread_deg),
-            remedy=tr("Turn it by {minimum:.0f} or more.", minimum=MIN_ROTATION_DEG),
+            remedy=tr("Turn it by {minimum:.0f} degrees or more.", minimum=MIN_ROTATION_DEG),
         )

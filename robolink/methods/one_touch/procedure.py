@@ -57,7 +57,7 @@ def require_known_length(stored: ToolOffset | None) -> ToolOffset:
     """
     if stored is None:
         raise ConfigError(
-            tr("The tool is not defined, so nobody knows how far above the pin it has to stop."),
+            tr("The tool is not defined: how far above the pin it has to stop is not known."),
             remedy=tr(
                 "Write about where the tip is with 'tool set', to a millimetre or two, and "
                 "measure then."

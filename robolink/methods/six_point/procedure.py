@@ -128,8 +128,8 @@ class _AxisTeaching:
         )
         ask = Ask(
             tr(
-                "Bring the tip, without turning it, to where it is free to go {length:g} mm along "
-                "the tool's own +X, and {length:g} mm along its own +Z.",
+                "Jog the tip, without turning it, to where it is free to go {length:g} mm "
+                "along the tool's own +X, and {length:g} mm along its own +Z.",
                 length=self.ways.length_mm,
             ),
             TeachPrompt.ROOM,

@@ -50,7 +50,7 @@ def measure_sphere_touch(
             :func:`~robolink.calibration.solve_sphere_touch`.
     """
     touches = SurfaceTouches(plan)
-    first = yield from touches.shown(tr("Bring the tip onto the top of the sphere."), key=0)
+    first = yield from touches.shown(tr("Jog the tip onto the top of the sphere."), key=0)
     over = OverPin.touched(first, stored)
     drive = SurfaceDrive(plan, over, touches)
     yield from _upright(drive, over.pin_mm, survey)

@@ -23,8 +23,7 @@ import click
 
 from robolink.interrupts import Interrupted, output_closed
 from robolink_cli.console.columns import filled, within
-from robolink_cli.console.tolerance import PLAINLY
-from robolink_cli.console.visible import visible as visible
+from robolink_cli.console.tolerance import PLAINLY, visible
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer

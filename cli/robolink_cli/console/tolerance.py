@@ -1,8 +1,9 @@
-"""Output and input that never fail for want of a character."""
+"""Output and input that no character breaks: none is lacking, and none is obeyed."""
 
 import codecs
 import io
 import os
+import re
 import sys
 from typing import Final
 
@@ -11,6 +12,11 @@ PLAINLY: Final = "robolink.plainly"
 
 PLAIN: Final = "robolink.plain"
 """Where a command finds that lines are wanted in place of screens."""
+
+_OBEYED: Final = re.compile(
+    "[\x00-\x09\x0b-\x1f\x7f-\x9f"  # C0 without LF, DEL, C1
+    "\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]"  # line separators, direction of writing
+)
 
 _IN_ASCII: Final = {"\u00b1": "+-", "\u221e": "inf", "\u00b0": " deg", "\u2192": "->"}
 
@@ -27,6 +33,15 @@ def _plainly(error: UnicodeError) -> tuple[str | bytes, int]:
 
 
 codecs.register_error(PLAINLY, _plainly)
+
+
+def visible(text: str) -> str:
+    r"""Return ``text`` with everything that a terminal would obey as ``\x1b`` or ``\u202e``.
+
+    CRLF, with which controllers end their lines, is a line feed.
+    """
+    lines = text.replace("\r\n", "\n")
+    return _OBEYED.sub(lambda found: found[0].encode("unicode_escape").decode("ascii"), lines)
 
 
 def tolerate_any_console() -> None:

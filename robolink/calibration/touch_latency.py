@@ -156,7 +156,7 @@ def _implausible(what: str) -> CalibrationError:
         "implausible_latency",
         what,
         remedy=tr(
-            "Check the speeds: does the robot reach them before the touch? Touch again, and look "
-            "whether surface and tip are clean and the input is the right one."
+            "Does the robot reach these speeds before the touch? Are surface and tip clean, "
+            "and is it the right input? Then touch again."
         ),
     )

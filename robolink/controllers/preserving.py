@@ -153,7 +153,7 @@ def _unrestored(failure: RobolinkError, tool: int) -> str:
             cause=failure.what,
         )
     return tr(
-        "The tool of before, tool {tool}, could not be selected again: {cause} 'robolink "
+        "The previous tool, tool {tool}, could not be selected again: {cause} 'robolink "
         "recover' selects it.",
         tool=tool,
         cause=failure.what,

@@ -165,7 +165,7 @@ def verify_on_surface(
     """
     drive = SurfaceDrive(plan, over, SurfaceTouches(plan))
     proof = SurfaceProof(over.pose(UPRIGHT, 0.0), tolerance_mm, u_mm)
-    said = tr("Bring the tip onto the surface; what you jog shows the drift.")
+    said = tr("Jog the tip onto the surface again. We measure how far it was off.")
     for left in reversed(range(1 + MOST_MORE)):
         for spot in spots:
             found = yield from drive.touch(spot, key=len(proof.touches), instruction=said)
@@ -174,8 +174,8 @@ def verify_on_surface(
             break
         yield Notify(
             tr(
-                "The tip drifts {drift:.3f} mm: too near to {limit:.3f} mm to decide. The surface "
-                "is touched once more all over, and the mean counts.",
+                "The tip is {drift:.3f} mm off, too near to the limit of {limit:.3f} mm. The "
+                "surface is touched once more at every place; the mean counts.",
                 drift=proof.drift().distance_mm,
                 limit=tolerance_mm,
             )

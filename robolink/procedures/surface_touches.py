@@ -41,7 +41,7 @@ class SurfaceTouches(WitnessedTouches):
 
     def first(self, key: Hashable) -> Procedure[TouchedAt]:
         """Let the person bring the tip onto the surface from wherever it is, and lift off."""
-        return (yield from self.shown(tr("Bring the tip onto the surface."), key=key))
+        return (yield from self.shown(tr("Jog the tip onto the surface."), key=key))
 
     def again(
         self,
@@ -83,7 +83,7 @@ class SurfaceTouches(WitnessedTouches):
             arrival,
             (x_mm, y_mm, z_mm),
             key=key,
-            instruction=instruction or tr("Bring the tip onto the surface again, where it is."),
+            instruction=instruction or tr("Jog the tip onto the surface again, where it is."),
         )
         yield self.off(touch)
         return touch

@@ -105,7 +105,7 @@ class RecipeRun:
         if take_reference and not loaded.recipe.source.of_method.by_reference:
             raise ConfigError(
                 tr("This recipe takes no reference: the last calibration on the pin is one."),
-                remedy=tr("Make a full calibration there with the nozzle of before."),
+                remedy=tr("Make a full calibration there with the previous nozzle."),
             )
         self.takes_reference = take_reference
         self.changed: tuple[ChangedSince, ...] = ()

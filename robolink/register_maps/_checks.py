@@ -62,7 +62,7 @@ def _twice(file: MapFile) -> Iterator[Problem]:
     for key, numbers in numbered:
         for position, number in enumerate(numbers, start=1):
             if number in numbers[: position - 1]:
-                what = tr("{number} stands twice", number=number)
+                what = tr("{number} is given twice", number=number)
                 yield Problem(f"{key}#{position}.number", what)
 
 
@@ -139,7 +139,7 @@ def _places(file: MapFile, found: RegisterMap) -> Iterator[Problem]:
     claims = list(_claims(file, found))
     for claim in claims:
         if claim.addresses.stop - 1 > LAST_ADDRESS:
-            yield Problem(claim.where, tr("ends behind address {last}", last=LAST_ADDRESS))
+            yield Problem(claim.where, tr("ends beyond address {last}", last=LAST_ADDRESS))
     for first, second in combinations(claims, 2):
         if first.clashes(second):
             address = max(first.addresses.start, second.addresses.start)

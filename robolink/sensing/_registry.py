@@ -90,8 +90,8 @@ def _opener(url: str) -> SensorOpener:
             "sensor_not_found",
             tr("No sensor is called {url!r}.", url=sensor_name(url)),
             remedy=tr(
-                "Name it in the cell file under sensors, or install the package that brings it. "
-                "Known are: {known}.",
+                "Name it in the cell file under sensors, or install the package that brings "
+                "it. These are known: {known}.",
                 known=", ".join(known),
             ),
         )

@@ -300,7 +300,8 @@ class CallbackConversation:
         proof = run.measure.prove(run.result, change.requested)
         if not proof.passed:
             raise CalibrationError(
-                "drift", tr("The tip drifts by {drift:.3f} mm.", drift=proof.max_drift_mm)
+                "drift",
+                tr("The tip is {drift:.3f} mm off when the tool turns.", drift=proof.max_drift_mm),
             )
         change.allow_keeping(
             tr("proved by what the program saw after it wrote"),

@@ -164,7 +164,11 @@ class PermitCall:
             proof = self._touches.prove(result, written)
             if not proof.passed:
                 raise CalibrationError(
-                    "drift", tr("The tip drifts by {drift:.3f} mm.", drift=proof.max_drift_mm)
+                    "drift",
+                    tr(
+                        "The tip is {drift:.3f} mm off when the tool turns.",
+                        drift=proof.max_drift_mm,
+                    ),
                 )
             change.keep(tr("proved by what the program touched after the write"))
         return written

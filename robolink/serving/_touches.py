@@ -97,7 +97,7 @@ class ProgramTouches:
         if away_mm > limit_mm:
             raise CalibrationError(
                 "point_moved",
-                tr("The point lies {away:.3f} mm from where it was measured.", away=away_mm),
+                tr("The point is {away:.3f} mm from where it was measured.", away=away_mm),
             )
         return proof
 

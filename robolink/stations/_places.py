@@ -133,7 +133,7 @@ def _place(station: Station) -> tuple[float, float, float]:
 
 def _unknown(station: Station, what: str) -> ConfigError:
     return ConfigError(
-        tr("Nobody knows {what} of station {id}.", what=what, id=station.id),
+        tr("Station {id}: {what} must be known first.", what=what, id=station.id),
         remedy=tr(
             "Make a full calibration there ({calibrate}), learn it with "
             "'robolink cell station learn "

@@ -153,6 +153,6 @@ def _load(link: LinkUrl, media: Mapping[str, tuple[str, str]]) -> Callable[..., 
         known |= metadata.entry_points(group=TRANSPORTS_GROUP).names
         raise ConfigError(
             tr("Nothing here knows how to reach {scheme!r}.", scheme=link.scheme),
-            remedy=tr("Known are: {known}.", known=", ".join(sorted(known))),
+            remedy=tr("These are known: {known}.", known=", ".join(sorted(known))),
         )
     return cast(Callable[..., Any], found)

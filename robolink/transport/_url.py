@@ -105,7 +105,7 @@ def parse_url(text: str) -> LinkUrl:
     options = dict(pairs)
     if len(options) != len(pairs):
         raise ConfigError(
-            tr("An option stands twice in {text!r}.", text=text),
+            tr("An option is given twice in {text!r}.", text=text),
             remedy=tr("Give each option once."),
         )
     for forbidden in ("password", "passwd", "pass"):

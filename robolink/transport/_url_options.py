@@ -66,5 +66,5 @@ class UrlOptions:
                     scheme=self._scheme,
                     name=next(iter(self._left)),
                 ),
-                remedy=tr("Known are: {known}.", known=", ".join(self._known)),
+                remedy=tr("These are known: {known}.", known=", ".join(self._known)),
             )

@@ -27,7 +27,7 @@ def require_known(given: Iterable[str], known: Sequence[str], *, kind: str) -> N
     if unknown:
         raise ConfigError(
             tr("The {kind} simulator has no option {name!r}.", kind=kind, name=unknown[0]),
-            remedy=tr("Known are: {names}.", names=", ".join(known)),
+            remedy=tr("These are known: {names}.", names=", ".join(known)),
         )
 
 
@@ -59,6 +59,8 @@ def _value(name: str, text: str, hint: Any) -> object:  # noqa: ANN401 - a type 
         if text.lower() == "none":
             return None
         hint = int
+    if hint is str:
+        return text
     if hint is bool:
         if text.lower() in _TRUTH:
             return _TRUTH[text.lower()]

@@ -75,7 +75,7 @@ def test_a_command_says_where_a_surface_is_that_nobody_knows(cell):
     assert abs(cell.stored.z_mm - cell.truth.z_mm) < 0.02
     refused = cell.calibrate("z-touch", "--station", "NEW", "--at", place)
     assert refused.code == 2
-    assert "Nobody knows its input" in refused.document["error"]["what"]
+    assert "its input must be known first" in refused.document["error"]["what"]
 
 
 def test_a_command_says_where_beams_are_that_nobody_knows(cell):

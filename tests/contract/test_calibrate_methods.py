@@ -184,7 +184,7 @@ def test_four_axes_cannot_tilt_and_say_so_before_anything_moves(cell, method):
         (("one-touch", "--station", "PIN-99"), 2, "no station 'PIN-99'"),
         (("one-touch", "--station", "PLATE"), 2, "of kind touch; pin is needed"),
         (("one-touch", "--station", "PIN-07"), 7, "no_last_touch"),
-        (("one-touch", "--station", "PIN-07", "--absolute"), 2, "Nobody knows its place"),
+        (("one-touch", "--station", "PIN-07", "--absolute"), 2, "its place must be known first"),
         (("beams", "--station", "PIN-07"), 2, "of kind pin; beams is needed"),
         (("beams", "--station", "BEAMS-02", "--search", "6"), 2, "must be larger than --search"),
         (("beams", "--station", "BEAMS-02"), 7, "no_edge"),

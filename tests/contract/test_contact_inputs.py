@@ -76,7 +76,7 @@ def test_an_input_that_is_not_there_ends_it_with_the_robot_where_it_was(cell, tm
     assert f"Input {NOWHERE}" in done.document["error"]["what"]
     assert cell.world.robot.placement() == here
     assert cell.world.operator.touches == asked
-    assert "Bring the tip" not in done.err
+    assert "Jog the tip" not in done.err
 
 
 @pytest.mark.parametrize(

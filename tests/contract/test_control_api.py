@@ -154,7 +154,7 @@ def test_time_is_paused_stepped_and_hastened(at):
 @pytest.mark.parametrize(
     ("name", "act", "given", "words"),
     [
-        ("a", "dance", {}, "Known are: look"),
+        ("a", "dance", {}, "These are known: look"),
         ("a", "truth", {"tool": 1}, "takes no 'tool'"),
         ("a", "press_estop", {"hard": True}, "takes no 'hard'"),
         ("a", "raise_error", {}, "raise_error needs number"),
@@ -165,7 +165,7 @@ def test_time_is_paused_stepped_and_hastened(at):
         ("a", "restore", {"name": "nothing"}, "no snapshot"),
         ("a", "step", {"seconds": -1}, "from 0 to"),
         ("a", "set_clock", {"factor": 1e9}, "from 0 to 1000"),
-        ("a", "add_fault", {"action": "explode"}, "Known are"),
+        ("a", "add_fault", {"action": "explode"}, "These are known"),
         ("a", "add_fault", {"action": "echo"}, "cannot happen on epson"),
         ("a", "add_fault", {"action": "garble_reply", "bit": 9}, "fault 1, bit"),
         ("b", "add_fault", {"action": "lose_login"}, "cannot happen on softmotion"),

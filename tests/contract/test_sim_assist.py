@@ -95,7 +95,7 @@ def test_the_assist_port_counts_and_changes_the_nozzle(assisted):
 @pytest.mark.parametrize(
     ("act", "parameters", "words"),
     [
-        ("dance", {}, "Known are"),
+        ("dance", {}, "These are known"),
         ("raise_error", {}, "whole number"),
         ("raise_error", {"number": "4002"}, "whole number"),
         ("set_input", {"number": 9000}, "no bit"),

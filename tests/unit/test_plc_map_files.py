@@ -99,7 +99,7 @@ BAD = {
     "an address beyond the end": (
         GOOD.replace("address = 12", "address = 65535"),
         "tools#1.y",
-        "ends behind address 65535",
+        "ends beyond address 65535",
     ),
     "a negative address": (
         GOOD.replace("address = 12", "address = -1"),
@@ -149,7 +149,7 @@ BAD = {
     "a tool twice": (
         GOOD.replace("[commit]", "[[tools]]\nnumber = 1\nx = { address = 30 }\n[commit]"),
         "tools#2.number",
-        "stands twice",
+        "is given twice",
     ),
     "no commit": (GOOD.replace('[commit]\nkind = "none"\n', ""), "commit", "is missing"),
     "an unknown handshake": (GOOD.replace('"none"', '"maybe"'), "commit", "commit_bit"),

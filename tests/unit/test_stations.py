@@ -144,7 +144,7 @@ def test_a_station_that_nobody_knows_is_named_with_those_that_are(file):
     assert "BEAMS, PIN, PLATE" in unknown.value.remedy
     with pytest.raises(ConfigError, match="of kind beams; pin is needed"):
         find_station(find_cell("a"), [], "BEAMS", kind=StationKind.PIN)
-    with pytest.raises(ConfigError, match="Nobody knows its place of station PIN"):
+    with pytest.raises(ConfigError, match="its place must be known first"):
         pin_of(find_station(find_cell("a"), [], "PIN"))
 
 

@@ -198,7 +198,9 @@ def _require_one_controller(context: click.Context, origin: str, value: object) 
     """Refuse two names that a person typed, in whatever order they stand."""
     named = {origin, context.meta.get(_ORIGINS, {}).get("url")}
     if named == {"--controller", _CELL_OR_URL} and context.meta[GIVEN]["url"] != value:
-        raise click.UsageError(tr("Two controllers are named: name one, with -c or behind it."))
+        raise click.UsageError(
+            tr("Two controllers are named: name one, with -c or after the command.")
+        )
 
 
 def _note_json(context: click.Context, parameter: click.Parameter, value: bool) -> None:  # noqa: ARG001 - click's form

@@ -120,7 +120,7 @@ def life_options(function: F) -> F:
             "--idle-exit",
             type=click.FloatRange(min=0.1),
             metavar="SECONDS",
-            help="End when nobody has asked for anything for so long.",
+            help="End when nobody has asked for anything for this long.",
         ),
     )
     command: Any = packed

@@ -71,7 +71,7 @@ def heed_selection(controller: "Controller", cell: "Expected | None", *, yes: bo
     )
     if yes or json_is_on() or not on_terminal():
         raise DeclinedError(doubt, remedy=remedy)
-    if not asked(tr("{doubt} Move with it all the same?", doubt=doubt)):
+    if not asked(tr("{doubt} Move with it anyway?", doubt=doubt)):
         raise DeclinedError(doubt, remedy=remedy)
 
 

@@ -60,7 +60,7 @@ class Telling:
         told += self._recorded()
         told += self._journal()
         if told and outcome.error is None:
-            told.append(tr("The stop went out all the same."))
+            told.append(tr("The stop went out anyway."))
         if outcome.error is None:
             told.append(
                 tr(

@@ -65,7 +65,7 @@ def show_report(report: ToolReport) -> None:
     for drift in report.verification.drifts:
         say(
             tr(
-                "  drift at U {u:.1f}: {distance:.3f} mm",
+                "  at U {u:.1f}: {distance:.3f} mm off",
                 u=drift.u_deg,
                 distance=drift.distance_mm,
             )

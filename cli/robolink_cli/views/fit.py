@@ -58,9 +58,9 @@ def _interval(result: CalibrationResult) -> str:
     if result.interval_from == "resolution":
         basis = tr("from the step of the jogs")
     elif result.sigma_stated and result.interval_from != "residuals":
-        basis = tr("from a given standard deviation")
+        basis = tr("from what was stated")
     else:
-        basis = tr("from the residuals")
+        basis = tr("from how well they agree")
     return tr("95 % interval, each alone: {parts}, {basis}", parts="  ".join(parts), basis=basis)
 
 

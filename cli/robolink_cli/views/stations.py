@@ -189,5 +189,5 @@ def _meant(robot: str, robots: Sequence[str]) -> str:
             return name
     raise ConfigError(
         tr("No robot {robot!r} is on record here.", robot=robot),
-        remedy=tr("These are: {robots}.", robots=", ".join(robots) or tr("none")),
+        remedy=tr("These are known: {robots}.", robots=", ".join(robots) or tr("none")),
     )

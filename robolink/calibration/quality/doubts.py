@@ -50,18 +50,22 @@ def order_in_words(order: RunOrder) -> str:
 # Called late, because the language is chosen when a command runs.
 _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
     "small_rotation": lambda: tr("The poses differ little in U; half a turn would be best."),
-    "few_poses": lambda: tr("Few poses: four or more tell errors of placement from each other."),
-    "large_rms": lambda: tr("The residuals are large for this method."),
+    "few_poses": lambda: tr(
+        "Too few poses to tell which one is off; with four or more that shows."
+    ),
+    "large_rms": lambda: tr("The measurements agree badly with each other for this method."),
     "large_residual": lambda: tr("One touch is far off. Touch it again."),
     "camera_moved": lambda: tr(
         "The camera sees things beside where they are: it was moved, or its calibration is old."
     ),
     "unequal_scale": lambda: tr("The camera's two axes differ much in scale."),
     "large_shear": lambda: tr("The image is askew: the camera seems to lean."),
-    "large_pixel_residual": lambda: tr("The looks agree within more than half a pixel only."),
+    "large_pixel_residual": lambda: tr(
+        "The looks differ from each other by more than half a pixel."
+    ),
     "turned_from_stored": lambda: tr(
-        "An axis lies more than 45 degrees from where it is stored: make sure that +X and +Z were "
-        "not taken for other axes. The proof by tilting does not show it."
+        "An axis is more than 45 degrees from where it is stored: make sure that +X and +Z "
+        "were not taken for other axes. The test by tilting does not show it."
     ),
     "ways_askew": lambda: tr(
         "The ways are further off a right angle than the touches scatter: the orientation is less "
@@ -74,15 +78,14 @@ _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
         "Some poses are copies of others; a copy tells nothing new and counts once."
     ),
     "sigma_contradicted": lambda: tr(
-        "The poses scatter more than the stated standard deviation allows; the interval follows "
-        "the scatter."
+        "The poses agree less well than was stated; the interval goes by how well they agree."
     ),
     "residuals_too_small": lambda: tr(
-        "The poses agree far better than the stated standard deviation lets expect: they may be "
-        "copied or smoothed, or it was stated carelessly."
+        "The poses agree far better than was stated: they may be copied or smoothed, or what "
+        "was stated is too large."
     ),
     "high_leverage": lambda: tr(
-        "All depends on a single pose; take one more near it, so that an error of it shows."
+        "The result hangs on a single pose; take one more near it, so that its error would show."
     ),
     "step_in_run_order": lambda: tr(
         "Between two touches something moved: those before and those after do not agree. Take "
@@ -105,14 +108,15 @@ _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
         "stay unseen."
     ),
     "drift_undecided": lambda: tr(
-        "The drift lies too near to its limit to be called good or bad; take more touches."
+        "The turn test came out too near to its limit to say passed or failed; take more touches."
     ),
     "gauge_marginal": lambda: tr("The spread of the measurement is marginal for the tolerance."),
     "gauge_unfit": lambda: tr("The spread of the measurement is too large for the tolerance."),
     "chart_point_out": lambda: tr("A point lies beyond the limits of the chart."),
     "chart_drift": lambda: tr("The chart shows a slow drift."),
     "resolution_floor": lambda: tr(
-        "The poses agree better than their resolution; the interval follows the resolution."
+        "The poses agree better than the robot can show positions; the interval goes by what "
+        "it can show."
     ),
     "height_not_assessed": lambda: tr(
         "The flange leans, so an error of the tool's Z is in X and Y; nobody said how sure Z is, "

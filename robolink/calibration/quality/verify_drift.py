@@ -65,7 +65,8 @@ def verify_drift(
             "insufficient_rotation",
             tr("The tool turns over {spread:.1f} degrees only.", spread=spread_deg),
             remedy=tr(
-                "Turn it by {minimum:.0f} or more; an error hides else.", minimum=min_rotation_deg
+                "Turn it by {minimum:.0f} degrees or more; with less, an error stays hidden.",
+                minimum=min_rotation_deg,
             ),
         )
     if spread_deg < WARN_ROTATION_DEG:

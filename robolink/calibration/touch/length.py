@@ -136,7 +136,7 @@ def length_not_observable(why: str) -> CalibrationError:
     return CalibrationError(
         "length_not_observable",
         tr("{why} The heights of the touches cannot tell the length of the tip.", why=why),
-        remedy=tr("Measure Z by a touch of a surface, or keep it knowingly."),
+        remedy=tr("Measure Z by a touch of a surface, or decide to keep it."),
     )
 
 
@@ -157,5 +157,5 @@ def _require_agreeing(name: str, heights_mm: Sequence[float], sigma_z_mm: float)
                 "Heights differ by {spread:.2f} mm on one pin: at least one touch was in the air.",
                 spread=spread,
             ),
-            remedy=tr("Touch the pin again, until the tip stands on it each time."),
+            remedy=tr("Touch the pin again, each time until the tip is on it."),
         )

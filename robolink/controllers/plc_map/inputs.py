@@ -29,7 +29,7 @@ class MappedInputs:
             raise ConfigError(
                 tr("The map has no input {number}.", number=bit),
                 remedy=tr(
-                    "It has these: {numbers}.",
+                    "These are known: {numbers}.",
                     numbers=", ".join(map(str, self._inputs)) or tr("none"),
                 ),
             )

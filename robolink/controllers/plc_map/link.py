@@ -61,7 +61,7 @@ class MappedPlc(DriverLink):
         raise NotReadyError(
             tr("The number by which the map knows {identity} reads zero.", identity=self.identity),
             reason=NotReadyReason.NOT_REMOTE,
-            remedy=tr("Look whether the PLC's program runs, then try again; nothing was written."),
+            remedy=tr("Check that the PLC's program runs, then try again; nothing was written."),
             controller=self.identity,
         )
 

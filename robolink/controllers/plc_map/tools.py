@@ -61,7 +61,7 @@ class RegisterToolTable(ToolTableCore):
         super().require_writable(tool)
         if not self._map.slots[tool].table.writable:
             raise ToolError(
-                tr("Tool {tool} stands in input registers, which nobody can write.", tool=tool),
+                tr("Tool {tool} is in input registers, which nobody can write.", tool=tool),
                 remedy=tr("Change it at the HMI, or map holding registers."),
                 controller=self._plc.identity,
             )
@@ -139,7 +139,7 @@ class RegisterToolTable(ToolTableCore):
         return tr("Choose one of these: {tools}.", tools=", ".join(map(str, self.indices())))
 
     def _known(self, lowest: int) -> str:  # noqa: ARG002 - alike for both
-        return tr("The map has these: {tools}.", tools=", ".join(map(str, self.indices())))
+        return tr("These are known: {tools}.", tools=", ".join(map(str, self.indices())))
 
 
 class _RegisterWrite(ToolWrite):

@@ -138,7 +138,7 @@ def _marker(row: _Stored) -> Marker:
             raise ValueError(told)
     except (ValueError, TypeError) as error:
         raise JournalError(
-            tr("A safety record of {controller} makes no sense.", controller=row.controller),
+            tr("A safety record of {controller} cannot be read.", controller=row.controller),
             remedy=tr(
                 "It says what was left unfinished, {request!r} of {when}, and may be of a newer "
                 "robolink. Check the robot's selected tool and its tool offsets by hand, then "

@@ -88,7 +88,7 @@ def _apart(places: Sequence[Pair]) -> Iterator[Problem]:
             yield Problem(
                 f"fiducials_mm#{other}",
                 tr(
-                    "lies {spacing:g} mm from fiducial {one}; {limit:g} mm are the least",
+                    "is {spacing:g} mm from fiducial {one}; it must be at least {limit:g} mm",
                     spacing=spacing_mm,
                     one=one,
                     limit=LEAST_SPACING_MM,

@@ -48,7 +48,7 @@ class BoardSource(CalibratedCameraSource):
     @property
     def remedy(self) -> str:
         """What to do when a measurement makes the board jump."""
-        return tr("Look whether the board is held as drawn, and which marks the camera found.")
+        return tr("Check that the board is held as drawn, and which marks the camera found.")
 
     def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
         """Return the steps of a measurement; see :class:`~robolink.procedures.MovingSource`."""

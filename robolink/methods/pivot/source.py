@@ -146,7 +146,7 @@ def require_known_tip(stored: ToolOffset | None) -> ToolOffset:
     """
     if stored is None:
         raise ConfigError(
-            tr("The tool is not defined, so a tilt would swing its tip nobody knows where to."),
+            tr("The tool is not defined: where its tip would swing when it tilts is not known."),
             remedy=tr(
                 "Write about where the tip is with 'tool set', to a millimetre or two, and "
                 "measure then."

@@ -69,7 +69,7 @@ def require_lean(normal: Vector, survey: PlaneSurvey) -> None:
             lean=lean_deg,
             most=survey.most_lean_deg,
         ),
-        remedy=tr("Nothing was written. Put it flatter, or look whether all touches were on it."),
+        remedy=tr("Nothing was written. Put it flatter, or check that all touches were on it."),
     )
 
 

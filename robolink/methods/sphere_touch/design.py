@@ -49,7 +49,7 @@ def sphere_of(places_mm: Sequence[Vector], survey: SphereSurvey) -> tuple[Vector
                 found=radius_mm,
                 stated=survey.radius_mm,
             ),
-            remedy=tr("Give the radius, not the diameter, and look whether all touches were made."),
+            remedy=tr("Give the radius, not the diameter, and check that all touches were made."),
         )
     x, y, z = centre.tolist()
     aside_mm = math.hypot(places_mm[0][0] - x, places_mm[0][1] - y)

@@ -42,7 +42,7 @@ class SphereTouchSource(TouchSource):
     @property
     def remedy(self) -> str:
         """What to do when a measurement makes the tip jump."""
-        return tr("Check that all touches were on the same sphere, and that it is fast.")
+        return tr("Check that all touches were on the same sphere, and that it is fixed.")
 
     def verify(
         self,

@@ -33,7 +33,7 @@ class ZTouchParameters(MethodParameters):
 
     input: Annotated[
         InputNumber | None,
-        Help(declared("Number of the input that the surface switches; else the station's.")),
+        Help(declared("Number of the input that the surface switches; without it, the station's.")),
     ] = None
     off_when_touched: Annotated[
         bool,

@@ -228,7 +228,7 @@ def _read_printed(frame: SerialFrame, letter: Letter) -> Reply:
     if len(data) < 2 or data[:1] != b'"' or data[-1:] != b'"':
         raise _no_answer(
             frame,
-            tr("What was printed does not stand in quotes: {data!r}.", data=data[:40]),
+            tr("What was printed is not in quotes: {data!r}.", data=data[:40]),
             tr("Connect again; if it happens twice, report it with the firmware version."),
         )
     text = data[1:-1].decode(_ENCODING)

@@ -15,7 +15,7 @@ def tool_numbers(draft: Draft) -> Iterator[Problem]:
     seen: set[int] = set()
     for place, tool in _tools(draft):
         if tool.number in seen:
-            yield Problem(f"{place}.number", tr("stands there twice; write each tool once"))
+            yield Problem(f"{place}.number", tr("is given twice; write each tool once"))
         seen.add(tool.number)
 
 
@@ -36,7 +36,7 @@ def points(draft: Draft) -> Iterator[Problem]:
                 )
         elif tool.poses is not None:
             if tool.points is not None:
-                yield Problem(where, tr("stands beside poses; give one of the two"))
+                yield Problem(where, tr("is given beside poses; give one of the two"))
         elif tool.points is None:
             yield Problem(where, tr("is missing: the numbers of the points that touch the pin"))
         else:
@@ -118,8 +118,8 @@ def room(draft: Draft) -> Iterator[Problem]:
             yield Problem(
                 where,
                 tr(
-                    "lies outside the box about the safe pose, where a run ends and the next one "
-                    "starts; move it, or make [box] larger"
+                    "is outside the box around the safe pose, where a run ends and the next "
+                    "one starts; move it, or make [box] larger"
                 ),
             )
 
@@ -132,7 +132,7 @@ def _together(box: Box, poses: list[FlangePose]) -> Iterator[Problem]:
     tall = any(abs(a.z_mm - b.z_mm) > box.down_mm + box.up_mm for a, b in combinations(poses, 2))
     if wide or tall:
         yield Problem(
-            "box", tr("is too small: wherever the robot starts, some pose of a tool lies outside")
+            "box", tr("is too small: wherever the robot starts, some pose of a tool is outside")
         )
 
 

@@ -276,7 +276,7 @@ class AssistClient(ClosedAtExit):
 
     def _broken(self) -> TransportBrokenError:
         return TransportBrokenError(
-            tr("The simulator behind {url} is gone.", url=self._url),
+            tr("The simulator at {url} is gone.", url=self._url),
             remedy=tr("Start it again."),
         )
 
@@ -315,7 +315,9 @@ def simulator_at(url: str) -> Assisted:
     if named is None:
         raise ConfigError(
             tr("{url!r} is not a sim URL.", url=url),
-            remedy=tr("Known are: {known}.", known=", ".join(f"{it}://NAME" for it in _IN_PROCESS)),
+            remedy=tr(
+                "These are known: {known}.", known=", ".join(f"{it}://NAME" for it in _IN_PROCESS)
+            ),
         )
     return named(parts.hostname or "")
 

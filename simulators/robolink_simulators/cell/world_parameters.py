@@ -158,7 +158,7 @@ def parameters_from_text(pairs: Mapping[str, str]) -> dict[str, object]:
         if name not in parameter_names():
             raise ConfigError(
                 tr("The simulated world has no parameter {name!r}.", name=name),
-                remedy=tr("Known are: {names}.", names=", ".join(parameter_names())),
+                remedy=tr("These are known: {names}.", names=", ".join(parameter_names())),
             )
     values = values_from_text(WorldParameters, pairs)
     for name in ("camera_um_per_px_x", "camera_um_per_px_y"):

@@ -69,7 +69,7 @@ class ControlClient(ClosedAtExit):
         except (OSError, HTTPException, ValueError, RecursionError) as error:
             self.close()
             raise TransportBrokenError(
-                tr("The simulator behind {url} is gone.", url=self._shown),
+                tr("The simulator at {url} is gone.", url=self._shown),
                 remedy=tr("Start it again."),
             ) from error
         if reply.status != _OK or not isinstance(answer, dict):

@@ -141,7 +141,9 @@ class ControlServer(ClosedAtExit):
             case _:
                 return HTTPStatus.NOT_FOUND, _error(
                     tr("There is no such address."),
-                    tr("Known are: {known}.", known=", ".join(map(self._path_of, self.cells))),
+                    tr(
+                        "These are known: {known}.", known=", ".join(map(self._path_of, self.cells))
+                    ),
                 )
 
     def _acted(self, method: str, cell: ControlledCell, act: str, given: dict[str, Any]) -> _Reply:

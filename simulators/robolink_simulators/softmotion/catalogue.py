@@ -73,7 +73,7 @@ def machine_named(name: str, parameters: Mapping[str, float] | None = None) -> M
                 kinematics=name,
                 names=", ".join(sorted(left)),
             ),
-            remedy=tr("Known are: {names}.", names=", ".join(parameter_names(name))),
+            remedy=tr("These are known: {names}.", names=", ".join(parameter_names(name))),
         )
     _require_standing(name, kinematics, limits)
     model = MachineModel(kinematics, limits)
@@ -143,8 +143,8 @@ def _no_machine(name: str) -> ConfigError:
         remedy = tr("Is {name} meant?", name=by_name[close[0]])
     else:
         remedy = tr(
-            "Known are: {names}; the first {count} of them also with + and one of {others}; or "
-            "module:Class for a kinematics of your own.",
+            "These are known: {names}; the first {count} of them also with + and one of "
+            "{others}; or module:Class for a kinematics of your own.",
             names=", ".join((*POSITION_ROWS, *STANDALONE_ROWS)),
             count=len(POSITION_ROWS),
             others=", ".join(ORIENTATION_ROWS),

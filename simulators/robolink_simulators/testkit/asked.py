@@ -55,7 +55,7 @@ class CellRequest:
             if name not in names:
                 raise ConfigError(
                     tr("A simulated cell is not asked for by {name!r}.", name=name),
-                    remedy=tr("Known are: {names}.", names=", ".join(names)),
+                    remedy=tr("These are known: {names}.", names=", ".join(names)),
                 )
         request = cls(**given)
         if request.true_tool is not None and len(request.true_tool) not in (3, 6):

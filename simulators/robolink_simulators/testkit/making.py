@@ -229,5 +229,5 @@ def _name() -> str:
 def _no_medium(medium: str, known: tuple[str, ...]) -> ConfigError:
     return ConfigError(
         tr("A simulator is not served by {medium!r}.", medium=medium),
-        remedy=tr("Known are: {known}.", known=", ".join(known)),
+        remedy=tr("These are known: {known}.", known=", ".join(known)),
     )

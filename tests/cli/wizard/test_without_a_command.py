@@ -33,7 +33,7 @@ def test_a_cell_without_a_command_is_asked_for_a_job(words, tmp_path, monkeypatc
     hand = ScreenHand(words)
     try:
         assert hand.end() == 2
-        assert "No recipe stands beside the cell file" in hand.text
+        assert "There is no recipe beside the cell file" in hand.text
         rows = [row.rstrip() for row in hand.text.split("\n") if row.strip()]
         assert not any(re.search("STOPPED|Missing", row) for row in rows), "nothing was begun"
         assert rows[-1].endswith("calibrate two-pose --tool N")

@@ -59,7 +59,7 @@ def test_f62_a_bent_marker_is_not_acted_on(tmp_path, open_anew, was, bent):
                 f"UPDATE markers SET {column} = replace({column}, ?, ?)", (was, bent)
             )
     connection.close()
-    with pytest.raises(JournalError, match="makes no sense"):
+    with pytest.raises(JournalError, match="cannot be read"):
         open_anew(str(path)).log("cell").open_markers()
 
 
@@ -73,7 +73,7 @@ def test_f62_a_marker_under_another_name_blocks_who_does_not_know_it(tmp_path, o
     with sqlite3.connect(path) as connection:
         connection.execute("UPDATE markers SET controller = 'cemm'")
     connection.close()
-    with pytest.raises(JournalError, match="of cemm makes no sense"):
+    with pytest.raises(JournalError, match="of cemm cannot be read"):
         open_anew(str(path)).log("cell").begin(marker("another"))
 
 

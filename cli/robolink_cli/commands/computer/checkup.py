@@ -35,7 +35,7 @@ def in_words(remarks: Sequence[Remark]) -> Iterator[str]:
         if remark.remedy:
             yield f"      {remark.remedy}"
     if any(remark.level is Level.BAD for remark in remarks):
-        yield tr("Something is in the way; see the first lines.")
+        yield tr("Something is wrong; see the first lines.")
     else:
         yield tr("No obstacle was found.")
 

@@ -52,7 +52,7 @@ def guarded(subject: str, look: Callable[[], Iterable[Remark]]) -> Iterator[Rema
             subject,
             Level.WARN,
             tr("this could not be looked at ({error}).", error=failure(error)),
-            tr("The other lines hold all the same."),
+            tr("The other lines still count."),
         )
 
 

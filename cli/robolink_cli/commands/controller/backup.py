@@ -107,7 +107,7 @@ def compare(
 @click.option(
     "--other-controller",
     is_flag=True,
-    help="The backup is of another controller and meant for this one all the same.",
+    help="The backup is of another controller and is still meant for this one.",
 )
 @controller_options
 @dry_run_option

@@ -90,7 +90,7 @@ def choose_recipe(desk: AskingDesk, cell: "Cell | None") -> "LoadedRecipe":
             desk.tell(f"{path}: {error.what}")
     if not loaded:
         raise ConfigError(
-            tr("No recipe stands beside the cell file, nor in this folder."),
+            tr("There is no recipe beside the cell file, nor in this folder."),
             remedy=tr(
                 "To begin with one that comes along: robolink recipe list. To measure one tool "
                 "without a recipe: robolink calibrate two-pose --tool N"

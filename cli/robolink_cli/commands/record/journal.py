@@ -121,7 +121,7 @@ journal.add_command(drift)
 @journal.command("list")
 @_filters
 @click.option(
-    "--limit", type=click.IntRange(min=1), default=20, show_default=True, help="At most so many."
+    "--limit", type=click.IntRange(min=1), default=20, show_default=True, help="At most this many."
 )
 @json_option
 def list_entries(*, limit: int, **meant: Any) -> None:  # noqa: ANN401 - click's form

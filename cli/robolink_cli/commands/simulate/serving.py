@@ -175,7 +175,7 @@ def named_values(texts: Sequence[str], example: str) -> dict[str, str]:
         name, equals, value = text.partition("=")
         if not equals or name in pairs:
             raise ConfigError(
-                tr("The option {option!r} is not NAME=VALUE, or stands twice.", option=text),
+                tr("The option {option!r} is not NAME=VALUE, or is given twice.", option=text),
                 remedy=tr("Write for example {example}.", example=example),
             )
         pairs[name] = value

@@ -130,7 +130,7 @@ def variable_type(text: str) -> VariableType:
             return kind
     raise ConfigError(
         tr("There is no variable type {text!r}.", text=text),
-        remedy=tr("Known are: {names}.", names=", ".join(VariableType)),
+        remedy=tr("These are known: {names}.", names=", ".join(VariableType)),
     )
 
 

@@ -88,7 +88,7 @@ class Settings:
                 self._window.command(statement)
         if self.read() != before:
             raise NotReadyError(
-                tr("The power mode and speed of before could not be put back."),
+                tr("The previous power mode and speed could not be put back."),
                 reason=NotReadyReason.HIGH_POWER,
                 remedy=tr("Check Power, Speed and SpeedS before you start the cell."),
                 controller=self._identity,

@@ -95,7 +95,7 @@ class Taken:
 
     def _example(self) -> str:
         if self.choices:
-            return tr("Known are: {choices}.", choices=", ".join(self.choices))
+            return tr("These are known: {choices}.", choices=", ".join(self.choices))
         examples = {"whole": "1", "number": "1.5", "flag": "true", "text": '"a"'}
         return tr("Give it as {example}.", example=f'"{self.name}": {examples[self.form]}')
 

@@ -41,7 +41,7 @@ def act_named(cell: ControlledCell, name: object) -> ControlAct:
     if act is None:
         raise UnknownActError(
             tr("The simulator cannot do {act!r}.", act=name),
-            remedy=tr("Known are: {acts}.", acts=", ".join(acts)),
+            remedy=tr("These are known: {acts}.", acts=", ".join(acts)),
         )
     return act
 

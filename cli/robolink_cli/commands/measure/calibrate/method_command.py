@@ -85,7 +85,9 @@ def _of_the_place(method: AnyMethod) -> list[Decorator]:
             motion_option(
                 "--at",
                 metavar="X,Y,Z",
-                help=declared("Where the station is, in the base; else what is known of it."),
+                help=declared(
+                    "Where the station is, in the base; without it, what is known of it."
+                ),
             )
         )
     if method.from_poses is not None and method.pose_help is not None:

@@ -221,7 +221,7 @@ def _angles_deg(node: Node) -> tuple[float, float, float]:
         return node.number("u"), node.number_or("v", 0.0), node.number_or("w", 0.0)
     quaternion = [node.number(name) for name in ("qx", "qy", "qz", "qs")]
     if abs(math.hypot(*quaternion) - 1) > _UNIT_WITHIN:
-        raise unusable(node.path, tr("the quaternion has not the length 1"))
+        raise unusable(node.path, tr("the quaternion's length is not 1"))
     import numpy as np
 
     from robolink.calibration import quaternion_rotations, uvw_deg

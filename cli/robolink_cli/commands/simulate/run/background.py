@@ -69,7 +69,7 @@ def _first_line(process: "subprocess.Popen[bytes]", log: Path, errors: Path) -> 
         time.sleep(_LOOK_S)
     raise ConnectError(
         tr("The simulators did not listen within {seconds:g} s.", seconds=_MOST_S),
-        remedy=tr("What they said meanwhile stands in {path}.", path=errors),
+        remedy=tr("What they said meanwhile is in {path}.", path=errors),
     )
 
 

@@ -121,7 +121,7 @@ class _CellsReader:
         if not isinstance(assist, bool):
             self._object(name, "assist", tr("must be true or false"))
         elif assist and not kind.person:
-            self._object(name, "assist", tr("must be false: nobody stands beside this kind"))
+            self._object(name, "assist", tr("must be false: this kind has no person at the cell"))
         keys = DeclaredKeys(self._commands[str(table["kind"])], self._folder)
         said = {key: value for key, value in table.items() if key not in _OWN_KEYS}
         given = keys.values(said, lambda key, what: self._object(name, key, what))

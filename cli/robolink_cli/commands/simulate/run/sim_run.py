@@ -13,9 +13,7 @@ from robolink_cli.session.context import json_option
 
 @click.command("run")
 @click.argument("file", type=click.Path(dir_okay=False, path_type=Path))
-@click.option(
-    "--check", "only_checked", is_flag=True, help="Look whether the file is right; serve nothing."
-)
+@click.option("--check", "only_checked", is_flag=True, help="Only check the file; serve nothing.")
 @click.option(
     "--wait-ready",
     is_flag=True,

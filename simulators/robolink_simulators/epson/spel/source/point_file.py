@@ -81,7 +81,7 @@ def read_points(path: Path, encoding: str | None = None) -> tuple[dict[int, Poin
 
 def _not_understood(path: Path, number: str) -> ConfigError:
     return ConfigError(
-        tr("Point {number} of {path} makes no sense.", number=number, path=path),
+        tr("Point {number} of {path} cannot be read.", number=number, path=path),
         remedy=tr("Save the points again in RC+."),
     )
 

@@ -1,4 +1,4 @@
-"""What was measured, next to what is stored and what limits say; what became of it, and who hears."""
+"""What was measured, beside what is stored and what limits say; what came of it, and who hears."""
 
 import math
 from collections.abc import Mapping, Sequence

@@ -158,7 +158,7 @@ def test_who_stops_in_the_middle_gets_the_old_value_back(cell):
 @pytest.mark.soak
 @pytest.mark.parametrize("how", ["e-stop", "guard", "Ctrl-C"])
 def test_what_stops_the_robot_in_the_test_leaves_no_unproved_value_in_use(cell, how):
-    pressed = []
+    pressed: list[int] = []
 
     class Presses(Instants):
         def pass_by(self, kind, what=""):

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 from robolink_cli.prompts import operator as _operator
+from robolink_cli.prompts.present import sitting_at
 from robolink_simulators.assist.port import open_eyes
 
 from robolink.model import EntryKind, MarkerKind
@@ -53,6 +54,32 @@ def new_chosen(cell, *more, answers=None, instants=None):
     with somebody(cell, answers) as asked:
         ended = cell.run("recover", "--choose", "new", *more, instants=instants, asks=True)
     return ended, asked
+
+
+class Desk(_operator.AssistedOperator):
+    """A desk at which a person takes the new value, agrees to all points, and jogs."""
+
+    asked: tuple[str, ...] = ()
+
+    @staticmethod
+    def glance():
+        return None
+
+    def regard(self, subject):
+        pass
+
+    @contextmanager
+    def following(self, look):
+        yield
+
+    def ask(self, question, kind):
+        self.asked += (question,)
+        super().ask(question, kind)
+
+    def poll(self, wait_s):
+        assert self._clock is not None
+        self._clock.sleep(0.5)  # a person looks before they answer
+        return "2" if len(self.asked) == 1 else super().poll(wait_s)
 
 
 class Killed(Instants):
@@ -124,6 +151,19 @@ def test_a_tip_that_is_elsewhere_gets_the_old_value_back_with_one_write(cell):
     assert len(questions) > 2
     assert (cell.changed(), cell.open_markers()) == (set(), ())
     assert (len(cell.writes()) - written, cell.selected, verified(cell)) == (1, 1, [False])
+
+
+def test_at_a_desk_the_page_the_check_list_and_the_touches_follow_each_other(cell):
+    with open_eyes(cell.url) as eyes:
+        desk = Desk.with_eyes(eyes, lambda _text: None, clock=cell.clock)
+        assert isinstance(desk, Desk)
+        with sitting_at(desk), pytest.MonkeyPatch.context() as patch:
+            patch.setattr(_recipe_instants, "Person", lambda _instants: desk)
+            ended = cell.run("recover")
+    assert ended.code == 0, ended.err
+    assert desk.asked[:2] == ("Look at the robot: which needle is mounted?", "Start moving")
+    assert len(desk.asked) == 5
+    assert (cell.changed(), cell.open_markers(), verified(cell)) == ({1}, (), [True])
 
 
 @pytest.mark.soak

@@ -39,4 +39,6 @@ def draws_whole_screens() -> bool:
         size = os.get_terminal_size(sys.stderr.fileno())
     except (OSError, ValueError, AttributeError):
         return False
-    return size.columns >= WIDTH and size.lines >= HEIGHT
+    # prompt_toolkit keeps off the last column of a Windows console, which would wrap there.
+    columns = size.columns - (1 if os.name == "nt" else 0)
+    return columns >= WIDTH and size.lines >= HEIGHT

@@ -13,8 +13,8 @@ from robolink.messages import joined, tr
 from robolink_cli.commands.computer.doctor_finding import Level, Remark
 from robolink_cli.commands.computer.requirements import check_versions
 from robolink_cli.console.language import speaking_for
+from robolink_cli.console.output import visible
 from robolink_cli.console.tolerance import tolerate_any_console
-from robolink_cli.console.visible import visible
 
 _FOUND = 1
 _NOT_RUNNABLE = 2

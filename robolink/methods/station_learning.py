@@ -50,6 +50,19 @@ def learn_station(
             ``touch_heights_differ``, ``touch_not_proven``, and those of the solvers.
         ConfigError: Nobody knows what the station switches, or about where it is; or it is a
             camera.
+
+    Example:
+        >>> from robolink.methods import learn_station
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.stations import Station, StationKind
+        >>> from robolink.testing import PaperCell
+        >>> here, tip = Pose(300, 100, 20, 0), ToolOffset(12, -4, -20)
+        >>> station = Station(id="PIN-07", kind=StationKind.PIN)
+        >>> found = PaperCell(here, tip, (310, 95, -40)).run(
+        ...     learn_station(station, here=here, tool=1, tip=tip, sigma_mm=0.02)
+        ... )
+        >>> round(found.x_mm, 3), round(found.y_mm, 3), round(found.z_mm, 3), found.sigma_mm
+        (310.0, 95.0, -40.0, 0.02)
     """
     if station.kind is StationKind.CAMERA:
         raise ConfigError(

@@ -1,4 +1,4 @@
-"""For whoever drives another kind of controller: what it is held to, and one that lives in memory.
+"""For whoever brings a kind of controller or a method: what it is held to, and what to try it with.
 
 The checks are plain functions; any test framework, or none, can call them. They are the bar for the
 kinds of this package too (``tests/contract/test_controller_contract.py``).
@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from robolink.testing.memory_controller import MemoryMachine as MemoryMachine
     from robolink.testing.motion_checks import MOVING_CHECKS as MOVING_CHECKS
     from robolink.testing.on_site import kept_on_site as kept_on_site
+    from robolink.testing.paper_cell import PaperCell as PaperCell
     from robolink.testing.reading_checks import READING_CHECKS as READING_CHECKS
     from robolink.testing.subject import Check as Check
     from robolink.testing.subject import ContractBrokenError as ContractBrokenError
@@ -28,6 +29,7 @@ else:
             "memory_controller": "MemoryController MemoryMachine",
             "motion_checks": "MOVING_CHECKS",
             "on_site": "kept_on_site",
+            "paper_cell": "PaperCell",
             "reading_checks": "READING_CHECKS",
             "subject": "Check ContractBrokenError Subject",
             "suite": "CheckOutcome check_controller outcomes",

@@ -59,6 +59,8 @@ def _value(name: str, text: str, hint: Any) -> object:  # noqa: ANN401 - a type 
         if text.lower() == "none":
             return None
         hint = int
+    if hint is str:
+        return text
     if hint is bool:
         if text.lower() in _TRUTH:
             return _TRUTH[text.lower()]

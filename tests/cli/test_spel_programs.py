@@ -87,6 +87,23 @@ def test_run_tells_where_a_program_failed(ended, program):
     assert "no function nobody" in end.err
 
 
+def test_a_background_task_starts_the_program(ended, program):
+    path = program(GOOD + "Function bg\n  Wait 1\n  StartMain main\nFend\n")
+    end = ended("spel", "run", path, "--option", "background_tasks=bg")
+    assert (end.code, end.out) == (0, "one 2\n3\n")
+    both = ended("spel", "run", path, "--option", "background_tasks=bg", "--function", "main")
+    assert both.out == "one 2\n3\none 2\n3\n"
+
+
+def test_a_background_task_is_named_as_there_is_one(ended, program):
+    end = ended("spel", "run", program(GOOD), "--option", "background_tasks=nobody")
+    assert end.code == 2
+    assert "nobody" in end.err
+    alone = ended("sim", "epson", "--option", "background_tasks=bg")
+    assert alone.code == 2
+    assert "--option background_tasks" in alone.err
+
+
 def test_points_alone_are_no_program(ended, program):
     end = ended("sim", "epson", "--tcp", "127.0.0.1:0", "--points", program("", "a.pts"))
     assert end.code == 2

@@ -95,6 +95,9 @@ def test_every_option_with_named_values_is_varied_here():
         "for_test",
         "integer_overflow",
         "undeclared",
+        "background_tasks",
+        "advanced_task_commands",
+        "windows_status",
         "globals_at_start",
         "ports_of_ended_task",
     }

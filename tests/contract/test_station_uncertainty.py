@@ -91,7 +91,7 @@ def test_the_limit_of_a_process_is_compared_with_the_region():
     assert found.half95_mm == pytest.approx(0.0277, abs=1e-4)
     assert found.region95_radius_mm == pytest.approx(0.0395, abs=1e-4)
     AcceptanceCriteria(interval_mm=0.041).judge_fit(found)
-    with pytest.raises(CalibrationError, match="region") as refused:
+    with pytest.raises(CalibrationError, match="all axes together") as refused:
         AcceptanceCriteria(interval_mm=0.03).judge_fit(found)
     assert refused.value.code == "large_interval"
 

@@ -68,5 +68,5 @@ def test_a_refusal_leaves_no_marker(serve):
 def test_a_marker_of_something_else_is_left_to_a_person(serve):
     marker = Marker("1", MarkerKind.SET, "$SetAnalog,1", "then", {"item": ["analog", "1"]})
     with serve(EpsonSimulator()) as url, robolink.connect(url) as controller:
-        with pytest.raises(ConfigError, match="cannot be understood"):
+        with pytest.raises(ConfigError, match="cannot be read"):
             controller.resolver.examine(marker)

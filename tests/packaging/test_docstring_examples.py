@@ -30,6 +30,7 @@ HELD = (
     "robolink.drift",
     "robolink.inspection",
     "robolink.journal",
+    "robolink.methods",
     "robolink.model",
     "robolink.pose_tables",
     "robolink.protocols.epson_binary",

@@ -122,7 +122,7 @@ def test_nobody_is_told_of_a_half_open_link(login, connect):
     assert other.ask("$Login,") == ""  # the first one still has the only place
     simulator.advance(simulator.now_ns + 61_000_000_000)  # until the remote time-out
     assert other.ask("$Login,") == "#Login,0"
-    assert simulator._links == [other.link]  # nothing is kept of the dead one
+    assert simulator._links._links == [other.link]  # nothing is kept of the dead one
 
 
 @pytest.mark.parametrize("action", ["reset", "half_open", "restart"])

@@ -166,6 +166,7 @@ def test_the_preferences_are_one_field_of_which_the_last_digit_is_bit_0(login):
     assert parse_preferences(field) == {
         Preference.DRY_RUN,
         Preference.RESET_OUTPUTS_OFF,
+        Preference.ADVANCED_TASK_COMMANDS,
         Preference.GLOBALS_CLEARED_AT_START,
     }
 

@@ -200,7 +200,7 @@ def test_a_change_that_another_recovered_meanwhile_is_neither_kept_nor_taken_bac
                 with cell.connected(cell.log("Bob")) as other:
                     assert recover(other, keep=True).left == ()
                     change_tools(other, [Wanted(1, OTHER, NEW[1])])
-                cell.simulator._slot.admit(cell.simulator._links[0], cell.simulator.now_ns)
+                cell.simulator._slot.admit(cell.simulator._links._links[0], cell.simulator.now_ns)
                 change.keep("verified")
     assert cell.tools[1] == OTHER
     assert "verified" not in {entry.verdict for entry in cell.entries(EntryKind.DONE)}

@@ -14,23 +14,35 @@ so that the sentences of the cleaning up cannot break it off.
 
 import io
 import os
+import re
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from typing import TYPE_CHECKING, Final
 
-import click
-
 from robolink.interrupts import Interrupted, output_closed
 from robolink_cli.console.columns import filled, within
 from robolink_cli.console.tolerance import PLAINLY
-from robolink_cli.console.visible import visible as visible
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
 
+_OBEYED: Final = re.compile(
+    "[\x00-\x09\x0b-\x1f\x7f-\x9f"  # C0 without LF, DEL, C1
+    "\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]"  # line separators, direction of writing
+)
+
 _NARROWEST: Final = 20
+
+
+def visible(text: str) -> str:
+    r"""Return ``text`` with everything that a terminal would obey as ``\x1b`` or ``\u202e``.
+
+    CRLF, with which controllers end their lines, is a line feed.
+    """
+    lines = text.replace("\r\n", "\n")
+    return _OBEYED.sub(lambda found: found[0].encode("unicode_escape").decode("ascii"), lines)
 
 
 ShownBy = Callable[[str, bool], None]
@@ -75,6 +87,8 @@ def draw(text: str, *, beside: bool = False) -> None:
         text: One line or several.
         beside: On stderr, beside the result.
     """
+    import click  # not above: doctor shows its findings where click cannot be imported
+
     # The stream is named, because click takes an ASCII console for a misunderstanding and
     # would send it UTF-8.
     click.echo(visible(text), file=sys.stderr if beside else sys.stdout)
@@ -109,6 +123,8 @@ def beside(text: str, taken: int) -> str:
 
 def hand_over(document: str) -> None:
     """Write JSON for a program; it is ASCII, and escapes what it holds by itself."""
+    import click
+
     click.echo(document)
 
 

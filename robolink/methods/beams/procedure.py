@@ -56,6 +56,20 @@ def measure_beams(
     Raises:
         CalibrationError: ``tilted_pose`` before anything moves; ``no_edge``, ``edge_passed``,
             ``bent_needle``, and those of :func:`solve_crossed_beams`.
+
+    Example:
+        >>> from robolink.calibration import Beam
+        >>> from robolink.methods import BeamsParameters, measure_beams
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.stations import BeamStation
+        >>> from robolink.testing import PaperCell
+        >>> beams = BeamStation((Beam(300, 80, 0), Beam(300, 80, 90)), -30, inputs=(3, 4))
+        >>> here, stored = Pose(300, 100, 20, 0), ToolOffset(12, -3.5, -20)
+        >>> broken = {3: lambda at: abs(at[1] - 80) < 0.4, 4: lambda at: abs(at[0] - 300) < 0.4}
+        >>> cell = PaperCell(here, ToolOffset(12.3, -3.9, -20), switches=broken)
+        >>> found = cell.run(measure_beams(beams, BeamsParameters(), here=here, stored=stored))
+        >>> round(found.offset.x_mm, 3), round(found.offset.y_mm, 3)
+        (12.3, -3.9)
     """
     solvable_planes([here], height_of(stored))
     drive = BeamDrive(station, plan, here, stored or NO_OFFSET)
@@ -90,6 +104,20 @@ def trace_beams(
 
     Raises:
         CalibrationError: ``no_edge``, ``edge_passed``, and those of :func:`find_beams`.
+
+    Example:
+        >>> from robolink.calibration import Beam
+        >>> from robolink.methods import BeamsParameters, trace_beams
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.stations import BeamStation
+        >>> from robolink.testing import PaperCell
+        >>> guess = BeamStation((Beam(300, 80, 0), Beam(300, 80, 90)), -30, inputs=(3, 4))
+        >>> broken = {3: lambda at: abs(at[1] - 80.5) < 0.4, 4: lambda at: abs(at[0] - 299) < 0.4}
+        >>> here, pin = Pose(300, 100, 20, 0), ToolOffset(0, 0, -20)
+        >>> cell = PaperCell(here, pin, switches=broken)
+        >>> one, other = cell.run(trace_beams(guess, BeamsParameters(), here=here, tip=pin))
+        >>> round(one.y_mm, 3), round(other.x_mm, 3)
+        (80.5, 299.0)
     """
     travel, crossings = BeamTravel(here), list[Crossing]()
     for aside_mm in asides_mm:
@@ -124,6 +152,22 @@ def verify_by_crossing(
 
     Raises:
         CalibrationError: As :func:`measure_beams`.
+
+    Example:
+        >>> from robolink.calibration import Beam
+        >>> from robolink.methods import BeamsParameters, verify_by_crossing
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.stations import BeamStation
+        >>> from robolink.testing import PaperCell
+        >>> beams = BeamStation((Beam(300, 80, 0), Beam(300, 80, 90)), -30, inputs=(3, 4))
+        >>> tip = Pose(300, 80, 0, 0)
+        >>> proof = verify_by_crossing(
+        ...     beams, BeamsParameters(), here=tip, angles_deg=(0, 90), tolerance_mm=0.05
+        ... )
+        >>> broken = {3: lambda at: abs(at[1] - 80) < 0.4, 4: lambda at: abs(at[0] - 300) < 0.4}
+        >>> shown = PaperCell(tip, ToolOffset(0.2), switches=broken).run(proof)
+        >>> shown.passed, [round(drift.distance_mm, 3) for drift in shown.drifts]
+        (False, [0.2, 0.2])
     """
     travel, drifts = BeamTravel(here), list[Drift]()
     for angle_deg in angles_deg:

@@ -59,6 +59,21 @@ def measure_board(
             ``coincident_fiducials``, ``spacing_mismatch``, and the others of :func:`solve_board`
             and :func:`solve_board_round`.
         LimitError: The arm cannot bring the board before the camera so; nothing was moved.
+
+    Example:
+        >>> from robolink.calibration import BoardDrawing
+        >>> from robolink.methods import measure_board
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.procedures import LookPlan
+        >>> from robolink.stations import CameraStation
+        >>> from robolink.testing import PaperCell
+        >>> board, held = BoardDrawing.of_two(40), ToolOffset(2, -1, -20, 8)
+        >>> camera, here, plan = CameraStation(300, 80, -30), Pose(300, 100, 20, 0), LookPlan()
+        >>> cell = PaperCell(here, held, marks=dict(enumerate(board.seen_from(held), start=1)))
+        >>> stored = ToolOffset(0, 0, -20)
+        >>> found = cell.run(measure_board(camera, plan, board, here=here, stored=stored))
+        >>> round(found.offset.x_mm, 3), round(found.offset.y_mm, 3), round(found.offset.u_deg, 3)
+        (2.0, -1.0, 8.0)
     """
     board.require_apart()
     solvable_planes([here], height_of(stored))
@@ -139,6 +154,23 @@ def verify_board(
 
     Raises:
         CalibrationError: As :func:`measure_board`.
+
+    Example:
+        >>> from robolink.calibration import BoardDrawing
+        >>> from robolink.methods import verify_board
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.procedures import LookPlan
+        >>> from robolink.stations import CameraStation
+        >>> from robolink.testing import PaperCell
+        >>> board, here = BoardDrawing(((20, 0), (-20, 0))), Pose(300, 80, 0, 0)
+        >>> proof = verify_board(
+        ...     CameraStation(300, 80, -30), LookPlan(), board, here=here, angles_deg=(0, 90),
+        ...     tolerance_mm=0.1,
+        ... )
+        >>> fiducials = dict(enumerate(board.seen_from(ToolOffset(0.03)), start=1))
+        >>> shown = PaperCell(here, ToolOffset(), marks=fiducials).run(proof)
+        >>> shown.passed, round(shown.max_drift_mm, 3)
+        (True, 0.03)
     """
     drive = CameraDrive(station, plan, here)
     places = _places(board, aside, nearest_first(angles_deg, here))

@@ -43,6 +43,18 @@ def measure_camera(
         CalibrationError: ``tilted_pose`` before anything moves; ``tip_not_seen``,
             ``several_tips_seen``, ``camera_not_calibrated``, and those of
             :func:`solve_camera_round`.
+
+    Example:
+        >>> from robolink.methods import measure_camera
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.procedures import LookPlan
+        >>> from robolink.stations import CameraStation
+        >>> from robolink.testing import PaperCell
+        >>> camera, here = CameraStation(x_mm=300, y_mm=80, z_mm=-30), Pose(300, 100, 20, 0)
+        >>> course = measure_camera(camera, LookPlan(), here=here, stored=ToolOffset(12, -3.5, -20))
+        >>> found = PaperCell(here, ToolOffset(12.4, -3.8, -20)).run(course)
+        >>> round(found.offset.x_mm, 3), round(found.offset.y_mm, 3)
+        (12.4, -3.8)
     """
 
     def solve(sightings: Sequence[Sighting]) -> CameraRound:

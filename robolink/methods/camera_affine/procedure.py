@@ -47,6 +47,18 @@ def measure_camera_affine(
             when the pattern cannot tell, and ``tilted_pose``; ``tip_not_seen``,
             ``several_tips_seen``, ``camera_changed``, and the others of
             :func:`solve_camera_affine`.
+
+    Example:
+        >>> from robolink.methods import CameraAffineParameters, measure_camera_affine
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.stations import CameraStation
+        >>> from robolink.testing import PaperCell
+        >>> camera, here = CameraStation(x_mm=300, y_mm=80, z_mm=-30), Pose(300, 100, 20, 0)
+        >>> plan, stored = CameraAffineParameters(), ToolOffset(12, -3.5, -20)
+        >>> course = measure_camera_affine(camera, plan, here=here, stored=stored)
+        >>> found = PaperCell(here, ToolOffset(12.2, -3.6, -20)).run(course)
+        >>> round(found.offset.x_mm, 3), round(found.offset.y_mm, 3)
+        (12.2, -3.6)
     """
     _require_pattern(plan)
     solvable_planes([here], height_of(stored))

@@ -42,6 +42,16 @@ def source_of(
         ConfigError: A parameter is outside its limits, does not go together with others, or what
             is to be judged by a limit leaves nothing to judge. Nothing has been sent.
         RobolinkError: What the method itself finds missing at the site.
+
+    Example:
+        >>> from robolink.methods import Site, find_method, source_of
+        >>> from robolink.stations import Station, StationKind
+        >>> from robolink.testing import MemoryController
+        >>> method = find_method("two-pose")
+        >>> pin = Station(id="PIN-07", kind=StationKind.PIN)
+        >>> site = Site(controller=MemoryController(), tool=1, station=pin)
+        >>> type(source_of(method, method.parameters(), site)).__name__
+        'TwoPoseSource'
     """
     check = Check(
         limits=limits,
@@ -65,6 +75,18 @@ def parameter_problems(
 
     The place of a problem is the name of a parameter, or of one of :class:`StatedLimits`. What
     goes together is asked only of parameters that are right in themselves.
+
+    Args:
+        method: The method.
+        parameters: Its parameters.
+        check: What is known besides them: what was stated, and how high the box is.
+
+    Example:
+        >>> from robolink.methods import Check, find_method, parameter_problems
+        >>> method = find_method("n-angle")
+        >>> parameters = method.parameters(count=2)
+        >>> [problem.where for problem in parameter_problems(method, parameters, Check())]
+        ['count']
     """
     outside = tuple(_outside(parameters))
     if outside:

@@ -59,6 +59,17 @@ def measure_n_angle(
         CalibrationError: ``not_touched``, ``typed_ahead``, ``touch_heights_differ``,
             ``touch_not_proven``, ``large_residual``, and as :func:`solve_n_angle`.
         LimitError: The arm cannot turn so over this pin, nor to the other side, nor half as far.
+
+    Example:
+        >>> from robolink.methods import measure_n_angle
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.procedures import TouchPlan
+        >>> from robolink.testing import PaperCell
+        >>> cell = PaperCell(Pose(300, 100, 20, 0), ToolOffset(12.3, -3.9, -20), (310, 95, -40))
+        >>> stored = ToolOffset(12, -4, -20)
+        >>> found = cell.run(measure_n_angle(TouchPlan(), turns_deg=(120, 240), stored=stored))
+        >>> round(found.offset.x_mm, 3), round(found.offset.y_mm, 3), found.dof
+        (12.3, -3.9, 2)
     """
     count = 1 + len(turns_deg)
     touches = PinTouches(plan, comes_down=stored is not None, total=count, retakes=True)

@@ -58,9 +58,24 @@ class LastTouch:
 def find_last_touch(controller: Controller, tool: int, station: str) -> LastTouch:
     """Return the last calibration of a tool on a pin, if it stands for what is stored.
 
+    Args:
+        controller: The controller, connected; its record is looked at.
+        tool: Number of the tool.
+        station: Name of the pin.
+
     Raises:
         CalibrationError: ``no_last_touch``: there is none; ``reference_outdated``: the tool was
             changed since.
+
+    Example:
+        >>> from robolink.errors import CalibrationError
+        >>> from robolink.methods import find_last_touch
+        >>> from robolink.testing import MemoryController
+        >>> try:
+        ...     find_last_touch(MemoryController(), tool=1, station="PIN-07")
+        ... except CalibrationError as error:
+        ...     print(error.code)
+        no_last_touch
     """
     kept = controller.outcomes.recorded(tool=tool, kinds=KEPT)
     newest = next(

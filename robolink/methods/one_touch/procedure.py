@@ -33,6 +33,22 @@ def measure_one_touch(
     Raises:
         CalibrationError: ``not_touched``, ``typed_ahead``, and as ``solve``.
         ConfigError: Nobody knows how long the tool is.
+
+    Example:
+        >>> from robolink.calibration import Pin
+        >>> from robolink.methods import Absolute, measure_one_touch
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.procedures import TouchPlan
+        >>> from robolink.testing import PaperCell
+        >>> here, pin_mm, stored = Pose(300, 100, 20, 0), (310, 95, -40), ToolOffset(12, -4, -20)
+        >>> solver = Absolute(Pin(*pin_mm), sigma_mm=0.02)
+        >>> course = measure_one_touch(
+        ...     TouchPlan(), here=here, pin_mm=pin_mm, u_deg=30, stored=stored,
+        ...     solve=lambda touch: solver.solve([touch], stored),
+        ... )
+        >>> found = PaperCell(here, ToolOffset(12.2, -4.1, -20.3), pin_mm).run(course)
+        >>> [round(length, 3) for length in found.offset.components()[:3]]
+        [12.2, -4.1, -20.3]
     """
     guess = require_known_length(stored)
     contact = carrying(replace(here, u_deg=u_deg), guess, pin_mm)

@@ -140,6 +140,18 @@ def difference_from_last(
     Raises:
         CalibrationError: ``no_last_touch`` or ``reference_outdated``.
         ConfigError: Nothing tells how well a touch repeats.
+
+    Example:
+        >>> from robolink.calibration import NeedleLimits
+        >>> from robolink.errors import CalibrationError
+        >>> from robolink.methods import difference_from_last
+        >>> from robolink.testing import MemoryController
+        >>> limits = NeedleLimits()
+        >>> try:
+        ...     difference_from_last(MemoryController(), 1, "PIN-07", sigma_mm=0.02, limits=limits)
+        ... except CalibrationError as error:
+        ...     print(error.what)
+        Tool 1 was never calibrated on station PIN-07.
     """
     last = find_last_touch(controller, tool, station)
     sigma = sigma_mm or last.touch_sigma_mm

@@ -58,6 +58,17 @@ def measure_pivot(
     Raises:
         CalibrationError: ``not_tilted``; ``not_touched``, ``typed_ahead``, ``touch_not_proven``,
             ``large_residual``; and as :func:`solve_pivot`.
+
+    Example:
+        >>> from robolink.methods import informative_tilts, measure_pivot
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.procedures import TouchPlan
+        >>> from robolink.testing import PaperCell
+        >>> cell = PaperCell(Pose(300, 100, 20, 0), ToolOffset(12.3, -3.9, -20.6), (310, 95, -40))
+        >>> tilts, stored = informative_tilts(6, tilt_deg=30), ToolOffset(12, -4, -20)
+        >>> found = cell.run(measure_pivot(TouchPlan(), tilts=tilts, stored=stored))
+        >>> [round(length, 3) for length in found.offset.components()[:3]]
+        [12.3, -3.9, -20.6]
     """
     result, _ = yield from pivot_then_lift(
         plan, tilts=tilts, stored=stored, sigma_mm=sigma_mm, sampling=sampling
@@ -154,6 +165,19 @@ def verify_by_tilting(
     Raises:
         CalibrationError: ``not_tilted``, and ``not_touched`` or ``typed_ahead`` with the tip drawn
             back.
+
+    Example:
+        >>> from robolink.methods import OverPin, proving_tilts, verify_by_tilting
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.procedures import TouchPlan
+        >>> from robolink.testing import PaperCell
+        >>> pin_mm, lifted = (310, 95, -40), Pose(310, 95, -30, 0)
+        >>> proof = verify_by_tilting(
+        ...     TouchPlan(), over=OverPin(lifted, pin_mm), tilts=proving_tilts(30), tolerance_mm=0.2
+        ... )
+        >>> shown = PaperCell(lifted, ToolOffset(0, 0, -1), pin_mm).run(proof)  # 1 mm too long
+        >>> shown.passed, shown.max_drift_mm > 0.4
+        (False, True)
     """
     tilts = yield from proving_in_reach(over, tilts, plan.lift_mm)
     swing = _Swing(plan, over, PinTouches(plan, planar=False))

@@ -56,6 +56,19 @@ def measure_plane_touch(
         CalibrationError: ``surface_leans``, ``not_tilted``; ``not_touched``, ``typed_ahead``,
             ``touch_not_proven``, ``large_residual``; and as
             :func:`~robolink.calibration.solve_plane_touch`.
+
+    Example:
+        >>> from robolink.methods import PlaneSurvey, measure_plane_touch
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.procedures import TouchPlan
+        >>> from robolink.testing import PaperCell
+        >>> cell = PaperCell(
+        ...     Pose(300, 100, 20, 0), ToolOffset(12.3, -3.9, -20.6), lambda at: (at[0], at[1], -40)
+        ... )
+        >>> stored, survey = ToolOffset(12, -4, -20), PlaneSurvey(count=8)
+        >>> found = cell.run(measure_plane_touch(TouchPlan(), survey, stored=stored, axes=6))
+        >>> [round(length, 3) for length in found.offset.components()[:3]]
+        [12.3, -3.9, -20.6]
     """
     touches = SurfaceTouches(plan)
     over = OverPin.touched((yield from touches.first(0)), stored)

@@ -73,6 +73,16 @@ class PointsSource:
         sentence: Where they come from, for a report.
         in_mm: Whether they are in mm for certain, as the controller's own points are; others are
             doubted where the stored tool, or where the robot is, speaks for metres or inches.
+
+    Example:
+        >>> from robolink.methods import PointsSource
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.testing import MemoryController
+        >>> taught = [Pose(298, 99, -60, 0), Pose(322, 91, -60, 180)]
+        >>> source = PointsSource(lambda: taught, sentence="Points 10 and 11.", in_mm=True)
+        >>> found = source.find(MemoryController(), 1, stored=ToolOffset(12, -3.5, -20))
+        >>> [round(length, 3) for length in found.result.offset.components()[:2]]
+        [12.0, -4.0]
     """
 
     def __init__(
@@ -116,9 +126,23 @@ class PointsSource:
 
         Nobody saw these touches being made: the result says so (docs/reference/evidence.md 1).
 
+        Args:
+            controller: The controller, connected; its tools are read.
+            tool: Number of the tool.
+            stored: The offset stored now, ``None`` where the tool is not defined.
+
         Raises:
             CalibrationError: As :meth:`measure`; ``touch_heights_differ``, ``suspect_units`` among
                 others.
+
+        Example:
+            >>> from robolink.methods import PointsSource
+            >>> from robolink.model import Pose, ToolOffset
+            >>> from robolink.testing import MemoryController
+            >>> source = PointsSource(lambda: [Pose(298, 99, -60, 0), Pose(322, 91, -60, 180)])
+            >>> stored = ToolOffset(12, -3.5, -20)
+            >>> source.find(MemoryController(), tool=1, stored=stored).result.notes[-1]
+            'touches_not_witnessed'
         """
         found = self._found(controller, tool, stored)
         notes = (*found.result.notes, "touches_not_witnessed")

@@ -31,6 +31,19 @@ def measure_runout_table(
 
     Raises:
         CalibrationError: As :func:`measure_camera`, and those of :func:`solve_runout_table`.
+
+    Example:
+        >>> from robolink.methods import RunoutTableParameters, measure_runout_table
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.stations import CameraStation
+        >>> from robolink.testing import PaperCell
+        >>> camera, here = CameraStation(x_mm=300, y_mm=80, z_mm=-30), Pose(300, 100, 20, 0)
+        >>> plan = RunoutTableParameters(turns_deg=tuple(range(0, 360, 45))).look
+        >>> stored = ToolOffset(12, -3.5, -20)
+        >>> course = measure_runout_table(camera, plan, here=here, stored=stored)
+        >>> found = PaperCell(here, ToolOffset(12.1, -3.2, -20)).run(course)
+        >>> round(found.offset.x_mm, 3), round(found.offset.y_mm, 3), len(found.inputs)
+        (12.1, -3.2, 8)
     """
 
     def solve(sightings: Sequence[Sighting]) -> RunoutTableResult:

@@ -75,6 +75,21 @@ def measure_six_point(
     Raises:
         CalibrationError: ``turned_on_the_way``, ``short_axis`` and ``axes_not_square`` when the
             person was told so three times; and as :func:`measure_pivot`.
+
+    Example:
+        >>> from robolink.methods import AxisTeachPlan, informative_tilts, measure_six_point
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.procedures import TouchPlan
+        >>> from robolink.testing import PaperCell
+        >>> true, stored = ToolOffset(12.3, -3.9, -20.6, 9), ToolOffset(12, -4, -20, 10)
+        >>> cell = PaperCell(Pose(300, 100, 20, 0), true, (310, 95, -40))
+        >>> found = cell.run(
+        ...     measure_six_point(
+        ...         TouchPlan(), AxisTeachPlan(), tilts=informative_tilts(6, 30), stored=stored
+        ...     )
+        ... )
+        >>> round(found.offset.z_mm, 3), round(found.offset.u_deg, 3)
+        (-20.6, 9.0)
     """
     fit, lifted = yield from pivot_then_lift(
         plan, tilts=tilts, stored=stored, sigma_mm=sigma_mm, sampling=sampling

@@ -48,6 +48,22 @@ def measure_sphere_touch(
         CalibrationError: ``off_top``, ``radius_contradicted``, ``not_tilted``; ``not_touched``,
             ``typed_ahead``, ``touch_not_proven``, ``large_residual``; and as
             :func:`~robolink.calibration.solve_sphere_touch`.
+
+    Example:
+        >>> import math
+        >>> from robolink.methods import SphereSurvey, measure_sphere_touch
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.procedures import TouchPlan
+        >>> from robolink.testing import PaperCell
+        >>> def onto_the_ball(at, centre=(310, 95, -60), radius_mm=10):
+        ...     share = radius_mm / math.dist(at, centre)
+        ...     return tuple(c + share * (x - c) for x, c in zip(at, centre))
+        >>> cell = PaperCell(Pose(298, 99, 20, 0), ToolOffset(12.3, -3.9, -20.6), onto_the_ball)
+        >>> course = measure_sphere_touch(
+        ...     TouchPlan(), SphereSurvey(radius_mm=10), stored=ToolOffset(12, -4, -20), axes=6
+        ... )
+        >>> [round(length, 3) for length in cell.run(course).offset.components()[:3]]
+        [12.3, -3.9, -20.6]
     """
     touches = SurfaceTouches(plan)
     first = yield from touches.shown(tr("Jog the tip onto the top of the sphere."), key=0)

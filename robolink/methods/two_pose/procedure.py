@@ -31,10 +31,26 @@ def measure_two_pose(
     The second approach uses ``stored`` so that the tip comes down near the pin; without it the
     robot stays at the lift, and the person jogs it down. It ends with the tip lifted off the pin.
 
+    Args:
+        plan: Lift, clearance, and by how much U differs.
+        stored: The offset stored now, ``None`` where the tool is not defined.
+        sigma_mm: Standard deviation of one coordinate of one touch, where it is known.
+
     Raises:
         CalibrationError: ``not_touched``, ``typed_ahead``, ``touch_heights_differ``, and as
             :func:`solve_two_pose`.
         LimitError: The arm cannot turn so over this pin, to neither side.
+
+    Example:
+        >>> from robolink.methods import measure_two_pose
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.procedures import TouchPlan
+        >>> from robolink.testing import PaperCell
+        >>> cell = PaperCell(Pose(300, 100, 20, 0), ToolOffset(12.3, -3.9, -20), (310, 95, -40))
+        >>> plan, stored = TouchPlan(turn_deg=120), ToolOffset(12, -4, -20)
+        >>> found = cell.run(measure_two_pose(plan, stored=stored, sigma_mm=0.02))
+        >>> round(found.offset.x_mm, 3), round(found.offset.y_mm, 3)
+        (12.3, -3.9)
     """
     touches = PinTouches(plan, comes_down=stored is not None, total=2, retakes=True)
     first = yield from touches.first()

@@ -52,6 +52,18 @@ def measure_z_touch(
     Raises:
         CalibrationError: ``tilted_pose`` before anything moves; ``no_edge``, ``edge_passed``, and
             those of :func:`solve_z_touch`.
+
+    Example:
+        >>> from robolink.methods import ZTouchParameters, measure_z_touch
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.stations import TouchStation
+        >>> from robolink.testing import PaperCell
+        >>> plate = TouchStation(x_mm=320, y_mm=60, z_mm=-50, input=5)
+        >>> here, stored = Pose(300, 100, 20, 0), ToolOffset(12, -4, -20)
+        >>> cell = PaperCell(here, ToolOffset(12, -4, -20.4), switches={5: lambda at: at[2] < -50})
+        >>> found = cell.run(measure_z_touch(plate, ZTouchParameters(), here=here, stored=stored))
+        >>> round(found.offset.z_mm, 3)
+        -20.4
     """
     solvable_planes([here], height_of(stored))
     probing = _ZTouchSampler(station, plan, here, stored or NO_OFFSET, here, stored, sigma_mm, here)
@@ -84,6 +96,20 @@ def verify_by_touching(
 
     Raises:
         CalibrationError: As :func:`measure_z_touch`.
+
+    Example:
+        >>> from robolink.methods import ZTouchParameters, verify_by_touching
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.stations import TouchStation
+        >>> from robolink.testing import PaperCell
+        >>> plate, tip = TouchStation(320, 60, -50, input=5), Pose(320, 60, -20, 0)
+        >>> proof = verify_by_touching(
+        ...     plate, ZTouchParameters(), here=tip, angles_deg=(0, 90), tolerance_mm=0.05
+        ... )
+        >>> on_the_plate = {5: lambda at: at[2] < -50}
+        >>> shown = PaperCell(tip, ToolOffset(0, 0, -0.02), switches=on_the_plate).run(proof)
+        >>> shown.heights_only, round(shown.max_drift_mm, 3)
+        (True, 0.02)
     """
     drifts = []
     for angle_deg in angles_deg:

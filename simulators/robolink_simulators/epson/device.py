@@ -208,7 +208,7 @@ class EpsonSimulator(RequestTaking):
 
         Raises:
             ProgramRefused: It cannot be built.
-            ConfigError: A file cannot be read.
+            ConfigError: A file cannot be read, or what is to begin in the background cannot.
         """
         with self.acting():
             project = load_project(self._session, programs, points)
@@ -219,6 +219,7 @@ class EpsonSimulator(RequestTaking):
                 self._companion = None  # the real one is part of the project
             self._desk.starter = self.program.starter(lambda: self._now_ns)
             self.panel.starter = self._desk.starter
+            self.program.begin_background(self._now_ns)
             return self.program
 
     def status_flags(self) -> StatusFlags:
@@ -302,6 +303,8 @@ class EpsonSimulator(RequestTaking):
             self.condition.restart()
             self.machine.forget_volatile(self._now_ns)
             self._window.restart()
+            if self.program is not None:
+                self.program.begin_background(self._now_ns)
 
     def push(self, data: bytes) -> None:
         """Send every client bytes that nobody asked for (F10)."""

@@ -83,6 +83,7 @@ class SpelNumbers:
     motion_aborted: int = 2999  # docs/reference/spel.md 10
     not_in_this_task: int = 2295  # docs/reference/spel.md 10
     robot_in_use: int = 2200  # docs/reference/spel.md 10
+    preference_off: int = 2194
     port_not_open: int = 2909
     port_of_other_task: int = 2912
     port_in_use: int = 2900
@@ -234,6 +235,12 @@ class EpsonOptions:
             type [open].
         globals_at_start: Start clears global variables that are not preserved [D for the Run
             window], or keeps them.
+        background_tasks: Functions that begin as background tasks when the controller starts, with
+            commas between [D; that they begin with the controller is I].
+        advanced_task_commands: Preference "advanced task commands": programs may say StartMain,
+            Cont and Reset Error [D; that it is on is assumed, as samples use all three].
+        windows_status: What WindowsStatus tells: 1 for a PC, 2 for RC+, 3 for both [D; that
+            neither is connected is assumed].
         ports_of_ended_task: A task that ends closes its ports, or leaves them open [U].
         rs232_numbers: How Remote RS232 writes numbers [D in three languages, D otherwise in one].
         rs232_nak_code: How the code of a refusal is written there [U].
@@ -302,6 +309,9 @@ class EpsonOptions:
     integer_overflow: Literal["error", "wrap"] = "error"
     undeclared: Literal["error", "real", "double"] = "error"
     globals_at_start: Literal["cleared", "kept"] = "cleared"
+    background_tasks: str = ""
+    advanced_task_commands: bool = True
+    windows_status: Literal[0, 1, 2, 3] = 0
     ports_of_ended_task: Literal["closed", "open"] = "closed"
     rs232_numbers: Literal["binary", "ascii_hex"] = "binary"
     rs232_nak_code: Literal["digits", "binary"] = "digits"

@@ -66,6 +66,7 @@ class RefusalKind(StrEnum):
     ABORTED_AT_REST = "aborted_at_rest"
     NOT_IN_THIS_TASK = "not_in_this_task"
     ROBOT_IN_USE = "robot_in_use"
+    PREFERENCE_OFF = "preference_off"
     PORT_NOT_OPEN = "port_not_open"
     PORT_OF_OTHER_TASK = "port_of_other_task"
     PORT_IN_USE = "port_in_use"

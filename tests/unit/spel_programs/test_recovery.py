@@ -37,9 +37,16 @@ def ends_after(made, number):
     return [motion.flange_mm for motion in made.simulator.machine.arm.motions.motions(number)]
 
 
+SEEN = "  Print CtrlInfo(1) And &H6000, RobotInfo(1)\n"
+
+
 def broken_off(cell, recover):
+    return broken_off_of(cell, GUARDED.format(recover=recover))
+
+
+def broken_off_of(cell, program):
     """Start a motion, open the safeguard on the way, move the arm by hand, close it."""
-    made = cell(GUARDED.format(recover=recover))
+    made = cell(program)
     made.runner.start("main", 0)
     advanced(made, 0.5)
     arm = made.simulator.machine.arm
@@ -67,6 +74,15 @@ def test_the_robot_goes_back_to_where_the_safeguard_opened_and_then_on(cell, rec
     assert printed[-2:] == ["1 0 -1 0", "arrived"]
     assert printed[1:-2] == (["-1"] if recover.startswith("Print") else [])
     assert made.runner.failure is None
+
+
+def test_a_program_sees_that_the_robot_is_on_its_way_back(cell):
+    watched = GUARDED.replace("  Cont\n", "  Cont\nFend\nFunction watch\n  Wait 0.02\n" + SEEN)
+    made, _ = broken_off_of(cell, watched.format(recover="Xqt 10, watch, NoPause\n  Recover All"))
+    advanced(made, 20)
+    printed = "".join(made.runner.console).splitlines()
+    assert printed[:2] == ["8192 2 0", "16384 4"]
+    assert printed[-2:] == ["1 0 -1 0", "arrived"]
 
 
 def test_without_move_only_the_motors_come_on(cell):

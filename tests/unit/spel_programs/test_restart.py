@@ -79,9 +79,7 @@ Fend
 
 
 def test_startmain_starts_a_program_from_the_background_once(cell):
-    made = cell(BACKGROUND)
-    functions = made.runner.project.functions
-    made.runner.begin(functions["bgmain"], [], TaskKind.BACKGROUND, None, 0)
+    made = cell(BACKGROUND, background_tasks="BgMain")
     made.simulator.advance(700_000_000)
     assert made.simulator.condition.task is Task.RUNNING
     assert made.runner.tasks[1].kind is TaskKind.NORMAL

@@ -70,8 +70,7 @@ def check(files: tuple[Path, ...], points: tuple[Path, ...]) -> None:
 @programs_argument
 @click.option(
     "--function",
-    default="main",
-    show_default=True,
+    show_default="main; none beside background tasks",
     help="The function to start; it takes no arguments.",
 )
 @project_options
@@ -98,7 +97,7 @@ def run(
     *,
     files: tuple[Path, ...],
     points: tuple[Path, ...],
-    function: str,
+    function: str | None,
     vision: Path | None,
     lines: tuple[str, ...],
     folder: Path | None,
@@ -108,6 +107,9 @@ def run(
     most_s: float,
 ) -> None:
     """Run SPEL+ programs on a simulated controller and show what they print.
+
+    --option background_tasks=NAME,NAME names functions that begin as background tasks. They go on
+    until --for is over, and may start main themselves (StartMain); nothing else is started then.
 
     Simulated time does not wait, unless a TCP/IP port is open or Input waits for a line, which is
     taken from here. Nothing but this machine is reached, and no robot moves.
@@ -120,6 +122,8 @@ def run(
     printed = list[str]()
     simulator.load(files, points)
     ProjectSurroundings(vision, lines, folder).install(simulator)
+    if function is None and not simulator.options.background_tasks:
+        function = "main"
     ended = _run(simulator, function, most_s, trace=trace, printed=printed)
     program = simulator.program
     if program is not None and program.failure is not None:
@@ -134,7 +138,7 @@ def run(
 
 def _run(
     simulator: "EpsonSimulator",
-    function: str,
+    function: str | None,
     most_s: float,
     *,
     trace: bool,
@@ -158,7 +162,8 @@ def _run(
             f"{task.now_ns / 1e9:12.6f} {task.task_number:3} {file}:{line}: {text}"
         )
     try:
-        runner.start(function, simulator.now_ns)
+        if function is not None:
+            runner.start(function, simulator.now_ns)
     except SpelRefusal as refusal:
         raise click.UsageError(
             tr("There is no function {name} without arguments.", name=function)

@@ -78,7 +78,8 @@ class DrivenRobot:
         motors_on: Whether the motors are on.
         power_high: Whether power is high; low after anything that resets the parameters.
         jump: When the last Jump began, and how long its three parts were to take, in ns.
-        recovers_to: Where it was when the safeguard opened, until it is back there.
+        recovers_to: Where it was when the safeguard opened, until it goes back there.
+        way_back: Which of its motions leads back there, ``None`` before the first.
         latch: Takes its position at edges of an input.
         reservation: The motion that waits for SyncRobots, if whoever gave it still does.
         opened_brakes: Joints whose brake was opened by hand while the motors are off.
@@ -110,6 +111,7 @@ class DrivenRobot:
         self.latch = PositionLatch(self.arm)
         self.jump: tuple[int, tuple[int, ...]] | None = None
         self.recovers_to: Joints | None = None
+        self.way_back: int | None = None
         self.drives = DriveSettings(model.axes)
         limits = TorqueLimits(lambda: self.drives, lambda: self.power_high)
         self.observer = DriveObserver(self.arm, self._load, limits.shares)
@@ -129,6 +131,11 @@ class DrivenRobot:
         return (
             self.arm.model.with_arm(arms.values(arms.selected)) if arms.selected else self.arm.model
         )
+
+    @property
+    def recovering(self) -> bool:
+        """Whether it is on its way back to where the safeguard stopped it."""
+        return self.arm.moving and self.arm.moves_started == self.way_back
 
     def put_in_force(self, number: int) -> None:
         """Put an arm in force: all that is said of places counts for it from then on.

@@ -78,7 +78,9 @@ def preferences_of(options: EpsonOptions) -> frozenset[Preference]:
         Preference.DRY_RUN: options.dry_run,
         Preference.VIRTUAL_IO: options.virtual_io,
         Preference.MAINTENANCE_DATA: options.maintenance_data,
-        Preference.GLOBALS_CLEARED_AT_START: True,
+        Preference.GLOBALS_CLEARED_AT_START: options.globals_at_start == "cleared",
+        Preference.BACKGROUND_TASKS: bool(options.background_tasks),
+        Preference.ADVANCED_TASK_COMMANDS: options.advanced_task_commands,
     }
     return frozenset(preference for preference, is_on in on.items() if is_on)
 

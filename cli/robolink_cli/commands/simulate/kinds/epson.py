@@ -161,6 +161,8 @@ def load_programs(
     """
     if not programs:
         named = "--points" if points else surroundings.named
+        if named is None and simulator.options.background_tasks:
+            named = "--option background_tasks"
         if named is not None:
             raise click.UsageError(tr("{option} goes with --program.", option=named))
         return

@@ -38,6 +38,7 @@ def recover(evaluator: Evaluator, command: KeywordStatement) -> int:
             if moves and robot.recovers_to is not None:
                 leg = go_leg(machine, robot.arm.joints, robot.recovers_to)
                 longest_ns = max(longest_ns, robot.arm.start([leg], now_ns) - now_ns)
+                robot.way_back = robot.arm.moves_started
             robot.recovers_to = None
     finally:
         machine.robot_number = chosen

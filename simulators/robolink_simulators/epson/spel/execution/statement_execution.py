@@ -59,6 +59,7 @@ class StatementExecution:
     Attributes:
         output: What was printed so far; each Print ends with CRLF unless it said otherwise.
         error: Why it failed, ``None`` while it has not.
+        moves: Whether it moves the robot.
     """
 
     def __init__(
@@ -71,6 +72,7 @@ class StatementExecution:
     ) -> None:
         self.output = ""
         self.error: SpelError | None = None
+        self.moves = any(isinstance(one, MotionStatement) for one in statements)
         self._evaluator = evaluator
         self._pending = list(reversed(statements))
         self._began_ns = now_ns

@@ -56,6 +56,7 @@ def _controller(session: Session, arguments: Arguments) -> Value:
         | flags.serious_error << 11
         | flags.warning << 12
         | any(robot.recovers_to is not None for robot in session.machine.robots) << 13
+        | any(robot.recovering for robot in session.machine.robots) << 14
     )
     told = {
         1: ready,
@@ -115,7 +116,7 @@ def _robot(session: Session, arguments: Arguments) -> Value:
     machine = session.machine
     words = {
         0: machine.motors_on << 3 | machine.power_high << 4 | 1 << 8 | machine.till_met << 14,
-        1: (machine.robot.recovers_to is not None) << 1,
+        1: (machine.robot.recovers_to is not None) << 1 | machine.robot.recovering << 2,
         2: int(machine.robot.at_home),
         3: (1 << machine.model.axes) - 1 if machine.motors_on else 0,
         4: 0,
@@ -154,7 +155,7 @@ STATE_FUNCTIONS: Final[dict[str, tuple[range, StateFunction]]] = {
     "folderexists": (range(1, 2), lambda s, a: s.files.exists(as_text(a[0]), folder=True)),
     "curdir$": (range(1), lambda s, _: s.files.present),
     "curdrive$": (range(1), lambda s, _: s.files.drive.upper()),
-    "windowsstatus": (range(1), lambda *_: 0),  # neither a PC nor RC+ is connected (assumed)
+    "windowsstatus": (range(1), lambda s, _: s.options.windows_status),
     "projectname$": (range(1), lambda s, _: s.project_name),
     "tw": (range(1), lambda s, _: s.memory.timed_out),
 }

@@ -48,6 +48,8 @@ from robolink_simulators.epson.spel.programs.operations import (
 )
 from robolink_simulators.epson.spel.source.faults import ProgramFault, SourcePlace
 from robolink_simulators.epson.spel.tasks.compiled import JumpTarget, LocalSlot, Operation
+from robolink_simulators.epson.spel.tasks.permissions import require_advanced
+from robolink_simulators.epson.spel.tasks.task import SpelTask
 from robolink_simulators.epson.spel.tree import (
     AssignPoint,
     AssignVariable,
@@ -267,7 +269,7 @@ class FunctionCompiler:
                 )
             statement = without_forced(statement)
             if statement.name == "reset" and statement.arguments == (Name("error"),):
-                emitter.emit(lambda t: t.runner.end_others(t))
+                emitter.emit(clear_for_error)
         prepared = emitter.hoisted(statement)
         self._check(prepared)
         emitter.emit(carry_out(prepared))
@@ -284,6 +286,16 @@ class FunctionCompiler:
         elif hasattr(node, "__dataclass_fields__"):
             for name in node.__dataclass_fields__:
                 self._check(getattr(node, name))
+
+
+def clear_for_error(task: SpelTask) -> None:
+    """Do for Reset Error what comes before the error is cleared.
+
+    Raises:
+        Refusal: The preference does not let programs say it.
+    """
+    require_advanced(task)
+    task.runner.end_others(task)
 
 
 def carry_out(statement: Statement) -> Operation:

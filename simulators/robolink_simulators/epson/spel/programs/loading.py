@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
+from robolink.errors import ConfigError
+from robolink.messages import tr
 from robolink_simulators.epson.memory.bits import IOLabel
 from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.options import EpsonOptions
@@ -13,7 +15,8 @@ from robolink_simulators.epson.spel.programs.project import build_project
 from robolink_simulators.epson.spel.session import PointFile, Session
 from robolink_simulators.epson.spel.source.point_file import read_points
 from robolink_simulators.epson.spel.source.source_text import encoding_of
-from robolink_simulators.epson.spel.tasks.compiled import SpelProject
+from robolink_simulators.epson.spel.tasks.compiled import CompiledFunction, SpelProject
+from robolink_simulators.epson.spel.tasks.task_table import MOST_IN_BACKGROUND
 
 IO_LABELS: Final = "IOLabels.dat"
 
@@ -85,10 +88,11 @@ def load_project(
 
     Raises:
         ProgramRefused: It cannot be built; the controller is as it was.
-        ConfigError: A file cannot be read.
+        ConfigError: A file cannot be read, or what is to begin in the background cannot.
     """
     data = project_data(programs, points)
     project = build_project(programs, session.options, labels=data.labels, encoding=data.encoding)
+    project.background = _in_the_background(project, session.options.background_tasks)
     session.point_files.clear()
     session.point_files.update(data.files)
     session.files.encoding = (data.encoding or "utf-8").removesuffix("-sig")
@@ -101,6 +105,20 @@ def load_project(
     for name, variable in project.preserved().items():
         session.variables.adopt(name, variable.kind.name, variable.bounds, variable.listed())
     return project
+
+
+def _in_the_background(project: SpelProject, names: str) -> tuple[CompiledFunction, ...]:
+    """Return the functions that are named for the background, with commas between."""
+    found = list[CompiledFunction]()
+    for name in filter(None, (part.strip() for part in names.split(","))):
+        function = project.functions.get(name.lower())
+        if function is None or function.parameters:
+            raise ConfigError(tr("There is no function {name} without arguments.", name=name))
+        found.append(function)
+    if len(found) > MOST_IN_BACKGROUND:
+        text = tr("A controller has {most} background tasks.", most=MOST_IN_BACKGROUND)
+        raise ConfigError(text)
+    return tuple(found)
 
 
 def check_project(

@@ -83,12 +83,14 @@ class SpelProject:
             ``preserve``.
         modules: Variables of each file.
         sources: The lines of each file, for those who follow a run.
+        background: The functions that begin with the controller, as background tasks.
     """
 
     functions: dict[str, CompiledFunction] = field(default_factory=dict)
     shared: dict[str, tuple[Variable, str]] = field(default_factory=dict)
     modules: dict[str, dict[str, Variable]] = field(default_factory=dict)
     sources: dict[SourcePlace, str] = field(default_factory=dict)
+    background: tuple[CompiledFunction, ...] = ()
 
     def clear_globals(self) -> None:
         """Forget what is not preserved, as the start of a function does."""

@@ -121,7 +121,7 @@ TASK_FUNCTIONS: Final[dict[str, tuple[range, TaskFunction]]] = {
     "erl": (range(2), _of_failure("line", 0)),
     "erf$": (range(2), _of_failure("function", "")),
     "era": (range(2), lambda *_: 0),
-    "errb": (range(2), lambda *_: 0),
+    "errb": (range(2), _of_failure("robot", 0)),
     "ert": (range(1), _failed_task),
     "tmr": (range(1, 2), lambda t, a: _runner(t).sharing.timer_s(as_integer(a[0]), t.present_ns)),
     "elapsedtime": (range(1), _elapsed),

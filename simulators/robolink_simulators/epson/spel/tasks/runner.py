@@ -26,6 +26,9 @@ from robolink_simulators.epson.vision.system import VisionSystem
 BURST_NS: Final = 1_000_000
 """How long a task goes on before the others are looked at, in ns, if none of them is due."""
 
+NO_JOINT: Final = 0
+"""The joint of an error that lies at none; which joint met it, no error tells here."""
+
 _CONSOLE_LINES: Final = 2000
 TraceHook = Callable[[SpelTask, str, int, str], None]
 """Called with a task, file, line and text before each statement."""
@@ -96,8 +99,6 @@ class ProgramRunner:
         function = self.project.functions.get(name.lower())
         if function is None or function.parameters:
             raise SpelRefusal(RefusalKind.NO_SUCH_FUNCTION, f"There is no function {name}")
-        if self.session.options.globals_at_start == "cleared":
-            self.project.clear_globals()
         self.advance(now_ns)
         return self.begin_main(function, now_ns)
 
@@ -107,9 +108,17 @@ class ProgramRunner:
         Raises:
             Refusal: No task is free.
         """
+        if self.session.options.globals_at_start == "cleared":
+            self.project.clear_globals()
+        self.traps.clear()
         self._main, self.failure = function, None
         self._condition.task = Task.RUNNING
         return self.begin(function, [], TaskKind.NORMAL, None, now_ns)
+
+    def begin_background(self, now_ns: int) -> None:
+        """Begin the background tasks of the project, as a controller does that was switched on."""
+        for function in self.project.background:
+            self.begin(function, [], TaskKind.BACKGROUND, None, now_ns)
 
     def begin(
         self,
@@ -182,7 +191,7 @@ class ProgramRunner:
         self._condition.failure = (failure.number % 10_000, str(failure))
         self._stopped_by = "abort"
         if not stood:  # a task of Trap Abort that fails starts none (documented)
-            self.traps.happen("error", task.now_ns)
+            self.traps.happen("error", task.now_ns, (failure.number, failure.robot, NO_JOINT))
         self._stop(background=True)
 
     def end(self, task: SpelTask) -> None:
@@ -222,11 +231,8 @@ class ProgramRunner:
         if self._main is None:
             raise SpelRefusal(RefusalKind.NO_SUCH_FUNCTION, "No program has run")
         self.quit_all()
-        self.traps.clear()
         self._condition.task, self.table.paused = Task.NONE, False
         self._tidy()
-        if self.session.options.globals_at_start == "cleared":
-            self.project.clear_globals()
         self.begin_main(self._main, now_ns)
 
     def _heed(self) -> None:

@@ -77,6 +77,7 @@ class TaskFailure:
         function: Its function.
         file: Its file.
         line: Line in the file.
+        robot: Number of the robot whose motion met it, 0 for none.
     """
 
     number: int
@@ -85,6 +86,7 @@ class TaskFailure:
     function: str
     file: str
     line: int
+    robot: int = 0
 
     def __str__(self) -> str:
         where = f"{self.file}:{self.line} in {self.function} of task {self.task}"
@@ -257,13 +259,19 @@ class SpelTask(Evaluator):
             self.loop_passes = 0
             raise SpelRefusal(RefusalKind.EXCESSIVE_LOOP, "Excessive loop detected")
 
-    def fail(self, number: int, text: str) -> bool:
-        """Take an error: go to where it is dealt with; tell whether there is such a place."""
+    def fail(self, number: int, text: str, robot: int = 0) -> bool:
+        """Take an error: go to where it is dealt with; tell whether there is such a place.
+
+        Args:
+            number: What Err tells.
+            text: The controller's sentence.
+            robot: The robot whose motion met it, 0 for none.
+        """
         frame = self.frame
         place = frame.function.places[self.pc - 1]
         self.frame.pc = self.pc
         self.failure = TaskFailure(
-            number, text, self.task_number, frame.function.spelled, place.file, place.line
+            number, text, self.task_number, frame.function.spelled, place.file, place.line, robot
         )
         self.session.memory.last_error = number
         for depth in range(len(self.frames) - 1, -1, -1):

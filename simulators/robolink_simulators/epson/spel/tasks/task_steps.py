@@ -110,7 +110,8 @@ class TaskSteps:
             self._runner.show(execution.output)
         task.now_ns = max(task.now_ns, execution.ended_ns)
         if execution.error is not None:
-            self._fail(task, execution.error.number, execution.error.text)
+            robot = task.robot_number if execution.moves else 0
+            self._fail(task, execution.error.number, execution.error.text, robot)
 
     def fail(self, task: SpelTask, refusal: SpelRefusal) -> None:
         """Let a task meet an error: where it deals with it, or at its end."""
@@ -119,7 +120,7 @@ class TaskSteps:
         else:
             self._fail(task, getattr(self._session.options.numbers, refusal.kind), refusal.text)
 
-    def _fail(self, task: SpelTask, number: int, text: str) -> None:
+    def _fail(self, task: SpelTask, number: int, text: str, robot: int = 0) -> None:
         task.waiting = None
-        if not task.fail(number, text) and task.failure is not None:
+        if not task.fail(number, text, robot) and task.failure is not None:
             self._runner.give_up(task, task.failure)

@@ -13,6 +13,8 @@ _NORMAL: Final = range(1, 33)
 _BACKGROUND: Final = range(65, 81)
 _TRAPS: Final = range(257, 268)
 
+MOST_IN_BACKGROUND: Final = len(_BACKGROUND)
+
 
 class TaskTable:
     """The tasks of a controller.

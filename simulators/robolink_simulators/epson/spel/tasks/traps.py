@@ -1,10 +1,12 @@
 """Trap: what interrupts a task when something happens (docs/reference/spel.md 4.7)."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
 from robolink_simulators.epson.refusals import SpelRefusal
 from robolink_simulators.epson.spel.expressions.closures import Run
+from robolink_simulators.epson.spel.expressions.data_types import Variable
 from robolink_simulators.epson.spel.expressions.values import truth
 from robolink_simulators.epson.spel.statements.waiting import LOOK_NS, follows_robot
 from robolink_simulators.epson.spel.tasks.compiled import CompiledFunction, JumpTarget
@@ -12,6 +14,8 @@ from robolink_simulators.epson.spel.tasks.task import CallFrame, SpelTask, TaskK
 
 EVENTS: Final = frozenset({"emergency", "error", "pause", "sgopen", "sgclose", "abort", "finish"})
 HIGHEST_TRAP: Final = 4
+TOLD_OF_ERROR: Final = ("number", "robot", "joint")
+"""What a function of Trap Error may take: three Integer by value (p. 855)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,11 +80,17 @@ class Traps:
         self._conditions.clear()
         self._events.clear()
 
-    def happen(self, event: str, now_ns: int) -> None:
-        """Start what an event starts."""
+    def happen(self, event: str, now_ns: int, about: Sequence[int] = ()) -> None:
+        """Start what an event starts.
+
+        Args:
+            event: What happens.
+            now_ns: When.
+            about: What the function is told of it, if it asks for that.
+        """
         function = self._events.get(event)
         if function is not None:
-            self._start(function, now_ns)
+            self._start(function, now_ns, about)
 
     def look(self, now_ns: int) -> None:
         """Fire the traps whose condition holds; each fires once (documented)."""
@@ -115,8 +125,12 @@ class Traps:
         elif trap.function is not None:
             task.enter(trap.function, [], task.frame.function.result_slots - 1)
 
-    def _start(self, function: CompiledFunction, now_ns: int) -> None:
+    def _start(self, function: CompiledFunction, now_ns: int, about: Sequence[int] = ()) -> None:
+        asked = function.parameters
+        given = [Variable(slot.kind) for slot in function.variables[1 : 1 + asked]]
+        for variable, value in zip(given, about, strict=bool(given)):
+            variable.values[0] = value
         try:
-            self._runner.begin(function, [], TaskKind.TRAP, None, now_ns)
+            self._runner.begin(function, given, TaskKind.TRAP, None, now_ns)
         except SpelRefusal:
             return

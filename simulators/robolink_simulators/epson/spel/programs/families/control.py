@@ -17,6 +17,7 @@ from robolink_simulators.epson.spel.line_tree import TaskStatement
 from robolink_simulators.epson.spel.programs.emitter import Emitter
 from robolink_simulators.epson.spel.tasks.compiled import Operation
 from robolink_simulators.epson.spel.tasks.functions import number_of_function
+from robolink_simulators.epson.spel.tasks.permissions import require_advanced, require_unbound
 from robolink_simulators.epson.spel.tasks.task import SpelTask, TaskKind
 from robolink_simulators.epson.spel.tasks.waits import Blocking
 from robolink_simulators.epson.spel.tree import Expression, Name
@@ -268,7 +269,11 @@ def _pause(emitter: Emitter, node: TaskStatement) -> Operation:  # noqa: ARG001
 
 
 def _continue(emitter: Emitter, node: TaskStatement) -> Operation:  # noqa: ARG001
-    return lambda t: t.runner.turn_to(Task.RUNNING)
+    def go(t: SpelTask) -> None:
+        require_advanced(t)
+        t.runner.turn_to(Task.RUNNING)
+
+    return go
 
 
 def _restart(emitter: Emitter, node: TaskStatement) -> Operation:
@@ -276,6 +281,7 @@ def _restart(emitter: Emitter, node: TaskStatement) -> Operation:
         raise emitter.fault(tr("{word} takes no arguments", word=node.word))
 
     def go(t: SpelTask) -> object:
+        require_unbound(t)
         t.runner.start_again(t.now_ns)
         return t.turn()
 
@@ -291,6 +297,7 @@ def _start_main(emitter: Emitter, node: TaskStatement) -> Operation:
         raise emitter.fault(tr("{word} needs main to main63", word=node.word))
 
     def go(t: SpelTask) -> None:
+        require_advanced(t)
         if t.kind is not TaskKind.BACKGROUND or not t.runner.table.only_background:
             raise SpelRefusal(RefusalKind.NOT_IN_THIS_TASK, "Background only, one program at once")
         t.runner.begin_main(function, t.now_ns)

@@ -9,14 +9,14 @@ from robolink_simulators.epson.spel.line_tree import VisionAccess, VisionRun, Vi
 from robolink_simulators.epson.spel.programs.emitter import Emitter
 from robolink_simulators.epson.spel.programs.scope import Reference
 from robolink_simulators.epson.spel.tasks.compiled import Operation
-from robolink_simulators.epson.spel.tasks.task import SpelTask, TaskKind
+from robolink_simulators.epson.spel.tasks.permissions import require_unbound
+from robolink_simulators.epson.spel.tasks.task import SpelTask
 from robolink_simulators.epson.spel.tasks.waits import Blocking
 from robolink_simulators.epson.spel.tree import ByReference, Expression, Name
 from robolink_simulators.epson.vision.picture_file import SUFFIX
 from robolink_simulators.epson.vision.system import RESULTS, VisionSystem
 
 _NS_PER_MS = 1_000_000
-_FORBIDDEN = frozenset({TaskKind.NO_ABORT, TaskKind.BACKGROUND})
 
 
 def vision_of(t: SpelTask) -> VisionSystem:
@@ -25,8 +25,7 @@ def vision_of(t: SpelTask) -> VisionSystem:
     Raises:
         Refusal: This kind of task may not, or the project has none.
     """
-    if t.kind in _FORBIDDEN:
-        raise SpelRefusal(RefusalKind.NOT_IN_THIS_TASK, "No vision in this kind of task")
+    require_unbound(t)
     vision: VisionSystem | None = t.runner.vision
     if vision is None:
         raise SpelRefusal(RefusalKind.VISION_SEQUENCE, "The project has no vision sequences")

@@ -173,13 +173,13 @@ def _judged(
         action: What settling would do about it, without a full stop.
     """
     if restored:
-        sentence = tr("Tool {tool} is selected, as it was before.", tool=now)
+        sentence = tr("Tool {tool} is selected, as before.", tool=now)
         return Finding(marker, Verdict.DONE, sentence)
     if now == before:
         sentence = tr("Tool {tool} is selected, as before; power mode or speed are not.", tool=now)
     else:
         sentence = tr(
-            "Tool {now} is selected; before it was tool {before}.", now=now, before=before
+            "Tool {now} is selected now; it was tool {before} before.", now=now, before=before
         )
     entry = NewEntry(EntryKind.SELECTION, tool=before, verdict=Verdict.NOT_RESTORED)
     return Finding(marker, Verdict.NOT_RESTORED, sentence, action, (entry,))

@@ -127,10 +127,10 @@ def require_inside(controller: Controller, steps: Sequence[PlannedStep]) -> None
             raise LimitError(
                 tr("{step} {refusal}", step=step.text, refusal=step.refusal),
                 remedy=tr(
-                    "The allowed area lies about where the robot stands at the start: jog "
-                    "closer to the pin ('robolink robot jog'), or widen the area. Where the "
-                    "arm cannot reach, put the station elsewhere, or turn the tool another "
-                    "way."
+                    "The allowed area is around where the robot stands at the start: jog the "
+                    "tip closer to where it is measured ('robolink robot jog'), or widen the "
+                    "area. Where the arm cannot reach, put the station elsewhere, or turn the "
+                    "tool another way."
                 ),
                 controller=controller.identity,
             )

@@ -65,11 +65,15 @@ class CameraDrive:
         seen = list[SeenAt]()
         for place in places:
             if before_camera and place.u_deg == here.u_deg:
-                yield Move(self._beside(place), Path.STRAIGHT, tr("Moving on before the camera."))
+                yield Move(
+                    self._beside(place),
+                    Path.STRAIGHT,
+                    tr("Moving to the next place before the camera."),
+                )
             else:
                 yield from self._turn_to(place, here)
             here, before_camera = self.pose(place), True
-            yield Move(here, Path.STRAIGHT, tr("Coming before the camera from the same side."))
+            yield Move(here, Path.STRAIGHT, tr("Approaching the camera from the same side."))
             seen.append((yield from self._look(place)))
         return seen
 
@@ -158,7 +162,7 @@ class CameraDrive:
         if here.z_mm < high_mm:
             yield Move(replace(here, z_mm=high_mm), Path.STRAIGHT, tr("Lifting before the turn."))
         yield Move(replace(above, z_mm=high_mm), Path.JOINT, tr("Moving above the camera."))
-        yield Move(self._beside(place), Path.STRAIGHT, tr("Lowering before the camera."))
+        yield Move(self._beside(place), Path.STRAIGHT, tr("Lowering into the camera's focus."))
 
     def _beside(self, place: Place) -> Pose:
         pose, by_mm = self.pose(place), self.plan.beside_mm

@@ -91,6 +91,7 @@ def station_payload(station: Station, *, robot: str = "") -> dict[str, Any]:
         "how": station.how,
         "found_at": station.found_at or None,
         "entry": station.entry,
+        "base": None if station.base is None else list(station.base),
         "gauge": station.gauge or None,
         "gauge_due": station.gauge_due or None,
         "check_due": due.isoformat() if due else None,

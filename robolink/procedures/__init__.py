@@ -52,15 +52,15 @@ if TYPE_CHECKING:
     from robolink.procedures.pin.touches import touch_again as touch_again
     from robolink.procedures.pin.touches import turned_touches as turned_touches
     from robolink.procedures.pose_method import PoseMethod as PoseMethod
-    from robolink.procedures.sequential_sampling import TAKE_ALL as TAKE_ALL
-    from robolink.procedures.sequential_sampling import Sampler as Sampler
-    from robolink.procedures.sequential_sampling import Samples as Samples
-    from robolink.procedures.sequential_sampling import SamplingPolicy as SamplingPolicy
-    from robolink.procedures.sequential_sampling import SequentialSampler as SequentialSampler
-    from robolink.procedures.sequential_sampling import agreement as agreement
-    from robolink.procedures.sequential_sampling import finalize_samples as finalize_samples
-    from robolink.procedures.sequential_sampling import may_end_early as may_end_early
-    from robolink.procedures.sequential_sampling import sample_sequentially as sample_sequentially
+    from robolink.procedures.sampling.sampler import Sampler as Sampler
+    from robolink.procedures.sampling.sampler import SequentialSampler as SequentialSampler
+    from robolink.procedures.sampling.sequential import TAKE_ALL as TAKE_ALL
+    from robolink.procedures.sampling.sequential import Samples as Samples
+    from robolink.procedures.sampling.sequential import SamplingPolicy as SamplingPolicy
+    from robolink.procedures.sampling.sequential import agreement as agreement
+    from robolink.procedures.sampling.sequential import finalize_samples as finalize_samples
+    from robolink.procedures.sampling.sequential import may_end_early as may_end_early
+    from robolink.procedures.sampling.sequential import sample_sequentially as sample_sequentially
     from robolink.procedures.source import FindsStation as FindsStation
     from robolink.procedures.source import MeasurementContext as MeasurementContext
     from robolink.procedures.source import MovingSource as MovingSource
@@ -91,9 +91,10 @@ __getattr__ = lazy_exports(
         "pin.touch_plan": "TouchPlan plain_pose",
         "pin.touches": "PinTouches lift_off touch_again turned_touches",
         "pose_method": "PoseMethod",
-        "sequential_sampling": (
-            "Sampler Samples SamplingPolicy SequentialSampler TAKE_ALL agreement finalize_samples "
-            "may_end_early sample_sequentially"
+        "sampling.sampler": "Sampler SequentialSampler",
+        "sampling.sequential": (
+            "Samples SamplingPolicy TAKE_ALL agreement finalize_samples may_end_early "
+            "sample_sequentially"
         ),
         "source": "FindsStation MeasurementContext MovingSource RequiresSensor StopsAbovePin "
         "TipSource TouchesFurther",

@@ -33,6 +33,7 @@ HELD = (
     "robolink.methods",
     "robolink.model",
     "robolink.pose_tables",
+    "robolink.procedures",
     "robolink.protocols.epson_binary",
     "robolink.protocols.epson_text",
     "robolink.protocols.mailbox",

@@ -38,10 +38,17 @@ HELD = (
     "robolink.protocols.epson_text",
     "robolink.protocols.mailbox",
     "robolink.protocols.spel",
+    "robolink.recipe",
+    "robolink.register_maps",
+    "robolink.report",
+    "robolink.runner",
     "robolink.sensing",
+    "robolink.serving",
     "robolink.stations",
+    "robolink.stopping",
     "robolink.testing",
     "robolink.transaction",
+    "robolink.transport",
 )
 """Packages whose callables are held to it."""
 

@@ -26,8 +26,7 @@ TOPS = {
 }
 
 INSIDE = frozenset(
-    f"robolink_simulators.{name}"
-    for name in ("epson", "epson.spel", "faults", "plc", "soak", "soak.rules")
+    f"robolink_simulators.{name}" for name in ("epson", "epson.spel", "plc", "soak", "soak.rules")
 )
 """Packages of simulators that are not held to it."""
 

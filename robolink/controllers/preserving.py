@@ -34,6 +34,21 @@ class Preserver:
         link: The controller.
         tools: Its tools.
         groups: What moves.
+
+    Example:
+        >>> from robolink import ToolOffset
+        >>> from robolink.controllers import Preserver
+        >>> from robolink.journal import memory_journal
+        >>> from robolink.testing import MemoryController, MemoryMachine
+        >>> from robolink.testing.memory_controller import MemoryLink
+        >>> from robolink.timing import SystemClock
+        >>> machine, url = MemoryMachine({1: ToolOffset(12)}, selected=1), "acme+usb://arm"
+        >>> link = MemoryLink(machine, url, memory_journal(url).log(url), SystemClock())
+        >>> tools = MemoryController(machine).tools
+        >>> with Preserver(link, tools).preserved("a trial"):
+        ...     tools.select(0)
+        >>> tools.selected()
+        1
     """
 
     def __init__(

@@ -93,6 +93,20 @@ class AcceptanceCriteria:
 
         Raises:
             CalibrationError: ``diverging`` or ``implausible_change``.
+
+        Example:
+            >>> from robolink.calibration import solve_two_pose
+            >>> from robolink.errors import CalibrationError
+            >>> from robolink.model import Pose, ToolOffset
+            >>> from robolink.nozzle_change import AcceptanceCriteria, Proposal
+            >>> stored = ToolOffset(9, -4, -20)
+            >>> touches = Pose(298, 99, -60, 0), Pose(322, 91, -60, 180)
+            >>> result = solve_two_pose(*touches, stored=stored)
+            >>> try:
+            ...     AcceptanceCriteria(max_change_mm=2).judge_change(Proposal(1, stored, result))
+            ... except CalibrationError as error:
+            ...     print(error.code)
+            implausible_change
         """
         change, in_plane = proposal.change_mm, proposal.plane_change_mm
         if change is None or in_plane is None:

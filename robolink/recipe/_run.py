@@ -63,6 +63,17 @@ class RecipeRun:
         CalibrationError: ``rank_deficient``: this robot cannot tilt its tool, and would have to.
         ConfigError: Neither the recipe nor the station's record says where the station is, the
             recipe takes no reference, or a person would have to touch where only is measured.
+
+    Example:
+        >>> from pathlib import Path
+        >>> import robolink
+        >>> from robolink.recipe import RecipeRun, load_recipe
+        >>> from robolink_simulators.testkit.recipes import written_recipe
+        >>> with robolink.connect("epson+sim://recipe-example") as controller:
+        ...     loaded = load_recipe(written_recipe(Path.cwd()))
+        ...     run = RecipeRun(controller, loaded, operator=None)
+        ...     [one.tool for one in run.plan.tools]
+        [1]
     """
 
     def __init__(

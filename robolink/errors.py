@@ -213,6 +213,7 @@ class NotReadyReason(StrEnum):
     DRY_RUN = "dry_run"
     VIRTUAL_IO = "virtual_io"
     OTHER_ROBOT = "other_robot"
+    OTHER_BASE = "other_base"
 
 
 class NotReadyError(ControllerError):

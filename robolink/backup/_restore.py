@@ -250,8 +250,8 @@ def _another(cause: str) -> ConfigError:
     return ConfigError(
         tr("This backup is not of this controller: {cause}.", cause=cause),
         remedy=tr(
-            "Check which controller is named, and the file. If it is meant for this controller "
-            "all the same, {other}.",
+            "Check which controller is named, and the file. If it is still meant for this "
+            "controller, {other}.",
             other=way(Way.OTHER_CONTROLLER),
         ),
     )

@@ -54,6 +54,24 @@ class ControllerCore(ABC):
         link: The controller, connected.
         capabilities: See above.
         tools: See above.
+
+    Example:
+        >>> from robolink.controllers import ControllerCore
+        >>> from robolink.journal import memory_journal
+        >>> from robolink.model import Capabilities, ControllerStatus
+        >>> from robolink.testing import MemoryController, MemoryMachine
+        >>> from robolink.testing.memory_controller import MemoryLink
+        >>> from robolink.timing import SystemClock
+        >>> class Acme(ControllerCore):  # with the tools of another, for the example
+        ...     groups, exchanges = (), 0
+        ...     def _read_status(self):
+        ...         return ControllerStatus(remote=True, ready=True)
+        ...     def _close_link(self): ...
+        >>> url, able = "acme+usb://core-example", Capabilities(tool_write=True)
+        >>> link = MemoryLink(MemoryMachine(), url, memory_journal(url).log(url), SystemClock())
+        >>> with Acme(link, capabilities=able, tools=MemoryController().tools) as controller:
+        ...     controller.status().ready, controller.capabilities.motion
+        (True, False)
     """
 
     tools: ToolTable

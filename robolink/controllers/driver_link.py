@@ -103,6 +103,18 @@ class DriverLink:
         latch: See above.
         outcomes: Where the markers are kept.
         gate: Holds Ctrl-C back inside.
+
+    Example:
+        >>> from contextlib import nullcontext
+        >>> from robolink.controllers import DriverLink
+        >>> from robolink.journal import memory_journal
+        >>> from robolink.stop_latch import StopLatch
+        >>> from robolink.timing import SystemClock
+        >>> url = "acme+tcp://192.168.0.9:7000"
+        >>> outcomes = memory_journal(url).log(url)
+        >>> link = DriverLink(url, SystemClock(), StopLatch(url), outcomes, gate=nullcontext())
+        >>> with link.lock.held("a trial"):
+        ...     link.markers.look()
     """
 
     def __init__(

@@ -71,6 +71,10 @@ class MotionGroupCore(ABC):
     def require_able(self, purpose: str) -> None:
         """Refuse what no movement could begin in now; see the model."""
 
+    def base(self) -> tuple[float, ...] | None:
+        """Return where the base stands that positions count from; none where this kind has none."""
+        return None
+
     def axes(self) -> Mapping[str, tuple[float, ...]]:
         """Read the positions of the axes; none where this kind does not tell them."""
         return {}

@@ -34,6 +34,21 @@ class Preserver:
         link: The controller.
         tools: Its tools.
         groups: What moves.
+
+    Example:
+        >>> from robolink import ToolOffset
+        >>> from robolink.controllers import Preserver
+        >>> from robolink.journal import memory_journal
+        >>> from robolink.testing import MemoryController, MemoryMachine
+        >>> from robolink.testing.memory_controller import MemoryLink
+        >>> from robolink.timing import SystemClock
+        >>> machine, url = MemoryMachine({1: ToolOffset(12)}, selected=1), "acme+usb://arm"
+        >>> link = MemoryLink(machine, url, memory_journal(url).log(url), SystemClock())
+        >>> tools = MemoryController(machine).tools
+        >>> with Preserver(link, tools).preserved("a trial"):
+        ...     tools.select(0)
+        >>> tools.selected()
+        1
     """
 
     def __init__(
@@ -173,13 +188,13 @@ def _judged(
         action: What settling would do about it, without a full stop.
     """
     if restored:
-        sentence = tr("Tool {tool} is selected, as it was before.", tool=now)
+        sentence = tr("Tool {tool} is selected, as before.", tool=now)
         return Finding(marker, Verdict.DONE, sentence)
     if now == before:
         sentence = tr("Tool {tool} is selected, as before; power mode or speed are not.", tool=now)
     else:
         sentence = tr(
-            "Tool {now} is selected; before it was tool {before}.", now=now, before=before
+            "Tool {now} is selected now; it was tool {before} before.", now=now, before=before
         )
     entry = NewEntry(EntryKind.SELECTION, tool=before, verdict=Verdict.NOT_RESTORED)
     return Finding(marker, Verdict.NOT_RESTORED, sentence, action, (entry,))

@@ -97,6 +97,21 @@ class MarkerResolver:
         link: The controller.
         tools: Its tools.
         preserver: Puts back what procedures have changed.
+
+    Example:
+        >>> from robolink.controllers import MarkerResolver, Preserver
+        >>> from robolink.journal import memory_journal
+        >>> from robolink.model import MarkerKind
+        >>> from robolink.testing import MemoryController, MemoryMachine
+        >>> from robolink.testing.memory_controller import MemoryLink
+        >>> from robolink.timing import SystemClock
+        >>> machine, url = MemoryMachine(), "acme+usb://resolver-example"
+        >>> link = MemoryLink(machine, url, memory_journal(url).log(url), SystemClock())
+        >>> tools = MemoryController(machine).tools
+        >>> resolver = MarkerResolver(link, tools, Preserver(link, tools))
+        >>> left = link.markers.begin(MarkerKind.MOVE, "Go to P1", {})
+        >>> resolver.examine(left).verdict.name
+        'LOOK'
     """
 
     def __init__(self, link: DriverLink, tools: ToolTable, preserver: Preserver) -> None:

@@ -45,6 +45,26 @@ class ToolWrite(MarkedCommand[ToolOffset | None]):
         requested: See above.
         request: What is sent, as a person may read it.
         same: Whether the controller stores two values alike.
+
+    Example:
+        >>> from robolink import ToolOffset
+        >>> from robolink.controllers import ToolWrite
+        >>> from robolink.journal import memory_journal
+        >>> from robolink.testing import MemoryMachine
+        >>> from robolink.testing.memory_controller import MemoryLink
+        >>> from robolink.timing import SystemClock
+        >>> machine, url = MemoryMachine(), "acme+usb://write-example"
+        >>> class AcmeWrite(ToolWrite):
+        ...     def read_before(self, expected):
+        ...         return self.read_back()
+        ...     def send(self):
+        ...         machine.store(self.tool, self.requested)
+        ...     def read_back(self):
+        ...         return machine.read(self.tool)
+        >>> link = MemoryLink(machine, url, memory_journal(url).log(url), SystemClock())
+        >>> write = AcmeWrite(link, 2, ToolOffset(5, 6, -70), "TOOL 2", same=lambda a, b: a == b)
+        >>> write.change(expected=None).before, machine.read(2).z_mm
+        (None, -70)
     """
 
     def __init__(

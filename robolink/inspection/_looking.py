@@ -110,7 +110,7 @@ def _unsettled(controller: Controller) -> Iterator[InspectionFinding]:
             InspectionCode.UNSETTLED,
             marker.operation[:8],
             tr(
-                "Begun on {when} and not proved finished: {request}.",
+                "Not finished since {when}: {request}.",
                 when=marker.begun_at,
                 request=marker.request,
             ),
@@ -131,7 +131,7 @@ def _changed(
 
 def _put_back(tool: int) -> str:
     return tr(
-        "If nobody meant it, write the recorded value back with 'robolink tool set {tool}'; else "
-        "measure the tool again.",
+        "If nobody meant it, write the recorded value back with 'robolink tool set {tool}'; "
+        "otherwise measure the tool again.",
         tool=tool,
     )

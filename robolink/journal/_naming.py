@@ -180,7 +180,7 @@ def _entries(found: Identity, meeting: _Meeting) -> list[NewEntry]:
     said = [_other_than_before(found, meeting), _also_elsewhere(found, meeting)]
     said.append(_nobodys(found, meeting))
     said += [
-        tr("What stands under {name} is on record of {own}.", name=name, own=found.name)
+        tr("What is on record under {name} belongs to {own}.", name=name, own=found.name)
         for name in meeting.unclaimed
     ]
     details = {"address": found.address, "before": meeting.before, "also": list(meeting.elsewhere)}

@@ -59,8 +59,7 @@ class AcceptanceCriteria:
         if doubt:
             raise CalibrationError(
                 doubt,
-                _out_of_order(result)
-                or tr("The touches scatter far more than the stated standard deviation says."),
+                _out_of_order(result) or tr("The touches agree far less well than was stated."),
                 remedy=tr(
                     "Nobody is asked before the write, so it is refused. Take the run again, or "
                     "let a person look at it."
@@ -94,6 +93,20 @@ class AcceptanceCriteria:
 
         Raises:
             CalibrationError: ``diverging`` or ``implausible_change``.
+
+        Example:
+            >>> from robolink.calibration import solve_two_pose
+            >>> from robolink.errors import CalibrationError
+            >>> from robolink.model import Pose, ToolOffset
+            >>> from robolink.nozzle_change import AcceptanceCriteria, Proposal
+            >>> stored = ToolOffset(9, -4, -20)
+            >>> touches = Pose(298, 99, -60, 0), Pose(322, 91, -60, 180)
+            >>> result = solve_two_pose(*touches, stored=stored)
+            >>> try:
+            ...     AcceptanceCriteria(max_change_mm=2).judge_change(Proposal(1, stored, result))
+            ... except CalibrationError as error:
+            ...     print(error.code)
+            implausible_change
         """
         change, in_plane = proposal.change_mm, proposal.plane_change_mm
         if change is None or in_plane is None:
@@ -104,8 +117,8 @@ class AcceptanceCriteria:
             raise CalibrationError(
                 "implausible_change",
                 tr(
-                    "The tip would move by {change:.3f} mm; up to {limit:.3f} mm are allowed "
-                    "here. Is the right nozzle mounted, and tight?",
+                    "The tip would move {change:.3f} mm; {limit:.3f} mm is allowed. Is the "
+                    "right nozzle mounted, and tight?",
                     change=change,
                     limit=self.limit_mm,
                 ),
@@ -149,7 +162,7 @@ class AcceptanceCriteria:
 
     def _of_fit(self, result: CalibrationResult) -> Iterator[LimitVerdict]:
         for code, name, found_mm, limit_mm in (
-            ("large_rms", tr("Scatter (rms)"), result.rms_mm, self.rms_mm),
+            ("large_rms", tr("Scatter"), result.rms_mm, self.rms_mm),
             (
                 "large_residual",
                 tr("Worst sample"),

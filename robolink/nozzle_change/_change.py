@@ -70,6 +70,22 @@ class NozzleChange:
         earlier: Where the corrections of before are found, for the refusal of growing ones.
         order: The order that it carries out (:func:`robolink.transaction.carrying_out`).
         describe: Makes the result of the order, plain JSON, from what the change did.
+
+    Example:
+        >>> from robolink.methods import PointsSource
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
+        >>> from robolink.testing import MemoryController, MemoryMachine
+        >>> class Nobody:  # implements robolink.Operator
+        ...     def tell(self, text): ...
+        >>> touches = [Pose(298, 99, -60, 0), Pose(322, 91, -60, 180)]
+        >>> tool = ToolPlan(1, source=PointsSource(lambda: touches), verify=False)
+        >>> plan = ChangePlan((tool,), ask_before_write=False)
+        >>> machine = MemoryMachine({1: ToolOffset(12, -3.5, -20)})
+        >>> with MemoryController(machine) as controller:
+        ...     report = NozzleChange(controller, plan, operator=Nobody()).run()
+        >>> round(machine.read(1).y_mm, 3)
+        -4.0
     """
 
     def __init__(

@@ -77,6 +77,14 @@ def known_height(
 
     Returns:
         ``None`` where nothing tells it.
+
+    Example:
+        >>> from robolink.nozzle_change import known_height
+        >>> from robolink.stations import Station, StationKind
+        >>> from robolink.testing import MemoryController
+        >>> pin = Station(id="PIN-07", kind=StationKind.PIN).at(310, 95, -40, sigma_mm=0.02)
+        >>> known_height(MemoryController(), tool=1, pin="PIN-07", stated=pin).place_mm
+        (310, 95, -40)
     """
     if not pin:
         return None

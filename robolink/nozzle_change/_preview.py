@@ -104,6 +104,18 @@ def foresee(
         here: Where the flange is.
         settings: The limits.
         arm: Is asked about movements; ``None`` for asking nobody.
+
+    Example:
+        >>> from robolink.methods import measure_two_pose
+        >>> from robolink.model import Pose, ToolOffset, WorkBox
+        >>> from robolink.nozzle_change import foresee
+        >>> from robolink.procedures import TouchPlan
+        >>> from robolink.runner import RunSettings
+        >>> course = measure_two_pose(TouchPlan(nominal=True), stored=ToolOffset(12, -4, -20))
+        >>> settings = RunSettings(WorkBox(z_max_mm=-12))  # 8 mm above the touch; it lifts by 10
+        >>> steps = foresee(course, here=Pose(298, 99, -20, 0), settings=settings)
+        >>> [bool(step.refusal) for step in steps]
+        [False, True, True, False, False, True]
     """
     steps = foreseen_steps(procedure, here, consider=arm.considered if arm else nothing_in_the_way)
     return tuple(_planned_steps(steps, settings, arm))
@@ -127,10 +139,10 @@ def require_inside(controller: Controller, steps: Sequence[PlannedStep]) -> None
             raise LimitError(
                 tr("{step} {refusal}", step=step.text, refusal=step.refusal),
                 remedy=tr(
-                    "The allowed area lies about where the robot stands at the start: jog "
-                    "closer to the pin ('robolink robot jog'), or widen the area. Where the "
-                    "arm cannot reach, put the station elsewhere, or turn the tool another "
-                    "way."
+                    "The allowed area is around where the robot stands at the start: jog the "
+                    "tip closer to where it is measured ('robolink robot jog'), or widen the "
+                    "area. Where the arm cannot reach, put the station elsewhere, or turn the "
+                    "tool another way."
                 ),
                 controller=controller.identity,
             )

@@ -105,6 +105,16 @@ def touching_as_recorded(controller: Controller, plan: TouchPlan, pin: str) -> T
         controller: Whose record is looked at.
         plan: The plan; a standard deviation that it states stays.
         pin: Name of the pin, empty for none.
+
+    Example:
+        >>> from robolink.nozzle_change import touching_as_recorded
+        >>> from robolink.procedures import TouchPlan
+        >>> from robolink.testing import MemoryController
+        >>> controller = MemoryController()  # of whose record nothing is told
+        >>> touching_as_recorded(controller, TouchPlan(), "PIN-07").sigma_z_mm is None
+        False
+        >>> touching_as_recorded(controller, TouchPlan(sigma_z_mm=0.004), "PIN-07").sigma_z_mm
+        0.004
     """
     if plan.sigma_z_mm is not None:
         return plan

@@ -14,7 +14,7 @@ from robolink.nozzle_change._plan import ToolPlan
 from robolink.nozzle_change._proposal import Proposal
 from robolink.nozzle_change._seating import Seating, nozzle_in, seating_of
 from robolink.procedures import FindsStation
-from robolink.stations import Station, find_stations, station_entry
+from robolink.stations import Station, base_now, find_stations, station_entry
 from robolink.ways import Way, way
 
 Proposals = Sequence[tuple[ToolPlan, Proposal]]
@@ -55,12 +55,16 @@ def check_stations(controller: Controller, proposals: Proposals) -> Proposals:
 def stations_found(controller: Controller, proposals: Proposals) -> Iterator[NewEntry]:
     """Yield what calibrations that were kept say about where pins are, and how cameras see."""
     known = find_stations(None, controller.outcomes.recorded(kinds=(EntryKind.STATION,)))
+    base: tuple[float, ...] | None = None
+    asked = False
     for plan, proposal in proposals:
         found = found_pin(plan.pin, proposal, known.get(plan.pin)) if plan.pin else None
         if isinstance(plan.source, FindsStation):
             found = plan.source.found_station(proposal.result, proposal.tool)
         if found is not None:
-            yield station_entry(found)
+            if not asked:
+                base, asked = base_now(controller), True
+            yield station_entry(found, base=base)
 
 
 def _shifts(

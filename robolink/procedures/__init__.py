@@ -54,15 +54,15 @@ if TYPE_CHECKING:
     from robolink.procedures.pin.turn_test import TurnsAboutPin as TurnsAboutPin
     from robolink.procedures.pin.turn_test import TurnTest as TurnTest
     from robolink.procedures.pose_method import PoseMethod as PoseMethod
-    from robolink.procedures.sequential_sampling import TAKE_ALL as TAKE_ALL
-    from robolink.procedures.sequential_sampling import Sampler as Sampler
-    from robolink.procedures.sequential_sampling import Samples as Samples
-    from robolink.procedures.sequential_sampling import SamplingPolicy as SamplingPolicy
-    from robolink.procedures.sequential_sampling import SequentialSampler as SequentialSampler
-    from robolink.procedures.sequential_sampling import agreement as agreement
-    from robolink.procedures.sequential_sampling import finalize_samples as finalize_samples
-    from robolink.procedures.sequential_sampling import may_end_early as may_end_early
-    from robolink.procedures.sequential_sampling import sample_sequentially as sample_sequentially
+    from robolink.procedures.sampling.sampler import Sampler as Sampler
+    from robolink.procedures.sampling.sampler import SequentialSampler as SequentialSampler
+    from robolink.procedures.sampling.sequential import TAKE_ALL as TAKE_ALL
+    from robolink.procedures.sampling.sequential import Samples as Samples
+    from robolink.procedures.sampling.sequential import SamplingPolicy as SamplingPolicy
+    from robolink.procedures.sampling.sequential import agreement as agreement
+    from robolink.procedures.sampling.sequential import finalize_samples as finalize_samples
+    from robolink.procedures.sampling.sequential import may_end_early as may_end_early
+    from robolink.procedures.sampling.sequential import sample_sequentially as sample_sequentially
     from robolink.procedures.source import FindsStation as FindsStation
     from robolink.procedures.source import MeasurementContext as MeasurementContext
     from robolink.procedures.source import MovingSource as MovingSource
@@ -94,9 +94,10 @@ __getattr__ = lazy_exports(
         "pin.touches": "PinTouches lift_off touch_again turned_touches",
         "pin.turn_test": "TurnTest TurnsAboutPin",
         "pose_method": "PoseMethod",
-        "sequential_sampling": (
-            "Sampler Samples SamplingPolicy SequentialSampler TAKE_ALL agreement finalize_samples "
-            "may_end_early sample_sequentially"
+        "sampling.sampler": "Sampler SequentialSampler",
+        "sampling.sequential": (
+            "Samples SamplingPolicy TAKE_ALL agreement finalize_samples may_end_early "
+            "sample_sequentially"
         ),
         "source": "FindsStation MeasurementContext MovingSource RequiresSensor StopsAbovePin "
         "TipSource TouchesFurther",

@@ -18,6 +18,14 @@ def approach_path(target: Pose, *, here: Pose, purpose: str) -> Procedure[None]:
         target: Where to.
         here: Where the frame is now.
         purpose: What for, for a person.
+
+    Example:
+        >>> from robolink.model import Pose
+        >>> from robolink.procedures import approach_path
+        >>> here, target = Pose(300, 100, -40, 0), Pose(310, 95, 5, 0)
+        >>> course = approach_path(target, here=here, purpose="To the pin.")
+        >>> [(step.path.value, step.target.x_mm, step.target.z_mm) for step in course]
+        [('straight', 300, 5), ('joint', 310, 5)]
     """
     top_mm = max(here.z_mm, target.z_mm)
     above = replace(target, z_mm=top_mm)
@@ -44,6 +52,21 @@ def seek_or_retract(step: Seek, *, here: Pose, safe_z_mm: float) -> Procedure[Po
 
     Raises:
         CalibrationError: ``no_edge`` or ``edge_passed``, with the tip drawn back.
+
+    Example:
+        >>> from robolink.errors import CalibrationError
+        >>> from robolink.model import InputEdge, Pose, ToolOffset
+        >>> from robolink.procedures import seek_or_retract
+        >>> from robolink.runner import Seek
+        >>> from robolink.testing import PaperCell
+        >>> here = Pose(300, 100, 0, 0)
+        >>> cell = PaperCell(here, ToolOffset())  # without a switch
+        >>> step = Seek(Pose(300, 100, -5, 0), InputEdge(5), 2, "Looking for the plate.")
+        >>> try:
+        ...     cell.run(seek_or_retract(step, here=here, safe_z_mm=10))
+        ... except CalibrationError as error:
+        ...     print(error.code, cell.here.z_mm)
+        no_edge 10
     """
     try:
         found: Pose = yield step

@@ -10,7 +10,8 @@ from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import TIP, Path, Pose, SpotUnit, ToolOffset
 from robolink.procedures.camera_plan import LookPlan
-from robolink.procedures.sequential_sampling import ResultT, finalize_samples
+from robolink.procedures.sampling.sampler import ResultT
+from robolink.procedures.sampling.sequential import finalize_samples
 from robolink.runner import Look, Move, Notify, Procedure, SeenAt, first_clear
 from robolink.stations import CameraStation
 
@@ -61,15 +62,30 @@ class CameraDrive:
         Raises:
             CalibrationError: ``tip_not_seen``, ``several_tips_seen`` and their like, with the
                 frame lifted.
+
+        Example:
+            >>> from robolink.model import Pose, ToolOffset
+            >>> from robolink.procedures import CameraDrive, LookPlan, Place
+            >>> from robolink.stations import CameraStation
+            >>> from robolink.testing import PaperCell
+            >>> here, tip = Pose(300, 100, 20, 0), ToolOffset(12, -4, -20)
+            >>> drive = CameraDrive(CameraStation(300, 80, -30), LookPlan(), here)
+            >>> seen = PaperCell(here, tip).run(drive.looks([Place(0, tip), Place(90, tip)], here))
+            >>> [(look.u_deg, round(look.spot.x, 3), round(look.spot.y, 3)) for look in seen]
+            [(0, 300.0, 80.0), (90, 300.0, 80.0)]
         """
         seen = list[SeenAt]()
         for place in places:
             if before_camera and place.u_deg == here.u_deg:
-                yield Move(self._beside(place), Path.STRAIGHT, tr("Moving on before the camera."))
+                yield Move(
+                    self._beside(place),
+                    Path.STRAIGHT,
+                    tr("Moving to the next place before the camera."),
+                )
             else:
                 yield from self._turn_to(place, here)
             here, before_camera = self.pose(place), True
-            yield Move(here, Path.STRAIGHT, tr("Coming before the camera from the same side."))
+            yield Move(here, Path.STRAIGHT, tr("Approaching the camera from the same side."))
             seen.append((yield from self._look(place)))
         return seen
 
@@ -87,6 +103,21 @@ class CameraDrive:
             CalibrationError: ``far_off``: a mark is farther from where it was expected than
                 anything explains; those of :meth:`looks`, and those of ``found``. The frame is
                 lifted then.
+
+        Example:
+            >>> from robolink.model import Pose, ToolOffset
+            >>> from robolink.procedures import CameraDrive, LookPlan, Place
+            >>> from robolink.stations import CameraStation
+            >>> from robolink.testing import PaperCell
+            >>> here, stored = Pose(300, 100, 20, 0), ToolOffset(12, -4, -20)
+            >>> drive = CameraDrive(CameraStation(300, 80, -30), LookPlan(), here)
+            >>> def seen_at_zero(looks):
+            ...     (look,) = looks
+            ...     return ToolOffset(look.spot.x - look.x_mm, look.spot.y - look.y_mm, stored.z_mm)
+            >>> cell = PaperCell(here, ToolOffset(12.7, -4.2, -20))
+            >>> expected = cell.run(drive.centred([Place(0, stored)], here, seen_at_zero))
+            >>> round(expected.x_mm, 3), round(expected.y_mm, 3)
+            (12.7, -4.2)
         """
         seen = yield from self.looks(places, here)
         try:
@@ -158,7 +189,7 @@ class CameraDrive:
         if here.z_mm < high_mm:
             yield Move(replace(here, z_mm=high_mm), Path.STRAIGHT, tr("Lifting before the turn."))
         yield Move(replace(above, z_mm=high_mm), Path.JOINT, tr("Moving above the camera."))
-        yield Move(self._beside(place), Path.STRAIGHT, tr("Lowering before the camera."))
+        yield Move(self._beside(place), Path.STRAIGHT, tr("Lowering into the camera's focus."))
 
     def _beside(self, place: Place) -> Pose:
         pose, by_mm = self.pose(place), self.plan.beside_mm
@@ -203,6 +234,23 @@ class CameraSamples(Generic[ResultT]):
         solver: Makes the result of the looks.
         here: Where the frame is.
         before_camera: Whether that is before the camera, with a mark in the image.
+
+    Example:
+        >>> from robolink.calibration import solve_camera_round
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.procedures import CameraDrive, CameraSamples, LookPlan, Place
+        >>> from robolink.stations import CameraStation
+        >>> from robolink.testing import PaperCell
+        >>> here, tip = Pose(300, 100, 20, 0), ToolOffset(12, -4, -20)
+        >>> station = CameraStation(300, 80, -30)
+        >>> def solver(looks):
+        ...     return solve_camera_round([station.sighting(look) for look in looks], stored=tip)
+        >>> samples = CameraSamples(CameraDrive(station, LookPlan(), here), solver, here)
+        >>> places = [Place(u_deg, tip) for u_deg in (0, 120, 240)]
+        >>> cell = PaperCell(here, ToolOffset(12.2, -4.1, -20))
+        >>> found = cell.run(samples.at(places, retake=False))
+        >>> round(found.offset.x_mm, 3), round(found.offset.y_mm, 3)
+        (12.2, -4.1)
     """
 
     def __init__(

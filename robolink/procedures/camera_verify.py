@@ -40,6 +40,19 @@ def verify_by_looking(
 
     Raises:
         CalibrationError: As :func:`~robolink.methods.measure_camera`.
+
+    Example:
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.procedures import LookPlan, verify_by_looking
+        >>> from robolink.stations import CameraStation
+        >>> from robolink.testing import PaperCell
+        >>> station, here = CameraStation(300, 80, -30), Pose(300, 80, 0, 0)
+        >>> proof = verify_by_looking(
+        ...     station, LookPlan(), here=here, angles_deg=(0, 120), tolerance_mm=0.2
+        ... )
+        >>> shown = PaperCell(here, ToolOffset(0.3)).run(proof)
+        >>> shown.passed, round(shown.max_drift_mm, 3)
+        (False, 0.3)
     """
     drive = CameraDrive(station, plan, here)
     places = [Place(u_deg, aside) for u_deg in nearest_first(angles_deg, here)]
@@ -60,7 +73,24 @@ def nearest_first(angles_deg: Sequence[float], here: Pose) -> list[float]:
 def seen_drift(
     station: CameraStation, look: SeenAt, place: Place, camera_error_mm: tuple[float, float]
 ) -> Drift:
-    """Return how far from where the controller puts it a mark was seen."""
+    """Return how far from where the controller puts it a mark was seen.
+
+    Args:
+        station: Where the camera is, and what its pixels mean.
+        look: What was seen, and where the frame was.
+        place: Where the mark is, by the controller, in that frame.
+        camera_error_mm: What the camera is off by, as the measurement found it; base X and Y.
+
+    Example:
+        >>> from robolink.model import Pose, Spot, SpotUnit, ToolOffset
+        >>> from robolink.procedures import Place, seen_drift
+        >>> from robolink.runner import SeenAt
+        >>> from robolink.stations import CameraStation
+        >>> look = SeenAt.of(Pose(300, 80, -30, 0), Spot(300.15, 80), SpotUnit.BASE_MM)
+        >>> station, place = CameraStation(300, 80, -30), Place(0, ToolOffset())
+        >>> round(seen_drift(station, look, place, camera_error_mm=(0.1, 0)).dx_mm, 3)
+        0.05
+    """
     sighting, (error_x, error_y) = station.sighting(look), camera_error_mm
     dx, dy = FlangePlane.of(look).in_base(place.at.x_mm, place.at.y_mm, place.at.z_mm)
     return Drift(

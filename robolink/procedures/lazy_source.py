@@ -16,6 +16,15 @@ class LazySource:
         sentence: What it does, for a report that is written before.
         clearance_mm: Least height above a pin at which the robot stops, ``None`` where there is no
             pin.
+
+    Example:
+        >>> from robolink.errors import ConfigError
+        >>> from robolink.procedures import LazySource
+        >>> def make():
+        ...     raise ConfigError("There is no camera here.")
+        >>> source = LazySource(make, sentence="A camera looks at the tip.")
+        >>> source.sentence  # nothing was made for it
+        'A camera looks at the tip.'
     """
 
     def __init__(

@@ -21,9 +21,25 @@ class MeasurementContext:
         start: Flange pose at the start of the change; limits lie about it.
 
     Args:
+        controller: See above.
+        operator: See above.
+        start: See above.
         settings: Limits and speeds for a tip at an offset from the flange.
         offers: Whether the person is asked about what a procedure offers.
         types: Whether the pose of a touch may be typed: a turn test by touches follows.
+
+    Example:
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.nozzle_change import Limits
+        >>> from robolink.procedures import MeasurementContext
+        >>> from robolink.testing import MemoryController
+        >>> class Nobody:  # implements robolink.Operator
+        ...     def tell(self, text): ...
+        >>> with MemoryController() as controller:
+        ...     start = controller.groups[0].pose()
+        ...     settings = Limits(speed_mm_s=10).settings
+        ...     context = MeasurementContext(controller, Nobody(), start=start, settings=settings)
+        ...     context.measure(lambda here: (yield from ()))  # a procedure of no step
     """
 
     def __init__(
@@ -66,6 +82,22 @@ class MeasurementContext:
             procedure: What is to be done.
             tip: Offset of the tip in whose frame it moves, ``None`` for the flange.
             camera: What looks are taken with.
+
+        Example:
+            >>> from robolink.nozzle_change import Limits
+            >>> from robolink.procedures import MeasurementContext, approach_path, offset_z
+            >>> from robolink.testing import MemoryController
+            >>> class Nobody:  # implements robolink.Operator
+            ...     def tell(self, text): ...
+            >>> with MemoryController() as controller:
+            ...     here = controller.groups[0].pose()
+            ...     limits = Limits()
+            ...     context = MeasurementContext(
+            ...         controller, Nobody(), start=here, settings=limits.settings
+            ...     )
+            ...     context.run(approach_path(offset_z(here, 10), here=here, purpose="Lifting."))
+            ...     controller.groups[0].pose().z_mm - here.z_mm
+            10.0
         """
         return self.runner(tip, camera).run(procedure)
 
@@ -118,9 +150,28 @@ class TipSource(Protocol):
     ) -> CalibrationResult:
         """Measure the tip of ``tool``, whose stored offset is given.
 
+        Args:
+            context: What to work with.
+            tool: Number of the tool.
+            stored: The offset stored now, ``None`` where the tool is not defined.
+
         Raises:
             CalibrationError: No trustworthy result; its code says why.
             RobolinkError: Anything else that ended it.
+
+        Example:
+            >>> from robolink.methods import PointsSource
+            >>> from robolink.model import Pose, ToolOffset
+            >>> from robolink.nozzle_change import Limits
+            >>> from robolink.procedures import MeasurementContext
+            >>> from robolink.testing import MemoryController
+            >>> source = PointsSource(lambda: [Pose(298, 99, -60, 0), Pose(322, 91, -60, 180)])
+            >>> limits = Limits()
+            >>> context = MeasurementContext(
+            ...     MemoryController(), None, start=None, settings=limits.settings
+            ... )
+            >>> source.measure(context, tool=1, stored=ToolOffset(12, -3.5, -20)).measured
+            ('x_mm', 'y_mm')
         """
 
 
@@ -153,6 +204,29 @@ class MovingSource(TipSource, Protocol):
             result: What was measured, with the offset that was written.
             tip: Where the tip was found, which differs from it where a difference was written.
             tolerance_mm: Largest drift that passes.
+
+        Example:
+            >>> from robolink.methods import CameraSource
+            >>> from robolink.model import Spot, SpotUnit, ToolOffset
+            >>> from robolink.nozzle_change import Limits
+            >>> from robolink.procedures import MeasurementContext
+            >>> from robolink.stations import CameraStation
+            >>> from robolink.testing import MemoryController, MemoryMachine
+            >>> machine = MemoryMachine({1: ToolOffset(12, -4, -20)})
+            >>> class Camera:  # implements robolink.TipSensor; tool 1 is 0.3 mm off
+            ...     identity, unit, resolution_px, settle_s = "camera", SpotUnit.BASE_MM, None, 0
+            ...     def see(self, mark=0):
+            ...         return [Spot(*machine.tip(ToolOffset(12.3, -4, -20)).coordinates()[:2])]
+            >>> class Nobody:  # implements robolink.Operator
+            ...     def tell(self, text): ...
+            >>> source = CameraSource(Camera(), CameraStation(300, 0, 80))
+            >>> controller = MemoryController(machine)
+            >>> start, settings = controller.groups[0].pose(), Limits().settings
+            >>> context = MeasurementContext(controller, Nobody(), start=start, settings=settings)
+            >>> found = source.measure(context, 1, controller.tools.read(1))
+            >>> machine.store(1, found.offset)
+            >>> source.verify(context, 1, found, tip=found.offset, tolerance_mm=0.1).passed
+            True
         """
 
 
@@ -181,6 +255,20 @@ class TouchesFurther(Protocol):
 
         Raises:
             CalibrationError: As the measurement.
+
+        Example:
+            >>> from robolink.methods import TwoPoseSource, measure_two_pose
+            >>> from robolink.model import Pose, ToolOffset
+            >>> from robolink.testing import PaperCell
+            >>> source, stored = TwoPoseSource(), ToolOffset(12, -4, -20)
+            >>> cell = PaperCell(Pose(300, 100, 20, 0), ToolOffset(12.3, -3.9, -20), (310, 95, -40))
+            >>> result = cell.run(measure_two_pose(source.touch, stored=stored))
+            >>> class OnPaper:  # in place of a MeasurementContext
+            ...     def measure(self, steps):
+            ...         return cell.run(steps(cell.here))
+            >>> again = source.further(OnPaper(), stored, result, again=1)
+            >>> round(again.offset.x_mm, 3), round(again.offset.y_mm, 3)
+            (12.3, -3.9)
         """
 
 

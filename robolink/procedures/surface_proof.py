@@ -42,6 +42,21 @@ class SurfaceProof:
             place: Where the frame in force should have been.
             found: Where it was.
             normal: The surface's unit normal there.
+
+        Example:
+            >>> import math
+            >>> from robolink.model import Pose
+            >>> from robolink.procedures import SurfaceProof
+            >>> from robolink.runner import TouchedAt
+            >>> tilts = (0, 0), (40, 0), (-40, 0), (0, 40), (0, -40)
+            >>> places = [Pose(0, 0, 0, 0, v_deg, w_deg) for v_deg, w_deg in tilts]
+            >>> proof = SurfaceProof(places[0], tolerance_mm=0.2, u_mm=0.02)
+            >>> for place in places:  # the tip is 0.1 mm short
+            ...     deeper_mm = 0.1 * math.cos(math.radians(place.v_deg or place.w_deg))
+            ...     found = Pose(0, 0, -deeper_mm, *place.coordinates()[3:])
+            ...     proof.add(place, TouchedAt.of(found), normal=(0, 0, 1))
+            >>> round(proof.drift().dz_mm, 3)
+            0.1
         """
         self.touches.append(found)
         self._rows.append((np.array(normal) @ rotation_of(place)).tolist())

@@ -68,6 +68,17 @@ class SurfaceTouches(WitnessedTouches):
 
         Raises:
             CalibrationError: ``not_touched`` or ``typed_ahead``, with the tip drawn back.
+
+        Example:
+            >>> from robolink.model import Pose, ToolOffset
+            >>> from robolink.procedures import SurfaceTouches, TouchPlan
+            >>> from robolink.testing import PaperCell
+            >>> touches, expected = SurfaceTouches(TouchPlan()), Pose(298, 99, -20, 0)
+            >>> cell = PaperCell(
+            ...     Pose(298, 99, 0, 0), ToolOffset(12, -4, -20.5), lambda at: (at[0], at[1], -40)
+            ... )
+            >>> cell.run(touches.again(expected, (0, 0, 1), key=0)).z_mm
+            -19.5
         """
         self._taken.pop(key, None)
         expected = plain_pose(expected)

@@ -34,7 +34,21 @@ class Answers:
     early: Mapping[tuple[int, int | None], str] = field(default_factory=dict)
 
     def prepared(self, number: int, prompt: Prompt, tool: int | None = None) -> str | None:
-        """Return the answer that was given beforehand, ``None`` when there is none."""
+        """Return the answer that was given beforehand, ``None`` when there is none.
+
+        Args:
+            number: Number of the prompt in the recipe, from 1.
+            prompt: The prompt.
+            tool: The tool that it is asked for, ``None`` for the whole change.
+
+        Example:
+            >>> from robolink.recipe import Answers, Prompt
+            >>> answers = Answers(yes=True, nozzle="N-0815")
+            >>> answers.prepared(1, Prompt(at="start", text="Is the cell clear?"))
+            'yes'
+            >>> answers.prepared(2, Prompt(at="start", text="Which nozzle?", answer="nozzle"))
+            'N-0815'
+        """
         if (number, tool) in self.early:
             return self.early[number, tool]
         if prompt.answer == "yes":

@@ -26,7 +26,7 @@ from robolink.recipe._locating import located
 from robolink.recipe._plans import plan_of
 from robolink.recipe._reference import Reference, find_reference
 from robolink.runner import Operator
-from robolink.stations import Station, find_stations
+from robolink.stations import Station, find_stations, require_base_of
 from robolink.transaction import ChangedSince, Order, changed_since, earlier_corrections
 from robolink.ways import Way, way
 
@@ -63,6 +63,17 @@ class RecipeRun:
         CalibrationError: ``rank_deficient``: this robot cannot tilt its tool, and would have to.
         ConfigError: Neither the recipe nor the station's record says where the station is, the
             recipe takes no reference, or a person would have to touch where only is measured.
+
+    Example:
+        >>> from pathlib import Path
+        >>> import robolink
+        >>> from robolink.recipe import RecipeRun, load_recipe
+        >>> from robolink_simulators.testkit.recipes import written_recipe
+        >>> with robolink.connect("epson+sim://recipe-example") as controller:
+        ...     loaded = load_recipe(written_recipe(Path.cwd()))
+        ...     run = RecipeRun(controller, loaded, operator=None)
+        ...     [one.tool for one in run.plan.tools]
+        [1]
     """
 
     def __init__(
@@ -87,7 +98,9 @@ class RecipeRun:
         self._controller = controller
         self._measure_only = measure_only
         self._order, self._describe = order, describe
-        self._loaded, station, self._remark = _located(loaded, controller, cell)
+        self._loaded, station, known = _located(loaded, controller, cell)
+        self._remark = known.remark() if known else ""
+        self._rests_on = _rests_on(self._loaded, station, known)
         self._operator = operator
         self._answers = answers or Answers()
         self._audience = audience or Listener()
@@ -117,6 +130,7 @@ class RecipeRun:
             CalibrationError: ``reference_outdated``, ``no_last_touch`` or ``sensor_not_found``.
             ConnectError: A camera is not there.
             LimitError: A foreseen target lies outside the box.
+            NotReadyError: The station was learnt in another base.
             NotAllowedError: A jump is accepted by somebody who is no engineer.
             OutcomeUnknownError: Something earlier is unsettled.
             BusyError: Somebody else is changing this controller.
@@ -126,6 +140,7 @@ class RecipeRun:
         controller.outcomes.look()
         controller.require_settled(tr("recipe {name!r}", name=recipe.name))
         self._require_role()
+        require_base_of(controller, self._rests_on)
         stored = {tool.number: controller.tools.read(tool.number) for tool in recipe.tools}
         found = (changed_since(controller, tool, now) for tool, now in stored.items())
         self.changed = tuple(change for change in found if change is not None)
@@ -276,10 +291,18 @@ def _switched(listener: RecipeListener, *, stopped: bool) -> str:
 
 def _located(
     loaded: LoadedRecipe, controller: Controller, cell: Cell | None
-) -> tuple[LoadedRecipe, Station, str]:
-    """Return the recipe with the place of its station, the station, and a remark about it."""
+) -> tuple[LoadedRecipe, Station, Station | None]:
+    """Return the recipe with the place of its station, the station, and what is known of that."""
     entries = controller.outcomes.recorded(kinds=(EntryKind.STATION,))
     stations = find_stations(cell, entries)
-    known = stations.get(loaded.recipe.station.id)
     recipe, station = located(loaded.recipe, stations)
-    return replace(loaded, recipe=recipe), station, known.remark() if known else ""
+    return replace(loaded, recipe=recipe), station, stations.get(loaded.recipe.station.id)
+
+
+def _rests_on(loaded: LoadedRecipe, station: Station, known: Station | None) -> Station:
+    """Return the station whose place the run goes by: the known one unless the recipe says it.
+
+    A full calibration finds the pin anew, and is judged by where it was.
+    """
+    says_it = not station.learnt and loaded.recipe.source.of_method.needs.place is not None
+    return station if known is None or says_it else known

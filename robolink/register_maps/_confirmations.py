@@ -56,8 +56,23 @@ def confirmation_of(identity: str, register_map: RegisterMap) -> Confirmation | 
 def confirm(identity: str, register_map: RegisterMap, *, by: str, compared: str) -> Confirmation:
     """Put on record that a person found this map right at this PLC.
 
+    Args:
+        identity: The PLC's name, never a URL: see :class:`robolink.model.Identity`.
+        register_map: The map.
+        by: Name or badge of the person.
+        compared: What was compared, in words.
+
     Raises:
         ConfigError: It cannot be stored.
+
+    Example:
+        >>> from robolink.register_maps import confirm, confirmation_of, load_map
+        >>> from robolink_simulators.testkit.recipes import written_map
+        >>> from pathlib import Path
+        >>> register_map = load_map(written_map(Path.cwd()))
+        >>> made = confirm("plc-7", register_map, by="K. Sato", compared="tool 1 with the HMI")
+        >>> confirmation_of("plc-7", register_map).by
+        'K. Sato'
     """
     made = Confirmation(by, wall_label(), compared)
     path = _path(identity, register_map)

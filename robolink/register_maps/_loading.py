@@ -97,4 +97,21 @@ def _sentence(detail: Any) -> str:  # noqa: ANN401 - pydantic's own form
             return tr("must be a list of tables")
         case "too_short":
             return tr("must not be empty")
+        case "missing":
+            return _missing(detail["loc"]) or sentence(detail)
     return sentence(detail)
+
+
+def _missing(location: Sequence[int | str]) -> str:
+    """Return what to write where a whole table is missing; empty for a key of a table."""
+    match tuple(location):
+        case ("schema",):
+            return tr('is missing: begin the file with schema = "robolink/plc-map/1"')
+        case ("tools",):
+            return tr("is missing: write one [[tools]] table for each tool")
+        case ("commit",):
+            return tr(
+                "is missing: write in [commit] how the PLC takes new values over: kind = "
+                '"commit_bit", "level" or "none"'
+            )
+    return ""

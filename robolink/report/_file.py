@@ -22,5 +22,20 @@ def save(
     Raises:
         ConfigError: A file is there already and ``replace`` is not set, or it cannot be
             written. What was there is unchanged.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from robolink import ToolOffset
+        >>> from robolink.report import reports_of, save
+        >>> from robolink.testing import MemoryController
+        >>> from robolink.transaction import Wanted, change_tools
+        >>> controller = MemoryController()
+        >>> receipts = change_tools(controller, [Wanted(3, ToolOffset(1, 2, -30), None)])
+        >>> entries = tuple(reversed(list(controller.outcomes.recorded(tool=3))))
+        >>> about = {"made_at": "2026-11-23T08:00:00Z", "robolink_version": "0.1.0"}
+        >>> (report,) = reports_of(entries, check="The journal is whole.", **about)
+        >>> save(report, Path("report.html"))
+        >>> Path("report.html").exists()
+        True
     """
     save_named(path, render(report, *others).encode("utf-8"), replace=replace)

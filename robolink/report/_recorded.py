@@ -38,6 +38,18 @@ def reports_of(
 
     Raises:
         ConfigError: It changed no tool, or an entry cannot be understood.
+
+    Example:
+        >>> from robolink import ToolOffset, connect
+        >>> from robolink.report import reports_of
+        >>> from robolink.transaction import Wanted, change_tools
+        >>> with connect("epson+sim://report-example") as controller:
+        ...     receipts = change_tools(controller, [Wanted(2, ToolOffset(5, 6, -70), None)])
+        ...     entries = tuple(reversed(list(controller.outcomes.recorded(tool=2))))
+        >>> about = {"made_at": "2026-11-23T08:00:00Z", "robolink_version": "0.1.0"}
+        >>> (report,) = reports_of(entries, check="The journal is whole.", **about)
+        >>> report.tool
+        2
     """
     tools = sorted({tool for entry in entries for tool in _tools(entry)})
     if not tools:

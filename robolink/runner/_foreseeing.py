@@ -70,6 +70,15 @@ def foreseen_steps(
     Raises:
         CalibrationError: It refuses before its first step.
         LimitError: It finds no way.
+
+    Example:
+        >>> from robolink.methods import measure_two_pose
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.procedures import TouchPlan
+        >>> from robolink.runner import foreseen_steps
+        >>> course = measure_two_pose(TouchPlan(nominal=True), stored=ToolOffset(12, -4, -20))
+        >>> [type(one.step).__name__ for one in foreseen_steps(course, Pose(298, 99, -20, 0))]
+        ['Ask', 'Move', 'Move', 'Move', 'Ask', 'Move']
     """
     try:
         step = next(procedure)
@@ -118,6 +127,19 @@ def first_clear(
 
     Raises:
         LimitError: None can; says why of the first.
+
+    Example:
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.procedures import approach_path
+        >>> from robolink.runner import first_clear
+        >>> from robolink.testing import PaperCell
+        >>> here = Pose(300, 100, 0, 0)
+        >>> options = [Pose(310, 95, 0, 170), Pose(310, 95, 0, -170)]
+        >>> def steps(target):
+        ...     return approach_path(target, here=here, purpose="Turning.")
+        >>> cell = PaperCell(here, ToolOffset())  # nothing is in the way there
+        >>> cell.run(first_clear(options, steps, here)).u_deg
+        170
     """
     refusals = list[tuple[Move, str]]()
     for option in options:

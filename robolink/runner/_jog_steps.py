@@ -180,7 +180,12 @@ def parse_steps(text: str) -> dict[str, float]:
             raise _no_step(plain[at:].strip())
         axis, sign, number = match.groups()
         if axis in deltas:
-            raise _no_step(match[0].strip())
+            raise ConfigError(
+                tr("{axis} is there twice: it would be one move. Nothing moved.", axis=axis),
+                remedy=tr(
+                    "Give each axis once, for example x+0.1 z-0.5, and the rest in the next step."
+                ),
+            )
         deltas[axis] = float(sign + number.replace(",", "."))
         at = match.end()
     if not deltas:

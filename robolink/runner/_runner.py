@@ -94,6 +94,15 @@ class Runner:
             computer fell silent. It is for measuring, where nothing was written yet.
         types: Whether the person may type the pose of a touch that says it may be typed; what
             rests on it has to be proved by touches.
+
+    Example:
+        >>> from robolink.model import Path, Pose, WorkBox
+        >>> from robolink.runner import Runner, RunSettings
+        >>> from robolink.testing import MemoryController
+        >>> controller, settings = MemoryController(), RunSettings(WorkBox(z_max_mm=200))
+        >>> runner = Runner(controller, controller.groups[0], operator=None, settings=settings)
+        >>> runner.move(Pose(300, 0, 90, 30, tool=0), Path.STRAIGHT).u_deg
+        30.0
     """
 
     def __init__(

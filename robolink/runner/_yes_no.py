@@ -58,6 +58,16 @@ def ask_yes_no_or(
         question: What a yes agrees to.
         answer: Fetches the next line that the person types.
         also: The words; one of them is returned as it stands here.
+
+    Example:
+        >>> from robolink.runner import ask_yes_no_or
+        >>> class Panel:  # implements robolink.Operator
+        ...     def ask(self, question, kind):
+        ...         print(question)
+        >>> lines = iter(["more"])
+        >>> ask_yes_no_or(Panel(), "Keep it?", lambda: next(lines), also=("more",))
+        Keep it?
+        'more'
     """
     for left in (1, 0):
         operator.ask(question, Question.YES_NO)

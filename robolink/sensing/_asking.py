@@ -71,7 +71,7 @@ def _require_finite(spot: Spot, sensor: TipSensor) -> None:
         raise CalibrationError(
             "non_finite",
             tr("{camera} answers {x}, {y}.", camera=sensor.identity, x=spot.x, y=spot.y),
-            remedy=tr("Restart the camera's program, and look what it finds in its picture."),
+            remedy=tr("Restart the camera's program, and look at what it finds in its picture."),
         )
 
 

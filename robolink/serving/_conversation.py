@@ -90,6 +90,17 @@ class CallbackConversation:
 
     Attributes:
         over: Whether the program has said that it is done.
+
+    Example:
+        >>> from robolink.journal import memory_journal
+        >>> from robolink.protocols.spel_callback import CallbackLine, CallbackWord
+        >>> from robolink.serving import CallbackConversation, CallbackLimits
+        >>> journal, limits = memory_journal("serving-example"), CallbackLimits(tolerance_mm=0.1)
+        >>> talk = CallbackConversation(journal, limits, peer="192.168.0.1")
+        >>> robot_tool_value = ("SIM00001", "1", "0", "-", "1", "1", *("0.000",) * 6)
+        >>> talk.answer(CallbackLine(1, CallbackWord.HELLO, robot_tool_value)).word.value
+        'WELCOME'
+        >>> talk.close()
     """
 
     def __init__(

@@ -109,6 +109,15 @@ class PermitCall:
         plan: What its program does.
         limits: What its touches are held to.
         ended: Asked at each look whether to give up.
+
+    Example:
+        >>> import robolink
+        >>> from robolink.serving import CallbackLimits, PermitCall, PermitPlan
+        >>> with robolink.connect("softmotion+sim://permit-example") as controller:
+        ...     plan, limits = PermitPlan(tool=1), CallbackLimits()
+        ...     call = PermitCall(controller, plan, limits, ended=lambda: True)
+        ...     print(call.answer())  # nobody asked for anything before it was to give up
+        None
     """
 
     def __init__(

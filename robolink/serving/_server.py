@@ -37,6 +37,18 @@ class CallbackServer:
 
     Raises:
         ConfigError: It cannot listen there, or everybody could call.
+
+    Example:
+        >>> from robolink.journal import memory_journal
+        >>> from robolink.serving import CallbackConversation, CallbackLimits, CallbackServer
+        >>> journal, limits = memory_journal("server-example"), CallbackLimits()
+        >>> server = CallbackServer(
+        ...     "127.0.0.1", 0, lambda peer: CallbackConversation(journal, limits, peer=peer)
+        ... )
+        >>> server.start()
+        >>> server.address[0]
+        '127.0.0.1'
+        >>> server.close()
     """
 
     def __init__(

@@ -9,6 +9,9 @@ from typing import TYPE_CHECKING
 from robolink.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
+    from robolink.stations._base import base_now as base_now
+    from robolink.stations._base import learnt_elsewhere as learnt_elsewhere
+    from robolink.stations._base import require_base_of as require_base_of
     from robolink.stations._finding import find_station as find_station
     from robolink.stations._finding import find_stations as find_stations
     from robolink.stations._places import beam_station as beam_station
@@ -29,6 +32,7 @@ if TYPE_CHECKING:
 __getattr__ = lazy_exports(
     __name__,
     {
+        "_base": "base_now learnt_elsewhere require_base_of",
         "_finding": "find_station find_stations",
         "_places": "beam_station camera_station pin_of sensor_of touch_station",
         "_records": "Found station_entry",

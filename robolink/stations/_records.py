@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Final
 
 from robolink.messages import tr
 from robolink.model import EntryKind, NewEntry, Recorded, finding_named_now
@@ -35,8 +36,14 @@ class Found:
     details: Mapping[str, object] = field(default_factory=dict)
 
 
-def station_entry(found: Found) -> NewEntry:
-    """Return the entry that makes a measurement of a station count from now on."""
+def station_entry(found: Found, *, base: tuple[float, ...] | None = None) -> NewEntry:
+    """Return the entry that makes a measurement of a station count from now on.
+
+    Args:
+        found: What was found.
+        base: Where the controller's base stands, as :func:`~robolink.stations.base_now` tells;
+            ``None`` where that is not known.
+    """
     places = ((found.x_mm, "X"), (found.y_mm, "Y"), (found.z_mm, "Z"))
     place = " ".join(f"{name} {value:.3f}" for value, name in places if value is not None)
     details: dict[str, object] = {
@@ -50,6 +57,8 @@ def station_entry(found: Found) -> NewEntry:
         "gauge": found.gauge,
         **found.details,
     }
+    if base is not None:
+        details["base"] = list(base)
     return NewEntry(
         EntryKind.STATION,
         tool=found.tool,
@@ -58,8 +67,10 @@ def station_entry(found: Found) -> NewEntry:
     )
 
 
+_AXES: Final = 6
+
 _COMMON = frozenset(
-    {"station", "kind", "x_mm", "y_mm", "z_mm", "sigma_mm", "how", "gauge"},
+    {"station", "kind", "x_mm", "y_mm", "z_mm", "sigma_mm", "how", "gauge", "base"},
 )
 
 
@@ -80,9 +91,17 @@ def station_of(entry: Recorded) -> Station | None:
         gauge=str(details.get("gauge", "")),
         found_at=entry.at,
         entry=entry.number,
+        base=_base(details.get("base")),
         details={key: value for key, value in details.items() if key not in _COMMON},
     )
 
 
 def _number(value: object) -> float | None:
     return float(value) if isinstance(value, (int, float)) else None
+
+
+def _base(value: object) -> tuple[float, ...] | None:
+    """Return a base of an entry; one that is no six numbers is none."""
+    numbers = [_number(one) for one in value] if isinstance(value, list) else []
+    known = tuple(one for one in numbers if one is not None)
+    return known if len(known) == len(numbers) == _AXES else None

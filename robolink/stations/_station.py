@@ -51,6 +51,8 @@ class Station:
         how: How it was found, in words.
         found_at: When, ISO 8601 UTC; empty when the cell file says where it is.
         entry: Number of the entry in the journal, ``None`` when the cell file says it.
+        base: Where the controller's base stood when it was learnt: X, Y, Z in mm, U, V, W in
+            degrees, seen from the robot; ``None`` where that is not on record.
         gauge: Id of the gauge that stands there, empty for none.
         gauge_due: Until when the calibration of that holds, ISO 8601; empty where nobody says it.
         check_every_days: After so many days it has to be learnt again, ``None`` for never.
@@ -68,6 +70,7 @@ class Station:
     how: str = ""
     found_at: str = ""
     entry: int | None = None
+    base: tuple[float, ...] | None = None
     gauge: str = ""
     gauge_due: str = ""
     check_every_days: float | None = None

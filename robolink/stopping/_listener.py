@@ -66,6 +66,15 @@ class StopListener(ClosedAtExit):
 
     Raises:
         OSError: There is no place to listen.
+
+    Example:
+        >>> from robolink.stopping import StopListener, far_end_of, holders_of
+        >>> from robolink.testing import MemoryController
+        >>> url = "epson+tcp://192.168.0.1:5000"
+        >>> with MemoryController(identity=url) as controller:
+        ...     with StopListener(controller, url, who="K. Sato, calibrating"):
+        ...         [holder.who for holder in holders_of(far_end_of(url))]
+        ['K. Sato, calibrating']
     """
 
     def __init__(

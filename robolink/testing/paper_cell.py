@@ -130,7 +130,7 @@ class PaperCell:
                 self.here = self._sought(step)
             case Ask():
                 self.here = self._shown(step)
-                contact = None if step.contact is None else True
+                contact = None if step.contact is None else self._touched is not None
                 return TouchedAt.of(self.here, seconds=_ANSWERED_AFTER_S, contact=contact)
         return self.here
 

@@ -61,6 +61,16 @@ def open_transport(
     Raises:
         ConfigError: The URL is wrong, or nothing knows its scheme.
         ConnectError: No connection could be made.
+
+    Example:
+        >>> from robolink.timing import Deadline
+        >>> from robolink.transport import open_transport
+        >>> line = open_transport("epson+sim://transport-example")
+        >>> deadline = Deadline.after(line.clock, 1)
+        >>> line.send(b"$Login" + bytes([13, 10]), deadline=deadline)
+        >>> line.receive(deadline=deadline)[:8]
+        b'#Login,0'
+        >>> line.close()
     """
     link = parse_url(url) if isinstance(url, str) else url
     opener = cast(TransportOpener, _find(link, _MEDIA))
@@ -82,6 +92,13 @@ def open_mailbox_link(
         ConnectError: No connection could be made, or nobody answers.
         TransportBrokenError: The bus or the line failed meanwhile.
         RemoteProtocolError: What answers makes no sense.
+
+    Example:
+        >>> from robolink.transport import open_mailbox_link
+        >>> link = open_mailbox_link("softmotion+sim://mailbox-link-example", timeout_s=1)
+        >>> link.read_head().heartbeat >= 0
+        True
+        >>> link.close()
     """
     link = parse_url(url) if isinstance(url, str) else url
     opened: MailboxLink = _find(link, _MAILBOX_MEDIA)(link, timeout_s=timeout_s, clock=clock)
@@ -94,6 +111,18 @@ def open_quick_link(
     """Open a link to a PLC mailbox for a stop or a look; as :func:`open_mailbox_link`.
 
     Over Modbus it has its own frames, because loading pymodbus takes longer than either.
+
+    Args:
+        url: For example ``softmotion+modbus-tcp://192.168.0.2:502``.
+        timeout_s: Longest wait for the connection, and for each exchange.
+        clock: Replaces the machine's clock; a simulator brings its own.
+
+    Example:
+        >>> from robolink.transport import open_quick_link
+        >>> link = open_quick_link("softmotion+sim://quick-link-example", timeout_s=1)
+        >>> link.identity
+        'softmotion+sim://quick-link-example'
+        >>> link.close()
     """
     link = parse_url(url) if isinstance(url, str) else url
     opener = _find(link, _MAILBOX_MEDIA)
@@ -119,6 +148,19 @@ def open_modbus(
         ConfigError: The URL is wrong, or nothing knows its scheme.
         ConnectError: No connection could be made, or nobody answers.
         RemoteProtocolError: What answers is no Modbus.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from robolink.register_maps import load_map
+        >>> from robolink.transport import open_modbus
+        >>> from robolink_simulators.plc import PlcSimulator, serve_plc
+        >>> from robolink_simulators.testkit.recipes import written_map
+        >>> path = written_map(Path.cwd())
+        >>> with serve_plc(PlcSimulator(load_map(path), seed=1), path) as host:
+        ...     client = open_modbus(host.url.partition("&map")[0], timeout_s=1)
+        ...     len(client.read_holding(100, 4))
+        ...     client.close()
+        4
     """
     link = parse_url(url) if isinstance(url, str) else url
     opened: ModbusClient = _find(link, _REGISTER_MEDIA)(link, timeout_s=timeout_s, clock=clock)

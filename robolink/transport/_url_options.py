@@ -22,7 +22,20 @@ class UrlOptions:
         self._known: list[str] = []
 
     def take_int(self, name: str, default: int | None, low: int, high: int) -> int:
-        """Return a whole number between ``low`` and ``high``; without a default it must stand."""
+        """Return a whole number between ``low`` and ``high``; without a default it must stand.
+
+        Args:
+            name: Name of the option.
+            default: What it is where it is not given; ``None`` where it must be.
+            low: Least number that it may be.
+            high: Largest.
+
+        Example:
+            >>> from robolink.transport import UrlOptions, parse_url
+            >>> options = UrlOptions(parse_url("plc+modbus-tcp://192.168.0.2:502?unit=7"))
+            >>> options.take_int("unit", default=1, low=0, high=247)
+            7
+        """
         if default is None and name not in self._left:
             raise ConfigError(
                 tr(
@@ -43,7 +56,19 @@ class UrlOptions:
         )
 
     def take_choice(self, name: str, default: str, choices: Mapping[str, _Choice]) -> _Choice:
-        """Return what ``choices`` holds for the value."""
+        """Return what ``choices`` holds for the value.
+
+        Args:
+            name: Name of the option.
+            default: Its text where it is not given.
+            choices: What each text means.
+
+        Example:
+            >>> from robolink.transport import UrlOptions, parse_url
+            >>> options = UrlOptions(parse_url("plc+modbus-rtu:///dev/ttyUSB0?parity=even"))
+            >>> options.take_choice("parity", "none", {"none": "N", "even": "E"})
+            'E'
+        """
         text = self.take_text(name, default)
         if text in choices:
             return choices[text]

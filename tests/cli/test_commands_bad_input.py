@@ -242,7 +242,7 @@ def test_nobody_to_ask_and_no_yes_means_no(cell, command):
 def test_an_implausible_change_is_refused_and_not_written(cell):
     refused = cell.run(*cell.calibration, "--max-change", "0.01")
     assert refused.code == 7
-    assert "up to 0.010 mm are allowed here" in refused.err
+    assert "0.010 mm is allowed" in refused.err
     assert "--max-change" in refused.err
     as_json = cell.run(*cell.calibration, "--max-change", "0.01", "--json")
     check_refused_as_document(as_json, 7, kind="CalibrationError", code="implausible_change")

@@ -84,7 +84,7 @@ def test_off_a_terminal_an_engineer_says_beforehand_how_far(cell, tools):
     for more in ((), ("--yes",), ("--accept-jump", "23.9")):
         code, _, err = cell("eva", *SIGN_ERROR, *more)
         assert code == 9, err
-        assert "The tip of tool 1 would move by 24.000 mm; this cell allows 1.500 mm." in err
+        assert "The tip of tool 1 would move 24.000 mm; this cell allows 1.500 mm." in err
         assert "--accept-jump" in err
     assert tools.get(1) == STORED
     code, out, err = cell("eva", *SIGN_ERROR, "--accept-jump", "24.1", "--json")
@@ -97,7 +97,7 @@ def test_on_a_terminal_an_engineer_is_asked_with_the_figure_whatever_yes_says(ce
     code, _, err = cell("eva", *SIGN_ERROR, "--yes")
     assert code == 0, err
     (question,) = person.questions
-    assert "would move by 24.000 mm; this cell allows 1.500 mm" in question
+    assert "would move 24.000 mm; this cell allows 1.500 mm" in question
     assert tools.get(1) == ToolOffset(-12.0, -3.5, -20.0)
 
 

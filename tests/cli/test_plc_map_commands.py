@@ -73,7 +73,7 @@ def test_a_register_list_becomes_the_beginning_of_a_map(shown, tmp_path):
     code, out, err = shown("plc", "check-map", "--from-csv", str(path))
     assert code == 0
     assert 'x = { table = "holding", address = 100, type = "REAL" }' in out
-    assert "1 rows are left" in err
+    assert "Rows left for you: 1" in err
     code, out, _ = shown("plc", "check-map", "--from-csv", str(path), "--json")
     assert document(out, "plc-map-draft")["left"] == ["Commit"]
 

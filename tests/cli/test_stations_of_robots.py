@@ -74,3 +74,23 @@ def test_what_does_not_tell_its_robot_is_listed_under_the_controller(run):
     learnt("", 77.0)
     assert (BOTH, "PIN-07", 77.0) in places(run)
     assert json.loads(run("show", "PIN-08", "--json")[1])["x_mm"] == 300.0
+
+
+def test_the_beams_of_a_station_are_shown_as_a_cell_file_has_them(
+    run, monkeypatch, tmp_path, capsys
+):
+    (tmp_path / "robolink.toml").write_text(f"""
+[cells.line3]
+url = "{URL}"
+stations.BEAMS-02 = {{ kind = "beams", z_mm = -106.0, beams = [
+    {{ input = 3, x_mm = 175.0, y_mm = 488.0, direction_deg = 2.0 }},
+    {{ input = 4, x_mm = 175.0, y_mm = 488.0, direction_deg = 91.0 }},
+] }}
+""")
+    monkeypatch.setenv("ROBOLINK_CONFIG", str(tmp_path / "robolink.toml"))
+    assert main.run(["-c", "line3", "cell", "station", "show", "BEAMS-02"]) == 0
+    shown = capsys.readouterr().out
+    for number, direction in ((3, 2), (4, 91)):
+        beam = f"input = {number}, x_mm = 175, y_mm = 488, direction_deg = {direction}"
+        assert f"  beams = {{ {beam} }}\n" in shown
+    assert "  off_when_broken = false\n" in shown

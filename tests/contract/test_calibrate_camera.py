@@ -178,7 +178,10 @@ sensor = "{cell.assist_url}"
         (kept,) = open_journal().log(cell.url).recorded(kinds=[EntryKind.STATION])
         assert kept.details["kind"] == "camera"
         shown = cell.run("-c", "line3", "station", "show", "CAM")
-        assert "mm per px" in shown.out
+        assert "  mm_per_px = [[" in shown.out
+        world = cell.run("sim", "assist", cell.assist_url, "set_world", "lean_deg=0")
+        assert "board_held false" in world.out
+        assert "contact_input none" in world.out
         cell.simulator.world.change_nozzle()
         done = cell.run("-c", "line3", "calibrate", "camera", *usual)
         assert done.code == 0, done.err

@@ -41,7 +41,7 @@ def test_a_jump_of_z_alone_is_implausible_where_z_was_measured(measured, z_from,
     if not change_mm:
         AcceptanceCriteria().judge_change(longer)
         return
-    with pytest.raises(CalibrationError, match="would move by 3") as refused:
+    with pytest.raises(CalibrationError, match="would move 3") as refused:
         AcceptanceCriteria().judge_change(longer)
     assert refused.value.code == "implausible_change"
 

@@ -46,10 +46,11 @@ def test_a_contact_input_is_seen_to_switch():
     assert touch.contact is True
 
 
-def test_a_touch_that_nobody_describes_is_not_made():
+@pytest.mark.parametrize("contact", [None, InputEdge(2)])
+def test_a_touch_that_nobody_describes_is_not_made(contact):
     cell = PaperCell(HERE, TIP)
     with pytest.raises(CalibrationError) as refused:
-        cell.run(measure_two_pose(TouchPlan(), stored=TIP))
+        cell.run(measure_two_pose(TouchPlan(contact=contact), stored=TIP))
     assert refused.value.code == "not_touched"
 
 

@@ -151,7 +151,7 @@ BAD = {
         "tools#2.number",
         "is given twice",
     ),
-    "no commit": (GOOD.replace('[commit]\nkind = "none"\n', ""), "commit", "is missing"),
+    "no commit": (GOOD.replace('[commit]\nkind = "none"\n', ""), "commit", 'kind = "commit_bit"'),
     "an unknown handshake": (GOOD.replace('"none"', '"maybe"'), "commit", "commit_bit"),
     "a trigger that is one bit of a register": (
         GOOD.replace(

@@ -308,7 +308,7 @@ def test_what_these_kinds_can_measure_is_accepted(text):
             "source.spacing_mm",
             "excludes fiducials_mm",
         ),
-        (MARKS, "source.fiducials_mm#3", "lies 3 mm from fiducial 2"),
+        (MARKS, "source.fiducials_mm#3", "is 3 mm from fiducial 2"),
         (
             with_(with_(BOARD, "[source]", ONE_LOOK), "[tolerances]", "rms_mm = 0.1"),
             "tolerances.rms_mm",

@@ -115,13 +115,19 @@ def test_a_step_is_understood_however_it_is_spaced_and_signed(text, deltas):
 
 @pytest.mark.parametrize(
     "text",
-    ["x0.1", "x+0.1\u00b2", "x+0,1234", "x+0.1.2", "x+1,  5", "+x1", "x+", "x+1 x+2", "x+-1", "y"],
+    ["x0.1", "x+0.1\u00b2", "x+0,1234", "x+0.1.2", "x+1,  5", "+x1", "x+", "x+-1", "y"],
 )
 def test_what_could_be_meant_otherwise_is_not_guessed(text):
     with pytest.raises(
         ConfigError,
         match=r"is no step\. A step is x\+0\.1: axis, sign, number, with a point\. Axes are",
     ):
+        parse_steps(text)
+
+
+@pytest.mark.parametrize("text", ["x+1 x+2", "z-5 z-5", "x+1 y-1 x-1"])
+def test_an_axis_that_is_there_twice_is_named(text):
+    with pytest.raises(ConfigError, match=f"^{text[0]} is there twice: .* Nothing moved"):
         parse_steps(text)
 
 

@@ -37,7 +37,7 @@ _ROBOT: Final = {
 
 _CELL: Final = {
     "list": (f"{COMPUTER}.config:list_cells", declared("The cells that have a name here.")),
-    "show": (f"{COMPUTER}.config:show", declared("All that is in force for one cell.")),
+    "show": (f"{COMPUTER}.config:show", declared("All settings that count for one cell.")),
     "check": (
         f"{COMPUTER}.cell_check:check",
         declared(
@@ -48,7 +48,7 @@ _CELL: Final = {
     "validate": (f"{COMPUTER}.config:check", declared("Whether the cell files are right.")),
     "doctor": (
         f"{COMPUTER}.doctor:doctor",
-        declared("What could get in the way on this computer."),
+        declared("What could go wrong on this computer."),
     ),
     "scan": (f"{COMPUTER}.scan:scan", declared("Try which of a few addresses answer.")),
     "ports": (f"{COMPUTER}.ports:ports", declared("List the serial ports.")),
@@ -112,13 +112,13 @@ _CONFIG: Final = {
 robot = LazyGroup(
     name="robot",
     lazy=_ROBOT,
-    help=declared("Look at the robot, move it a little, and calm it."),
+    help=declared("Look at the robot, move it a little, reset it."),
 )
 
 cell = LazyGroup(
     name="cell",
     lazy=_CELL,
-    help=declared("The cells of this computer: their files, their places, and what is in the way."),
+    help=declared("The cells of this computer: their files, their places, and what is wrong."),
 )
 
 

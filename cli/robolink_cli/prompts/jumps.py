@@ -137,7 +137,7 @@ def _figure(tool: int, jump: "Jump", allowed: Allowed) -> str:
     if allowed.length_mm is not None and jump.length_mm > allowed.length_mm:
         sentences.append(
             tr(
-                "The tip of tool {tool} would move by {change:.3f} mm; this cell allows "
+                "The tip of tool {tool} would move {change:.3f} mm; this cell allows "
                 "{limit:.3f} mm.",
                 tool=tool,
                 change=jump.length_mm,

@@ -1,6 +1,6 @@
 """The stations of a cell, as commands show them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -91,6 +91,7 @@ def station_payload(station: Station, *, robot: str = "") -> dict[str, Any]:
         "how": station.how,
         "found_at": station.found_at or None,
         "entry": station.entry,
+        "base": None if station.base is None else list(station.base),
         "gauge": station.gauge or None,
         "gauge_due": station.gauge_due or None,
         "check_due": due.isoformat() if due else None,
@@ -139,7 +140,27 @@ def show_station(one: StationOfRobot) -> None:
     if station.check_due:
         say(tr("  check due: {due}", due=station.check_due.date().isoformat()))
     for name, value in station.details.items():
-        say(f"  {name.replace('_', ' ')}: {value}")
+        for row in _tables(value) or (value,):
+            say(f"  {name} = {_as_in_a_cell_file(row)}")
+
+
+def _tables(value: object) -> tuple[Mapping[str, object], ...]:
+    """Return the tables of a list of them, such as two beams; empty for any other value."""
+    if not isinstance(value, list | tuple):
+        return ()
+    return tuple(one for one in value if isinstance(one, Mapping))
+
+
+def _as_in_a_cell_file(value: object) -> str:
+    """Return a detail as a cell file has it, texts without their quotes."""
+    if isinstance(value, Mapping):
+        inside = (f"{name} = {_as_in_a_cell_file(one)}" for name, one in value.items())
+        return f"{{ {', '.join(inside)} }}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_as_in_a_cell_file, value))}]"
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"{value:.7g}" if isinstance(value, float) else str(value)
 
 
 def _found(station: Station) -> str:

@@ -178,7 +178,9 @@ def _table(values_mm: Sequence[Sequence[Sequence[float]]]) -> Floats:
                 persons=o,
                 repeats=r,
             ),
-            remedy=tr("Usual are 10 nozzles, 3 persons and 3 repeats; 5, 3 and 3 fit a shift."),
+            remedy=tr(
+                "10 nozzles, 3 persons and 3 repeats are usual; 5, 3 and 3 fit into a shift."
+            ),
         )
     for i, part in enumerate(values_mm, start=1):
         for j, cell in enumerate(part, start=1):

@@ -50,6 +50,19 @@ class EpsonController(ControllerCore):
         outcomes: Where doubtful outcomes of this controller are kept.
         remote_timeout_s: The remote time-out set on the controller, as a person states it;
             0 (never) forbids motion.
+
+    Example:
+        >>> from robolink.controllers.epson import EpsonController
+        >>> from robolink.controllers.epson.link.line import open_line
+        >>> from robolink.controllers.epson.link.session import EpsonSession
+        >>> from robolink.journal import memory_journal
+        >>> line = open_line("epson+sim://session-example", timeout_s=1)
+        >>> session = EpsonSession(line, timeout_s=1)
+        >>> session.login(None)
+        >>> outcomes = memory_journal("session-example").log("session-example")
+        >>> with EpsonController(session, outcomes, remote_timeout_s=60) as controller:
+        ...     controller.status().ready
+        True
     """
 
     tools: EpsonToolTable
@@ -276,9 +289,27 @@ def open_epson(
 ) -> EpsonController:
     """Log in and return the controller; the line is closed when that fails.
 
+    Args:
+        line: The line to the controller; it is closed with the controller.
+        outcomes: Where doubtful outcomes of this controller are kept.
+        password: Its remote password, ``None`` for none.
+        timeout_s: Longest wait for one answer, seconds.
+        remote_timeout_s: The remote time-out set on the controller, as a person states it, seconds;
+            0 (never) forbids motion.
+
     Raises:
         LoginRefusedError: Wrong or missing password. One attempt is made.
         LoginUnansweredError: Nobody answers; another client may be logged in.
+
+    Example:
+        >>> from robolink.controllers.epson import open_epson
+        >>> from robolink.controllers.epson.link.line import open_line
+        >>> from robolink.journal import memory_journal
+        >>> line = open_line("epson+sim://login-example", timeout_s=1)
+        >>> outcomes = memory_journal("login-example").log("login-example")
+        >>> with open_epson(line, outcomes=outcomes) as controller:
+        ...     controller.tools.indices()[-1]
+        15
     """
     session = EpsonSession(line, timeout_s=timeout_s)
     try:

@@ -45,6 +45,22 @@ class PlcMapController(ControllerCore):
         client: An open Modbus client; the controller owns it from here on.
         register_map: The map.
         outcomes: Where doubtful outcomes of this PLC are kept.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from robolink.controllers.plc_map import PlcMapController
+        >>> from robolink.journal import memory_journal
+        >>> from robolink.register_maps import load_map
+        >>> from robolink.transport import open_modbus
+        >>> from robolink_simulators.plc import PlcSimulator, serve_plc
+        >>> from robolink_simulators.testkit.recipes import written_map
+        >>> path = written_map(Path.cwd())
+        >>> register_map, log = load_map(path), memory_journal("map-example").log("map-example")
+        >>> with serve_plc(PlcSimulator(register_map, seed=1), path) as host:
+        ...     client = open_modbus(host.url.partition("&map")[0])
+        ...     with PlcMapController(client, register_map, log) as controller:
+        ...         list(controller.tools.indices())
+        [1, 2]
     """
 
     tools: RegisterToolTable
@@ -202,6 +218,22 @@ def open_plc_map(
         ConfigError: The URL, an option or the map is wrong.
         ConnectError: No connection.
         RemoteProtocolError: The probe differs; says what the map should say.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from robolink.controllers.plc_map import open_plc_map
+        >>> from robolink.journal import memory_journal
+        >>> from robolink.register_maps import load_map
+        >>> from robolink.transport import parse_url
+        >>> from robolink_simulators.plc import PlcSimulator, serve_plc
+        >>> from robolink_simulators.testkit.recipes import written_map
+        >>> path = written_map(Path.cwd())
+        >>> def record(identity):
+        ...     return memory_journal(identity).log(identity)
+        >>> with serve_plc(PlcSimulator(load_map(path), seed=1), path) as host:
+        ...     with open_plc_map(parse_url(host.url), outcomes=record) as controller:
+        ...         controller.register_map.name
+        'simulated dispenser'
     """
     register_map, url = _with_map(url)
     client = open_modbus(url, timeout_s=timeout_s, clock=clock)

@@ -311,6 +311,16 @@ def open_softmotion(
     Raises:
         ConnectError: The mailbox program does not run.
         RemoteProtocolError: It is no mailbox of this version, or its words stand elsewhere.
+
+    Example:
+        >>> from robolink.controllers.softmotion import open_softmotion
+        >>> from robolink.journal import memory_journal
+        >>> from robolink.transport import open_mailbox_link
+        >>> link = open_mailbox_link("softmotion+sim://mailbox-example")
+        >>> log = memory_journal("mailbox-example").log("mailbox-example")
+        >>> with open_softmotion(link, outcomes=log) as controller:
+        ...     controller.groups[0].name
+        'axis group'
     """
     wire = MailboxWire(link, owner=owner or ambient.random_number(32), timeout_s=timeout_s)
     try:

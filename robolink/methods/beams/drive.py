@@ -100,7 +100,7 @@ class BeamScan:
         purpose = (
             tr("Looking for beam {number}.", number=number)
             if broken
-            else tr("leave beam {number}", number=number)
+            else tr("Leaving beam {number}.", number=number)
         )
         drive = self.drive
         step = Seek(

@@ -68,14 +68,19 @@ def find_last_touch(controller: Controller, tool: int, station: str) -> LastTouc
             changed since.
 
     Example:
-        >>> from robolink.errors import CalibrationError
-        >>> from robolink.methods import find_last_touch
-        >>> from robolink.testing import MemoryController
-        >>> try:
-        ...     find_last_touch(MemoryController(), tool=1, station="PIN-07")
-        ... except CalibrationError as error:
-        ...     print(error.code)
-        no_last_touch
+        >>> from robolink.methods import PointsSource, find_last_touch
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
+        >>> from robolink.testing import MemoryController, MemoryMachine
+        >>> class Nobody:  # implements robolink.Operator
+        ...     def tell(self, text): ...
+        >>> source = PointsSource(lambda: [Pose(298, 99, -20, 0), Pose(322, 91, -20, 180)])
+        >>> tool = ToolPlan(1, source, verify=False, pin="PIN-07")
+        >>> plan = ChangePlan((tool,), ask_before_write=False)
+        >>> with MemoryController(MemoryMachine({1: ToolOffset(12, -3.5, -20)})) as controller:
+        ...     report = NozzleChange(controller, plan, operator=Nobody()).run()
+        ...     find_last_touch(controller, 1, "PIN-07").place_mm
+        (310.0, 95.0, -40.0)
     """
     kept = controller.outcomes.recorded(tool=tool, kinds=KEPT)
     newest = next(

@@ -143,15 +143,24 @@ def difference_from_last(
 
     Example:
         >>> from robolink.calibration import NeedleLimits
-        >>> from robolink.errors import CalibrationError
-        >>> from robolink.methods import difference_from_last
-        >>> from robolink.testing import MemoryController
-        >>> limits = NeedleLimits()
-        >>> try:
-        ...     difference_from_last(MemoryController(), 1, "PIN-07", sigma_mm=0.02, limits=limits)
-        ... except CalibrationError as error:
-        ...     print(error.what)
-        Tool 1 was never calibrated on station PIN-07.
+        >>> from robolink.methods import PointsSource, difference_from_last
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
+        >>> from robolink.testing import MemoryController, MemoryMachine
+        >>> class Nobody:  # implements robolink.Operator
+        ...     def tell(self, text): ...
+        >>> stored = ToolOffset(12, -4, -20)
+        >>> source = PointsSource(lambda: [Pose(298, 99, -20, 0), Pose(322, 91, -20, 180)])
+        >>> tool = ToolPlan(1, source, verify=False, pin="PIN-07")
+        >>> with MemoryController(MemoryMachine({1: stored})) as controller:
+        ...     plan = ChangePlan((tool,), ask_before_write=False)
+        ...     report = NozzleChange(controller, plan, operator=Nobody()).run()
+        ...     solver = difference_from_last(
+        ...         controller, 1, "PIN-07", sigma_mm=0.02, limits=NeedleLimits()
+        ...     )
+        >>> new = solver.solve([Pose(297.8, 99, -20, 0)], stored)  # the next nozzle's one touch
+        >>> round(new.offset.x_mm, 3), round(new.offset.y_mm, 3)
+        (12.2, -4.0)
     """
     last = find_last_touch(controller, tool, station)
     sigma = sigma_mm or last.touch_sigma_mm

@@ -313,6 +313,14 @@ class MotionGroup(Protocol):
     def terms(self) -> MotionTerms:
         """Read what a person must know before it moves."""
 
+    def base(self) -> tuple[float, ...] | None:
+        """Read where the base stands that positions count from.
+
+        Returns:
+            X, Y, Z in mm and U, V, W in degrees, seen from the robot; ``None`` where this kind of
+            controller tells none.
+        """
+
     def axes(self) -> Mapping[str, tuple[float, ...]]:
         """Read the positions of the axes, by the names of what they count in."""
 

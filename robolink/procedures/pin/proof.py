@@ -57,6 +57,19 @@ def verify_by_turning(
     Raises:
         CalibrationError: ``not_touched`` or ``typed_ahead``, with the tip drawn back.
         LimitError: The arm cannot turn so over this pin, nor two thirds as far.
+
+    Example:
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.procedures import TouchPlan, verify_by_turning
+        >>> from robolink.testing import PaperCell
+        >>> contact = Pose(310, 95, -40, 0)
+        >>> proof = verify_by_turning(
+        ...     TouchPlan(), contact=contact, angles_deg=(120, 240), tolerance_mm=0.2
+        ... )
+        >>> cell = PaperCell(Pose(310, 95, -30, 0), ToolOffset(0.5), (310, 95, -40))
+        >>> shown = cell.run(proof)  # the tip is 0.5 mm beside where its offset says
+        >>> shown.passed, round(shown.max_drift_mm, 3)
+        (False, 0.5)
     """
     turning = _Turning(plan, contact, written, tip)
     angles_deg = yield from first_clear(
@@ -168,6 +181,16 @@ class DriftProof:
             place: Where the tip should have been.
             found: Where it was.
             in_space: Whether its height counts as drift, too.
+
+        Example:
+            >>> from robolink.model import Pose
+            >>> from robolink.procedures import DriftProof
+            >>> from robolink.runner import TouchedAt
+            >>> proof = DriftProof(tolerance_mm=0.2, u_mm=0.02)
+            >>> proof.add(Pose(310, 95, -40, 90), TouchedAt.of(Pose(310.3, 95.4, -40, 90)))
+            >>> shown = proof.result()
+            >>> shown.passed, round(shown.max_drift_mm, 3)
+            (False, 0.5)
         """
         self.touches.append(found)
         dz_mm = found.z_mm - place.z_mm if in_space else 0.0

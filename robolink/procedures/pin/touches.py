@@ -37,6 +37,16 @@ class PinTouches(WitnessedTouches):
         total: How many touches are planned, ``None`` where nobody knows.
         proof: Whether they are those of a proof.
         retakes: Whether whoever makes them hears of one that is to be made again, alone.
+
+    Example:
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.procedures import PinTouches, TouchPlan
+        >>> from robolink.testing import PaperCell
+        >>> touches = PinTouches(TouchPlan(lift_mm=10), total=2)
+        >>> cell = PaperCell(Pose(300, 100, 20, 0), ToolOffset(12, -4, -20), (310, 95, -40))
+        >>> touch = cell.run(touches.first())
+        >>> touch.z_mm, cell.here.z_mm  # lifted off again
+        (-20.0, -10.0)
     """
 
     def __init__(
@@ -78,6 +88,17 @@ class PinTouches(WitnessedTouches):
 
         Raises:
             CalibrationError: ``not_touched`` or ``typed_ahead``, with the tip drawn back.
+
+        Example:
+            >>> from robolink.model import Pose, ToolOffset
+            >>> from robolink.procedures import PinTouches, TouchPlan
+            >>> from robolink.testing import PaperCell
+            >>> touches, expected = PinTouches(TouchPlan()), Pose(298, 99, -20, 0)
+            >>> cell = PaperCell(Pose(298, 99, 0, 0), ToolOffset(12.1, -4, -20), (310, 95, -40))
+            >>> course = touches.again(expected, key=1, turning="Going.", instruction="Touch.")
+            >>> touch = cell.run(course)
+            >>> round(touch.x_mm, 3), touch.arrival.z_mm > touch.z_mm
+            (297.9, True)
         """
         self._taken.pop(key, None)
         expected = plain_pose(expected)
@@ -228,6 +249,18 @@ def touch_again(
 
     Raises:
         CalibrationError: ``not_touched`` or ``typed_ahead``, with the tip drawn back.
+
+    Example:
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.procedures import PinTouches, TouchPlan, touch_again
+        >>> from robolink.testing import PaperCell
+        >>> tip = ToolOffset(12, -4, -20)
+        >>> touches = PinTouches(TouchPlan())
+        >>> cell = PaperCell(Pose(300, 100, 20, 0), tip, (310, 95, -40))
+        >>> first = cell.run(touches.first())
+        >>> second = cell.run(touch_again(touches, first, 180, tip))
+        >>> round(second.x_mm, 3), round(second.y_mm, 3), second.u_deg
+        (322.0, 91.0, 180)
     """
     return (
         yield from touches.again(
@@ -257,6 +290,16 @@ def turned_touches(
         angles_deg: U of each.
         guess: About where the tip is.
         comes_down: As for :class:`PinTouches`.
+
+    Example:
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.procedures import TouchPlan, turned_touches
+        >>> from robolink.runner import Ask, foreseen_steps
+        >>> first, stored = Pose(298, 99, -20, 0), ToolOffset(12, -4, -20)
+        >>> course = turned_touches(TouchPlan(nominal=True), first, (120, 240), stored)
+        >>> asked = [one.step for one in foreseen_steps(course, first) if isinstance(one.step, Ask)]
+        >>> [step.foreseen.u_deg for step in asked]
+        [120, 240]
     """
     touches = PinTouches(plan, comes_down=comes_down)
     last: Pose = first

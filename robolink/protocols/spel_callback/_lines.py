@@ -102,7 +102,7 @@ def decode_line(data: bytes) -> CallbackLine:
     text = data.decode("latin-1")
     body, star, given = text.rpartition("*")
     if not star or len(text) > LONGEST_LINE or given != f"{check_sum(body):X}":
-        raise _useless(tr("A line is bent: its check sum is not right."), data)
+        raise _useless(tr("A line arrived damaged: its check sum is wrong."), data)
     version, *rest = body.split(",")
     if version != VERSION:
         raise _useless(tr("The other end speaks {version!r}.", version=version), data)

@@ -139,7 +139,7 @@ class ModbusMailboxLink:
         start = self._places.slots + SLOTS * SLOT_WORDS
         if start + DEVICE_WORDS > _REGISTERS:
             raise RejectedError(
-                tr("There are no registers behind the tool slots of {it}.", it=self.identity),
+                tr("There are no registers after the tool slots of {it}.", it=self.identity),
                 remedy=tr("Move the slots down by {count} registers.", count=DEVICE_WORDS),
                 controller=self.identity,
             )

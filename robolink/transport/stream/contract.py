@@ -35,10 +35,23 @@ class Transport(Protocol):
     def send(self, data: bytes, *, deadline: Deadline, secret: bool = False) -> None:
         """Send all of ``data``. ``secret`` keeps it out of every trace.
 
+        Args:
+            data: The bytes.
+            deadline: Until when they have to be out.
+            secret: Whether they are kept out of every trace.
+
         Raises:
             TransportBrokenError: The link is gone; an unknown prefix may be out.
             TransportTimeoutError: The deadline passed; an unknown prefix may be out.
             TransportClosedError: Used after :meth:`close`.
+
+        Example:
+            >>> from robolink.timing import Deadline
+            >>> from robolink.transport import open_transport
+            >>> line = open_transport("epson+sim://send-example")
+            >>> deadline = Deadline.after(line.clock, 1)
+            >>> line.send(b"$Login,secret" + bytes([13, 10]), deadline=deadline, secret=True)
+            >>> line.close()
         """
 
     def receive(self, *, deadline: Deadline) -> bytes:

@@ -89,7 +89,21 @@ class DialogueLog:
         self.keep(at_ns, direction, data)
 
     def keep(self, at_ns: int, direction: Direction, data: bytes) -> Passage:
-        """Keep one piece and return it."""
+        """Keep one piece and return it.
+
+        Args:
+            at_ns: When, on the clock of the link; the first one kept is at 0.
+            direction: Which way it went.
+            data: The bytes.
+
+        Example:
+            >>> from robolink.transport import DialogueLog
+            >>> log = DialogueLog("epson+tcp://192.168.0.1:5000", "2026-11-23T08:00:00Z")
+            >>> log.keep(5_000_000_000, "sent", b"$GetStatus").at_s
+            0.0
+            >>> log.keep(5_250_000_000, "received", b"#GetStatus,00100000001,0000").at_s
+            0.25
+        """
         if self._began_ns is None:
             self._began_ns = at_ns
         secret = direction == "sent" and data == SECRET_PLACEHOLDER

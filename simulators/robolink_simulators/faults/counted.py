@@ -51,6 +51,13 @@ class CountedFaults(Generic[AnyFault]):
 
     Raises:
         FaultNotPossibleError: There is no such fault on any of them.
+
+    Example:
+        >>> from robolink_simulators.faults import CountedFaults, Fault, FaultAction, LinkKind
+        >>> lost = Fault(FaultAction.DROP_REQUEST, match="GetStatus", on_exchange=1)
+        >>> faults = CountedFaults([lost], links={LinkKind.EPSON_TCP})
+        >>> [len(faults.take(request)) for request in ("$GetStatus", "$Execute", "$GetStatus")]
+        [0, 0, 1]
     """
 
     def __init__(
@@ -79,9 +86,21 @@ class CountedFaults(Generic[AnyFault]):
     def plan(self, faults: Iterable[Planned], seed: int, served: Collection[LinkKind]) -> None:
         """Plan what a file says, for a device that is served on certain links.
 
+        Args:
+            faults: What to plan.
+            seed: Decides what no fault says.
+            served: The links on which the device is served.
+
         Raises:
             FaultNotPossibleError: One of the faults can happen on none of these links. Nothing
                 is planned then.
+
+        Example:
+            >>> from robolink_simulators.faults import CountedFaults, Fault, FaultAction, LinkKind
+            >>> faults = CountedFaults(links={LinkKind.EPSON_TCP, LinkKind.EPSON_SERIAL})
+            >>> faults.plan([Fault(FaultAction.DROP_REQUEST)], seed=7, served={LinkKind.EPSON_TCP})
+            >>> len(faults.pending)
+            1
         """
         wanted = tuple(faults)
         for fault in wanted:

@@ -129,6 +129,20 @@ class FaultyDisk:
             database: The file, open or not.
             into: Another folder.
             seed: Draws the sectors that reached the disk unsynced; ``None`` for none of them.
+
+        Example:
+            >>> from pathlib import Path
+            >>> from robolink.journal import close_files, open_journal
+            >>> from robolink_simulators.faults import FaultyDisk
+            >>> kept, found = Path("kept"), Path("found")
+            >>> kept.mkdir(), found.mkdir()
+            (None, None)
+            >>> with FaultyDisk(kept) as disk:
+            ...     journal = open_journal(str(kept / "journal.db"))
+            ...     copy = disk.after_power_cut(kept / "journal.db", found, seed=7)
+            ...     close_files()
+            >>> copy.name
+            'journal.db'
         """
         chance = None if seed is None else random.Random(f"power cut {seed}")
         copied = self.after_kill(database, into)
@@ -152,7 +166,23 @@ class FaultyDisk:
         return flags
 
     def write(self, file: WatchedFile, data: bytes, offset: int) -> int:
-        """Write, unless the disk is full or unwritable."""
+        """Write, unless the disk is full or unwritable.
+
+        Args:
+            file: Where, as SQLite opened it.
+            data: What.
+            offset: From which byte on.
+
+        Example:
+            >>> from pathlib import Path
+            >>> from robolink.journal import close_files, open_journal
+            >>> from robolink_simulators.faults import FaultyDisk
+            >>> with FaultyDisk(Path.cwd()) as disk:  # SQLite writes by it
+            ...     journal = open_journal("journal.db")
+            ...     close_files()
+            >>> disk.writes > 0
+            True
+        """
         self._step("write", file)
         size = file.size()
         if self._is_on(DiskFault.UNWRITABLE):

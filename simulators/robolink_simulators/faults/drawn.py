@@ -87,6 +87,13 @@ def drawn_faults(seed: int, kind: LinkKind, rates: FaultRates) -> tuple[Fault, .
 
     Raises:
         FaultNotPossibleError: The link cannot have a fault that is asked for.
+
+    Example:
+        >>> from robolink_simulators.faults import FaultRates, LinkKind, drawn_faults
+        >>> rates = FaultRates(rate=0.5, exchanges=100)
+        >>> faults = drawn_faults(7, LinkKind.EPSON_TCP, rates)
+        >>> faults == drawn_faults(7, LinkKind.EPSON_TCP, rates), 30 < len(faults) < 70
+        (True, True)
     """
     chance = random.Random(f"stream {kind.value} {seed}")
     actions = _drawable(kind, rates, FaultAction)
@@ -107,8 +114,19 @@ def drawn_faults(seed: int, kind: LinkKind, rates: FaultRates) -> tuple[Fault, .
 def drawn_plc_faults(seed: int, kind: LinkKind, rates: FaultRates) -> tuple[PlcFault, ...]:
     """Return the faults of a mailbox that a seed draws; as :func:`drawn_faults`.
 
+    Args:
+        seed: Any number.
+        kind: The link: nothing is drawn that it cannot have.
+        rates: How many, of which kinds, on which exchanges.
+
     Raises:
         FaultNotPossibleError: The link cannot have a fault that is asked for.
+
+    Example:
+        >>> from robolink_simulators.faults import FaultRates, LinkKind, drawn_plc_faults
+        >>> rates = FaultRates(rate=1, exchanges=5)
+        >>> len(drawn_plc_faults(7, LinkKind.MAILBOX_SIM, rates))
+        5
     """
     chance = random.Random(f"mailbox {kind.value} {seed}")
     actions = _drawable(kind, rates, PlcFaultAction)

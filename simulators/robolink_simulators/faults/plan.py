@@ -49,6 +49,12 @@ class FaultPlan(CountedFaults[Fault]):
 
     Raises:
         FaultNotPossibleError: There is no such fault on any of them.
+
+    Example:
+        >>> from robolink_simulators.faults import Fault, FaultAction, FaultPlan
+        >>> plan = FaultPlan([Fault(FaultAction.GARBLE_REPLY, position=1, bit=0)])
+        >>> plan.departures(b"#Stop,0", plan.take("$Stop"))
+        [(0.0, b'#Rtop,0')]
     """
 
     def __init__(
@@ -69,6 +75,12 @@ class FaultPlan(CountedFaults[Fault]):
             seed: Any number.
             kind: The link.
             rates: How many, of which kinds, on which exchanges.
+
+        Example:
+            >>> from robolink_simulators.faults import FaultPlan, FaultRates, LinkKind
+            >>> rates = FaultRates(rate=1, exchanges=5)
+            >>> len(FaultPlan.drawn(7, LinkKind.EPSON_TCP, rates).pending)
+            5
         """
         return cls(drawn_faults(seed, kind, rates), seed, links={kind})
 

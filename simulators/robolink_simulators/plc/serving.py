@@ -108,6 +108,18 @@ def serve_plc(
     Raises:
         ConfigError: The address is not loopback and ``allow_remote`` is off.
         ConnectError: The port is taken, or the address is not this machine's.
+
+    Example:
+        >>> from pathlib import Path
+        >>> import robolink
+        >>> from robolink.register_maps import load_map
+        >>> from robolink_simulators.plc import PlcSimulator, serve_plc
+        >>> from robolink_simulators.testkit.recipes import written_map
+        >>> path = written_map(Path.cwd())
+        >>> with serve_plc(PlcSimulator(load_map(path), seed=7), path) as host:
+        ...     with robolink.connect(host.url) as controller:
+        ...         list(controller.tools.indices())
+        [1, 2]
     """
     clock = clock or ScaledClock()
     return PlcHost(simulator, map_file, (host, port), clock, allow_remote=allow_remote)

@@ -59,6 +59,16 @@ class SoftMotionWorld(Workplace):
     Attributes:
         operator: The person at the cell, who jogs with the machine's own panel.
         stored: The nozzle that was there before.
+
+    Example:
+        >>> from robolink import ToolOffset
+        >>> from robolink_simulators.softmotion import SoftMotionWorld
+        >>> from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
+        >>> group, tip = SoftMotionSimulator().plc.group, ToolOffset(12, -4, 60)
+        >>> stored = ToolOffset(12, -3, 60)
+        >>> world = SoftMotionWorld(group, {1: tip}, (300, 100, 50), seed=7, stored=stored)
+        >>> world.pin_mm, world.tips[1].y_mm
+        ((300, 100, 50), -4)
     """
 
     inputs = SIGNALS
@@ -93,6 +103,18 @@ class SoftMotionWorld(Workplace):
 
         The machine is put where the physical tip stands some mm beside the pin and above it.
         What is stored, and which tool is set, is up to the PLC program.
+
+        Args:
+            group: The robot in this world.
+            seed: Decides the nozzles and the errors of the eye.
+            parameters: What goes wrong here.
+
+        Example:
+            >>> from robolink_simulators.softmotion import SoftMotionWorld
+            >>> from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
+            >>> world = SoftMotionWorld.seeded(SoftMotionSimulator().plc.group, seed=7)
+            >>> world.tips[1] == world.stored
+            False
         """
         rng = random.Random(f"softmotion world {seed}")
         group.place(tuple(_stance(axis.limits.low, axis.limits.high) for axis in group.axes))

@@ -81,6 +81,15 @@ class StructuredProgram:
 
     Raises:
         StructuredTextError: A text is not in the subset; says where and why.
+
+    Example:
+        >>> from robolink_simulators.structured_text import SourceText, StructuredProgram
+        >>> text = "PROGRAM Count VAR n : INT; END_VAR n := n + 1; END_PROGRAM"
+        >>> program = StructuredProgram([SourceText("count.st", text)], "Count")
+        >>> for now_us in (0, 1000):
+        ...     program.cycle(now_us)
+        >>> program.value("n")
+        2
     """
 
     def __init__(

@@ -63,8 +63,8 @@ def _start(context: CliContext, register_list: Path) -> None:
         note(remark)
     note(
         tr(
-            "{found} components of tools were found; {left} rows are left for you. Fill in what "
-            "is open, then 'robolink expert plc check-map MAP.toml'.",
+            "Components of tools found: {found}. Rows left for you: {left}. Fill in what is "
+            "open, then 'robolink expert plc check-map MAP.toml'.",
             found=draft.found,
             left=len(draft.left),
         )

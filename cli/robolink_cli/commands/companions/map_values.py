@@ -108,7 +108,7 @@ class MapValues:
         for key in self.to_compare():
             if _way(self._numbers[key]) not in ways:
                 raise ConfigError(
-                    tr("{key} stands in another form and was not compared.", key=key),
+                    tr("{key} has another form and was not compared.", key=key),
                     remedy=tr("Give --shows {key}=... as well.", key=key),
                 )
         return ", ".join(answers)

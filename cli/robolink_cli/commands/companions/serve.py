@@ -125,7 +125,7 @@ def serve(
         return
     if tool is None or not permit_is_contact:
         raise click.UsageError(
-            tr("--plc needs --tool, and --permit-is-contact: else nothing shows a touch.")
+            tr("--plc needs --tool, and --permit-is-contact: without it nothing shows a touch.")
         )
     from robolink.serving import PermitPlan
     from robolink_cli.commands.companions.serve_plc import serve_plc

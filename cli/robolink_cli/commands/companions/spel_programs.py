@@ -90,7 +90,7 @@ def check(files: tuple[Path, ...], points: tuple[Path, ...]) -> None:
     default=LONGEST_RUN_S,
     show_default=True,
     metavar="SECONDS",
-    help="Simulated time after which a program that goes on is left.",
+    help="How long a program may run, in simulated time.",
 )
 @json_option
 def run(

@@ -86,12 +86,12 @@ def check(
     recipe: Path | None,
     published: bool,
 ) -> int:
-    """Look whether cells are in order, for a job that runs every night. Nothing moves.
+    """Check that cells are in order, for a job that runs every night. Nothing moves.
 
-    Without a CELL that of -c is meant, or else all cells of the cell files. Compared are the tools
-    with what was last proved to be in them, stations with their due days, and the course of the
-    changes with its limits; each look goes on record as one entry of the journal. Exit code 1 when
-    somebody should see to something; when a cell could not be looked at, the code of why not.
+    Without CELL it checks the cell of -c, or else all cells of the cell files: tools against what
+    was last proved to be in them, due days of stations, and the course of the changes against its
+    limits. Each check goes on record as one entry of the journal. Exit code 1 when somebody should
+    see to something; when a cell could not be checked, the code of why not.
     """
     from robolink_cli.commands.measure.sensor_check import SensorCheck
 

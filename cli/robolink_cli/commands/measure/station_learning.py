@@ -18,7 +18,16 @@ from robolink.nozzle_change import (
 )
 from robolink.procedures import MeasurementContext, TouchPlan
 from robolink.runner import ArmAhead, inputs_of
-from robolink.stations import Found, Station, StationKind, find_stations, station_entry
+from robolink.stations import (
+    Found,
+    Station,
+    StationKind,
+    base_now,
+    find_stations,
+    learnt_elsewhere,
+    require_base_of,
+    station_entry,
+)
 from robolink_cli.console.render import note, table
 from robolink_cli.prompts.operator import operator_at
 from robolink_cli.session.context import CliContext
@@ -98,7 +107,7 @@ def learn(
                 raise DeclinedError(
                     tr("You did not accept the place."), remedy=tr("Nothing was recorded.")
                 )
-            controller.outcomes.append(station_entry(found))
+            controller.outcomes.append(station_entry(found, base=base_now(controller)))
         kept = _known(context, controller, name)
     context.emit("station", station_payload(kept), lambda: None)
 
@@ -122,7 +131,20 @@ def _height_of_pin(controller: Controller, known: Station, found: Found, tool: i
 def _known(context: CliContext, controller: Controller, name: str) -> Station:
     entries = controller.outcomes.recorded(kinds=(EntryKind.STATION,))
     # A pin needs nothing but its name: the person finds it.
-    return find_stations(context.cell, entries).get(name) or Station(id=name, kind=StationKind.PIN)
+    unknown = Station(id=name, kind=StationKind.PIN)
+    known = find_stations(context.cell, entries).get(name) or unknown
+    if learnt_elsewhere(controller, known) is None:
+        return known
+    declared = find_stations(context.cell, ()).get(name)
+    if declared is None and known.kind is not StationKind.PIN:
+        require_base_of(controller, known)
+    note(
+        tr(
+            "What is on record of station {id} was learnt in another base (Base), and is not used.",
+            id=name,
+        )
+    )
+    return declared or unknown
 
 
 def _tip(controller: Controller, tool: int) -> ToolOffset:

@@ -66,6 +66,10 @@ def _shown(value: object) -> str:
         return ", ".join(f"{name} {_shown(part)}" for name, part in value.items())
     if isinstance(value, list):
         return " ".join(_shown(part) for part in value)
+    if isinstance(value, bool):
+        return str(value).lower()
+    if value is None:
+        return tr("none")
     return f"{value:.3f}" if isinstance(value, float) else str(value)
 
 

@@ -47,7 +47,7 @@ class EpsonAlarms:
         if isinstance(number, bool) or not 0 < number <= _HIGHEST:
             raise ConfigError(
                 tr("{number!r} is not an alarm's number.", number=number),
-                remedy=tr("'robolink status' shows the alarms that stand."),
+                remedy=tr("'robolink status' shows the alarms that are on."),
             )
         request = f"ResetAlm,{number}"
         with self._lock.held(request, calming=True):
@@ -55,7 +55,7 @@ class EpsonAlarms:
             self._session.exchange("ResetAlm", str(number))
             if number in self.list():
                 raise ControllerFaultError(
-                    tr("Alarm {number} still stands after its reset.", number=number),
+                    tr("Alarm {number} is still there after its reset.", number=number),
                     code=number,
                     remedy=tr("Remove the cause; the alarm list in RC+ names it."),
                     controller=self._session.identity,

@@ -65,8 +65,20 @@ class EpsonVariables:
     ) -> tuple[Value, ...]:
         """Read ``count`` elements from ``indices`` on; the last subscript runs.
 
+        Args:
+            name: Name of the array.
+            indices: Subscripts of the first element.
+            kind: Type of its elements.
+            count: How many, 1 to 100.
+
         Raises:
             ConfigError: Strings cannot be read so, nor more than 100 elements at once.
+
+        Example:
+            >>> import robolink
+            >>> with robolink.connect("epson+sim://variables-example") as controller:
+            ...     controller.variables.read_array("g_Real_table", (2, 1), "Real", count=3)
+            (0.0, 0.0, 0.0)
         """
         kind = variable_type(kind)
         if kind is VariableType.STRING:

@@ -137,6 +137,9 @@ class EpsonGroup(MotionGroupCore):
         Returns:
             X, Y, Z in mm and U, V, W in degrees, seen from the robot; ``None`` where the
             controller shows something else than such numbers.
+
+        Raises:
+            RobolinkError: The controller does not take the statement now.
         """
         return spel.parse_base(self._link.window.printed(spel.show_base()))
 

@@ -64,6 +64,14 @@ def probe_line(url: str, *, timeout_s: float = 1.0, clock: Clock | None = None) 
         ConfigError: The URL is wrong, or names no serial line of an EPSON controller.
         ConnectError: The port is missing, forbidden, or used by another program.
         TransportError: The line is gone.
+
+    Example:
+        >>> from robolink.controllers.epson.verify import probe_line
+        >>> from robolink_simulators.epson import EpsonSimulator
+        >>> from robolink_simulators.hosting.streams.epson_serial import serve_serial
+        >>> with serve_serial(EpsonSimulator(seed=1)) as host:  # a pseudo terminal
+        ...     probe_line(host.url, timeout_s=1).found.value
+        'controller'
     """
     link, clock = parse_url(url), clock or SystemClock()
     dialect, place = require_line(link)

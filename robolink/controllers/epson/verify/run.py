@@ -45,6 +45,12 @@ def verify_epson(
         ConfigError: The URL is wrong.
         ConnectError: Nobody is reached.
         LoginRefusedError: Wrong or missing password.
+
+    Example:
+        >>> from robolink.controllers.epson.verify import verify_epson
+        >>> found = verify_epson("epson+sim://verify-example", timeout_s=1)
+        >>> len(found.facts) > 10
+        True
     """
     log = DialogueLog(parse_url(url).identity, wall_label())
     traces = (log,) if trace is None else (log, trace)

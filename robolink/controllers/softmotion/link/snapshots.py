@@ -80,7 +80,7 @@ def _require_place(words: Sequence[int], controller: str) -> None:
         return
     raise RemoteProtocolError(
         tr(
-            "The probe of {controller} stands {shift:+d} registers from its place, in this word "
+            "The probe of {controller} is {shift:+d} registers from its place, in this word "
             "order: {order}.",
             controller=controller,
             shift=shift,

@@ -262,7 +262,7 @@ class SoftMotionGroup(MotionGroupCore):
     def _frame(self, target: Pose) -> Six:
         if target.local:
             raise ConfigError(
-                tr("The target lies in local {local}; a PLC knows none.", local=target.local),
+                tr("The target is in local {local}; a PLC has no locals.", local=target.local),
                 remedy=tr("Give it in the base frame."),
             )
         if not all(map(math.isfinite, target.coordinates())):

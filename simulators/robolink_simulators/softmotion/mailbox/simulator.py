@@ -69,6 +69,16 @@ class SoftMotionSimulator(HostedDevice):
 
     Raises:
         ConfigError: No such kinematics or parameter, or a state file that does not fit.
+
+    Example:
+        >>> import robolink
+        >>> from robolink_simulators.hosting.in_process.softmotion import register, unregister
+        >>> from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
+        >>> simulator = SoftMotionSimulator("Kin_Scara3_Z", seed=7)
+        >>> with robolink.connect(register("plc-example", simulator)) as controller:
+        ...     controller.tools.selected()
+        1
+        >>> unregister("plc-example")
     """
 
     kind = "softmotion"
@@ -165,7 +175,20 @@ class SoftMotionSimulator(HostedDevice):
     def read(
         self, first: int, count: int, now_ns: int, link: LinkKind = LinkKind.MAILBOX_SIM
     ) -> ServedAccess:
-        """Serve a client that reads words of response and slots, over a kind of link."""
+        """Serve a client that reads words of response and slots, over a kind of link.
+
+        Args:
+            first: Number of the first word.
+            count: How many.
+            now_ns: When, on the clock of the simulated PLC.
+            link: Over which kind of link, by which faults are told apart.
+
+        Example:
+            >>> from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
+            >>> access = SoftMotionSimulator(seed=7).read(0, 2, now_ns=0)
+            >>> hex(access.words[0]), access.answered  # the version, as it stands on the wire
+            ('0x100', True)
+        """
         shown = shown_read(first, count)
         return self._serve(shown, now_ns, link, lambda _: self.plc.read(first, count, self._now_ns))
 
@@ -176,7 +199,19 @@ class SoftMotionSimulator(HostedDevice):
         now_ns: int,
         link: LinkKind = LinkKind.MAILBOX_SIM,
     ) -> ServedAccess:
-        """Serve a client that writes words of the command block."""
+        """Serve a client that writes words of the command block.
+
+        Args:
+            first: Number of the first word.
+            words: What is written.
+            now_ns: When, on the clock of the simulated PLC.
+            link: Over which kind of link, by which faults are told apart.
+
+        Example:
+            >>> from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
+            >>> SoftMotionSimulator(seed=7).write(0, [0x0100], now_ns=0).answered
+            True
+        """
         shown = shown_write(first, words, _opcode_name(words))
         return self._serve(shown, now_ns, link, lambda faults: self._take(first, words, faults))
 

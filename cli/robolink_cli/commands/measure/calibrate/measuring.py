@@ -88,6 +88,7 @@ def _station(
 
     Raises:
         ConfigError: There is none of that name, or it is something else.
+        NotReadyError: It was learnt in another base.
     """
     name, kind = frame.context.station, method.needs.station
     if not method.needs.named:
@@ -97,7 +98,7 @@ def _station(
     if stated and name not in find_stations(frame.context.cell, entries):
         known = Station(id=name, kind=kind)
     else:
-        known = station_at(frame, controller, kind)
+        known = station_at(frame, controller, kind, stated=place_mm is not None)
     return known if place_mm is None else known.at(*place_mm, sigma_mm=known.sigma_mm)
 
 

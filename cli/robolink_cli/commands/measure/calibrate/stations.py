@@ -2,19 +2,36 @@
 
 from robolink.messages import tr
 from robolink.model import Controller, EntryKind
-from robolink.stations import Station, StationKind, find_station, find_stations
+from robolink.stations import (
+    Station,
+    StationKind,
+    find_station,
+    find_stations,
+    require_base_of,
+)
 from robolink_cli.commands.measure.calibrate.request import CalibrationRequest
 from robolink_cli.console.render import note
 
 
-def station_at(frame: CalibrationRequest, controller: Controller, kind: StationKind) -> Station:
+def station_at(
+    frame: CalibrationRequest, controller: Controller, kind: StationKind, *, stated: bool = False
+) -> Station:
     """Return the station that the frame names, and say what there is to know about it.
+
+    Args:
+        frame: What was asked for.
+        controller: The controller, connected.
+        kind: What it has to be.
+        stated: Whether the command says where it is, whatever is on record.
 
     Raises:
         ConfigError: There is none of that name, or it is something else.
+        NotReadyError: It was learnt in another base.
     """
     entries = controller.outcomes.recorded(kinds=(EntryKind.STATION,))
     station = find_station(frame.context.cell, entries, frame.context.station, kind=kind)
+    if not stated:
+        require_base_of(controller, station)
     remark = station.remark()
     if remark:
         note(tr("Warning: {remark}", remark=remark))
@@ -28,6 +45,7 @@ def remark_on_pin(frame: CalibrationRequest, controller: Controller) -> None:
 
     Raises:
         ConfigError: The station of that name is no pin.
+        NotReadyError: It was learnt in another base.
     """
     if not frame.pin or not frame.finds_pin:
         return

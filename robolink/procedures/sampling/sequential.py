@@ -3,11 +3,19 @@
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Final, Generic, Protocol, TypeVar, runtime_checkable
+from typing import Final, Generic
 
 from robolink.calibration import MOST_RESIDUAL_MM, CalibrationResult
 from robolink.errors import CalibrationError
 from robolink.messages import joined, tr
+from robolink.procedures.sampling.sampler import (
+    AddsSamples,
+    PlaceT,
+    ResultT,
+    Sampler,
+    SequentialSampler,
+    TakenT,
+)
 from robolink.runner import (
     MORE,
     Confirm,
@@ -24,59 +32,6 @@ MOST_REPEATED: Final = 3
 _DIGITS: Final = 6
 """Residuals that are equal in so many decimals of a millimetre differ by rounding alone."""
 
-PlaceT = TypeVar("PlaceT")
-
-TakenT = TypeVar("TakenT")
-
-ResultT = TypeVar("ResultT", bound=CalibrationResult)
-
-PlaceT_contra = TypeVar("PlaceT_contra", contravariant=True)
-
-PlaceT_co = TypeVar("PlaceT_co", covariant=True)
-
-TakenT_contra = TypeVar("TakenT_contra", contravariant=True)
-
-ResultT_co = TypeVar("ResultT_co", bound=CalibrationResult, covariant=True)
-
-
-class Sampler(Protocol[PlaceT_contra, TakenT, ResultT_co]):
-    """How one method takes a touch, a look or a crossing, and what it makes of all of them."""
-
-    @property
-    def known(self) -> str:
-        """Which lengths become known, for a person: "X and Y"."""
-
-    def counted(self, count: int) -> str:
-        """Return how many were taken, for a person: "6 touches"."""
-
-    def take(self, place: PlaceT_contra) -> Procedure[TakenT]:
-        """Go to a place from wherever the one before ended, and take one there.
-
-        Raises:
-            CalibrationError: The sensor says nothing of use; the tip is drawn back.
-        """
-
-    def away(self) -> Procedure[None]:
-        """Lift the tip to where a person may take their time; nothing where it is there."""
-
-    def solve(self, taken: Sequence[TakenT]) -> ResultT_co:
-        """Return what they say, with their residuals in their order.
-
-        Raises:
-            CalibrationError: They say nothing that can be trusted.
-        """
-
-    def which(self, number: int, taken: TakenT) -> str:
-        """Return which one it is, for a person: "Pose 3, at U 120.0"."""
-
-
-@runtime_checkable
-class AddsSamples(Protocol[PlaceT_co, TakenT_contra]):
-    """A method that can take more than its plan says."""
-
-    def another(self, taken: Sequence[TakenT_contra]) -> Procedure[PlaceT_co | None]:
-        """Return where one more tells most, ``None`` where the arm has no room for it."""
-
 
 class Samples(Generic[PlaceT, TakenT, ResultT]):
     """What was taken so far, and at which place each.
@@ -88,6 +43,18 @@ class Samples(Generic[PlaceT, TakenT, ResultT]):
         method: How it is taken and solved.
         places: Where it is taken.
         taken: What was taken at the first of them.
+
+    Example:
+        >>> from robolink.procedures import Samples
+        >>> class Touches:  # in full: robolink.procedures.Sampler
+        ...     def take(self, place):
+        ...         return f"touch at U {place}"
+        ...         yield
+        >>> samples = Samples(Touches(), [0, 120, 240], ["touch at U 0"])
+        >>> for _ in samples.take(1):
+        ...     pass
+        >>> samples.taken
+        ['touch at U 0', 'touch at U 120']
     """
 
     def __init__(
@@ -156,6 +123,25 @@ def finalize_samples(
 
     Raises:
         CalibrationError: Those of ``method``.
+
+    Example:
+        >>> from robolink.calibration import solve_camera_round
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.procedures import CameraDrive, CameraSamples, LookPlan, Place
+        >>> from robolink.procedures import finalize_samples
+        >>> from robolink.stations import CameraStation
+        >>> from robolink.testing import PaperCell
+        >>> here, tip = Pose(300, 100, 20, 0), ToolOffset(12, -4, -20)
+        >>> camera = CameraStation(300, 80, -30)
+        >>> def solve(looks):
+        ...     return solve_camera_round([camera.sighting(look) for look in looks], stored=tip)
+        >>> looks = CameraSamples(CameraDrive(camera, LookPlan(), here), solve, here)
+        >>> cell, places = PaperCell(here, tip), [Place(0, tip), Place(60, tip), Place(120, tip)]
+        >>> seen = [cell.run(looks.take(place)) for place in places]
+        >>> cell.run(finalize_samples(looks, places, seen, retake=True)).dof
+        2
+        >>> cell.here.z_mm  # lifted
+        0.0
     """
     yield from method.away()
     samples, times = Samples(method, places, taken), Counter[int]()
@@ -209,6 +195,20 @@ def agreement(
         method: How they are named.
         fit: What they say; it has a degree of freedom.
         last: Index of the one that was taken last.
+
+    Example:
+        >>> from robolink.calibration import solve_n_angle
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.procedures import agreement
+        >>> class Touches:  # in full: robolink.procedures.Sampler
+        ...     known = "X and Y"
+        ...     def counted(self, count):
+        ...         return f"{count} touches"
+        >>> places = [(298, 99, 0), (306, 83, 90), (322, 91, 180), (314, 107, 270)]
+        >>> flange = [Pose(x, y, -20, u_deg) for x, y, u_deg in places]
+        >>> fit = solve_n_angle(flange, stored=ToolOffset(12, -4, -20))
+        >>> agreement(Touches(), fit, last=3)[:50]
+        '4 touches agree within 0.000 mm; the last is 0.000'
     """
     agree = tr(
         "{counted} agree within {rms:.3f} mm; the last is {last:.3f} mm off.",
@@ -279,21 +279,6 @@ class SamplingPolicy:
 TAKE_ALL: Final = SamplingPolicy()
 
 
-class SequentialSampler(
-    Sampler[PlaceT_contra, TakenT, ResultT_co], Protocol[PlaceT_contra, TakenT, ResultT_co]
-):
-    """What one method takes at each place, and what one more would bring."""
-
-    def foreseen(self, place: PlaceT_contra) -> TakenT:
-        """Return what would be taken at a place, as far as :meth:`gain` looks at it."""
-
-    def gain(self, taken: Sequence[TakenT]) -> float:
-        """Return the standard deviation of the tip as a multiple of a single one's."""
-
-    def named(self, taken: TakenT) -> str:
-        """Return where it was taken, for a person: "U 120.0"."""
-
-
 def sample_sequentially(
     method: SequentialSampler[PlaceT, TakenT, ResultT],
     first: TakenT,
@@ -313,6 +298,33 @@ def sample_sequentially(
 
     Raises:
         CalibrationError: Those of ``method``.
+
+    Example:
+        >>> from robolink.calibration import solve_camera_round
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.procedures import TAKE_ALL, CameraDrive, CameraSamples, LookPlan, Place
+        >>> from robolink.procedures import sample_sequentially
+        >>> from robolink.stations import CameraStation
+        >>> from robolink.testing import PaperCell
+        >>> here, tip = Pose(300, 100, 20, 0), ToolOffset(12, -4, -20)
+        >>> camera = CameraStation(300, 80, -30)
+        >>> class Looks(CameraSamples):  # implements SequentialSampler
+        ...     def foreseen(self, place):
+        ...         return place
+        ...     def gain(self, taken):
+        ...         return len(taken) ** -0.5
+        ...     def named(self, place):
+        ...         return f"U {place.u_deg}"
+        >>> def solve(looks):
+        ...     return solve_camera_round([camera.sighting(look) for look in looks], stored=tip)
+        >>> looks = Looks(CameraDrive(camera, LookPlan(), here), solve, here)
+        >>> cell = PaperCell(here, tip)
+        >>> places = [Place(u_deg, tip) for u_deg in (0, 60, 120, 180)]
+        >>> found = cell.run(
+        ...     sample_sequentially(looks, cell.run(looks.take(places[0])), places, TAKE_ALL)
+        ... )
+        >>> len(found.inputs), "4 looks agree" in cell.told[-1]
+        (4, True)
     """
     samples = Samples(method, places, [first])
     taken = samples.taken
@@ -341,6 +353,13 @@ def may_end_early(count: int, *, unknowns: int, sigma_stated: bool) -> bool:
         count: How many coordinates are measured.
         unknowns: How many numbers the fit has to find.
         sigma_stated: Whether somebody stated the standard deviation.
+
+    Example:
+        >>> from robolink.procedures import may_end_early
+        >>> may_end_early(8, unknowns=4, sigma_stated=False)  # four touches of X and Y
+        False
+        >>> may_end_early(8, unknowns=4, sigma_stated=True)
+        True
     """
     return count - 1 - unknowns >= (1 if sigma_stated else LEAST_DOF_TO_STOP)
 

@@ -14,7 +14,7 @@ from robolink_simulators.assist.port import open_eyes
 from robolink.model import EntryKind, MarkerKind
 from tests.faults import _recipe_instants
 from tests.faults._recipe_instants import Instants
-from tests.faults._what_stands import commits
+from tests.faults._what_stands import COMMANDS, Disturbed, commits
 from tests.faults.test_recover_guides import cell, kinds
 
 __all__ = ["cell"]
@@ -62,6 +62,7 @@ class Desk(_operator.AssistedOperator):
     """A desk at which a person takes the new value, agrees to all points, and jogs."""
 
     asked: tuple[str, ...] = ()
+
     glance: Callable[[], Any] = staticmethod(lambda: None)
 
     def regard(self, subject):
@@ -246,3 +247,21 @@ def test_off_a_terminal_the_new_value_is_kept_on_a_word_and_nothing_moves(cell):
     assert cell.run("recover", "--choose", "new").code == 0
     assert (cell.changed(), cell.open_markers(), verified(cell)) == ({1}, (), [])
     assert cell.moves_asked() == asked
+
+
+@pytest.mark.soak
+def test_a_group_of_axes_is_tested_too(tmp_path):
+    command = COMMANDS["PLC: recalibrate"]
+    with command.case.cell() as cell:
+        assert command.run(cell, tmp_path).code == 0
+        exchanges = len(cell.requests())
+    with command.case.cell() as cell:
+        with Disturbed("DISCONNECT", int(exchanges * 0.9)).on(cell):
+            assert command.run(cell, tmp_path).code == 6
+        cell.clock.sleep(60.0)
+        assert MarkerKind.CHANGE in kinds(cell)
+        written = len(cell.writes())
+        ended, _ = new_chosen(cell)
+        assert ended.code == 0, ended.err
+        assert (cell.changed(), cell.open_markers(), verified(cell)) == ({1}, (), [True])
+        assert len(cell.writes()) == written

@@ -1,8 +1,10 @@
 """A new value that a person chose after a crash is kept when its turn test has passed."""
 
 import re
+from collections.abc import Callable
 from contextlib import contextmanager
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from robolink_cli.prompts import operator as _operator
@@ -60,10 +62,7 @@ class Desk(_operator.AssistedOperator):
     """A desk at which a person takes the new value, agrees to all points, and jogs."""
 
     asked: tuple[str, ...] = ()
-
-    @staticmethod
-    def glance():
-        return None
+    glance: Callable[[], Any] = staticmethod(lambda: None)
 
     def regard(self, subject):
         pass

@@ -136,6 +136,16 @@ def finish_by_turn_test(
         OutcomeUnknownError: Something else is unsettled, too, or the change has no test, or its
             tools hold other values now; nothing moved.
         RobolinkError: Anything else that ended it, with the state it left.
+
+    Example:
+        >>> from robolink.errors import RobolinkError
+        >>> from robolink.nozzle_change import finish_by_turn_test
+        >>> from robolink.testing import MemoryController
+        >>> try:  # no change is open there
+        ...     finish_by_turn_test(MemoryController(), "c-1", operator=None)
+        ... except RobolinkError as error:
+        ...     print(type(error).__name__)
+        OutcomeUnknownError
     """
     marker, finding = _open(controller, operation)
     outcomes, request = controller.outcomes, marker.request

@@ -176,13 +176,46 @@ class Listener:
     """
 
     def moment(self, moment: Moment, context: MeasurementContext, tool: int | None = None) -> None:
-        """Stand between two phases; ``tool`` where the moment belongs to one."""
+        """Stand between two phases; ``tool`` where the moment belongs to one.
+
+        Args:
+            moment: Between which phases.
+            context: What to work with.
+            tool: The tool, where the moment belongs to one.
+
+        Example:
+            >>> from robolink.nozzle_change import Listener, Moment
+            >>> class Vacuum(Listener):
+            ...     def moment(self, moment, context, tool=None):
+            ...         if moment is Moment.BEFORE_MEASURE:
+            ...             print(f"vacuum off for tool {tool}")
+            >>> Vacuum().moment(Moment.BEFORE_MEASURE, None, 2)
+            vacuum off for tool 2
+        """
 
     def step(self, tool: int, done: StepDone) -> None:
         """Hear of a step of a measurement or of a verification."""
 
     def refused(self, tool: int, error: CalibrationError, *, again: bool) -> None:
-        """Hear that a measurement is not believed, and whether it is taken again."""
+        """Hear that a measurement is not believed, and whether it is taken again.
+
+        Args:
+            tool: Number of the tool.
+            error: Why.
+            again: Whether it is measured once more.
+
+        Example:
+            >>> from robolink.errors import CalibrationError
+            >>> from robolink.nozzle_change import Listener
+            >>> class Counter(Listener):
+            ...     refusals = 0
+            ...     def refused(self, tool, error, *, again):
+            ...         self.refusals += 1
+            >>> counter = Counter()
+            >>> counter.refused(1, CalibrationError("large_rms", "They scatter."), again=True)
+            >>> counter.refusals
+            1
+        """
 
     def adjusted(self, proposal: Proposal, context: MeasurementContext) -> Proposal:  # noqa: ARG002 - for overriding
         """Return what is to be proposed instead of the bare measurement."""

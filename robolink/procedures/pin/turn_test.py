@@ -88,4 +88,16 @@ class TurnsAboutPin(Protocol):
             result: What was measured, with the offset that is written.
             tip: Where the tip was found.
             tolerance_mm: Largest drift that passes.
+
+        Example:
+            >>> from robolink.calibration import solve_two_pose
+            >>> from robolink.methods import TwoPoseSource
+            >>> from robolink.model import Pose, ToolOffset
+            >>> from robolink.testing import PaperCell
+            >>> touches = Pose(298, 99, -20, 0), Pose(322, 91, -20, 180)
+            >>> result = solve_two_pose(*touches, stored=ToolOffset(12, -3.5, -20))
+            >>> test = TwoPoseSource().turn_test(1, result, tip=result.offset, tolerance_mm=0.2)
+            >>> cell = PaperCell(Pose(310, 95, -30, 0), ToolOffset(0.1), (310, 95, -40))
+            >>> round(cell.run(test.steps()).max_drift_mm, 3)
+            0.1
         """

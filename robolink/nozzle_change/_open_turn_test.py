@@ -136,6 +136,13 @@ def finish_by_turn_test(
         OutcomeUnknownError: Something else is unsettled, too, or the change has no test, or its
             tools hold other values now; nothing moved.
         RobolinkError: Anything else that ended it, with the state it left.
+
+    Example:
+        >>> import robolink
+        >>> from robolink.nozzle_change import finish_by_turn_test, open_turn_tests
+        >>> with robolink.connect("epson+sim://turn-test-example") as controller:
+        ...     for operation in open_turn_tests(controller):
+        ...         finish_by_turn_test(controller, operation, operator)
     """
     marker, finding = _open(controller, operation)
     outcomes, request = controller.outcomes, marker.request

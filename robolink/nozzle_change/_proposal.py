@@ -176,13 +176,42 @@ class Listener:
     """
 
     def moment(self, moment: Moment, context: MeasurementContext, tool: int | None = None) -> None:
-        """Stand between two phases; ``tool`` where the moment belongs to one."""
+        """Stand between two phases.
+
+        Args:
+            moment: Between which.
+            context: What the change works with.
+            tool: The tool, where the moment belongs to one.
+
+        Example:
+            >>> from robolink.nozzle_change import Listener, Moment
+            >>> class Counting(Listener):
+            ...     starts = 0
+            ...
+            ...     def moment(self, moment, context, tool=None):
+            ...         self.starts += moment is Moment.START
+        """
 
     def step(self, tool: int, done: StepDone) -> None:
         """Hear of a step of a measurement or of a verification."""
 
     def refused(self, tool: int, error: CalibrationError, *, again: bool) -> None:
-        """Hear that a measurement is not believed, and whether it is taken again."""
+        """Hear that a measurement is not believed.
+
+        Args:
+            tool: Number of the tool.
+            error: Why.
+            again: Whether it is taken again.
+
+        Example:
+            >>> from robolink.errors import CalibrationError
+            >>> from robolink.nozzle_change import Listener
+            >>> class Printing(Listener):
+            ...     def refused(self, tool, error, *, again):
+            ...         print(tool, error.code, again)
+            >>> Printing().refused(1, CalibrationError("not_touched", "In the air."), again=True)
+            1 not_touched True
+        """
 
     def adjusted(self, proposal: Proposal, context: MeasurementContext) -> Proposal:  # noqa: ARG002 - for overriding
         """Return what is to be proposed instead of the bare measurement."""

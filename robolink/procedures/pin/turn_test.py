@@ -25,6 +25,15 @@ class TurnTest:
         u_mm: Standard uncertainty of the drift that one touch shows.
         written: The offset that was written.
         tip: Where the tip was found.
+
+    Example:
+        >>> from robolink import Pose, ToolOffset
+        >>> from robolink.procedures import TouchPlan, TurnTest
+        >>> new = ToolOffset(12.3, -3.7, -20)
+        >>> pin = Pose(250, 200, -104, 0, tool=1)
+        >>> test = TurnTest(1, TouchPlan(), pin, (90.0, 0.0), 0.1, 0.03, written=new, tip=new)
+        >>> next(test.steps_after_a_break()).instruction
+        'Jog the tip onto the pin.'
     """
 
     tool: int
@@ -88,4 +97,10 @@ class TurnsAboutPin(Protocol):
             result: What was measured, with the offset that is written.
             tip: Where the tip was found.
             tolerance_mm: Largest drift that passes.
+
+        Example:
+            >>> from robolink.methods import TwoPoseSource
+            >>> from robolink.procedures import TurnsAboutPin
+            >>> isinstance(TwoPoseSource(), TurnsAboutPin)
+            True
         """

@@ -50,6 +50,8 @@ def _held() -> dict[str, int]:
 
 def _grown(before: Mapping[str, int]) -> Iterator[tuple[str, int, int]]:
     """Yield what there is more of than before."""
+    if all(now <= before[name] for name, now in _held().items()):
+        return
     gc.collect()  # a connection that was dropped in the middle is closed when it is collected
     for name, now in _held().items():
         if now > before[name]:

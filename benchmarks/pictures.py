@@ -11,6 +11,8 @@ from robolink.report._markup import drawing, element
 WIDTH: Final = 460
 HEIGHT: Final = 300
 _LEFT, _RIGHT, _TOP, _BOTTOM = 74, 20, 34, 52
+_ROOM = 24
+"""Half of what a value takes: at an edge it is not written over the scale."""
 _INK, _FAINT, _LINE = "#333333", "#dddddd", "#2b6cb0"
 _FONT: Final = "font-family:sans-serif;font-size:12px"
 
@@ -42,7 +44,9 @@ def picture(growth: Growth) -> str:
     dots = [element("circle", cx=f"{x:.1f}", cy=f"{y:.1f}", r=3, fill=_LINE) for x, y in places]
     line = " ".join(f"{x:.1f},{y:.1f}" for x, y in places)
     values = [
-        _text(f"{_short(y)}", x, at - 8, anchor="middle")
+        _text(
+            _short(y), min(max(x, _LEFT + _ROOM), WIDTH - _RIGHT - _ROOM), at - 8, anchor="middle"
+        )
         for (_, y), (x, at) in zip(growth.points, places, strict=True)
     ]
     drawn = element(

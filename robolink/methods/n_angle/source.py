@@ -11,12 +11,10 @@ from robolink.model import Pose, ToolOffset
 from robolink.procedures import (
     TAKE_ALL,
     ManualPinSource,
-    MeasurementContext,
     SamplingPolicy,
     TouchPlan,
-    touches_of,
 )
-from robolink.runner import Procedure
+from robolink.runner import Procedure, TouchedAt
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,23 +55,16 @@ class NAngleSource(ManualPinSource):
         """There is always a gap between two angles."""
         return True
 
-    def further(
-        self,
-        context: MeasurementContext,
-        stored: ToolOffset | None,
-        result: CalibrationResult,
-        again: int | None,
-    ) -> CalibrationResult:
-        """Go on; see :class:`~robolink.procedures.TouchesFurther`."""
-        return context.measure(
-            lambda here: go_on_n_angle(
-                self.touch,
-                here=here,
-                taken=touches_of(result),
-                again=again,
-                stored=stored,
-                sigma_mm=self.sigma_mm,
-            )
+    def _further_steps(
+        self, here: Pose, taken: Sequence[TouchedAt], again: int | None, stored: ToolOffset | None
+    ) -> Procedure[CalibrationResult]:
+        return go_on_n_angle(
+            self.touch,
+            here=here,
+            taken=taken,
+            again=again,
+            stored=stored,
+            sigma_mm=self.sigma_mm,
         )
 
 

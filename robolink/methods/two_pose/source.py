@@ -8,8 +8,8 @@ from robolink.calibration import CalibrationResult, solve_two_pose, two_of
 from robolink.messages import tr
 from robolink.methods.two_pose.procedure import go_on_two_pose, measure_two_pose
 from robolink.model import Pose, ToolOffset
-from robolink.procedures import ManualPinSource, MeasurementContext, TouchPlan, touches_of
-from robolink.runner import Procedure
+from robolink.procedures import ManualPinSource, TouchPlan
+from robolink.runner import Procedure, TouchedAt
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,23 +37,16 @@ class TwoPoseSource(ManualPinSource):
         """Two touches are the method; three are another one."""
         return False
 
-    def further(
-        self,
-        context: MeasurementContext,
-        stored: ToolOffset | None,
-        result: CalibrationResult,
-        again: int | None,
-    ) -> CalibrationResult:
-        """Go on; see :class:`~robolink.procedures.TouchesFurther`."""
-        return context.measure(
-            lambda here: go_on_two_pose(
-                self.touch,
-                here=here,
-                taken=touches_of(result),
-                again=1 if again is None else again,
-                stored=stored,
-                sigma_mm=self.sigma_mm,
-            )
+    def _further_steps(
+        self, here: Pose, taken: Sequence[TouchedAt], again: int | None, stored: ToolOffset | None
+    ) -> Procedure[CalibrationResult]:
+        return go_on_two_pose(
+            self.touch,
+            here=here,
+            taken=taken,
+            again=1 if again is None else again,
+            stored=stored,
+            sigma_mm=self.sigma_mm,
         )
 
 

@@ -127,6 +127,23 @@ class ManualPinSource(PinSource):
             tip=tip,
         )
 
+    def further(
+        self,
+        context: MeasurementContext,
+        stored: ToolOffset | None,
+        result: CalibrationResult,
+        again: int | None,
+    ) -> CalibrationResult:
+        """Go on; see :class:`~robolink.procedures.TouchesFurther`."""
+        taken = touches_of(result)
+        return context.measure(lambda here: self._further_steps(here, taken, again, stored))
+
+    @abstractmethod
+    def _further_steps(
+        self, here: Pose, taken: Sequence[TouchedAt], again: int | None, stored: ToolOffset | None
+    ) -> Procedure[CalibrationResult]:
+        """Return the steps that make one touch again, or one more where ``again`` is ``None``."""
+
 
 def middles_of_gaps(angles_deg: Sequence[float]) -> list[float]:
     """Return the angles between those that were measured, the one farthest from any first."""

@@ -121,6 +121,6 @@ def standoff_below_lift(clearance_mm: float, lift_mm: float, check: Check) -> It
 def two_poses_agree() -> str:
     """Return why the residuals of two poses cannot be judged."""
     return tr(
-        "cannot be judged: two poses always agree, so they leave no residual; "
-        "use n-angle, or limit the interval and state the standard deviation"
+        "cannot be judged: two poses cannot check each other; use n-angle, or limit "
+        "the interval and state the standard deviation"
     )

@@ -48,7 +48,7 @@ class NAngleParameters(UprightPinParameters):
     retake: Annotated[
         bool,
         Option(flag="--retake/--no-retake", default=True),
-        Help(declared("Whether the pose that fits worst is offered to be taken again.")),
+        Help(declared("Whether the touch that fits worst is offered to be made again.")),
     ] = False
 
     @property

@@ -277,4 +277,4 @@ class _PivotSampler:
         return tr("U {u:.1f} V {v:.1f} W {w:.1f}", u=pose.u_deg, v=pose.v_deg, w=pose.w_deg)
 
     def which(self, number: int, pose: Pose) -> str:
-        return tr("Pose {number}, at {where}", number=number, where=self.named(pose))
+        return tr("Touch {number} at {where}", number=number, where=self.named(pose))

@@ -39,6 +39,7 @@ def _symbols(given: tuple[str, str, str] | None) -> tuple[str, ...]:
 @click.option(
     "--base",
     type=click.IntRange(0, _LAST_BASE),
+    metavar="N",
     default=0,
     show_default=True,
     help="First register of both blocks, counted from 0.",

@@ -81,7 +81,7 @@ def check(files: tuple[Path, ...], points: tuple[Path, ...]) -> None:
     "options",
     multiple=True,
     metavar="NAME=VALUE",
-    help="A habit of the controller; a wrong name lists them all. May be repeated.",
+    help="A habit of the device; a wrong name lists them all. May be repeated.",
 )
 @click.option(
     "--for",

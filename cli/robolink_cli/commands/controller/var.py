@@ -40,6 +40,7 @@ def var() -> None:
 @click.option(
     "--count",
     type=click.IntRange(1, 100),
+    metavar="N",
     help="How many elements, from --index on; the last subscript counts up.",
 )
 @controller_options

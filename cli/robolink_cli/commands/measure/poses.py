@@ -112,5 +112,5 @@ def _sentences(how: "HowRead", count: int) -> list[str]:
     if how.ignored:
         lines.append(tr("Not used: {names}.", names=", ".join(how.ignored)))
     if how.skipped:
-        lines.append(tr("Left out, because they are no taught poses: {count}.", count=how.skipped))
+        lines.append(tr("Left out, because they are not taught poses: {count}.", count=how.skipped))
     return lines

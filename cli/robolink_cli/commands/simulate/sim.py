@@ -50,6 +50,7 @@ sim.add_command(sim_run)
 @click.option(
     "--baud",
     type=click.IntRange(0, 4_000_000),
+    metavar="N",
     default=0,
     show_default=True,
     help="How slow that line is, in real time; 0 carries everything at once.",
@@ -69,11 +70,13 @@ sim.add_command(sim_run)
 @click.option(
     "--profile",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    metavar="FILE",
     help="Cell profile written by verify-controller; --option overrules it.",
 )
 @click.option(
     "--replay",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    metavar="FILE",
     help="Serve a dialogue that --record has written, in place of a simulator.",
 )
 @click.option(

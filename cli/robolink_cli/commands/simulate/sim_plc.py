@@ -32,6 +32,7 @@ from robolink_cli.session.context import json_option
 @click.option(
     "--unit",
     type=click.IntRange(0, 255),
+    metavar="N",
     default=1,
     show_default=True,
     help="The unit identifier that answers; 1 to 247 on a serial line.",

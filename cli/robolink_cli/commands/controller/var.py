@@ -66,7 +66,11 @@ def get(
 
 
 # A negative value is no option.
-@var.command("set", context_settings={"ignore_unknown_options": True})
+@var.command(
+    "set",
+    context_settings={"ignore_unknown_options": True},
+    short_help="Set a variable and read it back.",
+)
 @click.argument("name")
 @click.argument("value")
 @click.option(

@@ -19,7 +19,7 @@ def poses() -> None:
     """Files of poses: what robolink understands of them."""
 
 
-@poses.command("show")
+@poses.command("show", short_help="Show the poses in a file, and how they were read.")
 @click.argument("file", type=click.Path(dir_okay=False, path_type=Path))
 @reading_options
 @json_option

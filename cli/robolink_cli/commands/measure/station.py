@@ -45,7 +45,7 @@ def show(context: CliContext, name: str, robot: str | None) -> None:
     context.emit("station", payload, lambda: show_station(found))
 
 
-@station.command("learn")
+@station.command("learn", short_help="Find a station with a tool whose offset is known.")
 @click.argument("name", metavar="ID", shell_complete=complete_station)
 @click.option(
     "--tool",

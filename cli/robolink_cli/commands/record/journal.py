@@ -168,7 +168,7 @@ def show(name: str) -> None:
         show_entry(entry)
 
 
-@journal.command("diff")
+@journal.command("diff", short_help="Show what differs between two entries or changes.")
 @click.argument("a", metavar="NUMBER|CHANGE")
 @click.argument("b", metavar="NUMBER|CHANGE")
 @json_option
@@ -184,7 +184,7 @@ def diff(a: str, b: str) -> None:
         show_diff(*sides)
 
 
-@journal.command("export")
+@journal.command("export", short_help="Write entries to a file, oldest first.")
 @click.argument("file", type=click.Path(dir_okay=False, path_type=Path))
 @click.option(
     "--format",
@@ -218,7 +218,7 @@ def export(
         say(tr("{count} entries were written to {file}.", count=counted.count, file=file))
 
 
-@journal.command("verify")
+@journal.command("verify", short_help="Check that no entry was changed and none is missing.")
 @json_option
 def verify() -> int:
     """Check that no entry was changed and none is missing; exit code 1 when one was.

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from robolink.model import Recorded
 
 
-@click.command("drift")
+@click.command("drift", short_help="Show how each tool's offset moved, and what stands out.")
 @click.option(
     "-c",
     "--controller",

@@ -60,7 +60,7 @@ def impact_request(
     """
     if numbers and path is not None:
         raise ConfigError(
-            tr("{names} exclude each other.", names=", ".join(names)),
+            tr("Only one of these can be given: {names}.", names=", ".join(names)),
             remedy=tr("Read the points from the controller or from a file."),
         )
     if numbers:

@@ -176,7 +176,7 @@ def pose_source(
     named = [name for name, value in given.items() if value]
     if len(named) > 1:
         raise ConfigError(
-            tr("{names} exclude each other.", names=", ".join(named)),
+            tr("Only one of these can be given: {names}.", names=", ".join(named)),
             remedy=tr("Give the poses in one way only."),
         )
     if path is None and choices != NOTHING_SAID:

@@ -58,7 +58,7 @@ def _symbols(given: tuple[str, str, str] | None) -> tuple[str, ...]:
     callback=lambda _, __, given: _symbols(given),
     help="Symbols of SMC_READ_TOOL_MODE in your Library Manager, to read tools by the block.",
 )
-@click.option("--force", is_flag=True, help="Write over files that were changed.")
+@click.option("--force", is_flag=True, help="Overwrite files that were changed.")
 @json_option
 def export(
     folder: Path, profile: str, base: int, kinematics: str, read_modes: tuple[str, ...], force: bool

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     "address",
     metavar="HOST:PORT",
     help=declared(
-        "Where SPEL+ programs call, for example 127.0.0.1:5001. A cell that is named besides says "
+        "Where SPEL+ programs call, for example 127.0.0.1:5001. With -c CELL, that cell says "
         "where its stations are."
     ),
 )
@@ -62,7 +62,7 @@ if TYPE_CHECKING:
     type=float,
     default=2.0,
     show_default=True,
-    help=declared("Largest change of the offset that is believed."),
+    help=declared("Largest change of the offset that is accepted."),
 )
 @click.option(
     "--sigma-mm", type=float, help=declared("How far one touch scatters, where it is known.")

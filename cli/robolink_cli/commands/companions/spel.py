@@ -21,7 +21,7 @@ spel.add_command(run)
 
 @spel.command("export")
 @click.argument("folder", metavar="DIR", type=click.Path(file_okay=False, path_type=Path))
-@click.option("--force", is_flag=True, help="Write over files that were changed.")
+@click.option("--force", is_flag=True, help="Overwrite files that were changed.")
 @json_option
 def export(folder: Path, force: bool) -> None:
     """Write the companion programs: what a controller's project can hold of ours.

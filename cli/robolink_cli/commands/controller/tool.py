@@ -151,8 +151,8 @@ def set_tool(
 ) -> None:
     """Write a tool offset; components that are not given are kept.
 
-    A change beyond the cell's max_change_mm or max_change_deg takes an engineer, who is asked
-    with the figure, whatever --yes says.
+    A change beyond the cell's max_change_mm or max_change_deg takes an engineer, who is shown the
+    figure and asked, even with --yes.
     """
     from robolink.transaction import Wanted, change_tools
 

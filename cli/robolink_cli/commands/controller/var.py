@@ -40,7 +40,7 @@ def var() -> None:
 @click.option(
     "--count",
     type=click.IntRange(1, 100),
-    help="How many elements, from --index on; the last subscript runs.",
+    help="How many elements, from --index on; the last subscript counts up.",
 )
 @controller_options
 def get(
@@ -124,7 +124,7 @@ def _subscripts(text: str | None) -> tuple[int, ...]:
     parts = text.split(",")
     if not all(part.isascii() and part.isdigit() for part in parts):
         raise ConfigError(
-            tr("{text!r} are no subscripts.", text=text),
+            tr("{text!r} are not subscripts.", text=text),
             remedy=tr("Write for example --index 0,3."),
         )
     return tuple(int(part) for part in parts)

@@ -148,13 +148,13 @@ def _show(found: "Verification") -> None:
         [(f.name, f.finding, _option(f), _short(f.evidence)) for f in settled],
     )
     table(
-        tr("not settled"),
+        tr("not found out"),
         (tr("fact"), tr("why"), tr("simulator option")),
         [(f.name, f.finding, f.option or "-") for f in found.facts if not f.settled],
     )
     say(
         tr(
-            "{settled} of {all} facts are settled. Nothing was written, and nothing moved.",
+            "{settled} of {all} facts were found out. Nothing was written, and nothing moved.",
             settled=len(settled),
             all=len(found.facts),
         )

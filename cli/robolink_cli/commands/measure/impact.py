@@ -49,8 +49,9 @@ def impact(
 ) -> None:
     """Show how far the tip will move at taught points when a tool's offset is changed.
 
-    Shown is where the tip that is on the arm now will go with the new offset, against where
-    it goes with the stored one. Nothing is written; legal only while no program runs.
+    The tip that is on the arm now goes to one place with the stored offset and to another with
+    the new one: the table shows how far these lie apart. Nothing is written; it works only while
+    no program runs.
     """
     from robolink.calibration import impact_on
     from robolink.errors import UndefinedToolError

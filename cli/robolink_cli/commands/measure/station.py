@@ -52,7 +52,7 @@ def show(context: CliContext, name: str, robot: str | None) -> None:
     type=click.IntRange(1, 15),
     required=True,
     shell_complete=complete_tool,
-    help=declared("The known tool."),
+    help=declared("Number of the tool whose offset is known."),
 )
 @click.option(
     "--sigma",
@@ -114,8 +114,8 @@ def learn(
 ) -> None:
     """Find a station with a tool whose offset is known, such as a gauge pin, and keep where it is.
 
-    A pin is touched by a person, twice; beams and surfaces are sought about where the cell file
-    says. No tool is written. What is wrong with the tool's offset shifts the station by as much.
+    A pin is touched by a person, twice; beams and surfaces are looked for near the place in the
+    cell file. No tool is written. An error in the tool's offset shifts the station by as much.
     """
     from robolink.model import InputEdge
     from robolink.nozzle_change import Limits, usual_box

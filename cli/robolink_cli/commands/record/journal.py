@@ -185,7 +185,7 @@ def diff(a: str, b: str) -> None:
     type=click.Choice(["csv", "json", "jsonl"]),
     help=declared("Form of the file; by default what its name ends with."),
 )
-@click.option("--force", is_flag=True, help=declared("Write over a file that is there already."))
+@click.option("--force", is_flag=True, help=declared("Overwrite a file that is already there."))
 @_filters
 @json_option
 def export(
@@ -217,7 +217,7 @@ def verify() -> int:
     """Check that no entry was changed and none is missing; exit code 1 when one was.
 
     The chain of hashes has no key. It shows what a disk, a program or a person did to single
-    entries. It cannot show that somebody who may write the whole journal made all of it anew,
+    entries. It cannot show that somebody who may write the whole journal rebuilt all of it,
     or took the newest entries off and set the note of the last one back: for that, keep the
     number and hash that this prints where that person cannot write, and compare.
     """
@@ -243,8 +243,9 @@ def verify() -> int:
         if found.last_number:
             say(
                 tr(
-                    "The last one is {number}, {hash}. Without a key this shows no journal that "
-                    "somebody made anew as a whole: compare that hash with one kept elsewhere.",
+                    "The last one is {number}, {hash}. Without a key this cannot show that "
+                    "somebody rebuilt the whole journal: compare that hash with one kept "
+                    "elsewhere.",
                     number=found.last_number,
                     hash=found.last_hash,
                 )

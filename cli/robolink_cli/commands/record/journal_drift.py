@@ -31,7 +31,9 @@ if TYPE_CHECKING:
 @click.option(
     "--since",
     type=click.DateTime(["%Y-%m-%d"]),
-    help=declared("Begin anew at this day, after a repair or with another kind of nozzle (UTC)."),
+    help=declared(
+        "Start again from this day, after a repair or with another kind of nozzle (UTC)."
+    ),
 )
 @click.option(
     "--baseline",
@@ -47,7 +49,7 @@ if TYPE_CHECKING:
     metavar="FILE",
     help=declared("Also write all charts to FILE, a page for a browser."),
 )
-@click.option("--force", is_flag=True, help=declared("Write over a file that is there already."))
+@click.option("--force", is_flag=True, help=declared("Overwrite a file that is already there."))
 @json_option
 def drift(
     *,
@@ -59,7 +61,7 @@ def drift(
     page: Path | None,
     force: bool,
 ) -> int:
-    """Show how each tool's offset went over its changes, and what stands out.
+    """Show how each tool's offset moved from change to change, and what stands out.
 
     Nozzles that wear, mounts that slip, pins that moved, a last change out of the ordinary. Only
     changes that were measured and kept count. Exit code 1 when something stands out.

@@ -75,7 +75,7 @@ def _agree(context: CliContext, *, yes: bool) -> None:
     """
     if not yes and (context.json or not on_terminal()):
         raise DeclinedError(
-            tr("An undo writes to the controller, and nobody can be asked here."),
-            remedy=tr("Nothing was written. Look at it with --dry-run, then give --yes."),
+            tr("An undo writes to the controller, but there is nobody to ask."),
+            remedy=tr("Nothing was written. Look at it with --dry-run, then add --yes."),
         )
     agree(tr("Write the old values back?"), yes=yes)

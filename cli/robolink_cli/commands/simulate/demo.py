@@ -19,7 +19,7 @@ from robolink_cli.session.context import json_option
     type=click.Choice(["careful", "careless"]),
     default="careful",
     show_default=True,
-    help="Who touches the pin; a careless person only presses ENTER, and must not be believed.",
+    help="Who touches the pin; a careless person only presses Enter, and must not be believed.",
 )
 @json_option
 def demo(seed: int, speed: float, operator: str) -> None:

@@ -86,7 +86,7 @@ def _of_the_place(method: AnyMethod) -> list[Decorator]:
                 "--at",
                 metavar="X,Y,Z",
                 help=declared(
-                    "Where the station is, in the base; without it, what is known of it."
+                    "Where the station is, in the base; without it, its place on record."
                 ),
             )
         )
@@ -103,7 +103,7 @@ def _of_the_place(method: AnyMethod) -> list[Decorator]:
 def _station_option(method: AnyMethod) -> Decorator:
     needs = method.needs
     known = _STATIONS[needs.station]
-    found = tr("Name of the pin; where it is found is kept, for one touch later.")
+    found = tr("Name of the pin; its place is kept, so that one touch will do later.")
     return click.option(
         "--station",
         metavar="ID",

@@ -127,8 +127,8 @@ def _own_options() -> tuple[Callable[[Callable[..., Any]], Callable[..., Any]], 
             default=USUAL_CHANGE_MM,
             show_default=True,
             help=declared(
-                "Largest change against the stored offset that is believed; more than the "
-                "cell allows takes an engineer."
+                "Largest change against the stored offset that is accepted; more than the cell "
+                "allows takes an engineer."
             ),
         ),
         click.option(
@@ -136,21 +136,21 @@ def _own_options() -> tuple[Callable[[Callable[..., Any]], Callable[..., Any]], 
             "rms_mm",
             type=_LENGTH,
             metavar="MM",
-            help=declared("Largest rms of the residuals that is believed."),
+            help=declared("Largest rms of the residuals that is accepted."),
         ),
         click.option(
             "--max-residual",
             "residual_mm",
             type=_LENGTH,
             metavar="MM",
-            help=declared("Largest residual of one pose that is believed."),
+            help=declared("Largest residual of one pose that is accepted."),
         ),
         click.option(
             "--max-interval",
             "interval_mm",
             type=_LENGTH,
             metavar="MM",
-            help=declared("Largest half of a 95 % interval that is believed."),
+            help=declared("Largest half of a 95 % interval that is accepted."),
         ),
         motion_option(
             "--tolerance",
@@ -158,11 +158,9 @@ def _own_options() -> tuple[Callable[[Callable[..., Any]], Callable[..., Any]], 
             type=_LENGTH,
             default=0.2,
             show_default=True,
-            help=declared("Largest drift about the new tip that passes."),
+            help=declared("Largest drift that passes the turn test."),
         ),
-        motion_option(
-            "--no-verify", is_flag=True, help=declared("Do not turn about the new tip afterwards.")
-        ),
+        motion_option("--no-verify", is_flag=True, help=declared("Leave the turn test out.")),
         motion_option(
             "--assist",
             metavar="URL",

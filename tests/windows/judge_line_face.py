@@ -9,11 +9,11 @@ def console(opened):
     console = opened("calls", "change", "needle.toml", "--plain", rows=60)
     console.see("Scan the id of the new needle.")
     console.type("N-0418\r")
-    console.see("Type the number of a point")
+    console.see("Type the number of a row")
     console.type("1\r")
     console.rest(0.5)
     console.type("3\r")
-    console.see("No point is open.")
+    console.see("No row is open.")
     return console
 
 

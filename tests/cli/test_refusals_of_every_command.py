@@ -92,7 +92,7 @@ BAD = {
     "calibrate camera": (["--tool", "1", "--station", "C"], "no station 'C'"),
     "calibrate camera-affine": (
         ["--tool", "1", "--station", "C", "--at", "1,2"],
-        "'1,2' is no place",
+        "'1,2' is not a place",
     ),
     "calibrate board": (["--tool", "1", "--station", "C"], "say where the fiducials are"),
     "calibrate runout-table": (

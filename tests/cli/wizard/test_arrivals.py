@@ -97,9 +97,21 @@ def test_a_key_does_not_count_while_another_waits_to_be_read(terminal):
     terminal.key("5", 1.01, every_s=0)
     terminal.until(1.2, every_s=0)  # neither thread nor loop had a turn
     assert reader.quiet() is None
+    assert reader.taken() == []  # it is for the thread to read, and to tell the loop of
+    assert reader.look()
     (came,) = reader.taken()
     assert gate.press("5", came.at_s, came.quiet_s) == []
     assert gate.due(reader.quiet() or 0.0) == []
+
+
+def test_a_descriptor_that_is_closed_ends_the_reading():
+    read, write = os.pipe()
+    reader = ArrivalReader(read)
+    os.close(read)
+    assert not reader.look()
+    assert reader.over
+    assert reader.taken() == []
+    os.close(write)
 
 
 def test_the_thread_notes_when_keys_come_while_the_loop_is_busy():

@@ -88,10 +88,16 @@ class ArrivalReader:
             return came
 
     def quiet(self) -> float | None:
-        """Return a time at which nothing was there, ``None`` while something waits to be taken."""
-        self.look()
+        """Return a time at which nothing was there, ``None`` while something waits to be taken.
+
+        What waits to be read is left to the thread, which tells the loop of it.
+        """
         with self._lock:
-            return None if self._came else self._quiet_s
+            before_s = self._now_s()
+            if self._came or (not self.over and _readable(self._fd)):
+                return None
+            self._quiet_s = before_s
+            return before_s
 
     @property
     def watched(self) -> bool:
@@ -106,7 +112,7 @@ class ArrivalReader:
         def follow() -> None:
             while not self.over:
                 waits_s = _TICK_S if self.watched else None
-                if end in select.select([self._fd, end], [], [], waits_s)[0]:
+                if end in _readable(self._fd, end, wait_s=waits_s):
                     return
                 if self.look():
                     came()
@@ -217,5 +223,9 @@ def timed(source: Input) -> Input:
     return TimedInput(source) if os.name == "posix" else source
 
 
-def _readable(fd: int) -> bool:
-    return bool(select.select([fd], [], [], 0)[0])
+def _readable(*descriptors: int, wait_s: float | None = 0.0) -> list[int]:
+    """Return those that can be read; one that was closed can, to find just that."""
+    try:
+        return select.select(descriptors, [], [], wait_s)[0]
+    except (OSError, ValueError):
+        return [descriptors[0]]

@@ -87,7 +87,7 @@ def test_a_person_types_steps_is_refused_an_unjogged_touch_and_stops(console, si
     console.wait_for("Type the number of a point")
     console.type("1")
     console.type("3")
-    console.wait_for("No point is open.")
+    console.wait_for("All points are confirmed.")
     console.type("y")
     console.wait_for("Scan the id of the new needle.")
     console.type("N-0418")

@@ -1,5 +1,6 @@
 """docs: the pages that come with robolink, read without a network."""
 
+import shutil
 import sys
 from pathlib import Path
 
@@ -82,6 +83,8 @@ def _list(titles: dict[str, str]) -> None:
 def _show(text: str) -> None:
     """Show a page: through the pager on a terminal, as it stands to a program."""
     if sys.stdout.isatty() and sys.stdin.isatty():
-        click.echo_via_pager(text)
+        from robolink_cli.commands.shipped.page_lines import page_lines
+
+        click.echo_via_pager(page_lines(text, shutil.get_terminal_size().columns))
     else:
         say(text.rstrip("\n"))

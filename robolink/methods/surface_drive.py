@@ -12,7 +12,7 @@ from robolink.methods.pivot.swing import tilt_in_air
 from robolink.methods.pivot.tilts import UPRIGHT, OverPin, Tilt
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import MOST_MORE, SurfaceProof, SurfaceTouches, TouchPlan
-from robolink.runner import Notify, Procedure, TouchedAt
+from robolink.runner import Notify, Procedure, TakenAgainError, TouchedAt
 
 if TYPE_CHECKING:
     from robolink.calibration import Floats
@@ -88,14 +88,19 @@ class SurfaceDrive:
                 drawn back.
         """
         yield from self.to(spot.tilt)
-        found = yield from self._touches.again(
-            self.pose(spot),
-            spot.normal,
-            key=key,
-            columns=columns,
-            further_mm=max(further_mm, self._swing_mm(spot)),
-            instruction=instruction,
-        )
+        try:
+            found = yield from self._touches.again(
+                self.pose(spot),
+                spot.normal,
+                key=key,
+                columns=columns,
+                further_mm=max(further_mm, self._swing_mm(spot)),
+                instruction=instruction,
+            )
+        except TakenAgainError:
+            # The tip was drawn back over this spot, and is tilted from there.
+            self._over = replace(self._over, pin_mm=spot.place_mm)
+            raise
         self._over = self._over.moved_to(found)
         return found
 
@@ -163,7 +168,7 @@ def verify_on_surface(
         CalibrationError: ``not_tilted``, and ``not_touched`` or ``typed_ahead`` with the tip drawn
             back.
     """
-    drive = SurfaceDrive(plan, over, SurfaceTouches(plan))
+    drive = SurfaceDrive(plan, over, SurfaceTouches(plan, proof=True))
     proof = SurfaceProof(over.pose(UPRIGHT, 0.0), tolerance_mm, u_mm)
     said = tr("Jog the tip onto the surface again. We measure how far it was off.")
     for left in reversed(range(1 + MOST_MORE)):

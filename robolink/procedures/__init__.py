@@ -56,12 +56,13 @@ if TYPE_CHECKING:
     from robolink.procedures.pose_method import PoseMethod as PoseMethod
     from robolink.procedures.sampling.sampler import Sampler as Sampler
     from robolink.procedures.sampling.sampler import SequentialSampler as SequentialSampler
+    from robolink.procedures.sampling.samples import Samples as Samples
     from robolink.procedures.sampling.sequential import TAKE_ALL as TAKE_ALL
-    from robolink.procedures.sampling.sequential import Samples as Samples
     from robolink.procedures.sampling.sequential import SamplingPolicy as SamplingPolicy
     from robolink.procedures.sampling.sequential import agreement as agreement
     from robolink.procedures.sampling.sequential import finalize_samples as finalize_samples
     from robolink.procedures.sampling.sequential import may_end_early as may_end_early
+    from robolink.procedures.sampling.sequential import resume_samples as resume_samples
     from robolink.procedures.sampling.sequential import sample_sequentially as sample_sequentially
     from robolink.procedures.source import FindsStation as FindsStation
     from robolink.procedures.source import MeasurementContext as MeasurementContext
@@ -95,9 +96,10 @@ __getattr__ = lazy_exports(
         "pin.turn_test": "TurnTest TurnsAboutPin",
         "pose_method": "PoseMethod",
         "sampling.sampler": "Sampler SequentialSampler",
+        "sampling.samples": "Samples",
         "sampling.sequential": (
-            "Samples SamplingPolicy TAKE_ALL agreement finalize_samples may_end_early "
-            "sample_sequentially"
+            "SamplingPolicy TAKE_ALL agreement finalize_samples may_end_early "
+            "resume_samples sample_sequentially"
         ),
         "source": "FindsStation MeasurementContext MovingSource RequiresSensor StopsAbovePin "
         "TipSource TouchesFurther",

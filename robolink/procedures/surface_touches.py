@@ -28,16 +28,42 @@ class SurfaceTouches(WitnessedTouches):
 
     Args:
         plan: Lift, clearance, contact input.
+        total: How many touches are planned, ``None`` where nobody knows.
+        proof: Whether they are those of a proof.
+        retakes: Whether whoever makes them hears of one that is to be made again, alone.
+
+    Example:
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.procedures import SurfaceTouches, TouchPlan
+        >>> from robolink.testing import PaperCell
+        >>> touches = SurfaceTouches(TouchPlan(lift_mm=12), total=9)
+        >>> cell = PaperCell(
+        ...     Pose(300, 100, 20, 0), ToolOffset(12, -4, -20), lambda at: (at[0], at[1], -40)
+        ... )
+        >>> cell.run(touches.first(0)).z_mm, cell.here.z_mm, len(touches.taken)  # lifted again
+        (-20.0, -8.0, 1)
     """
 
-    def __init__(self, plan: TouchPlan) -> None:
-        super().__init__(plan)
+    def __init__(
+        self,
+        plan: TouchPlan,
+        *,
+        total: int | None = None,
+        proof: bool = False,
+        retakes: bool = False,
+    ) -> None:
+        super().__init__(plan, total=total, proof=proof, retakes=retakes)
         self._drawing: SurfaceStandoffs | None = None
 
     @property
     def taken(self) -> tuple[TouchedAt, ...]:
-        """All that count, in their order."""
-        return tuple(self._taken.values())
+        """All that count, in the order of the plan: one made again stands where it stood."""
+        return tuple(self._by_number.values())
+
+    def others(self, key: Hashable) -> tuple[TouchedAt, ...]:
+        """Return those that count beside the one known by ``key``."""
+        number = self._numbers.get(key)
+        return tuple(touch for at, touch in self._by_number.items() if at != number)
 
     def first(self, key: Hashable) -> Procedure[TouchedAt]:
         """Let the person bring the tip onto the surface from wherever it is, and lift off."""

@@ -8,8 +8,9 @@ import pytest
 from robolink.calibration import rotation_of
 from robolink.errors import CalibrationError
 from robolink.methods import AxisTeachPlan, informative_tilts, measure_six_point
+from robolink.methods.six_point.procedure import go_on_six_point
 from robolink.model import Path, Pose, ToolOffset
-from robolink.runner import TeachPrompt
+from robolink.runner import TeachPrompt, TouchedAt
 from tests.calibration._tilting_person import (
     FRAMES,
     PIN,
@@ -168,3 +169,33 @@ def test_the_truth_of_place_and_orientation_lies_in_the_interval():
         assert "ways_askew" not in result.warnings
         assert (errors < 4 * np.array(result.half_width95)).all()
     assert 0.90 < held / total < 0.99
+
+
+@pytest.mark.parametrize("again", [0, 3])
+def test_from_the_values_one_touch_is_made_again_and_the_ways_stay(again):
+    class Slips(Guide):
+        def _error(self):
+            slipped = len(self.touches) == again and not self.asked
+            return [0.1 if slipped else 0.0, 0.0, 0.0]
+
+    guide = Slips()
+    before = measured(guide)
+    assert np.linalg.norm(np.subtract(before.offset.components()[:3], TIP.components()[:3])) > 0.01
+    taken = [TouchedAt.of(pose) for pose in before.inputs]
+    result = guide.run(
+        go_on_six_point(
+            PLAN,
+            AxisTeachPlan(),
+            here=guide.steps[-1][2],
+            taken=taken,
+            again=again,
+            tilts=informative_tilts(5, 20.0),
+            stored=STORED,
+        )
+    )
+    assert result.offset.components() == pytest.approx(TOOL.components(), abs=1e-6)
+    assert guide.asked == [TeachPrompt.ROOM, TeachPrompt.ALONG_X, TeachPrompt.ALONG_Z]
+    kept = [pose for number, pose in enumerate(before.inputs) if number != again]
+    assert [pose for number, pose in enumerate(result.inputs) if number != again] == kept
+    assert tip_mm(guide.steps[-1][2])[2] == pytest.approx(PIN[2] + PLAN.lift_mm, abs=0.1)
+    assert turned_deg(guide.steps[-1][2], guide.touches[0]) < 1e-6

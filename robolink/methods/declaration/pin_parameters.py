@@ -21,6 +21,13 @@ from robolink.methods.declaration.method import (
 from robolink.model import InputEdge
 from robolink.procedures import TouchPlan
 
+Retake = Annotated[
+    bool,
+    Option(flag="--retake/--no-retake", default=True),
+    Help(declared("Whether the pose that fits worst is offered to be taken again.")),
+]
+"""Whether the worst touch is offered again when all are made."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class PinParameters(MethodParameters):

@@ -7,7 +7,8 @@ from annotated_types import Ge, Le
 
 from robolink.messages import declared
 from robolink.methods.declaration.method import DEGREES, MM, Help, InputNumber, Option
-from robolink.methods.declaration.pin_parameters import PinParameters
+from robolink.methods.declaration.pin_parameters import PinParameters, Retake
+from robolink.procedures import SamplingPolicy
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,6 +46,13 @@ class SurfaceParameters(PinParameters):
         Option(metavar="DEG"),
         Help(declared("How far the tool leans, against the first touch.")),
     ] = 30.0
+
+    retake: Retake = False
+
+    @property
+    def sampling(self) -> SamplingPolicy:
+        """Whether a touch is offered to be made again."""
+        return SamplingPolicy(retake=self.retake)
 
     def states_station(self) -> bool:
         """Tell that nothing need be known about the surface: it is found with the tip."""

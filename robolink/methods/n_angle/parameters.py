@@ -11,7 +11,7 @@ from robolink.calibration import MIN_ROTATION_DEG, planar_sigma_gain
 from robolink.files.toml import Problem
 from robolink.messages import declared, tr
 from robolink.methods.declaration.method import DEGREES, Angle, Check, Help, Length, Option
-from robolink.methods.declaration.pin_parameters import UprightPinParameters
+from robolink.methods.declaration.pin_parameters import Retake, UprightPinParameters
 from robolink.model import Pose, angle_difference_deg
 from robolink.procedures import SamplingPolicy
 
@@ -45,11 +45,7 @@ class NAngleParameters(UprightPinParameters):
         Option(metavar="MM"),
         Help(declared("End early when X and Y together are known within this, in 95 %.")),
     ] = None
-    retake: Annotated[
-        bool,
-        Option(flag="--retake/--no-retake", default=True),
-        Help(declared("Whether the pose that fits worst is offered to be taken again.")),
-    ] = False
+    retake: Retake = False
 
     @property
     def touches_deg(self) -> tuple[float, ...]:

@@ -16,19 +16,18 @@ from robolink.model import Pose, ToolOffset, angle_difference_deg
 from robolink.procedures import (
     TAKE_ALL,
     PinTouches,
-    Samples,
     SamplingPolicy,
     TouchPlan,
-    agreement,
     approach_path,
     middles_of_gaps,
     offset_z,
     plain_pose,
+    resume_samples,
     sample_sequentially,
     touch_again,
     turned_touches,
 )
-from robolink.runner import Notify, Procedure, TouchedAt, first_clear
+from robolink.runner import Procedure, TouchedAt, first_clear
 
 _SHARES: Final = (1.0, -1.0, 0.5, -0.5)
 """By which the planned turns are scaled where the arm cannot take them up: to the other side, and
@@ -127,16 +126,8 @@ def go_on_n_angle(
         purpose=tr("Moving above the pin."),
     )
     turning = _NAngleSampler(touches, stored, sigma_mm, taken[-1])
-    samples = Samples(turning, places, taken)
-    if again is not None:
-        yield from samples.take(again)
-    else:
-        yield from samples.another()
+    result = yield from resume_samples(turning, places, taken, again)
     touches.require_made()
-    result = samples.solved()
-    if result.dof:
-        last = len(samples.taken) - 1 if again is None else again
-        yield Notify(agreement(turning, result, last=last))
     return result
 
 

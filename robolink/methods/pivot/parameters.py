@@ -7,7 +7,7 @@ from annotated_types import Ge, Le
 
 from robolink.messages import declared
 from robolink.methods.declaration.method import DEGREES, MM, Help, Length, Option
-from robolink.methods.declaration.pin_parameters import PinParameters
+from robolink.methods.declaration.pin_parameters import PinParameters, Retake
 from robolink.procedures import SamplingPolicy
 
 
@@ -45,11 +45,7 @@ class PivotParameters(PinParameters):
         Option(metavar="MM"),
         Help(declared("End early when X, Y and Z together are known within this, in 95 %.")),
     ] = None
-    retake: Annotated[
-        bool,
-        Option(flag="--retake/--no-retake", default=True),
-        Help(declared("Whether the pose that fits worst is offered to be taken again.")),
-    ] = False
+    retake: Retake = False
 
     @property
     def sampling(self) -> SamplingPolicy:

@@ -15,6 +15,7 @@ from robolink.calibration import (
     solve_pivot,
 )
 from robolink.messages import tr
+from robolink.methods.pivot.naming import TiltedNames
 from robolink.methods.pivot.reach import proving_in_reach, tilts_in_reach
 from robolink.methods.pivot.swing import tilt_in_air
 from robolink.methods.pivot.tilts import UPRIGHT, OverPin, Tilt
@@ -24,11 +25,10 @@ from robolink.procedures import (
     TAKE_ALL,
     DriftProof,
     PinTouches,
-    Samples,
     SamplingPolicy,
     TouchPlan,
-    agreement,
     approach_path,
+    resume_samples,
     sample_sequentially,
 )
 from robolink.runner import Notify, Procedure, TouchedAt
@@ -130,12 +130,9 @@ def go_on_pivot(
     )
     swing = _Swing(plan, over, touches)
     tilting = _PivotSampler(swing, stored, sigma_mm)
-    samples = Samples(tilting, places, taken)
-    yield from samples.take(again)
+    result = yield from resume_samples(tilting, places, taken, again)
     yield from swing.to(UPRIGHT)
     touches.require_made()
-    result = samples.solved()
-    yield Notify(agreement(tilting, result, last=again))
     return result
 
 
@@ -180,7 +177,7 @@ def verify_by_tilting(
         (False, True)
     """
     tilts = yield from proving_in_reach(over, tilts, plan.lift_mm)
-    swing = _Swing(plan, over, PinTouches(plan, planar=False))
+    swing = _Swing(plan, over, PinTouches(plan, planar=False, proof=True))
     proof = DriftProof(tolerance_mm, plan.u_drift_mm if u_mm is None else u_mm)
     by_place = {over.pose(tilt, 0.0).u_deg: tilt for tilt in tilts}
     for tilt in tilts:
@@ -242,19 +239,12 @@ class _Swing:
 
 
 @dataclass(frozen=True, slots=True)
-class _PivotSampler:
+class _PivotSampler(TiltedNames):
     """Tilted touches; implements ``SequentialSampler``. Each ends lifted off the pin."""
 
     swing: _Swing
     stored: ToolOffset
     sigma_mm: float | None
-
-    @property
-    def known(self) -> str:
-        return tr("X, Y and Z")
-
-    def counted(self, count: int) -> str:
-        return tr("{count} touches", count=count)
 
     def take(self, place: Tilt) -> Procedure[Pose]:
         return self.swing.touch(
@@ -272,9 +262,3 @@ class _PivotSampler:
 
     def gain(self, poses: Sequence[Pose]) -> float:
         return sigma_gain(pose_arrays(poses)[1])
-
-    def named(self, pose: Pose) -> str:
-        return tr("U {u:.1f} V {v:.1f} W {w:.1f}", u=pose.u_deg, v=pose.v_deg, w=pose.w_deg)
-
-    def which(self, number: int, pose: Pose) -> str:
-        return tr("Pose {number}, at {where}", number=number, where=self.named(pose))

@@ -15,9 +15,8 @@ from robolink.procedures import (
     SamplingPolicy,
     TouchPlan,
     drift_uncertainty_mm,
-    touches_of,
 )
-from robolink.runner import Procedure
+from robolink.runner import Procedure, TouchedAt
 
 if TYPE_CHECKING:
     from robolink.methods.pivot.tilts import Tilt
@@ -88,31 +87,23 @@ class PivotSource(PinSource):
         return context.run(procedure, tip=result.offset)
 
     @property
-    def adds_touch(self) -> bool | None:
+    def adds_touch(self) -> bool:
         """Which further tilt tells most depends on those of the plan."""
         return False
 
-    def further(
-        self,
-        context: MeasurementContext,
-        stored: ToolOffset | None,
-        result: CalibrationResult,
-        again: int | None,
-    ) -> CalibrationResult:
-        """Go on; see :class:`~robolink.procedures.TouchesFurther`."""
+    def _further_steps(
+        self, here: Pose, taken: Sequence[TouchedAt], again: int | None, stored: ToolOffset | None
+    ) -> Procedure[CalibrationResult]:
         from robolink.methods.pivot.procedure import go_on_pivot  # numpy
 
-        taken = touches_of(result)
-        return context.measure(
-            lambda here: go_on_pivot(
-                self.touch,
-                here=here,
-                taken=taken,
-                again=len(taken) - 1 if again is None else again,
-                tilts=self.tilts,
-                stored=require_known_tip(stored),
-                sigma_mm=self.sigma_mm,
-            )
+        return go_on_pivot(
+            self.touch,
+            here=here,
+            taken=taken,
+            again=len(taken) - 1 if again is None else again,
+            tilts=self.tilts,
+            stored=require_known_tip(stored),
+            sigma_mm=self.sigma_mm,
         )
 
     @property

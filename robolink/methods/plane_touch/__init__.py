@@ -22,6 +22,7 @@ def _source(parameters: PlaneTouchParameters, site: Site) -> "TipSource":
         parameters.survey,
         axes=axes_of(site.controller),
         sigma_mm=site.sigma_mm,
+        sampling=parameters.sampling,
     )
 
 

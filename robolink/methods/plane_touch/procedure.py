@@ -4,6 +4,9 @@ The first three touches are made in one orientation and tell how the plane lies.
 chosen that tell most about the tip, and touched at places round the first one.
 """
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 
 from robolink.calibration import (
@@ -12,7 +15,6 @@ from robolink.calibration import (
     plane_columns,
     solve_plane_touch,
 )
-from robolink.messages import tr
 from robolink.methods.pivot.reach import free_tilts
 from robolink.methods.pivot.tilts import UPRIGHT, OverPin
 from robolink.methods.plane_touch.design import (
@@ -24,10 +26,17 @@ from robolink.methods.plane_touch.design import (
     require_observable,
 )
 from robolink.methods.plane_touch.survey import UPRIGHTS, PlaneSurvey
-from robolink.methods.surface_drive import SurfaceDrive, SurfaceSpot, Vector, places_of
-from robolink.model import ToolOffset
-from robolink.procedures import SurfaceTouches, TouchPlan
-from robolink.runner import Notify, Procedure
+from robolink.methods.surface_drive import SurfaceSpot, Vector, places_of
+from robolink.methods.surface_sampler import SurfaceSampler, go_on_surface
+from robolink.model import Pose, ToolOffset
+from robolink.procedures import (
+    TAKE_ALL,
+    SamplingPolicy,
+    SurfaceTouches,
+    TouchPlan,
+    sample_sequentially,
+)
+from robolink.runner import Procedure, TouchedAt
 
 _LEVEL: Vector = (0.0, 0.0, 1.0)
 
@@ -39,6 +48,7 @@ def measure_plane_touch(
     stored: ToolOffset,
     axes: int = 0,
     sigma_mm: float | None = None,
+    sampling: SamplingPolicy = TAKE_ALL,
 ) -> Procedure[PlaneTouchResult]:
     """Measure a tip on a plane. Runs in Tool 0.
 
@@ -51,6 +61,7 @@ def measure_plane_touch(
             down nearer to the plane by up to 2 e sin(tilt / 2).
         axes: How many axes the robot has, 0 where nobody knows.
         sigma_mm: Standard deviation of one touch along the normal, where it is known.
+        sampling: Whether a touch may be made again when all are made.
 
     Raises:
         CalibrationError: ``surface_leans``, ``not_tilted``; ``not_touched``, ``typed_ahead``,
@@ -70,51 +81,117 @@ def measure_plane_touch(
         >>> [round(length, 3) for length in found.offset.components()[:3]]
         [12.3, -3.9, -20.6]
     """
-    touches = SurfaceTouches(plan)
-    over = OverPin.touched((yield from touches.first(0)), stored)
-    drive = SurfaceDrive(plan, over, touches)
-    normal = yield from _upright(plan, drive, touches, over.pin_mm, survey, stored)
-    uprights = [SurfaceSpot(UPRIGHT, place, normal) for place in places_of(touches.taken, stored)]
-    choice = yield from free_tilts(over, candidates(survey.tilt_deg, axes), plan.lift_mm)
-    spots, columns = informative_spots(drive, uprights, survey, choice, stored)
-    if not plan.nominal:
-        require_observable(columns)
-    for number in range(UPRIGHTS, survey.count):
-        yield Notify(tr("Touch {k} of {n}", k=number + 1, n=survey.count))
-        yield from drive.touch(spots[number], key=number, columns=columns[: number + 1])
-    yield from drive.to(UPRIGHT)
-    return _solved(touches, stored, sigma_mm)
-
-
-def _upright(
-    plan: TouchPlan,
-    drive: SurfaceDrive,
-    touches: SurfaceTouches,
-    first_mm: Vector,
-    survey: PlaneSurvey,
-    stored: ToolOffset,
-) -> Procedure[Vector]:
-    """Have the plane touched twice more in the first orientation; return how it lies."""
-    for number in range(1, UPRIGHTS):
-        place = on_plane(first_mm, _LEVEL, survey.beside_mm(number))
-        spot = SurfaceSpot(UPRIGHT, place, _LEVEL)
-        yield from drive.touch(spot, key=number, further_mm=survey.rise_mm)
-    if plan.nominal:
-        return _LEVEL
-    normal = normal_of(places_of(touches.taken, stored))
-    require_lean(normal, survey)
-    return normal
-
-
-def _solved(
-    touches: SurfaceTouches, stored: ToolOffset, sigma_mm: float | None
-) -> PlaneTouchResult:
-    result = solve_plane_touch(touches.taken, stored=stored, sigma_mm=sigma_mm)
-    plane = result.plane
-    columns = plane_columns(touches.taken, result.offset, plane.normal)
-    places: Floats = np.array(places_of(touches.taken, result.offset))
-    touches.require_made(columns, _upward(places @ plane.normal - plane.distance_mm, plane.normal))
+    touches = SurfaceTouches(plan, total=survey.count, retakes=True)
+    first = yield from touches.first(0)
+    over = OverPin.touched(first, stored)
+    sampler = _PlaneSampler(touches, over, survey, stored=stored, axes=axes, sigma_mm=sigma_mm)
+    result = yield from sample_sequentially(sampler, first, range(survey.count), sampling)
+    sampler.require_made(result)
     return result
+
+
+def go_on_plane_touch(
+    plan: TouchPlan,
+    survey: PlaneSurvey,
+    *,
+    here: Pose,
+    taken: Sequence[TouchedAt],
+    again: int,
+    stored: ToolOffset,
+    axes: int = 0,
+    sigma_mm: float | None = None,
+) -> Procedure[PlaneTouchResult]:
+    """Make one touch of :func:`measure_plane_touch` again. Runs in Tool 0, ends as it does.
+
+    Args:
+        plan: Lift, clearance, contact input.
+        survey: How many touches there were, and where.
+        here: Where the flange is.
+        taken: The touches of the measurement.
+        again: Index of the one that is made again.
+        stored: The offset stored now.
+        axes: How many axes the robot has, 0 where nobody knows.
+        sigma_mm: Standard deviation of one touch along the normal, where it is known.
+
+    Raises:
+        CalibrationError: As :func:`measure_plane_touch`.
+    """
+    touches = SurfaceTouches(plan, total=len(taken), retakes=True)
+    over = OverPin.touched(taken[0], stored)
+    sampler = _PlaneSampler(touches, over, survey, stored=stored, axes=axes, sigma_mm=sigma_mm)
+    sampler.adopt(taken, candidates(survey.tilt_deg, axes))
+    result = yield from go_on_surface(sampler, here=here, taken=taken, again=again)
+    sampler.require_made(result)
+    return result
+
+
+class _PlaneSampler(SurfaceSampler[PlaneTouchResult]):
+    """Touches of a plane."""
+
+    uprights = UPRIGHTS
+
+    def __init__(
+        self,
+        touches: SurfaceTouches,
+        over: OverPin,
+        survey: PlaneSurvey,
+        *,
+        stored: ToolOffset,
+        axes: int,
+        sigma_mm: float | None,
+    ) -> None:
+        super().__init__(touches, over, stored=stored, count=survey.count, sigma_mm=sigma_mm)
+        self._survey = survey
+        self._axes = axes
+
+    def solve(self, taken: Sequence[Pose]) -> PlaneTouchResult:
+        return solve_plane_touch(taken, stored=self.stored, sigma_mm=self.sigma_mm)
+
+    def derivatives(self, poses: Sequence[Pose]) -> Floats:
+        return plane_columns(poses, self.stored, self._normal())
+
+    def normal_at(self, place_mm: Vector) -> Vector:  # noqa: ARG002 - a plane has one
+        return self._normal()
+
+    def aligned(self, spot: SurfaceSpot) -> SurfaceSpot:
+        first, normal = self.upright_places()[0], self._normal()
+        beside_mm = spot.place_mm[0] - first[0], spot.place_mm[1] - first[1]
+        return replace(spot, place_mm=on_plane(first, normal, beside_mm), normal=normal)
+
+    def require_made(self, result: PlaneTouchResult) -> None:
+        """Refuse touches that were not made; see :meth:`SurfaceTouches.require_made`."""
+        plane, taken = result.plane, self.touches.taken
+        columns = plane_columns(taken, result.offset, plane.normal)
+        places: Floats = np.array(places_of(taken, result.offset))
+        misses_mm = places @ plane.normal - plane.distance_mm
+        self.touches.require_made(columns, _upward(misses_mm, plane.normal))
+
+    def _upright(self, place: int) -> tuple[SurfaceSpot, float]:
+        # As if nothing were known yet: one that is made again may be what the others contradict.
+        at = on_plane(self.upright_places()[0], _LEVEL, self._survey.beside_mm(place))
+        return SurfaceSpot(UPRIGHT, at, _LEVEL), self._survey.rise_mm
+
+    def _laid_out(self) -> Procedure[tuple[SurfaceSpot, ...]]:
+        survey, plan, normal = self._survey, self.touches.plan, self._normal()
+        uprights = [SurfaceSpot(UPRIGHT, place, normal) for place in self.upright_places()]
+        tilts = candidates(survey.tilt_deg, self._axes)
+        choice = yield from free_tilts(self.over, tilts, plan.lift_mm)
+        spots, columns = informative_spots(self.drive, uprights, survey, choice, self.stored)
+        if not plan.nominal:
+            require_observable(columns)
+        return spots
+
+    def _normal(self) -> Vector:
+        """Return how the plane lies by the upright touches.
+
+        Raises:
+            CalibrationError: ``rank_deficient`` or ``surface_leans``.
+        """
+        if self.touches.plan.nominal:
+            return _LEVEL
+        normal = normal_of(self.upright_places())
+        require_lean(normal, self._survey)
+        return normal
 
 
 def _upward(misses_mm: Floats, normal: Vector) -> Floats:

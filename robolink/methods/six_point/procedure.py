@@ -21,11 +21,11 @@ from robolink.calibration import (
 )
 from robolink.errors import CalibrationError
 from robolink.messages import joined, tr
-from robolink.methods.pivot.procedure import pivot_then_lift
+from robolink.methods.pivot.procedure import go_on_pivot, pivot_then_lift
 from robolink.methods.pivot.tilts import Tilt
 from robolink.model import Path, Pose, ToolOffset
 from robolink.procedures import TAKE_ALL, SamplingPolicy, TouchPlan, approach_path, offset_z
-from robolink.runner import Ask, Confirm, Move, Notify, Procedure, TeachPrompt
+from robolink.runner import Ask, Confirm, Move, Notify, Procedure, TeachPrompt, TouchedAt
 
 _SIDE_DEG: Final = 90.0
 
@@ -119,6 +119,57 @@ def measure_six_point(
         if not left or not askew or not (yield Confirm(tr("Show both ways again?"))):
             break
     yield from approach_path(lifted, here=start, purpose=tr("Moving back above the pin."))
+    return result
+
+
+def go_on_six_point(
+    plan: TouchPlan,
+    ways: AxisTeachPlan,
+    *,
+    here: Pose,
+    taken: Sequence[TouchedAt],
+    again: int | None,
+    tilts: Sequence[Tilt],
+    stored: ToolOffset,
+    sigma_mm: float | None = None,
+) -> Procedure[SixPointResult]:
+    """Make one touch of :func:`measure_six_point` again. Runs in Tool 0, ends as it does.
+
+    The ways along the axes stay as they were shown: they begin and end away from the pin.
+
+    Args:
+        plan: Lift and clearance.
+        ways: The ways along the axes.
+        here: Where the flange is, upright.
+        taken: The touches of the measurement, then the start and the ends of the ways.
+        again: Index of the touch that is made again; ``None`` for the last one.
+        tilts: Orientations of the plan.
+        stored: The offset stored now.
+        sigma_mm: Standard deviation of one coordinate of one placement, where it is known.
+
+    Raises:
+        CalibrationError: As :func:`measure_six_point`.
+    """
+    *touches, start, along_x, second = taken
+    fit = yield from go_on_pivot(
+        plan,
+        here=here,
+        taken=touches,
+        again=len(touches) - 1 if again is None else again,
+        tilts=tilts,
+        stored=stored,
+        sigma_mm=sigma_mm,
+    )
+    result = solve_six_point(
+        fit.inputs,
+        along_x,
+        second,
+        start=start,
+        second_is=ways.second_is,
+        stored=stored,
+        sigma_mm=sigma_mm,
+    )
+    yield Notify(_uncertainty(result))
     return result
 
 

@@ -10,7 +10,7 @@ from robolink.messages import tr
 from robolink.methods.pivot.source import PivotSource, require_known_tip
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import TAKE_ALL
-from robolink.runner import Procedure
+from robolink.runner import Procedure, TouchedAt
 
 if TYPE_CHECKING:
     from robolink.methods.six_point.procedure import AxisTeachPlan
@@ -37,9 +37,21 @@ class SixPointSource(PivotSource):
         )
         return f"{self._touched}; {shown}"
 
-    @property
-    def adds_touch(self) -> None:
-        """The ways along the axes were shown from where the touches left the tool."""
+    def _further_steps(
+        self, here: Pose, taken: Sequence[TouchedAt], again: int | None, stored: ToolOffset | None
+    ) -> Procedure[CalibrationResult]:
+        from robolink.methods.six_point.procedure import go_on_six_point  # numpy, as in the pivot
+
+        return go_on_six_point(
+            self.touch,
+            self.ways,
+            here=here,
+            taken=taken,
+            again=again,
+            tilts=self.tilts,
+            stored=require_known_tip(stored),
+            sigma_mm=self.sigma_mm,
+        )
 
     def _steps(self, stored: ToolOffset | None, *, live: bool) -> Procedure[CalibrationResult]:
         from robolink.methods.six_point.procedure import measure_six_point  # numpy, as in the pivot

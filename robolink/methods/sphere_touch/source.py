@@ -9,8 +9,15 @@ from robolink.messages import tr
 from robolink.methods.pivot.source import require_known_tip
 from robolink.methods.sphere_touch.survey import SphereSurvey
 from robolink.model import Pose, ToolOffset
-from robolink.procedures import MeasurementContext, TouchPlan, TouchSource, drift_uncertainty_mm
-from robolink.runner import Procedure
+from robolink.procedures import (
+    TAKE_ALL,
+    MeasurementContext,
+    SamplingPolicy,
+    TouchPlan,
+    TouchSource,
+    drift_uncertainty_mm,
+)
+from robolink.runner import Procedure, TouchedAt
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,12 +29,14 @@ class SphereTouchSource(TouchSource):
         survey: How many touches, and from which sides.
         axes: How many axes the robot has, 0 where nobody knows.
         sigma_mm: Standard deviation of one touch along the normal, where it is known.
+        sampling: Whether a touch is offered again when all are made.
     """
 
     touch: TouchPlan
     survey: SphereSurvey
     axes: int = 0
     sigma_mm: float | None = None
+    sampling: SamplingPolicy = TAKE_ALL
 
     @property
     def sentence(self) -> str:
@@ -83,6 +92,30 @@ class SphereTouchSource(TouchSource):
             yield from measure_sphere_touch(
                 self._touching(live=live),
                 self.survey,
+                stored=require_known_tip(stored),
+                axes=self.axes,
+                sigma_mm=self.sigma_mm,
+                sampling=self.sampling if live else TAKE_ALL,
+            )
+        )
+
+    @property
+    def adds_touch(self) -> bool:
+        """Where one more tells most depends on those of the plan."""
+        return False
+
+    def _further_steps(
+        self, here: Pose, taken: Sequence[TouchedAt], again: int | None, stored: ToolOffset | None
+    ) -> Procedure[CalibrationResult]:
+        from robolink.methods.sphere_touch.procedure import go_on_sphere_touch  # numpy
+
+        return (
+            yield from go_on_sphere_touch(
+                self.touch,
+                self.survey,
+                here=here,
+                taken=taken,
+                again=len(taken) - 1 if again is None else again,
                 stored=require_known_tip(stored),
                 axes=self.axes,
                 sigma_mm=self.sigma_mm,

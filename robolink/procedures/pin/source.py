@@ -67,6 +67,28 @@ class TouchSource(ABC):
         """
         return self._steps(stored, live=False)
 
+    @property
+    @abstractmethod
+    def adds_touch(self) -> bool:
+        """Whether one more can be made than planned, when all are made."""
+
+    def further(
+        self,
+        context: MeasurementContext,
+        stored: ToolOffset | None,
+        result: CalibrationResult,
+        again: int | None,
+    ) -> CalibrationResult:
+        """Go on; see :class:`~robolink.procedures.TouchesFurther`."""
+        taken = touches_of(result)
+        return context.measure(lambda here: self._further_steps(here, taken, again, stored))
+
+    @abstractmethod
+    def _further_steps(
+        self, here: Pose, taken: Sequence[TouchedAt], again: int | None, stored: ToolOffset | None
+    ) -> Procedure[CalibrationResult]:
+        """Return the steps that make one touch again, or one more where ``again`` is ``None``."""
+
     def _touching(self, *, live: bool) -> TouchPlan:
         """Return the plan of the touches, nominal where they are only shown."""
         return self.touch if live else replace(self.touch, nominal=True)
@@ -126,23 +148,6 @@ class ManualPinSource(PinSource):
             written=result.offset,
             tip=tip,
         )
-
-    def further(
-        self,
-        context: MeasurementContext,
-        stored: ToolOffset | None,
-        result: CalibrationResult,
-        again: int | None,
-    ) -> CalibrationResult:
-        """Go on; see :class:`~robolink.procedures.TouchesFurther`."""
-        taken = touches_of(result)
-        return context.measure(lambda here: self._further_steps(here, taken, again, stored))
-
-    @abstractmethod
-    def _further_steps(
-        self, here: Pose, taken: Sequence[TouchedAt], again: int | None, stored: ToolOffset | None
-    ) -> Procedure[CalibrationResult]:
-        """Return the steps that make one touch again, or one more where ``again`` is ``None``."""
 
 
 def middles_of_gaps(angles_deg: Sequence[float]) -> list[float]:

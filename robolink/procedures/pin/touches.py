@@ -5,7 +5,7 @@ the pin, and the last bit is done by the person, who sees it. How far beside and
 that a touch that was not made shows (docs/reference/evidence.md 1).
 """
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
@@ -118,15 +118,6 @@ class PinTouches(WitnessedTouches):
         """Go straight down to a standoff; returns the pose on arrival."""
         arrival: Pose = yield self._move(target, Path.STRAIGHT, tr("Lowering beside the pin."))
         return arrival
-
-    def adopt(self, touches: Mapping[Hashable, TouchedAt]) -> None:
-        """Take over the touches of a measurement that is gone on with.
-
-        Args:
-            touches: By the keys by which later ones take their places, in their order.
-        """
-        self._taken = dict(touches)
-        self._numbers = {key: number for number, key in enumerate(touches, start=1)}
 
     def require_made(self) -> None:
         """Refuse touches that were not made, whatever each of them looked like.

@@ -6,7 +6,7 @@ input switched (docs/reference/evidence.md 1). Another try is asked for, then it
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Hashable
+from collections.abc import Hashable, Mapping
 from dataclasses import replace
 from typing import Final
 
@@ -110,6 +110,15 @@ class WitnessedTouches(ABC):
             told,
             remedy=self._how_to_make(),
         )
+
+    def adopt(self, touches: Mapping[Hashable, TouchedAt]) -> None:
+        """Take over the touches of a measurement that is gone on with.
+
+        Args:
+            touches: By the keys by which later ones take their places, in their order.
+        """
+        self._taken = dict(touches)
+        self._numbers = {key: number for number, key in enumerate(touches, start=1)}
 
     @property
     def plan(self) -> TouchPlan:

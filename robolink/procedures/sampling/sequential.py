@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Final, Generic
+from typing import Final
 
 from robolink.calibration import MOST_RESIDUAL_MM, CalibrationResult
 from robolink.errors import CalibrationError
@@ -16,6 +16,7 @@ from robolink.procedures.sampling.sampler import (
     SequentialSampler,
     TakenT,
 )
+from robolink.procedures.sampling.samples import Samples
 from robolink.runner import (
     MORE,
     Confirm,
@@ -23,7 +24,6 @@ from robolink.runner import (
     FitSubject,
     Notify,
     Procedure,
-    TakenAgainError,
 )
 
 MOST_REPEATED: Final = 3
@@ -31,79 +31,6 @@ MOST_REPEATED: Final = 3
 
 _DIGITS: Final = 6
 """Residuals that are equal in so many decimals of a millimetre differ by rounding alone."""
-
-
-class Samples(Generic[PlaceT, TakenT, ResultT]):
-    """What was taken so far, and at which place each.
-
-    Attributes:
-        taken: In the order of the places; one that was taken again stands where it stood.
-
-    Args:
-        method: How it is taken and solved.
-        places: Where it is taken.
-        taken: What was taken at the first of them.
-
-    Example:
-        >>> from robolink.procedures import Samples
-        >>> class Touches:  # in full: robolink.procedures.Sampler
-        ...     def take(self, place):
-        ...         return f"touch at U {place}"
-        ...         yield
-        >>> samples = Samples(Touches(), [0, 120, 240], ["touch at U 0"])
-        >>> for _ in samples.take(1):
-        ...     pass
-        >>> samples.taken
-        ['touch at U 0', 'touch at U 120']
-    """
-
-    def __init__(
-        self,
-        method: Sampler[PlaceT, TakenT, ResultT],
-        places: Sequence[PlaceT],
-        taken: Sequence[TakenT],
-    ) -> None:
-        self._method = method
-        self._places = list(places)
-        self.taken = list(taken)
-
-    def take(self, index: int) -> Procedure[None]:
-        """Take the one at a place, once more or for the first time.
-
-        One that the person asks for again meanwhile comes first.
-        """
-        while True:
-            try:
-                one = yield from self._method.take(self._places[index])
-            except TakenAgainError as again:
-                yield Notify(again.what)
-                yield from self.take(again.number - 1)
-                continue
-            if index < len(self.taken):
-                self.taken[index] = one
-            else:
-                self.taken.append(one)
-            return
-
-    def another(self) -> Procedure[bool]:
-        """Take one more than planned; return whether there is room for it."""
-        if not isinstance(self._method, AddsSamples):
-            return False
-        place: PlaceT | None = yield from self._method.another(self.taken)
-        if place is None:
-            yield Notify(tr("The arm has no room for one more touch here."))
-            return False
-        self._places = [*self._places[: len(self.taken)], place]
-        yield from self.take(len(self.taken))
-        return True
-
-    def solved(self) -> ResultT:
-        """Return what they say.
-
-        Raises:
-            CalibrationError: They say nothing that can be trusted.
-        """
-        return self._method.solve(self.taken)
 
 
 def finalize_samples(
@@ -169,6 +96,55 @@ def finalize_samples(
         yield from method.away()
         result = samples.solved()
         yield Notify(agreement(method, result, last=worst))
+    return result
+
+
+def resume_samples(
+    method: Sampler[PlaceT, TakenT, ResultT],
+    places: Sequence[PlaceT],
+    taken: Sequence[TakenT],
+    again: int | None,
+) -> Procedure[ResultT]:
+    """Take one again, or one more, of a measurement that has ended. Ends lifted.
+
+    All others stay as they are.
+
+    Args:
+        method: How it is taken and solved.
+        places: Where those so far were taken.
+        taken: What was taken there.
+        again: Index of the one that is taken again; ``None`` for one more.
+
+    Raises:
+        CalibrationError: Those of ``method``.
+
+    Example:
+        >>> from robolink.calibration import solve_camera_round
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.procedures import CameraDrive, CameraSamples, LookPlan, Place
+        >>> from robolink.procedures import resume_samples
+        >>> from robolink.stations import CameraStation
+        >>> from robolink.testing import PaperCell
+        >>> here, tip = Pose(300, 100, 20, 0), ToolOffset(12, -4, -20)
+        >>> camera = CameraStation(300, 80, -30)
+        >>> def solve(looks):
+        ...     return solve_camera_round([camera.sighting(look) for look in looks], stored=tip)
+        >>> looks = CameraSamples(CameraDrive(camera, LookPlan(), here), solve, here)
+        >>> cell, places = PaperCell(here, tip), [Place(0, tip), Place(60, tip), Place(120, tip)]
+        >>> seen = [cell.run(looks.take(place)) for place in places]
+        >>> len(cell.run(resume_samples(looks, places, seen, again=1)).inputs)
+        3
+    """
+    samples = Samples(method, places, taken)
+    if again is None:
+        yield from samples.another()
+    else:
+        yield from samples.take(again)
+    yield from method.away()
+    result = samples.solved()
+    if result.dof:
+        last = len(samples.taken) - 1 if again is None else again
+        yield Notify(agreement(method, result, last=last))
     return result
 
 

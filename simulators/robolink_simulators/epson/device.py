@@ -12,14 +12,14 @@ from typing import Any
 
 from robolink.model import Secret
 from robolink.protocols.epson_binary import Dialect
-from robolink.protocols.epson_text import ErrorCode, StatusFlags
+from robolink.protocols.epson_text import StatusFlags
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.device.late_random import late_random
 from robolink_simulators.device.motion_log import StartedMotion
 from robolink_simulators.epson.arm.robots import find_robot
 from robolink_simulators.epson.card import ControllerCard
 from robolink_simulators.epson.companion import Companion
-from robolink_simulators.epson.condition import Condition, Mode, Task
+from robolink_simulators.epson.condition import Condition, Mode
 from robolink_simulators.epson.flash import Flash, moment_of, put_back
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.variables import Variables, project_variables
@@ -32,20 +32,20 @@ from robolink_simulators.epson.remote.commands import CommandDesk
 from robolink_simulators.epson.remote.link import EpsonServerLink
 from robolink_simulators.epson.remote.open_links import OpenLinks
 from robolink_simulators.epson.remote.queries import Alarms
-from robolink_simulators.epson.remote.requests import RequestTaking
 from robolink_simulators.epson.remote.service import Service
 from robolink_simulators.epson.spel import Interpreter
 from robolink_simulators.epson.spel.programs.loading import load_project
 from robolink_simulators.epson.spel.tasks.channels.ports import Ports
 from robolink_simulators.epson.spel.tasks.runner import ProgramRunner
+from robolink_simulators.epson.time_stepping import TimeStepping
 from robolink_simulators.epson.world import World
 from robolink_simulators.faults import Fault, FaultPlan
 from robolink_simulators.faults.links import EPSON_LINKS
 from robolink_simulators.serial_numbers import drawn_serial
 
 
-class EpsonSimulator(RequestTaking):
-    """Implements ``hosting.seam.WireDevice``.
+class EpsonSimulator(TimeStepping):
+    r"""Implements ``hosting.seam.WireDevice``.
 
     Args:
         robot: Name of a model, as in docs/reference/epson-robots.md, "Families"; several, with
@@ -76,6 +76,14 @@ class EpsonSimulator(RequestTaking):
 
     Raises:
         ConfigError: No such robot, or a state file that does not fit.
+
+    Example:
+        >>> from robolink_simulators.epson import EpsonSimulator
+        >>> controller = EpsonSimulator("T3-401S", seed=2)
+        >>> link = controller.connect(now_ns=0)
+        >>> link.receive(b'$Login\r\n$Execute,"Print 6 * 7"\r\n', now_ns=0)
+        >>> link.outgoing()
+        b'#Login,0\r\n#Execute,"42\r\n"\r\n'
     """
 
     kind = "epson"
@@ -102,11 +110,6 @@ class EpsonSimulator(RequestTaking):
         world: WorldParameters | None = None,
     ) -> None:
         super().__init__(seed)
-        # Until when all is done: a transport asks for one and the same instant several times.
-        self._settled_ns = -1
-        # What next_change found last, and for which of those instants.
-        self._next_ns: int | None = None
-        self._known_ns = -1
         self.options = options or EpsonOptions()
         self.faults = FaultPlan(faults, seed, links=EPSON_LINKS)
         self.durable = state_path is not None
@@ -116,7 +119,6 @@ class EpsonSimulator(RequestTaking):
         self._parameters = world
         self._links = OpenLinks()
         self._serial = serial or drawn_serial()
-        self._begun = False
         if state_path is not None or world is not None:
             self._begin()  # a file or a world that does not fit is refused now
 
@@ -199,7 +201,7 @@ class EpsonSimulator(RequestTaking):
         *,
         ports: Mapping[int, tuple[str, int]] | None = None,
     ) -> ProgramRunner:
-        """Load a project, in place of the one before: Start,n runs its function mainN.
+        r"""Load a project, in place of the one before: Start,n runs its function mainN.
 
         Args:
             programs: Its .prg files; IOLabels.dat is taken from beside them.
@@ -209,6 +211,19 @@ class EpsonSimulator(RequestTaking):
         Raises:
             ProgramRefused: It cannot be built.
             ConfigError: A file cannot be read, or what is to begin in the background cannot.
+
+        Example:
+            >>> from pathlib import Path
+            >>> from robolink_simulators.epson import EpsonSimulator
+            >>> controller, main = EpsonSimulator(), Path("Main.prg")
+            >>> _ = main.write_text("Function main\n  Wait 2\n  On 5\nFend\n")
+            >>> _ = controller.load([main])
+            >>> controller.panel.start_production()
+            >>> for now_s in (1, 3):
+            ...     controller.advance(now_s * 1_000_000_000)
+            ...     print(controller.machine.outputs.get(5))
+            False
+            True
         """
         with self.acting():
             project = load_project(self._session, programs, points)
@@ -241,35 +256,6 @@ class EpsonSimulator(RequestTaking):
         if self._slot.client is not None and self.options.second_client == "closed":
             link.cut()
         return link
-
-    def advance(self, now_ns: int) -> None:
-        """Let simulated time reach ``now_ns``, stopping wherever something changes."""
-        if now_ns == self._settled_ns or self._passes(now_ns):
-            return
-        while now_ns > self._now_ns < (change := self.next_change() or now_ns) < now_ns:
-            self._step(change)
-        self._step(max(now_ns, self._now_ns))
-
-    def next_change(self) -> int | None:
-        """Return when :meth:`advance` will next do something by itself, if ever."""
-        if not self._begun:
-            return None
-        if self._settled_ns == -1 or self._settled_ns != self._known_ns or self._at_work:
-            self._next_ns, self._known_ns = self._found_next(), self._settled_ns
-        return self._next_ns
-
-    def _found_next(self) -> int | None:
-        first = self._links.next_change()
-        for change in (
-            self._slot.deadline(unfinished=self._service.unfinished),
-            self._window.next_change(),
-            self._mishaps.next_change(),
-            self.machine.timed_bits.next_change(),
-            None if self.program is None else self.program.next_change(),
-        ):
-            if change is not None and (first is None or change < first):
-                first = change
-        return first
 
     @property
     def machine_name(self) -> str:
@@ -329,63 +315,3 @@ class EpsonSimulator(RequestTaking):
 
     def _restore(self, held: Mapping[str, Any]) -> None:
         put_back(held, self.machine, self.variables, self.worlds, now_ns=self._now_ns)
-
-    def _after_act(self) -> None:
-        self._settled_ns = -1
-
-    def _passes(self, now_ns: int) -> bool:
-        """Let time pass in which nothing happens, as it mostly does; False when something may.
-
-        What an idle controller does by itself :meth:`next_change` tells, all of it.
-        """
-        if not self._begun:
-            self._now_ns = max(now_ns, self._now_ns)
-            return True
-        if now_ns < self._now_ns or self._at_work or not self._links.settled:
-            return False
-        change = self.next_change()
-        if change is not None and change <= now_ns:
-            return False
-        self._now_ns = self._settled_ns = self._known_ns = now_ns
-        self.machine.advance(now_ns)
-        return True
-
-    @property
-    def _at_work(self) -> bool:
-        """Whether something goes on that is looked at as time passes."""
-        return (
-            self.program is not None
-            or self._window.busy
-            or self.condition.task is Task.RUNNING
-            or self.durable
-            or self.machine.moving
-        )
-
-    def _step(self, now_ns: int) -> None:
-        self._now_ns = now_ns
-        self._stepping = True
-        try:
-            if self.program is not None:
-                self.program.advance(now_ns)
-            self.machine.advance(now_ns)
-            self.machine.timed_bits.advance(now_ns)
-            self._window.advance(now_ns)
-            self._mishaps.carry_out(now_ns)
-            if self._companion is not None and self.condition.task is Task.RUNNING:
-                self._companion.publish_changes()
-            self._supervise(now_ns)
-            self._flash.save_changes()
-            self._settled_ns, self._known_ns = now_ns, -1
-        finally:
-            self._stepping = False
-
-    def _supervise(self, now_ns: int) -> None:
-        """Keep the time-outs of docs/reference/epson.md 1.1."""
-        overdue, client = self._slot.overdue(now_ns, unfinished=self._service.unfinished)
-        watches_only = self.condition.monitoring_only
-        if overdue and (not watches_only or self.options.monitoring_timeout == "error"):
-            self._window.interrupt(now_ns)
-            self.condition.raise_error(ErrorCode.TIMED_OUT)
-        if client is not None:
-            client.cut()
-        self._links.supervise(now_ns)

@@ -15,10 +15,9 @@ from robolink_simulators.epson.condition import Condition, Task
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.variables import Variables
 from robolink_simulators.epson.options import EpsonOptions
-from robolink_simulators.epson.refusals import SpelRefusal
+from robolink_simulators.epson.refusals import RequestRefused, SpelRefusal, malformed, number
 from robolink_simulators.epson.remote.io_commands import Fields, Served, io_commands
 from robolink_simulators.epson.remote.queries import Alarms, check_robot, query_commands
-from robolink_simulators.epson.request_refusals import RequestRefused, malformed, number
 
 _HIGHEST_FUNCTION = {5: 7, 7: 63, 8: 63}
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.bits import BitBank
-from robolink_simulators.epson.request_refusals import number
+from robolink_simulators.epson.refusals import number
 
 Fields = tuple[str, ...]
 """What a served command answers; nothing stands for a lone ``0``."""

@@ -14,8 +14,8 @@ from robolink_simulators.epson.condition import Condition
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.driven_robot import DrivenRobot
 from robolink_simulators.epson.options import EpsonOptions, SpelNumbers
+from robolink_simulators.epson.refusals import malformed, number
 from robolink_simulators.epson.remote.io_commands import Fields, Served
-from robolink_simulators.epson.request_refusals import malformed, number
 
 _NOT_APPLICABLE: Final = "-1"
 _AXES: Final = 6

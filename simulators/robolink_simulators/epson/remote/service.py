@@ -12,12 +12,12 @@ from robolink.protocols.epson_text import (
 )
 from robolink_simulators.epson.condition import Condition, Task
 from robolink_simulators.epson.options import EpsonOptions
+from robolink_simulators.epson.refusals import RequestRefused
 from robolink_simulators.epson.remote.client_slot import ClientSlot
 from robolink_simulators.epson.remote.command_window import SpelWindow
 from robolink_simulators.epson.remote.commands import CommandDesk
 from robolink_simulators.epson.remote.exchange import PendingRequest
 from robolink_simulators.epson.remote.link import EpsonServerLink
-from robolink_simulators.epson.request_refusals import RequestRefused
 
 
 class Service:

@@ -3,8 +3,7 @@
 What takes time (motion, Wait, what stands inside ``!...!``) is :class:`StatementExecution`'s.
 """
 
-from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
-from robolink_simulators.epson.request_refusals import RequestRefused
+from robolink_simulators.epson.refusals import RefusalKind, RequestRefused, SpelRefusal
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.printing import (
     CRLF,

@@ -9,8 +9,7 @@ from robolink_simulators.cell.frames import X_AXIS, Y_AXIS, Z_AXIS, Frame, about
 from robolink_simulators.epson.arm.kinematics import PLAIN
 from robolink_simulators.epson.definitions.local_frames import coordinates_of_frame, frame_at
 from robolink_simulators.epson.memory.points import AXES, HIGHEST_LOCAL, Point
-from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
-from robolink_simulators.epson.request_refusals import RequestRefused
+from robolink_simulators.epson.refusals import RefusalKind, RequestRefused, SpelRefusal
 from robolink_simulators.epson.spel.expressions.closures import Run, Scope, check_count, closure
 from robolink_simulators.epson.spel.expressions.data_types import Variable
 from robolink_simulators.epson.spel.expressions.joint_functions import (

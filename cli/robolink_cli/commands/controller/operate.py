@@ -23,6 +23,7 @@ from robolink_cli.session.context import (
 from robolink_cli.session.motion_consent import agree_to_motion
 from robolink_cli.session.opening import open_controller
 from robolink_cli.stopping.notes import forget_stop, own_name_of
+from robolink_cli.views.machine_words import state_word
 
 if TYPE_CHECKING:
     from robolink.model import Controller
@@ -127,7 +128,9 @@ def reset(context: CliContext, dry_run: bool, yes: bool) -> None:
     context.emit(
         "reset",
         payload,
-        lambda: say(tr("The reset was carried out; the controller is: {state}.", state=state)),
+        lambda: say(
+            tr("The reset was carried out; the controller is: {state}.", state=state_word(state))
+        ),
     )
 
 

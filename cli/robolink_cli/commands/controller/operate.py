@@ -7,6 +7,7 @@ import click
 from robolink.messages import tr
 from robolink.model import Act
 from robolink_cli.access.capabilities import preferences_of, require_epson, require_softmotion
+from robolink_cli.console.machine_words import state_word
 from robolink_cli.console.render import note, say
 from robolink_cli.options.consent import dry_run_option, yes_option
 from robolink_cli.options.shared import shared_options
@@ -23,7 +24,6 @@ from robolink_cli.session.context import (
 from robolink_cli.session.motion_consent import agree_to_motion
 from robolink_cli.session.opening import open_controller
 from robolink_cli.stopping.notes import forget_stop, own_name_of
-from robolink_cli.views.machine_words import state_word
 
 if TYPE_CHECKING:
     from robolink.model import Controller

@@ -1,7 +1,7 @@
 """The two rows that stand above every screen."""
 
 from robolink.messages import tr
-from robolink_cli.views.machine_words import state_word
+from robolink_cli.console.machine_words import state_word
 from robolink_cli.wizard.state import WizardState
 
 

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from robolink.nozzle_change._open_turn_test import OpenTurnTest as OpenTurnTest
     from robolink.nozzle_change._open_turn_test import finish_by_turn_test as finish_by_turn_test
     from robolink.nozzle_change._open_turn_test import open_turn_tests as open_turn_tests
+    from robolink.nozzle_change._open_turn_test import untested_sentences as untested_sentences
     from robolink.nozzle_change._plan import ChangePlan as ChangePlan
     from robolink.nozzle_change._plan import Limits as Limits
     from robolink.nozzle_change._plan import ToolPlan as ToolPlan
@@ -43,7 +44,7 @@ __getattr__ = lazy_exports(
         "_acceptance": "AcceptanceCriteria",
         "_change": "DescribeReport Earlier NozzleChange",
         "_length": "known_height",
-        "_open_turn_test": "OpenTurnTest finish_by_turn_test open_turn_tests",
+        "_open_turn_test": "OpenTurnTest finish_by_turn_test open_turn_tests untested_sentences",
         "_plan": "ChangePlan Limits ToolPlan clearance_too_small require_contact_input "
         "require_ready usual_box",
         "_preview": "PlannedStep flange_now foresee preview require_inside",

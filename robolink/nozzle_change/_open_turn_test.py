@@ -7,14 +7,15 @@ verdict. So a process that is killed in the test leaves what it found
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import astuple, dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, TypeVar
 
 from robolink.calibration import VerifyResult
 from robolink.errors import (
     CalibrationError,
+    ConfigError,
     LeaseLostError,
     OutcomeUnknownError,
     RemoteProtocolError,
@@ -23,24 +24,23 @@ from robolink.errors import (
     VerifyError,
 )
 from robolink.messages import joined, tr
+from robolink.methods import find_method
 from robolink.model import Controller, Finding, Marker, MarkerKind, Verdict
 from robolink.nozzle_change._acceptance import require_proved
 from robolink.nozzle_change._plan import Limits, ToolPlan
 from robolink.nozzle_change._proposal import Proposal
 from robolink.nozzle_change._records import verification_entry
-from robolink.procedures import (
-    TOUCH_CODES,
-    MeasurementContext,
-    TurnsAboutPin,
-    TurnTest,
-)
-from robolink.runner import Operator, Runner, RunSettings
+from robolink.procedures import TOUCH_CODES, KeepsProof, KeptProof, MeasurementContext
+from robolink.runner import Operator, RunSettings
 from robolink.transaction import Settler
 
 if TYPE_CHECKING:
     from pydantic import TypeAdapter
 
+KeptT = TypeVar("KeptT")
+
 _KEY: Final = "turn_tests"
+_UNTESTED: Final = "untested"
 _OUT_OF_REACH: Final = (OutcomeUnknownError, TransportError, RemoteProtocolError, LeaseLostError)
 """After these nothing can be put back here: the link is gone, or the right to write."""
 
@@ -54,7 +54,7 @@ class OpenTurnTest:
         settings: Limits and speeds, about where the flange was when the change began.
     """
 
-    test: TurnTest
+    test: KeptProof
     settings: RunSettings
 
 
@@ -63,29 +63,49 @@ def marked_turn_tests(
 ) -> dict[str, object]:
     """Return what the marker of a change keeps of its turn tests, plain JSON.
 
-    Nothing, where one of its tools is proved in another way, or not at all.
+    Where one of its tools has none that could be made later, what it was measured with, and why.
 
     Args:
         context: Where the change began.
         limits: Where and how fast the robot may go.
         proposals: What is to be written.
     """
-    tests: list[OpenTurnTest] = []
+    tests, untested = list[dict[str, object]](), dict[str, object]()
     for plan, proposal in proposals:
-        source, start = plan.moving, context.start
-        if start is None or not plan.verify or not isinstance(source, TurnsAboutPin):
-            return {}
-        test = source.turn_test(
-            proposal.tool,
-            proposal.result,
-            tip=proposal.tip,
-            tolerance_mm=plan.criteria.drift_tolerance_mm,
-        )
-        settings = limits.settings(start, proposal.result.offset)
-        if not all(map(math.isfinite, astuple(settings.box))):
-            return {}
-        tests.append(OpenTurnTest(test, settings))
-    return {_KEY: _adapter().dump_python(tuple(tests), mode="json")}
+        kept = _kept(context, limits, plan, proposal)
+        if isinstance(kept, str):
+            untested[str(proposal.tool)] = {"method": proposal.result.method, "why": kept}
+        else:
+            tests.append(kept)
+    return {_UNTESTED: untested} if untested else {_KEY: tests}
+
+
+def _kept(
+    context: MeasurementContext, limits: Limits, plan: ToolPlan, proposal: Proposal
+) -> dict[str, object] | str:
+    """Return the test of one tool, or why there is none."""
+    source, start = plan.moving, context.start
+    if source is None or start is None:
+        return "no_motion"
+    if not plan.verify:
+        return "not_wanted"
+    if not isinstance(source, KeepsProof):
+        return "no_proof"
+    test = source.proof(
+        context,
+        proposal.tool,
+        proposal.result,
+        tip=proposal.tip,
+        tolerance_mm=plan.criteria.drift_tolerance_mm,
+    )
+    settings = limits.settings(start, proposal.result.offset)
+    if not all(map(math.isfinite, astuple(settings.box))):
+        return "no_box"
+    return test.obstacle or {
+        "method": test.method,
+        "test": _adapter(type(test)).dump_python(test, mode="json"),
+        "settings": _adapter(RunSettings).dump_python(settings, mode="json"),
+    }
 
 
 def open_turn_tests(controller: Controller) -> dict[str, tuple[OpenTurnTest, ...]]:
@@ -106,6 +126,72 @@ def open_turn_tests(controller: Controller) -> dict[str, tuple[OpenTurnTest, ...
         if tests and settler.examine(marker).verdict is Verdict.DONE:
             found[marker.operation] = tests
     return found
+
+
+def untested_sentences(controller: Controller) -> list[str]:
+    """Return of each written change that keeps no turn test why, and what measures and tests anew.
+
+    Args:
+        controller: The controller, connected.
+
+    Raises:
+        RobolinkError: It cannot be read.
+    """
+    settler = Settler(controller, keep=True)
+    told = list[str]()
+    for marker in controller.outcomes.open_markers():
+        if marker.kind is not MarkerKind.CHANGE or _tests_of(marker):
+            continue
+        if settler.examine(marker).verdict is Verdict.DONE:
+            told += _whys(marker)
+    return told
+
+
+def _whys(marker: Marker) -> Iterator[str]:
+    """Yield a sentence for each tool of a change whose test cannot be made now."""
+    untested = marker.details.get(_UNTESTED)
+    if not isinstance(untested, dict):
+        yield tr("Nothing is on record about how this change was to be tested.")
+        return
+    for tool, entry in untested.items():
+        method, why = str(entry.get("method", "")), str(entry.get("why", ""))
+        yield joined(" ", (_why(tool, method, why), _anew(method, why)))
+
+
+def _why(tool: str, method: str, why: str) -> str:
+    sentences = {
+        "no_motion": tr(
+            "Tool {tool} was measured from poses that existed already: nothing moves in that, so "
+            "there is no turn test.",
+            tool=tool,
+        ),
+        "not_wanted": tr("Tool {tool} was written without a turn test, as was asked.", tool=tool),
+        "no_box": tr(
+            "Nothing says how far the robot may go in the turn test of tool {tool}.", tool=tool
+        ),
+        "camera_open": tr(
+            "A program had opened the camera that measured tool {tool}: it cannot be opened from "
+            "here.",
+            tool=tool,
+        ),
+        "camera_token": tr(
+            "The address of the camera that measured tool {tool} holds a token, which is kept "
+            "nowhere.",
+            tool=tool,
+        ),
+    }
+    return sentences.get(why) or tr(
+        "{method}, which measured tool {tool}, keeps no turn test.", method=method, tool=tool
+    )
+
+
+def _anew(method: str, why: str) -> str:
+    """Return which command measures and tests, when this is settled."""
+    by_motion = "two-pose" if why == "no_motion" else method
+    return tr(
+        "When this is settled, 'robolink calibrate {method}' measures and tests it.",
+        method=by_motion,
+    )
 
 
 def finish_by_turn_test(
@@ -198,9 +284,11 @@ def _prove(
     """
     tool = one.test.tool
     controller.tools.select(tool)
-    runner = Runner(controller, controller.groups[0], operator, one.settings)
+    context = MeasurementContext(
+        controller, operator, start=None, settings=lambda _start, _tip: one.settings
+    )
     try:
-        result = runner.run(one.test.steps_after_a_break())
+        result = one.test.prove_after_a_break(context)
     except CalibrationError as error:
         if error.code not in TOUCH_CODES:
             raise
@@ -256,16 +344,33 @@ def _stays_open() -> str:
 def _tests_of(marker: Marker) -> tuple[OpenTurnTest, ...]:
     """Return what a marker keeps; nothing where it is not that of such a change, or unreadable."""
     kept, tools = marker.details.get(_KEY), marker.details.get("tools")
-    if marker.kind is not MarkerKind.CHANGE or not kept or not isinstance(tools, dict):
+    if marker.kind is not MarkerKind.CHANGE or not isinstance(kept, list):
         return ()
     try:
-        tests = _adapter().validate_python(kept)
-    except ValueError:
+        tests = tuple(map(_read, kept))
+    except (ValueError, ConfigError):
         return ()
-    return tests if {str(one.test.tool) for one in tests} == set(tools) else ()
+    named = {str(one.test.tool) for one in tests}
+    return tests if isinstance(tools, dict) and named == set(tools) else ()
 
 
-def _adapter() -> "TypeAdapter[tuple[OpenTurnTest, ...]]":
+def _read(kept: Mapping[str, object]) -> OpenTurnTest:
+    """Return a test that was kept.
+
+    Raises:
+        ConfigError: No method of that name is installed.
+        ValueError: It is none.
+    """
+    proof = find_method(str(kept.get("method"))).proof
+    if proof is None:
+        raise ValueError("a method without a proof of its own")
+    return OpenTurnTest(
+        _adapter(proof()).validate_python(kept.get("test")),
+        _adapter(RunSettings).validate_python(kept.get("settings")),
+    )
+
+
+def _adapter(kind: type[KeptT]) -> "TypeAdapter[KeptT]":
     from pydantic import TypeAdapter  # only a change that is open, or begins, needs it
 
-    return TypeAdapter(tuple[OpenTurnTest, ...])
+    return TypeAdapter(kind)

@@ -125,7 +125,7 @@ def test_told_to_it_writes_and_moves_and_puts_everything_back(
         (("--write", "--tool", "1", "--yes"), 2, "Tool 1 is selected"),
         (("--write", "--yes"), 2, "--write and --tool go together"),
         (("--tool", "2", "--yes"), 2, "--write and --tool go together"),
-        (("--driver", "nowhere"), 2, "names no driver"),
+        (("--driver", "nowhere"), 2, "is not the name of a driver"),
         (("--driver", "no_such_module:x"), 2, "cannot be loaded"),
     ],
 )

@@ -44,7 +44,7 @@ def test_a_password_file_that_others_may_read_is_refused(tmp_path, mode):
     path = tmp_path / "secret"
     path.write_text("hunter2")
     path.chmod(mode)
-    with pytest.raises(errors.ConfigError, match="Others than its owner") as caught:
+    with pytest.raises(errors.ConfigError, match="Other users") as caught:
         _password.find_password(URL, password_file=path)
     assert "chmod 600" in caught.value.remedy
 

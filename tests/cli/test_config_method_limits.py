@@ -72,7 +72,7 @@ def test_what_only_one_method_refuses_names_that_one(cell, tmp_path, capsys):
     say(tmp_path, "lift_mm = 6")
     code, problems = check(capsys)
     assert (code, list(problems)) == (2, ["cells.a.clearance_mm"])
-    assert "(so refuse: one-touch)" in problems["cells.a.clearance_mm"]
+    assert "These methods refuse it: one-touch." in problems["cells.a.clearance_mm"]
 
 
 def test_files_are_looked_at_together_and_the_one_that_says_it_is_named(

@@ -65,7 +65,7 @@ def test_a_healthy_computer_is_told_so(capsys, tmp_path):
     assert main.run(["doctor"]) == 0
     shown = capsys.readouterr().out
     assert "ok    click: 8.5.1\n" in shown
-    assert shown.endswith("No obstacle was found.\n")
+    assert shown.endswith("No problem was found.\n")
     assert list(tmp_path.iterdir()) == []
 
 

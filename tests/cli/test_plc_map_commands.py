@@ -106,7 +106,7 @@ def test_without_a_probe_nothing_is_written_until_a_person_has_compared(shown, s
     code, _, err = shown("-c", url, "plc", "check-map", "--shows", "3.x=1")
     assert (code, "names no value" in err) == (2, True)
     code, _, err = shown("-c", url, "plc", "check-map", "--shows", "1.x=much")
-    assert (code, "is no number" in err) == (2, True)
+    assert (code, "is not a number" in err) == (2, True)
     code, out, _ = shown("-c", url, "--json", "plc", "check-map", "--shows", "1.x=-5,44")
     assert code == 0
     assert document(out, "plc-map-values")["confirmed_by"]

@@ -40,7 +40,7 @@ def test_a_range_is_one_address_two_ends_or_a_network(text, first, last, count):
     "text", ["", "localhost", "192.0.2", "192.0.2.1-300", "192.0.2.1-", "a/24", "::1", "1.2.3.4/99"]
 )
 def test_what_is_no_range_is_refused_with_an_example(text):
-    with pytest.raises(ConfigError, match="no range of addresses") as caught:
+    with pytest.raises(ConfigError, match="not a range of addresses") as caught:
         parse_range(text)
     assert "192.168.0.1-20" in caught.value.remedy
 
@@ -85,7 +85,7 @@ def test_a_person_sees_a_url_and_a_count(listener, capsys):
     assert main.run(["scan", "127.0.0.1-2", "--port", str(port)]) == 0
     shown = capsys.readouterr().out
     assert shown.startswith(f"epson+tcp://127.0.0.1:{port}\nport {port}: 1 of 2 addresses")
-    assert "no proof of a controller" in shown
+    assert "does not prove a controller" in shown
 
 
 def test_nobody_there_is_said_and_is_no_error(listener, capsys):
@@ -252,7 +252,7 @@ def test_into_a_conversation_of_others_nothing_is_sent(capsys, far_end):
     assert heard == []
     assert main.run(["scan", "--line", url]) == 0
     shown = capsys.readouterr().out
-    assert "somebody talks there unasked; nothing was sent" in shown
+    assert "something sends there unasked; nothing was sent to it" in shown
     assert "sent: nothing; received: 31 32" in shown
 
 

@@ -160,7 +160,7 @@ def test_a_password_file_that_others_may_read_does_not_keep_it_back(moving, stop
     (tmp_path / "password").chmod(0o644)
     code, _, err = stop("-c", moving.url, "--password-file", str(tmp_path / "password"))
     assert code == 0
-    assert "Others than its owner may read" in err
+    assert "Other users may read" in err
 
 
 @pytest.mark.parametrize(

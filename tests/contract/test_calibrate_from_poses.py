@@ -185,7 +185,7 @@ def test_on_a_terminal_a_no_writes_nothing(command, simulator, monkeypatch):
     monkeypatch.setattr(given_poses, "agree", decline)
     assert command(*calibrate("--points", "901,902"))[0] == 9
     (question,) = asked
-    assert "Write them to tool 1 all the same?" in question
+    assert "Write it to tool 1 all the same?" in question
     assert "Nobody saw these touches" in question
     assert stored(simulator) == STORED
 

@@ -193,7 +193,7 @@ def test_the_blocks_of_a_page_can_be_typed(cell, page, capsys, monkeypatch):
             typed = re.sub(r"assist\+tcp://TOKEN\S+", person, typed)
             words = shlex.split(typed.replace("undo --to 7", f"undo --to {entry}"))[1:]
             code, shown = ended(words, capsys)
-            if code == 9 or "nobody can be asked here" in shown.err:
+            if code == 9 or "there is nobody to ask" in shown.err:
                 code, shown = ended(agreed(words, person), capsys)
             assert code == end, f"{place}: {line}\n{shown.out}{shown.err}"
 

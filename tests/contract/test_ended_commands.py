@@ -18,7 +18,7 @@ from tests.faults._nozzle_cell import OLD_TIP, served_cell
 
 pytestmark = pytest.mark.simulator_only
 
-JOG = r"Enter when it is on the pin"
+JOG = r"When it is there: done"
 
 
 @pytest.fixture

@@ -139,7 +139,7 @@ def test_pendant_points_only_and_nothing_moves(cell):
     teach(cell, ToolOffset(12.3, -3.4, -20))
     refused = cell.run("recalibrate", path, "--yes")
     assert refused.code == 9
-    assert "consistent only with the tool value that they were taught with" in refused.err
+    assert "fit only the tool value that they were taught with" in refused.err
     first = cell.run("recalibrate", path, "--yes", "--reference")
     assert first.code == 0, first.err
     assert cell.tool_1 == OLD_TIP

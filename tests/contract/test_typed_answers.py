@@ -14,7 +14,7 @@ from tests.contract._terminal import Terminal
 pytestmark = pytest.mark.simulator_only
 
 YES_NO = r"\[y or n\]"
-JOG = r"Enter when it is on the pin"
+JOG = r"When it is there: done"
 
 
 @pytest.fixture

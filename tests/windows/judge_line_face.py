@@ -84,10 +84,10 @@ def console(windows: WindowsPython, simulator, state, tmp_path: Path) -> Console
 
 def test_a_person_types_steps_is_refused_an_unjogged_touch_and_stops(console, simulator):
     simulated, _ = simulator
-    console.wait_for("Type the number of a point")
+    console.wait_for("Type the number of a row")
     console.type("1")
     console.type("3")
-    console.wait_for("No point is open.")
+    console.wait_for("No row is open.")
     console.type("y")
     console.wait_for("Scan the id of the new needle.")
     console.type("N-0418")

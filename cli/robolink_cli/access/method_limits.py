@@ -31,7 +31,7 @@ def refused_by_methods(settings: "CellSettings") -> Iterator[Problem]:
             refusals.setdefault(problem, []).append(method.name)
     for problem, names in refusals.items():
         methods = ", ".join(names)
-        said = tr("{why} (so refuse: {methods})", why=problem.what, methods=methods)
+        said = tr("{why} These methods refuse it: {methods}.", why=problem.what, methods=methods)
         yield Problem(problem.where, said)
 
 

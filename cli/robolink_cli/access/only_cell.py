@@ -33,8 +33,8 @@ def nothing_named() -> ConfigError:
     if len(names) == 1:
         return ConfigError(
             tr(
-                "No cell is named. What moves or writes takes the only one, {name}, just where it "
-                "can ask you first.",
+                "No cell is named. A command that moves or writes takes the only one, {name}, "
+                "only where it can ask you first.",
                 name=names[0],
             ),
             remedy=tr("Name it: -c {name}", name=names[0]),

@@ -81,7 +81,7 @@ def _from_file(path: Path) -> Secret:
         return Secret(lines[0].decode("utf-8-sig") if lines else "")
     except OthersMayReadError as error:
         raise ConfigError(
-            tr("Others than its owner may read the password file {path}.", path=path),
+            tr("Other users may read the password file {path}.", path=path),
             remedy=tr("Run: chmod 600 {path}", path=path),
         ) from error
     except (OSError, UnicodeError) as error:

@@ -39,7 +39,7 @@ def recording(path: str | None, controller: str) -> "Iterator[TraceSink | None]"
     except OSError as error:
         raise ConfigError(
             tr("The recording {path} cannot be written: {cause}.", path=path, cause=error.strerror),
-            remedy=tr("Choose another file; nothing was sent."),
+            remedy=tr("Nothing was sent. Choose another file."),
         ) from error
     with file:
 

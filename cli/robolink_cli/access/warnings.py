@@ -43,8 +43,8 @@ def note_at_work(outcomes: "OutcomeLog", url: str) -> bool:
         working = outcomes.at_work()
     if working:
         what = tr(
-            "What it has begun it ends itself; there is nothing to recover. Wait for it, or "
-            "'robolink -c {url} stop'.",
+            "It ends by itself what it has begun; there is nothing to recover. Wait for it, or "
+            "stop it: robolink -c {url} stop",
             url=url,
         )
         note(f"{working}\n  {what}")
@@ -79,15 +79,15 @@ def _record_missing(marker: "Marker", url: str) -> str:
     details = marker.details
     journal, before = str(details.get("journal", "")), str(details.get("before", ""))
     said = tr(
-        "This controller was changed from here before, but the journal {journal} knows nothing of "
-        "it: what was left unfinished does not show.",
+        "This controller was changed from here before, but the journal {journal} knows nothing "
+        "of it: jobs left unfinished do not show.",
         journal=journal,
     )
     if before and before != journal:
         said += " " + tr("Its record was kept in {before}.", before=before)
     remedy = tr(
-        "Look at the selected tool and at the tools first. 'robolink -c {url} recover' begins a "
-        "new record on your word.",
+        "Look at the selected tool and at the tools first. Then 'robolink -c {url} recover' "
+        "asks you, and begins a new record.",
         url=url,
     )
     return f"{said}\n  {remedy}"

@@ -118,7 +118,7 @@ robot = LazyGroup(
 cell = LazyGroup(
     name="cell",
     lazy=_CELL,
-    help=declared("The cells of this computer: their files, their places, and what is wrong."),
+    help=declared("The cells of this computer: their files, their stations, and what is wrong."),
 )
 
 

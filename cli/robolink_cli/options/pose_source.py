@@ -102,7 +102,13 @@ def pose_source_options(
     options = (
         click.option("--points", metavar="N,N", help=points),
         click.option("--pose", "typed", metavar="X,Y,..", multiple=True, help=typed),
-        click.option("--poses", "path", type=click.Path(dir_okay=False, path_type=Path), help=path),
+        click.option(
+            "--poses",
+            "path",
+            type=click.Path(dir_okay=False, path_type=Path),
+            metavar="FILE",
+            help=path,
+        ),
         click.option(
             "--taught-tool",
             type=click.IntRange(0, 15),
@@ -176,7 +182,7 @@ def pose_source(
     named = [name for name, value in given.items() if value]
     if len(named) > 1:
         raise ConfigError(
-            tr("{names} exclude each other.", names=", ".join(named)),
+            tr("Only one of these can be given: {names}.", names=", ".join(named)),
             remedy=tr("Give the poses in one way only."),
         )
     if path is None and choices != NOTHING_SAID:

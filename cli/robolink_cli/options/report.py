@@ -35,7 +35,9 @@ def report_options(function: F) -> F:
     function = click.option(
         "--force",
         is_flag=True,
-        help=declared("Let --report replace a file that is there; it forces nothing else."),
+        help=declared(
+            "Let --report overwrite a file that is already there; it forces nothing else."
+        ),
     )(function)
     return click.option(
         "--report",

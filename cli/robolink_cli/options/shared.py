@@ -48,7 +48,7 @@ class _Language(click.ParamType[str]):
         found = language_named(value)
         if found is None and value != os.environ.get(VARIABLE):
             self.fail(
-                tr("{value!r} is no language of robolink: zh or en.", value=value), param, ctx
+                tr("{value!r} is not a language of robolink: zh or en.", value=value), param, ctx
             )
         return found or ENGLISH
 
@@ -124,6 +124,7 @@ def _link_options(command: CommandT) -> CommandT:
         click.option(
             "--password-file",
             type=click.Path(dir_okay=False),
+            metavar="FILE",
             expose_value=False,
             callback=_keep,
             help=declared(

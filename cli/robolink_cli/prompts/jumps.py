@@ -124,11 +124,11 @@ def _ask(tool: int, jump: "Jump", allowed: Allowed) -> None:
         raise DeclinedError(
             figure,
             remedy=tr(
-                "Nothing was written. Look at sign and unit. An engineer may write it on a "
+                "Nothing was written. Check sign and unit. An engineer may write it on a "
                 "terminal, or with --accept-jump and --accept-turn."
             ),
         )
-    if not asked(tr("{figure} Are sign and unit right? Write it?", figure=figure)):
+    if not asked(tr("{figure} Write it all the same? Check sign and unit first.", figure=figure)):
         raise DeclinedError(tr("That was not y."), remedy=tr("Nothing was written."))
 
 

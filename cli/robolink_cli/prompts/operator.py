@@ -76,13 +76,11 @@ class TerminalOperator:
 
 def _how(kind: Question) -> str:
     """Return how a question is answered."""
-    if kind is Question.PLACE:
-        return tr("Steps: x+0.1 z-0.5. Enter when it is on the pin. To end: q.")
     if kind is Question.TEXT:
         return tr("Type or scan it, then Enter. To end: q.")
     if kind is Question.YES_NO:
         return tr("y or n")
-    return tr("Steps: x+5 z-0.5. Enter when it is there. To end: q.")
+    return tr("Steps: x+0.1 z-0.5. When it is there: done. To end: q.")
 
 
 def terminal() -> Operator:

@@ -216,7 +216,9 @@ def _check_robot(controller: "Controller", cell: "Expected", *, looks: bool) -> 
 
 
 def _unrecorded() -> str:
-    return tr("So what is unfinished may not show, and nothing can be changed until it is mended.")
+    return tr(
+        "So unfinished jobs may not show, and nothing can be changed until the journal is repaired."
+    )
 
 
 def _open_markers(controller: "Controller", *, lenient: bool) -> "tuple[Marker, ...]":
@@ -247,6 +249,6 @@ def _offer_to_restore(controller: "Controller", markers: "Iterable[Marker]") -> 
             continue
         with suppress(ControllerError):
             finding = controller.resolver.examine(marker)
-            if finding.action and asked(tr("{action}. Do that now?", action=finding.action)):
+            if finding.action and asked(tr("{action}. Do this now?", action=finding.action)):
                 controller.resolver.settle(finding)
                 note(tr("Done, and read back."))

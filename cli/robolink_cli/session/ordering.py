@@ -53,8 +53,8 @@ def order_option(function: F) -> F:
         metavar="ID",
         type=OrderType(),
         help=declared(
-            "Id of this job from a line computer; delivered again it does nothing, and reports "
-            "the first result."
+            "Id of this order from a line computer; delivered again it does nothing, and "
+            "reports the first result."
         ),
     )(function)
 

@@ -28,10 +28,7 @@ def _fit(result: CalibrationResult) -> str:
         if result.method == "one-touch":
             return tr("One touch cannot be checked.")
         if result.method == "two-pose":
-            return tr(
-                "Two touches cannot check each other: each error counts {gain:.2f} times.",
-                gain=result.sigma_gain,
-            )
+            return tr("Two touches cannot check each other.")
         return tr("Nothing is left over that could check it.")
     return tr(
         "The {count} touches agree within {rms:.3f} mm; the worst is {largest:.3f} mm off.",
@@ -61,7 +58,9 @@ def _interval(result: CalibrationResult) -> str:
         basis = tr("from what was stated")
     else:
         basis = tr("from how well they agree")
-    return tr("95 % interval, each alone: {parts}, {basis}", parts="  ".join(parts), basis=basis)
+    return tr(
+        "sure to (95 %, each axis alone): {parts}, {basis}", parts="  ".join(parts), basis=basis
+    )
 
 
 def _region(result: CalibrationResult) -> str:
@@ -70,7 +69,7 @@ def _region(result: CalibrationResult) -> str:
     if result.region95_radius_mm is None or len(names) < 2:
         return ""
     return tr(
-        "tip within {radius:.3f} mm of ({names}) in 95 %",
+        "sure to (95 %, {names} together): {radius:.3f} mm",
         radius=result.region95_radius_mm,
         names=", ".join(names),
     )
@@ -82,8 +81,8 @@ def _parts(result: CalibrationResult) -> str:
     if budget is None:
         return ""
     told = tr(
-        "standard uncertainty: from these touches {a:.4f} mm (type A), known otherwise "
-        "{b:.4f} mm (type B), together {c:.4f} mm",
+        "sure to (about 68 %): from these touches {a:.3f} mm, from what else is known {b:.3f} "
+        "mm, together {c:.3f} mm",
         a=budget.type_a_mm,
         b=budget.type_b_mm,
         c=budget.u_c_mm,
@@ -99,7 +98,7 @@ def _ways(result: CalibrationResult) -> str:
     off_deg = result.details().get("off_square_deg")
     if not isinstance(off_deg, float):
         return ""
-    return tr("the ways are {off:.2f} degrees off a right angle", off=abs(off_deg))
+    return tr("The ways are {off:.2f} degrees off a right angle.", off=abs(off_deg))
 
 
 def _camera(result: CalibrationResult) -> str:
@@ -140,7 +139,7 @@ def _runout(result: CalibrationResult) -> str:
     if not isinstance(result, RunoutTableResult):
         return ""
     rows = len(result.table.rows)
-    told = tr("the tip wobbles") if result.wobble else tr("no wobble beyond the noise")
+    told = tr("the tip wobbles") if result.wobble else tr("no wobble larger than the scatter")
     return tr(
         "{told}: it is at most {peak:.3f} mm from where X and Y put it, at {rows} angles",
         told=told,
@@ -177,4 +176,4 @@ def show_residuals(result: CalibrationResult) -> None:
         )
     angles = (f"{name[0].upper()} deg" for name in names)
     columns = (tr("pose"), *angles, "dX mm", "dY mm", "dZ mm", tr("distance mm"), "")
-    table(tr("residuals"), columns, rows)
+    table(tr("How well it fits"), columns, rows)

@@ -54,7 +54,7 @@ def answered_by_key(state: WizardState, key: KeyPressed) -> Answered:
     if isinstance(subject, FitSubject):
         return _fit_key(state, subject, key)
     return {"1": "y", "y": "y", "j": "y", "3": "n", "n": "n"}.get(key.name) or state.says(
-        tr("[1] Yes or [3] No.")
+        tr("Press [1] for yes or [3] for no.")
     )
 
 
@@ -170,11 +170,11 @@ def _check(state: WizardState, subject: CheckSubject, word: str) -> Answered:
         checked = state.checked ^ {word}
         return replace(state, checked=checked, message=_left_open(subject, checked))
     if word != "main":
-        return state.says(tr("[5] starts when no point is open."))
+        return state.says(tr("[5] starts when no row is open."))
     left = subject.open_keys(state.checked)
     return state.says(_left_open(subject, state.checked)) if left else "y"
 
 
 def _left_open(subject: CheckSubject, checked: frozenset[str]) -> str:
     keys = " ".join(f"[{key}]" for key in subject.open_keys(checked))
-    return tr("Not yet. First: {keys}.", keys=keys) if keys else tr("No point is open.")
+    return tr("Not yet. First: {keys}.", keys=keys) if keys else tr("No row is open.")

@@ -1,7 +1,7 @@
 """The proof of a tip by looks of a camera, as a value."""
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, cast
 
 from robolink.calibration import VerifyResult, seen_from
 from robolink.model import Pose, TipSensor
@@ -49,10 +49,9 @@ class LookTest(PlacedProof):
         return ""
 
     def prove(self, context: MeasurementContext) -> VerifyResult:
-        """Make it; see :meth:`KeptProof.prove`."""
-        camera = self.sensor
-        if not isinstance(camera, str | TipSensor):
-            raise TypeError("a camera is its name, its URL, or open")
+        """Make it; see :meth:`~robolink.procedures.KeptProof.prove`."""
+        # As the source gave it; a type with a protocol in it could not be read back from a record.
+        camera = cast("str | TipSensor", self.sensor)
         here = context.controller.groups[0].pose()
         with calibrated_camera(camera, self.station) as eye:
             return context.run(self.steps(here), tip=self.written, camera=eye)

@@ -8,7 +8,7 @@ from robolink.messages import tr
 from robolink.methods.pivot.procedure import verify_by_tilting
 from robolink.methods.pivot.tilts import OverPin, proving_tilts
 from robolink.model import Pose
-from robolink.procedures.proving.touched_first import TiltingProof, Vector
+from robolink.procedures.pin.tilting_proof import TiltingProof, Vector
 from robolink.runner import Procedure
 
 

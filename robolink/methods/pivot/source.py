@@ -68,7 +68,7 @@ class PivotSource(PinSource):
     ) -> "TiltTest":
         """Return the tilt test; see :class:`~robolink.procedures.KeepsProof`."""
         from robolink.methods.pivot.proof import TiltTest  # numpy
-        from robolink.procedures.proving.touched_first import upright_of
+        from robolink.procedures.pin.tilting_proof import upright_of
 
         x_mm, y_mm, z_mm = result.reference_point_mm
         return TiltTest(

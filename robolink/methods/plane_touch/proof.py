@@ -19,7 +19,7 @@ from robolink.methods.surface_drive import (
 )
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import TouchPlan
-from robolink.procedures.proving.touched_first import TiltingProof
+from robolink.procedures.pin.tilting_proof import TiltingProof
 from robolink.runner import Procedure
 
 TURNED_DEG = 30.0

@@ -72,7 +72,7 @@ class PlaneTouchSource(TouchSource):
         """
         from robolink.calibration import PlaneTouchResult
         from robolink.methods.plane_touch.proof import PlaneTest  # numpy
-        from robolink.procedures.proving.touched_first import upright_of
+        from robolink.procedures.pin.tilting_proof import upright_of
 
         if not isinstance(result, PlaneTouchResult):
             raise TypeError("the plane that was touched is a part of the result")

@@ -21,7 +21,7 @@ class WobbleTest(LookTest):
     table: RunoutTable
 
     def prove(self, context: MeasurementContext) -> VerifyResult:
-        """Make it; see :meth:`KeptProof.prove`."""
+        """Make it; see :meth:`~robolink.procedures.KeptProof.prove`."""
         # "slots" makes the class anew, so the short form of super() would not find it.
         seen = LookTest.prove(self, context)
         drifts = []

@@ -21,7 +21,7 @@ from robolink.methods.surface_drive import (
 )
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import SurfaceTouches, TouchPlan
-from robolink.procedures.proving.touched_first import TiltingProof
+from robolink.procedures.pin.tilting_proof import TiltingProof
 from robolink.runner import Procedure
 
 

@@ -72,7 +72,7 @@ class SphereTouchSource(TouchSource):
         """
         from robolink.calibration import SphereTouchResult
         from robolink.methods.sphere_touch.proof import SphereTest, TouchedSphere  # numpy
-        from robolink.procedures.proving.touched_first import upright_of
+        from robolink.procedures.pin.tilting_proof import upright_of
 
         if not isinstance(result, SphereTouchResult):
             raise TypeError("the sphere that was touched is a part of the result")

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from robolink_cli.commands.companions.map_values import MapValues
 
 
-@click.command("check-map")
+@click.command("check-map", short_help="Check the map of a PLC's registers.")
 @click.argument("file", metavar="[MAP.toml]", required=False, type=click.Path(path_type=Path))
 @click.option(
     "--from-csv",
@@ -156,7 +156,7 @@ def _opened(context: CliContext) -> "PlcMapController":
     url = parse_url(context.require_url())
     if url.kind != "plc":
         raise ConfigError(
-            tr("{url} is no PLC with a map.", url=url.identity),
+            tr("{url} is not a PLC with a map.", url=url.identity),
             remedy=tr("Give -c plc+modbus-tcp://192.168.0.2?map=machine.toml, or a map file."),
         )
     # Nothing is written here, so nothing is recorded but the confirmation.
@@ -181,7 +181,7 @@ def _asked(controller: "PlcMapController", values: "MapValues") -> list[str]:
     wanted = values.to_compare()
     if not on_terminal():
         raise DeclinedError(
-            tr("Nobody has compared this map with the HMI, and nobody can be asked here."),
+            tr("Nobody has compared this map with the HMI, but there is nobody to ask."),
             remedy=tr(
                 "Run it on a terminal, or give what the HMI shows: {options}.",
                 options=" ".join(f"--shows {key}=..." for key in wanted),

@@ -82,7 +82,10 @@ class MapValues:
         for key, number in self._numbers.items():
             if _way(number) not in chosen:
                 raise ConfigError(
-                    tr("{key} reads 0 or nothing, which proves no map right.", key=key),
+                    tr(
+                        "{key} reads 0 or nothing, which does not show that a map is right.",
+                        key=key,
+                    ),
                     remedy=tr("Give it another value at the HMI for the comparison."),
                 )
         return list(chosen.values())
@@ -119,7 +122,7 @@ class MapValues:
             value = decimal(text)
         except ValueError as error:
             raise ConfigError(
-                tr("{shown!r} is no number.", shown=shown),
+                tr("{shown!r} is not a number.", shown=shown),
                 remedy=tr("Type what the HMI shows for {key}, in mm or degrees.", key=key),
             ) from error
         found = self.values.get(key, 0.0)

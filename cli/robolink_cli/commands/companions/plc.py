@@ -27,7 +27,7 @@ def _symbols(given: tuple[str, str, str] | None) -> tuple[str, ...]:
     return names
 
 
-@plc.command("export")
+@plc.command("export", short_help="Write the program of the mailbox and its register map.")
 @click.argument("folder", metavar="DIR", type=click.Path(file_okay=False, path_type=Path))
 @click.option(
     "--profile",
@@ -39,6 +39,7 @@ def _symbols(given: tuple[str, str, str] | None) -> tuple[str, ...]:
 @click.option(
     "--base",
     type=click.IntRange(0, _LAST_BASE),
+    metavar="N",
     default=0,
     show_default=True,
     help="First register of both blocks, counted from 0.",
@@ -58,7 +59,7 @@ def _symbols(given: tuple[str, str, str] | None) -> tuple[str, ...]:
     callback=lambda _, __, given: _symbols(given),
     help="Symbols of SMC_READ_TOOL_MODE in your Library Manager, to read tools by the block.",
 )
-@click.option("--force", is_flag=True, help="Write over files that were changed.")
+@click.option("--force", is_flag=True, help="Overwrite files that were changed.")
 @json_option
 def export(
     folder: Path, profile: str, base: int, kinematics: str, read_modes: tuple[str, ...], force: bool

@@ -36,7 +36,7 @@ def plc_texts(
     """
     if kinematics and find_kinematics_word(kinematics) is None:
         raise ConfigError(
-            tr("{name} is no kinematics of the register map.", name=kinematics),
+            tr("{name} is not a kinematics of the register map.", name=kinematics),
             remedy=tr("See the table of kinematics in register_map.md."),
         )
     program = program_texts(profile, base=base, kinematics=kinematics, read_modes=read_modes)

@@ -43,7 +43,7 @@ def serve_plc(context: CliContext, plan: "PermitPlan", limits: "CallbackLimits")
 
 def _tell_kept(tool: int, kept: "ToolOffset") -> None:
     sentence = tr(
-        "Tool {tool} was proved and kept: X {x:.3f} Y {y:.3f} Z {z:.3f}.",
+        "Tool {tool} was tested and kept: X {x:.3f} Y {y:.3f} Z {z:.3f}.",
         tool=tool,
         x=kept.x_mm,
         y=kept.y_mm,

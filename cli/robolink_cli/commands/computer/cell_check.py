@@ -63,7 +63,8 @@ class CheckedCell(NamedTuple):
 @click.option(
     "--since",
     type=click.DateTime(["%Y-%m-%d"]),
-    help=declared("Begin the charts anew at this day, after a repair (UTC)."),
+    metavar="YYYY-MM-DD",
+    help=declared("Start the charts again from this day, after a repair (UTC)."),
 )
 @click.option(
     "--measure",

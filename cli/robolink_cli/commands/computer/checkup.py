@@ -37,7 +37,7 @@ def in_words(remarks: Sequence[Remark]) -> Iterator[str]:
     if any(remark.level is Level.BAD for remark in remarks):
         yield tr("Something is wrong; see the first lines.")
     else:
-        yield tr("No obstacle was found.")
+        yield tr("No problem was found.")
 
 
 def check_state_folder() -> Iterator[Remark]:

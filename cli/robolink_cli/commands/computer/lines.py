@@ -75,8 +75,8 @@ def show_lines(asked: Sequence[AskedLine]) -> None:
 
     found = {
         AtTheLine.CONTROLLER: tr("an EPSON controller answers by Remote RS232"),
-        AtTheLine.OTHER: tr("something answers, and not as Remote RS232 at these settings"),
-        AtTheLine.TALKING: tr("somebody talks there unasked; nothing was sent"),
+        AtTheLine.OTHER: tr("something answers, but not as Remote RS232 at these settings"),
+        AtTheLine.TALKING: tr("something sends there unasked; nothing was sent to it"),
         AtTheLine.NOBODY: tr("nobody answers"),
     }
     for line in asked:

@@ -46,7 +46,7 @@ def parse_range(text: str) -> list[str]:
         first, last = _ends(text)
     except ValueError as error:
         raise ConfigError(
-            tr("{text!r} is no range of addresses.", text=text),
+            tr("{text!r} is not a range of addresses.", text=text),
             remedy=tr("Write 192.168.0.7, 192.168.0.1-20 or 192.168.0.0/28."),
         ) from error
     count = last - first + 1

@@ -16,7 +16,7 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
 
 @click.command()
 @click.argument("file", type=_FILE)
-@click.option("--force", is_flag=True, help="Write over a file that is there already.")
+@click.option("--force", is_flag=True, help="Overwrite a file that is already there.")
 @controller_options
 def backup(context: CliContext, file: Path, force: bool) -> None:
     """Save all fifteen tools, the one that is selected, and which controller it is. Reads only."""
@@ -99,6 +99,7 @@ def compare(
     "--tool",
     "tools",
     type=int,
+    metavar="N",
     multiple=True,
     shell_complete=complete_tool,
     help="Only this tool; may be repeated.",
@@ -124,7 +125,7 @@ def restore(
 ) -> None:
     """Write the tools of a backup that differ, each only if nobody changed it meanwhile.
 
-    A tool that is undefined in the backup is cleared. Nothing else is touched.
+    A tool that is undefined in the backup is cleared. Nothing else is changed.
     """
     from robolink.backup import load, plan_restore, read_tools, require_same_controller
     from robolink_cli.commands.controller.restoration import Restoration

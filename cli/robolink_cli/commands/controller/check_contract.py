@@ -97,13 +97,13 @@ def check_contract(
     junit: Path | None,
     yes: bool,
 ) -> int:
-    """Hold a controller to what every kind of controller promises; without more, reading only.
+    """Hold a controller to what every kind of controller promises; without options, reading only.
 
     With --write it writes one tool several times, selects it and the flange, stops and resets;
     with --move it goes up and down in small steps. Tool, selection, power and speed come back, and
-    stand on record until they are back: 'robolink recover' does it where this is killed. Ends
-    with 1 where a promise is broken; what a controller refuses to show in its present state is an
-    error, as elsewhere.
+    stay on record until they are back: where this is killed, 'robolink recover' brings them back.
+    Ends with 1 where a promise is broken; what a controller refuses to show in its present state is
+    an error, as elsewhere.
     """
     if (writes and tool is None) or (tool is not None and not writes):
         raise click.UsageError(tr("--write and --tool go together: say which tool may change."))
@@ -236,8 +236,8 @@ def _agree(controller: "Controller", asked: _Asked) -> None:
         said.append(tr("Tool {tool} is written several times and selected.", tool=asked.tool))
     said.append(
         tr(
-            "The controller is stopped and reset, which can switch outputs off: a part may drop. "
-            "What was there comes back. Go on?"
+            "The controller is stopped and reset, which can switch outputs off: a part may "
+            "drop. What was there comes back. Start the checks now?"
         )
     )
     if asked.step_mm is not None:

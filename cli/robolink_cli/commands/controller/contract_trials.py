@@ -49,11 +49,13 @@ class TrialConnections:
         self._listening.close()
         if (note := find_note(far_end_of(self._url), "")) is not None:
             # It came while no check had the controller, and went there by itself.
-            raise StoppedError(note.sentence, remedy=tr("Find out why, then begin them again."))
+            raise StoppedError(
+                note.sentence, remedy=tr("Find out why, then start the checks again.")
+            )
         if self._stopped_by is not None:
             raise StoppedError(
                 tr("{who} stopped the checks.", who=self._stopped_by),
-                remedy=tr("Find out why, then begin them again."),
+                remedy=tr("Find out why, then start the checks again."),
             )
         controller = robolink.connect(
             self._url,
@@ -100,7 +102,7 @@ def driver_named(name: str) -> "Callable[[], Controller]":
     module, colon, attribute = name.partition(":")
     if not (colon and module and attribute):
         raise ConfigError(
-            tr("{name!r} names no driver.", name=name),
+            tr("{name!r} is not the name of a driver.", name=name),
             remedy=tr("Write for example {example}.", example="my_package.driver:connect"),
         )
     if str(Path.cwd()) not in module_path:

@@ -62,8 +62,8 @@ def where(context: CliContext) -> None:
 def stop(dry_run: bool) -> None:
     """Bring the robot to rest, whoever moves it. Not an emergency stop, and no substitute for one.
 
-    Nothing is asked and no file is waited for. What may move next is asked about, until 'robolink
-    robot reset' or 'robolink robot release'.
+    Nothing is asked and no file is waited for. From then on a command that moves asks first, until
+    'robolink robot reset' or 'robolink robot release'.
     """
     from robolink_cli.stopping.outcome import Telling, requests_of
     from robolink_cli.stopping.stop_first import stop_first
@@ -89,7 +89,7 @@ def stop(dry_run: bool) -> None:
 def release(yes: bool) -> None:
     """Let the robot be moved again after a stop: shows who stopped it and when, and asks.
 
-    Nothing is sent: a PLC that is held by a stop, and a controller in error, want 'reset'.
+    Nothing is sent: a PLC that is held by a stop, and a controller in error, need 'reset'.
     """
     from robolink_cli.stopping.notes import release_stop
 
@@ -118,7 +118,7 @@ def reset(context: CliContext, dry_run: bool, yes: bool) -> None:
         effect, told = _effect_of_reset(controller)
         if told and (yes or not on_terminal()):
             note(effect)  # nobody is asked, so it is said before it is sent
-        agree(tr("{effect} Go on?", effect=effect), yes=yes)
+        agree(tr("{effect} Reset now?", effect=effect), yes=yes)
         controller.reset_fault()
         state = controller.status().state
         name = own_name_of(controller)

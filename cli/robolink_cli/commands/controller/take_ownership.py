@@ -67,7 +67,7 @@ def _ask(plc: "SoftMotionController", holder: str, *, yes: bool) -> None:
     if not yes and not on_terminal():
         raise DeclinedError(
             tr(
-                "Client {holder} holds the mailbox of {controller}, and nobody can be asked here.",
+                "Client {holder} holds the mailbox of {controller}, but there is nobody to ask.",
                 holder=holder,
                 controller=plc.identity,
             ),
@@ -79,13 +79,13 @@ def _ask(plc: "SoftMotionController", holder: str, *, yes: bool) -> None:
         )
     if plc.status().running:
         question = tr(
-            "Client {holder} holds the mailbox, and the group moves: the PLC will halt it. Take "
-            "the mailbox away, because you see the cell?",
+            "Client {holder} holds the mailbox, and the axis group moves: the PLC will halt "
+            "it. Take the mailbox away? Only if you see the cell.",
             holder=holder,
         )
     else:
         question = tr(
-            "Client {holder} holds the mailbox. Take it away, because you see the cell?",
+            "Client {holder} holds the mailbox. Take it away? Only if you see the cell.",
             holder=holder,
         )
     agree(question, yes=yes)

@@ -40,7 +40,8 @@ def var() -> None:
 @click.option(
     "--count",
     type=click.IntRange(1, 100),
-    help="How many elements, from --index on; the last subscript runs.",
+    metavar="N",
+    help="How many elements, from --index on; the last subscript counts up.",
 )
 @controller_options
 def get(
@@ -65,7 +66,11 @@ def get(
 
 
 # A negative value is no option.
-@var.command("set", context_settings={"ignore_unknown_options": True})
+@var.command(
+    "set",
+    context_settings={"ignore_unknown_options": True},
+    short_help="Set a variable and read it back.",
+)
 @click.argument("name")
 @click.argument("value")
 @click.option(
@@ -124,7 +129,7 @@ def _subscripts(text: str | None) -> tuple[int, ...]:
     parts = text.split(",")
     if not all(part.isascii() and part.isdigit() for part in parts):
         raise ConfigError(
-            tr("{text!r} are no subscripts.", text=text),
+            tr("{text!r} are not subscripts.", text=text),
             remedy=tr("Write for example --index 0,3."),
         )
     return tuple(int(part) for part in parts)

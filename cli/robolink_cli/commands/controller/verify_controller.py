@@ -24,10 +24,16 @@ _file = click.Path(dir_okay=False, path_type=Path)
 
 @click.command("verify-controller")
 @click.option(
-    "--profile", type=_file, help="Write a cell profile, for 'robolink sim epson --profile'."
+    "--profile",
+    type=_file,
+    metavar="FILE",
+    help="Write a cell profile, for 'robolink sim epson --profile'.",
 )
 @click.option(
-    "--transcript", type=_file, help="Write all that was said, for 'robolink sim epson --replay'."
+    "--transcript",
+    type=_file,
+    metavar="FILE",
+    help="Write all that was said, for 'robolink sim epson --replay'.",
 )
 @click.option("--redact", is_flag=True, help="Leave names, serial numbers and addresses out.")
 @controller_options
@@ -148,13 +154,13 @@ def _show(found: "Verification") -> None:
         [(f.name, f.finding, _option(f), _short(f.evidence)) for f in settled],
     )
     table(
-        tr("not settled"),
+        tr("not found out"),
         (tr("fact"), tr("why"), tr("simulator option")),
         [(f.name, f.finding, f.option or "-") for f in found.facts if not f.settled],
     )
     say(
         tr(
-            "{settled} of {all} facts are settled. Nothing was written, and nothing moved.",
+            "{settled} of {all} facts were found out. Nothing was written, and nothing moved.",
             settled=len(settled),
             all=len(found.facts),
         )

@@ -20,19 +20,23 @@ from robolink_cli.session.opening import open_controller
 @click.option(
     "--tool",
     type=click.IntRange(1, 15),
+    metavar="N",
     required=True,
     shell_complete=complete_tool,
     help="Number of the tool.",
 )
-@click.option("--x", type=DECIMAL, help="New offset, mm from the flange; left out: as stored.")
-@click.option("--y", type=DECIMAL, help="mm from the flange.")
-@click.option("--z", type=DECIMAL, help="mm from the flange.")
-@click.option("--u", type=DECIMAL, help="Degrees about Z.")
+@click.option(
+    "--x", type=DECIMAL, metavar="MM", help="New offset, mm from the flange; left out: as stored."
+)
+@click.option("--y", type=DECIMAL, metavar="MM", help="mm from the flange.")
+@click.option("--z", type=DECIMAL, metavar="MM", help="mm from the flange.")
+@click.option("--u", type=DECIMAL, metavar="DEG", help="Degrees about Z.")
 @click.option("--points", metavar="1-50", help="Taught points to read from the controller.")
 @click.option(
     "--pts",
     "path",
     type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
     help="A .pts file of EPSON RC+ in place of the controller's points.",
 )
 @report_options
@@ -49,8 +53,9 @@ def impact(
 ) -> None:
     """Show how far the tip will move at taught points when a tool's offset is changed.
 
-    Shown is where the tip that is on the arm now will go with the new offset, against where
-    it goes with the stored one. Nothing is written; legal only while no program runs.
+    The tip that is on the arm now goes to one place with the stored offset and to another with
+    the new one: the table shows how far these lie apart. Nothing is written; it works only while
+    no program runs.
     """
     from robolink.calibration import impact_on
     from robolink.errors import UndefinedToolError

@@ -186,16 +186,17 @@ class Recalibration:
     def _explain_reference(self) -> None:
         note(
             tr(
-                "There is no reference yet. Taught points are consistent only with the tool value "
-                "that they were taught with, so this first run measures and writes nothing: it "
-                "records where the tip is for which the stored value is right. Changes from then "
-                "on are differences to it."
+                "There is no reference yet. Taught points fit only the tool value that they "
+                "were taught with. So this first run measures and writes nothing: it records "
+                "where that tip is. Later changes are measured against it."
             )
         )
         if not on_terminal():
             raise DeclinedError(
-                tr("A reference is needed first, and nobody can be asked here."),
-                remedy=tr("Mount the nozzle that the points were taught with, give --reference."),
+                tr("A reference is needed first, but there is nobody to ask."),
+                remedy=tr(
+                    "Mount the nozzle that the points were taught with, then give --reference."
+                ),
             )
         if not asked(tr("Is the nozzle mounted that the points were taught with?")):
             raise DeclinedError(
@@ -208,8 +209,8 @@ class Recalibration:
         nobody = not self._answers.yes and self._assist_url is None and not on_terminal()
         if nobody and not run.takes_reference:
             raise DeclinedError(
-                tr("Tools would be written, and nobody can be asked here."),
-                remedy=tr("Run it on a terminal, or give --yes. Nothing was written."),
+                tr("Tools would be written, but there is nobody to ask."),
+                remedy=tr("Nothing was written. Add --yes, or run it on a terminal."),
             )
 
     def _dry_run(self, controller: Controller, run: RecipeRun) -> dict[str, object]:

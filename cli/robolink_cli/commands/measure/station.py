@@ -45,14 +45,15 @@ def show(context: CliContext, name: str, robot: str | None) -> None:
     context.emit("station", payload, lambda: show_station(found))
 
 
-@station.command("learn")
+@station.command("learn", short_help="Find a station with a tool whose offset is known.")
 @click.argument("name", metavar="ID", shell_complete=complete_station)
 @click.option(
     "--tool",
     type=click.IntRange(1, 15),
+    metavar="N",
     required=True,
     shell_complete=complete_tool,
-    help=declared("The known tool."),
+    help=declared("Number of the tool whose offset is known."),
 )
 @click.option(
     "--sigma",
@@ -73,6 +74,7 @@ def show(context: CliContext, name: str, robot: str | None) -> None:
     "--box",
     "box_mm",
     type=click.FloatRange(min=1),
+    metavar="MM",
     default=150.0,
     show_default=True,
     help=declared("How far, sideways, the flange may go from where it is."),
@@ -114,8 +116,8 @@ def learn(
 ) -> None:
     """Find a station with a tool whose offset is known, such as a gauge pin, and keep where it is.
 
-    A pin is touched by a person, twice; beams and surfaces are sought about where the cell file
-    says. No tool is written. What is wrong with the tool's offset shifts the station by as much.
+    A pin is touched by a person, twice; beams and surfaces are looked for near the place in the
+    cell file. No tool is written. An error in the tool's offset shifts the station by as much.
     """
     from robolink.model import InputEdge
     from robolink.nozzle_change import Limits, usual_box

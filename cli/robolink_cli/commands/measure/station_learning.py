@@ -118,8 +118,8 @@ def _height_of_pin(controller: Controller, known: Station, found: Found, tool: i
         return found
     note(
         tr(
-            "Z of tool {tool} was never measured, calibrations kept it: the height of {station} "
-            "is not learnt from it.",
+            "Z of tool {tool} was never measured, calibrations left it as it was: the height "
+            "of {station} is not learnt from it.",
             tool=tool,
             station=found.id,
         )
@@ -151,7 +151,7 @@ def _tip(controller: Controller, tool: int) -> ToolOffset:
     offset = controller.tools.read(tool)
     if offset is None:
         raise UndefinedToolError(
-            tr("Tool {tool} is not defined, so its tip finds nothing.", tool=tool),
+            tr("Tool {tool} is not defined, so no station can be found with it.", tool=tool),
             remedy=tr("Use a tool whose offset is known well, such as a gauge pin."),
             controller=controller.identity,
         )
@@ -167,7 +167,7 @@ def _show(known: Station, found: Found) -> None:
     columns = ("", "X mm", "Y mm", "Z mm")
     before = [number(known.x_mm), number(known.y_mm), number(known.z_mm)]
     after = [number(found.x_mm), number(found.y_mm), number(found.z_mm)]
-    rows = [[tr("before"), *before], [tr("found"), *after]]
+    rows = [[tr("before"), *before], [tr("after"), *after]]
     table(tr("station {id}", id=found.id), columns, rows)
     for line in _lines(found):
         note(

@@ -45,6 +45,7 @@ def _filters(function: F) -> F:
         click.option(
             "--tool",
             type=int,
+            metavar="N",
             shell_complete=complete_tool,
             help=declared("Only about this tool."),
         ),
@@ -53,7 +54,8 @@ def _filters(function: F) -> F:
             "kinds",
             type=click.Choice(list(_KINDS), case_sensitive=False),
             multiple=True,
-            help=declared("Only of this kind; may be repeated."),
+            metavar="KIND",
+            help=declared("Only of this kind; a wrong name lists them all. May be repeated."),
         ),
         click.option("--change", metavar="ID", help=declared("Only of this tool change.")),
     )
@@ -121,7 +123,12 @@ journal.add_command(drift)
 @journal.command("list")
 @_filters
 @click.option(
-    "--limit", type=click.IntRange(min=1), default=20, show_default=True, help="At most this many."
+    "--limit",
+    type=click.IntRange(min=1),
+    metavar="N",
+    default=20,
+    show_default=True,
+    help="At most this many.",
 )
 @json_option
 def list_entries(*, limit: int, **meant: Any) -> None:  # noqa: ANN401 - click's form
@@ -136,7 +143,7 @@ def list_entries(*, limit: int, **meant: Any) -> None:  # noqa: ANN401 - click's
             emit_json("robolink/journal/1", {"entries": []})
         else:
             say(tr("There is no journal yet at {location}.", location=location))
-            say(tr("The first change that robolink makes starts one."))
+            say(tr("The first change that robolink makes starts it."))
         return
     entries = list(wanted.of(journal_to_read(), limit=limit))
     if json_is_on():
@@ -161,7 +168,7 @@ def show(name: str) -> None:
         show_entry(entry)
 
 
-@journal.command("diff")
+@journal.command("diff", short_help="Show what differs between two entries or changes.")
 @click.argument("a", metavar="NUMBER|CHANGE")
 @click.argument("b", metavar="NUMBER|CHANGE")
 @json_option
@@ -177,7 +184,7 @@ def diff(a: str, b: str) -> None:
         show_diff(*sides)
 
 
-@journal.command("export")
+@journal.command("export", short_help="Write entries to a file, oldest first.")
 @click.argument("file", type=click.Path(dir_okay=False, path_type=Path))
 @click.option(
     "--format",
@@ -185,7 +192,7 @@ def diff(a: str, b: str) -> None:
     type=click.Choice(["csv", "json", "jsonl"]),
     help=declared("Form of the file; by default what its name ends with."),
 )
-@click.option("--force", is_flag=True, help=declared("Write over a file that is there already."))
+@click.option("--force", is_flag=True, help=declared("Overwrite a file that is already there."))
 @_filters
 @json_option
 def export(
@@ -211,13 +218,13 @@ def export(
         say(tr("{count} entries were written to {file}.", count=counted.count, file=file))
 
 
-@journal.command("verify")
+@journal.command("verify", short_help="Check that no entry was changed and none is missing.")
 @json_option
 def verify() -> int:
     """Check that no entry was changed and none is missing; exit code 1 when one was.
 
     The chain of hashes has no key. It shows what a disk, a program or a person did to single
-    entries. It cannot show that somebody who may write the whole journal made all of it anew,
+    entries. It cannot show that somebody who may write the whole journal rebuilt all of it,
     or took the newest entries off and set the note of the last one back: for that, keep the
     number and hash that this prints where that person cannot write, and compare.
     """
@@ -243,8 +250,9 @@ def verify() -> int:
         if found.last_number:
             say(
                 tr(
-                    "The last one is {number}, {hash}. Without a key this shows no journal that "
-                    "somebody made anew as a whole: compare that hash with one kept elsewhere.",
+                    "The last one is {number}, {hash}. Without a key this cannot show that "
+                    "somebody rebuilt the whole journal: compare that hash with one kept "
+                    "elsewhere.",
                     number=found.last_number,
                     hash=found.last_hash,
                 )

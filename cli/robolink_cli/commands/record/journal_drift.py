@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from robolink.model import Recorded
 
 
-@click.command("drift")
+@click.command("drift", short_help="Show how each tool's offset moved, and what stands out.")
 @click.option(
     "-c",
     "--controller",
@@ -27,15 +27,21 @@ if TYPE_CHECKING:
     shell_complete=complete_cell,
     help=declared("Only of this controller; without it, of all."),
 )
-@click.option("--tool", type=int, shell_complete=complete_tool, help=declared("Only this tool."))
+@click.option(
+    "--tool", type=int, metavar="N", shell_complete=complete_tool, help=declared("Only this tool.")
+)
 @click.option(
     "--since",
     type=click.DateTime(["%Y-%m-%d"]),
-    help=declared("Begin anew at this day, after a repair or with another kind of nozzle (UTC)."),
+    metavar="YYYY-MM-DD",
+    help=declared(
+        "Start again from this day, after a repair or with another kind of nozzle (UTC)."
+    ),
 )
 @click.option(
     "--baseline",
     type=click.IntRange(min=20, max=1000),
+    metavar="N",
     default=20,
     show_default=True,
     help=declared("On how many of the first changes the limits rest."),
@@ -47,7 +53,7 @@ if TYPE_CHECKING:
     metavar="FILE",
     help=declared("Also write all charts to FILE, a page for a browser."),
 )
-@click.option("--force", is_flag=True, help=declared("Write over a file that is there already."))
+@click.option("--force", is_flag=True, help=declared("Overwrite a file that is already there."))
 @json_option
 def drift(
     *,
@@ -59,7 +65,7 @@ def drift(
     page: Path | None,
     force: bool,
 ) -> int:
-    """Show how each tool's offset went over its changes, and what stands out.
+    """Show how each tool's offset moved from change to change, and what stands out.
 
     Nozzles that wear, mounts that slip, pins that moved, a last change out of the ordinary. Only
     changes that were measured and kept count. Exit code 1 when something stands out.

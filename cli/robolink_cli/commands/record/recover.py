@@ -25,30 +25,34 @@ from robolink_cli.views.documents import finding_payload
 @click.option(
     "--keep",
     is_flag=True,
-    help="Keep new values that nobody verified; without it the old ones are written back.",
+    help="Keep new values that nobody tested; without it the old ones are written back.",
 )
 @click.option(
     "--choose",
     type=click.Choice(["old", "new", "blocked"]),
     help=declared(
-        "Your word in one: old values back; new values kept, at a terminal after their turn test; "
-        "or everything left blocked as it is."
+        "Your answer to all of it: old values back; new values kept, on a terminal after their "
+        "turn test; or everything left blocked as it is."
     ),
 )
 @click.option(
     "--yes",
     is_flag=True,
-    help="Your word for what reading cannot settle: you have looked, and work may go on.",
+    help="Your answer where reading is not enough: you have looked, and work may go on.",
 )
 @click.option(
     "--forget",
     is_flag=True,
-    help="Forget everything that is open on your word, without looking or restoring.",
+    help=(
+        "Drop everything that is open, without a check and without restoring; you answer for it."
+    ),
 )
 @click.option(
     "--take-over",
     metavar="REASON",
-    help="End the lease of another who has this controller, and record why.",
+    help=(
+        "Take this controller over from whoever is on record as working on it; the reason is kept."
+    ),
 )
 def recover(
     context: CliContext,
@@ -59,13 +63,13 @@ def recover(
     forget: bool,
     take_over: str | None,
 ) -> int:
-    """Settle what was begun and not proved finished, by reading and with your word.
+    """Put right what a stop, a crash or a lost link left open: what this PC cannot see, you decide.
 
     It finishes or takes back each tool change, selects the cell's own tool again, and says how
     far the robot came. Each tool is written once at most. Nothing moves, but for the turn test of
-    a new value that you choose at the terminal, when you have agreed to it. What only a person
+    a new value that you choose on the terminal, when you have agreed to it. What only a person
     can judge is asked on a terminal; elsewhere it is left open, with exit code 6, unless --yes
-    gives your word. It may be run again at any time.
+    answers for you. It may be run again at any time.
     """
     if choose is not None and (keep or yes or forget):
         raise ConfigError(
@@ -103,7 +107,7 @@ def recover(
 @yes_option
 @click.option("--forget", is_flag=True, help="As with 'robolink recover'.")
 def resolve(context: CliContext, dry_run: bool, yes: bool, forget: bool) -> int:
-    """Do what 'robolink recover' does; off a terminal the command itself is your word."""
+    """Do what 'robolink recover' does; without a terminal the command itself is your answer."""
     with open_controller(context, quiet=True, changes=not dry_run) as controller:
         guide = Guide(controller, keep=False, word=yes or not on_terminal())
         done, forgotten = _gone_through(guide, forget=forget, yes=yes, dry_run=dry_run)

@@ -15,7 +15,7 @@ _ENDINGS = (".html", ".htm")
 @click.command()
 @click.argument("change", required=False)
 @click.argument("file", type=click.Path(dir_okay=False, path_type=Path), required=False)
-@click.option("--force", is_flag=True, help=declared("Write over a file that is there already."))
+@click.option("--force", is_flag=True, help=declared("Overwrite a file that is already there."))
 @click.option(
     "--points",
     metavar="1-50",

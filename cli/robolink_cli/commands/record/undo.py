@@ -14,7 +14,11 @@ from robolink_cli.session.opening import open_controller
 @click.command()
 @click.argument("change", required=False)
 @click.option(
-    "--tool", type=int, shell_complete=complete_tool, help=declared("Only this tool of the change.")
+    "--tool",
+    type=int,
+    metavar="N",
+    shell_complete=complete_tool,
+    help=declared("Only this tool of the change."),
 )
 @click.option(
     "--to",
@@ -75,7 +79,7 @@ def _agree(context: CliContext, *, yes: bool) -> None:
     """
     if not yes and (context.json or not on_terminal()):
         raise DeclinedError(
-            tr("An undo writes to the controller, and nobody can be asked here."),
-            remedy=tr("Nothing was written. Look at it with --dry-run, then give --yes."),
+            tr("An undo writes to the controller, but there is nobody to ask."),
+            remedy=tr("Nothing was written. Look at it with --dry-run, then add --yes."),
         )
     agree(tr("Write the old values back?"), yes=yes)

@@ -71,7 +71,7 @@ class AcceptedChange(DemonstratedChange):
     def drift_mm(self) -> float:
         """The largest drift about the new tip."""
         if self.report.verification is None:
-            raise VerifyError(tr("The demonstration was not verified."))
+            raise VerifyError(tr("The demonstration did not pass its test."))
         return self.report.verification.max_drift_mm
 
     def end(self) -> dict[str, object]:

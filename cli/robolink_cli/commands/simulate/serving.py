@@ -158,7 +158,7 @@ def host_and_port(address: str, option: str) -> tuple[str, int]:
         and int(port) <= 0xFFFF
     ):
         raise ConfigError(
-            tr("{address!r} is no address to listen on.", address=address),
+            tr("{address!r} is not an address to listen on.", address=address),
             remedy=tr("Write for example {option} 127.0.0.1:5000.", option=option),
         )
     return host, int(port)

@@ -49,7 +49,7 @@ def told_question(state: WizardState) -> str:
         write = tr("To write, type the tool number ({numbers}). n = do not write.", numbers=numbers)
         return joined(" ", (write, *_further(subject)))
     if isinstance(subject, CheckSubject):
-        return tr("Type the number of a point, then y to start; n = leave.")
+        return tr("Type the number of a row, then y to start; n = leave.")
     if isinstance(subject, FitSubject) and subject.more:
         return tr("{question} [y, n, or more for one more touch]", question=question.text)
     return tr("{question} [y or n]", question=question.text)

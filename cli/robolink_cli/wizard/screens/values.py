@@ -121,7 +121,7 @@ def judgement(proposal: Proposal, verdicts: tuple[LimitVerdict, ...]) -> list[st
     ]
     if "z_mm" in proposal.kept:
         z = mm((proposal.before or ToolOffset()).z_mm)
-        lines.append(f" {padded(tr('LOOK'), 5)}" + tr("Z {z} is not measured, stays.", z=z))
+        lines.append(f" {padded(tr('LOOK'), 5)}" + tr("Z {z} is not measured; it stays.", z=z))
     return lines
 
 

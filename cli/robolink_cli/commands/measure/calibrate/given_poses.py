@@ -243,11 +243,11 @@ def _agree_to_write(tool: int, *, yes: bool) -> None:
         return
     if not on_terminal():
         raise DeclinedError(
-            tr("Tool {tool} would be written, and nobody can be asked here.", tool=tool),
-            remedy=tr("Run it on a terminal, or give --yes. Nothing was written."),
+            tr("Tool {tool} would be written, but there is nobody to ask.", tool=tool),
+            remedy=tr("Nothing was written. Add --yes, or run it on a terminal."),
         )
     question = tr(
-        "Nobody saw these touches, and nothing has tested them. Write them to tool {tool} "
+        "Nobody saw these touches, and the new value is not tested. Write it to tool {tool} "
         "all the same? 'robolink undo' takes it back.",
         tool=tool,
     )
@@ -262,8 +262,7 @@ def _show_end(report: ToolReport) -> None:
         say(tr("Tool {tool} is written and read back.", tool=tool))
     say(
         tr(
-            "Not tested yet. To test: turn the tip on a pin in tool {tool}, or run 'robolink "
-            "calibrate two-pose --tool {tool}'.",
+            "Not tested yet. To test: robolink calibrate two-pose --tool {tool}",
             tool=tool,
         )
     )

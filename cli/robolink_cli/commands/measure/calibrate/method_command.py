@@ -86,7 +86,7 @@ def _of_the_place(method: AnyMethod) -> list[Decorator]:
                 "--at",
                 metavar="X,Y,Z",
                 help=declared(
-                    "Where the station is, in the base; without it, what is known of it."
+                    "Where the station is, in the base; without it, its place on record."
                 ),
             )
         )
@@ -103,7 +103,7 @@ def _of_the_place(method: AnyMethod) -> list[Decorator]:
 def _station_option(method: AnyMethod) -> Decorator:
     needs = method.needs
     known = _STATIONS[needs.station]
-    found = tr("Name of the pin; where it is found is kept, for one touch later.")
+    found = tr("Name of the pin; its place is kept, so that one touch will do later.")
     return click.option(
         "--station",
         metavar="ID",
@@ -124,7 +124,7 @@ def _option(field: ParameterField) -> Decorator:
             flags, field.name, is_flag=True, default=said, show_default=bool(said), help=field.help
         )
     attributes: dict[str, Any] = {"type": type_of(field), "help": field.help}
-    metavar = field.option.metavar or _METAVARS.get(field.unit, "")
+    metavar = field.option.metavar or _METAVARS.get(field.unit, "N" if _counts(field) else "")
     if metavar and not _is_choice(field):
         attributes["metavar"] = metavar
     if is_repeated(field):
@@ -132,6 +132,10 @@ def _option(field: ParameterField) -> Decorator:
     elif default is not None:
         attributes |= {"default": as_typed(default), "show_default": True}
     return kind(field.flag, field.name, **attributes)
+
+
+def _counts(field: ParameterField) -> bool:
+    return field.kind in (int, int | None)
 
 
 def _is_choice(field: ParameterField) -> bool:

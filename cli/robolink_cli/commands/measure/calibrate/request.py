@@ -188,13 +188,11 @@ def _require_tool(tool: int) -> None:
 
 def _refuse_to_show_nothing(impact: ImpactRequest | None, report: ReportRequest | None) -> None:
     """Refuse to show in a dry run what only a measurement can give."""
-    if impact is not None:
+    given = "--impact" if impact is not None else "--report" if report is not None else None
+    if given is not None:
         raise ConfigError(
-            tr("A dry run measures nothing, so there is no impact to show."),
-            remedy=tr("Leave --impact out, or use 'robolink tool impact' with an offset."),
-        )
-    if report is not None:
-        raise ConfigError(
-            tr("A dry run measures nothing, so there is nothing to report."),
-            remedy=tr("Leave --report out, or use 'robolink tool impact' with an offset."),
+            tr("A dry run measures nothing, so there is nothing to show or report."),
+            remedy=tr(
+                "Leave {option} out, or use 'robolink tool impact' with an offset.", option=given
+            ),
         )

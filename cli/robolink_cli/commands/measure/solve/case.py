@@ -53,7 +53,7 @@ class Node:
 
     def __init__(self, value: object, path: str, frames: "KnownFrames | None" = None) -> None:
         if not isinstance(value, dict):
-            raise unusable(path, tr("an object is wanted here"))
+            raise unusable(path, tr("an object is expected here"))
         self.frames = frames or KnownFrames()
         self._value: dict[str, object] = value
         self._read: set[str] = set()
@@ -128,7 +128,7 @@ class Node:
         """Return a whole number."""
         value = self.number(name)
         if value != int(value):
-            raise unusable(self.at(name), tr("a whole number is wanted here"))
+            raise unusable(self.at(name), tr("a whole number is expected here"))
         return int(value)
 
     def child(self, name: str) -> "Node":
@@ -156,7 +156,7 @@ class Node:
     def _items(self, name: str) -> Iterator[tuple[object, str]]:
         value = self.raw(name)
         if not isinstance(value, list):
-            raise unusable(self.at(name), tr("a list is wanted here"))
+            raise unusable(self.at(name), tr("a list is expected here"))
         for index, item in enumerate(value):
             yield item, f"{self.at(name)}[{index}]"
 
@@ -211,7 +211,7 @@ def _by_number(node: Node) -> dict[int, ToolOffset]:
     found = {}
     for name in node:
         if not name.isdecimal():
-            raise unusable(node.at(name), tr("a number of a tool or local is wanted here"))
+            raise unusable(node.at(name), tr("the number of a tool or local is expected here"))
         found[int(name)] = read_offset(node.child(name))
     return found
 

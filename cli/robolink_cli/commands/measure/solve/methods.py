@@ -51,7 +51,7 @@ def board(node: Node) -> Payload:
     """A held board, from two fiducials."""
     seen = [_fiducial(child) for child in node.children("fiducials")]
     if len(seen) != 2:
-        raise unusable(node.at("fiducials"), tr("two fiducials are wanted; board_fit takes more"))
+        raise unusable(node.at("fiducials"), tr("two fiducials are needed; board_fit takes more"))
     known, height = known_tip(node)
     result = cal.solve_board(
         *seen,

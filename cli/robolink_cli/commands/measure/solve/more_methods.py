@@ -62,7 +62,7 @@ def crossed_beams(node: Node) -> Payload:
     """Travels through two beams whose places are known."""
     beams = [_beam(child) for child in node.children("beams")]
     if len(beams) != 2:
-        raise unusable(node.at("beams"), tr("two beams are wanted"))
+        raise unusable(node.at("beams"), tr("two beams are needed"))
     known, height = known_tip(node)
     result = cal.solve_crossed_beams(
         [_crossing(child) for child in node.children("crossings")],

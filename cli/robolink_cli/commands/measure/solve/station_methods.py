@@ -51,7 +51,7 @@ def station_shift(node: Node) -> Payload:
     """By how much a station seems to have moved, tool by tool."""
     shifts = [_shift(child) for child in node.children("shifts")]
     if not shifts:
-        raise unusable(node.at("shifts"), tr("one shift or more is wanted"))
+        raise unusable(node.at("shifts"), tr("at least one shift is needed"))
     found = cal.judge_shifts(shifts, seat_changes=node.optional("seat_changes", node.whole))
     assert found is not None  # noqa: S101 - there are shifts
     tolerance_mm = node.optional("tolerance_mm", node.number)
@@ -79,7 +79,7 @@ def needle_chain(node: Node) -> Payload:
     """Needle changes one after the other since a full calibration."""
     changes = node.whole("changes")
     if changes < 0:
-        raise unusable(node.at("changes"), tr("0 or more is wanted"))
+        raise unusable(node.at("changes"), tr("0 or more is expected"))
     # Whatever is no shared touch is two touches a change, which is the larger.
     shared = node.text("reference") == _SHARED
     u_mm = cal.chain_sigma_mm(
@@ -105,9 +105,9 @@ def _shift(node: Node) -> "cal.TipShift":
     sigma_mm = node.number("touch_sigma_mm")
     node.finish()
     if len(vector) not in (1, 2, 3):
-        raise unusable(node.at("vector"), tr("one number, two or three are wanted"))
+        raise unusable(node.at("vector"), tr("one, two or three numbers are expected"))
     if seat and len(seat) < len(vector):
-        raise unusable(node.at("seat_sigma_mm"), tr("one number an axis is wanted"))
+        raise unusable(node.at("seat_sigma_mm"), tr("one number for each axis is expected"))
     cal.require_positive(sigma_mm, "touch_sigma_mm")
     return cal.TipShift(tool, vector, sigma_mm, seat)
 
@@ -121,7 +121,7 @@ def _decision(node: Node) -> "cal.LengthDecision | None":
 def _flag(node: Node, name: str) -> bool:
     value = node.optional(name, node.raw)
     if value not in (None, True, False):
-        raise unusable(node.at(name), tr("true or false is wanted here"))
+        raise unusable(node.at(name), tr("true or false is expected here"))
     return bool(value)
 
 

@@ -33,7 +33,7 @@ def _plane(node: Node) -> "cal.TouchedPlane":
     normal, distance = node.numbers("normal"), node.number("distance_mm")
     node.finish()
     if len(normal) != 3 or not any(normal):
-        raise unusable(node.at("normal"), tr("three numbers are wanted here, not all of them 0"))
+        raise unusable(node.at("normal"), tr("three numbers are expected here, not all of them 0"))
     return cal.TouchedPlane((normal[0], normal[1], normal[2]), distance)
 
 
@@ -87,7 +87,7 @@ def _axes(node: Node, name: str) -> tuple[str, ...]:
     if not isinstance(value, list) or sorted(map(str, value)) != sorted(_AXES):
         raise unusable(
             node.at(name),
-            tr("these three are wanted in any order: {words}", words=", ".join(_AXES)),
+            tr("these three are expected, in any order: {words}", words=", ".join(_AXES)),
         )
     return tuple(map(str, value))
 
@@ -120,7 +120,7 @@ def _table(node: Node, axes: tuple[str, ...]) -> list[list[list[float]]]:
 
 def _list(value: object, path: str) -> list[object]:
     if not isinstance(value, list):
-        raise unusable(path, tr("a list is wanted here"))
+        raise unusable(path, tr("a list is expected here"))
     return value
 
 

@@ -98,7 +98,7 @@ _GROUNDS: Final = {
     "touch_not_proven": declared("The standoffs before the touches were not undone."),
     "large_residual": declared("One touch does not fit the others."),
     "large_drift": declared("The tip is too far off when the tool turns."),
-    "drift_undecided": declared("The drift is neither surely inside the tolerance nor outside."),
+    "drift_undecided": declared("It is not sure whether the drift is inside the tolerance."),
 }
 
 
@@ -135,7 +135,7 @@ def _standoff(node: Node) -> "cal.Standoff":
 def _flag(node: Node, name: str) -> bool:
     value = node.optional(name, node.raw)
     if not isinstance(value, (bool, type(None))):
-        raise unusable(node.at(name), tr("true or false is wanted here"))
+        raise unusable(node.at(name), tr("true or false is expected here"))
     return bool(value)
 
 

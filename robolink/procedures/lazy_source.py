@@ -98,7 +98,7 @@ class LazySource:
         """
         source = self._source
         if not isinstance(source, KeepsProof):
-            raise ConfigError(tr("This measurement has no proof that could be kept."))
+            raise ConfigError(tr("This measurement has no turn test that can be made later."))
         return source.proof(context, tool, result, tip=tip, tolerance_mm=tolerance_mm)
 
     @property

@@ -56,12 +56,12 @@ class PermitPlan:
 
     def __post_init__(self) -> None:
         if self.method not in PERMIT_METHODS:
-            raise ConfigError(tr("There is no method {name!r}.", name=self.method))
+            raise ConfigError(tr("There is no calibration method {name!r}.", name=self.method))
         if self.touches < LEAST_TOUCHES or self.proofs < LEAST_PROOFS:
             raise ConfigError(
                 tr(
-                    "{touches} touches and {proofs} proofs are too few; {least} and {least_proofs} "
-                    "are needed.",
+                    "{touches} touches and {proofs} turn tests are too few; {least} "
+                    "and {least_proofs} are needed.",
                     touches=self.touches,
                     proofs=self.proofs,
                     least=LEAST_TOUCHES,

@@ -268,7 +268,7 @@ def test_a_line_that_cannot_be_opened_is_told_and_the_next_one_asked(capsys, far
     ("arguments", "said"),
     [
         ((), "range of addresses, or a serial line"),
-        (("--line", "epson+tcp://127.0.0.1:1"), "no serial line of an EPSON controller"),
+        (("--line", "epson+tcp://127.0.0.1:1"), "not a serial line of an EPSON controller"),
         (("--line", "epson+serial:///dev/ttyS77x"), "baud"),
         (("--line", "epson+serial:///dev/ttyS77x?baud=9600&numbers=roman"), "numbers"),
     ],

@@ -98,7 +98,7 @@ def _ways(result: CalibrationResult) -> str:
     off_deg = result.details().get("off_square_deg")
     if not isinstance(off_deg, float):
         return ""
-    return tr("The ways are {off:.2f} degrees off a right angle.", off=abs(off_deg))
+    return tr("The moves are {off:.2f} degrees off a right angle.", off=abs(off_deg))
 
 
 def _camera(result: CalibrationResult) -> str:

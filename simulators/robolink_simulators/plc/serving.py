@@ -180,7 +180,7 @@ def serve_plc_line(
     if simulator.unit not in _UNITS_ON_A_LINE:
         raise ConfigError(
             tr("There is no unit {unit} on a serial line.", unit=simulator.unit),
-            remedy=tr("Give a unit from 1 to 247."),
+            remedy=tr("Give a unit from {first} to {last}.", first=1, last=247),
         )
     try:
         return PlcLineHost(simulator, map_file, clock or ScaledClock())

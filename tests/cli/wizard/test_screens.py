@@ -10,6 +10,7 @@ from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.happenings import HasEnded, Reading, TaughtPoints, WasRead, WasRegarded
 from robolink_cli.wizard.screens.drawing import screen_of
 from robolink_cli.wizard.screens.ending import ended_of
+from robolink_cli.wizard.screens.layout import broken
 from robolink_cli.wizard.screens.told import told_before, told_question
 from robolink_cli.wizard.state import Header
 from wcwidth import wcswidth
@@ -238,3 +239,10 @@ def test_keys_of_a_list_stand_at_the_right_edge_in_every_language(language):
     keyed = [row for row in rows[3:12] if "[7]" in row or "[3]" in row]
     assert len(keyed) == 2
     assert {wcswidth(row) for row in keyed} == {79}, language
+
+
+def test_a_path_that_is_wider_than_the_screen_is_shown_to_its_end():
+    path = "/home/cell/" + "folder/" * 20 + "end.json"
+    rows = list(broken(f"Saved in {path}"))
+    assert max(map(len, rows)) <= 80
+    assert "".join(rows).replace(" ", "") == f"Savedin{path}"

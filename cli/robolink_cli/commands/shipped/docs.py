@@ -1,5 +1,6 @@
 """docs: the pages that come with robolink, read without a network."""
 
+import shutil
 import sys
 from pathlib import Path
 
@@ -7,6 +8,7 @@ import click
 
 from robolink.messages import tr
 from robolink_cli.console.render import emit_json, json_is_on, say, say_listed
+from robolink_cli.console.tolerance import is_terminal
 from robolink_cli.session.context import json_option
 
 
@@ -81,7 +83,9 @@ def _list(titles: dict[str, str]) -> None:
 
 def _show(text: str) -> None:
     """Show a page: through the pager on a terminal, as it stands to a program."""
-    if sys.stdout.isatty() and sys.stdin.isatty():
-        click.echo_via_pager(text)
+    if is_terminal(sys.stdout) and is_terminal(sys.stdin):
+        from robolink_cli.commands.shipped.page_lines import page_lines
+
+        click.echo_via_pager(page_lines(text, shutil.get_terminal_size().columns))
     else:
         say(text.rstrip("\n"))

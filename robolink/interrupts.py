@@ -15,6 +15,7 @@ of ``signal.signal`` would cost more than everything else that the driver does i
 sessions of a process share it: a program may hold an EPSON robot and a PLC at a time.
 """
 
+import _thread
 import signal
 import threading
 from collections.abc import Callable, Iterator
@@ -81,6 +82,7 @@ class _Handler:
         depth: How many times the thread that is ended is inside a gate.
         held: What came while it was.
         ended_by: What ended the command that is under way, ``None`` while nothing has.
+        closed: Whether the window was closed, on Windows, which has no signal for that.
     """
 
     def __init__(self) -> None:
@@ -91,6 +93,7 @@ class _Handler:
         self.depth = 0
         self.held: EndedBy | None = None
         self.ended_by: EndedBy | None = None
+        self.closed = False
 
     def watch(self, numbers: dict[int, EndedBy]) -> list[int]:
         """Take over those signals that nobody else has taken; return which."""
@@ -142,7 +145,7 @@ class _Handler:
             raise Interrupted(by)
 
     def _came(self, number: int, frame: FrameType | None) -> None:  # noqa: ARG002 - signal's form
-        self.arrived(_OF_A_COMMAND[number])
+        self.arrived(EndedBy.HUNG_UP if self.closed else _OF_A_COMMAND[number])
 
     def heard_here(self) -> bool:
         """Tell whether this is the thread whose work is ended."""
@@ -228,6 +231,16 @@ def output_closed() -> None:
     """
     if threading.current_thread() is threading.main_thread():
         _handler.arrived(EndedBy.OUTPUT_CLOSED)
+
+
+def window_closed() -> None:
+    """End the command because its window was closed; for another thread than the main one.
+
+    On Windows, where the main thread hears of it as of a Ctrl-Break.
+    """
+    if (number := getattr(signal, "SIGBREAK", None)) is not None:
+        _handler.closed = True
+        _thread.interrupt_main(number)
 
 
 def ended_by() -> EndedBy | None:

@@ -30,7 +30,7 @@ def find_plug_in(group: str, name: str) -> object | None:
         return None
     # One that is installed twice (an editable copy beside a wheel) leads to the same place.
     if len(found) > 1 and len({entry.value for entry in found}) > 1:
-        raise PlugInError(tr("several packages bring it"))
+        raise PlugInError(tr("several packages provide it"))
     try:
         return found[0].load()  # type: ignore[no-any-return]
     except (ImportError, AttributeError) as error:

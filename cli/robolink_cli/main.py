@@ -27,6 +27,7 @@ from robolink_cli.console.tolerance import (
     tolerate_any_console,
 )
 from robolink_cli.console.ways import SHELL_WAYS
+from robolink_cli.console.window_closing import closing_in_order
 from robolink_cli.front_page import FrontPage
 from robolink_cli.options.shared import TYPED, shared_options
 
@@ -83,7 +84,7 @@ def tell_stop(request: "StopRequest", outcome: "StopOutcome") -> int:
 
 
 def _guarded(speak: Callable[[], int], *, last: bool) -> int:
-    with one_ending(last=last), watched_output(), speaking(SHELL_WAYS):
+    with one_ending(last=last), closing_in_order(), watched_output(), speaking(SHELL_WAYS):
         tolerate_any_console()
         try:
             code = speak()

@@ -60,8 +60,9 @@ def keep_first_backup(
                 cause=error,
             ),
             remedy=tr(
-                "Make that folder writable or name another one with ROBOLINK_STATE_DIR. Without "
-                "a backup the first write to a controller is not made."
+                "Nothing was written: the first write to a controller needs a backup. "
+                "Make that folder writable, or name another one with "
+                "ROBOLINK_STATE_DIR."
             ),
             controller=controller.identity,
         ) from error

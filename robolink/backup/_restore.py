@@ -87,7 +87,7 @@ def require_same_controller(backup: Backup, identity: str, facts: ControllerFact
     pairs = (
         (tr("controller serial"), saved.controller_serial, facts.controller_serial),
         (tr("robot serials"), _listed(saved.robot_serials), _listed(facts.robot_serials)),
-        (tr("robot in force"), saved.robot_number, facts.robot_number),
+        (tr("selected robot"), saved.robot_number, facts.robot_number),
     )
     known = [(name, a, b) for name, a, b in pairs if a is not None and b is not None]
     for name, a, b in known:
@@ -101,7 +101,7 @@ def require_same_controller(backup: Backup, identity: str, facts: ControllerFact
     if not told_apart and backup.controller != identity:
         raise _another(
             tr(
-                "no serial number can be read, and the backup is of {saved}",
+                "no serial number can be read, and the backup is from {saved}",
                 saved=backup.controller,
             )
         )
@@ -214,7 +214,7 @@ def _check_index(tool: int) -> None:
     if tool not in TOOLS:
         raise ToolIndexError(
             tr("There is no tool {tool}.", tool=tool),
-            remedy=tr("EPSON controllers have tools 1 to 15."),
+            remedy=tr("EPSON controllers have tools {lowest} to 15.", lowest=1),
         )
 
 
@@ -223,7 +223,7 @@ def _check_selection(plan: RestorePlan, now: ToolState) -> None:
     if plan.select and after[plan.select] is None:
         raise UndefinedToolError(
             tr(
-                "The backup has tool {tool} selected, but that would not be defined.",
+                "The backup selects tool {tool}, but that tool would be undefined.",
                 tool=plan.select,
             ),
             remedy=tr(
@@ -238,8 +238,8 @@ def _check_selection(plan: RestorePlan, now: ToolState) -> None:
                 tool=in_force,
             ),
             remedy=tr(
-                "Select another tool first, add {selected}, or name the other tools with {tools}. "
-                "Nothing was written.",
+                "Nothing was written. Select another tool first, add {selected}, or "
+                "name the other tools with {tools}.",
                 selected=way(Way.SELECTED_TOO),
                 tools=way(Way.TOOLS),
             ),
@@ -248,10 +248,10 @@ def _check_selection(plan: RestorePlan, now: ToolState) -> None:
 
 def _another(cause: str) -> ConfigError:
     return ConfigError(
-        tr("This backup is not of this controller: {cause}.", cause=cause),
+        tr("This backup does not match this controller: {cause}.", cause=cause),
         remedy=tr(
-            "Check which controller is named, and the file. If it is still meant for this "
-            "controller, {other}.",
+            "Check that this is the right controller and the right file. If the "
+            "backup is meant for this controller all the same, {other}.",
             other=way(Way.OTHER_CONTROLLER),
         ),
     )

@@ -110,7 +110,7 @@ class Crossing:
         if abs(across) <= _ALONG_THE_BEAM * math.hypot(dx, dy):
             raise CalibrationError(
                 "no_crossing",
-                tr("A travel through beam {beam} ran along it.", beam=self.beam + 1),
+                tr("One pass went along beam {beam} instead of across it.", beam=self.beam + 1),
                 remedy=tr("Drive the tip straight across each beam."),
             )
         return math.copysign(1.0, across)

@@ -42,13 +42,11 @@ def require_flange_in_base(poses: Sequence[Pose]) -> None:
             raise CalibrationError(
                 "local_pose",
                 tr(
-                    "These are positions in Local {local}; what they are compared with lies in "
-                    "the base.",
+                    "These positions are in Local {local}; they are compared with "
+                    "positions in the base.",
                     local=pose.local,
                 ),
-                remedy=tr(
-                    "Give where Local {local} lies, or take them in Local 0.", local=pose.local
-                ),
+                remedy=tr("Say where Local {local} is, or take them in Local 0.", local=pose.local),
             )
 
 

@@ -122,8 +122,8 @@ def require_plausible(found: TouchFit, sigma_mm: float | None) -> None:
     if not low - slack * found.latency_gain <= found.latency_s <= high + slack * found.latency_gain:
         raise _implausible(
             tr(
-                "The trigger would be read {latency:.4f} s after the touch; no trigger is before "
-                "{low:g} or after {high:g} s.",
+                "The trigger would be read {latency:.4f} s after the touch; possible "
+                "are {low:g} to {high:g} s.",
                 latency=found.latency_s,
                 low=low,
                 high=high,
@@ -134,8 +134,8 @@ def require_plausible(found: TouchFit, sigma_mm: float | None) -> None:
     if overshoot is not None and not low - slack <= overshoot <= high + slack:
         raise _implausible(
             tr(
-                "The way of braking would be {overshoot:.5f} s^2/mm times the squared speed; it "
-                "lies between {low:g} and {high:g}.",
+                "The braking distance would be {overshoot:.5f} s^2/mm times the "
+                "squared speed; possible are {low:g} to {high:g}.",
                 overshoot=overshoot,
                 low=low,
                 high=high,

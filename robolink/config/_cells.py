@@ -119,7 +119,7 @@ def check_file(path: Path) -> tuple[Problem, ...]:
     names = [
         Problem(
             dotted(["cells", name]),
-            tr("cannot be the name of a cell: it must be free of blanks and of + : / \\"),
+            tr("cannot be the name of a cell: it must not contain blanks or + : / \\"),
         )
         for name in (cells if isinstance(cells, dict) else ())
         if not _CELL_NAME.fullmatch(name)
@@ -221,6 +221,6 @@ def _cell(name: str, said: Mapping[str, tuple[Path, object]]) -> Cell:
         ]
         raise CELL_FILE.refusal(next(iter(origins.values())), problems) from error
     if settings.url is None:
-        missing = Problem(dotted(["cells", name, "url"]), tr("is missing, in every file"))
+        missing = Problem(dotted(["cells", name, "url"]), tr("is missing in every file"))
         raise CELL_FILE.refusal(next(iter(origins.values())), [missing])
     return Cell(name, settings.url, settings, origins)

@@ -57,7 +57,7 @@ class MotionGroupCore(ABC):
         """Return what a person must know before it moves."""
         return MotionTerms(
             tr("{group} of {identity}", group=self.name, identity=self._driver.identity),
-            tr("Nothing stops it when this computer falls silent."),
+            tr("Nothing stops it if this computer falls silent."),
         )
 
     def obstacle(self, target: Pose, path: Path, *, start: Pose | None = None) -> str:

@@ -194,7 +194,7 @@ def _judged(
         sentence = tr("Tool {tool} is selected, as before; power mode or speed are not.", tool=now)
     else:
         sentence = tr(
-            "Tool {now} is selected now; it was tool {before} before.", now=now, before=before
+            "Tool {now} is selected now; it was tool {tool} before.", now=now, tool=before
         )
     entry = NewEntry(EntryKind.SELECTION, tool=before, verdict=Verdict.NOT_RESTORED)
     return Finding(marker, Verdict.NOT_RESTORED, sentence, action, (entry,))

@@ -57,8 +57,8 @@ def connect_when_reachable(
     """
     if not within_s >= 0:
         raise ConfigError(
-            tr("{seconds} s is no time to wait.", seconds=within_s),
-            remedy=tr("Say how many seconds it may be tried; 0 is for one attempt."),
+            tr("A wait of {seconds} s is not possible.", seconds=within_s),
+            remedy=tr("Say for how many seconds to keep trying; 0 means one attempt."),
         )
     clock = clock or SystemClock()
     deadline, pause_s = Deadline.after(clock, within_s), FIRST_PAUSE_S

@@ -115,8 +115,12 @@ def find_opener(url: LinkUrl) -> ControllerOpener:
             found = find_plug_in(CONTROLLERS_GROUP, name)
         except PlugInError as error:
             raise ConfigError(
-                tr("What connects to {kind!r} cannot be loaded: {cause}.", kind=name, cause=error),
-                remedy=tr("Install the package that brings it again."),
+                tr(
+                    "The part that connects to {kind!r} cannot be loaded: {cause}.",
+                    kind=name,
+                    cause=error,
+                ),
+                remedy=tr("Reinstall the package that provides it."),
             ) from error.origin
         if found is not None:
             return cast(ControllerOpener, found)

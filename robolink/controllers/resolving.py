@@ -43,7 +43,7 @@ def examine_write(tools: ToolTable, marker: Marker) -> Finding:
     elif tools.same(now, before):
         verdict = Verdict.NOT_APPLIED
         sentence = tr(
-            "Tool {tool} still holds the old value {now}; the write did not take.",
+            "Tool {tool} still holds the old value {now}; the write did not take effect.",
             tool=tool,
             now=describe_offset(now),
         )
@@ -64,7 +64,7 @@ def examine_select(tools: ToolTable, marker: Marker) -> Finding:
     """Return what became of one selection."""
     now, wanted = tools.selected(), int(str(marker.details["select"]))
     verdict = Verdict.DONE if now == wanted else Verdict.NOT_APPLIED
-    return Finding(marker, verdict, tr("Tool {now} is selected now.", now=now))
+    return Finding(marker, verdict, tr("Tool {tool} is selected now.", tool=now))
 
 
 def examine_move(marker: Marker) -> Finding:

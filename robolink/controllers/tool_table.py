@@ -228,7 +228,7 @@ class ToolTableCore(ABC):
             if before is None:  # what was in force could not be put back, nor the new one proved
                 raise RejectedError(
                     tr(
-                        "{controller} does not tell which tool is selected.",
+                        "{controller} does not report which tool is selected.",
                         controller=self._driver.identity,
                     ),
                     remedy=tr("Select tool {tool} at the machine.", tool=tool),
@@ -350,8 +350,8 @@ def require_replacement(tool: int, then_select: int | None) -> int:
         raise SelectedToolError(
             tr("Tool {tool} is selected, so it was not cleared.", tool=tool),
             remedy=tr(
-                "Say which tool the machine is to have in its place: {then_select}, 0 for the "
-                "flange; the programs of the machine go on with that one.",
+                "Say which tool to select instead: {then_select}, 0 for the flange. "
+                "The machine's programs go on with that tool.",
                 then_select=way(Way.THEN_SELECT),
             ),
         )

@@ -91,7 +91,7 @@ def _unusual(charts: Sequence[Chart], changes: Sequence[MeasuredChange]) -> Iter
             change.change,
             off,
             tr(
-                "Tool {tool}: the last change is out of the ordinary, {off} from the mean.",
+                "Tool {tool}: the last change is unusual, {off} from the average.",
                 tool=tool,
                 off=_said(off),
             ),
@@ -178,8 +178,8 @@ def _lengths(charts: Sequence[Chart]) -> Iterator[DriftFinding]:
                 (chart.subject,),
                 [chart],
                 tr(
-                    "Tool {tool} has another length: {off} on average over the last {count} "
-                    "changes, since {when}.",
+                    "The length of tool {tool} has changed: {off} on average over the "
+                    "last {count} changes, since {when}.",
                     tool=chart.subject,
                     **_facts([chart]),
                 ),
@@ -238,7 +238,7 @@ def _pins(charts: Sequence[Chart]) -> Iterator[DriftFinding]:
                 station=station,
                 **_facts(of_pin),
             ),
-            tr("The pin, or what it stands on, has moved: fasten it, then learn it anew."),
+            tr("The pin, or what it stands on, has moved: fasten it, then learn it again."),
         )
 
 
@@ -250,12 +250,15 @@ def _turn_tests(charts: Sequence[Chart]) -> Iterator[DriftFinding]:
                 (chart.subject,),
                 [chart],
                 tr(
-                    "The turn test of tool {tool} ends {off} farther off on average over the last "
-                    "{count} changes, since {when}.",
+                    "The turn test of tool {tool} is {off} worse on average over the "
+                    "last {count} changes, since {when}.",
                     tool=chart.subject,
                     **_facts([chart]),
                 ),
-                tr("Something has become loose, or the touches worse: mount, pin, lens, light."),
+                tr(
+                    "Something has come loose, or the touches have become worse: check "
+                    "mount, pin, lens and light."
+                ),
             )
 
 

@@ -43,7 +43,7 @@ def read_named(path: Path, *, most_bytes: int = MOST_BYTES, secret: bool = False
     with os.fdopen(descriptor, "rb") as file:
         mode = _mode_of_regular(descriptor)
         if secret and os.name == "posix" and mode & 0o077:
-            raise OthersMayReadError(errno.EPERM, tr("others than its owner may read it"))
+            raise OthersMayReadError(errno.EPERM, tr("people other than its owner may read it"))
         data = file.read(most_bytes + 1)
     if len(data) > most_bytes:
         raise OSError(errno.EFBIG, tr("it is longer than {most:g} MB", most=most_bytes / 1_000_000))
@@ -83,7 +83,7 @@ def require_free(path: Path, *, replace: bool = False) -> None:
     if path.is_dir() or (path.exists() and not replace):
         raise _taken(path)
     if not path.parent.is_dir() or not os.access(path.parent, os.W_OK):
-        raise _unwritable(path, tr("there is no such folder, or it may not be written"))
+        raise _unwritable(path, tr("there is no such folder, or it cannot be written to"))
 
 
 def save_named(path: Path, data: bytes | Iterable[bytes], *, replace: bool = False) -> None:
@@ -113,13 +113,13 @@ _AT_ONCE: Final = (
 def _mode_of_regular(descriptor: int) -> int:
     mode = os.fstat(descriptor).st_mode
     if not stat.S_ISREG(mode):
-        raise OSError(errno.EINVAL, tr("it is no regular file"))
+        raise OSError(errno.EINVAL, tr("it is not a regular file"))
     return mode
 
 
 def _taken(path: Path) -> ConfigError:
     return ConfigError(
-        tr("{path} exists already; it was not written over.", path=path),
+        tr("{path} exists already; it was not overwritten.", path=path),
         remedy=tr("Give another name, or {overwrite} to replace it.", overwrite=way(Way.OVERWRITE)),
     )
 

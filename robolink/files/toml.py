@@ -117,6 +117,6 @@ class FileKind:
 
     def _unreadable(self, path: Path, cause: str) -> ConfigError:
         return ConfigError(
-            tr("{file} cannot be read: {cause}.", file=self.named(path), cause=cause),
+            tr("{path} cannot be read: {cause}.", path=self.named(path), cause=cause),
             remedy=self.unreadable_remedy(),
         )

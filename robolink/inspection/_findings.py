@@ -70,7 +70,7 @@ class Inspection:
             for number, value in self.tools.items()
         }
         verdict = (
-            tr("To see to: {codes}.", codes=", ".join(one.code for one in self.findings))
+            tr("Needs attention: {codes}.", codes=", ".join(one.code for one in self.findings))
             if self.findings
             else tr("In order.")
         )

@@ -40,7 +40,7 @@ def measured_findings(run: RecipeRun) -> tuple[InspectionFinding, ...]:
                 found=one.proposal.change_mm,
                 limit=limits[one.proposal.tool],
             ),
-            tr("Is the needle straight and tight? Then measure it anew: robolink change"),
+            tr("Is the needle straight and tight? Then measure it again: robolink change"),
         )
         for one in report.tools
         if (one.proposal.change_mm or 0.0) > limits[one.proposal.tool]

@@ -99,12 +99,15 @@ class Lease:
             return ""
         who = seen.who()
         if not self._holder.shares_clock_with(who):
-            return seen.at_work(tr("Whether it still works shows when it is watched for a while."))
+            return seen.at_work(tr("Watch it for a while to see whether it is still working."))
         silent_s = max(0, self._clock.now_ns() - seen.beat_ns) / NS_PER_S
         if silent_s >= LEASE_S or self._holder.proves_gone(who):
             return ""
         return seen.at_work(
-            tr("It is alive: its last sign of life is {seconds:.0f} s old.", seconds=silent_s)
+            tr(
+                "It is still working: its last sign of life was {seconds:.0f} s ago.",
+                seconds=silent_s,
+            )
         )
 
     def prepare(self) -> None:
@@ -230,7 +233,7 @@ class Lease:
 
     def _lost_error(self) -> LeaseLostError:
         return LeaseLostError(
-            tr("Another took over {controller} meanwhile.", controller=self.controller),
+            tr("Somebody else took over {controller} meanwhile.", controller=self.controller),
             remedy=tr(
                 "Nothing was sent. Read the tool again before you write: 'robolink journal list' "
                 "shows who did what."

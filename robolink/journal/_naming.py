@@ -180,7 +180,7 @@ def _entries(found: Identity, meeting: _Meeting) -> list[NewEntry]:
     said = [_other_than_before(found, meeting), _also_elsewhere(found, meeting)]
     said.append(_nobodys(found, meeting))
     said += [
-        tr("What is on record under {name} belongs to {own}.", name=name, own=found.name)
+        tr("The records under {name} belong to {own}.", name=name, own=found.name)
         for name in meeting.unclaimed
     ]
     details = {"address": found.address, "before": meeting.before, "also": list(meeting.elsewhere)}
@@ -206,8 +206,8 @@ def _other_than_before(found: Identity, meeting: _Meeting) -> str:
     if meeting.before in ("", found.name, found.place):
         return ""
     return tr(
-        "At {address} answers {name}; the last time it was {before}. Is it the controller that "
-        "you mean? What is unfinished on the other one does not show here.",
+        "{name} answers at {address}; last time it was {before}. Is this the right "
+        "controller? Unfinished work on the other one is not shown here.",
         address=found.address,
         name=found.name,
         before=meeting.before,
@@ -218,7 +218,7 @@ def _also_elsewhere(found: Identity, meeting: _Meeting) -> str:
     if not meeting.elsewhere or meeting.before == found.name:
         return ""
     return tr(
-        "{address} leads to {name}, known from {others}: one controller, one record.",
+        "{address} is {name}, already known as {others}: one controller, one record.",
         address=found.address,
         name=found.name,
         others=", ".join(meeting.elsewhere),
@@ -229,9 +229,10 @@ def _nobodys(found: Identity, meeting: _Meeting) -> str:
     if not meeting.shared:
         return ""
     return tr(
-        "Each of the {count} robots of {name} has its own record from now on. What stands under "
-        "that name does not tell which of them it is about: it stays listed, and nothing is "
-        "compared with it or undone by it. Places of stations are learnt again for each robot.",
+        "Each of the {count} robots of {name} now has a record of its own. Earlier "
+        "entries do not say which robot they are about: they stay listed, but nothing "
+        "is compared with them or undone from them. Learn the stations again for each "
+        "robot.",
         count=len(found.robots),
         name=found.name,
     )

@@ -306,7 +306,7 @@ class JournalOutcomeLog:
 
     def _settled_by_another(self) -> OutcomeUnknownError:
         return OutcomeUnknownError(
-            tr("Another settled meanwhile what was begun on {name}.", name=self._names.identity),
+            tr("Somebody else has settled what was begun on {name}.", name=self._names.identity),
             remedy=tr("Read the tools again: 'robolink journal list' shows who did what."),
             controller=self._names.identity,
         )

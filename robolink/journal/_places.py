@@ -73,7 +73,7 @@ def place_of(location: str) -> JournalPlace:
         shown = f"postgresql+psycopg://{_without_password(rest)}"
         return JournalPlace(shown, shown, url=url)
     raise JournalError(
-        tr("robolink keeps no journal in {scheme!r} databases.", scheme=scheme),
+        tr("robolink cannot keep its journal in a {scheme!r} database.", scheme=scheme),
         remedy=tr(
             "Name a file, or a database as postgresql+psycopg://user@host/database, in "
             "ROBOLINK_JOURNAL."
@@ -94,7 +94,7 @@ def _require_regular(path: Path) -> None:
         return  # opening it says why
     if special:
         raise JournalError(
-            tr("The journal {path} is no regular file.", path=path),
+            tr("The journal {path} is not a regular file.", path=path),
             remedy=tr("Name a file, or a PostgreSQL database, in ROBOLINK_JOURNAL."),
         )
 

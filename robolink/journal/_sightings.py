@@ -77,7 +77,7 @@ class LeaseSighting:
             alive: Whether he lives, one sentence.
         """
         said = tr(
-            "{holder} is at work on this controller since {since}: {purpose}.",
+            "{holder} has been at work on this controller since {since}: {purpose}.",
             holder=describe(self.who()),
             since=self.taken_at,
             purpose=self.purpose,

@@ -69,7 +69,7 @@ def find_method(name: str) -> AnyMethod:
             tr(
                 "The calibration method {name!r} cannot be loaded: {cause}.", name=name, cause=error
             ),
-            remedy=tr("Install the package that brings it again."),
+            remedy=tr("Reinstall the package that provides it."),
         ) from error.origin
     if found is None:
         raise ConfigError(

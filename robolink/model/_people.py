@@ -46,7 +46,8 @@ def require_engineer(outcomes: OutcomeLog, act: str, **details: object) -> None:
         raise NotAllowedError(
             tr("{person} may not {act}. Ask an engineer.", person=person, act=act),
             remedy=tr(
-                "Nothing was sent. One whom the cell file calls an engineer may, with {operator}.",
+                "Nothing was sent. Somebody listed as an engineer in the cell file "
+                "may do it, with {operator}.",
                 operator=way(Way.OPERATOR),
             ),
         )

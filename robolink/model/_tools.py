@@ -83,7 +83,7 @@ def describe_offset(offset: ToolOffset | None) -> str:
         return tr("undefined")
     if offset.of_no_tool:
         numbers = ", ".join(f"{value:g}" for value in offset.components())
-        return tr("the values of no tool ({numbers})", numbers=numbers)
+        return tr("not the values of a tool ({numbers})", numbers=numbers)
     names = ("X", "Y", "Z", "U", "V", "W")
     pairs = zip(names, offset.components(), strict=True)
     # Adding 0.0 takes the sign off a negative zero.
@@ -166,8 +166,8 @@ def tool_changed(
             expected=describe_offset(expected),
         ),
         remedy=tr(
-            "Someone changed it: a program that runs TLSet at its start, the pendant, or "
-            "a restored project. Read it again and decide anew."
+            "The usual causes: a program that runs TLSet at its start, the pendant, a "
+            "restored project. Read the tool again, then decide."
         ),
         controller=controller,
         request=request,

@@ -61,8 +61,8 @@ class AcceptanceCriteria:
                 doubt,
                 _out_of_order(result) or tr("The touches agree far less well than was stated."),
                 remedy=tr(
-                    "Nobody is asked before the write, so it is refused. Take the run again, or "
-                    "let a person look at it."
+                    "Nobody is asked before this write, so it was refused. Measure "
+                    "again, or have a person look at it."
                 ),
             )
         for verdict in self._of_fit(result):
@@ -162,10 +162,10 @@ class AcceptanceCriteria:
 
     def _of_fit(self, result: CalibrationResult) -> Iterator[LimitVerdict]:
         for code, name, found_mm, limit_mm in (
-            ("large_rms", tr("Scatter"), result.rms_mm, self.rms_mm),
+            ("large_rms", tr("How well the touches agree"), result.rms_mm, self.rms_mm),
             (
                 "large_residual",
-                tr("Worst sample"),
+                tr("The touch that fits worst"),
                 result.max_residual_mm,
                 self.max_residual_mm,
             ),
@@ -178,7 +178,7 @@ class AcceptanceCriteria:
 def _sureness(result: CalibrationResult) -> tuple[str, float | None]:
     """Return what a limit of the process is compared with, and its name."""
     region = result.region95_radius_mm is not None
-    name = tr("Uncertainty, all axes together (95 %)") if region else tr("Uncertainty (95 %)")
+    name = tr("Sure to, all axes together (95 %)") if region else tr("Sure to (95 %)")
     return name, result.known_within_mm
 
 
@@ -203,8 +203,8 @@ def require_proved(result: VerifyResult, identity: str) -> None:
     if result.codes:
         raise VerifyError(
             tr(
-                "The heights of the touches of the proof differ from that of the measurement: at "
-                "least one touch was in the air."
+                "The heights of the turn test differ from those of the measurement: "
+                "at least one touch was in the air."
             ),
             remedy=tr("Measure again, each time until the tip is on the pin."),
             code=result.codes[0],

@@ -115,7 +115,9 @@ def settle_lengths(
     for plan, proposal, told in found:
         why = told.why
         if told.change is not None and plan.pin in sunk:
-            why = tr("All tools stand alike higher or lower on the pin, so it may be the pin.")
+            why = tr(
+                "All tools are higher or lower on the pin by the same amount, so it may be the pin."
+            )
         if chain_of(proposal.result) is not None and plan.pin:
             made = _chained(context.controller, plan, proposal)
         elif why:
@@ -134,8 +136,8 @@ def _chained(controller: Controller, plan: ToolPlan, proposal: Proposal) -> Prop
     if last.z_from == "kept" and "z_mm" in proposal.result.measured:
         # A difference is as right as what it was added to.
         kept = tr(
-            "The old Z was kept and never measured: how much longer or shorter the new tip is, is "
-            "right; its length is as right as the old one."
+            "The old Z was kept and never measured. How much longer or shorter the "
+            "new tip is, is known; its length is only as good as the old value."
         )
         notes = (*notes, kept)
     return replace(proposal, kept_record=origin, notes=notes)
@@ -220,7 +222,7 @@ def _said(proposal: Proposal, why: str, *, attended: bool) -> Proposal:
         note = tr("{why} Z was measured by the height of the touches, and may be wrong.", why=why)
     else:
         doubted = replace(result, notes=(*result.notes, "length_not_observable"))
-        note = tr("{why} Whether the tip is as long as before is not known; Z is kept.", why=why)
+        note = tr("{why} It is not known whether the tip is as long as before; Z is kept.", why=why)
     return replace(proposal, result=doubted, notes=(*proposal.notes, note))
 
 

@@ -138,14 +138,39 @@ def finish_by_turn_test(
         RobolinkError: Anything else that ended it, with the state it left.
 
     Example:
-        >>> from robolink.errors import RobolinkError
-        >>> from robolink.nozzle_change import finish_by_turn_test
-        >>> from robolink.testing import MemoryController
-        >>> try:  # no change is open there
-        ...     finish_by_turn_test(MemoryController(), "c-1", operator=None)
-        ... except RobolinkError as error:
-        ...     print(type(error).__name__)
-        OutcomeUnknownError
+        >>> import robolink
+        >>> from robolink.errors import OutcomeUnknownError
+        >>> from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
+        >>> from robolink.nozzle_change import finish_by_turn_test, open_turn_tests
+        >>> from robolink.transaction import recover
+        >>> from robolink_cli.prompts.operator import AssistedOperator
+        >>> from robolink_simulators.assist.port import InProcessEyes
+        >>> from robolink_simulators.epson import EpsonSimulator
+        >>> from robolink_simulators.hosting.in_process.epson import register
+        >>> simulator, written = EpsonSimulator(), []
+        >>> def cut_off(_number, request):  # in the first movement after the write
+        ...     written.extend([request] * ("TLSet 1," in request))
+        ...     if written and "Move" in request:
+        ...         simulator.on_request = None
+        ...         simulator.panel.cut_link()
+        >>> def somebody(controller):  # jogs the tip onto the pin
+        ...     eyes = InProcessEyes(simulator)
+        ...     return AssistedOperator.with_eyes(eyes, lambda _: None, clock=controller.clock)
+        >>> url, plan = register("turn-test-example", simulator), ChangePlan((ToolPlan(1),))
+        >>> simulator.on_request = cut_off
+        >>> with robolink.connect(url) as controller:
+        ...     try:
+        ...         NozzleChange(controller, plan, operator=somebody(controller)).run()
+        ...     except OutcomeUnknownError:
+        ...         print("cut off")
+        cut off
+        >>> with robolink.connect(url) as controller:
+        ...     (change,) = open_turn_tests(controller)
+        ...     _ = recover(controller, later=[change], confirm=lambda _: True)
+        ...     with controller.outcomes.hold("turn test"):
+        ...         found = finish_by_turn_test(controller, change, somebody(controller))
+        ...     str(found.verdict), len(written), controller.outcomes.open_markers()
+        ('done', 1, ())
     """
     marker, finding = _open(controller, operation)
     outcomes, request = controller.outcomes, marker.request

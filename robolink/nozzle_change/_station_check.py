@@ -134,8 +134,8 @@ def _judged(plan: ToolPlan, proposal: Proposal, shift: StationShift) -> Proposal
     if finds_pin(proposal.result) or not shift.undecided(plan.criteria.drift_tolerance_mm):
         return proposal
     said = tr(
-        "Station {station} may have moved by up to {detectable:.2f} mm: with so many new nozzles "
-        "less would not show.",
+        "Station {station} may have moved by up to {detectable:.2f} mm: with this "
+        "many new nozzles, a smaller shift would not show.",
         station=plan.pin,
         detectable=shift.detectable_mm,
     )
@@ -172,29 +172,22 @@ def _refusal(station: str, shift: StationShift) -> CalibrationError:
 def _sentence(station: str, shift: StationShift) -> str:
     dx, dy = shift.vector_mm[:2]
     if len(shift.tools) > 1:
-        said = tr(
-            "Tools {tools} shifted together by X {dx:+.3f} Y {dy:+.3f} mm at station {station}, "
-            "more than new nozzles explain: the station moved",
+        return tr(
+            "Pin {station} seems to have moved by X {dx:+.3f} Y {dy:+.3f} mm: tools {tools} "
+            "shifted alike, by more than new nozzles explain.",
             tools=", ".join(map(str, shift.tools)),
             dx=dx,
             dy=dy,
             station=station,
         )
-    else:
-        said = tr(
-            "Station {station} shifted by X {dx:+.3f} Y {dy:+.3f} mm since it was found last, and "
-            "the nozzle of tool {tool} does not explain it: the station moved",
-            station=station,
-            dx=dx,
-            dy=dy,
-            tool=shift.tools[0],
-        )
-    sure = tr(
-        "(chi-square {found:.0f}; chance stays below {limit:.0f})",
-        found=shift.chi_square,
-        limit=shift.chi_square_limit,
+    return tr(
+        "Pin {station} seems to have moved by X {dx:+.3f} Y {dy:+.3f} mm since it was found last: "
+        "the nozzle of tool {tool} does not explain it.",
+        station=station,
+        dx=dx,
+        dy=dy,
+        tool=shift.tools[0],
     )
-    return f"{said} {sure}."
 
 
 def found_with(controller: Controller, tools: Sequence[int]) -> dict[int, tuple[str, ...]]:

@@ -109,7 +109,7 @@ def rule_named(name: str) -> RotationRule:
     if not axes or axes[0] == axes[1] or axes[1] == axes[2]:
         names = ", ".join([*RULES, "RzRyRx"])
         raise UnusableText(
-            tr("{name!r} is no rule for angles; there are {names}", name=name, names=names)
+            tr("{name!r} is not a rule for angles; use one of {names}", name=name, names=names)
         )
     return RotationRule("".join(f"R{axis}" for axis in axes), axes, ("1", "2", "3"))
 

@@ -26,14 +26,14 @@ def settled_length(raw: RawTable, said: str | None) -> tuple[LengthUnit, str]:
     if said is not None:
         unit = _unit(said)
         if raw.stated_length and raw.length is not unit:
-            why = tr("it says {length} itself, and {said} was named", length=raw.length, said=unit)
+            why = tr("it says {length} itself, but {said} was given", length=raw.length, said=unit)
             raise UnusableText(why)
         return unit, "option"
     positions = [pose.position for pose in raw.poses]
     if raw.length is not None:
         far = any(abs(value) > _FAR_M for place in positions for value in place)
         if raw.length is LengthUnit.M and far:
-            raise UnclearText(which_length(tr("its lengths should be metres, and are too large")))
+            raise UnclearText(which_length(tr("its lengths should be metres, but are too large")))
         return raw.length, "file" if raw.stated_length else "format"
     if raw.unit_in_comment:
         raise UnclearText(
@@ -57,5 +57,5 @@ def _unit(name: str) -> LengthUnit:
         return LengthUnit(name.strip().lower())
     except ValueError as error:
         raise UnusableText(
-            tr("{name!r} is no unit of length; there are mm, cm, m and in", name=name)
+            tr("{name!r} is not a unit of length; use mm, cm, m or in", name=name)
         ) from error

@@ -90,7 +90,7 @@ def checked(matrix: Sequence[float], line: int) -> Matrix:
     """
     deviation = _deviation(matrix)
     if not deviation <= ROTATION_WITHIN:
-        why = tr("the matrix is no rotation: its rows are off by {off:.3g}", off=deviation)
+        why = tr("the matrix is not a rotation: its rows are off by {off:.3g}", off=deviation)
         raise UnusableText(why, line)
     if _determinant(matrix) < 0:
         raise UnusableText(tr("the matrix is left-handed: it mirrors"), line)

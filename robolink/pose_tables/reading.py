@@ -152,7 +152,7 @@ def _undisputed(raw: RawTable, choices: ReadingChoices) -> RawTable:
         UnusableText: The person named columns, or another rule for angles.
     """
     if choices.columns is not None:
-        why = tr("columns were named, and a file of {layout} has none", layout=raw.layout)
+        why = tr("columns were given, but a file of {layout} has none", layout=raw.layout)
         raise UnusableText(why)
     if choices.euler is None:
         return raw
@@ -160,7 +160,7 @@ def _undisputed(raw: RawTable, choices: ReadingChoices) -> RawTable:
     if rule.formula != raw.rotation and not (rule is EPSON and raw.rotation == EPSON.formula):
         raise UnusableText(
             tr(
-                "its rotations are defined as {own}, and {named} was named",
+                "its rotations are defined as {own}, but {named} was given",
                 own=raw.rotation,
                 named=rule.name,
             )

@@ -80,7 +80,7 @@ class CameraDrive:
                 yield Move(
                     self._beside(place),
                     Path.STRAIGHT,
-                    tr("Moving to the next place before the camera."),
+                    tr("Moving to the next place over the camera."),
                 )
             else:
                 yield from self._turn_to(place, here)
@@ -134,8 +134,8 @@ class CameraDrive:
             raise CalibrationError(
                 "far_off",
                 tr(
-                    "What the camera found is {away:.2f} mm from where it is expected; up to "
-                    "{limit:g} mm are followed.",
+                    "What the camera found is {away:.2f} mm from where it is "
+                    "expected, limit {limit:g} mm.",
                     away=away_mm,
                     limit=self.plan.search_mm,
                 ),
@@ -312,4 +312,4 @@ class CameraSamples(Generic[ResultT]):
 
     def which(self, number: int, look: SeenAt) -> str:
         """Say which one it is."""
-        return tr("Look {number}, at U {u:.1f}", number=number, u=look.u_deg)
+        return tr("Look {number} at U {u:.1f}", number=number, u=look.u_deg)

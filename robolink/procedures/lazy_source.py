@@ -18,13 +18,21 @@ class LazySource:
             pin.
 
     Example:
-        >>> from robolink.errors import ConfigError
+        >>> from robolink import Pose, ToolOffset
+        >>> from robolink.methods import TwoPoseSource
         >>> from robolink.procedures import LazySource
+        >>> from robolink.testing import PaperCell
+        >>> made = []
         >>> def make():
-        ...     raise ConfigError("There is no camera here.")
-        >>> source = LazySource(make, sentence="A camera looks at the tip.")
-        >>> source.sentence  # nothing was made for it
-        'A camera looks at the tip.'
+        ...     made.append(TwoPoseSource())
+        ...     return made[0]
+        >>> source = LazySource(make, sentence="A pin is touched at two angles.")
+        >>> source.sentence, len(made)  # nothing was made for it
+        ('A pin is touched at two angles.', 0)
+        >>> cell = PaperCell(Pose(300, 100, 20, 0), ToolOffset(12, -4, -20), (310, 95, -40))
+        >>> found = cell.run(source.procedure(ToolOffset(12.3, -3.9, -20), cell.here))
+        >>> round(found.offset.x_mm, 6), round(found.offset.y_mm, 6), len(made)
+        (12.0, -4.0, 1)
     """
 
     def __init__(

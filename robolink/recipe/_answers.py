@@ -110,7 +110,7 @@ def ask_prompt(context: MeasurementContext, prompt: Prompt) -> str:
     if not runner.confirm(prompt.text):
         raise DeclinedError(
             tr("{question!r} was answered with no.", question=prompt.text),
-            remedy=tr("Nothing was written. Start again when it is so."),
+            remedy=tr("Nothing was written. Start again when the answer is yes."),
         )
     return "yes"
 
@@ -135,7 +135,10 @@ def ask_height(context: MeasurementContext, tool: int, name: str) -> float:
         except ConfigError as error:
             context.operator.tell(str(error))
     raise DeclinedError(
-        tr("No number was typed for Z of tool {tool}, however often it was asked.", tool=tool),
+        tr(
+            "No number was typed for Z of tool {tool}, although it was asked several times.",
+            tool=tool,
+        ),
         remedy=tr("Nothing was written. Start again with the length of the new tip at hand."),
     )
 

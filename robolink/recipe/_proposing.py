@@ -133,7 +133,7 @@ def _height(
     if reference.contact_z_mm is None:
         raise CalibrationError(
             "reference_outdated",
-            tr("The reference of {at} has no height of the contact.", at=reference.at),
+            tr("The reference of {at} does not say how high the contact was.", at=reference.at),
             remedy=tr("Take a new reference with {reference}.", reference=way(Way.REFERENCE)),
         )
     return offset.z_mm - (height - reference.contact_z_mm)

@@ -78,7 +78,7 @@ def find_reference(controller: Controller, tool: int, station: str) -> Reference
     raise CalibrationError(
         "reference_outdated",
         tr(
-            "Tool {tool} holds {stored}; its reference at {station} of {at} stands for {value}.",
+            "Tool {tool} holds {stored}; its reference at {station}, of {at}, belongs to {value}.",
             tool=tool,
             stored=describe_offset(stored),
             station=station,

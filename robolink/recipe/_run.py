@@ -267,7 +267,8 @@ def _require_sensor(loaded: LoadedRecipe) -> None:
     if not method.needs.by_sensor:
         raise ConfigError(
             tr(
-                "By {method!r} a person touches; a check measures by beams, a switch or a camera.",
+                "The method {method!r} needs a person to touch; a check measures by "
+                "beams, a switch or a camera.",
                 method=method.name,
             ),
             remedy=tr("Name a recipe that measures by a sensor."),

@@ -96,7 +96,7 @@ def draft_from_csv(path: Path) -> MapDraft:
             if known.axis in components:
                 raise _BadRowError(
                     tr(
-                        "{axis} of tool {tool} stands in a line before it",
+                        "{axis} of tool {tool} is in an earlier line already",
                         axis=known.axis.upper(),
                         tool=known.tool,
                     )
@@ -106,13 +106,13 @@ def draft_from_csv(path: Path) -> MapDraft:
             bad.append(tr("line {line} ({name}): {why}", line=line, name=row["name"], why=error))
     found = sum(len(components) for components in tools.values())
     if not found:
-        named = tr("no name in it is one of a tool's component, such as Tool1_X or GVL.T1.x")
+        named = tr("no name in it is that of a tool's component, such as Tool1_X or GVL.T1.x")
         raise _unusable(path, "; ".join(bad) or named)
     notes = []
     if references:
         notes.append(
             tr(
-                "The addresses are taken for numbers as manuals print them: 40401 is holding "
+                "The addresses are read as manuals print them: 40401 is holding "
                 "register 400, counted from 0."
             )
         )
@@ -182,7 +182,7 @@ def _number(row: Mapping[str, str], place: str, unit_in_name: str) -> str:
         try:
             parts.append(f"scale = {float(row['scale'])!r}")
         except ValueError as error:
-            raise _BadRowError(tr("its scale is no number")) from error
+            raise _BadRowError(tr("its scale is not a number")) from error
     return ", ".join(parts)
 
 

@@ -140,7 +140,7 @@ class Resolving:
         units: Mapping[str, float] = _ANGLES if angle else _LENGTHS
         unit = keys.unit or (common.angle_unit if angle else common.length_unit)
         if unit not in units:
-            self._tell(f"{path}.unit", tr("must be one of {units}", units=", ".join(units)))
+            self._tell(f"{path}.unit", tr("must be one of {values}", values=", ".join(units)))
             return 1.0
         return units[unit]
 

@@ -68,8 +68,8 @@ class StepsTaken:
         return NotYet(
             "coarse_step",
             tr(
-                "Not yet: the last step was {mm:.2f} mm. Finish with 0.10 mm or less.",
-                mm=self._last,
+                "Not yet: the last step was {mm} mm. Finish with 0.10 mm or less.",
+                mm=f"{self._last:.2f}",
             ),
         )
 

@@ -151,7 +151,7 @@ def first_clear(
         if refusal is None:
             if refusals:
                 yield Notify(
-                    tr("The robot takes another way than planned: {why}", why=refusals[0][1])
+                    tr("The robot takes another path than planned: {why}", why=refusals[0][1])
                 )
             return option
         refusals.append(refusal)
@@ -159,7 +159,8 @@ def first_clear(
     raise LimitError(
         tr("{step} {refusal} Nothing was moved for it.", step=move.purpose, refusal=why),
         remedy=tr(
-            "Tilt or turn the tool otherwise at the first place, or put the reference point where "
-            "the arm has room and stays away from its singular places."
+            "Tilt or turn the tool another way at the first place, or put the "
+            "reference point where the arm has room and stays away from its singular "
+            "places."
         ),
     )

@@ -195,6 +195,6 @@ def parse_steps(text: str) -> dict[str, float]:
 
 def _no_step(word: str) -> ConfigError:
     return ConfigError(
-        tr("{word!r} is no step. A step is x+0.1: axis, sign, number, with a point.", word=word),
+        tr("{word!r} is not a step. A step is x+0.1: axis, sign, number, with a point.", word=word),
         remedy=tr("Axes are x, y, z and u, for example x+0.1 z-0.5. Nothing moved."),
     )

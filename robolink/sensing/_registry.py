@@ -80,7 +80,7 @@ def _opener(url: str) -> SensorOpener:
                 url=sensor_name(url),
                 cause=error,
             ),
-            remedy=tr("Install the package that brings it again."),
+            remedy=tr("Reinstall the package that provides it."),
         ) from error.origin
     if found is None:
         from importlib import metadata  # costs more than the rest of this package
@@ -90,8 +90,8 @@ def _opener(url: str) -> SensorOpener:
             "sensor_not_found",
             tr("No sensor is called {url!r}.", url=sensor_name(url)),
             remedy=tr(
-                "Name it in the cell file under sensors, or install the package that brings "
-                "it. These are known: {known}.",
+                "Name it in the cell file under sensors, or install the package that "
+                "provides it. These are known: {known}.",
                 known=", ".join(known),
             ),
         )

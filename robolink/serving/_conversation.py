@@ -170,7 +170,7 @@ class CallbackConversation:
     def _hello(self, fields: Sequence[str]) -> Answer:
         serial, robot, flag, operation, tool, *value = fields
         if flag not in ("0", "1", "2", "3"):
-            raise RemoteProtocolError(tr("{field!r} is no state of a program.", field=flag))
+            raise RemoteProtocolError(tr("{field!r} is not a state of a program.", field=flag))
         place = f"spel@{self._peer}"
         name = record_name(serial, _number(robot), self._controllers) or place
         log = self._journal.log(name, signature=self._signature)
@@ -264,7 +264,7 @@ class CallbackConversation:
 
         pose_fields, seen = fields[:_POSE_FIELDS], fields[_POSE_FIELDS:]
         if len(seen) != run.measure.length:
-            raise RemoteProtocolError(tr("A pose has another number of fields."))
+            raise RemoteProtocolError(tr("A pose has the wrong number of fields."))
         taken_in, (x, y, z, u, v, w) = _number(pose_fields[0]), read_components(pose_fields[1:])
         if taken_in and taken_in not in known:
             raise CalibrationError(
@@ -387,7 +387,7 @@ def _code(error: RobolinkError) -> str:
 
 def _number(field_text: str) -> int:
     if not (field_text.isascii() and field_text.isdecimal() and len(field_text) <= 5):
-        raise RemoteProtocolError(tr("{field!r} is no number.", field=field_text))
+        raise RemoteProtocolError(tr("{field!r} is not a number.", field=field_text))
     return int(field_text)
 
 

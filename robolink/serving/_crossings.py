@@ -42,7 +42,7 @@ class _Travels:
         from robolink.calibration import Crossing
 
         if (self.entered is None) is not broken or (self.entered and self.entered[0] != beam):
-            raise CalibrationError("edge_order", tr("The edges of a beam came in another order."))
+            raise CalibrationError("edge_order", tr("The edges of a beam came in the wrong order."))
         if self.entered is None:
             require_room(len(self.crossings))
             self.entered = beam, flange
@@ -86,7 +86,7 @@ class ProgramCrossings:
         """
         beam, before, now = seen
         if beam not in ("1", "2") or not {before, now} <= {"0", "1"}:
-            raise RemoteProtocolError(tr("{fields} is no edge.", fields=",".join(seen)))
+            raise RemoteProtocolError(tr("{fields} is not an edge.", fields=",".join(seen)))
         if before == now:
             raise CalibrationError("no_edge", tr("Input of beam {beam} did not switch.", beam=beam))
         broken = (now == "1") is not self._station.off_when_broken
@@ -211,7 +211,7 @@ def _require_turned(poses: Sequence[Pose], measured: Sequence[Pose]) -> None:
     if min(turns_deg) < LEAST_TURN_DEG:
         raise CalibrationError(
             "insufficient_rotation",
-            tr("The proof has to differ by {least:g} degrees of U.", least=LEAST_TURN_DEG),
+            tr("The turn test has to differ by {least:g} degrees of U.", least=LEAST_TURN_DEG),
         )
 
 

@@ -97,6 +97,6 @@ def require_own(poses: Sequence[Pose], used: Sequence[Pose]) -> None:
     for pose in poses:
         if any(math.dist(pose.coordinates(), other.coordinates()) < _SAME_MM for other in before):
             raise CalibrationError(
-                "proof_is_a_copy", tr("A pose of the proof was sent before: it proves nothing.")
+                "proof_is_a_copy", tr("A pose of the turn test was sent before: it proves nothing.")
             )
         before.append(pose)

@@ -58,7 +58,7 @@ class ProgramLooks:
         count, *place = seen
         x_mm, y_mm = read_place(place)
         if not (count.isascii() and count.isdecimal()):
-            raise RemoteProtocolError(tr("{field!r} is no number.", field=count))
+            raise RemoteProtocolError(tr("{field!r} is not a number.", field=count))
         if count.strip("0") == "":
             raise CalibrationError("tip_not_seen", tr("The camera did not see the tip."))
         if count != "1":
@@ -105,13 +105,13 @@ class ProgramLooks:
         require_own([look.flange for look in looks], result.inputs)
         if angle_spread_deg([look.flange.u_deg for look in looks]) < MIN_ROTATION_DEG:
             raise CalibrationError(
-                "insufficient_rotation", tr("The tool is hardly turned in the proof.")
+                "insufficient_rotation", tr("The tool is hardly turned in the turn test.")
             )
         places = [(look.x_mm, look.y_mm) for look in looks]
         if any(dist(*pair) > _SEEN_APART * limit_mm for pair in combinations(places, 2)):
             raise CalibrationError(
                 "not_turned_about_the_tip",
-                tr("In the proof the tool has to turn about the new tip."),
+                tr("In the turn test the tool has to turn about the new tip."),
             )
         error_x, error_y = camera_error_of(result)
         drifts = []

@@ -75,7 +75,9 @@ def measure_named(
         beams = beam_station(station(place, StationKind.BEAMS))
         return ProgramCrossings(beams, limits, max_lean_deg=BeamsParameters().max_lean_deg)
     if at or method not in ("n-angle", "pivot", "camera"):
-        raise CalibrationError("unknown_method", tr("There is no method {name!r}.", name=name))
+        raise CalibrationError(
+            "unknown_method", tr("There is no calibration method {name!r}.", name=name)
+        )
     if method == "camera":
         return ProgramLooks(limits)
     return touches_by(method, limits)

@@ -56,12 +56,12 @@ class PermitPlan:
 
     def __post_init__(self) -> None:
         if self.method not in PERMIT_METHODS:
-            raise ConfigError(tr("There is no method {name!r}.", name=self.method))
+            raise ConfigError(tr("There is no calibration method {name!r}.", name=self.method))
         if self.touches < LEAST_TOUCHES or self.proofs < LEAST_PROOFS:
             raise ConfigError(
                 tr(
-                    "{touches} touches and {proofs} proofs are too few; {least} and {least_proofs} "
-                    "are needed.",
+                    "{touches} touches and {proofs} turn tests are too few; {least} "
+                    "and {least_proofs} are needed.",
                     touches=self.touches,
                     proofs=self.proofs,
                     least=LEAST_TOUCHES,
@@ -111,13 +111,29 @@ class PermitCall:
         ended: Asked at each look whether to give up.
 
     Example:
+        >>> import itertools, math
         >>> import robolink
         >>> from robolink.serving import CallbackLimits, PermitCall, PermitPlan
-        >>> with robolink.connect("softmotion+sim://permit-example") as controller:
-        ...     plan, limits = PermitPlan(tool=1), CallbackLimits()
-        ...     call = PermitCall(controller, plan, limits, ended=lambda: True)
-        ...     print(call.answer())  # nobody asked for anything before it was to give up
-        None
+        >>> from robolink_simulators.hosting.in_process.softmotion import simulator_named
+        >>> controller = robolink.connect("softmotion+sim://permit-example")
+        >>> plc = simulator_named("permit-example")
+        >>> looks, world = itertools.count(), plc.world
+        >>> turns_deg = iter((0, -60, -60, -30, 60, 60, -105))  # five touches, two proofs
+        >>> def program():  # of the PLC, at each look: clear of the pin, later on it
+        ...     look = next(looks) % 12
+        ...     if look == 0:
+        ...         plc.panel.withdraw_permit()
+        ...         world.robot.turn(next(turns_deg))
+        ...         world.robot.carry(world.tips[1], world.gap_mm())
+        ...     if look == 5:
+        ...         plc.panel.give_permit()
+        ...     return False
+        >>> plan, limits = PermitPlan(tool=1), CallbackLimits()
+        >>> with controller:
+        ...     kept = PermitCall(controller, plan, limits, ended=program).answer()
+        >>> tip = world.tips[1]
+        >>> math.hypot(kept.x_mm - tip.x_mm, kept.y_mm - tip.y_mm) < 0.001
+        True
     """
 
     def __init__(

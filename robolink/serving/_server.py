@@ -63,7 +63,7 @@ class CallbackServer:
         self._allowed = frozenset(_ip(address) for address in allow)
         if not self._allowed and not ipaddress.ip_address(_ip(host)).is_loopback:
             raise ConfigError(
-                tr("At {host} any computer of the network could call.", host=host),
+                tr("At {host} any computer on the network could call.", host=host),
                 remedy=tr("Say which may: their addresses, one by one."),
             )
         self._conversation, self._tell = conversation, tell
@@ -77,7 +77,7 @@ class CallbackServer:
         except OSError as error:
             raise ConfigError(
                 tr(
-                    "Nobody can listen at {host}:{port}: {cause}.",
+                    "robolink cannot listen at {host}:{port}: {cause}.",
                     host=host,
                     port=port,
                     cause=error,
@@ -171,7 +171,7 @@ def _ip(text: str) -> str:
         found = ipaddress.ip_address(text.partition("%")[0])
     except ValueError as error:
         raise ConfigError(
-            tr("{address!r} is no address of a computer.", address=text),
+            tr("{address!r} is not the address of a computer.", address=text),
             remedy=tr("Write it in numbers, for example 192.168.0.20."),
         ) from error
     mapped = getattr(found, "ipv4_mapped", None)

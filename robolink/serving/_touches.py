@@ -42,7 +42,7 @@ class _Touches:
         if self.unwitnessed:
             raise CalibrationError(
                 "touches_not_witnessed",
-                tr("{count} touches were seen by no contact.", count=self.unwitnessed),
+                tr("{count} touches gave no contact signal.", count=self.unwitnessed),
             )
         require_poses_sent(len(self.poses), least)
 

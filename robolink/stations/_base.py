@@ -61,8 +61,8 @@ def require_base_of(controller: Controller, station: Station) -> None:
         return
     raise NotReadyError(
         tr(
-            "Station {id} was learnt while the controller's base (Base) stood at {before}; it "
-            "stands at {now}: the place on record is another one now.",
+            "Station {id} was learnt with the controller's base (Base) at {before}; "
+            "it is at {now} now, so the place on record is somewhere else.",
             id=station.id,
             before=_shown(station.base),
             now=_shown(now),

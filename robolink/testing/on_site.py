@@ -97,7 +97,7 @@ def _require_spare(controller: Controller, tool: int) -> None:
     controller.tools.require_writable(tool)
     if controller.tools.selected() == tool:
         raise ConfigError(
-            tr("Tool {tool} is selected: the checks would write over it.", tool=tool),
+            tr("Tool {tool} is selected: the checks would overwrite it.", tool=tool),
             remedy=tr("Name a tool that no program uses."),
         )
 

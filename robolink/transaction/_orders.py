@@ -124,7 +124,7 @@ def require_order_id(order: str) -> str:
     if 0 < len(order) <= LONGEST_ORDER and order.isascii() and order.isprintable():
         return order
     raise ConfigError(
-        tr("{order} is no id of an order.", order=repr(order[: LONGEST_ORDER + 1])),
+        tr("{order} is not the id of an order.", order=repr(order[: LONGEST_ORDER + 1])),
         remedy=tr("Give 1 to {most} printable ASCII characters.", most=LONGEST_ORDER),
     )
 
@@ -284,6 +284,6 @@ def _refused(what: str) -> ConfigError:
 
 def _anew() -> str:
     return tr(
-        "It is not carried out again: nothing was moved or written. Give a new order where the "
-        "work is to be done."
+        "It is not carried out again: nothing was moved or written. Give a new order "
+        "if the work has to be done again."
     )

@@ -62,7 +62,7 @@ class Settler:
         if not all(n or o for n, o in zip(new, old, strict=True)):
             return self._conflict(marker, steps, now)
         if all(old):
-            text = tr("{holds} Nothing of the change took.", holds=sentence)
+            text = tr("{holds} Nothing of the change took effect.", holds=sentence)
             return _finding(marker, Verdict.NOT_APPLIED, text, steps, now)
         if all(new) and (self._keep or not marker.details.get("verify")):
             text = tr("{holds} The change is complete.", holds=sentence)
@@ -116,7 +116,7 @@ class Settler:
         if begun_on and begun_on != in_force:
             raise NotReadyError(
                 tr(
-                    "{request!r} was begun on {robot}; {other} is in force now.",
+                    "{request!r} was begun on {robot}; {other} is selected now.",
                     request=marker.request,
                     robot=begun_on,
                     other=in_force or self._controller.outcomes.identity,
@@ -152,8 +152,9 @@ class Settler:
         selected = self._controller.tools.selected()
         now = tr("unknown") if selected is None else str(selected)
         sentence = tr(
-            "Tool {tool} is selected. Whether that is the cell's own, and whether each tool holds "
-            "what it should, only you can tell: nothing here knows what was unfinished.",
+            "Tool {tool} is selected. Only you can tell whether that is right for "
+            "this cell, and whether each tool holds what it should: this PC has no "
+            "record of what was unfinished.",
             tool=now,
         )
         backup = marker.details.get("backup")

@@ -56,7 +56,7 @@ def _nothing_to_undo(change: str, *, taken_back: bool) -> str:
         return tr("No finished change of this controller is on record.")
     if taken_back:
         return tr("The change {change} was taken back when it was made.", change=change[:8])
-    return tr("The change {change} finished nothing of that tool.", change=change[:8])
+    return tr("The change {change} completed nothing for that tool.", change=change[:8])
 
 
 def proof_numbered(outcomes: OutcomeLog, number: int) -> Recorded | None:

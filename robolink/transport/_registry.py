@@ -182,11 +182,11 @@ def _load(link: LinkUrl, media: Mapping[str, tuple[str, str]]) -> Callable[..., 
     except PlugInError as error:
         raise ConfigError(
             tr(
-                "What reaches {scheme!r} cannot be loaded: {cause}.",
-                scheme=link.scheme,
+                "The part that connects to {kind!r} cannot be loaded: {cause}.",
+                kind=link.scheme,
                 cause=error,
             ),
-            remedy=tr("Install robolink again, or the package that brings this scheme."),
+            remedy=tr("Reinstall robolink, or the package that provides this scheme."),
         ) from error.origin
     if found is None:
         from importlib import metadata  # costs more than all of this package

@@ -90,7 +90,7 @@ def parse_url(text: str) -> LinkUrl:
     if parts.username is not None or parts.password is not None:
         raise ConfigError(
             tr("A controller URL must not carry a user name or password."),
-            remedy=tr("Remove it and give it so: {password}.", password=way(Way.PASSWORD)),
+            remedy=tr("Remove it, and give it like this: {password}.", password=way(Way.PASSWORD)),
         )
     kind, plus, medium = parts.scheme.partition("+")
     if not (kind and plus and medium):
@@ -112,6 +112,8 @@ def parse_url(text: str) -> LinkUrl:
         if forbidden in options:
             raise ConfigError(
                 tr("A controller URL must not carry a password."),
-                remedy=tr("Remove it and give it so: {password}.", password=way(Way.PASSWORD)),
+                remedy=tr(
+                    "Remove it, and give it like this: {password}.", password=way(Way.PASSWORD)
+                ),
             )
     return LinkUrl(kind, medium, parts.hostname or "", port, parts.path, options)

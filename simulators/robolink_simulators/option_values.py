@@ -70,12 +70,12 @@ def _value(name: str, text: str, hint: Any) -> object:  # noqa: ANN401 - a type 
     except ValueError:
         value = -1
     if not 0 <= value <= _MOST:
-        raise _refused(name, text, tr("a number from 0 up"))
+        raise _refused(name, text, tr("a number, 0 or more"))
     return value
 
 
 def _refused(name: str, text: str, allowed: str) -> ConfigError:
     return ConfigError(
-        tr("The simulator option {name} cannot be {text!r}.", name=name, text=text),
+        tr("The simulator option {name} cannot be {value!r}.", name=name, value=text),
         remedy=tr("It takes: {allowed}.", allowed=allowed),
     )

@@ -1,6 +1,7 @@
 """The drives through beams and onto a plate, fed with an ideal tip: what moves, and where."""
 
 import random
+import re
 from dataclasses import replace
 
 import pytest
@@ -201,8 +202,8 @@ def require_safe_ways(steps):
 
 
 PLANS = [
-    (0.0, 3, 4, "Crossing 4, at beam 2, fits", 4),
-    (180.0, 2, 14, "Crossing 10, at beam 1 and U -60.0, fits", 3),
+    (0.0, 3, 4, "Crossing 4 at beam 2 is 0.", 4),
+    (180.0, 2, 14, "Crossing 10 at beam 1 and U -60.0 is 0.", 3),
 ]
 """Second angle, repeats, the crossing in which the needle slips, how it is named, and its input.
 
@@ -217,7 +218,7 @@ def test_each_crossing_that_others_check_tells_how_it_fits_and_how_sure_the_tip_
     ]
     assert all("the last is 0.00" in text for text in cell.told)
     assert all("X and Y: each sure to +-0.0" in text for text in cell.told)
-    assert "One more, at beam 2, would leave" in cell.told[0]
+    assert "One more at beam 2 would make it about +-0.0" in cell.told[0]
     assert "One more" not in cell.told[-1]
     assert cell.offers == []
 
@@ -227,7 +228,7 @@ def test_where_the_beams_are_is_not_relied_on_before_the_tool_has_turned():
     cell.run(measure_beams(STATION, BeamsParameters(turn_deg=180.0), here=HERE, stored=STORED))
     assert [int(text.split()[0]) for text in cell.told] == [5, 6, 7, 8, *range(11, 17)]
     assert ["sure to" in text for text in cell.told] == [False] * 4 + [True] * 6
-    assert "One more, at beam 2 and U -60.0" in cell.told[4]
+    assert "One more at beam 2 and U -60.0" in cell.told[4]
 
 
 @pytest.mark.parametrize(("turn_deg", "repeats", "slip", "named", "number"), PLANS)
@@ -360,9 +361,11 @@ def test_each_touch_tells_how_it_fits_and_the_worst_alone_is_made_again():
         f"{count} touches" for count in (3, 4, 5, 6, 6)
     ]
     assert " Z: each sure to +-" in cell.told[0]
-    assert "One more, at 1 mm/s, would leave 75 % of that." in cell.told[0]
+    half, following = map(float, re.findall(r"\+-(\d\.\d+)", cell.told[0]))
+    assert "One more at 1 mm/s would make it about" in cell.told[0]
+    assert following == pytest.approx(0.745 * half, rel=0.01)
     (question, when), *_ = cell.offers
-    assert question.startswith("Touch 3, at 2 mm/s, fits worst: it is 0.2")
+    assert question.startswith("Touch 3 at 2 mm/s is 0.2")
     down, seek, back_off, lift = cell.steps[when:]
     assert isinstance(seek, Seek)
     assert seek.speed_mm_s == 2.0

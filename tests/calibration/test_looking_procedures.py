@@ -224,7 +224,7 @@ def test_the_look_that_fits_worst_is_offered_and_taken_again():
     cell = tip_cell()
     cell.wrong = {3: 20.0}
     result = cell.run(measure_camera(STATION, LookPlan(), here=HERE, stored=STORED, retake=True))
-    assert cell.offers[0].startswith("Look 2, at U 60.0, fits worst: it is 0.2")
+    assert cell.offers[0].startswith("Look 2 at U 60.0 is 0.2")
     assert len(cell.offers) == 2
     assert len(cell.looks) == 1 + 4 + 1
     assert cell.told[-1].startswith("4 looks agree within 0.000 mm; the last is 0.000 mm off")

@@ -81,7 +81,7 @@ def test_it_tells_how_sure_it_is_after_each_touch_from_the_third_on():
     course(person)
     assert len(person.told) == 6
     assert person.told[0].startswith("3 touches agree within")
-    assert "One more, at U" in person.told[0]
+    assert "One more at U" in person.told[0]
     assert "One more" not in person.told[-1]
     assert person.offers == []
 
@@ -117,7 +117,7 @@ def test_an_interval_that_is_never_reached_takes_all_touches():
 def test_the_pose_that_fits_worst_is_named_and_taken_again(slip):
     person = Person(slips=[slip], accepts=1)
     result = course(person, retake=True)
-    assert f"Pose {slip}, at U" in person.offers[0]
+    assert f"Touch {slip} at U" in person.offers[0]
     assert "Take it again?" in person.offers[0]
     assert person.touches == 9
     assert len(result.inputs) == 8

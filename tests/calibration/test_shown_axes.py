@@ -88,7 +88,7 @@ def test_exact_poses_give_all_six_whichever_way_the_flange_points(start, second_
 def test_the_robot_only_goes_straight_back_and_ends_above_the_pin_as_it_began(start):
     guide = Guide(start)
     measured(guide)
-    shown = [move for move in guide.steps if "where the way began" in move[0].purpose]
+    shown = [move for move in guide.steps if "where the move began" in move[0].purpose]
     assert [step.path for step, _, _ in shown] == [Path.STRAIGHT] * 2
     assert all(turned_deg(here, there) < 1e-4 for _, here, there in shown)
     for _, _, there in guide.steps:
@@ -101,12 +101,16 @@ def test_the_robot_only_goes_straight_back_and_ends_above_the_pin_as_it_began(st
 @pytest.mark.parametrize(
     ("shows", "what", "remedy"),
     [
-        ([(8.0 * X, 0.0)], "The way along the axis is 8.0", "Move 50 mm or more"),
-        ([(60.0 * X, 0.5), (0.0 * X, -0.5)], "The tool turned on the way", "Keep the orientation"),
+        ([(8.0 * X, 0.0)], "The move along the axis is 8.0", "Move 50 mm or more"),
+        (
+            [(60.0 * X, 0.5), (0.0 * X, -0.5)],
+            "The tool turned during the move",
+            "Keep the orientation",
+        ),
         (
             [(60.0 * X + 4.0 * Z, 0.0)],
             "degrees off a right angle",
-            "start both ways at the same pose",
+            "start both moves at the same pose",
         ),
     ],
 )
@@ -141,7 +145,7 @@ def test_after_the_third_time_it_ends_with_the_name_of_what_is_wrong(show, code,
 def test_a_way_to_the_wrong_side_is_offered_again_or_stays_in_doubt(accepts):
     guide = Guide(sigma_mm=0.0, shows=[(-60.0 * X, 0.0)], accepts=accepts)
     result = measured(guide)
-    assert guide.offers[0].startswith("This way leads 163 degrees away from +X")
+    assert guide.offers[0].startswith("This move leads 163 degrees away from +X")
     assert ("turned_from_stored" in result.warnings) is (not accepts)
     right = result.offset.components() == pytest.approx(TOOL.components(), abs=1e-6)
     assert right is bool(accepts)
@@ -152,10 +156,10 @@ def test_ways_that_are_less_square_than_the_touches_scatter_are_offered_again():
     doubted = Guide(shows=[askew])
     assert "ways_askew" in measured(doubted).warnings
     (told,) = [text for text in doubted.told if "right angle" in text]
-    assert "more than the touches scatter" in told
+    assert "The touches explain less than that" in told
     again = Guide(shows=[askew], accepts=1)
     assert measured(again).warnings == ()
-    assert again.offers == ["Show both ways again?"]
+    assert again.offers == ["Show both moves again?"]
     assert len(again.asked) == 5
 
 

@@ -67,7 +67,7 @@ def test_it_tells_how_sure_all_three_lengths_are_and_ends_when_that_is_enough():
     result = course(person, count=12, until_mm=0.1)
     assert person.told[0].startswith("3 touches agree within")
     assert "X, Y and Z: each sure to" in person.told[0]
-    assert "One more, at U" in person.told[0]
+    assert "One more at U" in person.told[0]
     assert "touches were taken" in person.told[-1]
     assert 4 <= len(result.inputs) < 12
 
@@ -76,7 +76,7 @@ def test_it_tells_how_sure_all_three_lengths_are_and_ends_when_that_is_enough():
 def test_the_pose_that_fits_worst_is_taken_again_in_the_same_orientation(slip):
     person = Person(slips=[slip], accepts=1)
     result = course(person, count=8, retake=True)
-    assert f"Pose {slip}, at U" in person.offers[0]
+    assert f"Touch {slip} at U" in person.offers[0]
     assert len(person.touches) == 9
     again, first = person.touches[8], person.touches[slip - 1]
     assert rotation_of(again) == pytest.approx(rotation_of(first), abs=1e-9)
@@ -101,14 +101,14 @@ def test_tilts_out_of_reach_are_replaced_by_others_before_the_tool_tilts():
     person = Person(UPRIGHT, reaches=leans_to_one_side)
     result = course(person)
     assert all(leans_to_one_side(there) for _, _, there in person.steps)
-    assert "cannot be taken up over this pin: out of reach. Others are taken" in person.told[0]
+    assert "cannot be reached over this pin: out of reach. Others replace them" in person.told[0]
     assert len(person.touches) == 6
     errors = np.subtract(result.offset.components()[:3], TIP.components()[:3])
     assert (np.abs(errors) <= result.half_width95).all()
     # Nothing is said, and nothing chosen anew, where all of them are in reach.
     free = Person(UPRIGHT)
     course(free)
-    assert not any("cannot be taken up" in text for text in free.told)
+    assert not any("cannot be reached" in text for text in free.told)
 
 
 def test_an_arm_that_takes_up_hardly_any_tilt_is_refused_before_it_tilts():

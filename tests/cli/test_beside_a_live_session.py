@@ -58,9 +58,9 @@ def test_it_is_told_who_is_at_work_and_never_to_recover(plc, run):
         code, err = run("-c", plc, *command)
         assert code == 0
         assert "Ann Lee (ann, process" in err
-        assert "on pc-7) is at work on this controller since" in err
+        assert "on pc-7) has been at work on this controller since" in err
         assert "calibration of tool 1" in err
-        assert "It is alive" in err
+        assert "It is still working" in err
         assert "recover' puts" not in err
 
 
@@ -84,8 +84,8 @@ def test_a_holder_on_another_computer_is_named_without_waiting(plc, run):
     session(plc, boot="another start of another system")
     code, err = run("-c", plc, "status")
     assert code == 0
-    assert "is at work on this controller" in err
-    assert "Whether it still works shows" in err
+    assert "has been at work on this controller" in err
+    assert "Watch it for a while" in err
 
 
 @pytest.mark.parametrize("gone", ["silent", "ended"])

@@ -86,7 +86,7 @@ def test_a_station_that_was_never_learnt_and_work_left_open(cells, simulator):
     log.close()
     code, document = cells(more=PIN)
     assert (code, found(document)) == (1, ["unsettled", "station_due"])
-    assert recorded()[-1].verdict == "To see to: unsettled, station_due."
+    assert recorded()[-1].verdict == "Needs attention: unsettled, station_due."
 
 
 def test_a_mount_that_slips_is_told_and_an_earlier_course_left_out(cells, simulator):
@@ -195,7 +195,7 @@ def test_a_sensor_measures_after_a_yes_and_nothing_is_written(cells, simulator, 
     assert not [text for _, way, text in simulator.log if way == ">" and "TLSet 1," in text]
     assert set(simulator.machine.tools.defined()) == set(before)
     assert simulator.machine.tools.selected == 1
-    assert recorded()[-1].verdict == "To see to: tip_moved."
+    assert recorded()[-1].verdict == "Needs attention: tip_moved."
 
 
 def test_nothing_moves_without_a_person_s_yes(cells, simulator, watched, tmp_path, capsys):
@@ -216,6 +216,6 @@ def test_a_recipe_by_which_a_person_touches_measures_nothing(cells, simulator, w
     example = ROOT / "examples" / "recipes" / "scara-pin.toml"
     code, document = cells("--measure", str(example))
     assert code == 2
-    assert "a person touches" in document["cells"][0]["error"]["what"]
+    assert "a person to touch" in document["cells"][0]["error"]["what"]
     assert asked == []
     assert simulator.machine.arm.moves_started == 0

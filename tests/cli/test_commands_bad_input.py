@@ -120,8 +120,8 @@ NUMBERS = {
     "NaN": (["tool", "set", "1", "--x", "nan"], "x_mm is not a number"),
     "infinity": (["tool", "set", "1", "--u", "inf"], "u_deg is not a number"),
     "no component": (["tool", "set", "1"], "No component was given"),
-    "no jog step": (["jog", "--yes", "x0.1"], "is no step"),
-    "jog NaN": (["jog", "--yes", "x+nan"], "is no step"),
+    "no jog step": (["jog", "--yes", "x0.1"], "is not a step"),
+    "jog NaN": (["jog", "--yes", "x+nan"], "is not a step"),
     "too large a step": (["jog", "--yes", "x+50"], "more than one step may be"),
     "clearance above the lift": (
         ["calibrate", "two-pose", "--tool", "1", "--clearance", "20"],

@@ -50,7 +50,7 @@ def test_path_shows_each_place_and_whether_it_is_there(cells, capsys, monkeypatc
         ("site", True),
     ]
     assert main.run(["config", "path"]) == 0
-    assert f"{cells / 'robolink.toml'}\n    the working folder's: found" in capsys.readouterr().out
+    assert f"{cells / 'robolink.toml'}\n    the working folder's: exists" in capsys.readouterr().out
 
 
 def test_check_finds_all_right(cells, capsys):

@@ -137,7 +137,7 @@ def test_a_tool_that_was_written_before_is_named(ended):
     code, _, err = ended(act)
     assert code == 143
     assert err.splitlines()[-1] == (
-        "Nothing was moved. Tool 3 holds X 1.500 Y 2.500 Z 3.500 U 0.000 now; before it held "
+        "Nothing was moved. Tool 3 now holds X 1.500 Y 2.500 Z 3.500 U 0.000; before, it held "
         "undefined. Tool 1 is selected."
     )
 

@@ -1,4 +1,4 @@
-"""What is no regular file, or has no end, is refused at once by every command that reads one."""
+"""What is not a regular file, or has no end, is refused at once by every command that reads one."""
 
 import json
 import os
@@ -87,7 +87,7 @@ def test_a_journal_is_no_exception(no_file, capsys, monkeypatch):
     monkeypatch.setenv("ROBOLINK_JOURNAL", str(no_file))
     code, what = run(["journal", "list"], capsys)
     assert code == 2
-    assert f"{no_file} is no regular file" in what
+    assert f"{no_file} is not a regular file" in what
 
 
 @pytest.mark.parametrize("where", ["environment", "cell file"])

@@ -60,7 +60,7 @@ def test_f79_one_order_for_two_jobs_is_refused(run, simulator):
 @pytest.mark.parametrize("order", ["", "x" * 65, "Zw\xf6lf", "a\nb"])
 def test_f79_an_order_is_some_printable_characters(run, simulator, order):
     code, _, err = run("tool", "set", "1", "--x", "12.5", "--order", order, "--yes")
-    assert (code, "no id of an order" in err) == (2, True)
+    assert (code, "not the id of an order" in err) == (2, True)
     assert simulator.machine.flash_writes == 0
 
 

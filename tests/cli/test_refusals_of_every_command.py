@@ -80,7 +80,7 @@ BAD = {
     "robot variable set": (["g_Long", "x", "--type", "Long"], "x"),
     "expert verify-controller": (["--timeout", "0"], "0"),
     "expert check-contract": (["now"], "Two controllers are named"),
-    "robot jog": (["--yes", "x0.1"], "is no step"),
+    "robot jog": (["--yes", "x0.1"], "is not a step"),
     "calibrate two-pose": (["--tool", "1", "--taught-tool", "0"], "--taught-tool"),
     "calibrate n-angle": (["--tool", "1", "--angles", "0,90"], "must hold at least 3"),
     "calibrate one-touch": (["--tool", "1"], "Missing option '--station'"),
@@ -92,7 +92,7 @@ BAD = {
     "calibrate camera": (["--tool", "1", "--station", "C"], "no station 'C'"),
     "calibrate camera-affine": (
         ["--tool", "1", "--station", "C", "--at", "1,2"],
-        "'1,2' is no place",
+        "'1,2' is not a place",
     ),
     "calibrate board": (["--tool", "1", "--station", "C"], "say where the fiducials are"),
     "calibrate runout-table": (

@@ -77,7 +77,7 @@ ENDS = {
     "declined": ((CALIBRATION, DECLINED), "Declined, nothing was written"),
     "refused at once": ((REFUSED,), "Refused, nothing was written"),
     "refused, then measured": ((REFUSED, CALIBRATION), "A proposal, nothing was written"),
-    "drifts": ((CALIBRATION, *WRITTEN, FAILED, BACK), "The verification failed"),
+    "drifts": ((CALIBRATION, *WRITTEN, FAILED, BACK), "The turn test failed"),
     "taken back": ((*WRITTEN, BACK), "Taken back, the tool has its old value again"),
     "not applied": (
         (WRITTEN[0], entry(EntryKind.NOT_APPLIED, **VALUES, value=OLD)),
@@ -148,7 +148,7 @@ def test_the_page_says_who_when_with_what_and_what_came_of_it(run, recorded, sim
         "A person typed Z.",
         "half a turn would be best",
         "odd thing",
-        "passed : the largest drift is 0.022 mm; 0.200 mm are allowed.",
+        "Passed: 0.022 mm off at most, limit 0.200 mm.",
         "All 7 entries of the journal were checked",
         *(found.hash for found in open_journal().entries()),
     ):

@@ -85,7 +85,7 @@ def test_a_person_sees_a_url_and_a_count(listener, capsys):
     assert main.run(["scan", "127.0.0.1-2", "--port", str(port)]) == 0
     shown = capsys.readouterr().out
     assert shown.startswith(f"epson+tcp://127.0.0.1:{port}\nport {port}: 1 of 2 addresses")
-    assert "no proof of a controller" in shown
+    assert "does not prove a controller" in shown
 
 
 def test_nobody_there_is_said_and_is_no_error(listener, capsys):
@@ -268,7 +268,7 @@ def test_a_line_that_cannot_be_opened_is_told_and_the_next_one_asked(capsys, far
     ("arguments", "said"),
     [
         ((), "range of addresses, or a serial line"),
-        (("--line", "epson+tcp://127.0.0.1:1"), "no serial line of an EPSON controller"),
+        (("--line", "epson+tcp://127.0.0.1:1"), "not a serial line of an EPSON controller"),
         (("--line", "epson+serial:///dev/ttyS77x"), "baud"),
         (("--line", "epson+serial:///dev/ttyS77x?baud=9600&numbers=roman"), "numbers"),
     ],

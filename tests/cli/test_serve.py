@@ -71,7 +71,7 @@ def test_a_server_that_is_killed_in_the_proof_leaves_the_old_tool_and_the_next_o
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.0.20"])
 def test_another_address_than_this_computer_s_needs_a_list_of_who_may_call(host):
-    with pytest.raises(ConfigError, match="any computer of the network"):
+    with pytest.raises(ConfigError, match="any computer on the network"):
         CallbackServer(host, 0, conversation)
 
 

@@ -70,5 +70,5 @@ def test_a_name_of_before_says_its_new_one_on_a_terminal_and_does_the_same(name,
 def test_an_address_of_either_name_is_refused_by_todays(option, capsys):
     assert main.run(["--json", "sim", "softmotion", option, "nowhere"]) == 2
     error = json.loads(capsys.readouterr().out)["error"]
-    assert "'nowhere' is no address" in error["what"]
+    assert "'nowhere' is not an address" in error["what"]
     assert error["remedy"] == "Write for example --tcp 127.0.0.1:5000."

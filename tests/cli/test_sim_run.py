@@ -143,7 +143,10 @@ tcp = "127.0.0.1:6012"
         ('[cells.a]\nkind = "epson"\nseed = "1"', "line 4, cells.a.seed: must be a whole number"),
         ('[cells.a]\nkind = "epson"\nseed = -1', "line 4, cells.a.seed: -1 is not in the range"),
         ('[cells.a]\nkind = "epson"\nspeed = 1001', "line 4, cells.a.speed: 1001"),
-        ('[cells.a]\nkind = "epson"\ntcp = "here"', "line 4, cells.a.tcp: 'here' is no address"),
+        (
+            '[cells.a]\nkind = "epson"\ntcp = "here"',
+            "line 4, cells.a.tcp: 'here' is not an address",
+        ),
         ('[cells.a]\nkind = "epson"\nserial = "com"', "line 4, cells.a.serial: 'com' is not 'pty'"),
         ('[cells.a]\nkind = "epson"\nallow_remote = 1', "line 4, cells.a.allow_remote: must be"),
         ('[cells.a]\nkind = "epson"\noption = ["a=1"]', "line 4, cells.a.option: must be a table"),

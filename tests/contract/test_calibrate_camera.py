@@ -207,7 +207,7 @@ BOARD = ("calibrate", "board")
         ("", (*AFFINE, "--sensor", SIM, "--span", "0"), 2, "must be at least 0.2"),
         ("", (*AFFINE, "--sensor", SIM, "--angles", "0,20"), 2, "spread over at least 30"),
         ("", (*AFFINE, "--sensor", SIM, "--angles", "0,361"), 2, "must be at most 360"),
-        ("", AFFINE, 2, "which camera it sees through"),
+        ("", AFFINE, 2, "which camera looks at"),
         ("?world.camera_miss_share=1", (*AFFINE, "--sensor", SIM), 7, "does not see the tip"),
         ("", ("calibrate", "camera", "--sensor", SIM), 7, "nothing says what they mean"),
         ("", (*BOARD, "--sensor", SIM, "--spacing", "3"), 2, "must be at least 5"),

@@ -93,7 +93,7 @@ def test_a_pivot_near_a_singular_wrist_takes_other_tilts(at):
     at.world.pin_mm = (x_mm + 3.0, y_mm - 3.0, z_mm - 4.0)
     done = at.calibrate("pivot", "--count", "5")
     recovered(done, at.truth, "xyz")
-    assert "of the 4 tilts of the plan cannot be taken up over this pin" in done.err
+    assert "of the 4 planned tilts cannot be reached over this pin" in done.err
 
 
 @each(*ROBOTS, chosen={"C12-C1401S"})

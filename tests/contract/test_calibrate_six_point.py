@@ -74,7 +74,7 @@ def test_place_and_orientation_are_found_written_and_proved(plc, tmp_path):
     assert document["off_square_deg"] == pytest.approx(0.0, abs=0.1)
     assert document["verification"]["passed"]
     assert "Ways along the tool's axes shown by you: 2" in said
-    assert "The ways are 0.0" in said
+    assert "The moves are 0.0" in said
     with_tool = replace(ToolOffset(), **document["proposed"])
     a_deg, b_deg, c_deg = plc.plc.memory.slot(1).tool[3:]
     # The PLC keeps Rz(A) Ry(B) Rz(C).
@@ -83,7 +83,7 @@ def test_place_and_orientation_are_found_written_and_proved(plc, tmp_path):
     )
     assert kept == pytest.approx(orientation(with_tool), abs=1e-6)
     text = page.read_text()
-    assert "5 (where the ways begin)" in text
+    assert "5 (where the moves begin)" in text
     assert "6 (along X)" in text
 
 

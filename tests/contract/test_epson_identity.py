@@ -57,7 +57,7 @@ def test_another_simulator_on_the_same_port_inherits_nothing():
         leave_open(url)
     with serve_tcp(EpsonSimulator(), "127.0.0.1", port), robolink.connect(url) as controller:
         assert controller.outcomes.open_markers() == ()
-        assert "the last time it was" in controller.outcomes.remarks[0]
+        assert "last time it was" in controller.outcomes.remarks[0]
     assert len(open_journal().open_markers()) == 1
 
 

@@ -96,7 +96,7 @@ def test_a_straight_way_to_a_singular_wrist_is_refused_before_it_is_sent(arm):
     machine.arm.place(Joints(*stands[:4], 4.0, stands[5]), simulator.now_ns)
     singular = controller.groups[0].pose()
     started = machine.arm.moves_started
-    with pytest.raises(LimitError, match=r"Joint 5 would stand at 4\.0 degrees"):
+    with pytest.raises(LimitError, match=r"Joint 5 would be at 4\.0 degrees"):
         go(controller, replace(singular, z_mm=singular.z_mm), STRAIGHT)
     assert machine.arm.moves_started == started
     go(controller, singular, JOINT)  # from joint to joint it may

@@ -130,7 +130,7 @@ HALVES |= {"z-touch": {"speeds_mm_s": (2.0, 1.0)}, "beams": {"repeats": 1, "turn
 
 NO_RESIDUAL = ("two-pose", "one-touch", "points", *HALVES)
 TYPED = {"rms_mm": "--max-rms", "max_mm": "--max-residual", "interval_mm": "--max-interval"}
-UNKNOWN_SIGMA = "is missing: the measurement leaves no residual"
+UNKNOWN_SIGMA = "is missing: the measurement cannot check itself"
 
 
 def of_the_library(method, values, **more):

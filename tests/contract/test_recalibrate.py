@@ -291,7 +291,7 @@ def test_a_reference_does_not_stand_for_a_tool_that_somebody_changed(cell, recip
     cell.simulator.machine.tools.set(1, ToolOffset(12.2, -3.5, -20))
     refused = assisted(cell, path)
     assert refused.code == 7
-    assert "stands for X 12.000" in refused.err
+    assert "belongs to X 12.000" in refused.err
 
 
 def test_a_tool_that_somebody_else_changed_is_named_with_the_usual_causes(cell, recipe):
@@ -331,7 +331,7 @@ def test_corrections_that_grow_on_one_nozzle_are_refused(cell, recipe):
         before = cell.tool_1
         done = assisted(cell, recipe(TOUCH), "--nozzle", "N-1")
         assert done.code == code, (step, done.err)
-    assert "they grow" in done.err
+    assert "The correction grew" in done.err
     assert cell.tool_1 == before
     # Another nozzle may sit further off.
     assert assisted(cell, recipe(TOUCH), "--nozzle", "N-2").code == 0

@@ -118,8 +118,8 @@ def test_a_bumped_pin_shifts_all_tools_and_nothing_is_written(arm, tmp_path):
     assert refused.code == 7, refused.err
     error = refused.document["error"]
     assert error["code"] == "station_moved"
-    assert "Tools 1, 2 shifted together by X +0." in error["what"]
-    assert "the station moved" in error["what"]
+    assert "seems to have moved by X +0." in error["what"]
+    assert ": tools 1, 2 shifted alike" in error["what"]
     assert [arm.held(tool) for tool in (1, 2)] == held
     assert {entry.details["code"] for entry in arm.recorded(EntryKind.REFUSED)} == {"station_moved"}
     arm.bump_pin(-0.3, 0.2)

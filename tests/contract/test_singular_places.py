@@ -24,11 +24,11 @@ PLACES = {
     "wrist": (
         TABLE,
         (0.0, -25.0, -57.0, 0.0, -8.0, 0.0),
-        r"Joint 5 would stand at -\d\.\d degrees",
+        r"Joint 5 would be at -\d\.\d degrees",
     ),
     "elbow": (TABLE, (0.0, -88.6, 84.0, 0.0, -85.4, 0.0), "cannot reach"),
     "shoulder": ("CX4-A601S", (0.0, 65.651, -27.855, 0.0, -127.796, 0.0), "cannot reach"),
-    "wrist under a ceiling": (CEILING, (0.0, -25.0, -57.0, 0.0, -8.0, 0.0), "Joint 5 would stand"),
+    "wrist under a ceiling": (CEILING, (0.0, -25.0, -57.0, 0.0, -8.0, 0.0), "Joint 5 would be"),
     "elbow under a ceiling": (CEILING, (0.0, -75.2, 77.6, 0.0, 87.6, 0.0), "cannot reach"),
 }
 """The tool points down in each: joint 5 nearly at 0; the arm nearly stretched; the wrist 26 mm
@@ -161,7 +161,7 @@ def test_touches_at_angles_turn_half_as_far_where_the_arm_ends(at):
     stand(at, FAR_OUT, LEANING)
     done = at.calibrate("n-angle", "--station", "PIN-07", "--count", "4")
     assert done.code == 0, done.err[-900:]
-    assert "The robot takes another way than planned" in done.err
+    assert "The robot takes another path than planned" in done.err
     for axis in ("x", "y"):
         wrong = done.document["proposed"][f"{axis}_mm"] - getattr(at.truth, f"{axis}_mm")
         assert abs(wrong) <= interval_mm(done.document["fit"], axis)

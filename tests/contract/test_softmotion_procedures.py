@@ -66,7 +66,7 @@ def test_the_machine_is_named_and_its_start_is_numbered(cell, controller):
 @pytest.mark.fault("F70")
 def test_a_start_of_the_plc_is_told_as_one_on_every_link(cell, controller):
     cell.restart()
-    with pytest.raises(TransportBrokenError, match="started anew") as ended:
+    with pytest.raises(TransportBrokenError, match="restarted") as ended:
         controller.status()
     assert "no tool slot is selected" in ended.value.remedy
     with cell.connect() as again:

@@ -115,7 +115,7 @@ def test_a_program_is_executed_behind_the_mailbox_and_is_not_put_back(program, s
     assert cell.simulator.executes_program
     cell.snapshot("now")
     for back in (cell.put_back, lambda: cell.restore("now"), lambda: cell.do("reset")):
-        with pytest.raises(ConfigError, match="executes a program is not made anew"):
+        with pytest.raises(ConfigError, match="executes a program cannot be rebuilt"):
             back()
 
 
@@ -126,20 +126,20 @@ def test_a_program_that_does_not_fit_is_refused(program, softmotion_factory, req
         (program / "RL_Kept.st").unlink()
         softmotion_factory(program=program)
     for kind in ("epson", "plc"):
-        with pytest.raises(ConfigError, match="by a simulated SoftMotion PLC alone"):
+        with pytest.raises(ConfigError, match="Only a simulated SoftMotion PLC"):
             request.getfixturevalue(f"{kind}_factory")(program=program)
 
 
 @pytest.mark.parametrize(
     ("given", "words"),
-    [({"robots": "C8"}, "not asked for by 'robots'"), ({"true_tool": (1, 2)}, "three lengths")],
+    [({"robots": "C8"}, "has no parameter 'robots'"), ({"true_tool": (1, 2)}, "three lengths")],
 )
 def test_what_cannot_be_asked_for_is_refused(given, words, epson_factory):
     with pytest.raises(ConfigError, match=words):
         CellRequest.of(given)
     with pytest.raises(ConfigError, match=words):
         epson_factory(**given)
-    with pytest.raises(ConfigError, match="not served by 'carrier pigeon'"):
+    with pytest.raises(ConfigError, match="cannot be served over 'carrier pigeon'"):
         epson_factory(medium="carrier pigeon")
 
 
@@ -285,5 +285,5 @@ def test_a_test_that_fails_shows_wire_seed_and_state(tmp_path):
     assert "> $GetStatus" in shown
     assert '"pin_mm"' in shown
     assert shown.count("robolink wire: epson") == 1
-    assert "not asked for by 'colour'" in shown
+    assert "has no parameter 'colour'" in shown
     assert "(nothing moved)" in shown

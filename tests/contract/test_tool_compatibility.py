@@ -171,7 +171,7 @@ def test_a_position_kinematics_of_one_s_own_needs_the_interface_to_carry_another
 
 
 def test_a_plc_is_not_told_which_kinematics_it_has():
-    with pytest.raises(ConfigError, match="says by itself"):
+    with pytest.raises(ConfigError, match="The PLC itself reports"):
         robolink.connect("softmotion+modbus-tcp://127.0.0.1:1?kinematics=Kin_Gantry3")
 
 
@@ -217,7 +217,7 @@ SCARA_PIN = str(EXAMPLES / "recipes" / "scara-pin.toml")
 def test_what_a_recipe_would_measure_in_vain_is_said_before_anything_moves(run, words):
     code, told = run(*words, "--assist", "softmotion+sim://fits")
     assert code == 5
-    assert "Kin_Scara2_Z could not be told what would be measured: X, Y." in told
+    assert "Kin_Scara2_Z cannot be given what would be measured: X, Y." in told
 
 
 @pytest.mark.parametrize(

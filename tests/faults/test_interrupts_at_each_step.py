@@ -75,14 +75,17 @@ def check_last_line(cell: NozzleCell, line: str) -> None:
     assert line.startswith("Every movement has ended. " if moved else "Nothing was moved. "), line
     holds = describe_offset(cell.tool_1)
     if cell.tool_1 != OLD_TIP:
-        written = f"Tool 1 holds {holds} now; before it held {describe_offset(OLD_TIP)}."
+        written = f"Tool 1 now holds {holds}; before, it held {describe_offset(OLD_TIP)}."
     elif cell.simulator.machine.flash_writes:
         written = f"Tool 1 holds {holds}, as before."
     else:
         written = "Nothing was written."
     assert written in line
     # Before it was read once, nobody claims to know it.
-    selected = (f"Tool {cell.selected_tool} is selected.", "Which tool is selected was not read.")
+    selected = (
+        f"Tool {cell.selected_tool} is selected.",
+        "It was not read which tool is selected.",
+    )
     assert line.endswith(selected)
 
 

@@ -20,7 +20,7 @@ SAID = {
     "damaged": "it is damaged",
     "newer": "this robolink knows forms up to",
     "garbage": "it is not a journal",
-    "unreachable": "the database is not reached",
+    "unreachable": "the database cannot be reached",
 }
 LOOKS = {
     "status": ["status"],

@@ -330,7 +330,10 @@ def test_what_is_put_back_is_read_twice_before_it_is_trusted(serve, query, which
     simulator.faults.add(fault)
     with serve(simulator) as url, robolink.connect(url, timeout_s=0.5) as controller:
         with (
-            pytest.raises(RemoteProtocolError, match=r"not the same twice: Tool .* Nothing was"),
+            pytest.raises(
+                RemoteProtocolError,
+                match=r"two different answers about its tool, power and speed: Tool .* Nothing was",
+            ),
             controller.preserved("a procedure"),
         ):
             raise AssertionError("the procedure ran")

@@ -137,5 +137,5 @@ def test_f71_the_password_of_a_journal_s_server_stands_in_no_error():
             while cause is not None:
                 told.append(str(cause))
                 cause = cause.__cause__
-            assert "is not reached" in told[0]
+            assert "cannot be reached" in told[0]
             assert not [text for text in told if "canary-secret" in text]

@@ -25,20 +25,14 @@ TOPS = {
     "robolink_simulators": ROOT / "simulators" / "robolink_simulators",
 }
 
-INSIDE = frozenset(
-    f"robolink_simulators.{name}" for name in ("epson", "epson.spel", "plc", "soak", "soak.rules")
-)
-"""Packages of simulators that are not held to it."""
-
 HELD = sorted(
     {
         ".".join((top, *path.parent.relative_to(folder).parts))
         for top, folder in TOPS.items()
         for path in folder.rglob("__init__.py")
     }
-    - INSIDE
 )
-"""Packages whose callables are held to it: all of the library."""
+"""Packages whose callables are held to it: all of the library, and all of the simulators."""
 
 MANY = 3
 

@@ -6,7 +6,7 @@ from string import Formatter
 
 import pytest
 from babel.messages.pofile import read_po
-from robolink_cli.console.columns import columns
+from robolink_cli.console.columns import columns, filled
 
 from tests.packaging.test_catalogue import CATALOGUE
 from tools.sentences import collect
@@ -128,3 +128,12 @@ def test_what_click_says_is_translated_with_the_same_values():
 def test_columns_are_counted_as_a_terminal_shows_them():
     assert columns("Tool 1") == 6
     assert columns("工具 1") == 6
+
+
+def test_a_bracket_is_not_left_alone_at_the_end_of_a_line():
+    said = "旋转(例如龙门)为 0。 [默认：180.0]"  # noqa: RUF001
+    for width in range(12, columns(said)):
+        lines = filled(said, width).split("\n")
+        assert all(columns(line) <= width for line in lines)
+        assert not [line for line in lines if line.endswith(("(", "["))]
+        assert "".join(lines).replace(" ", "") == said.replace(" ", "")

@@ -142,7 +142,7 @@ def test_a_tool_that_cannot_be_written_is_refused(tool, error):
 
 OTHERS = {
     "robot serials": replace(FACTS, robot_serials=("B2",)),
-    "robot in force": replace(FACTS, robot_number=2),
+    "selected robot": replace(FACTS, robot_number=2),
 }
 
 

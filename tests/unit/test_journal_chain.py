@@ -116,7 +116,7 @@ def test_entries_that_are_gone_are_named(condition, problem):
         ("UPDATE head SET number = 4", "The journal ends with entry 4, but there are entries up"),
         ("UPDATE head SET number = 6", "Entry 6 is missing."),
         ("UPDATE head SET hash = 'x'", "Entry 5 is not the one that was stored last."),
-        ("DELETE FROM head", "The note of which entry was stored last is missing."),
+        ("DELETE FROM head", "The note that says which entry was stored last is missing."),
     ],
 )
 def test_a_changed_note_of_the_end_is_found(statement, problem):

@@ -159,18 +159,18 @@ def output(ledger):
     [
         (
             lambda ledger: None,
-            "Nothing was moved. Nothing was written. Which tool is selected was not read.",
+            "Nothing was moved. Nothing was written. It was not read which tool is selected.",
         ),
         (
             in_doubt,
             "Nothing was moved. Tool 1 may hold the new value X 12.500 Y -3.500 Z -20.000 U 0.000; "
-            "it held X 12.000 Y -3.500 Z -20.000 U 0.000. Tool 1 is selected. "
+            "before, it held X 12.000 Y -3.500 Z -20.000 U 0.000. Tool 1 is selected. "
             "Next: robolink recover.",
         ),
         (
             changed,
-            "Nothing was moved. Tool 1 holds X 12.500 Y -3.500 Z -20.000 U 0.000 now; before it "
-            "held X 12.000 Y -3.500 Z -20.000 U 0.000. Which tool is selected was not read.",
+            "Nothing was moved. Tool 1 now holds X 12.500 Y -3.500 Z -20.000 U 0.000; before, "
+            "it held X 12.000 Y -3.500 Z -20.000 U 0.000. It was not read which tool is selected.",
         ),
         (
             tool_zero,
@@ -179,13 +179,13 @@ def output(ledger):
         ),
         (
             on_the_way,
-            "The robot may still move, and the end of this was not seen: Go P1. Nothing was "
-            "written. Which tool is selected was not read. Next: robolink recover.",
+            "The robot may still be moving; the end of this was not seen: Go P1. Nothing was "
+            "written. It was not read which tool is selected. Next: robolink recover.",
         ),
         (
             output,
             "Nothing was moved. This was carried out: SetIO,8,1. "
-            "Which tool is selected was not read.",
+            "It was not read which tool is selected.",
         ),
     ],
 )

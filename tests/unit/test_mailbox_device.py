@@ -105,7 +105,7 @@ def test_a_state_file_with_an_impossible_number_is_refused(tmp_path, bent):
     document = json.loads(path.read_text())
     document["memory"]["device_id"] = bent
     path.write_text(json.dumps(document))
-    with pytest.raises(ConfigError, match="no saved state"):
+    with pytest.raises(ConfigError, match="not a saved state"):
         plc(path)
 
 

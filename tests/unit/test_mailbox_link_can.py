@@ -190,7 +190,7 @@ def toggled(service, data):
 @pytest.mark.fault("F51")
 def test_an_answer_that_does_not_fit_aborts_the_transfer(link_to, foreign):
     bus, link = link_to(node_with(0, lambda data: [(SDO_ANSWER, foreign)]))
-    with pytest.raises(RemoteProtocolError, match="something else than object 2100h:0"):
+    with pytest.raises(RemoteProtocolError, match="something other than object 2100h:0"):
         link.write_command((7,) * 64)
     assert [data[0] for _, data in bus.sent[2:]] == [0x21, 0x80]
 

@@ -97,7 +97,7 @@ def test_frames_that_come_in_a_flood_are_named_before_the_deadline():
 )
 def test_an_answer_that_does_not_fit_its_number_ends_the_link(answer):
     line, client = over_tcp(lambda frame: [answer])
-    with pytest.raises(RemoteProtocolError, match="something else"):
+    with pytest.raises(RemoteProtocolError, match="something other"):
         client.read_input(0, 1)
     assert line.closed
 

@@ -75,7 +75,7 @@ def test_good_rows_are_kept_beside_bad_ones_each_named_with_its_line(tmp_path):
         "line 6 (GVL.Tool1_X)",
         "line 8 (Pump)",
     ]
-    assert "X of tool 1 stands in a line before it" in draft.bad[3]
+    assert "X of tool 1 is in an earlier line already" in draft.bad[3]
     for line in draft.bad:
         assert f"# {line}" in draft.text
 

@@ -156,12 +156,12 @@ def test_units_that_a_format_defines_are_not_believed_against_reason(read):
 
 
 REFUSED = {
-    "DECL E6AXIS XHOME={A1 0,A2 -90,A3 90,A4 0,A5 0,A6 0}\n": "joints are no pose",
-    "CONST jointtarget j1:=[[0,0,0,0,30,0],[9E+09,9E+09]];\n": "joints are no pose",
-    "movej([0,-1.57,1.57,0,0,0], a=1.4)\n": "joints are no pose",
-    "P[1]{\n GP1:\n UF : 0, UT : 1,\n J1= 0.0 deg, J2= 1.0 deg\n};\n": "joints are no pose",
+    "DECL E6AXIS XHOME={A1 0,A2 -90,A3 90,A4 0,A5 0,A6 0}\n": "joint angles are not a pose",
+    "CONST jointtarget j1:=[[0,0,0,0,30,0],[9E+09,9E+09]];\n": "joint angles are not a pose",
+    "movej([0,-1.57,1.57,0,0,0], a=1.4)\n": "joint angles are not a pose",
+    "P[1]{\n GP1:\n UF : 0, UT : 1,\n J1= 0.0 deg, J2= 1.0 deg\n};\n": "are not a pose",
     "P1 = AglToPls(0, 0, 0, 0)\n": "not given in coordinates",
-    "P1 = XY(300, 200, -50, 100) +X(10)\n": "line 1: the point is changed behind its numbers",
+    "P1 = XY(300, 200, -50, 100) +X(10)\n": "line 1: the point is changed after its numbers",
     "P1 = XY(300, 200, -50)\n": "line 1: the point does not hold four or six",
     "P1 = XY(x, y, z, u)\n": "line 1: the point does not hold four or six",
     "DECL POS XP={X 1,Y 2,Z 3}\n": "line 1: there is no A, B, C",

@@ -138,7 +138,7 @@ def test_the_angles_are_those_of_the_method(text, where, what):
         (
             with_(with_(BEAMS, "[source]", "repeats = 1"), "[tolerances]", "interval_mm = 0.1"),
             "tolerances.sigma_mm",
-            "is missing: the measurement leaves no residual",
+            "is missing: the measurement cannot check itself",
         ),
         (
             with_(BEAMS, "[source]", "repeats = 1", "retake = true"),
@@ -252,7 +252,7 @@ ONE_LOOK = "turns_deg = [0]"
         (
             with_(with_(CAMERA, "[source]", ONE_LOOK), "[tolerances]", "interval_mm = 0.1"),
             "tolerances.sigma_mm",
-            "is missing: the measurement leaves no residual",
+            "is missing: the measurement cannot check itself",
         ),
     ],
 )
@@ -476,7 +476,7 @@ def test_without_a_safe_pose_one_box_can_hold_all_poses(retreat, inside):
 def test_residuals_of_two_poses_are_not_judged_and_the_reason_is_told(text, key):
     found = problems(with_(text, "[tolerances]", f"{key} = 0.1"))
     assert list(found) == [f"tolerances.{key}"]
-    assert "two poses always agree" in found[f"tolerances.{key}"]
+    assert "two poses cannot check each other" in found[f"tolerances.{key}"]
 
 
 def test_the_largest_residual_may_not_be_smaller_than_the_rms():
@@ -534,7 +534,7 @@ def test_attempts_belong_to_measuring_again():
     ("at_", "tool", "what"),
     [
         ("before_measure", 3, None),
-        ("before_measure", 4, "is no tool of this recipe"),
+        ("before_measure", 4, "is not a tool of this recipe"),
         ("start", 3, 'means nothing here: "start" comes once'),
         ("before_write", 4, 'means nothing here: "before_write" comes once'),
     ],

@@ -142,7 +142,7 @@ def test_the_largest_is_marked_once_in_the_table_and_once_in_the_picture():
     assert page.text.count("P1, largest") == 1
     assert "P1: 0.500 mm" in page.text
     assert "Largest: 0.500 mm, P1." in page.text
-    assert "It is equal at every point" in page.text
+    assert "It is the same at every point" in page.text
 
 
 @pytest.mark.parametrize("name", ["50 points", "one point", "a huge shift"])
@@ -221,7 +221,7 @@ OUTCOMES = {
     Outcome.PROPOSED: "A proposal, nothing was written",
     Outcome.DECLINED: "Declined, nothing was written",
     Outcome.REFUSED: "Refused, nothing was written",
-    Outcome.VERIFY_FAILED: "The verification failed",
+    Outcome.VERIFY_FAILED: "The turn test failed",
     Outcome.NOT_APPLIED: "Not applied, the tool keeps its old value",
     Outcome.ROLLED_BACK: "Taken back, the tool has its old value again",
     Outcome.CONFLICT: "Conflict: the tool holds neither the old nor the new value",
@@ -238,7 +238,7 @@ def test_how_it_ended_stands_at_the_top(outcome):
 def test_the_drifts_are_shown_with_what_is_allowed():
     drifts = (Drift(90, 0.3, -0.4), Drift(0, 0.01, 0.0))
     page = Page(render(report(verification=VerifyResult(drifts, 0.2))))
-    assert "failed : the largest drift is 0.500 mm; 0.200 mm are allowed." in page.text
+    assert "Failed: 0.500 mm off at most, limit 0.200 mm." in page.text
     assert "90.000 0.300 -0.400 0.500" in page.text
 
 

@@ -210,7 +210,7 @@ def test_only_a_change_of_the_tools_is_written(login, state):
 @pytest.mark.parametrize("text", ["", "{}", '{"schema": "robolink/sim-state/1"}', "[1]"])
 def test_a_state_that_fits_nothing_is_refused_and_kept(state, text):
     state.write_text(text)
-    with pytest.raises(ConfigError, match="no saved state"):
+    with pytest.raises(ConfigError, match="not a saved state"):
         EpsonSimulator(state_path=state)
     assert state.read_text() == text
 

@@ -48,7 +48,7 @@ def test_what_it_has_not_is_named():
 
 def test_a_state_file_that_does_not_fit_is_refused_at_once(tmp_path):
     (tmp_path / "state.json").write_text("{}")
-    with pytest.raises(ConfigError, match="no saved state"):
+    with pytest.raises(ConfigError, match="not a saved state"):
         EpsonSimulator(state_path=tmp_path / "state.json")
 
 

@@ -53,7 +53,7 @@ def test_options_reach_the_part_that_they_are_about():
         ({"unit_um": "0"}, "above 0"),
         ({"program_cycle_us": "0"}, "above 0"),
         ({"cycle_us": "9000000"}, "above 0"),
-        ({"watchdog_ms": "-1"}, "from 0 up"),
+        ({"watchdog_ms": "-1"}, "0 or more"),
         ({"response": "4000"}, "4096 registers"),
         ({"slots": "100"}, "response and slots overlap"),
         ({"registers": "holding"}, "command and response overlap"),

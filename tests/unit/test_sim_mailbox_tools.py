@@ -189,5 +189,5 @@ def test_a_file_that_does_not_fit_is_refused(tmp_path, change):
     path = tmp_path / "plc.json"
     SoftMotionSimulator(state_path=path)
     path.write_text(path.read_text().replace(*change))
-    with pytest.raises(ConfigError, match="no saved state"):
+    with pytest.raises(ConfigError, match="not a saved state"):
         SoftMotionSimulator(state_path=path)

@@ -70,7 +70,7 @@ def test_nothing_is_written_when_a_tool_holds_something_else(cell, controller, p
     cell.put(place, OTHER)
     with pytest.raises(ToolChangedError, match=r"holds X 1\.000 .* not the expected") as refused:
         change_tools(controller, wanted(1, 2))
-    assert "Read it again" in refused.value.remedy
+    assert "Read the tool again" in refused.value.remedy
     assert cell.writes == 0
     assert cell.story() == []
 
@@ -191,7 +191,7 @@ def test_a_link_that_is_gone_leaves_the_change_to_recover(cell):
 
 def test_a_change_that_another_recovered_meanwhile_is_neither_kept_nor_taken_back(cell):
     with cell.connected() as controller:
-        with pytest.raises(OutcomeUnknownError, match="Another settled meanwhile"):
+        with pytest.raises(OutcomeUnknownError, match="Somebody else has settled"):
             with ToolChange(controller, wanted(1), verify=True) as change:
                 change.write()
                 # He is silent for so long that another may do his work.

@@ -46,7 +46,7 @@ def leave_write_open(cell):
 def test_nothing_that_took_is_not_applied(cell, controller):
     finding = Settler(controller).examine(leave_open(cell))
     assert finding.verdict is Verdict.NOT_APPLIED
-    assert finding.sentence.endswith("Nothing of the change took.")
+    assert finding.sentence.endswith("Nothing of the change took effect.")
     Settler(controller).settle(finding)
     assert cell.story(1)[-1] == cell.story(2)[-1] == "not applied"
     assert cell.journal.open_markers() == ()

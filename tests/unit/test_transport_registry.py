@@ -80,7 +80,7 @@ def test_of_two_packages_that_bring_the_same_none_is_guessed(monkeypatch):
         for place in ("one:open", "another:open")
     )
     monkeypatch.setattr(metadata, "entry_points", lambda **by: both.select(**by))
-    with pytest.raises(ConfigError, match="cannot be loaded: several packages bring it"):
+    with pytest.raises(ConfigError, match="cannot be loaded: several packages provide it"):
         find_opener(parse_url("gantry+tcp://192.168.0.1"))
 
 

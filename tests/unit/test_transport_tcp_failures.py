@@ -100,8 +100,8 @@ def sockets(monkeypatch):
         (ConnectionRefusedError(errno.ECONNREFUSED, "refused"), "refuses connections"),
         (TimeoutError("timed out"), "did not answer within 3 s"),
         (OSError(errno.ETIMEDOUT, "timed out"), "did not answer within 3 s"),
-        (OSError(errno.EHOSTUNREACH, "no route"), "no way to"),
-        (OSError(errno.ENETUNREACH, "no network"), "no way to"),
+        (OSError(errno.EHOSTUNREACH, "no route"), "no route to"),
+        (OSError(errno.ENETUNREACH, "no network"), "no route to"),
         (PermissionError(errno.EACCES, "forbidden here"), "forbidden here"),
     ],
 )

@@ -60,7 +60,11 @@ class WindowsPython:
         return self.folder / "python" / "python.exe"
 
     def run(
-        self, *arguments: str, seconds: float = 300, **environment: str
+        self,
+        *arguments: str,
+        seconds: float = 300,
+        cwd: Path = ROOT / "build",
+        **environment: str,
     ) -> subprocess.CompletedProcess[str]:
         """Run python.exe to its end and return what it said and its exit code."""
         # stdout has to be a pipe: wine hands a plain file on as a handle that CPython refuses.
@@ -73,7 +77,7 @@ class WindowsPython:
             errors="replace",
             timeout=seconds,
             check=False,
-            cwd=ROOT / "build",
+            cwd=cwd,
         )
 
     def start(self, *arguments: str, **environment: str) -> "subprocess.Popen[str]":

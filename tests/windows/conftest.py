@@ -1,9 +1,12 @@
 """One Windows Python for all judges, made once."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from robolink_simulators.epson.device import EpsonSimulator
 
+from tests.windows._cells import Opener, cell_for_windows
 from tests.windows._windows_python import WindowsPython, made, suite_beside
 
 
@@ -17,6 +20,21 @@ def windows() -> WindowsPython:
 def suite(windows: WindowsPython) -> Path:
     """The tests, where they import the wheel and not the source."""
     return suite_beside(windows)
+
+
+@pytest.fixture
+def simulator() -> EpsonSimulator:
+    """A simulated controller of this machine."""
+    return EpsonSimulator(seed=7)
+
+
+@pytest.fixture
+def opened(
+    windows: WindowsPython, simulator: EpsonSimulator, state: dict[str, str], tmp_path: Path
+) -> Iterator[Opener]:
+    """What runs a command at that controller in a console of Windows."""
+    with cell_for_windows(windows, simulator, state, tmp_path) as opener:
+        yield opener
 
 
 @pytest.fixture

@@ -6,11 +6,13 @@ from typing import Final
 _WIDE: Final = "\u1100-\u115f\u2e80-\u303e\u3041-\ua4cf\uac00-\ud7a3\uf900-\ufaff\ufe30-\ufe6f"
 _WIDE_FORMS: Final = "\uff00-\uff60\uffe0-\uffe6"
 _CLOSING: Final = "\u3001\u3002\uff0c\uff1a\uff1b\uff01\uff1f\uff09\u201d\u300b,.:;!?)"
+_OPENING: Final = "(\\[\uff08\u201c\u300a"
 _HAS_WIDE: Final = re.compile(f"[{_WIDE}{_WIDE_FORMS}]")
 _PIECES: Final = re.compile(
-    rf"[{_WIDE}{_WIDE_FORMS}][{_CLOSING}]*|[^\s{_WIDE}{_WIDE_FORMS}]+[{_CLOSING}]*|\s+"
+    rf"[{_OPENING}]*[{_WIDE}{_WIDE_FORMS}][{_CLOSING}]*"
+    rf"|[^\s{_WIDE}{_WIDE_FORMS}]+?(?=[{_OPENING}]*[{_WIDE}{_WIDE_FORMS}]|\s|$)[{_CLOSING}]*|\s+"
 )
-"""What stays on one line: a wide character with the sign that closes it, a word, a blank."""
+"""What stays on one line: a wide character with the signs about it, a word, a blank."""
 
 
 def has_wide(text: str) -> bool:

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Final
 
 from robolink.interrupts import Interrupted, output_closed
 from robolink_cli.console.columns import filled, within
-from robolink_cli.console.tolerance import PLAINLY
+from robolink_cli.console.tolerance import PLAINLY, is_terminal
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
@@ -64,7 +64,7 @@ def shown_by(shower: ShownBy) -> Iterator[None]:
 
 def drawn_elsewhere() -> bool:
     """Tell whether somebody else draws on the terminal now."""
-    return _shown_by is not None and sys.stdout.isatty()
+    return _shown_by is not None and is_terminal(sys.stdout)
 
 
 def show(text: str, *, beside: bool = False) -> None:
@@ -74,7 +74,7 @@ def show(text: str, *, beside: bool = False) -> None:
         text: One line or several.
         beside: On stderr, beside the result.
     """
-    if _shown_by is not None and (sys.stderr if beside else sys.stdout).isatty():
+    if _shown_by is not None and is_terminal(sys.stderr if beside else sys.stdout):
         _shown_by(visible(text), beside)
         return
     draw(text, beside=beside)

@@ -4,7 +4,7 @@ import codecs
 import io
 import os
 import sys
-from typing import Final
+from typing import Final, TextIO
 
 PLAINLY: Final = "robolink.plainly"
 """Name of what stands in for characters that an encoding lacks: signs in letters, else escapes."""
@@ -61,6 +61,31 @@ def help_width() -> int:
 def may_be_guided() -> bool:
     """Tell whether a person sits at both ends of this process's terminal."""
     try:
-        return os.isatty(sys.stdin.fileno()) and os.isatty(sys.stderr.fileno())
+        ends = [stream.fileno() for stream in (sys.stdin, sys.stderr)]
+        return all(os.isatty(end) and _is_no_other_device(end) for end in ends)
     except (OSError, ValueError, AttributeError):  # closed, or a stream inside a program
         return False
+
+
+def is_terminal(stream: TextIO | None) -> bool:
+    """Tell whether a stream is a terminal, where a person can be."""
+    try:
+        return (
+            stream is not None
+            and stream.isatty()
+            and (os.name != "nt" or _is_no_other_device(stream.fileno()))
+        )
+    except (OSError, ValueError, AttributeError):  # closed, or a stream inside a program
+        return False
+
+
+def _is_no_other_device(descriptor: int) -> bool:
+    """Tell whether what says that it is a terminal is one: on Windows NUL and a port say so too."""
+    if sys.platform != "win32":
+        return True
+    import ctypes
+    import msvcrt
+
+    handle, mode = msvcrt.get_osfhandle(descriptor), ctypes.c_ulong()
+    console = ctypes.windll.kernel32
+    return bool(console.GetConsoleMode(ctypes.c_void_p(handle), ctypes.byref(mode)))

@@ -41,6 +41,7 @@ def impact_options(function: F) -> F:
     function = click.option(
         "--impact-pts",
         type=click.Path(dir_okay=False, path_type=Path),
+        metavar="FILE",
         help=declared("The same for all points of a .pts file of EPSON RC+."),
     )(function)
     return click.option(
@@ -134,7 +135,7 @@ def show_impact(tool: int, impact: "Impact") -> None:
             )
         )
     else:
-        say(tr("  no point could be judged"))
+        say(f"  {tr('No point could be judged.')}")
     _show_left_out(impact)
 
 
@@ -143,7 +144,8 @@ def _show_left_out(impact: "Impact") -> None:
         say(tr("  not taught, skipped: {count}", count=len(impact.undefined)))
     if impact.other_local:
         named = ", ".join(f"P{n} (local {local})" for n, local in impact.other_local.items())
-        say(tr("  in another local, left out: {points}", points=named))
+        left_out = tr("In another local, left out: {points}.", points=named)
+        say(f"  {left_out}")
 
 
 def _cell(value: float) -> str:

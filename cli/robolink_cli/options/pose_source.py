@@ -102,7 +102,13 @@ def pose_source_options(
     options = (
         click.option("--points", metavar="N,N", help=points),
         click.option("--pose", "typed", metavar="X,Y,..", multiple=True, help=typed),
-        click.option("--poses", "path", type=click.Path(dir_okay=False, path_type=Path), help=path),
+        click.option(
+            "--poses",
+            "path",
+            type=click.Path(dir_okay=False, path_type=Path),
+            metavar="FILE",
+            help=path,
+        ),
         click.option(
             "--taught-tool",
             type=click.IntRange(0, 15),

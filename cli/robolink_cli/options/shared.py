@@ -124,6 +124,7 @@ def _link_options(command: CommandT) -> CommandT:
         click.option(
             "--password-file",
             type=click.Path(dir_okay=False),
+            metavar="FILE",
             expose_value=False,
             callback=_keep,
             help=declared(

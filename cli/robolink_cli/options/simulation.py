@@ -54,6 +54,7 @@ def simulation_options(function: F) -> F:
         click.option(
             "--state",
             type=click.Path(dir_okay=False, path_type=Path),
+            metavar="FILE",
             help="File that keeps the tools over a restart, as flash or retained memory does.",
         ),
         pace_options,
@@ -195,6 +196,7 @@ def seed_option(function: F) -> F:
     return click.option(
         "--seed",
         type=click.IntRange(min=0),
+        metavar="N",
         default=1,
         show_default=True,
         help="Another cell: other tools, another tip.",
@@ -207,8 +209,8 @@ def pace_options(function: F) -> F:
         "--exchange",
         type=click.FloatRange(min=0, max=10),
         metavar="SECONDS",
-        show_default="0; 0.05 at speed 0",
-        help="How much simulated time each request takes besides.",
+        help="How much simulated time each request takes besides; without it 0, and 0.05 at "
+        "--speed 0.",
     )(function)
     return click.option(
         "--speed",
@@ -233,6 +235,7 @@ def faults_option(function: F) -> F:
     return click.option(
         "--faults",
         type=click.Path(exists=True, dir_okay=False, path_type=Path),
+        metavar="FILE",
         help="What is planned to go wrong: a file, as docs/fault-plans.md explains.",
     )(function)
 

@@ -13,11 +13,11 @@ from importlib import import_module
 from types import ModuleType
 from typing import Any, Final, Protocol
 
+from robolink_cli.console.tolerance import is_terminal
+from robolink_cli.prompts.console_lines import BURST_S, ConsoleLines
+
 QUIET_S: Final = 0.035
 """Two keys of a person are further apart; the characters of a scanner are not."""
-
-_BURST_S: Final = 1.0
-"""Longest time in which a burst is waited out: a key that is held down never ends."""
 
 
 class Lines(Protocol):
@@ -41,7 +41,7 @@ class Lines(Protocol):
 
 def open_lines() -> Lines:
     """Return the lines of this process's stdin."""
-    if sys.stdin is None or not sys.stdin.isatty():
+    if not is_terminal(sys.stdin):
         return StreamLines()
     console = _module("msvcrt")
     if console is not None:
@@ -80,7 +80,7 @@ class TerminalLines:
         import time
 
         dropped, self._held = self._held, b""
-        end_s = time.monotonic() + _BURST_S
+        end_s = time.monotonic() + BURST_S
         while (data := self._read(quiet_s)) and time.monotonic() < end_s:
             dropped += data
         try:
@@ -128,7 +128,7 @@ class StreamLines:
 
         self._start()
         dropped: list[str] = []
-        end_s = time.monotonic() + _BURST_S
+        end_s = time.monotonic() + BURST_S
         while time.monotonic() < end_s:
             try:
                 line = self._queue.get(block=quiet_s > 0, timeout=quiet_s or None)
@@ -151,39 +151,6 @@ class StreamLines:
                 self._queue.put(line)
         finally:
             self._queue.put(None)
-
-
-class ConsoleLines(StreamLines):
-    """Lines of a Windows console: the console's own editing, and its queue of keys."""
-
-    def __init__(self, console: Any) -> None:  # noqa: ANN401 - the module exists on Windows only
-        super().__init__()
-        self._console = console
-
-    def forget(self, quiet_s: float) -> list[str]:
-        """Drop what was typed; see :class:`Lines`."""
-        import time
-
-        dropped: list[str] = []
-        end_s = time.monotonic() + _BURST_S
-        quiet_from_s = time.monotonic()
-        while time.monotonic() < end_s:
-            if self._console.kbhit():
-                self._console.getwch()
-                quiet_from_s = time.monotonic()
-            elif time.monotonic() - quiet_from_s >= quiet_s:
-                break
-            else:
-                time.sleep(0.005)
-        while True:
-            try:
-                line = self._queue.get_nowait()
-            except queue.Empty:
-                return dropped
-            if line is None:
-                self._queue.put(None)
-                return dropped
-            dropped.append(line.rstrip("\r\n"))
 
 
 def _text(line: bytes) -> str:

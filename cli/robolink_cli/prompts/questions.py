@@ -7,6 +7,7 @@ import click
 
 from robolink.errors import DeclinedError
 from robolink.messages import tr
+from robolink_cli.console.tolerance import is_terminal
 
 WATCHED: Final = "robolink.watched"
 """Where a prompt finds the controller whose status it must read while a person thinks."""
@@ -14,7 +15,7 @@ WATCHED: Final = "robolink.watched"
 
 def on_terminal() -> bool:
     """Tell whether a person can be asked."""
-    return sys.stdin.isatty() and sys.stderr.isatty()
+    return is_terminal(sys.stdin) and is_terminal(sys.stderr)
 
 
 def agree(question: str, *, yes: bool) -> None:

@@ -1,5 +1,6 @@
 """Whether a command is shown as a wizard, and what stands in its first row."""
 
+import os
 import shlex
 from collections.abc import Callable
 from typing import TYPE_CHECKING, TypeVar
@@ -63,4 +64,10 @@ def _typed_again(context: CliContext, chosen: tuple[str, ...]) -> str:
     named = any(word in ("-c", "--controller") or word[:13] == "--controller=" for word in words)
     if context.cell is not None and not named:
         words = ["-c", context.cell.name, *words]
-    return shlex.join(["robolink", *words])
+    words = ["robolink", *words]
+    if os.name != "nt":
+        return shlex.join(words)
+    import subprocess
+
+    # cmd.exe and PowerShell both know double quotes; single ones are letters to cmd.exe.
+    return subprocess.list2cmdline(words)

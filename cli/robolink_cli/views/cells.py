@@ -37,7 +37,7 @@ def show_files(files: Sequence[Mapping[str, object]]) -> None:
         "site": tr("for everybody on this computer"),
     }
     for file in files:
-        found = tr("found") if file["exists"] else tr("not there")
+        found = tr("exists") if file["exists"] else tr("not there")
         say(f"{file['path']}\n    {why[str(file['source'])]}: {found}")
 
 

@@ -81,8 +81,8 @@ def _parts(result: CalibrationResult) -> str:
     if budget is None:
         return ""
     told = tr(
-        "standard uncertainty: from these touches {a:.4f} mm (type A), known otherwise "
-        "{b:.4f} mm (type B), together {c:.4f} mm",
+        "sure to (about 68 %): from these touches {a:.3f} mm, from what else is known {b:.3f} "
+        "mm, together {c:.3f} mm",
         a=budget.type_a_mm,
         b=budget.type_b_mm,
         c=budget.u_c_mm,
@@ -98,7 +98,7 @@ def _ways(result: CalibrationResult) -> str:
     off_deg = result.details().get("off_square_deg")
     if not isinstance(off_deg, float):
         return ""
-    return tr("the ways are {off:.2f} degrees off a right angle", off=abs(off_deg))
+    return tr("The moves are {off:.2f} degrees off a right angle.", off=abs(off_deg))
 
 
 def _camera(result: CalibrationResult) -> str:
@@ -176,4 +176,4 @@ def show_residuals(result: CalibrationResult) -> None:
         )
     angles = (f"{name[0].upper()} deg" for name in names)
     columns = (tr("pose"), *angles, "dX mm", "dY mm", "dZ mm", tr("distance mm"), "")
-    table(tr("residuals"), columns, rows)
+    table(tr("How well it fits"), columns, rows)

@@ -82,7 +82,7 @@ def show_list(entries: Sequence[Recorded], *, all_controllers: bool) -> None:
                 )
             )
         return
-    columns = [tr("number"), tr("time (UTC)"), tr("change"), tr("tool"), tr("kind")]
+    columns = [tr("number"), tr("time (UTC)"), tr("change id"), tr("tool"), tr("kind")]
     columns += [tr("value or verdict"), tr("who")]
     if all_controllers:
         columns.insert(2, tr("controller"))
@@ -104,7 +104,7 @@ def show_entry(entry: Recorded) -> None:
         tr("controller"): entry.controller,
         tr("kind"): entry.kind,
         tr("tool"): "" if entry.tool is None else entry.tool,
-        tr("change"): entry.change,
+        tr("change id"): entry.change,
         tr("operation"): entry.operation,
         tr("allowed"): entry.tolerance,
         tr("verdict"): entry.verdict,

@@ -114,7 +114,16 @@ def show_stations(known: Sequence[StationOfRobot]) -> None:
         return
     several = any(one.robot for one in known)
     whose = [tr("robot")] if several else []
-    columns = (*whose, tr("station"), tr("kind"), "X mm", "Y mm", "Z mm", "sigma mm", tr("found"))
+    columns = (
+        *whose,
+        tr("station"),
+        tr("kind"),
+        "X mm",
+        "Y mm",
+        "Z mm",
+        "sigma mm",
+        tr("known from"),
+    )
     rows = [
         [
             *([one.robot.rpartition("/")[2]] if several else []),

@@ -222,8 +222,8 @@ def _require_observable(fit: LinearFit) -> None:
         return
     matrix_part, offset_part = np.abs(fit.weakest[:4]).max(), np.abs(fit.weakest[6:]).max()
     if offset_part > matrix_part:
-        what = tr("The tool turned too little: its offset and the camera's place mix.")
-        remedy = tr("Add pictures at other angles of U, best all round.")
+        what = tr("The tool turned too little to tell its offset from the place of the camera.")
+        remedy = tr("Add pictures at other angles of U, best over a full turn.")
     else:
         what = tr("The tip moved too little over the image: its scale and turn are unknown.")
         remedy = tr("Add pictures at three places or more that are not in line, at one U.")

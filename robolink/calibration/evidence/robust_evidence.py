@@ -33,7 +33,7 @@ def with_consensus(result: ResultT, kept: Mask, spread_mm: float) -> ResultT:
         raise CalibrationError(
             "robust_unstable",
             tr(
-                "Different draws keep different poses, and their results lie {apart:.3f} mm apart.",
+                "Chance decides which poses are left out: the results differ by {apart:.3f} mm.",
                 apart=spread_mm,
             ),
             remedy=tr("Take more poses, or state how large an outlier is."),
@@ -53,7 +53,7 @@ def require_robust_poses(count: int, minimum: int) -> None:
         raise CalibrationError(
             "robust_too_few",
             tr(
-                "Among {count} poses no outlier can be told; it takes {minimum}.",
+                "An outlier cannot be found among {count} poses; it takes {minimum}.",
                 count=count,
                 minimum=minimum,
             ),

@@ -56,7 +56,8 @@ def require_within_reach(poses: Sequence[Pose], robot: RobotReach) -> None:
     if max(radii) > _REACH_ROOM * robot.reach_mm:
         raise _suspect(
             tr(
-                "A position is {radius:.1f} mm from the base axis; the robot reaches {reach:.0f}.",
+                "A position is {radius:.1f} mm from the base axis; the robot reaches "
+                "{reach:.0f} mm.",
                 radius=max(radii),
                 reach=robot.reach_mm,
             )
@@ -95,7 +96,7 @@ def require_near(poses: Sequence[Pose], live: Pose) -> None:
 
     as_given = away(1.0)
     if any(away(factor) < as_given for factor in (25.4, 1000.0)):
-        raise _suspect(tr("Read in metres or inches they lie nearer to where the robot is."))
+        raise _suspect(tr("Read as metres or inches, they would be nearer to where the robot is."))
 
 
 def require_stored_scale(result: CalibrationResult, stored: ToolOffset | None) -> None:
@@ -114,8 +115,8 @@ def require_stored_scale(result: CalibrationResult, stored: ToolOffset | None) -
     ):
         raise _suspect(
             tr(
-                "The offset would be {ratio:.4g} times as long as the stored one, as metres or "
-                "inches are.",
+                "The offset would be {ratio:.4g} times as long as the stored one: it "
+                "looks like metres or inches.",
                 ratio=ratio,
             )
         )

@@ -43,9 +43,10 @@ def axis_displacement(start: Pose, end: Pose, *, wanted_mm: float | None = None)
     if float(np.linalg.norm(way)) < (wanted_mm or LEAST_WAY_MM):
         raise CalibrationError(
             "short_axis",
-            tr("The way along the axis is {way:.2f} mm.", way=float(np.linalg.norm(way))),
+            tr("The move along the axis is {way:.2f} mm long.", way=float(np.linalg.norm(way))),
             remedy=tr(
-                "Move {least:g} mm or more; the direction is as good as the way is long.",
+                "Move {least:g} mm or more; the longer the move, the better the "
+                "direction is known.",
                 least=wanted_mm or GOOD_WAY_MM,
             ),
         )
@@ -63,8 +64,8 @@ def require_unturned(start: Pose, end: Pose) -> None:
     if off > math.sqrt(2) * math.radians(_TURNED_DEG):
         raise CalibrationError(
             "turned_on_the_way",
-            tr("The tool turned on the way that should show its axis."),
-            remedy=tr("Keep the orientation in which the way began."),
+            tr("The tool turned during the move that should show its axis."),
+            remedy=tr("Keep the orientation in which the move began."),
         )
 
 

@@ -147,8 +147,8 @@ def _in_flange(flange: Pose, shift: Point) -> list[float]:
         raise CalibrationError(
             "tilted_pose",
             tr(
-                "The flange leans by {lean:.2f} degrees, so a longer or shorter needle would look "
-                "as if it were moved aside.",
+                "The flange leans by {lean:.2f} degrees, so a longer or shorter "
+                "needle would look as if it had moved sideways.",
                 lean=plane.lean_deg,
             ),
             remedy=tr("Hold the flange upright or straight upside down, or give the height too."),

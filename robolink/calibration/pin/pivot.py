@@ -215,16 +215,16 @@ def _require_observable(
                 axis=_axis_name(design),
             ),
             remedy=tr(
-                "Tilt it by 30 degrees or more; a robot of four axes can only tell X and Y, "
-                "with the method n_angle."
+                "Tilt it by 30 degrees or more; a four-axis robot can find X and Y "
+                "only, with the method n-angle."
             ),
         )
     if weak:
         raise CalibrationError(
             "insufficient_rotation",
             tr(
-                "The orientations differ too little along {axis}: every placement error would "
-                "count {gain:.1f} times (condition {condition:.0f}).",
+                "The orientations differ too little along {axis}: every error of a "
+                "touch would count {gain:.1f} times (condition {condition:.0f}).",
                 axis=_axis_name(design),
                 gain=math.sqrt(float(design.unit_covariance.diagonal().max())),
                 condition=design.condition_number,

@@ -133,8 +133,8 @@ def solve_six_point(
     if off is not None and abs(off) > MOST_OFF_SQUARE_DEG:
         raise CalibrationError(
             "axes_not_square",
-            tr("The ways along X and Z are {angle:.1f} degrees off a right angle.", angle=off),
-            remedy=tr("Move along the tool's own axes; start both ways at the same pose."),
+            tr("The moves along X and Z are {angle:.1f} degrees off a right angle.", angle=off),
+            remedy=tr("Move along the tool's own axes; start both moves at the same pose."),
         )
     frame = _frame(x_axis, second_axis, square=second_is == "xz")
     u, v, w = uvw_deg(frame)

@@ -50,42 +50,41 @@ def order_in_words(order: RunOrder) -> str:
 # Called late, because the language is chosen when a command runs.
 _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
     "small_rotation": lambda: tr("The poses differ little in U; half a turn would be best."),
-    "few_poses": lambda: tr(
-        "Too few poses to tell which one is off; with four or more that shows."
-    ),
+    "few_poses": lambda: tr("Too few poses to tell which one is off; four or more would show it."),
     "large_rms": lambda: tr("The measurements agree badly with each other for this method."),
     "large_residual": lambda: tr("One touch is far off. Touch it again."),
     "camera_moved": lambda: tr(
-        "The camera sees things beside where they are: it was moved, or its calibration is old."
+        "The camera is off: it was moved, or its calibration is out of date."
     ),
-    "unequal_scale": lambda: tr("The camera's two axes differ much in scale."),
+    "unequal_scale": lambda: tr("The camera's two axes differ greatly in scale."),
     "large_shear": lambda: tr("The image is askew: the camera seems to lean."),
     "large_pixel_residual": lambda: tr(
         "The looks differ from each other by more than half a pixel."
     ),
     "turned_from_stored": lambda: tr(
-        "An axis is more than 45 degrees from where it is stored: make sure that +X and +Z "
-        "were not taken for other axes. The test by tilting does not show it."
+        "An axis is more than 45 degrees from the stored one: make sure that +X and "
+        "+Z were not mistaken for other axes. The test by tilting cannot show that."
     ),
     "ways_askew": lambda: tr(
-        "The ways are further off a right angle than the touches scatter: the orientation is less "
-        "sure than its interval says."
+        "The two moves are further from a right angle than the touches explain: the "
+        "orientation is less sure than its +- says."
     ),
     "full_calibration_due": lambda: tr(
-        "A full calibration is due: the errors of the needle changes since then add up."
+        "A full calibration is due: the errors of the needle changes since the last "
+        "one have added up."
     ),
     "duplicate_poses": lambda: tr(
         "Some poses are copies of others; a copy tells nothing new and counts once."
     ),
     "sigma_contradicted": lambda: tr(
-        "The poses agree less well than was stated; the interval goes by how well they agree."
+        "The poses agree less well than was stated; the +- is taken from how well they agree."
     ),
     "residuals_too_small": lambda: tr(
         "The poses agree far better than was stated: they may be copied or smoothed, or what "
         "was stated is too large."
     ),
     "high_leverage": lambda: tr(
-        "The result hangs on a single pose; take one more near it, so that its error would show."
+        "The result depends on a single pose; take one more near it, so that an error would show."
     ),
     "step_in_run_order": lambda: tr(
         "Between two touches something moved: those before and those after do not agree. Take "
@@ -96,34 +95,36 @@ _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
         "all again."
     ),
     "approach_bias": lambda: tr(
-        "The touches are off toward the side from which the tip came; come from several sides."
+        "The touches are off toward the side that the tip came from. Approach from several sides."
     ),
     "wobble": lambda: tr("The tip wobbles when it turns: it is bent, or the camera leans."),
     "wobble_not_identifiable": lambda: tr(
         "These angles cannot tell an offset from a wobble; four or more that spread would."
     ),
-    "overshoot": lambda: tr("The tip runs on after the trigger; that was taken out."),
+    "overshoot": lambda: tr("The tip runs on after the trigger; the result is corrected for it."),
     "station_undecided": lambda: tr(
         "Whether the station moved cannot be told from these tools; a shift that matters could "
         "stay unseen."
     ),
     "drift_undecided": lambda: tr(
-        "The turn test came out too near to its limit to say passed or failed; take more touches."
+        "The turn test is too near to its limit to call it passed or failed; take more touches."
     ),
-    "gauge_marginal": lambda: tr("The spread of the measurement is marginal for the tolerance."),
-    "gauge_unfit": lambda: tr("The spread of the measurement is too large for the tolerance."),
-    "chart_point_out": lambda: tr("A point lies beyond the limits of the chart."),
+    "gauge_marginal": lambda: tr(
+        "The measurement repeats only just well enough for the tolerance."
+    ),
+    "gauge_unfit": lambda: tr("The measurement does not repeat well enough for the tolerance."),
+    "chart_point_out": lambda: tr("A value is outside the limits of the chart."),
     "chart_drift": lambda: tr("The chart shows a slow drift."),
     "resolution_floor": lambda: tr(
-        "The poses agree better than the robot can show positions; the interval goes by what "
-        "it can show."
+        "The poses agree better than the robot can show positions; the +- is taken "
+        "from the smallest step it shows."
     ),
     "height_not_assessed": lambda: tr(
-        "The flange leans, so an error of the tool's Z is in X and Y; nobody said how sure Z is, "
-        "and the interval leaves it out."
+        "The flange leans, so an error of the tool's Z reaches X and Y. How sure Z is "
+        "was not given, so the +- leaves it out."
     ),
     "order_not_testable": lambda: tr(
-        "Too few touches to see whether something moved meanwhile; from six on that shows."
+        "Too few touches to see whether something moved meanwhile; six or more would show it."
     ),
     "touches_not_witnessed": lambda: tr(
         "Nobody saw these touches being made: the poses were taught, typed or in a file."

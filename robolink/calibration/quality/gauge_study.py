@@ -173,14 +173,12 @@ def _table(values_mm: Sequence[Sequence[Sequence[float]]]) -> Floats:
         raise CalibrationError(
             "too_few_values",
             tr(
-                "{nozzles} nozzles, {persons} persons and {repeats} repeats are too few.",
+                "{nozzles} nozzles, {persons} people and {repeats} repeats are too few.",
                 nozzles=n,
                 persons=o,
                 repeats=r,
             ),
-            remedy=tr(
-                "10 nozzles, 3 persons and 3 repeats are usual; 5, 3 and 3 fit into a shift."
-            ),
+            remedy=tr("10 nozzles, 3 people and 3 repeats are usual; 5, 3 and 3 fit into a shift."),
         )
     for i, part in enumerate(values_mm, start=1):
         for j, cell in enumerate(part, start=1):

@@ -129,7 +129,7 @@ def require_shrinking(
     raise CalibrationError(
         "diverging",
         tr(
-            "The correction is {now:.3f} mm after one of {before:.3f} mm: they grow.",
+            "The correction grew from {before:.3f} mm to {now:.3f} mm.",
             now=now_mm,
             before=earlier_mm[-1],
         ),

@@ -214,7 +214,10 @@ def _found(p: Floats, r: Floats) -> tuple[_State, LinearFit]:
         if full and apart > _SAME_TIP_MM and square_sum(other) <= _AS_GOOD * square_sum(best):
             raise CalibrationError(
                 "ambiguous_tip",
-                tr("Two tips, {apart:.2f} mm apart, fit these touches alike.", apart=apart),
+                tr(
+                    "Two places of the tip, {apart:.2f} mm apart, fit these touches equally well.",
+                    apart=apart,
+                ),
                 remedy=tr("Touch in more orientations."),
             )
     return best

@@ -209,7 +209,8 @@ def _require_radius(places: Floats, radius_mm: float | None) -> None:
         raise CalibrationError(
             "radius_contradicted",
             tr(
-                "The touches lie on a sphere of {found:.2f} mm; {stated:.2f} mm was stated.",
+                "The touches fit a sphere with a radius of {found:.2f} mm; "
+                "{stated:.2f} mm was stated.",
                 found=found_mm,
                 stated=radius_mm,
             ),

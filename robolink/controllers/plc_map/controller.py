@@ -257,7 +257,7 @@ def _with_map(url: LinkUrl) -> tuple[RegisterMap, LinkUrl]:
     file = options.pop("map", "")
     if not file:
         raise ConfigError(
-            tr("The option map is missing in the {scheme} URL.", scheme=url.scheme),
+            tr("The option {name} is missing in the {scheme} URL.", name="map", scheme=url.scheme),
             remedy=tr(
                 "Write for example {scheme}://192.168.0.2?map=machine.toml.", scheme=url.scheme
             ),

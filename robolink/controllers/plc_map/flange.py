@@ -40,7 +40,7 @@ class FlangeReader(MotionGroupCore):
         """
         if not self._flange:
             raise RejectedError(
-                tr("This PLC does not tell where the flange is."),
+                tr("This PLC does not report where the flange is."),
                 remedy=tr(
                     "Read the poses at the HMI and give them with {poses}; or add [flange] to the "
                     "map, if the PLC has registers for it.",

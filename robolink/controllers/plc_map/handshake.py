@@ -148,7 +148,7 @@ class Handshake:
         while self._registers.is_on(self._commit.answer):
             if deadline.expired:
                 raise self._unknown(
-                    tr("Its done signal stays on, {timeout:g} s after.", timeout=timeout_s),
+                    tr("Its done signal is still on {timeout:g} s later.", timeout=timeout_s),
                     request,
                 )
             self._registers.clock.sleep(_POLL_S)
@@ -182,12 +182,12 @@ class Handshake:
         return (
             tr("error {code}, {text}", code=code, text=text)
             if text
-            else tr("error {code}, of which the map says nothing", code=code)
+            else tr("error {code}, which the map does not explain", code=code)
         )
 
     def _unknown(self, why: str, request: str) -> OutcomeUnknownError:
         return OutcomeUnknownError(
-            tr("Whether the PLC took the value over is not known. {why}", why=why),
+            tr("It is not known whether the PLC took the value. {why}", why=why),
             remedy=tr("The request was not repeated. Look at the HMI, then 'robolink recover'."),
             controller=self._registers.identity,
             request=request,

@@ -59,7 +59,10 @@ class MappedPlc(DriverLink):
         if found.certain:
             return found
         raise NotReadyError(
-            tr("The number by which the map knows {identity} reads zero.", identity=self.identity),
+            tr(
+                "The number that identifies {identity} in the map reads zero.",
+                identity=self.identity,
+            ),
             reason=NotReadyReason.NOT_REMOTE,
             remedy=tr("Check that the PLC's program runs, then try again; nothing was written."),
             controller=self.identity,
@@ -99,9 +102,9 @@ class MappedPlc(DriverLink):
                     identity=self.identity,
                 ),
                 remedy=tr(
-                    "Run 'robolink expert plc check-map' with the same -c and "
-                    "compare with the HMI. A map "
-                    "that was changed is confirmed anew. Nothing was written."
+                    "Nothing was written. Run 'robolink expert plc check-map' with "
+                    "the same -c and compare with the HMI. A changed map has to be "
+                    "confirmed again."
                 ),
                 controller=self.identity,
                 request=request,

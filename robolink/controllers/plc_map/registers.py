@@ -102,12 +102,12 @@ class Registers:
                 return found
         raise RemoteProtocolError(
             tr(
-                "The registers from {place} on change with every look.",
+                "The registers from {place} on are different at every reading.",
                 place=describe_place(table, addresses.start),
             ),
             remedy=tr(
-                "Compare the addresses in the map with the PLC's register list; or another "
-                "program writes them just now."
+                "Compare the addresses in the map with the PLC's register list; or "
+                "another program is writing them now."
             ),
             controller=self.identity,
         )

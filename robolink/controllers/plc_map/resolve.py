@@ -42,6 +42,6 @@ class RegisterResolver(MarkerResolver):
         finding = examine_write(self._registers, marker)
         if finding.verdict is not Verdict.DONE or not self._registers.handshake.answers:
             return finding
-        sentence = tr("{holds} Whether the PLC took it over is not known.", holds=finding.sentence)
-        action = tr("ask the PLC once more to take over what stands in the registers")
+        sentence = tr("{holds} It is not known whether the PLC took it.", holds=finding.sentence)
+        action = tr("ask the PLC once more to take what is in the registers")
         return replace(finding, verdict=Verdict.NOT_FINISHED, sentence=sentence, action=action)

@@ -65,7 +65,7 @@ class Slots:
             return SlotContent(dict.fromkeys(addresses, 0))
         raise ToolError(
             tr("Tool {tool} of this PLC cannot be made undefined.", tool=slot.tool),
-            remedy=tr("Write another offset, or zeros where the machine takes them for no tool."),
+            remedy=tr("Write another offset; or zeros, if this machine takes zeros as no tool."),
             controller=self._registers.identity,
         )
 

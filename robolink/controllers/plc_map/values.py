@@ -109,7 +109,10 @@ class OffsetValues:
             self.numbers(slot.components, words, largest_mm=self._map.largest_mm)
         except RemoteProtocolError as error:
             raise LimitError(
-                tr("{cause} It would read so after the write; nothing was sent.", cause=error.what),
+                tr(
+                    "{cause} It would read like that after the write, so nothing was sent.",
+                    cause=error.what,
+                ),
                 remedy=tr("Write 0 in place of so small a number."),
                 controller=self._identity,
             ) from error

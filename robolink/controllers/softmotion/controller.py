@@ -281,8 +281,8 @@ def _own_kinematics(url: LinkUrl) -> tuple[LinkUrl, str]:
         return url, named if is_custom(named) else ""
     if named and not is_custom(named):
         raise ConfigError(
-            tr("A PLC says by itself that its kinematics is {name}.", name=named),
-            remedy=tr("Leave kinematics out, or name the class of your own as module:Class."),
+            tr("The PLC itself reports that its kinematics is {name}.", name=named),
+            remedy=tr("Leave kinematics out, or name your own class as module:Class."),
         )
     options = {name: value for name, value in url.options.items() if name != "kinematics"}
     return replace(url, options=options), named

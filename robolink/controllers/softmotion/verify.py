@@ -98,7 +98,7 @@ def _device(mailbox: Mailbox) -> MailboxFinding:
         tr("PLC number (device_id)"),
         tr("none: this PLC is known by its address only"),
         right=False,
-        remedy=tr("Load the mailbox program of this robolink: it draws a number of its own."),
+        remedy=tr("Load the mailbox program of this robolink: it gives itself a number."),
     )
 
 
@@ -181,5 +181,5 @@ def _state(now: Response) -> Iterator[MailboxFinding]:
         right=damaged,
         remedy=""
         if damaged
-        else tr("Since its start the PLC refused so many: look for a gateway or a bad line."),
+        else tr("The PLC has refused this many since its start: look for a gateway or a bad line."),
     )

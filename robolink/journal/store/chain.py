@@ -79,7 +79,7 @@ class ChainCheck:
     def problems_at_end(self, head: tuple[int, str] | None) -> Iterator[str]:
         """Compare the end with number and hash of the entry that was stored last."""
         if head is None:
-            yield tr("The note of which entry was stored last is missing.")
+            yield tr("The note that says which entry was stored last is missing.")
             return
         number, last_hash = head
         if self.number < number:

@@ -166,7 +166,8 @@ def _require_file(place: JournalPlace) -> None:
         raise JournalError(
             tr("There is no journal {name}.", name=place.name),
             remedy=tr(
-                "The first change that robolink makes starts one; ROBOLINK_JOURNAL names another."
+                "The first change that robolink makes starts one; or name another one "
+                "in ROBOLINK_JOURNAL."
             ),
         )
 
@@ -191,7 +192,7 @@ def _postgresql(place: JournalPlace, *, read_only: bool) -> Backend:
         )
     except ImportError as error:
         raise JournalError(
-            tr("The package psycopg is missing, which reaches {name}.", name=place.name),
+            tr("The package psycopg, which connects to {name}, is missing.", name=place.name),
             remedy=tr("Install it: pip install 'robolink[postgresql]'."),
         ) from error
     settings = [f"SET lock_timeout = {round(BUSY_S * 1000)}", "SET synchronous_commit TO on"]

@@ -84,12 +84,12 @@ def _reason(error: BaseException) -> str:
 
 
 def _sentences(reason: str, text: str) -> tuple[str, str]:
-    elsewhere = tr("ROBOLINK_JOURNAL names another place.")
+    elsewhere = tr("Or name another place in ROBOLINK_JOURNAL.")
     match reason:
         case "full":
             return tr("the disk is full"), tr("Free space there, then repeat the command.")
         case "disk":
-            cause = tr("the disk did not do it ({text})", text=text)
+            cause = tr("the disk reported an error ({text})", text=text)
             return cause, tr("Check the disk and the space on it. {elsewhere}", elsewhere=elsewhere)
         case "forbidden":
             cause = tr("this user may not write or open it ({text})", text=text)
@@ -107,7 +107,7 @@ def _sentences(reason: str, text: str) -> tuple[str, str]:
             cause = tr("the database does not let this user write ({text})", text=text)
             return cause, tr("Give the user that right. {elsewhere}", elsewhere=elsewhere)
         case "unreachable":
-            cause = tr("the database is not reached ({text})", text=text)
+            cause = tr("the database cannot be reached ({text})", text=text)
             return cause, tr("Check that its server runs, the address, its name and the network.")
         case _:
             return text, tr("Check the file or the database. {elsewhere}", elsewhere=elsewhere)

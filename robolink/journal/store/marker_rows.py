@@ -140,9 +140,9 @@ def _marker(row: _Stored) -> Marker:
         raise JournalError(
             tr("A safety record of {controller} cannot be read.", controller=row.controller),
             remedy=tr(
-                "It says what was left unfinished, {request!r} of {when}, and may be of a newer "
-                "robolink. Check the robot's selected tool and its tool offsets by hand, then "
-                "move the journal away.",
+                "It says what was left unfinished, {request!r} of {when}, and may "
+                "have been written by a newer robolink. Check the robot's selected "
+                "tool and its tool offsets by hand, then move the journal away.",
                 request=row.request,
                 when=row.begun_at,
             ),

@@ -193,8 +193,8 @@ def stored_version(connection: Connection, name: str) -> int:
         raise JournalError(
             tr("{name} is a database, but not a journal of robolink.", name=name),
             remedy=tr(
-                "Nothing was written to it. Give the journal a file or a database of its own; "
-                "ROBOLINK_JOURNAL names it."
+                "Nothing was written to it. Give the journal a file or a database of "
+                "its own, and name it in ROBOLINK_JOURNAL."
             ),
         )
     rows = StatementRunner(connection).rows(_VERSION)

@@ -94,7 +94,7 @@ class CrossingSampler:
 
     def which(self, number: int, crossing: Crossing) -> str:
         """Say which one it is."""
-        return tr("Crossing {number}, at {where}", number=number, where=self.named(crossing))
+        return tr("Crossing {number} at {where}", number=number, where=self.named(crossing))
 
     @property
     def _solver(self) -> CrossingSolver:

@@ -82,7 +82,7 @@ class BeamsParameters(MethodParameters):
         int,
         Ge(1),
         Le(10),
-        Help(declared("How often each beam is crossed both ways; once leaves no residual.")),
+        Help(declared("How often each beam is crossed both ways; once cannot be checked.")),
     ] = 2
     search_mm: Annotated[
         float,
@@ -186,8 +186,9 @@ class BeamsParameters(MethodParameters):
         if self.repeats > 1 or self.turn_deg:
             return ""
         return tr(
-            "cannot be judged: crossings that are not repeated always agree, so they leave no "
-            "residual; repeat them, or limit the interval and state the standard deviation"
+            "cannot be judged: crossings that are not repeated cannot check each "
+            "other; repeat them, or limit the interval and state the standard "
+            "deviation"
         )
 
     def states_station(self) -> bool:

@@ -76,8 +76,9 @@ class BoardParameters(LookParameters):
         if drawing is None or not drawing.is_pair or len(self.turns_deg) > 1:
             return ""
         return tr(
-            "cannot be judged: two fiducials at one angle always agree, so they leave no residual; "
-            "look at two angles or more, or limit the interval and state the standard deviation"
+            "cannot be judged: two fiducials at one angle cannot check each other; "
+            "look at two angles or more, or limit the interval and state the standard "
+            "deviation"
         )
 
 

@@ -15,6 +15,7 @@ class CameraParameters(LookParameters):
         if len(self.turns_deg) > 2:
             return ""
         return tr(
-            "cannot be judged: looks at one or two angles always agree, so they leave no residual; "
-            "look at three angles or more, or limit the interval and state the standard deviation"
+            "cannot be judged: looks at one or two angles cannot check each other; "
+            "look at three angles or more, or limit the interval and state the "
+            "standard deviation"
         )

@@ -82,7 +82,7 @@ def _require_pattern(plan: CameraAffineParameters) -> None:
     if plan.span_mm < LEAST_SPAN_MM:
         raise CalibrationError(
             "rank_deficient",
-            tr("A pattern of {span:g} mm does not tell what a pixel is.", span=plan.span_mm),
+            tr("A pattern of {span:g} mm is too small to tell what a pixel is.", span=plan.span_mm),
             remedy=tr("Let the tip go {least:g} mm or more to each side.", least=LEAST_SPAN_MM),
         )
     spread_deg = angle_spread_deg([0.0, *plan.look.turns_deg])

@@ -154,8 +154,8 @@ def _of_interval(
             yield Problem(
                 "sigma_mm",
                 tr(
-                    "is missing: the measurement leaves no residual, so the interval can be "
-                    "judged only from a stated standard deviation"
+                    "is missing: the measurement cannot check itself, so the interval "
+                    "can be judged only from a stated standard deviation"
                 ),
             )
     elif not check.poses_exist and (gain := parameters.sigma_gain()):

@@ -159,7 +159,7 @@ def camera_at(parameters: LookParameters, site: "Site") -> "tuple[str | TipSenso
     sensor = site.sensor or parameters.sensor or sensor_of(site.station)
     if not sensor:
         raise ConfigError(
-            tr("Station {id}: which camera it sees through is not known.", id=site.station.id),
+            tr("It is not known which camera looks at station {id}.", id=site.station.id),
             remedy=tr(
                 "Give {sensor}, write source.sensor, or state it in the cell file.",
                 sensor=way(Way.SENSOR),

@@ -24,7 +24,7 @@ from robolink.procedures import TouchPlan
 Retake = Annotated[
     bool,
     Option(flag="--retake/--no-retake", default=True),
-    Help(declared("Whether the pose that fits worst is offered to be taken again.")),
+    Help(declared("Whether the touch that fits worst is offered to be made again.")),
 ]
 """Whether the worst touch is offered again when all are made."""
 
@@ -128,6 +128,6 @@ def standoff_below_lift(clearance_mm: float, lift_mm: float, check: Check) -> It
 def two_poses_agree() -> str:
     """Return why the residuals of two poses cannot be judged."""
     return tr(
-        "cannot be judged: two poses always agree, so they leave no residual; "
-        "use n-angle, or limit the interval and state the standard deviation"
+        "cannot be judged: two poses cannot check each other; use n-angle, or limit "
+        "the interval and state the standard deviation"
     )

@@ -35,7 +35,9 @@ class SurfaceParameters(PinParameters):
         InputNumber | None,
         Option(metavar="N"),
         Help(
-            declared("Number of the input that shows contact of tip and surface, if there is one.")
+            declared(
+                "Number of the input that shows contact of tip and surface, where there is one."
+            )
         ),
     ] = None
     tilt_deg: Annotated[

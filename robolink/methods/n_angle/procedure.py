@@ -197,7 +197,7 @@ class _NAngleSampler:
         return tr("U {u:.1f}", u=pose.u_deg)
 
     def which(self, number: int, pose: Pose) -> str:
-        return tr("Pose {number}, at {where}", number=number, where=self.named(pose))
+        return tr("Touch {number} at {where}", number=number, where=self.named(pose))
 
 
 def _came_from_mm(touch: Pose) -> tuple[float, float] | None:

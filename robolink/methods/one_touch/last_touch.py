@@ -102,8 +102,8 @@ def find_last_touch(controller: Controller, tool: int, station: str) -> LastTouc
         raise CalibrationError(
             "reference_outdated",
             tr(
-                "Tool {tool} holds {stored}; its last touch at {station} of {at} stands for "
-                "{value}.",
+                "Tool {tool} holds {stored}; its last touch at {station}, of {at}, "
+                "belongs to {value}.",
                 tool=tool,
                 stored=describe_offset(stored),
                 station=station,

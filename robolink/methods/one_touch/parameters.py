@@ -24,14 +24,18 @@ class OneTouchParameters(PinParameters):
         Ge(1),
         Le(1000),
         Option(moves=False),
-        Help(declared("Differences after which a full calibration is due in any case.")),
+        Help(
+            declared(
+                "Number of changes by difference after which a full calibration is due in any case."
+            )
+        ),
     ] = 20
     lift_mm: Annotated[
         float,
         Ge(1),
         Le(100),
         MM,
-        Help(declared("How far above the pin the tip comes and goes, and turns.")),
+        Help(declared("How far above the pin the tip comes, goes and turns.")),
     ] = 10.0
     clearance_mm: Annotated[
         float,
@@ -51,4 +55,4 @@ class OneTouchParameters(PinParameters):
 
     def no_residual(self) -> str:
         """Return why residuals cannot be judged."""
-        return tr("cannot be judged: one touch leaves no residual; limit the interval")
+        return tr("cannot be judged: one touch cannot be checked; limit the interval")

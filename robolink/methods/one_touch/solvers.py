@@ -166,7 +166,10 @@ def difference_from_last(
     sigma = sigma_mm or last.touch_sigma_mm
     if sigma is None:
         raise ConfigError(
-            tr("Nothing tells how well a touch repeats: the last calibration left no residual."),
+            tr(
+                "It is not known how well a touch repeats: the last calibration left "
+                "nothing that checks it."
+            ),
             remedy=tr(
                 "Give {sigma} (in a recipe sigma_mm), or calibrate with n-angle once.",
                 sigma=way(Way.SIGMA),

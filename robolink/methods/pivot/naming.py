@@ -24,4 +24,4 @@ class TiltedNames:
 
     def which(self, number: int, pose: Pose) -> str:
         """Return which one it is."""
-        return tr("Pose {number}, at {where}", number=number, where=self.named(pose))
+        return tr("Touch {number} at {where}", number=number, where=self.named(pose))

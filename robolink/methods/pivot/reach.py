@@ -51,8 +51,8 @@ def tilts_in_reach(
     chosen = best_tilts(free, min(len(wanted), len(free)))
     yield Notify(
         tr(
-            "{missed} of the {count} tilts of the plan cannot be taken up over this pin: {why} "
-            "Others are taken in their place, {chosen} in all.",
+            "{missed} of the {count} planned tilts cannot be reached over this pin: "
+            "{why} Others replace them, {chosen} in all.",
             missed=sum(map(bool, refusals)),
             count=len(wanted),
             why=first,
@@ -82,8 +82,8 @@ def free_tilts(
     if len(free) < len(choice):
         yield Notify(
             tr(
-                "{missed} of {count} tilts cannot be taken up here: {why} The touches are chosen "
-                "among the others.",
+                "{missed} of {count} tilts cannot be reached here: {why} The touches "
+                "are chosen from the others.",
                 missed=len(choice) - len(free),
                 count=len(choice),
                 why=next(filter(None, refusals)),
@@ -133,7 +133,7 @@ def _way(over: OverPin, tilt: Tilt, lift_mm: float) -> Iterator[Move]:
 def _not_tilted(why: str) -> CalibrationError:
     return CalibrationError(
         "not_tilted",
-        tr("Too few orientations can be taken up over this pin: {why}", why=why),
+        tr("Too few orientations can be reached over this pin: {why}", why=why),
         remedy=tr(
             "Nothing was tilted. Put the pin where the arm has room to all sides, tilt less with "
             "{tilt}, or teach the poses and give {points}.",

@@ -33,12 +33,13 @@ def tilt_in_air(over: OverPin, stands: Tilt, goal: Tilt, lift_mm: float) -> Proc
             raise CalibrationError(
                 "not_tilted",
                 tr(
-                    "The tool stands {amiss:.1f} degrees from the orientation it was sent to.",
+                    "The tool is {amiss:.1f} degrees from the orientation it was sent to.",
                     amiss=amiss_deg,
                 ),
                 remedy=tr(
-                    "This robot cannot take it up. It stands with the tip lifted. Tilt less "
-                    "with {tilt}, or teach the poses and give {points}.",
+                    "This robot cannot reach it, and stands still with the tip "
+                    "lifted. Tilt less with {tilt}, or teach the poses and give "
+                    "{points}.",
                     tilt=way(Way.TILT),
                     points=way(Way.TAUGHT_POINTS),
                 ),

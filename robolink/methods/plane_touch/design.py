@@ -46,7 +46,10 @@ def normal_of(places_mm: Sequence[Vector]) -> Vector:
     if np.linalg.norm(across) < _LEAST_ALTITUDE * longest_mm**2:
         raise CalibrationError(
             "rank_deficient",
-            tr("The first three touches are nearly in one line, so how the plane lies is unknown."),
+            tr(
+                "The first three touches are nearly in one line, so how the plane is "
+                "tilted is unknown."
+            ),
             remedy=tr("Nothing was written. Jog straight onto the surface, or put it flatter."),
         )
     x, y, z = (across / np.linalg.norm(across) * math.copysign(1.0, across[2])).tolist()
@@ -65,7 +68,7 @@ def require_lean(normal: Vector, survey: PlaneSurvey) -> None:
     raise CalibrationError(
         "surface_leans",
         tr(
-            "The plane leans by {lean:.1f} degrees; {most:g} are allowed.",
+            "The plane leans by {lean:.1f} degrees, limit {most:g}.",
             lean=lean_deg,
             most=survey.most_lean_deg,
         ),
@@ -170,8 +173,9 @@ def require_observable(columns: Floats) -> None:
     raise CalibrationError(
         "rank_deficient" if fit.rank < _SIX else "insufficient_rotation",
         tr(
-            "Touches of a plane that lies so do not tell where the tip is along {axis} of the "
-            "flange: the tilts that this robot can take up change nothing there.",
+            "Touches of a plane at this angle do not tell where the tip is along "
+            "{axis} of the flange: the tilts that this robot can reach change nothing "
+            "there.",
             axis=weak,
         ),
         remedy=tr(

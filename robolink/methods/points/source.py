@@ -228,8 +228,8 @@ def _require_taught_with(tool: int, poses: Sequence[Pose]) -> None:
                 "These poses are those of tool {other}, not of tool {tool}.", other=other, tool=tool
             ),
             remedy=tr(
-                "Name the tool that was selected with {taught_tool}; what its number holds on this "
-                "controller is used.",
+                "Name the tool that was selected with {taught_tool}; its value on "
+                "this controller is used.",
                 taught_tool=way(Way.TAUGHT_TOOL),
             ),
         )

@@ -36,16 +36,18 @@ def _from_poses(parameters: SixPointParameters, site: Site) -> "PoseMethod":
 
 METHOD = Method(
     name="six-point",
-    summary=declared("A pivot and two ways along the tool's axes: all six components."),
+    summary=declared("A pivot and two moves along the tool's axes: all six components."),
     description=declared(
-        "Find all six components: a pivot, then a way along the tool's X and one along its Z.\n\n"
-        "The touches go as in 'calibrate pivot'. Then, in the air and without turning, you bring "
-        "the tip to where it has room, and jog it along the tool's own +X; the robot goes straight "
-        "back; and along its own +Z. A way that is too short or has turned is said at once. The "
-        "work box reaches higher by the length of a way.\n\n"
-        "With poses that exist already nothing moves: three or more on one pin, tilted and turned; "
-        "the last two, in this order, after a way along +X and one along +Z, both from the last "
-        "pose on the pin."
+        "Find all six components: a pivot, then a move along the tool's X and one "
+        "along its Z.\n\n"
+        "The touches go as in 'calibrate pivot'. Then, in the air and without "
+        "turning, you bring the tip to where it has room, and jog it along the tool's "
+        "own +X; the robot goes straight back; and along its own +Z. A move that is "
+        "too short or has turned is told at once. The work box reaches higher by the "
+        "length of a move.\n\n"
+        "With poses that exist already nothing moves: three or more on one pin, "
+        "tilted and turned; the last two, in this order, after a move along +X and "
+        "one along +Z, both from the last pose on the pin."
     ),
     parameters=SixPointParameters,
     measures=("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg"),

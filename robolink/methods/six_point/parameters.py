@@ -20,13 +20,15 @@ class SixPointParameters(PivotParameters):
         Le(200),
         MM,
         Option(metavar="MM"),
-        Help(declared("Least length of each of the two ways; the longer, the surer the axes.")),
+        Help(declared("Least length of each of the two moves; the longer, the surer the axes.")),
     ] = 50.0
     second_is: Annotated[
         Literal["z", "xz"],
         Option(moves=False),
         Help(
-            declared("What the second way shows: the tool's +Z, or its XZ plane on the side of +Z.")
+            declared(
+                "What the second move shows: the tool's +Z, or its XZ plane on the side of +Z."
+            )
         ),
     ] = "z"
 

@@ -116,7 +116,7 @@ def measure_six_point(
             continue
         yield Notify(_uncertainty(result))
         askew = "ways_askew" in result.warnings
-        if not left or not askew or not (yield Confirm(tr("Show both ways again?"))):
+        if not left or not askew or not (yield Confirm(tr("Show both moves again?"))):
             break
     yield from approach_path(lifted, here=start, purpose=tr("Moving back above the pin."))
     return result
@@ -214,7 +214,7 @@ class _AxisTeaching:
             end = yield from _shown(
                 ask, lambda pose: axis_displacement(start, pose, wanted_mm=self.ways.length_mm)
             )
-            yield Move(start, Path.STRAIGHT, tr("Moving back to where the way began."))
+            yield Move(start, Path.STRAIGHT, tr("Moving back to where the move began."))
             if not left or not (yield from self._doubted(start, end, way)):
                 break
         return end
@@ -231,8 +231,8 @@ class _AxisTeaching:
             return False
         again: bool = yield Confirm(
             tr(
-                "This way leads {angle:.0f} degrees away from {axis} as it is stored. Show it "
-                "again?",
+                "This move leads {angle:.0f} degrees away from {axis} as it is "
+                "stored. Show it again?",
                 angle=far_deg,
                 axis="+X" if way is TeachPrompt.ALONG_X else "+Z",
             )
@@ -289,13 +289,13 @@ def _uncertainty(result: SixPointResult) -> str:
     half_deg = max(result.half_width95[3:], default=None)
     off_deg = result.off_square_deg
     if off_deg is None:
-        said = tr("The ways show the axes.")
+        said = tr("The moves show the axes.")
     else:
-        said = tr("The ways are {off:.2f} degrees off a right angle.", off=abs(off_deg))
+        said = tr("The moves are {off:.2f} degrees off a right angle.", off=abs(off_deg))
     if half_deg is None:
         return said
     if "ways_askew" in result.warnings:
-        doubted = tr("That is more than the touches scatter: a way was not quite along its axis.")
+        doubted = tr("The touches explain less than that: a move was not quite along its axis.")
         return joined(" ", (said, doubted))
     known = tr("U, V and W are sure to +-{half:.3f} degrees.", half=half_deg)
     return joined(" ", (said, known))

@@ -32,7 +32,7 @@ class SixPointSource(PivotSource):
     def sentence(self) -> str:
         """What it does, for a report."""
         shown = tr(
-            "two ways of {length:g} mm and more along the tool's own axes",
+            "two moves of {length:g} mm and more along the tool's own axes",
             length=self.ways.length_mm,
         )
         return f"{self._touched}; {shown}"

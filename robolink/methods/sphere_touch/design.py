@@ -45,7 +45,8 @@ def sphere_of(places_mm: Sequence[Vector], survey: SphereSurvey) -> tuple[Vector
         raise CalibrationError(
             "radius_contradicted",
             tr(
-                "The touches lie on a sphere of {found:.2f} mm; {stated:.2f} mm was stated.",
+                "The touches fit a sphere with a radius of {found:.2f} mm; "
+                "{stated:.2f} mm was stated.",
                 found=radius_mm,
                 stated=survey.radius_mm,
             ),
@@ -57,8 +58,8 @@ def sphere_of(places_mm: Sequence[Vector], survey: SphereSurvey) -> tuple[Vector
         raise CalibrationError(
             "off_top",
             tr(
-                "The first touch was {aside:.1f} mm beside the top of the sphere; {most:.1f} mm "
-                "are allowed.",
+                "The first touch was {aside:.1f} mm beside the top of the sphere, "
+                "limit {most:.1f} mm.",
                 aside=aside_mm,
                 most=survey.aside_mm,
             ),

@@ -146,8 +146,8 @@ class ZTouchParameters(MethodParameters):
         if len(self.speeds_mm_s) > 2:
             return ""
         return tr(
-            "cannot be judged: two touches always agree, so they leave no residual; give four "
-            "speeds, or limit the interval and state the standard deviation"
+            "cannot be judged: two touches cannot check each other; give four speeds, "
+            "or limit the interval and state the standard deviation"
         )
 
 

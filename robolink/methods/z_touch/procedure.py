@@ -201,7 +201,7 @@ class _ZTouchSampler:
         return tr("{speed:g} mm/s", speed=touch.speed_mm_s)
 
     def which(self, number: int, touch: Touch) -> str:
-        return tr("Touch {number}, at {where}", number=number, where=self.named(touch))
+        return tr("Touch {number} at {where}", number=number, where=self.named(touch))
 
     @property
     def _above(self) -> Pose:

@@ -53,7 +53,9 @@ def kinematics_class(part: str) -> type[Any]:
             remedy=tr("Give module:Class; Python must find the module (PYTHONPATH)."),
         ) from error
     if not isinstance(found, type):
-        raise ConfigError(tr("{name!r} is no class.", name=part), remedy=tr("Give module:Class."))
+        raise ConfigError(
+            tr("{name!r} is not a class.", name=part), remedy=tr("Give module:Class.")
+        )
     return found
 
 

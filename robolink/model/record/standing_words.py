@@ -19,7 +19,7 @@ def describe_standing(standing: Standing) -> str:
 def _movement(standing: Standing) -> str:
     if standing.moving:
         return tr(
-            "The robot may still move, and the end of this was not seen: {requests}.",
+            "The robot may still be moving; the end of this was not seen: {requests}.",
             requests=", ".join(standing.moving),
         )
     if standing.moved:
@@ -49,14 +49,14 @@ def _tool(number: int, tool: ToolStanding) -> str:
     before, holds = _shown(tool.before), _shown(tool.holds)
     if not tool.known:
         return tr(
-            "Tool {tool} may hold the new value {requested}; it held {before}.",
+            "Tool {tool} may hold the new value {requested}; before, it held {before}.",
             tool=number,
             requested=_shown(tool.requested),
             before=before,
         )
     if tool.differs:
         return tr(
-            "Tool {tool} holds {holds} now; before it held {before}.",
+            "Tool {tool} now holds {holds}; before, it held {before}.",
             tool=number,
             holds=holds,
             before=before,
@@ -66,9 +66,9 @@ def _tool(number: int, tool: ToolStanding) -> str:
 
 def _selection(standing: Standing) -> str:
     if not standing.selection_known:
-        return tr("Which tool is selected now is not proved.")
+        return tr("It is not proved which tool is selected now.")
     if standing.selected is None:
-        return tr("Which tool is selected was not read.")
+        return tr("It was not read which tool is selected.")
     if standing.selected_another:
         return tr(
             "Tool {now} is selected now; it was tool {tool} before.",

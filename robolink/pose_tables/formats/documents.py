@@ -68,7 +68,7 @@ def read_document(document: object, choices: ReadingChoices, *, layout: str) -> 
     if not found:
         raise UnusableText(tr("there is no pose in it"))
     if choices.columns is not None:
-        raise UnusableText(tr("columns were named, and it names its values itself"))
+        raise UnusableText(tr("columns were given, but the file names its values itself"))
     made = _Made(choices)
     poses = [made.pose(place, one) for place, one in enumerate(found, start=1)]
     return made.table(poses, layout)
@@ -110,7 +110,7 @@ class _Made:
     def _matrix(self, place: int, rows: list[list[float]]) -> RawPose:
         pose = pose_of_rows(rows, 0)
         if pose is None:
-            raise UnusableText(tr("its matrix is none of a pose"))
+            raise UnusableText(tr("its matrix is not that of a pose"))
         pose.line = place
         self._texts.add(tr("matrix"))
         self._lengths.add(None)
@@ -212,7 +212,7 @@ def _listed(rows: Sequence[list[object]], choices: ReadingChoices, layout: str) 
     for place, row in enumerate(rows, start=1):
         if len(row) != len(heads):
             why = tr(
-                "it has {count} columns, and {wanted} are named", count=len(row), wanted=len(heads)
+                "it has {count} columns, but {wanted} are named", count=len(row), wanted=len(heads)
             )
             raise UnusableText(why, pose=place)
     columns = PoseColumns(heads, choices, as_number)

@@ -121,7 +121,7 @@ def _blocks(text: str) -> Iterator[tuple[int, dict[str, float], str]]:
     counted = _COUNT.search(text)
     blocks = list(_BLOCK.finditer(text))
     if counted is None or int(counted[1]) != len(blocks):
-        raise UnusableText(tr("it is not a whole point file of EPSON RC+"))
+        raise UnusableText(tr("it is not a complete point file of EPSON RC+"))
     seen: set[float] = set()
     for number, block in enumerate(blocks, start=1):
         fields = {name: float(value) for name, value in _FIELD.findall(block[1])}

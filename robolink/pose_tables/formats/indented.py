@@ -103,7 +103,7 @@ def _mapping(entries: list[Entry], start: int, indent: int, depth: int) -> tuple
             break
         name, rest = key[1].strip("\"'"), key[2]
         if name in found:
-            raise UnusableText(tr("{name} stands there twice", name=name), line)
+            raise UnusableText(tr("{name} appears twice", name=name), line)
         place += 1
         if rest:
             found[name] = _scalar(rest, line)

@@ -213,7 +213,9 @@ def _program(
     stated: bool = False,
 ) -> RawTable:
     if not poses:
-        raise UnusableText(tr("its points are joints or not taught, and joints are no pose"))
+        raise UnusableText(
+            tr("its points are joint angles or not taught, and joint angles are not a pose")
+        )
     return RawTable(
         maker,
         poses,

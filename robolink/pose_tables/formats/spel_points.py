@@ -68,7 +68,7 @@ def _point(line: int, found: re.Match[str]) -> RawPose:
     if len(parts) not in (4, 6) or not all(map(_NUMBER.fullmatch, parts)):
         raise UnusableText(tr("the point does not hold four or six numbers"), line)
     if not _FLAGS.fullmatch(found["rest"]):
-        raise UnusableText(tr("the point is changed behind its numbers"), line)
+        raise UnusableText(tr("the point is changed after its numbers"), line)
     numbers = [float(part) for part in parts]
     x, y, z, u = numbers[:4]
     v, w = numbers[4:] or (0.0, 0.0)

@@ -196,7 +196,7 @@ class PoseColumns:
         elif name == "number":
             given.setdefault("name", str(cell))
         else:
-            raise UnusableText(tr("{name} is no whole number", name=name), line)
+            raise UnusableText(tr("{name} is not a whole number", name=name), line)
 
 
 _NOTHING: Final = frozenset[str]()

@@ -156,7 +156,9 @@ def named_by_person(text: str) -> tuple[ColumnHead, ...]:
         head = column_head(part)
         if head.meaning == SKIPPED and part.strip() != SKIPPED:
             names = ", ".join([*MEANINGS, SKIPPED])
-            why = tr("{name!r} is no name of a column; there are {names}", name=part, names=names)
+            why = tr(
+                "{name!r} is not the name of a column; use one of {names}", name=part, names=names
+            )
             raise UnusableText(why)
         heads.append(head)
     require_each_once(heads)

@@ -75,7 +75,7 @@ def turn_columns(heads: Sequence[ColumnHead], euler: str | None) -> TurnColumns:
     if angles:
         return _by_angles(angles, heads, rule_named(euler) if euler else None)
     if euler and (quaternion or matrix):
-        raise UnusableText(tr("a rule for angles was named, and it has no angles"))
+        raise UnusableText(tr("a rule for angles was given, but the file has no angles"))
     if len(quaternion) == len(QUATERNION):
         scalar = "qw" if "qw" in quaternion else "w"
         return TurnColumns(("qx", "qy", "qz", scalar), "quaternion QX QY QZ QW", _by_quaternion)

@@ -117,7 +117,9 @@ def _headed(
             require_each_once(heads, line)
             return _with_line_of_units(heads, units), body
         if are_joints(cells):
-            raise UnusableText(tr("its columns are joints, and joints are no pose"), line)
+            raise UnusableText(
+                tr("its columns are joint angles, and joint angles are not a pose"), line
+            )
     heads = _in_comments(comments, form, width) or _one_matrix(body, form, width)
     if heads:
         return heads, body
@@ -193,7 +195,7 @@ def _fitted(line: int, cells: list[str], heads: Sequence[ColumnHead]) -> list[st
     if more or missing:
         raise UnusableText(
             tr(
-                "it has {count} columns, and {wanted} are named",
+                "it has {count} columns, but {wanted} are named",
                 count=len(cells),
                 wanted=len(heads),
             ),

@@ -77,7 +77,7 @@ def finalize_samples(
     for _ in range(MOST_REPEATED if retake and result.dof else 0):
         worst = worst_of(result, times)
         question = tr(
-            "{which}, fits worst: it is {distance:.3f} mm off. Take it again?",
+            "{which} is {distance:.3f} mm off. Take it again?",
             which=method.which(worst + 1, samples.taken[worst]),
             distance=result.residual_distances_mm[worst],
         )
@@ -359,10 +359,11 @@ def _progress(
     if following is None or fit.half95_mm is None:
         return Notify(told, fit=shown)
     better = method.gain([*taken, following]) / method.gain(taken)
+    next_mm = fit.half95_mm * better
     gain = tr(
-        "One more, at {where}, would leave {share:.0f} % of that.",
+        "One more at {where} would make it about +-{next:.3f} mm.",
         where=method.named(following),
-        share=100 * better,
+        next=next_mm,
     )
     told = joined(" ", (told, gain))
-    return Notify(told, fit=replace(shown, next_mm=fit.half95_mm * better))
+    return Notify(told, fit=replace(shown, next_mm=next_mm))

@@ -157,7 +157,10 @@ class FrameBuffer:
         known = (STX,) if self._role is Role.DEVICE else (ACK, NAK)
         if self._data[0] not in known:
             raise RemoteProtocolError(
-                tr("{data!r} begins no answer of Remote RS232.", data=bytes(self._data[:20])),
+                tr(
+                    "{data!r} does not begin an answer of Remote RS232.",
+                    data=bytes(self._data[:20]),
+                ),
                 remedy=tr(
                     "Check baud rate, parity and stop bits on both ends, and that the control "
                     "device is Remote RS232; then connect again."

@@ -28,7 +28,7 @@ def write_request(request: Request, dialect: Dialect) -> bytes:
     if letter.name == "GetVariable":
         parameters = _scalar(parameters)
     if len(parameters) != len(letter.request):
-        raise _refused(request.name, tr("the number of its parameters is another one"))
+        raise _refused(request.name, tr("it has the wrong number of parameters"))
     data = b"".join(
         _written(request.name, part, text, dialect)
         for part, text in zip(letter.request, parameters, strict=True)
@@ -245,7 +245,7 @@ def _read_status(frame: SerialFrame, letter: Letter) -> Reply:
     if found is None:
         raise _no_answer(
             frame,
-            tr("{data!r} is no status.", data=frame.data[:40]),
+            tr("{reply!r} is not a status.", reply=frame.data[:40]),
             tr("Connect again; if it happens twice, report it with the firmware version."),
         )
     flags = "".join(str(flag) for flag in found[1])

@@ -97,7 +97,7 @@ class MessageBuffer:
         end = self._find_end()
         if (len(self._data) if end < 0 else end) > self._max_line:
             raise RemoteProtocolError(
-                tr("A message longer than {limit} bytes arrived.", limit=self._max_line),
+                tr("A message is longer than {limit} bytes.", limit=self._max_line),
                 remedy=tr("Check that this port is the controller's Remote Ethernet port."),
                 raw=self.held,
             )

@@ -62,7 +62,7 @@ def read_answer(line: bytes, encoding: str) -> Reply | Refusal:
         if comma and code.isdigit() and len(code) <= _MAX_CODE_DIGITS:
             return Refusal(name.decode(encoding, _UNDECODABLE), int(code))
     raise RemoteProtocolError(
-        tr("{line!r} is no answer of Remote Ethernet.", line=line[:80]),
+        tr("{line!r} is not an answer of Remote Ethernet.", line=line[:80]),
         remedy=tr(
             "Check the port and the control device in the controller's setup, then connect again."
         ),

@@ -53,7 +53,7 @@ def parse_preferences(field: str) -> frozenset[Preference]:
     text = field.strip()
     if len(text) < DIGITS or text.strip("01"):
         raise RemoteProtocolError(
-            tr("{field!r} are no preferences of a controller.", field=field[:80]),
+            tr("{field!r} are not preferences of a controller.", field=field[:80]),
             remedy=tr("Report it with the firmware version ('robolink expert verify-controller')."),
             request="GetContSettings",
             raw=field.encode("utf-8"),

@@ -153,7 +153,7 @@ def _meanings() -> dict[int, str]:
     return {
         ErrorClass.NONE: tr("no error"),
         ErrorClass.VERSION: tr("another major version of the mailbox"),
-        ErrorClass.BUSY: tr("another command is in work"),
+        ErrorClass.BUSY: tr("another command is running"),
         ErrorClass.UNKNOWN_OPCODE: tr("the mailbox program does not hold this command"),
         ErrorClass.NOT_OWNER: tr("another client, or nobody, owns the mailbox"),
         ErrorClass.STALE_EPOCH: tr("the ownership has passed on since"),
@@ -162,7 +162,7 @@ def _meanings() -> dict[int, str]:
         ErrorClass.SLOT_EMPTY: tr("the tool slot is empty"),
         ErrorClass.OPERAND: tr("an operand is out of range or not finite"),
         ErrorClass.QUEUE_FULL: tr("four movements are unfinished"),
-        ErrorClass.OTHER_BOOT: tr("the PLC has started anew since"),
+        ErrorClass.OTHER_BOOT: tr("the PLC has restarted since"),
         ErrorClass.NOT_PERMITTED: tr("the machine does not permit it now"),
         ErrorClass.DISABLED: tr("the axis group is disabled"),
         ErrorClass.ERRORSTOP: tr("the axis group is in its error state"),

@@ -216,7 +216,7 @@ def _xy(values: tuple[float, ...], *, six_axes: bool) -> str:
         if any(value != decimal(0.0) for value in written[4:]):
             raise LocalProtocolError(
                 tr(
-                    "A robot of four axes cannot take V = {v} and W = {w}.",
+                    "A four-axis robot cannot take V = {v} and W = {w}.",
                     v=values[4],
                     w=values[5],
                 ),

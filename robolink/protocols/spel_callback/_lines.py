@@ -83,7 +83,7 @@ def encode_line(line: CallbackLine) -> bytes:
     """
     for field in line.fields:
         if not _FIELD.fullmatch(field):
-            raise LocalProtocolError(tr("{field!r} cannot stand in a line.", field=field))
+            raise LocalProtocolError(tr("{field!r} cannot be part of a line.", field=field))
     text = ",".join((VERSION, str(line.number), line.word, *line.fields))
     text = f"{text}*{check_sum(text):X}"
     if len(text) > LONGEST_LINE or not 1 <= line.number <= _LAST_NUMBER:
@@ -110,7 +110,7 @@ def decode_line(data: bytes) -> CallbackLine:
         raise _useless(tr("A line lacks a part."), data)
     number, word, *fields = rest
     if not re.fullmatch("[1-9][0-9]{0,5}", number):
-        raise _useless(tr("{number!r} is no number of a line.", number=number), data)
+        raise _useless(tr("{number!r} is not a line number.", number=number), data)
     if word not in CallbackWord.__members__:
         raise _useless(tr("{word!r} is not known.", word=word), data)
     return CallbackLine(int(number), CallbackWord(word), tuple(fields))

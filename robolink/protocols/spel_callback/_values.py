@@ -52,7 +52,11 @@ def read_place(fields: Sequence[str]) -> tuple[float, ...]:
 def _read(fields: Sequence[str], count: int) -> tuple[float, ...]:
     if len(fields) != count or not all(map(_WHOLE.fullmatch, fields)):
         raise RemoteProtocolError(
-            tr("{fields} are no {count} whole thousandths.", fields=",".join(fields), count=count)
+            tr(
+                "{fields} are not {count} whole numbers of thousandths.",
+                fields=",".join(fields),
+                count=count,
+            )
         )
     return tuple(int(field) / 1000 for field in fields)
 

@@ -25,7 +25,8 @@ def moments(draft: Draft) -> Iterator[Problem]:
             )
         elif known is not None and entry.tool not in known:
             yield Problem(
-                where, tr("is no tool of this recipe; write one of its [[tools]], or leave it out")
+                where,
+                tr("is not a tool of this recipe; write one of its [[tools]], or leave it out"),
             )
 
 

@@ -36,7 +36,7 @@ def points(draft: Draft) -> Iterator[Problem]:
                 )
         elif tool.poses is not None:
             if tool.points is not None:
-                yield Problem(where, tr("is given beside poses; give one of the two"))
+                yield Problem(where, tr("is given as well as poses; give one of the two"))
         elif tool.points is None:
             yield Problem(where, tr("is missing: the numbers of the points that touch the pin"))
         else:

@@ -102,5 +102,5 @@ def _named(number: int, count: int, fit: CalibrationResult | None, *, left_out: 
     if fit is None or not six_point or number < len(fit.residuals_mm):
         return str(number + 1)
     # The last two show the axes; the one before them, where it is no touch, is where they begin.
-    part = (tr("where the ways begin"), tr("along X"), tr("second way"))[number - count]
+    part = (tr("where the moves begin"), tr("along X"), tr("second move"))[number - count]
     return tr("{number} ({part})", number=number + 1, part=part)

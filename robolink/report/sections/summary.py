@@ -100,8 +100,9 @@ def _time(report: Report) -> list[tuple[str, str]]:
     if report.record is None:
         return [(tr("time"), report.made_at)]
     first, last = (report.record.entries[index].at for index in (0, -1))
-    at = (first, last) if first[:19] != last[:19] else (first,)
-    utc = tr(" to ").join(_clock(one) for one in at)
+    utc = _clock(first)
+    if first[:19] != last[:19]:
+        utc = tr("{first} to {last}", first=utc, last=_clock(last))
     local = report.local_time and _clock(report.local_time)
     return [
         (tr("time (UTC)"), utc),
@@ -146,7 +147,7 @@ def _verdict(outcome: Outcome) -> str:
         Outcome.PROPOSED: tr("A proposal, nothing was written"),
         Outcome.DECLINED: tr("Declined, nothing was written"),
         Outcome.REFUSED: tr("Refused, nothing was written"),
-        Outcome.VERIFY_FAILED: tr("The verification failed"),
+        Outcome.VERIFY_FAILED: tr("The turn test failed"),
         Outcome.NOT_APPLIED: tr("Not applied, the tool keeps its old value"),
         Outcome.ROLLED_BACK: tr("Taken back, the tool has its old value again"),
         Outcome.CONFLICT: tr("Conflict: the tool holds neither the old nor the new value"),

@@ -180,6 +180,6 @@ class NodeWatch:
             tr(
                 "Node {node} of {identity} has restarted.", node=self._node, identity=self._identity
             ),
-            remedy=tr("Connect again; what was under way has to be looked at."),
+            remedy=tr("Connect again, then check what was under way."),
             controller=self._identity,
         )

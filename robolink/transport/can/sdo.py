@@ -148,7 +148,11 @@ class SdoTransfer:
 
     def _unanswered(self) -> TransportTimeoutError:
         return TransportTimeoutError(
-            tr("{identity} did not answer: {object}.", identity=self._identity, object=self._shown),
+            tr(
+                "{identity} did not answer: {request}.",
+                identity=self._identity,
+                request=self._shown,
+            ),
             remedy=tr(
                 "Check that the PLC runs, its node number, the bit rate and the terminators, then "
                 "connect again."
@@ -181,7 +185,7 @@ class SdoTransfer:
         self._abort(_ABORT_UNKNOWN_SERVICE)
         return RemoteProtocolError(
             tr(
-                "{identity} answered something else than {object}.",
+                "{identity} answered something other than {object}.",
                 identity=self._identity,
                 object=self._shown,
             ),

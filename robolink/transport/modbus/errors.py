@@ -87,7 +87,7 @@ def restless(identity: str, count: int, raw: bytes) -> RemoteProtocolError:
     """Return the error for a serial line on which no pause comes."""
     return RemoteProtocolError(
         tr(
-            "The line of {identity} does not fall silent: {count} bytes without a pause.",
+            "The line of {identity} is never quiet: {count} bytes without a pause.",
             identity=identity,
             count=count,
         ),
@@ -126,7 +126,7 @@ def unintelligible(identity: str, request: ModbusRequest, raw: bytes) -> RemoteP
 def mismatched(identity: str, request: ModbusRequest) -> RemoteProtocolError:
     """Return the error for an answer to another request than the one it claims."""
     return RemoteProtocolError(
-        tr("{identity} answered something else than it was asked.", identity=identity),
+        tr("{identity} answered something other than it was asked.", identity=identity),
         remedy=tr(
             "Check the unit in the URL ({unit}) and that no other device shares this address.",
             unit=request.unit,

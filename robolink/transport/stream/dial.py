@@ -78,8 +78,9 @@ def _connect_error(error: OSError, url: LinkUrl, timeout_s: float) -> ConnectErr
     if isinstance(error, ConnectionRefusedError):
         what = tr("{identity} refuses connections.", identity=url.identity)
         remedy = tr(
-            "The machine is there, but nothing listens on this port: check the port number and "
-            "that the controller serves the network: remote control, or its Modbus server."
+            "The machine is there, but nothing listens on this port. Check the port "
+            "number, and that the controller's remote control, or its Modbus server, "
+            "is switched on."
         )
     elif isinstance(error, TimeoutError):
         what = tr(
@@ -89,7 +90,7 @@ def _connect_error(error: OSError, url: LinkUrl, timeout_s: float) -> ConnectErr
         )
         remedy = tr("Check that the controller is on, its address, the cable and any firewall.")
     elif error.errno in _UNREACHABLE:
-        what = tr("There is no way to {identity}.", identity=url.identity)
+        what = tr("There is no route to {identity}.", identity=url.identity)
         remedy = tr("Check the cable and that this computer has an address in the same network.")
     else:
         what = tr(

@@ -287,7 +287,7 @@ class SerialTransport:
                 controller=self.identity,
             )
         return TransportBrokenError(
-            tr("{identity} broke off: {cause}.", identity=self.identity, cause=error),
+            tr("The connection to {identity} broke: {cause}.", identity=self.identity, cause=error),
             remedy=tr("Check that the adapter is still plugged in, then connect again."),
             controller=self.identity,
         )

@@ -182,7 +182,8 @@ def _given(method: str, query: str, body: bytes) -> dict[str, Any]:
         given = None
     if not isinstance(given, dict):
         raise ConfigError(
-            tr("The request is no JSON object."), remedy=tr("Give it as {example}.", example="{}")
+            tr("The request is not a JSON object."),
+            remedy=tr("Give it as {example}.", example="{}"),
         )
     return given
 

@@ -193,11 +193,11 @@ class HostedDevice(ABC):
     def _require_renewable(self) -> None:
         if self.durable:
             raise ConfigError(
-                tr("A simulator that keeps its state in a file is not made anew."),
+                tr("A simulator that keeps its state in a file cannot be rebuilt."),
                 remedy=tr("Restart it, or start another one without a file."),
             )
         if self.executes_program:
             raise ConfigError(
-                tr("A simulator that executes a program is not made anew."),
-                remedy=tr("Restart it in place of that."),
+                tr("A simulator that executes a program cannot be rebuilt."),
+                remedy=tr("Restart it instead."),
             )

@@ -45,7 +45,7 @@ from robolink_simulators.serial_numbers import drawn_serial
 
 
 class EpsonSimulator(TimeStepping):
-    """Implements ``hosting.seam.WireDevice``.
+    r"""Implements ``hosting.seam.WireDevice``.
 
     Args:
         robot: Name of a model, as in docs/reference/epson-robots.md, "Families"; several, with
@@ -76,6 +76,14 @@ class EpsonSimulator(TimeStepping):
 
     Raises:
         ConfigError: No such robot, or a state file that does not fit.
+
+    Example:
+        >>> from robolink_simulators.epson import EpsonSimulator
+        >>> controller = EpsonSimulator("T3-401S", seed=2)
+        >>> link = controller.connect(now_ns=0)
+        >>> link.receive(b'$Login\r\n$Execute,"Print 6 * 7"\r\n', now_ns=0)
+        >>> link.outgoing()
+        b'#Login,0\r\n#Execute,"42\r\n"\r\n'
     """
 
     kind = "epson"
@@ -193,7 +201,7 @@ class EpsonSimulator(TimeStepping):
         *,
         ports: Mapping[int, tuple[str, int]] | None = None,
     ) -> ProgramRunner:
-        """Load a project, in place of the one before: Start,n runs its function mainN.
+        r"""Load a project, in place of the one before: Start,n runs its function mainN.
 
         Args:
             programs: Its .prg files; IOLabels.dat is taken from beside them.
@@ -203,6 +211,19 @@ class EpsonSimulator(TimeStepping):
         Raises:
             ProgramRefused: It cannot be built.
             ConfigError: A file cannot be read, or what is to begin in the background cannot.
+
+        Example:
+            >>> from pathlib import Path
+            >>> from robolink_simulators.epson import EpsonSimulator
+            >>> controller, main = EpsonSimulator(), Path("Main.prg")
+            >>> _ = main.write_text("Function main\n  Wait 2\n  On 5\nFend\n")
+            >>> _ = controller.load([main])
+            >>> controller.panel.start_production()
+            >>> for now_s in (1, 3):
+            ...     controller.advance(now_s * 1_000_000_000)
+            ...     print(controller.machine.outputs.get(5))
+            False
+            True
         """
         with self.acting():
             project = load_project(self._session, programs, points)

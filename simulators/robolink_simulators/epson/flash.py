@@ -57,7 +57,9 @@ class Flash:
         except (OSError, KeyError, RecursionError, TypeError, ValueError) as error:
             raise ConfigError(
                 tr(
-                    "{path} is no saved state of a simulated {robot}.", path=self._path, robot=robot
+                    "{path} is not a saved state of a simulated {robot}.",
+                    path=self._path,
+                    robot=robot,
                 ),
                 remedy=tr("Name another file, or delete this one to start afresh."),
             ) from error

@@ -67,7 +67,7 @@ class FaultRates:
     def __post_init__(self) -> None:
         if not 0 <= self.rate <= 1:
             raise ConfigError(
-                tr("A rate of {rate:g} faults an exchange cannot be.", rate=self.rate),
+                tr("A rate of {rate:g} faults per exchange is not possible.", rate=self.rate),
                 remedy=tr("Give a rate from 0 to 1."),
             )
         if not 0 <= self.exchanges <= MOST_EXCHANGES:

@@ -41,6 +41,17 @@ class PlcSimulator(HostedDevice):
         unit: The unit identifier; another one is answered with exception 11 over TCP, and not
             at all on a serial line.
         seed: Other tools.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from robolink.register_maps import load_map
+        >>> from robolink_simulators.plc import PlcSimulator
+        >>> from robolink_simulators.testkit.recipes import written_map
+        >>> plc = PlcSimulator(load_map(written_map(Path.cwd())), unit=3)
+        >>> link = plc.connect(now_ns=0)
+        >>> link.receive(bytes.fromhex("0001 0000 0006 04 03 0064 0002"), now_ns=0)
+        >>> link.outgoing().hex(" ")  # unit 4 is not there: exception 11
+        '00 01 00 00 00 03 04 83 0b'
     """
 
     kind = "plc"
@@ -112,7 +123,30 @@ class PlcSimulator(HostedDevice):
     def serve(
         self, request: PlcRequest, frames: Frames, link: PlcLink, *, counted: bool = False
     ) -> list[Departure]:
-        """Carry a request out and return what leaves for it, when."""
+        """Carry a request out and return what leaves for it, when.
+
+        Args:
+            request: What a client asks.
+            frames: How answers are wrapped for that client.
+            link: Its connection, for a fault that stalls it.
+            counted: Whether it met its faults before, so that it meets none again.
+
+        Returns:
+            Seconds from now and bytes of each piece; none where nothing is answered.
+
+        Example:
+            >>> from pathlib import Path
+            >>> from robolink.register_maps import RegisterTable, load_map
+            >>> from robolink_simulators.plc import PlcSimulator
+            >>> from robolink_simulators.plc.frames import PlcRequest, TcpFrames
+            >>> from robolink_simulators.testkit.recipes import written_map
+            >>> plc, frames = PlcSimulator(load_map(written_map(Path.cwd()))), TcpFrames()
+            >>> link = plc.connect(now_ns=0, frames=frames)
+            >>> asked = PlcRequest(1, 1, 6, RegisterTable.HOLDING, 100, 1, values=(7,))
+            >>> ((seconds, reply),) = plc.serve(asked, frames, link)
+            >>> seconds, reply.hex(" ")  # it is written: the request comes back
+            (0.0, '00 01 00 00 00 06 01 06 00 64 00 07')
+        """
         if frames.shared and request.unit != self.unit:
             return []
         self.log.append((self._now_ns, ">", request.words))

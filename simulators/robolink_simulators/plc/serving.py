@@ -19,7 +19,33 @@ _UNITS_ON_A_LINE: Final = range(1, 248)
 
 
 class PlcHost(TcpHost):
-    """A TCP host whose URL names the map as well."""
+    """A TCP host whose URL names the map as well.
+
+    Args:
+        simulator: What to serve.
+        map_file: The file of its map, for the URL.
+        address: Address and port to bind to; port 0 for a free one.
+        clock: The simulated time.
+        allow_remote: Whether an address that other machines can reach is taken.
+
+    Raises:
+        ConfigError: The address is not loopback and ``allow_remote`` is off.
+        ConnectError: The port is taken, or the address is not this machine's.
+
+    Example:
+        >>> from pathlib import Path
+        >>> import robolink
+        >>> from robolink.register_maps import load_map
+        >>> from robolink_simulators.cell.clock import ScaledClock
+        >>> from robolink_simulators.plc import PlcHost, PlcSimulator
+        >>> from robolink_simulators.testkit.recipes import written_map
+        >>> path = written_map(Path.cwd())
+        >>> plc, here = PlcSimulator(load_map(path), unit=3), ("127.0.0.1", 0)
+        >>> with PlcHost(plc, path, here, ScaledClock(), allow_remote=False) as host:
+        ...     with robolink.connect(host.url) as controller:
+        ...         print(controller.tools.selected(), "unit=3" in host.url)
+        1 True
+    """
 
     def __init__(
         self,
@@ -138,11 +164,23 @@ def serve_plc_line(
     Raises:
         ConfigError: No unit on a line can have the simulator's number.
         ConnectError: This system has no pseudo terminals.
+
+    Example:
+        >>> from pathlib import Path
+        >>> import robolink
+        >>> from robolink.register_maps import load_map
+        >>> from robolink_simulators.plc import PlcSimulator, serve_plc_line
+        >>> from robolink_simulators.testkit.recipes import written_map
+        >>> path = written_map(Path.cwd())
+        >>> with serve_plc_line(PlcSimulator(load_map(path)), path) as host:
+        ...     with robolink.connect(host.url) as controller:
+        ...         list(controller.tools.indices())
+        [1, 2]
     """
     if simulator.unit not in _UNITS_ON_A_LINE:
         raise ConfigError(
             tr("There is no unit {unit} on a serial line.", unit=simulator.unit),
-            remedy=tr("Give a unit from 1 to 247."),
+            remedy=tr("Give a unit from {first} to {last}.", first=1, last=247),
         )
     try:
         return PlcLineHost(simulator, map_file, clock or ScaledClock())

@@ -114,7 +114,7 @@ def _parts(name: str) -> list[KinematicsRow]:
         )
     if first in STANDALONE_ROWS and others:
         raise ConfigError(
-            tr("{name} is whole: nothing can be coupled to it.", name=first),
+            tr("{name} is complete: nothing can be coupled to it.", name=first),
             remedy=tr("Couple to one of {names}.", names=", ".join(POSITION_ROWS)),
         )
     rows = [_row(first, name, {**POSITION_ROWS, **STANDALONE_ROWS}, carries=bool(others))]
@@ -156,7 +156,7 @@ def _require_finite(parameters: Mapping[str, float]) -> None:
     for name, value in parameters.items():
         if not math.isfinite(value):
             raise ConfigError(
-                tr("The parameter {name} cannot be {value}.", name=name, value=value),
+                tr("The parameter {name} cannot be {value!r}.", name=name, value=value),
                 remedy=tr("Give a finite decimal number."),
             )
 
@@ -219,7 +219,7 @@ def _require_standing(name: str, kinematics: KinematicsModel, limits: Sequence[A
     except BlockRefused as refused:
         raise ConfigError(
             tr(
-                "{name} cannot stand at the limits of its axes: {cause}.",
+                "{name} cannot be at the limits of its axes: {cause}.",
                 name=name,
                 cause=refused.text,
             ),

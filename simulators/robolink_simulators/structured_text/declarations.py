@@ -73,7 +73,7 @@ class Declarations:
             member, of_tree, first = field.children
             low = require_name(member, file, dialect)
             if low in structure.members:
-                raise refused(TextPlace.of(file, field), tr("{name} stands there twice", name=low))
+                raise refused(TextPlace.of(file, field), tr("{name} appears twice", name=low))
             of = self.type_of(of_tree, file, dialect)
             structure.members[low] = self._variable(low, of, slot, first, file, dialect)
         self.types[name.upper()] = structure
@@ -82,7 +82,7 @@ class Declarations:
         """Refuse the name of a type or block that is there already, or no compiler takes."""
         require_name(name, file, dialect)
         if name.upper() in self.types:
-            raise refused(TextPlace.of(file, name), tr("{name} stands there twice", name=str(name)))
+            raise refused(TextPlace.of(file, name), tr("{name} appears twice", name=str(name)))
 
     def type_of(self, tree: Node, file: str, dialect: TextDialect) -> DataType:
         """Return the type that a text names.
@@ -136,7 +136,7 @@ class Declarations:
     ) -> None:
         names, address, of_tree, first = tree.children
         if address is not None and dialect is TextDialect.COMMON:
-            raise refused(TextPlace.of(file, tree), tr("addresses stand in the glue only"))
+            raise refused(TextPlace.of(file, tree), tr("addresses appear in the glue only"))
         of = self.type_of(of_tree, file, dialect)
         instances = isinstance(of, ArrayType) and isinstance(of.element, BlockType)
         if dialect is TextDialect.COMMON and (
@@ -149,7 +149,7 @@ class Declarations:
         for name in names.children:
             low = require_name(name, file, dialect)
             if low in members:
-                raise refused(TextPlace.of(file, name), tr("{name} stands there twice", name=low))
+                raise refused(TextPlace.of(file, name), tr("{name} appears twice", name=low))
             variable = self._variable(low, of, len(members), first, file, dialect)
             variable.kind, variable.retained = kind, "RETAIN" in words
             variable.constant = "CONSTANT" in words

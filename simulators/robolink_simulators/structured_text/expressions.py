@@ -111,19 +111,19 @@ class ExpressionTranslator:
         if of is LREAL:
             return constant(LREAL, float(digits.replace("_", "")))
         if "." in digits:
-            raise refused(place, tr("{number} is no {type}", number=digits, type=of.name))
+            raise refused(place, tr("{number} is not of type {type}", number=digits, type=of.name))
         number = _whole_number(digits)
         if of is BOOL and number in (0, 1):
             return constant(BOOL, bool(number))
         if of.family in (Family.INTEGER, Family.BITS) and number <= of.highest:
             return constant(of, number)
-        raise refused(place, tr("{number} is no {type}", number=digits, type=of.name))
+        raise refused(place, tr("{number} is not of type {type}", number=digits, type=of.name))
 
     def _duration(self, text: str, place: TextPlace) -> int:
         digits = text.partition("#")[2].replace("_", "").lower()
         parts = _PARTS.findall(digits)
         if "".join(number + unit for number, unit in parts) != digits:
-            raise refused(place, tr("{text} is no duration", text=text))
+            raise refused(place, tr("{text} is not a duration", text=text))
         return round(sum(float(number) * _UNITS_US[unit] for number, unit in parts))
 
 

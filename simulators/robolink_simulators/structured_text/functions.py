@@ -106,7 +106,7 @@ def _shift(given: Sequence[Typed], name: str, place: TextPlace) -> Typed:
         value: int = get(frame)
         n: int = by(frame)
         if n < 0:
-            raise refused(place, tr("a shift by less than nothing"))
+            raise refused(place, tr("a shift by less than zero"))
         if name == "SHL":
             return value << n & mask if n < bits else 0
         if name == "SHR":
@@ -228,4 +228,4 @@ def _whole(
         whole = make(number)
         if target.lowest <= whole <= target.highest:
             return whole
-    raise refused(place, tr("{number} is no {type}", number=number, type=target.name))
+    raise refused(place, tr("{number} is not of type {type}", number=number, type=target.name))

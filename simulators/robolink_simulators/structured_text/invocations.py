@@ -40,7 +40,7 @@ def call(
     instance = translator.reference(called)
     block = instance.type
     if not isinstance(block, BlockType):
-        raise refused(place, tr("{name} is no function block", name=instance.name))
+        raise refused(place, tr("{name} is not a function block", name=instance.name))
     before: list[Step] = []
     after: list[Step] = []
     named: set[str] = set()
@@ -83,7 +83,7 @@ def _given(
     if member.kind == "var_in_out":
         return _by_reference(member, value, translator, place)
     if member.kind != "var_input":
-        raise refused(place, tr("{pin} is no input", pin=member.name))
+        raise refused(place, tr("{pin} is not an input", pin=member.name))
     if isinstance(member.type, ScalarType):
         get = kept(translator.expression(value), member.type, place)
 
@@ -112,7 +112,7 @@ def _by_reference(
         raise refused(
             place,
             tr(
-                "{found} stands where {wanted} is expected",
+                "{found} appears where {wanted} is expected",
                 found=type_name(given.type),
                 wanted=type_name(member.type),
             ),
@@ -134,7 +134,7 @@ def _taken(
     target = translator.reference(value)
     fits = member.kind == "var_output" and same(member.type, target.type)
     if not fits or not isinstance(member.type, ScalarType) or not target.writable:
-        raise refused(place, tr("{pin} is no output for that", pin=member.name))
+        raise refused(place, tr("{pin} is not an output for that", pin=member.name))
     slot, store = member.slot, target.storer()
 
     def take(frame: Frame, inside: Frame) -> None:

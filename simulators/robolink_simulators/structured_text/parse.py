@@ -193,9 +193,9 @@ def _require_common(file: str, text: str) -> None:
             continue
         place = _place_at(file, text, match.start())
         if inside is not None:
-            raise refused(place, tr("a comment stands inside a comment"))
+            raise refused(place, tr("a comment is inside a comment"))
         if line_comment:
-            raise refused(place, tr("a comment is written (* so *) here, not with //"))
+            raise refused(place, tr("a comment is written (* like this *) here, not with //"))
         raise refused(place, tr("a pragma does not belong to the common subset"))
 
 

@@ -218,7 +218,7 @@ class StructuredProgram:
     def _list(self, tree: Node, source: SourceText) -> None:
         if source.dialect is TextDialect.COMMON:
             raise refused(
-                TextPlace.of(source.name, tree), tr("global variables stand in the glue only")
+                TextPlace.of(source.name, tree), tr("global variables appear in the glue only")
             )
         section = type(tree)("section", [_kind_var(tree), *tree.children])
         variables = self._declared.variables(iter([section]), source.name, source.dialect)

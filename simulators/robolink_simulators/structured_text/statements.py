@@ -181,7 +181,7 @@ class StatementTranslator(ExpressionTranslator):
             other.start < span.stop and span.start < other.stop for other, _ in ranges
         )
         if taken:
-            raise refused(self.place(label), tr("the label stands there twice"))
+            raise refused(self.place(label), tr("the label appears twice"))
         if high is None:
             singles[low] = action
         else:
@@ -194,7 +194,7 @@ class StatementTranslator(ExpressionTranslator):
         variable = self._scope.members.get(low)
         of = variable.type if variable else None
         if not isinstance(of, ScalarType) or of.family is not Family.INTEGER or not variable:
-            raise refused(place, tr("{name} is no whole number of this block", name=str(name)))
+            raise refused(place, tr("{name} is not a whole number of this block", name=str(name)))
         if variable.kind == "var_in_out" or low in self._scope.turning:
             raise refused(place, tr("{name} cannot count this loop", name=str(name)))
         first = kept(self._bound(first_tree), of, place)
@@ -251,7 +251,7 @@ class StatementTranslator(ExpressionTranslator):
 
     def _exit(self, tree: Node) -> Action:
         if not self._depth:
-            raise refused(self.place(tree), tr("EXIT stands in no loop"))
+            raise refused(self.place(tree), tr("EXIT is not in a loop"))
         return lambda _: _EXIT
 
 

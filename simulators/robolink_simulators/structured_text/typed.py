@@ -69,7 +69,8 @@ def fitted(piece: Typed, wanted: DataType, place: TextPlace) -> Typed:
         if piece.constant is not None and wanted.lowest <= piece.constant <= wanted.highest:
             return constant(wanted, piece.constant)
         raise refused(
-            place, tr("{number} is no {type}", number=piece.constant, type=type_name(wanted))
+            place,
+            tr("{number} is not of type {type}", number=piece.constant, type=type_name(wanted)),
         )
     hint = ""
     if whole or wanted is LREAL:
@@ -77,7 +78,7 @@ def fitted(piece: Typed, wanted: DataType, place: TextPlace) -> Typed:
     raise refused(
         place,
         tr(
-            "{found} stands where {wanted} is expected",
+            "{found} appears where {wanted} is expected",
             found=type_name(piece.type),
             wanted=type_name(wanted),
         ),

@@ -54,7 +54,7 @@ class CellRequest:
         for name in given:
             if name not in names:
                 raise ConfigError(
-                    tr("A simulated cell is not asked for by {name!r}.", name=name),
+                    tr("A simulated cell has no parameter {name!r}.", name=name),
                     remedy=tr("These are known: {names}.", names=", ".join(names)),
                 )
         request = cls(**given)
@@ -73,8 +73,8 @@ class CellRequest:
         """
         if self.program is not None:
             raise ConfigError(
-                tr("A program is executed by a simulated SoftMotion PLC alone."),
-                remedy=tr("Ask for it where that is made: {example}.", example=_PROGRAM_EXAMPLE),
+                tr("Only a simulated SoftMotion PLC executes a program."),
+                remedy=tr("Give it where that PLC is made: {example}.", example=_PROGRAM_EXAMPLE),
             )
 
     @property

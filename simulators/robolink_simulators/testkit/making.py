@@ -228,6 +228,6 @@ def _name() -> str:
 
 def _no_medium(medium: str, known: tuple[str, ...]) -> ConfigError:
     return ConfigError(
-        tr("A simulator is not served by {medium!r}.", medium=medium),
+        tr("A simulator cannot be served over {medium!r}.", medium=medium),
         remedy=tr("These are known: {known}.", known=", ".join(known)),
     )

@@ -35,7 +35,7 @@ def fit_subject(*off_mm, worst=None):
     rows = tuple(
         FitRow(
             number,
-            tr("Pose {number}, at {where}", number=number, where=tr("U {u:.1f}", u=90.0 * number)),
+            tr("Touch {number} at {where}", number=number, where=tr("U {u:.1f}", u=90.0 * number)),
             (off, 0.0),
         )
         for number, off in enumerate(off_mm, start=1)

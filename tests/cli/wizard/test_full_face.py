@@ -52,8 +52,12 @@ class Drawn:
         return "\n".join(screen.display)
 
 
+def paste(source, text):
+    source.send_text(f"\x1b[200~{text}\x1b[201~")
+
+
 def test_keys_of_a_pipe_jog_take_and_write():
-    """One face, one work: touch, burst, write."""
+    """One face, one work: a pasted id, touch, burst, write."""
     from robolink_cli.wizard.desk import Desk
 
     desk, answers, pose = Desk(), [], [ARRIVAL]
@@ -73,6 +77,7 @@ def test_keys_of_a_pipe_jog_take_and_write():
             pose[0] = there
 
     def do():
+        said(None, Question.TEXT, "N-7")
         said(touch_subject(), Question.PLACE, "done")
         said(write_subject(1), Question.YES_NO, "y")
 
@@ -82,17 +87,25 @@ def test_keys_of_a_pipe_jog_take_and_write():
         try:
             source.send_text("66")  # before anything was asked
             work.start()
+            until(lambda: "[Enter] Done" in face.text)
+            time.sleep(0.35)
+            paste(source, "N-7\r5")  # no key of another line may come with it
+            until(lambda: "Too fast for a hand. Ignored." in face.text)
+            paste(source, "N-7\r")
             until(lambda: "Touch 2 of 4" in face.text)
             time.sleep(0.35)
+            paste(source, "5")
+            time.sleep(0.1)
+            assert answers == ["N-7"]
             source.send_text("4006381333931\r\n")
             time.sleep(0.3)
             assert "Too fast for a hand. Ignored." in face.text
             source.send_text("\x1b[6~")  # PgDn: Z down
-            until(lambda: answers == ["z-0.1"])
+            until(lambda: answers == ["N-7", "z-0.1"])
             time.sleep(0.4)
             source.send_text("\r")
             time.sleep(0.1)
-            assert answers == ["z-0.1"]
+            assert answers == ["N-7", "z-0.1"]
             source.send_text("5")
             until(lambda: "To write" in face.text)
             time.sleep(0.35)
@@ -107,7 +120,7 @@ def test_keys_of_a_pipe_jog_take_and_write():
             work.wait(5.0)
             face.thread.join(5.0)
     assert work.error is None, work.error
-    assert answers == ["z-0.1", "done", "y"]
+    assert answers == ["N-7", "z-0.1", "done", "y"]
 
 
 @pytest.mark.parametrize(("keys", "again"), [(("\r", "5"), True), (("\r", "0"), False)])

@@ -69,11 +69,11 @@ def test_f78_without_the_shared_journal_nothing_new_begins_and_what_runs_ends_sa
         with pytest.raises(RobolinkError) as ended:
             change_tools(controller, [Wanted(1, NEW, OLD)])
         epson.on_request = None
-        assert "is not reached" in str(ended.value) or "record" in str(ended.value), ended.value
+        assert "cannot be reached" in str(ended.value) or "record" in str(ended.value), ended.value
         written = writes(epson)
         assert written == (0 if not at else written)
         # Nothing else begins.
-        with pytest.raises(JournalError, match="is not reached"):
+        with pytest.raises(JournalError, match="cannot be reached"):
             controller.tools.write(2, NEW, expected=None)
         assert writes(epson) == written <= 2
         assert epson.machine.tools.get(2) is None

@@ -95,7 +95,7 @@ def test_a_shared_record_of_before_is_lost_to_nobody_and_taken_for_nobodys(
     assert values(log) == []
     assert {entry.number for entry in present.entries(controller=URL)} >= set(before)
     assert present.verify().problems == ()
-    said = [text for text in log.remarks if "its own record from now on" in text]
+    said = [text for text in log.remarks if "now has a record of its own" in text]
     assert len(said) == (0 if reading else 1)
     log = met(present, ALONE)
     log.open_markers()

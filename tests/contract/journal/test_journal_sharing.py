@@ -239,7 +239,7 @@ def test_a_server_that_was_restarted_is_found_again(server, open_anew):
     server.stop()
     try:
         for _ in range(2):
-            with pytest.raises(JournalError, match="is not reached") as caught:
+            with pytest.raises(JournalError, match="cannot be reached") as caught:
                 log.begin(marker("a"))
             assert "The command was not sent." in caught.value.remedy
     finally:
@@ -249,6 +249,6 @@ def test_a_server_that_was_restarted_is_found_again(server, open_anew):
 
 
 def test_a_database_that_does_not_exist_is_named(server, open_anew):
-    with pytest.raises(JournalError, match="is not reached") as caught:
+    with pytest.raises(JournalError, match="cannot be reached") as caught:
         open_anew(server.url("nowhere"))
     assert "nowhere" in str(caught.value)

@@ -31,4 +31,4 @@ class PlateTouchParameters(MethodParameters):
             yield Problem("clearance_mm", tr("must be smaller than {other}", other=other))
 
     def no_residual(self) -> str:
-        return tr("cannot be judged: two touches always agree")
+        return tr("cannot be judged: two touches cannot check each other")

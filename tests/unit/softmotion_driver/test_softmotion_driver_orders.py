@@ -119,7 +119,7 @@ def test_an_acknowledgement_of_another_opcode_is_not_taken_as_ours(cell, plc, co
 
 def test_a_plc_that_starts_anew_in_the_middle_of_a_command_leaves_it_unknown(cell, plc, controller):
     cell.link.before("read_head", plc.restart)
-    with pytest.raises(OutcomeUnknownError, match="started anew"):
+    with pytest.raises(OutcomeUnknownError, match="restarted"):
         controller.io.set_output(5, 1)
     assert len(cell.open_requests()) == 1
 
@@ -127,7 +127,7 @@ def test_a_plc_that_starts_anew_in_the_middle_of_a_command_leaves_it_unknown(cel
 @pytest.mark.fault("F14", "F29")
 def test_a_plc_that_started_anew_before_a_command_is_told_nothing(cell, plc, controller):
     plc.restart()
-    with pytest.raises(TransportBrokenError, match="started anew"):
+    with pytest.raises(TransportBrokenError, match="restarted"):
         controller.io.set_output(5, 1)
     assert cell.link.sent == []
     assert cell.open_requests() == []
@@ -179,7 +179,7 @@ def test_a_command_that_a_stop_ends_is_not_taken_as_done(cell, plc, controller):
 
     cell.link.before("read_head", still_active)
     cell.link.before("read_head", stop_it)
-    with pytest.raises(ControllerFaultError, match="ended before it was done"):
+    with pytest.raises(ControllerFaultError, match="ended before it finished"):
         controller.motors(False)
 
 

@@ -385,11 +385,11 @@ def test_a_slot_with_the_values_of_no_tool_is_named_and_never_worked_with(plc, c
     plc.slots[3] = replace(plc.slots[3], tool=NO_TOOL)
     held = controller.tools.read(3)
     assert held.components() == NO_TOOL
-    assert "the values of no tool" in describe_offset(held)
-    with pytest.raises(ToolError, match="values of no tool") as refusal:
+    assert "not the values of a tool" in describe_offset(held)
+    with pytest.raises(ToolError, match="not the values of a tool") as refusal:
         controller.tools.select(3)
     assert "'robolink tool clear'" in refusal.value.remedy
-    with pytest.raises(ToolError, match="values of no tool"):
+    with pytest.raises(ToolError, match="not the values of a tool"):
         controller.tools.write(4, held, expected=None)
     assert plc.executed == []
 
@@ -405,7 +405,7 @@ def test_a_slot_with_the_values_of_no_tool_is_written_or_cleared(plc, controller
 
 def test_an_angle_that_no_tool_has_is_not_taken_for_a_rotation(plc, controller):
     plc.slots[3] = replace(plc.slots[3], tool=(1.0, 2.0, 3.0, 1e200, 0.0, 0.0))
-    with pytest.raises(ToolError, match="values of no tool"):
+    with pytest.raises(ToolError, match="not the values of a tool"):
         controller.tools.select(3)
 
 

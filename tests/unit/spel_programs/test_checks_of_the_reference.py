@@ -146,9 +146,9 @@ AMBIGUITIES = [
 
 # number, what a build says of the text
 FAULTS = [
-    (1, "Print 1,, 2", "this cannot stand here: ,"),
-    (2, "Print XY(1,2,3,4) * 2", "this cannot stand here: *"),
-    (12, "f(1)+1", "this cannot stand here: +"),
+    (1, "Print 1,, 2", "this cannot be here: ,"),
+    (2, "Print XY(1,2,3,4) * 2", "this cannot be here: *"),
+    (12, "f(1)+1", "this cannot be here: +"),
 ]
 
 

@@ -283,7 +283,7 @@ def test_one_project_is_read_in_one_code_page(cell):
     ("text", "told"),
     [
         (LOOP.format("Print (1"), "main.prg:2:9: the line ends too early"),
-        (LOOP.format("If 1 The"), "main.prg:2:6: this cannot stand here: The"),
+        (LOOP.format("If 1 The"), "main.prg:2:6: this cannot be here: The"),
         (LOOP.format("x = 1"), "main.prg:2: nothing is called x"),
         (LOOP.format("Foo 1"), "there is no statement and no function foo"),
         (LOOP.format("GoTo away"), "error 3108"),
@@ -294,7 +294,7 @@ def test_one_project_is_read_in_one_code_page(cell):
         (LOOP.format("Integer a\nInteger A"), "a is declared twice"),
         (LOOP.format("Exit For"), "there is no such loop around it"),
         ("Function main\nPrint 1\n", "this is never closed (expected Fend)"),
-        ("Print 1\n", "this cannot stand outside of functions"),
+        ("Print 1\n", "this cannot be outside functions"),
         ('#include "none.inc"\n', "There is no file none.inc"),
         (LOOP.format("Print f(1)") + "Function f\nFend\n", "f takes 0 arguments"),
         (LOOP.format("Print 1") + "Function MAIN\nFend\n", "there is another function MAIN"),

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from robolink_cli.commands.companions.map_values import MapValues
 
 
-@click.command("check-map")
+@click.command("check-map", short_help="Check the map of a PLC's registers.")
 @click.argument("file", metavar="[MAP.toml]", required=False, type=click.Path(path_type=Path))
 @click.option(
     "--from-csv",

@@ -27,7 +27,7 @@ def _symbols(given: tuple[str, str, str] | None) -> tuple[str, ...]:
     return names
 
 
-@plc.command("export")
+@plc.command("export", short_help="Write the program of the mailbox and its register map.")
 @click.argument("folder", metavar="DIR", type=click.Path(file_okay=False, path_type=Path))
 @click.option(
     "--profile",
@@ -39,6 +39,7 @@ def _symbols(given: tuple[str, str, str] | None) -> tuple[str, ...]:
 @click.option(
     "--base",
     type=click.IntRange(0, _LAST_BASE),
+    metavar="N",
     default=0,
     show_default=True,
     help="First register of both blocks, counted from 0.",

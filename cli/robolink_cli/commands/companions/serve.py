@@ -53,6 +53,7 @@ if TYPE_CHECKING:
 @click.option(
     "--tolerance-mm",
     type=float,
+    metavar="MM",
     default=0.1,
     show_default=True,
     help=declared("Largest drift about the new tip, and widest interval."),
@@ -60,21 +61,27 @@ if TYPE_CHECKING:
 @click.option(
     "--max-change-mm",
     type=float,
+    metavar="MM",
     default=2.0,
     show_default=True,
     help=declared("Largest change of the offset that is accepted."),
 )
 @click.option(
-    "--sigma-mm", type=float, help=declared("How far one touch scatters, where it is known.")
+    "--sigma-mm",
+    type=float,
+    metavar="MM",
+    help=declared("How far one touch scatters, where it is known."),
 )
 @click.option(
     "--tool",
     type=click.IntRange(1, 15),
+    metavar="N",
     help=declared("With a PLC: the slot that its program measures."),
 )
 @click.option(
     "--touches",
     type=int,
+    metavar="N",
     default=5,
     show_default=True,
     help=declared("With a PLC: touches before the write."),
@@ -82,6 +89,7 @@ if TYPE_CHECKING:
 @click.option(
     "--proofs",
     type=int,
+    metavar="N",
     default=2,
     show_default=True,
     help=declared("With a PLC: touches afterwards."),

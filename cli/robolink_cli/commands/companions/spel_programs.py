@@ -33,7 +33,7 @@ def programs_argument(function: Any) -> Any:  # noqa: ANN401 - a decorator of cl
     return click.argument("files", metavar="FILE...", nargs=-1, required=True, type=_FILE)(function)
 
 
-@click.command("check")
+@click.command("check", short_help="Build SPEL+ programs and tell every fault.")
 @programs_argument
 @json_option
 def check(files: tuple[Path, ...], points: tuple[Path, ...]) -> None:
@@ -66,22 +66,25 @@ def check(files: tuple[Path, ...], points: tuple[Path, ...]) -> None:
         )
 
 
-@click.command("run")
+@click.command("run", short_help="Run SPEL+ programs on a simulated controller.")
 @programs_argument
 @click.option(
     "--function",
-    show_default="main; none beside background tasks",
-    help="The function to start; it takes no arguments.",
+    metavar="NAME",
+    help="The function to start; it takes no arguments. Without it main, or none beside background "
+    "tasks.",
 )
 @project_options
 @click.option("--trace", is_flag=True, help="Show each statement before it is carried out.")
-@click.option("--robot", default="T6-602S", show_default=True, help="Model of the robot.")
+@click.option(
+    "--robot", metavar="MODEL", default="T6-602S", show_default=True, help="Model of the robot."
+)
 @click.option(
     "--option",
     "options",
     multiple=True,
     metavar="NAME=VALUE",
-    help="A habit of the controller; a wrong name lists them all. May be repeated.",
+    help="A habit of the device; a wrong name lists them all. May be repeated.",
 )
 @click.option(
     "--for",

@@ -63,6 +63,7 @@ class CheckedCell(NamedTuple):
 @click.option(
     "--since",
     type=click.DateTime(["%Y-%m-%d"]),
+    metavar="YYYY-MM-DD",
     help=declared("Start the charts again from this day, after a repair (UTC)."),
 )
 @click.option(

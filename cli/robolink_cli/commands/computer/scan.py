@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("addresses", metavar="[RANGE]", required=False)
-@click.option("--port", type=click.IntRange(1, 65535), default=5000, show_default=True)
+@click.option("--port", type=click.IntRange(1, 65535), metavar="N", default=5000, show_default=True)
 @click.option(
     "--timeout",
     "timeout_s",
@@ -106,4 +106,4 @@ def _show(
         )
     )
     if answering:
-        say(tr("An open port is no proof of a controller: 'robolink -c URL status' asks it."))
+        say(tr("An open port does not prove a controller: 'robolink -c URL status' asks it."))

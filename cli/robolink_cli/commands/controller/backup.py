@@ -99,6 +99,7 @@ def compare(
     "--tool",
     "tools",
     type=int,
+    metavar="N",
     multiple=True,
     shell_complete=complete_tool,
     help="Only this tool; may be repeated.",

@@ -23,7 +23,14 @@ _CELL_KEYS: Final = {"speed_mm_s": "speed_mm_s", "box_mm": "jog_box_mm"}
 
 @click.command()
 @click.argument("steps", nargs=-1)
-@click.option("--speed", "speed_mm_s", type=click.FloatRange(1, 100), default=20.0, metavar="MM_S")
+@click.option(
+    "--speed",
+    "speed_mm_s",
+    type=click.FloatRange(1, 100),
+    default=20.0,
+    metavar="MM_S",
+    help="Speed of straight moves, in Power Low.",
+)
 @click.option(
     "--box",
     "box_mm",

@@ -127,12 +127,12 @@ def _get_by_mode(context: CliContext, mode: str) -> None:
 
 @tool.command("set")
 @click.argument("number", type=int, shell_complete=complete_tool)
-@click.option("--x", type=DECIMAL, help="mm from the flange.")
-@click.option("--y", type=DECIMAL, help="mm from the flange.")
-@click.option("--z", type=DECIMAL, help="mm from the flange.")
-@click.option("--u", type=DECIMAL, help="Degrees about Z.")
-@click.option("--v", type=DECIMAL, help="Degrees about Y; six-axis robots only.")
-@click.option("--w", type=DECIMAL, help="Degrees about X; six-axis robots only.")
+@click.option("--x", type=DECIMAL, metavar="MM", help="mm from the flange.")
+@click.option("--y", type=DECIMAL, metavar="MM", help="mm from the flange.")
+@click.option("--z", type=DECIMAL, metavar="MM", help="mm from the flange.")
+@click.option("--u", type=DECIMAL, metavar="DEG", help="Degrees about Z.")
+@click.option("--v", type=DECIMAL, metavar="DEG", help="Degrees about Y; six-axis robots only.")
+@click.option("--w", type=DECIMAL, metavar="DEG", help="Degrees about X; six-axis robots only.")
 @accept_jump_options
 @order_option
 @controller_options

@@ -40,6 +40,7 @@ def var() -> None:
 @click.option(
     "--count",
     type=click.IntRange(1, 100),
+    metavar="N",
     help="How many elements, from --index on; the last subscript counts up.",
 )
 @controller_options
@@ -65,7 +66,11 @@ def get(
 
 
 # A negative value is no option.
-@var.command("set", context_settings={"ignore_unknown_options": True})
+@var.command(
+    "set",
+    context_settings={"ignore_unknown_options": True},
+    short_help="Set a variable and read it back.",
+)
 @click.argument("name")
 @click.argument("value")
 @click.option(

@@ -24,10 +24,16 @@ _file = click.Path(dir_okay=False, path_type=Path)
 
 @click.command("verify-controller")
 @click.option(
-    "--profile", type=_file, help="Write a cell profile, for 'robolink sim epson --profile'."
+    "--profile",
+    type=_file,
+    metavar="FILE",
+    help="Write a cell profile, for 'robolink sim epson --profile'.",
 )
 @click.option(
-    "--transcript", type=_file, help="Write all that was said, for 'robolink sim epson --replay'."
+    "--transcript",
+    type=_file,
+    metavar="FILE",
+    help="Write all that was said, for 'robolink sim epson --replay'.",
 )
 @click.option("--redact", is_flag=True, help="Leave names, serial numbers and addresses out.")
 @controller_options

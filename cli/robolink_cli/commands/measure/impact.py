@@ -20,19 +20,23 @@ from robolink_cli.session.opening import open_controller
 @click.option(
     "--tool",
     type=click.IntRange(1, 15),
+    metavar="N",
     required=True,
     shell_complete=complete_tool,
     help="Number of the tool.",
 )
-@click.option("--x", type=DECIMAL, help="New offset, mm from the flange; left out: as stored.")
-@click.option("--y", type=DECIMAL, help="mm from the flange.")
-@click.option("--z", type=DECIMAL, help="mm from the flange.")
-@click.option("--u", type=DECIMAL, help="Degrees about Z.")
+@click.option(
+    "--x", type=DECIMAL, metavar="MM", help="New offset, mm from the flange; left out: as stored."
+)
+@click.option("--y", type=DECIMAL, metavar="MM", help="mm from the flange.")
+@click.option("--z", type=DECIMAL, metavar="MM", help="mm from the flange.")
+@click.option("--u", type=DECIMAL, metavar="DEG", help="Degrees about Z.")
 @click.option("--points", metavar="1-50", help="Taught points to read from the controller.")
 @click.option(
     "--pts",
     "path",
     type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
     help="A .pts file of EPSON RC+ in place of the controller's points.",
 )
 @report_options

@@ -19,7 +19,7 @@ def poses() -> None:
     """Files of poses: what robolink understands of them."""
 
 
-@poses.command("show")
+@poses.command("show", short_help="Show the poses in a file, and how they were read.")
 @click.argument("file", type=click.Path(dir_okay=False, path_type=Path))
 @reading_options
 @json_option
@@ -112,5 +112,5 @@ def _sentences(how: "HowRead", count: int) -> list[str]:
     if how.ignored:
         lines.append(tr("Not used: {names}.", names=", ".join(how.ignored)))
     if how.skipped:
-        lines.append(tr("Left out, because they are no taught poses: {count}.", count=how.skipped))
+        lines.append(tr("Left out, because they are not taught poses: {count}.", count=how.skipped))
     return lines

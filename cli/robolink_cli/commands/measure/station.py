@@ -45,11 +45,12 @@ def show(context: CliContext, name: str, robot: str | None) -> None:
     context.emit("station", payload, lambda: show_station(found))
 
 
-@station.command("learn")
+@station.command("learn", short_help="Find a station with a tool whose offset is known.")
 @click.argument("name", metavar="ID", shell_complete=complete_station)
 @click.option(
     "--tool",
     type=click.IntRange(1, 15),
+    metavar="N",
     required=True,
     shell_complete=complete_tool,
     help=declared("Number of the tool whose offset is known."),
@@ -73,6 +74,7 @@ def show(context: CliContext, name: str, robot: str | None) -> None:
     "--box",
     "box_mm",
     type=click.FloatRange(min=1),
+    metavar="MM",
     default=150.0,
     show_default=True,
     help=declared("How far, sideways, the flange may go from where it is."),

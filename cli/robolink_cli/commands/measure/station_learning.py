@@ -167,7 +167,7 @@ def _show(known: Station, found: Found) -> None:
     columns = ("", "X mm", "Y mm", "Z mm")
     before = [number(known.x_mm), number(known.y_mm), number(known.z_mm)]
     after = [number(found.x_mm), number(found.y_mm), number(found.z_mm)]
-    rows = [[tr("before"), *before], [tr("found"), *after]]
+    rows = [[tr("before"), *before], [tr("after"), *after]]
     table(tr("station {id}", id=found.id), columns, rows)
     for line in _lines(found):
         note(

@@ -45,6 +45,7 @@ def _filters(function: F) -> F:
         click.option(
             "--tool",
             type=int,
+            metavar="N",
             shell_complete=complete_tool,
             help=declared("Only about this tool."),
         ),
@@ -53,7 +54,8 @@ def _filters(function: F) -> F:
             "kinds",
             type=click.Choice(list(_KINDS), case_sensitive=False),
             multiple=True,
-            help=declared("Only of this kind; may be repeated."),
+            metavar="KIND",
+            help=declared("Only of this kind; a wrong name lists them all. May be repeated."),
         ),
         click.option("--change", metavar="ID", help=declared("Only of this tool change.")),
     )
@@ -121,7 +123,12 @@ journal.add_command(drift)
 @journal.command("list")
 @_filters
 @click.option(
-    "--limit", type=click.IntRange(min=1), default=20, show_default=True, help="At most this many."
+    "--limit",
+    type=click.IntRange(min=1),
+    metavar="N",
+    default=20,
+    show_default=True,
+    help="At most this many.",
 )
 @json_option
 def list_entries(*, limit: int, **meant: Any) -> None:  # noqa: ANN401 - click's form
@@ -136,7 +143,7 @@ def list_entries(*, limit: int, **meant: Any) -> None:  # noqa: ANN401 - click's
             emit_json("robolink/journal/1", {"entries": []})
         else:
             say(tr("There is no journal yet at {location}.", location=location))
-            say(tr("The first change that robolink makes starts one."))
+            say(tr("The first change that robolink makes starts it."))
         return
     entries = list(wanted.of(journal_to_read(), limit=limit))
     if json_is_on():
@@ -161,7 +168,7 @@ def show(name: str) -> None:
         show_entry(entry)
 
 
-@journal.command("diff")
+@journal.command("diff", short_help="Show what differs between two entries or changes.")
 @click.argument("a", metavar="NUMBER|CHANGE")
 @click.argument("b", metavar="NUMBER|CHANGE")
 @json_option
@@ -177,7 +184,7 @@ def diff(a: str, b: str) -> None:
         show_diff(*sides)
 
 
-@journal.command("export")
+@journal.command("export", short_help="Write entries to a file, oldest first.")
 @click.argument("file", type=click.Path(dir_okay=False, path_type=Path))
 @click.option(
     "--format",
@@ -211,7 +218,7 @@ def export(
         say(tr("{count} entries were written to {file}.", count=counted.count, file=file))
 
 
-@journal.command("verify")
+@journal.command("verify", short_help="Check that no entry was changed and none is missing.")
 @json_option
 def verify() -> int:
     """Check that no entry was changed and none is missing; exit code 1 when one was.

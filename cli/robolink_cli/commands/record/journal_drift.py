@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from robolink.model import Recorded
 
 
-@click.command("drift")
+@click.command("drift", short_help="Show how each tool's offset moved, and what stands out.")
 @click.option(
     "-c",
     "--controller",
@@ -27,10 +27,13 @@ if TYPE_CHECKING:
     shell_complete=complete_cell,
     help=declared("Only of this controller; without it, of all."),
 )
-@click.option("--tool", type=int, shell_complete=complete_tool, help=declared("Only this tool."))
+@click.option(
+    "--tool", type=int, metavar="N", shell_complete=complete_tool, help=declared("Only this tool.")
+)
 @click.option(
     "--since",
     type=click.DateTime(["%Y-%m-%d"]),
+    metavar="YYYY-MM-DD",
     help=declared(
         "Start again from this day, after a repair or with another kind of nozzle (UTC)."
     ),
@@ -38,6 +41,7 @@ if TYPE_CHECKING:
 @click.option(
     "--baseline",
     type=click.IntRange(min=20, max=1000),
+    metavar="N",
     default=20,
     show_default=True,
     help=declared("On how many of the first changes the limits rest."),

@@ -14,7 +14,11 @@ from robolink_cli.session.opening import open_controller
 @click.command()
 @click.argument("change", required=False)
 @click.option(
-    "--tool", type=int, shell_complete=complete_tool, help=declared("Only this tool of the change.")
+    "--tool",
+    type=int,
+    metavar="N",
+    shell_complete=complete_tool,
+    help=declared("Only this tool of the change."),
 )
 @click.option(
     "--to",

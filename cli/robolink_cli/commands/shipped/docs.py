@@ -7,6 +7,7 @@ import click
 
 from robolink.messages import tr
 from robolink_cli.console.render import emit_json, json_is_on, say, say_listed
+from robolink_cli.console.tolerance import is_terminal
 from robolink_cli.session.context import json_option
 
 
@@ -81,7 +82,7 @@ def _list(titles: dict[str, str]) -> None:
 
 def _show(text: str) -> None:
     """Show a page: through the pager on a terminal, as it stands to a program."""
-    if sys.stdout.isatty() and sys.stdin.isatty():
+    if is_terminal(sys.stdout) and is_terminal(sys.stdin):
         click.echo_via_pager(text)
     else:
         say(text.rstrip("\n"))

@@ -35,7 +35,7 @@ def list_models() -> None:
     say(tr("To begin with one: robolink recipe new NAME FILE"))
 
 
-@recipe.command("new")
+@recipe.command("new", short_help="Copy a recipe to a file of your own.")
 @click.argument("name", shell_complete=_complete_model)
 @click.argument("file", type=click.Path(dir_okay=False, path_type=Path), required=False)
 @click.option("--force", is_flag=True, help="Overwrite a file that is already there.")

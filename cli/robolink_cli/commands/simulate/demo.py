@@ -6,10 +6,13 @@ from robolink_cli.session.context import json_option
 
 
 @click.command()
-@click.option("--seed", type=int, default=1, show_default=True, help="Another cell, another tip.")
+@click.option(
+    "--seed", type=int, metavar="N", default=1, show_default=True, help="Another cell, another tip."
+)
 @click.option(
     "--speed",
     type=click.FloatRange(1, 100),
+    metavar="FACTOR",
     default=20.0,
     show_default=True,
     help="How many times faster than real the simulated time passes.",

@@ -42,7 +42,11 @@ sim.add_command(softmotion)
 sim.add_command(sim_run)
 
 
-@sim.command(cls=SectionedCommand, sections=SECTIONS)
+@sim.command(
+    cls=SectionedCommand,
+    sections=SECTIONS,
+    short_help="Serve a simulated EPSON controller until Ctrl-C.",
+)
 @tcp_option("127.0.0.1:5000", declared("Where to listen; port 0 takes a free one."))
 @serial_option(
     declared("Remote RS232 on a pseudo terminal, whose path is printed, in place of --tcp.")
@@ -50,12 +54,14 @@ sim.add_command(sim_run)
 @click.option(
     "--baud",
     type=click.IntRange(0, 4_000_000),
+    metavar="N",
     default=0,
     show_default=True,
     help="How slow that line is, in real time; 0 carries everything at once.",
 )
 @click.option(
     "--robot",
+    metavar="MODEL",
     default="T6-602S",
     show_default=True,
     shell_complete=_complete_robot,
@@ -69,11 +75,13 @@ sim.add_command(sim_run)
 @click.option(
     "--profile",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    metavar="FILE",
     help="Cell profile written by verify-controller; --option overrules it.",
 )
 @click.option(
     "--replay",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    metavar="FILE",
     help="Serve a dialogue that --record has written, in place of a simulator.",
 )
 @click.option(
@@ -122,7 +130,7 @@ def epson(
     serve_alone(EPSON_KIND, life, {"address": address, "allow_remote": allow_remote, **more})
 
 
-@sim.command()
+@sim.command(short_help="Be the person at a simulated cell.")
 @click.argument("url")
 @click.argument("act")
 @click.argument("values", nargs=-1, metavar="[NAME=NUMBER]...")
@@ -139,7 +147,7 @@ def assist(url: str, act: str, values: tuple[str, ...]) -> None:
     do_act(url, act, values)
 
 
-@sim.command()
+@sim.command(short_help="Do something to a simulated controller past the wire.")
 @click.argument("act")
 @click.argument("values", nargs=-1, metavar="[NAME=VALUE]...")
 @click.option(

@@ -19,7 +19,12 @@ from robolink_cli.options.simulation import (
 from robolink_cli.session.context import json_option
 
 
-@click.command("plc", cls=SectionedCommand, sections=SECTIONS)
+@click.command(
+    "plc",
+    cls=SectionedCommand,
+    sections=SECTIONS,
+    short_help="Serve a simulated PLC with the registers of any map.",
+)
 @click.option(
     "--map",
     "map_file",
@@ -32,6 +37,7 @@ from robolink_cli.session.context import json_option
 @click.option(
     "--unit",
     type=click.IntRange(0, 255),
+    metavar="N",
     default=1,
     show_default=True,
     help="The unit identifier that answers; 1 to 247 on a serial line.",

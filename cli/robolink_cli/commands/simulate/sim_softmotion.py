@@ -31,10 +31,20 @@ def _complete_kinematics(_: click.Context, __: click.Parameter, start: str) -> l
     help="Be a CANopen node, for example on udp_multicast:239.74.163.2:43113 or socketcan:vcan0.",
 )
 @click.option(
-    "--unit", type=click.IntRange(1, 247), default=1, show_default=True, help="On the serial line."
+    "--unit",
+    type=click.IntRange(1, 247),
+    metavar="N",
+    default=1,
+    show_default=True,
+    help="Unit identifier on the serial line.",
 )
 @click.option(
-    "--node", type=click.IntRange(1, 127), default=5, show_default=True, help="On the CAN bus."
+    "--node",
+    type=click.IntRange(1, 127),
+    metavar="N",
+    default=5,
+    show_default=True,
+    help="Number of the node on the CAN bus.",
 )
 @click.option(
     "--kinematics",

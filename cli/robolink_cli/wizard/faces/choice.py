@@ -36,6 +36,10 @@ def draws_whole_screens() -> bool:
     if os.name != "nt" and os.environ.get("TERM", "") in _POOR:
         return False
     try:
+        if os.name == "nt":
+            # What prompt_toolkit calls on Windows are functions of stdout's console, whatever it
+            # is told to draw on; with stdout in a file there is none, and it breaks off.
+            os.get_terminal_size(sys.stdout.fileno())
         size = os.get_terminal_size(sys.stderr.fileno())
     except (OSError, ValueError, AttributeError):
         return False

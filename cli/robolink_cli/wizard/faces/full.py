@@ -4,6 +4,7 @@ Only here is that package imported. A screen is a text of 24 rows; what differs 
 """
 
 import asyncio
+import os
 import sys
 import time
 from contextlib import suppress
@@ -17,7 +18,9 @@ from prompt_toolkit.key_binding import KeyBindings, KeyPressEvent
 from prompt_toolkit.layout import FormattedTextControl, Layout, Window
 from prompt_toolkit.output import Output, create_output
 
+from robolink.interrupts import EndedBy, ended_by
 from robolink_cli.console.output import visible
+from robolink_cli.prompts.lines import open_lines
 from robolink_cli.wizard.desk import Desk
 from robolink_cli.wizard.faces.effects import carry_out, leaves
 from robolink_cli.wizard.faces.lines import LineFace
@@ -95,6 +98,8 @@ class FullFace:
 
     def _shows_the_end(self) -> bool:
         """Show how the work ended, where there is a screen for it, until it is left."""
+        if ended_by() is EndedBy.HUNG_UP:
+            return False  # nobody is there to leave it
         if self._state.ended is None:
             ended = ended_of(self._state, self._work.error, time.monotonic())
             if ended is None:
@@ -113,7 +118,7 @@ class FullFace:
 
         bindings.add("<any>", eager=True)(pressed)
         bindings.add("escape", eager=True)(pressed)
-        bindings.add("<bracketed-paste>", eager=True)(lambda _event: self._happens(TooFast()))
+        bindings.add("<bracketed-paste>", eager=True)(lambda event: self._pasted(event.data))
         return bindings
 
     def _press(self, key: str, data: str) -> None:
@@ -126,6 +131,18 @@ class FullFace:
                 return
         for one in self._gate.press(key, now_s, stops=stops_at_once(self._state, name_of(key))):
             self._happens(self._pressed(one, now_s))
+
+    def _pasted(self, text: str) -> None:
+        """Take what came at once: one line into a field, as a Windows console hands a scan on.
+
+        prompt_toolkit makes a paste of keys that its reader finds in one look, ENTER among them.
+        """
+        line, ends, more = text.replace("\r", "\n").partition("\n")
+        if not self._state.has_field or self._state.writing is not None or more.strip("\n"):
+            self._happens(TooFast())
+            return
+        for key in (*line, *(["c-m"] if ends else [])):
+            self._press(key, key)
 
     def _fills(self, key: str, text: str) -> bool:
         """Tell whether a key goes into the field at once; what writes goes through the gate."""
@@ -148,6 +165,9 @@ class FullFace:
     def _forget_keys(self) -> None:
         """Drop what is still held down: it is not for the shell."""
         clear_typeahead(self._input)
+        if os.name == "nt":
+            open_lines().forget(0.0)
+            return
         with suppress(ImportError, OSError, ValueError, AttributeError):
             termios: Any = import_module("termios")
             with suppress(termios.error):

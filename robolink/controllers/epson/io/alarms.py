@@ -28,7 +28,11 @@ class EpsonAlarms:
         count, *numbers = self._session.exchange("GetAlm").fields
         if spel.parse_integer(count) != len(numbers):
             raise RemoteProtocolError(
-                tr("{count} alarms were announced and {found} came.", count=count, found=numbers),
+                tr(
+                    "{count} alarms were announced, but {found} arrived.",
+                    count=count,
+                    found=numbers,
+                ),
                 remedy=tr("Keep this text and report it with the controller's firmware version."),
                 controller=self._session.identity,
                 request="GetAlm",

@@ -69,7 +69,7 @@ class ValueSetter:
         if not change.same(found, change.requested):
             raise ReadBackError(
                 tr(
-                    "{request} was accepted, but {found!r} is read back in place of {requested!r}.",
+                    "{request} was accepted, but reads back as {found!r} instead of {requested!r}.",
                     request=request,
                     found=found,
                     requested=change.requested,

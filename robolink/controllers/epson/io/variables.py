@@ -95,7 +95,7 @@ class EpsonVariables:
         if len(fields) != count:
             raise RemoteProtocolError(
                 tr(
-                    "{count} elements of {name} were asked for and {found} came.",
+                    "{count} elements of {name} were requested, but {found} arrived.",
                     count=count,
                     name=name,
                     found=len(fields),
@@ -182,8 +182,8 @@ def _subscripts(indices: Sequence[int]) -> str:
     plain = all(isinstance(i, int) and not isinstance(i, bool) and i >= 0 for i in indices)
     if not (plain and 1 <= len(indices) <= _MOST_SUBSCRIPTS):
         raise ConfigError(
-            tr("{indices} are no subscripts.", indices=list(indices)),
-            remedy=tr("Give one to three whole numbers from 0 up."),
+            tr("{indices} are not subscripts.", indices=list(indices)),
+            remedy=tr("Give one to three whole numbers, each 0 or more."),
         )
     return ",".join(str(index) for index in indices)
 

@@ -36,7 +36,10 @@ def _remedy(code: int) -> str:
     if code == 21:
         return tr("Wait for the running statement, or stop it.")
     if code == 11:
-        return tr("Connect again to log in; or this firmware does not know the command.")
+        return tr(
+            "Connect again to log in. If it is refused again, this firmware does not know "
+            "the command."
+        )
     return tr("Nothing was repeated. Read the status before you go on.")
 
 
@@ -121,7 +124,7 @@ def _stopped(status: ControllerStatus) -> tuple[NotReadyReason, str, str] | None
         return (
             NotReadyReason.EMERGENCY_STOP,
             tr("The emergency stop is pressed."),
-            tr("Remove the danger, release it, then run 'robolink robot reset'."),
+            tr("Remove the danger, release the emergency stop, then run 'robolink robot reset'."),
         )
     if status.fault:
         return (
@@ -149,7 +152,7 @@ def _occupied(status: ControllerStatus) -> tuple[NotReadyReason, str, str] | Non
         return (
             NotReadyReason.PAUSED,
             tr("A program is paused on the controller."),
-            tr("Continue it to its end, or stop the cell."),
+            tr("Let it run to its end, or stop the cell."),
         )
     if not status.ready:
         return (

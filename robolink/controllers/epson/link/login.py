@@ -13,7 +13,7 @@ PASSWORD_REFUSALS: Final = (13, 98)
 def unanswered(controller: str) -> LoginUnansweredError:
     """Return the error for a controller that is reached and does not answer the login."""
     return LoginUnansweredError(
-        tr("{identity} is reached but does not answer the login.", identity=controller),
+        tr("{identity} can be reached, but does not answer the login.", identity=controller),
         remedy=tr(
             "Only one client may be logged in: close the other one. If there is none, "
             "check that this port is the controller's Remote Ethernet port."
@@ -29,8 +29,8 @@ def refused(code: int, controller: str) -> LoginRefusedError:
         tr("The controller refused the login (code {code}).", code=code),
         code=code,
         remedy=tr(
-            "Give the password set in the controller's Remote Ethernet page: {password}. No "
-            "second attempt was made.",
+            "Give the password that is set on the controller's Remote Ethernet page: "
+            "{password}. No second attempt was made.",
             password=way(Way.PASSWORD),
         ),
         controller=controller,

@@ -85,7 +85,7 @@ def _silence(transport: Transport) -> int:
         found += len(data or b"")
         if found > _MOST_BYTES or deadline.expired:
             raise RemoteProtocolError(
-                tr("The line {identity} does not fall silent.", identity=transport.identity),
+                tr("The line {identity} is never quiet.", identity=transport.identity),
                 remedy=tr(
                     "Check baud rate and parity, that no other program uses the line, and that "
                     "the control device is Remote RS232."

@@ -230,7 +230,7 @@ class EpsonSession:
         if self._ended_by is not None:
             raise TransportClosedError(
                 tr("The connection to {identity} has ended.", identity=self.identity),
-                remedy=tr("Connect again; the controller's state is read anew then."),
+                remedy=tr("Connect again; the controller's state is then read again."),
                 controller=self.identity,
                 request=request.name,
             ) from self._ended_by

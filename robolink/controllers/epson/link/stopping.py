@@ -190,7 +190,10 @@ class StopLine:
             if answer.name.lower() == request.name.lower() or not answer.name:
                 return self._accepted(answer, request)
         raise RemoteProtocolError(
-            tr("{identity} answers what nobody asked.", identity=self._transport.identity),
+            tr(
+                "{identity} sent an answer to a question nobody asked.",
+                identity=self._transport.identity,
+            ),
             remedy=tr("Look for a second program on this controller."),
             controller=self._transport.identity,
         )

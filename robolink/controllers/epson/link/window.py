@@ -71,12 +71,12 @@ class CommandWindow:
         if self._session.carries("Abort"):
             return
         raise NotReadyError(
-            tr("Nothing that was begun over this serial line could be stopped over it."),
+            tr("What is started over this serial line could not be stopped over it."),
             reason=NotReadyReason.NO_ABORT,
             remedy=tr(
                 "Nothing was sent. Move over Remote Ethernet; or see with 'robolink "
-                "verify-controller' that the controller knows the letter A, and write "
-                "letters=guessed into the URL."
+                "expert verify-controller' that the controller knows the letter A, "
+                "and write letters=guessed into the URL."
             ),
             controller=self._session.identity,
             request=request,

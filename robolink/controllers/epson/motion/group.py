@@ -122,8 +122,8 @@ class EpsonGroup(MotionGroupCore):
         base = self.base()
         if base is not None and any(base):
             moved = tr(
-                "Its positions count from a base (Base) that stands at {place} in the robot: what "
-                "was taught or learned while the base stood elsewhere is another place now.",
+                "The controller's base (Base) is at {place} in the robot: positions "
+                "taught or learnt with another base are somewhere else now.",
                 place=" ".join(f"{axis} {at:g}" for axis, at in zip("XYZUVW", base, strict=True)),
             )
             watch = joined(" ", (watch, moved))

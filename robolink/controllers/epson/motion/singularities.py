@@ -83,8 +83,8 @@ class SingularPlaces:
         here = read_position(self.window, spel.print_real_position()) if straight else None
         found = self._in_the_way(target, path, here, 0.0)
         remedy = tr(
-            "Tilt or turn the tool otherwise, or put the reference point elsewhere: in reach, "
-            "and so that joint 5 stays more than {limit:g} degrees from 0.",
+            "Tilt or turn the tool another way, or put the reference point elsewhere: "
+            "within reach, and where joint 5 stays more than {limit:g} degrees from 0.",
             limit=KEPT_CLEAR_DEG,
         )
         if here is not None and not found:
@@ -102,14 +102,14 @@ class SingularPlaces:
         straight = path is Path.STRAIGHT
         for place in _places(start if straight else None, target):
             if not self._reaches(place):
-                return tr("The robot cannot reach that place with its tool turned so.")
+                return tr("The robot cannot reach that place with its tool turned that way.")
             if not straight or not self.six_axes:
                 continue
             bend_deg = self._joint_at(place, _WRIST)
             if abs(bend_deg) < KEPT_CLEAR_DEG + further_deg:
                 return tr(
-                    "Joint 5 would stand at {angle:.1f} degrees there, too near to its singular "
-                    "place at 0 for a straight movement.",
+                    "Joint 5 would be at {angle:.1f} degrees there, too near to its "
+                    "singular place at 0 for a straight movement.",
                     angle=bend_deg,
                 )
         return ""

@@ -84,14 +84,14 @@ class EpsonPreserver(Preserver):
         if first != second:
             raise RemoteProtocolError(
                 tr(
-                    "What the controller says about its tool, power and speed is not the same "
-                    "twice: {first}, then {second}.",
+                    "The controller gave two different answers about its tool, power "
+                    "and speed: {first}, then {second}.",
                     first=first.shown(),
                     second=second.shown(),
                 ),
                 remedy=tr(
-                    "Nothing was changed. Check the cable and what stands between this PC and "
-                    "the controller, and that no other program sets them."
+                    "Nothing was changed. Check the cable and everything between this "
+                    "PC and the controller, and that no other program sets them."
                 ),
                 controller=self._epson.identity,
                 request=reason,
@@ -113,4 +113,4 @@ class EpsonPreserver(Preserver):
         tool = InForce.from_marker(marker).tool
         if now == tool:
             return tr("Set power mode and speed as they were")
-        return tr("Select tool {tool} again, with the power mode and speed of then", tool=tool)
+        return tr("Select tool {tool} again, with the earlier power mode and speed", tool=tool)

@@ -90,7 +90,7 @@ def require_line(link: LinkUrl) -> tuple[Dialect, LinkUrl]:
     """
     if (link.kind, link.medium) != ("epson", SERIAL):
         raise ConfigError(
-            tr("{identity} is no serial line of an EPSON controller.", identity=link.identity),
+            tr("{identity} is not a serial line of an EPSON controller.", identity=link.identity),
             remedy=tr("Write for example {scheme}:///dev/ttyUSB0.", scheme="epson+serial"),
         )
     return take_dialect(link)

@@ -72,7 +72,7 @@ def _abort(interview: Interview) -> Fact:
 
 def _not_asked() -> tuple[Fact, ...]:
     ports = tr("not tried: a wrong length is an error that cannot be told from others")
-    opening = tr("not seen: whatever EOT is answered with is thrown away")
+    opening = tr("not seen: any answer to EOT is thrown away")
     return (
         Fact(tr("number of a port of words"), ports, "rs232_word_port_bytes"),
         Fact(tr("answer to EOT"), opening, "rs232_eot_answer"),

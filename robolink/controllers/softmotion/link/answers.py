@@ -70,7 +70,7 @@ def refused(command: Command, now: Response, error_class: int) -> RejectedError:
 def command_ended_early(command: Command) -> ControllerFaultError:
     """Return the error for a command, not a movement, that a stop or a fault ended."""
     return ControllerFaultError(
-        tr("{request!r} was ended before it was done.", request=describe(command)),
+        tr("{request!r} was ended before it finished.", request=describe(command)),
         remedy=tr("Someone stopped the group, or it went into error. Read the status."),
         request=describe(command),
     )
@@ -128,7 +128,7 @@ def _remedy(error_class: int, raw_error: int = 0) -> str:
             "Run 'robolink robot reset' to release the stop when the cell is clear."
         ),
         ErrorClass.MOVING: tr("Wait for the end of the movement."),
-        ErrorClass.BUSY: tr("Wait for the command in work, or stop it."),
+        ErrorClass.BUSY: tr("Wait for the running command, or stop it."),
         ErrorClass.QUEUE_FULL: tr("Wait for the first movement to end."),
         ErrorClass.SLOT_EMPTY: tr("Write the slot first, with a calibration or 'tool set'."),
         ErrorClass.TOOL_INCOMPATIBLE: tr(
@@ -139,8 +139,9 @@ def _remedy(error_class: int, raw_error: int = 0) -> str:
             "The PLC's own kinematics must implement ISMKinematicsWithOrientationImage."
         ),
         ErrorClass.HEARTBEAT_LOST: tr(
-            "A movement goes on only while someone waits on it. This computer, or the network, "
-            "was too slow for half a second: close other programs, then start again."
+            "A movement continues only while a program waits for it. This computer, "
+            "or the network, was too slow for half a second: close other programs, "
+            "then start again."
         ),
     }
     return remedies.get(error_class) or tr("Read the status before you go on.")

@@ -173,7 +173,12 @@ class CommandSender:
         deadline = Deadline.after(self._wire.clock, COMPLETION_S)
         while (end := self._end_of(command, now)) is None:
             if deadline.expired:
-                raise self._wire.ended(self._silence(command, tr("began, and has not ended")))
+                raise self._wire.ended(
+                    self._silence(
+                        command,
+                        tr("{request!r} began, and has not ended.", request=describe(command)),
+                    )
+                )
             now = self._snapshots.news(now, begun_ns=begun_ns)
         return end
 
@@ -262,7 +267,9 @@ class CommandSender:
             if now.rejected != before.rejected:
                 return now, False
             if deadline.expired:
-                silence = self._silence(command, tr("was not acknowledged"))
+                silence = self._silence(
+                    command, tr("{request!r} was not acknowledged.", request=describe(command))
+                )
                 # Something stronger must be able to follow what should have ended a movement.
                 raise silence if command.only_ends else self._wire.ended(silence)
 
@@ -296,9 +303,9 @@ class CommandSender:
         if OPCODES[opcode].capability not in before.capabilities:
             raise refused(draft, before, ErrorClass.UNKNOWN_OPCODE)
 
-    def _silence(self, command: Command, how: str) -> TransportTimeoutError:
+    def _silence(self, command: Command, said: str) -> TransportTimeoutError:
         return TransportTimeoutError(
-            tr("{request!r} {how}.", request=describe(command), how=how),
+            said,
             remedy=tr("Look at the PLC; the command may still be carried out."),
             request=describe(command),
         )
@@ -308,7 +315,7 @@ class CommandSender:
         # not, is not shown any more (docs/mailbox.md, "When a command counts").
         return UnclearAnswerError(
             tr("A stop came before the end of {request!r} was read.", request=describe(command)),
-            remedy=tr("Read again what it was to change."),
+            remedy=tr("Read again what it should have changed."),
             controller=self._wire.identity,
             request=describe(command),
         )

@@ -84,13 +84,15 @@ def require_beats(whole_look_s: float, *, controller: str, request: str) -> None
     if whole_look_s > MOST_LOOK_S:
         raise ConfigError(
             tr(
-                "This line is too slow for movements: one look at the PLC takes {look:.2f} s, and "
-                "what moves is halted after 0.5 s without a sign of this computer.",
+                "This line is too slow for movements: one reading of the PLC takes "
+                "{look:.2f} s, and a movement is halted after 0.5 s without a sign "
+                "from this computer.",
                 look=whole_look_s,
             ),
             remedy=tr(
-                "Set the PLC's serial line and baud in the URL to 9600 or more, or move by Modbus "
-                "TCP. Tools can be read, written and selected as it is. Nothing was sent."
+                "Nothing was sent. Set the PLC's serial line and baud in the URL to "
+                "9600 or more, or move by Modbus TCP. Tools can still be read, "
+                "written and selected."
             ),
             controller=controller,
             request=request,
@@ -107,13 +109,13 @@ def require_still(now: Response, *, controller: str, request: str) -> None:
         raise NotReadyError(
             tr("The axis group is moving."),
             reason=NotReadyReason.RUNNING,
-            remedy=tr("Wait for its end, or stop it."),
+            remedy=tr("Wait until the movement has ended, or stop it."),
             controller=controller,
             request=request,
         )
     if now.bits & Bits.INTERRUPTED:
         raise NotReadyError(
-            tr("An interrupted movement waits to go on."),
+            tr("An interrupted movement is waiting to continue."),
             reason=NotReadyReason.PAUSED,
             remedy=tr("Let it continue to its end, or halt it."),
             controller=controller,

@@ -133,7 +133,7 @@ class Mailbox(DriverLink):
         if not all(map(math.isfinite, (*frame, *(v * self.unit_um for v in (x, y, z))))):
             raise self.wire.ended(
                 RemoteProtocolError(
-                    tr("{identity} sent a position with no number.", identity=self.identity),
+                    tr("{identity} sent a position that is not a number.", identity=self.identity),
                     remedy=tr("Look at the PLC's axes and kinematics, then connect again."),
                 )
             )

@@ -79,8 +79,9 @@ class Ownership:
                     identity=self._wire.identity,
                 ),
                 remedy=tr(
-                    "Close the other program; 10 s after its last sign the mailbox is free. A "
-                    "person at the cell may insist: 'robolink robot take-ownership'."
+                    "Close the other program; 10 s after its last sign the mailbox is "
+                    "free. A person at the cell can take it over: 'robolink robot "
+                    "take-ownership'."
                 ),
                 controller=self._wire.identity,
             )

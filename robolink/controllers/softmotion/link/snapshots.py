@@ -97,7 +97,7 @@ def _require_place(words: Sequence[int], controller: str) -> None:
 def _foreign(meaning: str, controller: str) -> RemoteProtocolError:
     return RemoteProtocolError(
         tr(
-            "What {controller} holds is no mailbox of this version: {meaning}.",
+            "{controller} does not hold a mailbox of this version: {meaning}.",
             controller=controller,
             meaning=meaning,
         ),
@@ -165,7 +165,10 @@ class Snapshots:
             if deadline.expired:
                 raise self._wire.ended(
                     ConnectError(
-                        tr("The mailbox of {identity} stands still.", identity=self._wire.identity),
+                        tr(
+                            "The mailbox of {identity} is not running.",
+                            identity=self._wire.identity,
+                        ),
                         remedy=tr(
                             "Its heartbeat does not count: the PLC is stopped, or the mailbox "
                             "program is not called in the motion task."
@@ -249,8 +252,8 @@ class Snapshots:
         if self._heartbeat.frozen(clock.now_ns()):
             raise self._wire.ended(
                 TransportTimeoutError(
-                    tr("The heartbeat of {identity} stands still.", identity=self._wire.identity),
-                    remedy=tr("The PLC was stopped, or its motion task is dead."),
+                    tr("The heartbeat of {identity} has stopped.", identity=self._wire.identity),
+                    remedy=tr("The PLC was stopped, or its motion task has failed."),
                 )
             )
         return now
@@ -308,10 +311,10 @@ class Snapshots:
         if met is None or (now.boot_id, now.unit_um) == (met.boot_id, met.unit_um):
             return None
         if now.boot_id != met.boot_id:
-            what = tr("The PLC {identity} has started anew.", identity=self._wire.identity)
+            what = tr("The PLC {identity} has restarted.", identity=self._wire.identity)
             remedy = tr(
-                "Nothing is re-applied by itself: no tool slot is selected now and the group is "
-                "disabled. Connect again and select the tool."
+                "Nothing comes back by itself: no tool slot is selected now and the "
+                "group is disabled. Connect again and select the tool."
             )
         else:
             what = tr("The unit of length of {identity} changed.", identity=self._wire.identity)

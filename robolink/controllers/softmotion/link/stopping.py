@@ -77,7 +77,8 @@ def _still(before: Response, now: Response) -> bool:
 def _restless(controller: str) -> OutcomeUnknownError:
     return OutcomeUnknownError(
         tr(
-            "{controller} was told to stop, but did not show within {seconds:g} s that it stands.",
+            "{controller} was told to stop, but did not show within {seconds:g} s "
+            "that it is at rest.",
             controller=controller,
             seconds=REST_S,
         ),

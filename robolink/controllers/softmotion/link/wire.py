@@ -273,6 +273,6 @@ class MailboxWire:
         if self._ended_by is not None:
             raise TransportClosedError(
                 tr("The connection to {identity} has ended.", identity=self.identity),
-                remedy=tr("Connect again; the controller's state is read anew then."),
+                remedy=tr("Connect again; the controller's state is then read again."),
                 controller=self.identity,
             ) from self._ended_by

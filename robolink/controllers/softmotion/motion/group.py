@@ -72,7 +72,7 @@ class SoftMotionGroup(MotionGroupCore):
         """Read what a person must know before the group moves."""
         return MotionTerms(
             tr("The axis group of {identity}", identity=self._mailbox.identity),
-            tr("The PLC halts it when this computer falls silent for half a second."),
+            tr("The PLC halts it if this computer falls silent for half a second."),
         )
 
     def motors_on(self) -> bool:

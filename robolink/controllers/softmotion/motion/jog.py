@@ -80,7 +80,7 @@ class Jog:
         axes = self.forward | self.backward
         if not axes or not axes <= set(_AXES) or self.forward & self.backward:
             raise ConfigError(
-                tr("No jog goes along these axes: {axes}.", axes=sorted(axes)),
+                tr("These axes cannot be jogged: {axes}.", axes=sorted(axes)),
                 remedy=tr("Give axes from 0 to 5, each in one direction."),
             )
         operands = (_mask(self.forward), _mask(self.backward), self.system, 0)
@@ -219,8 +219,7 @@ class JogWatch:
         if refusal is not None:
             raise ControllerFaultError(
                 tr(
-                    "The end of {jog} was not acknowledged. The group was halted in its place and "
-                    "stands still.",
+                    "The end of {jog} was not acknowledged. The group was halted and stands still.",
                     jog=self.request,
                 ),
                 remedy=tr("Look at the link to the PLC before the next jog."),

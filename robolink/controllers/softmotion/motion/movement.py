@@ -86,7 +86,7 @@ class SoftMotionMotion:
             if not self._watch(Deadline.after(mailbox.wire.clock, _HALT_S)):
                 raise mailbox.wire.ended(
                     TransportTimeoutError(
-                        tr("The PLC did not bring {request!r} to an end.", request=self._request),
+                        tr("The PLC did not finish {request!r}.", request=self._request),
                         remedy=tr("Press the emergency stop if the robot still moves."),
                         request=self._request,
                     )

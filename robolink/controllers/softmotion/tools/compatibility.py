@@ -79,7 +79,7 @@ def require_measurable(
     if impossible:
         raise _incompatible(
             tr(
-                "{kinematics} could not be told what would be measured: {parts}. {why}",
+                "{kinematics} cannot be given what would be measured: {parts}. {why}",
                 kinematics=_name(now),
                 parts=", ".join(name[0].upper() for name in impossible),
                 why=_why(space),
@@ -137,7 +137,8 @@ def _parts(space: OrientationSpace, shift: tuple[float, float, float]) -> str:
 def _why(space: OrientationSpace) -> str:
     if space.dof is OrientationDof.THREE:
         return tr(
-            "How its flange is turned is not known beforehand, so a shift would lead anywhere."
+            "How its flange is turned is not known beforehand, so it cannot be said "
+            "where a shift would lead."
         )
     x, y, z = space.v_u
     line = _AXES.get((abs(x), abs(y), abs(z))) or f"({x:.3f}, {y:.3f}, {z:.3f})"

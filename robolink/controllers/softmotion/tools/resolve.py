@@ -34,7 +34,7 @@ class SoftMotionResolver(MarkerResolver):
 
 def _examine_output(marker: Marker) -> Finding:
     sentence = tr(
-        "A PLC's output cannot be read through the mailbox: look what {request!r} did.",
+        "A PLC's output cannot be read through the mailbox: look at what {request!r} did.",
         request=marker.request,
     )
     return Finding(marker, Verdict.LOOK, sentence)

@@ -106,7 +106,7 @@ def _scatter(given: Given) -> float:
     noise_mm: float = given.get("noise_mm", 0.0)
     if noise_mm < 0:
         raise ConfigError(
-            tr("A scatter cannot be negative."), remedy=tr("Give noise_mm from 0 up.")
+            tr("A scatter cannot be negative."), remedy=tr("Give noise_mm of 0 or more.")
         )
     return noise_mm
 

@@ -217,7 +217,8 @@ def find_robot(name: str) -> RobotModel:
         raise ConfigError(
             tr("A six-axis robot on a wall cannot be simulated: {name!r}.", name=name),
             remedy=tr(
-                "How its Tool 0 lies is not known. Choose {name}, on a table, or one of a ceiling.",
+                "It is not known which way its Tool 0 points. Choose {name}, on a "
+                "table, or a robot on a ceiling.",
                 name=upright.name,
             ),
         )

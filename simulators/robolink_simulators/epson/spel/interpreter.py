@@ -27,6 +27,21 @@ class Interpreter:
         condition: What the functions of the controller's state tell; one of its own if none.
         variables: The project's variables; none if none are given.
         messages: Texts of error numbers, for ErrMsg$.
+
+    Example:
+        >>> import random
+        >>> from robolink_simulators.epson import EpsonOptions, EpsonSimulator
+        >>> from robolink_simulators.epson.spel import Interpreter
+        >>> machine = EpsonSimulator().machine
+        >>> window = Interpreter(machine, EpsonOptions(), random.Random(1))
+        >>> line = window.start("Wait 0.5; Print 6 * 7", now_ns=0)
+        >>> line.done, line.next_change()
+        (False, 500000000)
+        >>> line.advance(500_000_000)
+        >>> line.done, line.output.rstrip()
+        (True, '42')
+        >>> window.start("TLSet 0, XY(1, 0, 0, 0)", now_ns=0).error.text
+        'Tool 0 is fixed'
     """
 
     def __init__(

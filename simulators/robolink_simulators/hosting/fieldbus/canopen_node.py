@@ -144,8 +144,8 @@ def _connected(place: CanPlace) -> canopen.Network:
     except (can.CanError, OSError) as error:
         raise ConnectError(
             tr(
-                "The CAN bus {channel} cannot be opened: {cause}.",
-                channel=place.channel,
+                "The CAN bus {identity} cannot be opened: {cause}.",
+                identity=place.channel,
                 cause=error,
             ),
             remedy=tr("Check that the interface is up, or take another group and port."),

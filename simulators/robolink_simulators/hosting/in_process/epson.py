@@ -48,7 +48,7 @@ def open_epson(
     split = options.pop("split", "0")
     if split not in ("0", "1"):
         raise ConfigError(
-            tr("The option split cannot be {value!r}.", value=split),
+            tr("The option {name} cannot be {value!r}.", name="split", value=split),
             remedy=tr("Give 1 to cut what arrives into pieces, or leave it out."),
         )
     named = _named.open(link_url, options, clock, lambda given: _made(link_url.host, given))

@@ -31,7 +31,7 @@ class LinePort:
         if self._opened is not None:
             raise ConnectError(
                 tr("The simulated line is open in another program."),
-                remedy=tr("Let that one end first."),
+                remedy=tr("End that program first."),
             )
         self.far(now_ns).outgoing()
         self._opened = _OpenPort(self, now_ns)

@@ -101,6 +101,14 @@ def drawn_history(seed: int, hours: int, kind: CellKind | None = None) -> Histor
         seed: Decides everything.
         hours: How many hours; each has one change and one disturbance at least.
         kind: What stands in the cell; by default the seed decides.
+
+    Example:
+        >>> from robolink_simulators.soak import CellKind, drawn_history
+        >>> history = drawn_history(7, 2, CellKind.EPSON)
+        >>> [str(hour.deed) for hour in history.hours]
+        ['change the nozzle', 'type a tool offset']
+        >>> history == drawn_history(7, 3, CellKind.EPSON).without_hours([2])
+        True
     """
     own = kind or _TURNS[seed % len(_TURNS)]
     return History(seed, own, tuple(_hour(seed, number, own) for number in range(hours)))

@@ -66,7 +66,7 @@ class SeenSession:
         except BlockError:
             return  # it is read again
         if self._boot_id and now.boot_id != self._boot_id:
-            self._over[threading.get_ident()] = "the PLC has started anew since"
+            self._over[threading.get_ident()] = "the PLC has restarted since"
         self._boot_id = self._boot_id or now.boot_id
         if not acknowledged:
             return

@@ -14,7 +14,37 @@ from robolink_simulators.soak.story import Story
 
 
 class Rulebook(Grounds):
-    """Checks the rules of one cell; made from what :class:`Grounds` is made from."""
+    """Checks the rules of one cell.
+
+    Args:
+        story: Where a broken rule is noted.
+        plant: The machine.
+        books: The journal on the disk.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from robolink.model import ToolOffset
+        >>> from robolink_simulators.cell.clock import ManualClock
+        >>> from robolink_simulators.soak import drawn_history
+        >>> from robolink_simulators.soak.books import Books
+        >>> from robolink_simulators.soak.cell import VirtualCell
+        >>> from robolink_simulators.soak.people import wish_of
+        >>> from robolink_simulators.soak.plant.epson import EpsonPlant
+        >>> from robolink_simulators.soak.rules import Rulebook
+        >>> history, books = drawn_history(7, hours=2), Books(Path("journal.db"))
+        >>> typing = history.hours[1]  # somebody types an offset of tool 2
+        >>> cell = VirtualCell(history, Path("disk"))
+        >>> plant = EpsonPlant(ManualClock(), cell, seed=7)
+        >>> rules = Rulebook(cell.story, plant, books)
+        >>> rules.begin(typing, wish_of(typing))
+        >>> rules.left(plant.state())  # nothing was written, and nothing is on record
+        >>> cell.story.broken
+        []
+        >>> plant.simulator.machine.tools.set(2, ToolOffset(9.0, 9.0))
+        >>> rules.left(plant.state())
+        >>> cell.story.broken[0].rule
+        'OnlyWantedValues'
+    """
 
     def __init__(self, story: Story, plant: PlantMachine, books: Books) -> None:
         super().__init__(story, plant, books)
@@ -70,7 +100,35 @@ class Rulebook(Grounds):
     def ended(
         self, process: VirtualProcess, error: BaseException | None, state: MachineState
     ) -> None:
-        """Check how a deed ended, against what the machine keeps now."""
+        """Check how a deed ended, against what the machine keeps now.
+
+        Args:
+            process: Who did it.
+            error: What ended it, ``None`` where it ended well.
+            state: What the machine keeps now.
+
+        Example:
+            >>> from pathlib import Path
+            >>> from robolink.journal import LeaseHolder
+            >>> from robolink_simulators.cell.clock import ManualClock
+            >>> from robolink_simulators.soak import drawn_history
+            >>> from robolink_simulators.soak.books import Books
+            >>> from robolink_simulators.soak.cell import VirtualCell
+            >>> from robolink_simulators.soak.computer import VirtualProcess
+            >>> from robolink_simulators.soak.people import wish_of
+            >>> from robolink_simulators.soak.plant.epson import EpsonPlant
+            >>> from robolink_simulators.soak.rules import Rulebook
+            >>> history, books = drawn_history(7, hours=2), Books(Path("journal.db"))
+            >>> typing = history.hours[1]  # somebody types an offset of tool 2
+            >>> cell = VirtualCell(history, Path("disk"))
+            >>> plant = EpsonPlant(ManualClock(), cell, seed=7)
+            >>> rules = Rulebook(cell.story, plant, books)
+            >>> rules.begin(typing, wish_of(typing))
+            >>> process = VirtualProcess(101, "anna", LeaseHolder(), Path("journal.db"))
+            >>> rules.ended(process, None, plant.state())  # well, it says, and tool 2 holds nothing
+            >>> cell.story.broken[0].rule
+            'StateIsTold'
+        """
         self._at_end.ended(process, error, state)
 
     def left(self, state: MachineState) -> None:
@@ -78,5 +136,30 @@ class Rulebook(Grounds):
         self._at_rest.left(state)
 
     def at_rest(self, state: MachineState, *, usable: bool, why: str) -> None:
-        """Check the cell after its people have put it right."""
+        """Check the cell after its people have put it right.
+
+        Args:
+            state: What the machine keeps now.
+            usable: Whether they got it going again.
+            why: Why not, empty where they did.
+
+        Example:
+            >>> from pathlib import Path
+            >>> from robolink_simulators.cell.clock import ManualClock
+            >>> from robolink_simulators.soak import drawn_history
+            >>> from robolink_simulators.soak.books import Books
+            >>> from robolink_simulators.soak.cell import VirtualCell
+            >>> from robolink_simulators.soak.people import wish_of
+            >>> from robolink_simulators.soak.plant.epson import EpsonPlant
+            >>> from robolink_simulators.soak.rules import Rulebook
+            >>> history, books = drawn_history(7, hours=2), Books(Path("journal.db"))
+            >>> typing = history.hours[1]  # somebody types an offset of tool 2
+            >>> cell = VirtualCell(history, Path("disk"))
+            >>> plant = EpsonPlant(ManualClock(), cell, seed=7)
+            >>> rules = Rulebook(cell.story, plant, books)
+            >>> rules.begin(typing, wish_of(typing))
+            >>> rules.at_rest(plant.state(), usable=False, why="the guard is open")
+            >>> cell.story.broken[0].rule
+            'UsableAgain'
+        """
         self._at_rest.at_rest(state, usable=usable, why=why)

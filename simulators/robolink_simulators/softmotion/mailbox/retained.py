@@ -136,7 +136,7 @@ class RetainedFile:
         except (OSError, AttributeError, KeyError, RecursionError, TypeError, ValueError) as error:
             raise ConfigError(
                 tr(
-                    "{path} is no saved state of a simulated PLC with {machine}.",
+                    "{path} is not a saved state of a simulated PLC with {machine}.",
                     path=self._path,
                     machine=self._machine,
                 ),

@@ -185,6 +185,6 @@ def sources_in(folder: Path) -> tuple[SourceText, ...]:
 
 def _not_in_a_program() -> ConfigError:
     return ConfigError(
-        tr("A program that is executed from its text cannot be bent like that."),
+        tr("A program that is executed from its text cannot be changed like that."),
         remedy=tr("Change its text, or simulate without one."),
     )

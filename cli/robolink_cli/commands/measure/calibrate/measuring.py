@@ -114,6 +114,6 @@ def _three(text: str) -> tuple[float, float, float]:
 
 def _no_place(text: str) -> ConfigError:
     return ConfigError(
-        tr("{text!r} is no place.", text=text),
+        tr("{text!r} is not a place.", text=text),
         remedy=tr("Write X,Y,Z in mm, for example --at 170.95,477.06,-107.44."),
     )

@@ -124,7 +124,7 @@ def _option(field: ParameterField) -> Decorator:
             flags, field.name, is_flag=True, default=said, show_default=bool(said), help=field.help
         )
     attributes: dict[str, Any] = {"type": type_of(field), "help": field.help}
-    metavar = field.option.metavar or _METAVARS.get(field.unit, "")
+    metavar = field.option.metavar or _METAVARS.get(field.unit, "N" if _counts(field) else "")
     if metavar and not _is_choice(field):
         attributes["metavar"] = metavar
     if is_repeated(field):
@@ -132,6 +132,10 @@ def _option(field: ParameterField) -> Decorator:
     elif default is not None:
         attributes |= {"default": as_typed(default), "show_default": True}
     return kind(field.flag, field.name, **attributes)
+
+
+def _counts(field: ParameterField) -> bool:
+    return field.kind in (int, int | None)
 
 
 def _is_choice(field: ParameterField) -> bool:

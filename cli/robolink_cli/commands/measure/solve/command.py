@@ -21,9 +21,19 @@ from robolink_cli.session.context import json_option
     help="FILE holds poses only, of any kind that 'robolink expert poses show' reads.",
 )
 @reading_options
-@click.option("--sigma", "sigma_mm", type=DECIMAL, help="Standard deviation of one placement, mm.")
 @click.option(
-    "--threshold", "threshold_mm", type=DECIMAL, help="Residual that a robust method rejects, mm."
+    "--sigma",
+    "sigma_mm",
+    type=DECIMAL,
+    metavar="MM",
+    help="Standard deviation of one placement, mm.",
+)
+@click.option(
+    "--threshold",
+    "threshold_mm",
+    type=DECIMAL,
+    metavar="MM",
+    help="Residual that a robust method rejects, mm.",
 )
 @click.option(
     "--accept-residuals",

@@ -11,7 +11,7 @@ from robolink_cli.options.simulation import ServedLife, life_options
 from robolink_cli.session.context import json_option
 
 
-@click.command("run")
+@click.command("run", short_help="Serve many simulated controllers, as a file says.")
 @click.argument("file", type=click.Path(dir_okay=False, path_type=Path))
 @click.option("--check", "only_checked", is_flag=True, help="Only check the file; serve nothing.")
 @click.option(

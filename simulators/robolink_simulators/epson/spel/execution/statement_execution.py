@@ -60,6 +60,22 @@ class StatementExecution:
         output: What was printed so far; each Print ends with CRLF unless it said otherwise.
         error: Why it failed, ``None`` while it has not.
         moves: Whether it moves the robot.
+
+    Example:
+        >>> import random
+        >>> from robolink_simulators.epson import EpsonOptions, EpsonSimulator
+        >>> from robolink_simulators.epson.spel import Interpreter, StatementExecution
+        >>> from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
+        >>> from robolink_simulators.epson.spel.parse import parse
+        >>> machine = EpsonSimulator().machine
+        >>> session = Interpreter(machine, EpsonOptions(), random.Random(1)).session
+        >>> line = StatementExecution(Evaluator(session), parse("Wait 2; On 5"), now_ns=0)
+        >>> line.advance(1_999_999_999)
+        >>> line.done, machine.outputs.get(5)
+        (False, False)
+        >>> line.advance(2_000_000_000)
+        >>> line.done, machine.outputs.get(5)
+        (True, True)
     """
 
     def __init__(

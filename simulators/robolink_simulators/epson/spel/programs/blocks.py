@@ -124,7 +124,7 @@ class BlockCompiler:
         """End one branch of an If and begin the next."""
         block = self._innermost("if")
         if block.closed or block.other is None:
-            raise self._emitter.fault(tr("it stands behind Else"), expected=("EndIf",))
+            raise self._emitter.fault(tr("it comes after Else"), expected=("EndIf",))
         self._emitter.emit(jump(block.leave))
         self._emitter.put(block.other)
         return block
@@ -159,7 +159,7 @@ class BlockCompiler:
     def _case(self, value: Expression, sign: str) -> None:
         block = self._innermost("select")
         if block.closed:
-            raise self._emitter.fault(tr("it stands behind Default"), expected=("Send",))
+            raise self._emitter.fault(tr("it comes after Default"), expected=("Send",))
         self._end_case(block)
         block.other = JumpTarget()
         self._emitter.emit(case(block.slot, sign, self._emitter.run(value), block.other))
@@ -171,7 +171,7 @@ class BlockCompiler:
 
     def _for(self, loop: ForLoop) -> None:
         if sum(block.word == "for" for block in self._open) >= DEEPEST_FOR:
-            raise self._emitter.fault(tr("For stands in more than 10 other For"))
+            raise self._emitter.fault(tr("For is nested in more than 10 other For"))
         emitter = self._emitter
         step = None if loop.step is None else emitter.run(loop.step)
         ends = (emitter.run(loop.start), emitter.run(loop.end), step)

@@ -134,7 +134,7 @@ class FunctionCompiler:
         labels = self._emitter.function.labels
         if label in labels:
             self.faults.append(
-                self._emitter.fault(tr("the label {label} stands twice", label=label))
+                self._emitter.fault(tr("the label {label} appears twice", label=label))
             )
         target = labels.setdefault(label, JumpTarget())
         self._emitter.put(target)
@@ -329,7 +329,7 @@ def bounds_of(
     for bound in bounds:
         value = getattr(bound, "value", None)
         if not isinstance(value, int) or value < 0:
-            raise emitter.fault(tr("the bound of an array is a number from 0 on"))
+            raise emitter.fault(tr("the bound of an array is a number, 0 or more"))
         values.append(value)
     if elements(values) > most:
         raise emitter.fault(tr("this array may have {most} elements", most=most))

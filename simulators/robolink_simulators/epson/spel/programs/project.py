@@ -134,7 +134,7 @@ class ProjectBuilder:
             if not isinstance(node, Declaration):
                 raise ProgramFault(
                     line.place,
-                    tr("this cannot stand outside of functions"),
+                    tr("this cannot be outside functions"),
                     expected=("Function", "Global"),
                 )
             self._declare(node, line.place, module)

@@ -60,5 +60,5 @@ class ProgramRefused(ConfigError):
                 count=len(self.faults),
                 fault=self.faults[0],
             ),
-            remedy=tr("Mend the line that is named."),
+            remedy=tr("Correct the line that is named."),
         )

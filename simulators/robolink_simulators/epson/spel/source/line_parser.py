@@ -85,9 +85,7 @@ def _fault(
     words = list(dict.fromkeys(_WORDS[name] for name in _ORDER if name in expected))
     at_end = getattr(getattr(error, "token", None), "type", "") == "$END"
     text = (
-        tr("the line ends too early")
-        if at_end
-        else tr("this cannot stand here: {found}", found=found)
+        tr("the line ends too early") if at_end else tr("this cannot be here: {found}", found=found)
     )
     column = len(line.text) + 1 if at_end else error.column
     return ProgramFault(line.place, text, column=column, expected=tuple(words[:_MOST_EXPECTED]))

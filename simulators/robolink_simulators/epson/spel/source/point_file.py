@@ -30,7 +30,7 @@ def project_text(path: Path, encoding: str | None) -> str:
         return decoded(read_named(path), encoding)
     except OSError as error:
         raise ConfigError(
-            tr("{path} cannot be read: {why}.", path=path, why=error.strerror or error),
+            tr("{path} cannot be read: {cause}.", path=path, cause=error.strerror or error),
             remedy=tr("Give a file of the project, as RC+ has saved it."),
         ) from error
 

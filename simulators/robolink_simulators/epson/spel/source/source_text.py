@@ -198,7 +198,7 @@ def _content(path: Path) -> bytes:
         return read_named(path, most_bytes=LARGEST_PROGRAM)
     except OSError as error:
         raise ConfigError(
-            tr("{path} cannot be read: {why}.", path=path, why=error.strerror or error),
+            tr("{path} cannot be read: {cause}.", path=path, cause=error.strerror or error),
             remedy=tr("Give the file of a SPEL+ program, whose name ends in .prg."),
         ) from error
 

@@ -1,0 +1,109 @@
+"""A hand at the keys of a full screen, which reads what stands there; whatever draws it."""
+
+import re
+import time
+
+import pyte
+
+
+class HandAtScreen:
+    """Reads a screen, presses keys and brings the tip of a simulated robot onto its pin.
+
+    What derives from it says how to take what was drawn (``read``) and to press a key (``send``).
+
+    Args:
+        screen: What stands on the terminal.
+        eyes: What looks at the tip, ``None`` where none is brought anywhere.
+        tool: Which tip.
+    """
+
+    longest_s = 30.0
+    pause_s = 0.12
+
+    def __init__(self, screen, eyes=None, tool=1):
+        self.screen = screen
+        self.stream = pyte.ByteStream(screen)
+        self.keys, self.tool, self.eyes = 0, tool, eyes
+
+    def read(self, seconds=0.05):
+        """Take what was drawn; return whether the far end is still there."""
+        raise NotImplementedError
+
+    def send(self, key):
+        """Press one key."""
+        raise NotImplementedError
+
+    @property
+    def text(self):
+        return "\n".join(self.screen.display)
+
+    def see(self, pattern):
+        """Wait until something is seen on the screen."""
+        end_s = time.monotonic() + self.longest_s
+        while not (found := re.search(pattern, self.text)):
+            assert self.read(), f"it ended before {pattern!r}\n{self.text}"
+            assert time.monotonic() < end_s, f"{pattern!r} is not in\n{self.text}"
+        return found
+
+    def rest(self, seconds):
+        end_s = time.monotonic() + seconds
+        while (left_s := end_s - time.monotonic()) > 0:
+            self.read(left_s)
+
+    def press(self, keys, *, count=True):
+        """Press keys one by one, as a hand does."""
+        for key in keys:
+            self.keys += count
+            self.send(key)
+            self.rest(self.pause_s)
+
+    def start(self):
+        """Confirm what the list asks, and start."""
+        self.see(r"Start moving \(2 open\)")
+        self.rest(0.4)
+        self.press(["1", "3", "5"])
+
+    def left_mm(self):
+        assert self.eyes is not None
+        seen = self.eyes.look(self.tool)
+        return seen.dx_mm, seen.dy_mm, seen.dz_mm
+
+    def jog(self):
+        """Bring the tip onto the pin: hold keys in sizes that get smaller."""
+        self.rest(0.45)
+        for size in (1.0, 0.1, 0.01):
+            self._size(size)
+            for axis, plus, minus in ((0, "6", "4"), (1, "8", "2"), (2, "9", "3")):
+                self._hold(axis, plus, minus, size)
+        self.rest(0.45)
+
+    def _size(self, size):
+        for _ in range(9):
+            now = float(self.see(r"Step +([\d.]+) mm")[1])
+            if abs(now - size) < 1e-9:
+                return
+            self.press(["+" if now < size else "-"])
+
+    def _hold(self, axis, plus, minus, size):
+        """Hold one key until what is left is less than a step; it counts as one."""
+        held = False
+        for _ in range(60):
+            left = self.left_mm()[axis]
+            if size == 1.0 and axis == 2:
+                left = left + 0.3 if left < 0 else left
+            steps = int(abs(left) / size + (0.3 if size < 0.1 else 0.0))
+            if steps < 1:
+                return
+            self.keys += not held
+            held = True
+            before = self.left_mm()[axis]
+            self.press([plus if left > 0 else minus], count=False)
+            end_s = time.monotonic() + self.longest_s / 10
+            while self.left_mm()[axis] == before and time.monotonic() < end_s:
+                self.rest(0.03)
+            self.rest(0.15)
+
+    def touch(self):
+        self.see("Jog the tip onto the pin")
+        self.jog()
+        self.press(["5"])

@@ -1,0 +1,82 @@
+"""Finds sentences of the catalogue that are all but the same: one message, said in two ways.
+
+``python -m tests.packaging._near_copies`` prints the pairs that nobody has reviewed.
+"""
+
+import re
+import sys
+from collections import defaultdict
+from collections.abc import Iterable, Iterator
+from itertools import combinations, pairwise
+from pathlib import Path
+
+from babel.messages.pofile import read_po
+
+CATALOGUE = Path(__file__).parents[2] / "robolink" / "locale" / "robolink.pot"
+REVIEWED = Path(__file__).with_name("near_copies.txt")
+"""Two sentences and an empty line, again and again: pairs that are meant to differ."""
+
+SHORTEST = 6
+"""Words; shorter ones are labels, which are alike without saying the same."""
+MOST = 2
+"""So many words may be others, more or fewer."""
+
+_VALUE = re.compile(r"(?<!{){[^{}]+}")
+
+Pair = tuple[str, str]
+
+
+def sentences() -> list[str]:
+    """Return the sentences of the catalogue, each in one line."""
+    with CATALOGUE.open("rb") as file:
+        return [str(message.id).replace("\n", "\\n") for message in read_po(file) if message.id]
+
+
+def near_copies(said: Iterable[str]) -> Iterator[Pair]:
+    """Yield the pairs that differ in at most two words and fill in the same values."""
+    groups = defaultdict(list)
+    for sentence in said:
+        words = sentence.split()
+        if len(words) >= SHORTEST:
+            groups[tuple(sorted(_VALUE.findall(sentence)))].append((sentence, words))
+    for group in groups.values():
+        for one, other in _with_common_words(group):
+            if _differing(one[1], other[1]) <= MOST:
+                first, second = sorted((one[0], other[0]))
+                yield first, second
+
+
+def reviewed() -> set[Pair]:
+    """Return the pairs that somebody has read and left as they are."""
+    blocks = REVIEWED.read_text("utf-8").strip().split("\n\n")
+    return {(one, other) for one, other in (block.split("\n") for block in blocks)}
+
+
+def _with_common_words(group):
+    """Yield those that share two words side by side: six words of which two differ always do."""
+    places = defaultdict(list)
+    for number, (_, words) in enumerate(group):
+        for two in set(pairwise(words)):
+            places[two].append(number)
+    seen = {pair for numbers in places.values() for pair in combinations(numbers, 2)}
+    for one, other in seen:
+        if abs(len(group[one][1]) - len(group[other][1])) <= MOST:
+            yield group[one], group[other]
+
+
+def _differing(one, other) -> int:
+    """Return how many words have to be put in, taken out or changed; more than two is three."""
+    line = list(range(len(other) + 1))
+    for row, word in enumerate(one, 1):
+        line, above = [row], line
+        for column, its in enumerate(other, 1):
+            least = min(above[column], line[-1]) + 1
+            line.append(min(least, above[column - 1] + (word != its)))
+        if min(line) > MOST:
+            return MOST + 1
+    return line[-1]
+
+
+if __name__ == "__main__":
+    for pair in sorted(set(near_copies(sentences())) - reviewed()):
+        sys.stdout.write("\n".join(pair) + "\n\n")

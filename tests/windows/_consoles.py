@@ -1,0 +1,121 @@
+"""Consoles of Windows on terminals of this machine, and a hand at their keys."""
+
+import fcntl
+import os
+import pty
+import select
+import socket
+import struct
+import termios
+import time
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Final, Literal
+
+import pyte
+from robolink_simulators.assist.port import InProcessEyes
+from robolink_simulators.epson.device import EpsonSimulator
+
+from tests.cli.wizard._hand_at_screen import HandAtScreen
+from tests.windows._windows_python import WindowsPython
+
+Way = Literal["calls", "sequences"]
+PATIENCE_S: Final = 45.0
+_SCRIPT: Final = Path(__file__).with_name("_windows_console.py")
+
+
+class WindowsConsole(HandAtScreen):
+    """``robolink`` in a console of Windows, as ``_windows_console`` makes of wine's what it lacks.
+
+    Args:
+        python: The Windows Python.
+        way: How the program draws and reads: by calls of the console or by escape sequences.
+        words: The command line.
+        environment: What the program finds in its environment, besides the usual.
+        folder: Where it runs.
+        simulator: Whose tip the hand looks at.
+        columns: Width of the console.
+        rows: Height of the console.
+        redirected: What would stand behind the command line in cmd.exe, ``> file``.
+    """
+
+    longest_s = PATIENCE_S
+
+    def __init__(
+        self,
+        python: WindowsPython,
+        way: Way,
+        words: tuple[str, ...],
+        environment: Mapping[str, str],
+        folder: Path,
+        simulator: EpsonSimulator | None = None,
+        *,
+        columns: int = 100,
+        rows: int = 30,
+        redirected: str = "",
+    ) -> None:
+        super().__init__(pyte.Screen(columns, rows), simulator and InProcessEyes(simulator))
+        self._way = way
+        with socket.create_server(("127.0.0.1", 0)) as server:
+            server.settimeout(PATIENCE_S)
+            port = str(server.getsockname()[1])
+            command = python.command(f"Z:{_SCRIPT}", way, port, *words)
+            if redirected:
+                _, *line = command
+                command = ["wine", "cmd", "/c", f"{' '.join(line)} {redirected}"]
+            self._child, self._terminal = pty.fork()
+            if self._child == 0:
+                size = struct.pack("HHHH", rows, columns, 0, 0)
+                fcntl.ioctl(0, termios.TIOCSWINSZ, size)
+                os.chdir(folder)
+                os.execvpe(
+                    command[0], command, python.environment({**environment, "TERM": "xterm"})
+                )
+            self._keys, _ = server.accept()
+        self._over = False
+
+    def read(self, seconds: float = 0.05) -> bool:
+        """Take what was drawn; return whether the program is still there."""
+        ends = [end for end in (self._terminal, self._keys) if end is not None]
+        ready, _, _ = select.select(ends, [], [], 0 if self._over else seconds)
+        for end in ready:
+            try:
+                data = os.read(end if isinstance(end, int) else end.fileno(), 65536)
+            except OSError:
+                data = b""
+            drawn_here = isinstance(end, int) == (self._way == "calls")
+            if drawn_here:
+                self.stream.feed(data)
+            if not data:
+                self._over = True
+        return not self._over
+
+    def send(self, key: str) -> None:
+        """Have a key pressed and released."""
+        self._keys.sendall(f"{key}\n".encode())
+
+    def type(self, text: str) -> None:
+        """Write to the terminal, for wine's own console to make keys of; a person types later."""
+        self.rest(1.0)
+        os.write(self._terminal, text.encode())
+
+    def close(self) -> None:
+        """End a program that has not ended by itself."""
+        with suppress(OSError):
+            self.send("kill")
+        self._keys.close()
+        with suppress(OSError):
+            os.close(self._terminal)
+
+    def exit_code(self) -> int:
+        """Wait for the end of the program; return its exit code."""
+        end_s = time.monotonic() + PATIENCE_S
+        while True:
+            done, status = os.waitpid(self._child, os.WNOHANG)
+            if done:
+                return os.waitstatus_to_exitcode(status)
+            assert time.monotonic() < end_s, self.text
+            self.read(0.2)
+            if self._over:
+                time.sleep(0.1)

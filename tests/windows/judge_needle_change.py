@@ -1,0 +1,115 @@
+"""A whole needle change by keys on the full screen, in both ways in which Windows draws one."""
+
+import re
+
+import pytest
+
+BOTH = pytest.mark.parametrize("way", ["calls", "sequences"])
+
+
+def scan(console, code="N-7"):
+    """Scan a code as a scanner sends it: all of it at once, ENTER behind it."""
+    console.see("Scan the id of the new needle")
+    console.rest(0.6)
+    console.send(f"burst {'+'.join(code)}+enter")
+
+
+@BOTH
+def test_a_needle_is_changed_from_the_scan_to_done(opened, simulator, way):
+    before = simulator.machine.tools.get(1)
+    console = opened(way, "change", "needle.toml")
+    scan(console)
+    console.start()
+    console.see("Touch 1 of 2")
+    console.rest(0.6)
+    console.press(["5"])
+    console.see("Not yet: the tip still stands where the robot put it")
+    console.touch()
+    console.see("Touch 2 of 2")
+    console.touch()
+    console.see("exactly as long")
+    console.rest(0.6)
+    console.press(["1"])
+    console.see("To write, type the tool number")
+    console.rest(0.6)
+    assert simulator.machine.tools.get(1) == before
+    console.press(["enter", "*"])
+    console.see("Type the number of the tool first")
+    assert simulator.machine.tools.get(1) == before
+    console.press(["1", "*"])
+    for _ in range(2):
+        console.see("Turn test")
+        console.touch()
+        console.see("moving|DONE")
+    console.see("DONE")
+    console.rest(0.6)
+    console.press(["0"])
+    assert console.exit_code() == 0
+    console.see("Needle N-7 on tool 1 is measured, written and tested.")
+    after, true = simulator.machine.tools.get(1), simulator.world.tips[1]
+    assert after != before
+    assert abs(after.x_mm - true.x_mm) < 0.1
+    assert abs(after.y_mm - true.y_mm) < 0.1
+    assert simulator.machine.tools.selected == 1
+
+
+@BOTH
+def test_keys_without_numlock_jog_a_held_one_ends_with_its_release_and_escape_stops(
+    opened, simulator, way
+):
+    console = opened(way, "robot", "jog", "--keys")
+    console.see("everybody out of the cell")
+    console.rest(0.6)
+    console.press(["1"])
+    console.see("Step")
+    console.rest(0.6)
+    arm = simulator.machine.arm
+    for key in ("left", "up", "pageup", "home"):
+        began = arm.moves_started
+        console.press([key])
+        console.rest(1.0)
+        assert arm.moves_started == began + 1, key
+    began = arm.moves_started
+    for _ in range(45):
+        console.send("held right")
+        console.rest(0.033)
+    console.rest(1.0)
+    made = arm.moves_started
+    assert 1 <= made - began < 45
+    console.rest(1.0)
+    assert arm.moves_started == made
+    console.press(["escape"])
+    assert console.exit_code() == 0
+
+
+@BOTH
+def test_the_screens_are_straight_in_chinese(opened, simulator, way):
+    console = opened(way, "change", "needle.toml", language="zh")
+    scan(console)
+    console.see(r"开始移动")
+    console.rest(0.6)
+    rules = [row for row in console.screen.display if row.startswith("-")]
+    assert [row.rstrip() for row in rules] == ["-" * 80] * 2
+    console.press(["1", "3", "5"])
+    console.see("第 1 次触碰")
+    console.rest(0.6)
+    if way == "sequences":
+        assert columns_of(console, "模拟") == (76, 80)
+        assert columns_of(console, "停止")[1] == 80
+    console.press(["escape"])
+    console.see("已停止")
+    console.rest(0.6)
+    console.press(["0"])
+    assert console.exit_code() == 9
+    assert simulator.machine.tools.selected == 1
+
+
+def columns_of(console, text):
+    """Return where a text that ends a row of the screen begins and ends, in columns."""
+    for number, row in enumerate(console.screen.display):
+        if re.search(rf"{text}\s*$", row):
+            cells = console.screen.buffer[number]
+            taken = [column for column in range(100) if cells[column].data.strip()]
+            last = taken[-1] + 2  # the second half of a wide character is an empty cell
+            return last - 2 * len(text), last
+    raise AssertionError(console.text)

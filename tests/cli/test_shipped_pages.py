@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 from robolink_cli import main
+from robolink_cli.commands.shipped.page_lines import page_lines
+from robolink_cli.console.columns import columns
 
 ROOT = Path(__file__).parents[2]
 RECIPES = sorted(path.stem for path in (ROOT / "examples" / "recipes").glob("*.toml"))
@@ -40,6 +42,28 @@ def test_a_page_is_shown_as_it_stands(run, name):
     assert (code, out) == (0, (ROOT / "docs" / "drift.md").read_text(encoding="utf-8"))
     assert json.loads(run("docs", name, "--json")[1])["text"] == out
     assert Path(run("docs", name, "--path")[1].strip()) == ROOT / "docs" / "drift.md"
+
+
+@pytest.mark.parametrize("name", ["technician.md", "technician.zh.md"])
+def test_on_a_terminal_no_word_of_a_page_is_broken(name):
+    page = (ROOT / "docs" / name).read_text(encoding="utf-8")
+    shown = page_lines(page, 80)
+    assert max(columns(line) for line in shown.split("\n")) <= 80
+    assert "".join(shown.split()) == "".join(page.split())
+    assert re.findall(r"[\w/.]{3,}", shown, re.ASCII) == re.findall(r"[\w/.]{3,}", page, re.ASCII)
+    assert not re.search("[\u4e00-\u9fff] [\u4e00-\u9fff]", shown)
+
+
+def test_a_page_on_a_terminal_keeps_its_lists_tables_and_code():
+    page = (
+        "# Head\n\nOne two three\nfour five.\n\n* first\n  goes on\n* second\n\n"
+        "    a  b\n\n```sh\nx  y\nz\n```\n| a | b |"
+    )
+    shown = page_lines(page, 16).split("\n")
+    assert shown == [
+        *("# Head", "", "One two three", "four five.", "", "* first goes on", "* second", ""),
+        *("    a  b", "", "```sh", "x  y", "z", "```", "| a | b |"),
+    ]
 
 
 def test_a_page_that_is_there_in_chinese_is_shown_so(run):

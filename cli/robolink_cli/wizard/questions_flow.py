@@ -170,11 +170,11 @@ def _check(state: WizardState, subject: CheckSubject, word: str) -> Answered:
         checked = state.checked ^ {word}
         return replace(state, checked=checked, message=_left_open(subject, checked))
     if word != "main":
-        return state.says(tr("[5] starts when no row is open."))
+        return state.says(tr("Confirm each row first; then [5] starts."))
     left = subject.open_keys(state.checked)
     return state.says(_left_open(subject, state.checked)) if left else "y"
 
 
 def _left_open(subject: CheckSubject, checked: frozenset[str]) -> str:
     keys = " ".join(f"[{key}]" for key in subject.open_keys(checked))
-    return tr("Not yet. First: {keys}.", keys=keys) if keys else tr("No row is open.")
+    return tr("Not yet. First: {keys}.", keys=keys) if keys else tr("All rows are confirmed.")

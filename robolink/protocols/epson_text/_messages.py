@@ -121,6 +121,14 @@ def _without_line_end(text: str) -> str:
     return text.removesuffix("\n").removesuffix("\r")
 
 
+@lru_cache(maxsize=64)
+def _bare_request(name: str) -> bytes:
+    """Return the line of a request without parameters; empty where there is none by that name."""
+    command = find_command(name)
+    fits = command is not None and command.min_parameters == 0
+    return f"${name}".encode("ascii") if fits else b""
+
+
 def write_request(request: Request) -> bytes:
     """Return the line of a request.
 
@@ -128,15 +136,15 @@ def write_request(request: Request) -> bytes:
         LocalProtocolError: Unknown command, wrong parameters, or text that the line cannot
             carry. No message repeats a password.
     """
+    parameters = request.parameters
+    if not parameters and (bare := _bare_request(request.name)):
+        return bare
     command = find_command(request.name)
     if command is None:
         raise LocalProtocolError(
             tr("{name!r} is not a Remote Ethernet command.", name=request.name),
             remedy=tr("Use a command of the table in robolink.protocols.epson_text."),
         )
-    parameters = request.parameters
-    if not parameters and command.min_parameters == 0:
-        return f"${request.name}".encode("ascii")
     written = ",".join(parameters)
     if not (written.isascii() and written.isprintable()):
         raise _refused(request, tr("it holds a character that is not printable ASCII"))

@@ -1,5 +1,6 @@
 """docs: the pages that come with robolink, read without a network."""
 
+import shutil
 import sys
 from pathlib import Path
 
@@ -83,6 +84,8 @@ def _list(titles: dict[str, str]) -> None:
 def _show(text: str) -> None:
     """Show a page: through the pager on a terminal, as it stands to a program."""
     if is_terminal(sys.stdout) and is_terminal(sys.stdin):
-        click.echo_via_pager(text)
+        from robolink_cli.commands.shipped.page_lines import page_lines
+
+        click.echo_via_pager(page_lines(text, shutil.get_terminal_size().columns))
     else:
         say(text.rstrip("\n"))

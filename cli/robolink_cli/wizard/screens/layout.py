@@ -82,7 +82,17 @@ def broken(text: str, width: int = WIDTH) -> Iterator[str]:
         if columns(line) <= width:
             yield line.rstrip()
         else:
-            yield from filled(line, width).split("\n")
+            for row in filled(line, width).split("\n"):
+                yield from _pieces(row, width)
+
+
+def _pieces(row: str, width: int) -> Iterator[str]:
+    """Yield a row that is one long word, such as a path, in pieces: nothing of it is lost."""
+    while columns(row) > width:
+        piece = cut(row, width)
+        yield piece
+        row = row[len(piece) :]
+    yield row
 
 
 def row_of(values: Sequence[str], width: int = 11) -> str:

@@ -33,7 +33,7 @@ def moving_screen(state: WizardState, now_s: float) -> Screen:
     ]
     legend = tr("# base   O elbow   @ flange and its U direction   * where it goes")
     follows = state.reading is None or state.reading.follows
-    unknown = tr("Drawn where it began: this controller tells no position while it moves.")
+    unknown = tr("Picture of the start: this controller tells no position while it moves.")
     return Screen(
         title_row(state, tr("On the way")),
         (" " + tr("From above"), *lines, "", " " + legend, *([] if follows else [" " + unknown])),

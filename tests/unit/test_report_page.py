@@ -215,8 +215,8 @@ def test_points_that_cannot_be_judged_are_counted_and_named():
 
 
 OUTCOMES = {
-    Outcome.VERIFIED: "Written, read back and verified",
-    Outcome.WRITTEN: "Written and read back, not verified",
+    Outcome.VERIFIED: "Written, read back and tested",
+    Outcome.WRITTEN: "Written and read back, not tested",
     Outcome.SKIPPED: "Stored already, nothing was written",
     Outcome.PROPOSED: "A proposal, nothing was written",
     Outcome.DECLINED: "Declined, nothing was written",

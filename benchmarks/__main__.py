@@ -8,6 +8,11 @@ import json
 import os
 import platform
 import sys
+
+# Before numpy is loaded: on small systems a second thread of its library only waits, and where
+# other work has the second processor a floor takes seven times as long as with one thread.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path

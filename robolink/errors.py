@@ -46,8 +46,10 @@ boundary only, always ``from`` the original.
 """
 
 from enum import StrEnum
+from typing import TYPE_CHECKING
 
-from robolink.standing import UNTOUCHED, Standing
+if TYPE_CHECKING:  # what no command needs before something stands on a controller
+    from robolink.standing import Standing
 
 
 class RobolinkError(Exception):
@@ -60,10 +62,6 @@ class RobolinkError(Exception):
         request: The request under way, as it may be shown to a person.
         raw: The bytes that were read and could not be used.
 
-    Attributes:
-        controller_state: What stands on the controller now, of what was done to it in the block
-            that this error ended: a write, a change, a procedure or a whole connection, whichever
-            was the outermost that it has left.
     """
 
     def __init__(
@@ -76,7 +74,7 @@ class RobolinkError(Exception):
         raw: bytes = b"",
     ) -> None:
         super().__init__(what)
-        self.controller_state: Standing = UNTOUCHED
+        self._standing: Standing | None = None
         self.what = what
         self.remedy = remedy
         self.controller = controller
@@ -85,6 +83,23 @@ class RobolinkError(Exception):
 
     def __str__(self) -> str:
         return f"{self.what} {self.remedy}".rstrip()
+
+    @property
+    def controller_state(self) -> "Standing":
+        """What stands on the controller now, of what was done to it in the block that this ended.
+
+        That is a write, a change, a procedure or a whole connection, whichever was the outermost
+        that this error has left.
+        """
+        if self._standing is not None:
+            return self._standing
+        from robolink.standing import UNTOUCHED
+
+        return UNTOUCHED
+
+    @controller_state.setter
+    def controller_state(self, standing: "Standing") -> None:
+        self._standing = standing
 
 
 class ConfigError(RobolinkError, ValueError):

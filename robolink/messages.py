@@ -11,8 +11,11 @@ What is made when a module is imported is made before a language is known: it is
 """
 
 from collections.abc import Callable, Iterable, Mapping
+from typing import Final
 
 _translate: Callable[[str], str] | None = None
+
+_WIDE_STOPS = ("\u3002", "\uff01", "\uff1f")
 
 
 class Translated(str):
@@ -67,9 +70,14 @@ def spoken(sentence: str, /) -> str:
 
 
 def joined(between: str, sentences: Iterable[str]) -> str:
-    """Return whole sentences one after the other, to be kept in English like each of them."""
+    """Return whole sentences one after the other, to be kept in English like each of them.
+
+    No blank stands behind a Chinese full stop, which is wide by itself.
+    """
     parts = list(sentences)
-    text = between.join(parts)
+    text = "".join(parts[:1])
+    for part in parts[1:]:
+        text += part if between == " " and text.endswith(_WIDE_STOPS) else f"{between}{part}"
     english = between.join(in_english(part) for part in parts)
     return text if text == english else Translated(text, english)
 
@@ -81,15 +89,21 @@ def in_english(text: str) -> str:
 
 def plain(value: object) -> object:
     """Return plain values, mappings and lists with every sentence in them in English."""
+    if type(value) in _AS_THEY_ARE:  # most of a record, and far quicker than what follows
+        return value
     match value:
         case str():
             return in_english(value)
         case Mapping():
             return {key: plain(one) for key, one in value.items()}
         case list() | tuple():
-            return type(value)(plain(one) for one in value) if _is_bare(value) else value
+            return type(value)([plain(one) for one in value]) if _is_bare(value) else value
         case _:
             return value
+
+
+_AS_THEY_ARE: Final = frozenset({str, float, int, bool, type(None)})
+"""Types of values that no language changes; a sentence is a type of its own."""
 
 
 def _is_bare(value: object) -> bool:

@@ -54,7 +54,8 @@ class Deadline(NamedTuple):
 
     def remaining_s(self) -> float:
         """Return the seconds left, 0.0 when the deadline has passed."""
-        return max(0, self.at_ns - self.clock.now_ns()) / NS_PER_S
+        left_ns = self.at_ns - self.clock.now_ns()
+        return left_ns / NS_PER_S if left_ns > 0 else 0.0
 
     @property
     def expired(self) -> bool:

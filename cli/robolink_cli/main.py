@@ -10,12 +10,10 @@ from typing import TYPE_CHECKING, Final, NoReturn
 import click
 
 from robolink import __version__
-from robolink.errors import ConfigError
 from robolink.interrupts import Interrupted, one_ending
 from robolink.messages import declared, spoken
 from robolink.ways import speaking
 from robolink_cli.command_map import RENAMED, SECTIONS, SHORT_NAMES
-from robolink_cli.console.exit_codes import BUG, exit_code, report
 from robolink_cli.console.help_pages import in_language
 from robolink_cli.console.language import speaking_for
 from robolink_cli.console.output import hand_over, watched_output
@@ -90,6 +88,8 @@ def _guarded(speak: Callable[[], int], *, last: bool) -> int:
             code = speak()
             sys.stdout.flush()
         except KeyboardInterrupt as late:
+            from robolink_cli.console.exit_codes import exit_code
+
             return exit_code(late)
     return code
 
@@ -100,6 +100,8 @@ def _tell_stop(request: "StopRequest", outcome: "StopOutcome") -> int:
     telling, code = Telling(request, outcome), 0
     telling.explain_the_holder()
     if outcome.error is not None:
+        from robolink_cli.console.exit_codes import report
+
         code = report(outcome.error, as_json=request.json)
     elif request.json:
         hand_over(dumps("robolink/stop/1", telling.payload()))
@@ -130,6 +132,8 @@ def _answer(arguments: Sequence[str]) -> int:
     except click.exceptions.Exit as end:
         return end.exit_code
     except (Exception, KeyboardInterrupt) as caught:
+        from robolink_cli.console.exit_codes import exit_code, report
+
         error = _explained(caught)
         code = exit_code(error)
         # That nobody is left to read how it ended is no other end.
@@ -141,8 +145,11 @@ def _answer(arguments: Sequence[str]) -> int:
 
 def _explained(error: BaseException) -> BaseException:
     """Return the error; what looks like a defect beside packages that do not fit is none."""
+    from robolink_cli.console.exit_codes import BUG, exit_code
+
     if exit_code(error) != BUG:
         return error
+    from robolink.errors import ConfigError
     from robolink_cli.unfit_packages import cannot_run, unfit_packages
 
     unfit = unfit_packages()

@@ -65,6 +65,7 @@ if TYPE_CHECKING:
     from robolink.calibration.core.result import CalibrationResult as CalibrationResult
     from robolink.calibration.core.result import Drift as Drift
     from robolink.calibration.core.result import DriftVerdict as DriftVerdict
+    from robolink.calibration.core.result import ResidualVectors as ResidualVectors
     from robolink.calibration.core.result import VerifyResult as VerifyResult
     from robolink.calibration.core.result import judge_drift as judge_drift
     from robolink.calibration.core.result import offset_sigma_mm as offset_sigma_mm
@@ -231,7 +232,7 @@ __getattr__ = lazy_exports(
         "core.pose_suggestion": "PoseLimits PosePlan precise_enough select_poses sigma_gain "
         "suggest_poses",
         "core.result": "CalibrationResult Drift DriftVerdict GUARD_FACTOR PERSON_U_DRIFT_MM "
-        "PROBE_U_DRIFT_MM VerifyResult judge_drift offset_sigma_mm worst_of",
+        "PROBE_U_DRIFT_MM ResidualVectors VerifyResult judge_drift offset_sigma_mm worst_of",
         "core.least_squares": "linear_fit",
         "core.robust": "Floats Robust",
         "core.rotations": "pose_arrays quaternion_rotations rotation_of rotations uvw_deg zyz_deg",

@@ -258,8 +258,10 @@ class JournalOutcomeLog:
         Cheap, and raises nothing: whether the lease was lost, or the journal with it, the next
         :meth:`begin` says.
         """
-        with self._lock, suppress(JournalError):
-            self._lease.beat()
+        with self._lock:
+            if self._lease.held:  # whoever only looks, thousands of times, holds none
+                with suppress(JournalError):
+                    self._lease.beat()
 
     def take_over(self, reason: str) -> None:
         """End the lease of whoever has it, because a person insists; this is put on record.

@@ -14,7 +14,9 @@ from robolink_cli.commands.simulate.kinds.planned_faults import plan_faults
 from robolink_cli.console.render import switch_json_on
 from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.faults import LinkKind
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.in_process.epson import register
+
+from robolink.timing import NS_PER_S
 
 LOST = """
 schema = "robolink/faults/1"
@@ -39,11 +41,12 @@ def plan(tmp_path):
 def in_this_process(path, capsys):
     """A simulator with the plan; its URL, and what returns the next line that it told."""
     simulator = EpsonSimulator()
+    simulator.advance(NS_PER_S)
     with click.Context(click.Command("sim")) as context:
         switch_json_on(context)
         plan_faults(simulator, Path(path), {LinkKind.EPSON_TCP})
-    with serve_tcp(simulator) as host:
-        yield host.url, lambda: capsys.readouterr().out
+    # Its client waits in simulated time: an answer that comes is never late, however busy this is.
+    yield register("planned-faults", simulator), lambda: capsys.readouterr().out
 
 
 @contextmanager
@@ -74,7 +77,7 @@ def test_a_lost_answer_is_told_by_the_simulator_and_ends_the_client_in_doubt(
     path = plan("epson+tcp", "drop_reply", "TLSet 2, XY")
     with served(path, capsys) as (url, told):
         tool = ["tool", "set", "2", "--x", "10", "--y", "0", "--z", "-50"]
-        assert main.run(["-c", url, "--timeout", "0.8", *tool]) == 6
+        assert main.run(["-c", url, "--timeout", "10", *tool]) == 6
         document = json.loads(next(line for line in told().splitlines() if line[0] == "{"))
     assert document["schema"] == "robolink/fault/1"
     assert document["fault"] == {"action": "drop_reply", "match": "TLSet 2, XY"}

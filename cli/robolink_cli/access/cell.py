@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
-from robolink.errors import ConfigError
 from robolink.messages import tr
 
 if TYPE_CHECKING:
@@ -62,6 +61,8 @@ def require_expected_robot(controller: "Controller", cell: "Expected") -> None:
         return
     found = controller.facts().robot_models
     if cell.robot.casefold() not in (model.casefold() for model in found):
+        from robolink.errors import ConfigError  # here, because --help needs none
+
         raise ConfigError(
             tr(
                 "The cell {cell} has a robot {expected}, but at {url} there is: {found}.",

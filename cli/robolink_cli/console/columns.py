@@ -7,17 +7,22 @@ _WIDE: Final = "\u1100-\u115f\u2e80-\u303e\u3041-\ua4cf\uac00-\ud7a3\uf900-\ufaf
 _WIDE_FORMS: Final = "\uff00-\uff60\uffe0-\uffe6"
 _CLOSING: Final = "\u3001\u3002\uff0c\uff1a\uff1b\uff01\uff1f\uff09\u201d\u300b,.:;!?)"
 _OPENING: Final = "(\\[\uff08\u201c\u300a"
-_HAS_WIDE: Final = re.compile(f"[{_WIDE}{_WIDE_FORMS}]")
-_PIECES: Final = re.compile(
+_HAS_WIDE: Final = f"[{_WIDE}{_WIDE_FORMS}]"
+_PIECES: Final = (
     rf"[{_OPENING}]*[{_WIDE}{_WIDE_FORMS}][{_CLOSING}]*"
     rf"|[^\s{_WIDE}{_WIDE_FORMS}]+?(?=[{_OPENING}]*[{_WIDE}{_WIDE_FORMS}]|\s|$)[{_CLOSING}]*|\s+"
 )
-"""What stays on one line: a wide character with the signs about it, a word, a blank."""
+"""What stays on one line: a wide character with the signs about it, a word, a blank.
+
+To compile such large sets costs more than all else of a help page, so that it is done on need.
+"""
+_WORDS: Final = r"\S+|\s+"
+"""The same of a text without wide characters."""
 
 
 def has_wide(text: str) -> bool:
     """Tell whether a text holds a character of two columns."""
-    return _HAS_WIDE.search(text) is not None
+    return not text.isascii() and re.search(_HAS_WIDE, text) is not None
 
 
 def padded(text: str, width: int) -> str:
@@ -37,7 +42,7 @@ def columns(text: str) -> int:
 def filled(text: str, width: int, *, indent: str = "") -> str:
     """Return one paragraph in lines of at most ``width`` columns."""
     lines, line = [], indent
-    for piece in _PIECES.findall(text):
+    for piece in re.findall(_WORDS if text.isascii() else _PIECES, text):
         piece = " " if piece.isspace() else piece
         if line.strip() and columns(line + piece.rstrip()) > width:
             lines.append(line.rstrip())

@@ -2,16 +2,18 @@
 
 import io
 import os
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import click
 
 from robolink import errors
 from robolink.interrupts import EndedBy, Interrupted, ended_by
 from robolink.messages import tr
-from robolink.standing import UNTOUCHED, Components, Standing, standing_after
 from robolink_cli.console.output import hand_over, sentences, show
 from robolink_cli.console.render import dumps
+
+if TYPE_CHECKING:
+    from robolink.standing import Components, Standing
 
 DONE: Final = 0
 DIFFERENT: Final = 1
@@ -80,6 +82,8 @@ def exit_code(error: BaseException) -> int:
     What it left on the controller comes first: where a write or a movement may stand unproved,
     it is 6 whatever broke afterwards.
     """
+    from robolink.standing import standing_after  # here and below, because --help needs none
+
     if not standing_after(error).settled:
         return UNKNOWN
     if isinstance(error, KeyboardInterrupt):
@@ -93,6 +97,8 @@ def exit_code(error: BaseException) -> int:
 
 def report(error: BaseException, *, as_json: bool) -> int:
     """Tell a person, or a machine, about ``error``; return the exit code."""
+    from robolink.standing import UNTOUCHED, standing_after
+
     code = exit_code(error)
     if os.environ.get("ROBOLINK_DEBUG"):
         import traceback  # here, because --help needs none
@@ -129,6 +135,8 @@ def error_document(error: BaseException) -> str:
 
 def error_body(error: BaseException) -> dict[str, object]:
     """Return what is known about ``error``, as plain JSON."""
+    from robolink.standing import standing_after
+
     what, remedy = _sentences(error)
     ours = isinstance(error, errors.RobolinkError)
     standing = standing_after(error)
@@ -182,15 +190,17 @@ def _sentences(error: BaseException) -> tuple[str, str]:
 _NAMES: Final = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
 
 
-def tell_standing(standing: Standing) -> None:
+def tell_standing(standing: "Standing") -> None:
     """Say on stderr what stands; nothing of a command that had no controller, or only looked."""
+    from robolink.standing import UNTOUCHED
+
     if standing is not UNTOUCHED:
         from robolink.model import describe_standing  # here, because --help needs none
 
         show(sentences(describe_standing(standing)), beside=True)
 
 
-def standing_payload(standing: Standing) -> dict[str, object]:
+def standing_payload(standing: "Standing") -> dict[str, object]:
     """Return what stands, as plain JSON with units in the keys.
 
     What a tool holds is ``null`` where it is undefined, and where ``known`` is false.
@@ -215,5 +225,5 @@ def standing_payload(standing: Standing) -> dict[str, object]:
     }
 
 
-def _named(components: Components) -> dict[str, float] | None:
+def _named(components: "Components") -> dict[str, float] | None:
     return None if components is None else dict(zip(_NAMES, components, strict=True))

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
 
-_OBEYED: Final = re.compile(
+_OBEYED: Final = (
     "[\x00-\x09\x0b-\x1f\x7f-\x9f"  # C0 without LF, DEL, C1
     "\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]"  # line separators, direction of writing
 )
@@ -42,7 +42,9 @@ def visible(text: str) -> str:
     CRLF, with which controllers end their lines, is a line feed.
     """
     lines = text.replace("\r\n", "\n")
-    return _OBEYED.sub(lambda found: found[0].encode("unicode_escape").decode("ascii"), lines)
+    if lines.replace("\n", "").isprintable():
+        return lines  # nearly always; none of those characters is printable
+    return re.sub(_OBEYED, lambda found: found[0].encode("unicode_escape").decode("ascii"), lines)
 
 
 ShownBy = Callable[[str, bool], None]

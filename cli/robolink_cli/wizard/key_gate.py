@@ -4,10 +4,12 @@ A scanner sends a bar code as keys within milliseconds and ends it with CR LF; a
 still. Two keys of a person are further apart. So a key is held back for a moment, and when another
 one follows, neither counts (docs/decisions/0041). A key that is held down repeats by itself, always
 the same one, never faster than a terminal repeats: those count one by one.
+
+The times are those at which keys came to the terminal, not those at which a busy process gets to
+them. What is not known to be apart is not taken for a hand.
 """
 
-from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 from robolink_cli.wizard.keys import KEYPAD
 
@@ -37,52 +39,57 @@ def name_of(key: str) -> str:
     return _NAMES.get(key, key)
 
 
-@dataclass(slots=True)
-class _Held:
+class CountedKey(NamedTuple):
+    """A key, and by when it had come."""
+
     key: str
-    since_s: float
+    at_s: float
 
 
 class KeyGate:
     """Lets single keys through, and drops bursts. Times are those of one monotonic clock."""
 
     def __init__(self) -> None:
-        self._held: _Held | None = None
-        self._last: tuple[str, float] | None = None
+        self._held: CountedKey | None = None
+        self._last: CountedKey | None = None
         self._burst_s: float | None = None
 
-    def press(self, key: str, at_s: float, *, stops: bool = False) -> list[str]:
+    def press(
+        self, key: str, at_s: float, quiet_s: float | None = None, *, stops: bool = False
+    ) -> list[CountedKey]:
         """Take a key; return those that count by now, in their order.
 
         Args:
             key: The key.
-            at_s: When it came.
+            at_s: It had come by then.
+            quiet_s: The last time at which it surely had not; by default it came at ``at_s``.
             stops: Whether it stops where the person is now, and so never waits either.
         """
+        quiet_s = at_s if quiet_s is None else quiet_s
         if stops or key in AT_ONCE:
             self._held, self._burst_s = None, None
-            self._last = (key, at_s)
-            return [key]
-        last, self._last = self._last, (key, at_s)
+            self._last = CountedKey(key, at_s)
+            return [CountedKey(key, at_s)]
+        last, self._last = self._last, CountedKey(key, at_s)
         if self._burst_s is not None:
-            if at_s - self._burst_s < ALONE_S:
+            if quiet_s - self._burst_s < ALONE_S:
                 self._burst_s = at_s
                 return []
             self._burst_s = None
-        after_s = at_s - last[1] if last else ALONE_S
-        if last and after_s < ALONE_S and not (key == last[0] and after_s >= REPEATS_S):
+        after_s = quiet_s - last.at_s if last else ALONE_S
+        if last and after_s < ALONE_S and not (key == last.key and after_s >= REPEATS_S):
             self._held, self._burst_s = None, at_s
             return []
-        done = [self._held.key] if self._held is not None else []
-        self._held = _Held(key, at_s)
+        done = [self._held] if self._held is not None else []
+        self._held = self._last
         return done
 
-    def due(self, at_s: float) -> list[str]:
-        """Return the key that counts because nothing followed it."""
-        if self._held is None or at_s - self._held.since_s < ALONE_S:
+    def due(self, at_s: float) -> list[CountedKey]:
+        """Return the key that counts because nothing had followed it by a time."""
+        if self._held is None or at_s - self._held.at_s < ALONE_S:
             return []
-        key, self._held = self._held.key, None
-        return [key]
+        held, self._held = self._held, None
+        return [held]
 
     def burst_ended(self, at_s: float) -> bool:
         """Tell once that a burst was dropped, when it is over."""

@@ -108,7 +108,7 @@ def keep_unmeasured(stored: ToolOffset | None, **measured: float) -> ToolOffset:
     Raises:
         CalibrationError: ``implausible_offset`` when a length is beyond any tool.
     """
-    offset = replace(stored or ToolOffset(), **measured)
+    offset = ToolOffset(**measured) if stored is None else replace(stored, **measured)
     longest = max(abs(offset.x_mm), abs(offset.y_mm), abs(offset.z_mm))
     if longest > MAX_OFFSET_MM:
         raise CalibrationError(

@@ -1,10 +1,11 @@
 """What a calibration proposes, and how much of it was measured."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import Final
+from struct import iter_unpack
+from typing import Final, overload
 
 from robolink.calibration.core.budget import UncertaintyBudget
 from robolink.calibration.core.evidence import FitEvidence
@@ -15,6 +16,60 @@ from robolink.model import (
 )
 
 COMPONENTS = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
+
+
+class ResidualVectors(Sequence[tuple[float, ...]]):
+    """Residual vectors as a fit has them, which become tuples where somebody looks at one.
+
+    To make tuples of the residuals of thousands of poses takes a sixth as long as to solve them.
+    It is equal to the tuple of its vectors.
+
+    Args:
+        data: The numbers as the machine keeps them, one vector after the other.
+        dimensions: How many numbers a vector has.
+
+    Example:
+        >>> import numpy as np
+        >>> from robolink.calibration import ResidualVectors
+        >>> ResidualVectors(np.array([[0.1, -0.2], [0.0, 0.3]]).tobytes(), 2)
+        ((0.1, -0.2), (0.0, 0.3))
+    """
+
+    __slots__ = ("_data", "_dimensions", "_vectors")
+
+    def __init__(self, data: bytes, dimensions: int) -> None:
+        self._data = data
+        self._dimensions = dimensions
+        self._vectors: tuple[tuple[float, ...], ...] | None = None
+
+    def _looked_at(self) -> tuple[tuple[float, ...], ...]:
+        if self._vectors is None:
+            self._vectors = tuple(iter_unpack(f"{self._dimensions}d", self._data))
+        return self._vectors
+
+    def __len__(self) -> int:
+        return len(self._data) // (8 * self._dimensions)
+
+    @overload
+    def __getitem__(self, index: int) -> tuple[float, ...]: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[tuple[float, ...], ...]: ...
+    def __getitem__(self, index: int | slice) -> tuple[float, ...] | tuple[tuple[float, ...], ...]:
+        return self._looked_at()[index]
+
+    def __iter__(self) -> Iterator[tuple[float, ...]]:
+        return iter(self._looked_at())
+
+    def __eq__(self, other: object) -> bool:
+        if isinstance(other, ResidualVectors):
+            return self._looked_at() == other._looked_at()
+        return self._looked_at() == other
+
+    def __hash__(self) -> int:
+        return hash(self._looked_at())
+
+    def __repr__(self) -> str:
+        return repr(self._looked_at())
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +129,7 @@ class CalibrationResult:
     sigma_stated: bool = False
     rms_mm: float | None = None
     max_residual_mm: float | None = None
-    residuals_mm: tuple[tuple[float, ...], ...] = ()
+    residuals_mm: Sequence[tuple[float, ...]] = ()
     rejected: tuple[int, ...] = ()
     condition_number: float | None = None
     rank: int | None = None

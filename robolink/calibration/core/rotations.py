@@ -69,15 +69,34 @@ def checked_table(
         CalibrationError: As ``pose_checks.check_poses``.
     """
     try:
-        table = pose_table(poses)
+        table = _table_of_one_frame(poses)
+        alike = table is not None
+        if table is None:
+            table = pose_table(poses)
     except (struct_error, OverflowError):
-        table = np.full((1, 6), np.nan)
+        table, alike = np.full((1, 6), np.nan), False
     if not np.isfinite(table).all():
         require_finite_poses(poses)  # which tells the pose and the name
     near = np.abs(table[:, :2]) < METRES_BELOW if abs(table[0, 0]) < METRES_BELOW else _FAR
     refuse_metres(bool(near.all()))
-    hands, tools = {pose.hand for pose in poses}, {pose.tool for pose in poses}
-    return table, check_frames(hands, {pose.local for pose in poses}, tools, allow_mixed_hand)
+    some = poses[:1] if alike else poses
+    hands, tools = {pose.hand for pose in some}, {pose.tool for pose in some}
+    return table, check_frames(hands, {pose.local for pose in some}, tools, allow_mixed_hand)
+
+
+def _table_of_one_frame(poses: Sequence[Pose]) -> Floats | None:
+    """Return :func:`pose_table` of poses with one hand, tool and local, else ``None``.
+
+    Each pose is looked at once: among thousands, to fetch them again costs as much as to read them.
+    """
+    row, first = _ROW.pack, poses[0]
+    hand, tool, local = first.hand, first.tool, first.local
+    rows = [
+        row(p.x_mm, p.y_mm, p.z_mm, p.u_deg, p.v_deg, p.w_deg)
+        for p in poses
+        if p.hand is hand and p.tool is tool and p.local is local
+    ]
+    return np.frombuffer(b"".join(rows)).reshape(-1, 6) if len(rows) == len(poses) else None
 
 
 def rotation_of(pose: Pose) -> Floats:

@@ -45,7 +45,8 @@ def copies(table: Floats) -> tuple[int, ...]:
 def left_out(kept: Mask, duplicates: tuple[int, ...]) -> tuple[int, ...]:
     """Return the indices of poses that are neither kept nor copies: the outliers."""
     rejected = ~kept
-    rejected[list(duplicates)] = False
+    if duplicates:
+        rejected[list(duplicates)] = False
     return tuple(np.flatnonzero(rejected).tolist())
 
 

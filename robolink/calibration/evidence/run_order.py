@@ -35,6 +35,9 @@ _ALL_SPLITS_OF: Final = 100
 
 _FEW_SPLITS: Final = 32
 
+_ONES: Final = (np.eye(0), np.eye(1), np.eye(2), np.eye(3))
+"""By their size."""
+
 
 def run_order(
     centred: Floats, inverse: Floats, residuals: Floats, *, unknowns: int
@@ -124,13 +127,14 @@ def _gained(
     across = across.reshape(-1, dimensions, dimensions)
     # d' d: the column's own squares, less what the point and the offset take over.
     taken = across @ inverse @ across.transpose(0, 2, 1)
-    left = columns.own[:, None, None] * np.eye(dimensions) - taken
+    one = _ONES[dimensions]
+    left = columns.own[:, None, None] * one - taken
     limit = _SEEN * columns.squares
     # What is taken has no negative eigenvalue, so that none of what is left lies below this.
-    hidden = columns.own - taken.trace(axis1=1, axis2=2) < limit
+    hidden = columns.own - np.einsum("ijj->i", taken) < limit
     if hidden.any():
         hidden = np.linalg.eigvalsh(left)[:, 0] < limit
-        left[hidden] = np.eye(dimensions)
+        left[hidden] = one
     shifts: Floats = np.linalg.solve(left, right[..., None])[..., 0].astype(float)
     gained: Floats = np.einsum("ij,ij->i", shifts, right)
     gained[hidden] = -1.0

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from struct import iter_unpack
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from robolink.calibration.core.pose_checks import (
     some_on_their_head,
     tilted,
 )
-from robolink.calibration.core.result import CalibrationResult
+from robolink.calibration.core.result import CalibrationResult, ResidualVectors
 from robolink.calibration.core.robust import Floats, Indices, Mask, Robust
 from robolink.calibration.core.rotations import checked_table
 from robolink.calibration.evidence.pose_evidence import copies, left_out, with_evidence
@@ -39,6 +38,8 @@ RECOMMENDED_POSES = 4
 
 ROBUST_POSES = 6
 """Among fewer an outlier search cannot be trusted (docs/reference/evidence.md 10)."""
+
+_ONE = np.eye(2)
 
 _KEPT = ("z_mm", "u_deg", "v_deg", "w_deg")
 
@@ -91,7 +92,8 @@ def solve_n_angle(
     p, z, down = _planar(table, poses)
     duplicates = copies(table)
     kept: Mask = np.ones(len(poses), dtype=bool)
-    kept[list(duplicates)] = False
+    if duplicates:
+        kept[list(duplicates)] = False
     distinct = len(poses) - len(duplicates)
     if distinct < 2:
         raise _all_copies()
@@ -106,7 +108,7 @@ def solve_n_angle(
     fit = fit_planar(p, z, None if all_kept else kept)
     among = slice(None) if all_kept else kept
     residuals = fit.residuals[among].view(float).reshape(-1, 2)
-    unit_covariance = np.eye(2) * fit.sigma_gain**2
+    unit_covariance = _ONE * fit.sigma_gain**2
     result = judged(
         _result(
             fit,
@@ -156,7 +158,7 @@ def _result(
         warnings=warnings,
         inputs=inputs,
         rejected=rejected,
-        residuals_mm=tuple(iter_unpack("2d", fit.residuals.tobytes())),
+        residuals_mm=ResidualVectors(fit.residuals.tobytes(), 2),
         condition_number=fit.condition_number,
         rank=UNKNOWNS,
         unobservable=_KEPT,

@@ -6,7 +6,6 @@ Tilt shows Z, turning about the tool shows X and Y; a plan needs both
 
 import math
 from collections.abc import Sequence
-from struct import iter_unpack
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from robolink.calibration.core.pose_checks import (
     refuse_radians,
     require_poses,
 )
-from robolink.calibration.core.result import CalibrationResult
+from robolink.calibration.core.result import CalibrationResult, ResidualVectors
 from robolink.calibration.core.robust import Floats, Indices, Mask, Robust
 from robolink.calibration.core.rotations import checked_table, rotations
 from robolink.calibration.evidence.pose_evidence import copies, left_out, with_evidence
@@ -103,7 +102,8 @@ def solve_pivot(
     distinct = len(poses) - len(duplicates)
     require_poses(distinct, MINIMAL)
     kept: Mask = np.ones(len(poses), dtype=bool)
-    kept[list(duplicates)] = False
+    if duplicates:
+        kept[list(duplicates)] = False
     design = pivot_design(turned if not duplicates else turned[kept])
     _require_observable(poses, distinct, design, max_condition)
     spread_mm = 0.0
@@ -168,7 +168,7 @@ def _result(
         warnings=warnings,
         inputs=inputs,
         rejected=rejected,
-        residuals_mm=tuple(iter_unpack("3d", fit.residuals.tobytes())),
+        residuals_mm=ResidualVectors(fit.residuals.tobytes(), 3),
         condition_number=design.condition_number,
         rank=design.rank,
         unobservable=_KEPT,

@@ -69,7 +69,11 @@ class PlanarFit:
 def fit_planar(p: Complexes, z: Complexes, kept: Mask | None = None) -> PlanarFit:
     """Return the least squares of the kept poses; residuals are those of all poses."""
     chosen_p, chosen_z = (p, z) if kept is None else (p[kept], z[kept])
-    mean_p, mean_z = complex(chosen_p.mean()), complex(chosen_z.mean())
+    # A sum by itself: ``mean`` costs three times that at a few poses.
+    mean_p, mean_z = (
+        complex(chosen_p.sum()) / chosen_p.size,
+        complex(chosen_z.sum()) / chosen_z.size,
+    )
     turned = chosen_z - mean_z
     weight = float(np.vdot(turned, turned).real)
     tip = -complex(np.vdot(turned, chosen_p - mean_p)) / weight

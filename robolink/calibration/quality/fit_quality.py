@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -51,29 +51,29 @@ def judged(
     rms = worst = None
     if dof > 0:
         rms, worst = math.sqrt(total / len(residuals_mm)), math.sqrt(float(squares.max()))
-    spread = with_interval(result, unit_covariance, total, dof, sigma_mm=sigma_mm, grid_mm=grid_mm)
-    evidence = result.evidence or FitEvidence()
-    agreement, doubts = _agreement(evidence, total, dof, sigma_mm, grid_mm)
+    found = _interval(result, unit_covariance, total, dof, sigma_mm=sigma_mm, grid_mm=grid_mm)
+    agreement, doubts = _agreement(result.evidence, total, dof, sigma_mm, grid_mm)
     return replace(
-        spread,
+        result,
+        **found,
         rms_mm=rms,
         max_residual_mm=worst,
         dof=dof,
         evidence=agreement,
-        warnings=(*spread.warnings, *doubts, *tolerance.doubts(rms, worst)),
+        warnings=(*result.warnings, *doubts, *tolerance.doubts(rms, worst)),
     )
 
 
-def with_interval(
-    result: ResultT,
+def _interval(
+    result: CalibrationResult,
     unit_covariance: Floats,
     sum_of_squares: float,
     dof: int,
     *,
     sigma_mm: float | None,
     grid_mm: float | None = None,
-) -> ResultT:
-    """Return ``result`` with covariance, interval, region and budget, where anything tells them.
+) -> dict[str, Any]:
+    """Return covariance, interval, region and budget by their names, where anything tells them.
 
     The widest of what residuals, a stated sigma and the grid of the jogs give is taken
     (docs/reference/evidence.md 6).
@@ -92,39 +92,38 @@ def with_interval(
     known = tuple(Dispersion.known(sum_of_squares, dof, sigma_mm, grid_mm))
     widest = Dispersion.of(sum_of_squares, dof, sigma_mm, grid_mm)
     if widest is None:
-        return result
+        return {}
     covariance = tuple(map(tuple, (unit_covariance * widest.sigma_mm**2).tolist()))
     lengths = [index for index, name in enumerate(result.measured) if name.endswith("_mm")]
     region, gain = None, 0.0
     if lengths:
         whole = len(lengths) == len(unit_covariance)
         among = unit_covariance if whole else unit_covariance[np.ix_(lengths, lengths)]
-        gain = math.sqrt(max(float(among.diagonal().max()), 0.0))
+        gain = math.sqrt(max(*among.diagonal().tolist(), 0.0))
         axis = math.sqrt(max(float(np.linalg.eigvalsh(among)[-1]), 0.0))
         region = axis * max(one.sigma_mm * one.region_factor(len(lengths)) for one in known)
     from_grid = widest.source == "resolution"
-    return replace(
-        result,
-        covariance=covariance,
-        half_width95=widest.half_widths(covariance),
-        sigma_mm=widest.sigma_mm,
-        sigma_stated=sigma_mm is not None,
-        interval_from=widest.source,
-        region95_radius_mm=region,
-        budget=widest.budget(gain) if lengths else None,
-        notes=(*result.notes, "resolution_floor") if from_grid else result.notes,
-    )
+    return {
+        "covariance": covariance,
+        "half_width95": widest.half_widths(covariance),
+        "sigma_mm": widest.sigma_mm,
+        "sigma_stated": sigma_mm is not None,
+        "interval_from": widest.source,
+        "region95_radius_mm": region,
+        "budget": widest.budget(gain) if lengths else None,
+        "notes": (*result.notes, "resolution_floor") if from_grid else result.notes,
+    }
 
 
 def _agreement(
-    evidence: FitEvidence,
+    before: FitEvidence | None,
     sum_of_squares: float,
     dof: int,
     sigma_mm: float | None,
     grid_mm: float | None,
 ) -> tuple[FitEvidence, tuple[str, ...]]:
     """Compare the residuals with a stated sigma: chi-square, and the Birge ratio."""
-    evidence = replace(evidence, grid_mm=grid_mm)
+    evidence = FitEvidence(grid_mm=grid_mm) if before is None else replace(before, grid_mm=grid_mm)
     if sigma_mm is None or dof < 1:
         return evidence, ()
     ratio = math.sqrt(sum_of_squares) / sigma_mm

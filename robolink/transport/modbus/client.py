@@ -143,7 +143,7 @@ class ModbusClient:
         self, address: int, values: Sequence[int], *, unit: int | None = None
     ) -> None:
         """Write holding registers in one request (function 16), at most 123."""
-        if not all(0 <= value <= 0xFFFF for value in values):
+        if values and not (min(values) >= 0 and max(values) <= 0xFFFF):
             raise ConfigError(
                 tr("A register holds 0 to 65535."),
                 remedy=tr("Check the values; a negative number is sent plus 65536."),

@@ -1,7 +1,7 @@
 """From a URL to a Modbus client."""
 
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from robolink.errors import ConfigError, ConnectError, TransportTimeoutError
 from robolink.messages import tr
@@ -12,15 +12,12 @@ from robolink.transport.modbus.client import ModbusClient
 from robolink.transport.modbus.framing import Framing
 from robolink.transport.modbus.messages import Area
 from robolink.transport.modbus.register_frames import RegisterRtuFraming, RegisterTcpFraming
-from robolink.transport.modbus.rtu import RtuExchange, RtuLine
 from robolink.transport.modbus.tcp import TcpExchange
 from robolink.transport.stream.dial import dial
-from robolink.transport.stream.serial_port import (
-    SerialSettings,
-    open_serial,
-    take_settings,
-)
 from robolink.transport.stream.tcp import TcpTransport
+
+if TYPE_CHECKING:
+    from robolink.transport.stream.serial_port import SerialSettings
 
 TCP_MEDIUM: Final = "modbus-tcp"
 RTU_MEDIUM: Final = "modbus-rtu"
@@ -131,6 +128,10 @@ def _open_rtu(
     timeout_s: float,
     clock: Clock,
 ) -> ModbusClient:
+    # Here, because over TCP nothing of a serial line is needed.
+    from robolink.transport.modbus.rtu import RtuExchange, RtuLine
+    from robolink.transport.stream.serial_port import open_serial, take_settings
+
     unit = options.take_int("unit", _DEFAULT_UNITS[RTU_MEDIUM], 1, 247)
     settings = take_settings(options, baud=19_200, parity="even", stop_bits_without_parity="2")
     echo = options.take_choice("echo", "no", _NO_YES)
@@ -163,7 +164,7 @@ def _identity(url: LinkUrl, unit: int) -> str:
 
 
 def _nobody_there(
-    error: TransportTimeoutError, url: LinkUrl, unit: int, settings: SerialSettings
+    error: TransportTimeoutError, url: LinkUrl, unit: int, settings: "SerialSettings"
 ) -> ConnectError:
     return ConnectError(
         tr(

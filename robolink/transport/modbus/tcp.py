@@ -39,7 +39,7 @@ class TcpExchange:
         waiting = self._transport.receive_waiting()
         if waiting is not None:
             self._keep(waiting, request)
-        begun = self._leave_out_old(request)
+        begun = bool(self._buffer) and self._leave_out_old(request)
         self._transaction = self._transaction % 0xFFFF + 1
         frame = self._framing.pack(request, self._transaction)
         self._transport.send(frame, deadline=deadline)
@@ -69,7 +69,7 @@ class TcpExchange:
     def _next(self, request: ModbusRequest, deadline: Deadline) -> ModbusReply:
         while True:
             try:
-                reply = self._framing.take(self._buffer)
+                reply = self._framing.take(self._buffer) if self._buffer else None
             except FrameError as error:
                 raise errors.unintelligible(self._identity, request, error.raw) from error
             if reply is not None:

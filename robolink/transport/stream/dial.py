@@ -46,7 +46,7 @@ def dial(url: LinkUrl, *, timeout_s: float, deadline: Deadline) -> socket.socket
     failure: OSError = TimeoutError()
     try:
         for family, kind, number, _, address in socket.getaddrinfo(
-            host, port, type=socket.SOCK_STREAM
+            _as_looked_up(host), port, type=socket.SOCK_STREAM
         ):
             if deadline.expired:
                 break
@@ -61,6 +61,15 @@ def dial(url: LinkUrl, *, timeout_s: float, deadline: Deadline) -> socket.socket
             controller=url.identity,
         ) from error
     raise _connect_error(failure, url, timeout_s) from failure
+
+
+def _as_looked_up(host: str) -> str | bytes:
+    """Return the host as bytes where nothing of it has to be encoded: text loads tables of IDNA.
+
+    A name whose length IDNA would refuse is left to it, so that it is refused as before.
+    """
+    ordinary = host.isascii() and all(0 < len(label) < 64 for label in host.split("."))
+    return host.encode("ascii") if ordinary else host
 
 
 def _connect(connection: socket.socket, address: object, deadline: Deadline) -> socket.socket:

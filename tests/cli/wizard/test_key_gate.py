@@ -9,10 +9,10 @@ def passed(*pressed):
     gate, found, bursts, pending = KeyGate(), [], 0, sorted(pressed, key=lambda one: one[1])
     for tick in range(4000):
         now_s = tick / 1000
-        found += gate.due(now_s)
+        found += [one.key for one in gate.due(now_s)]
         bursts += gate.burst_ended(now_s)
         while pending and pending[0][1] <= now_s:
-            found += gate.press(pending[0][0], pending[0][1])
+            found += [one.key for one in gate.press(*pending[0])]
             pending.pop(0)
     return found, bursts
 

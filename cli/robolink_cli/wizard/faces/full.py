@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 from prompt_toolkit.application import Application
 from prompt_toolkit.input import Input, create_input
 from prompt_toolkit.input.typeahead import clear_typeahead
-from prompt_toolkit.key_binding import KeyBindings, KeyPressEvent
+from prompt_toolkit.key_binding import KeyBindings, KeyPress, KeyPressEvent
 from prompt_toolkit.layout import FormattedTextControl, Layout, Window
 from prompt_toolkit.output import Output, create_output
 
@@ -22,11 +22,12 @@ from robolink.interrupts import EndedBy, ended_by
 from robolink_cli.console.output import visible
 from robolink_cli.prompts.lines import open_lines
 from robolink_cli.wizard.desk import Desk
+from robolink_cli.wizard.faces.arrivals import TimedInput, TimedPress, timed
 from robolink_cli.wizard.faces.effects import carry_out, leaves
 from robolink_cli.wizard.faces.lines import LineFace
 from robolink_cli.wizard.flow import advance, stops_at_once
 from robolink_cli.wizard.happenings import Happening, HasEnded, KeyPressed, TooFast
-from robolink_cli.wizard.key_gate import KeyGate, name_of
+from robolink_cli.wizard.key_gate import CountedKey, KeyGate, name_of
 from robolink_cli.wizard.screens.drawing import screen_of
 from robolink_cli.wizard.screens.ending import ended_of
 from robolink_cli.wizard.screens.layout import HEIGHT, WIDTH
@@ -49,7 +50,7 @@ class FullFace:
     """
 
     def __init__(self, source: Input | None = None, output: Output | None = None) -> None:
-        self._input = create_input(sys.stdin) if source is None else source
+        self._input = timed(create_input(sys.stdin) if source is None else source)
         self._output = create_output(stdout=sys.stderr) if output is None else output
         self._gate = KeyGate()
         self._painted_s = 0.0
@@ -81,9 +82,7 @@ class FullFace:
         while True:
             ended, now_s = self._work.ended, time.monotonic()
             happened: list[Happening] = [*self._desk.happened()]
-            happened += [self._pressed(key, now_s) for key in self._gate.due(now_s)]
-            if self._gate.burst_ended(now_s):
-                happened.append(TooFast())
+            happened += self._alone(now_s)
             for one in happened:
                 self._happens(one)
             if happened or now_s - self._painted_s > _REPAINT_S:
@@ -95,6 +94,14 @@ class FullFace:
                 application.exit(result=not ended)
                 return
             await asyncio.sleep(_TURN_S)
+
+    def _alone(self, now_s: float) -> list[Happening]:
+        """Return what is known of keys because nothing followed them."""
+        quiet_s = self._input.quiet() if isinstance(self._input, TimedInput) else now_s
+        if quiet_s is None:
+            return []
+        found: list[Happening] = [self._pressed(one) for one in self._gate.due(quiet_s)]
+        return [*found, TooFast()] if self._gate.burst_ended(quiet_s) else found
 
     def _shows_the_end(self) -> bool:
         """Show how the work ended, where there is a screen for it, until it is left."""
@@ -114,23 +121,26 @@ class FullFace:
         def pressed(event: KeyPressEvent) -> None:
             press = event.key_sequence[0]
             key = getattr(press.key, "value", press.key)
-            self._press(str(key), press.data)
+            self._press(str(key), press)
 
         bindings.add("<any>", eager=True)(pressed)
         bindings.add("escape", eager=True)(pressed)
         bindings.add("<bracketed-paste>", eager=True)(lambda event: self._pasted(event.data))
         return bindings
 
-    def _press(self, key: str, data: str) -> None:
-        now_s = time.monotonic()
+    def _press(self, key: str, press: KeyPress) -> None:
+        data, at_s, quiet_s = press.data, time.monotonic(), None
+        if isinstance(press, TimedPress):
+            at_s, quiet_s = press.at_s, press.quiet_s
         if self._state.has_field and _writes(key):
             # A field takes bursts: scanners fill it in.
             text = data if data.isprintable() and name_of(key) not in ("enter", "backspace") else ""
             if self._fills(key, text):
-                self._happens(KeyPressed(name_of(key), text, now_s))
+                self._happens(KeyPressed(name_of(key), text, at_s))
                 return
-        for one in self._gate.press(key, now_s, stops=stops_at_once(self._state, name_of(key))):
-            self._happens(self._pressed(one, now_s))
+        stops = stops_at_once(self._state, name_of(key))
+        for one in self._gate.press(key, at_s, quiet_s, stops=stops):
+            self._happens(self._pressed(one))
 
     def _pasted(self, text: str) -> None:
         """Take what came at once: one line into a field, as a Windows console hands a scan on.
@@ -150,8 +160,8 @@ class FullFace:
             return True
         return text.isdigit() or name_of(key) == "backspace"
 
-    def _pressed(self, key: str, at_s: float) -> KeyPressed:
-        return KeyPressed(name_of(key), key if len(key) == 1 else "", at_s)
+    def _pressed(self, one: CountedKey) -> KeyPressed:
+        return KeyPressed(name_of(one.key), one.key if len(one.key) == 1 else "", one.at_s)
 
     def _happens(self, happening: Happening) -> None:
         self._state, effects = advance(self._state, happening)

@@ -201,30 +201,46 @@ class EpsonSession:
     @contextmanager
     def _exchanging(self, request: Request) -> Iterator[None]:
         """Hold the exchange lock for ``request``, once it is legal and no stop forbids it."""
-        what = _shown(request)
-        if not self._codec.carries(request.name):
-            self._line.require_carried(request.name)
-        checkpoint(Checkpoint.LOCK, what)
+        what = self._announced(request)
         try:
             with self._gate, self._wire:
-                checkpoint(Checkpoint.HELD, what)
-                self._check_usable(request)
-                self.latch.admit(command_class_of(request), what)
-                if self._pending is not None and request.name == "Abort":
-                    # Whatever ends it from here on was asked for.
-                    self._pending.abort_requested = True
+                self._admit(request, what)
                 yield
         finally:
             checkpoint(Checkpoint.EXCHANGE, what)
 
     def _ask(self, request: Request, *, secret: bool = False) -> Reply | Refusal:
-        with self._exchanging(request):
-            try:
-                self._expect_silence()
-                return self._receive(request, self._send(request, secret=secret))
-            except RobolinkError as error:
-                self._end(error)
-                raise
+        # As ``_exchanging``, but written out: a generator would cost each exchange a tenth of what
+        # the driver takes for it, and a function about it would make its way longer.
+        what = self._announced(request)
+        try:
+            with self._gate, self._wire:
+                self._admit(request, what)
+                try:
+                    self._expect_silence()
+                    return self._receive(request, self._send(request, secret=secret))
+                except RobolinkError as error:
+                    self._end(error)
+                    raise
+        finally:
+            checkpoint(Checkpoint.EXCHANGE, what)
+
+    def _announced(self, request: Request) -> str:
+        """Return a request that this line can carry as a person may read it, before the lock."""
+        what = _shown(request)
+        if not self._codec.carries(request.name):
+            self._line.require_carried(request.name)
+        checkpoint(Checkpoint.LOCK, what)
+        return what
+
+    def _admit(self, request: Request, what: str) -> None:
+        """Refuse, under the lock, what is not legal now or a stop forbids."""
+        checkpoint(Checkpoint.HELD, what)
+        self._check_usable(request)
+        self.latch.admit(command_class_of(request), what)
+        if self._pending is not None and request.name == "Abort":
+            # Whatever ends it from here on was asked for.
+            self._pending.abort_requested = True
 
     def _check_usable(self, request: Request) -> None:
         if self._ended_by is not None:
@@ -256,12 +272,11 @@ class EpsonSession:
     def _receive(self, request: Request, deadline: Deadline) -> Reply | Refusal:
         wanted = request.name.lower()
         while True:
-            event = self._codec.next_event()
-            if event is NEED_DATA:
-                self._codec.receive_data(self._heard(request, deadline))
-            elif isinstance(event, (Reply, Refusal)) and self._answers(event, wanted):
-                return event
-            else:
+            # What had arrived before was judged before the request was sent.
+            self._codec.receive_data(self._heard(request, deadline))
+            while (event := self._codec.next_event()) is not NEED_DATA:
+                if isinstance(event, (Reply, Refusal)) and self._answers(event, wanted):
+                    return event
                 # A login that was bent on its way comes back in its refusal, password and all.
                 self._take_aside(event, hidden=wanted == "login")
 

@@ -84,7 +84,7 @@ class Mailbox(DriverLink):
         """Tell whether this PLC holds both alike; rotations are compared as matrices."""
         if a is None or b is None:
             return a is b
-        return frames_match(self.to_plc(a), self.to_plc(b), tolerance=TOLERANCE)
+        return a == b or frames_match(self.to_plc(a), self.to_plc(b), tolerance=TOLERANCE)
 
     def to_plc(self, offset: ToolOffset) -> Six:
         """Return a tool in the PLC's units and angles."""

@@ -9,6 +9,7 @@ waiter's own. Then no two exchanges lie between two beats.
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from types import TracebackType
 from typing import Final
 
 from robolink import ambient
@@ -22,7 +23,10 @@ _LONGEST_EXCHANGE_S: Final = 10.0
 
 
 class Turns:
-    """Lets threads onto the wire. That one exchange follows another is the link's own lock."""
+    """Lets threads onto the wire. That one exchange follows another is the link's own lock.
+
+    A ``with`` block is one exchange.
+    """
 
     def __init__(self) -> None:
         self._changed = ambient.waiting_room()
@@ -58,8 +62,8 @@ class Turns:
             self._sign_s = _now_s()
             return True
 
-    @contextmanager
-    def taken(self) -> Iterator[None]:
+    # Not as a generator: every exchange comes here, and would pay for it.
+    def __enter__(self) -> None:
         """Wait until the waiter, if there is one, lets this thread in for one exchange."""
         with self._changed:
             self._waiting += 1
@@ -74,12 +78,17 @@ class Turns:
                 self._waiting -= 1
             self._let_in = 0
             self._inside += 1
-        try:
-            yield
-        finally:
-            with self._changed:
-                self._inside -= 1
-                self._changed.notify_all()
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Let the next one onto the wire."""
+        with self._changed:
+            self._inside -= 1
+            self._changed.notify_all()
 
     def _nobody_inside(self) -> bool:
         return not self._inside and not (self._let_in and self._waiting)

@@ -199,7 +199,7 @@ class MailboxWire:
         return self._here.goes_first
 
     def _turn(self) -> AbstractContextManager[None]:
-        return nullcontext() if self._goes_first else self._turns.taken()
+        return nullcontext() if self._goes_first else self._turns
 
     @property
     def _may_beat(self) -> bool:

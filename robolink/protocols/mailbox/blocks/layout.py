@@ -8,7 +8,7 @@ import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum, StrEnum
-from itertools import islice
+from itertools import accumulate
 from typing import Any, Final
 
 from robolink.messages import tr
@@ -72,7 +72,7 @@ class Layout:
         ValueError: The fields leave a gap or overlap.
     """
 
-    __slots__ = ("_by_name", "_image", "_registers", "fields", "words")
+    __slots__ = ("_by_name", "_image", "_places", "_registers", "fields", "words")
 
     def __init__(self, *fields: Field) -> None:
         starts = (field.word for field in fields)
@@ -82,6 +82,11 @@ class Layout:
         self.fields: Final = fields
         self.words: Final = end
         self._by_name = {field.name: field for field in fields}
+        values = [*accumulate((field.count for field in fields), initial=0)]
+        self._places: Final[dict[str, int | slice]] = {
+            field.name: first if field.count == 1 else slice(first, first + field.count)
+            for field, first in zip(fields, values, strict=False)
+        }
         formats = (field.type.value * field.count for field in fields)
         self._image = struct.Struct("<" + "".join(formats))
         self._registers = struct.Struct(f"<{self.words}H")
@@ -133,13 +138,10 @@ class Layout:
             BlockError: There are too few or too many words, or one is not 16 bits wide.
         """
         try:
-            parts = iter(self._image.unpack(self._registers.pack(*words)))
+            parts = self._image.unpack(self._registers.pack(*words))
         except struct.error as error:
             raise BlockError(BlockFault.LENGTH) from error
-        return {
-            field.name: next(parts) if field.count == 1 else tuple(islice(parts, field.count))
-            for field in self.fields
-        }
+        return {name: parts[place] for name, place in self._places.items()}
 
     def intact(self, words: Sequence[int]) -> bool:
         """Tell whether the checksum in ``words`` is that of the words before it."""

@@ -15,6 +15,8 @@ from typing import Final
 
 _translate: Callable[[str], str] | None = None
 
+_WIDE_STOPS = ("\u3002", "\uff01", "\uff1f")
+
 
 class Translated(str):
     """A sentence in the language of the process, which knows what it is in English.
@@ -68,9 +70,14 @@ def spoken(sentence: str, /) -> str:
 
 
 def joined(between: str, sentences: Iterable[str]) -> str:
-    """Return whole sentences one after the other, to be kept in English like each of them."""
+    """Return whole sentences one after the other, to be kept in English like each of them.
+
+    No blank stands behind a Chinese full stop, which is wide by itself.
+    """
     parts = list(sentences)
-    text = between.join(parts)
+    text = "".join(parts[:1])
+    for part in parts[1:]:
+        text += part if between == " " and text.endswith(_WIDE_STOPS) else f"{between}{part}"
     english = between.join(in_english(part) for part in parts)
     return text if text == english else Translated(text, english)
 

@@ -9,13 +9,15 @@ import sys
 from time import perf_counter
 
 from robolink_simulators.epson import EpsonSimulator
+from robolink_simulators.hosting.garbage import RareFullCollections
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 
 
 def main(count: int) -> None:
     """Serve so many until standard input ends."""
     allow_descriptors()
-    with serve_tcp(EpsonSimulator()):  # what the first one of a process costs is not each one's
+    # As `robolink sim` does; and what the first one of a process costs is not each one's.
+    with RareFullCollections(), serve_tcp(EpsonSimulator()):
         before_kib, start = resident_kib(), perf_counter()
         hosts = [serve_tcp(EpsonSimulator(seed=seed)) for seed in range(count)]
         opened_s = perf_counter() - start

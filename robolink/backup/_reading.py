@@ -41,7 +41,7 @@ class JsonReader:
             raise self.wrong(path, tr("it is not an object in braces"))
         for name in value:
             if name not in names:
-                raise self.wrong(_joined(path, name), tr("this name does not belong here"))
+                raise self.wrong(_joined(path, name), tr("this name is not known here"))
         for name in names:
             if name not in value:
                 raise self.wrong(_joined(path, name), tr("it is missing"))

@@ -191,7 +191,9 @@ def _judged(
         sentence = tr("Tool {tool} is selected, as before.", tool=now)
         return Finding(marker, Verdict.DONE, sentence)
     if now == before:
-        sentence = tr("Tool {tool} is selected, as before; power mode or speed are not.", tool=now)
+        sentence = tr(
+            "Tool {tool} is selected, as before; power mode or speed is not as before.", tool=now
+        )
     else:
         sentence = tr(
             "Tool {now} is selected now; it was tool {tool} before.", now=now, tool=before

@@ -10,9 +10,6 @@ if TYPE_CHECKING:
     from robolink.nozzle_change._change import Earlier as Earlier
     from robolink.nozzle_change._change import NozzleChange as NozzleChange
     from robolink.nozzle_change._length import known_height as known_height
-    from robolink.nozzle_change._open_turn_test import OpenTurnTest as OpenTurnTest
-    from robolink.nozzle_change._open_turn_test import finish_by_turn_test as finish_by_turn_test
-    from robolink.nozzle_change._open_turn_test import open_turn_tests as open_turn_tests
     from robolink.nozzle_change._plan import ChangePlan as ChangePlan
     from robolink.nozzle_change._plan import Limits as Limits
     from robolink.nozzle_change._plan import ToolPlan as ToolPlan
@@ -36,6 +33,14 @@ if TYPE_CHECKING:
     from robolink.nozzle_change._seating import height_is_known as height_is_known
     from robolink.nozzle_change._seating import tip_sigma_mm as tip_sigma_mm
     from robolink.nozzle_change._seating import touching_as_recorded as touching_as_recorded
+    from robolink.nozzle_change.open_turn_test.finishing import (
+        finish_by_turn_test as finish_by_turn_test,
+    )
+    from robolink.nozzle_change.open_turn_test.marking import OpenTurnTest as OpenTurnTest
+    from robolink.nozzle_change.open_turn_test.marking import open_turn_tests as open_turn_tests
+    from robolink.nozzle_change.open_turn_test.untested import (
+        untested_sentences as untested_sentences,
+    )
 
 __getattr__ = lazy_exports(
     __name__,
@@ -43,7 +48,9 @@ __getattr__ = lazy_exports(
         "_acceptance": "AcceptanceCriteria",
         "_change": "DescribeReport Earlier NozzleChange",
         "_length": "known_height",
-        "_open_turn_test": "OpenTurnTest finish_by_turn_test open_turn_tests",
+        "open_turn_test.finishing": "finish_by_turn_test",
+        "open_turn_test.marking": "OpenTurnTest open_turn_tests",
+        "open_turn_test.untested": "untested_sentences",
         "_plan": "ChangePlan Limits ToolPlan clearance_too_small require_contact_input "
         "require_ready usual_box",
         "_preview": "PlannedStep flange_now foresee preview require_inside",

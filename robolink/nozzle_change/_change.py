@@ -23,7 +23,6 @@ from robolink.nozzle_change._measuring import (
     Measuring,
     offer_of,
 )
-from robolink.nozzle_change._open_turn_test import marked_turn_tests
 from robolink.nozzle_change._plan import (
     ChangePlan,
     ToolPlan,
@@ -47,6 +46,7 @@ from robolink.nozzle_change._station_check import (
     found_with,
     stations_found,
 )
+from robolink.nozzle_change.open_turn_test.marking import marked_turn_tests
 from robolink.procedures import TOUCH_CODES, MeasurementContext
 from robolink.runner import Operator, regard
 from robolink.transaction import Order, ToolChange, Wanted, plain_result

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from robolink.procedures.camera_source import calibrated_camera as calibrated_camera
     from robolink.procedures.camera_source import camera_error_of as camera_error_of
     from robolink.procedures.camera_source import pixel_camera as pixel_camera
+    from robolink.procedures.camera_source import proof_angles as proof_angles
     from robolink.procedures.camera_verify import NO_ERROR as NO_ERROR
     from robolink.procedures.camera_verify import nearest_first as nearest_first
     from robolink.procedures.camera_verify import seen_drift as seen_drift
@@ -51,9 +52,12 @@ if TYPE_CHECKING:
     from robolink.procedures.pin.touches import lift_off as lift_off
     from robolink.procedures.pin.touches import touch_again as touch_again
     from robolink.procedures.pin.touches import turned_touches as turned_touches
-    from robolink.procedures.pin.turn_test import TurnsAboutPin as TurnsAboutPin
     from robolink.procedures.pin.turn_test import TurnTest as TurnTest
     from robolink.procedures.pose_method import PoseMethod as PoseMethod
+    from robolink.procedures.proving.kept_proof import KeepsProof as KeepsProof
+    from robolink.procedures.proving.kept_proof import KeptProof as KeptProof
+    from robolink.procedures.proving.kept_proof import PlacedProof as PlacedProof
+    from robolink.procedures.proving.kept_proof import ProvesAgain as ProvesAgain
     from robolink.procedures.sampling.sampler import Sampler as Sampler
     from robolink.procedures.sampling.sampler import SequentialSampler as SequentialSampler
     from robolink.procedures.sampling.samples import Samples as Samples
@@ -81,7 +85,8 @@ __getattr__ = lazy_exports(
         "camera_plan": "HALF_ROUND_DEG LookPlan TWO_ANGLES_DEG",
         "camera_samples": "CameraDrive CameraSamples Place",
         "camera_source": (
-            "CalibratedCameraSource angles_between calibrated_camera camera_error_of pixel_camera"
+            "CalibratedCameraSource angles_between calibrated_camera camera_error_of pixel_camera "
+            "proof_angles"
         ),
         "camera_verify": "NO_ERROR nearest_first seen_drift verify_by_looking",
         "input_source": "InputSource",
@@ -93,8 +98,9 @@ __getattr__ = lazy_exports(
         ),
         "pin.touch_plan": "TouchPlan plain_pose",
         "pin.touches": "PinTouches lift_off touch_again turned_touches",
-        "pin.turn_test": "TurnTest TurnsAboutPin",
+        "pin.turn_test": "TurnTest",
         "pose_method": "PoseMethod",
+        "proving.kept_proof": "KeepsProof KeptProof PlacedProof ProvesAgain",
         "sampling.sampler": "Sampler SequentialSampler",
         "sampling.samples": "Samples",
         "sampling.sequential": (

@@ -1,14 +1,15 @@
 """What all measurements with a camera have in common."""
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from robolink.calibration import CalibrationResult, toward_zero
+from robolink.calibration import CalibrationResult, tip_pose, toward_zero
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Pose, SpotUnit, TipSensor, ToolOffset
+from robolink.procedures.proving.kept_proof import ProvesAgain
 from robolink.procedures.source import MeasurementContext
 from robolink.runner import Procedure
 from robolink.sensing import open_sensor
@@ -26,6 +27,13 @@ def angles_between(measured_deg: Sequence[float]) -> tuple[float, ...]:
     if low == high:
         return (toward_zero(low, _HALF_A_TURN_DEG),)
     return low + (high - low) / 6, high - (high - low) / 6
+
+
+def proof_angles(result: CalibrationResult, tool: int) -> tuple[float, ...]:
+    """Return U of a new tool at which what looks measured is proved; see :func:`angles_between`."""
+    return angles_between(
+        [tip_pose(pose, result.offset, tool=tool).u_deg for pose in result.inputs]
+    )
 
 
 def camera_error_of(result: CalibrationResult) -> tuple[float, float]:
@@ -69,7 +77,7 @@ def pixel_camera(sensor: str | TipSensor) -> Iterator[TipSensor]:
 
 
 @dataclass(frozen=True, slots=True)
-class CalibratedCameraSource(ABC):
+class CalibratedCameraSource(ProvesAgain):
     """Measures by looks of a camera whose place and pixels are known.
 
     Attributes:

@@ -1,11 +1,12 @@
 """What measurements have in common in which the tip itself switches an input."""
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from dataclasses import replace
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 from robolink.calibration import CalibrationResult
 from robolink.model import Pose, ToolOffset
+from robolink.procedures.proving.kept_proof import ProvesAgain
 from robolink.procedures.source import MeasurementContext
 from robolink.runner import Procedure
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 PlanT = TypeVar("PlanT", bound="DataclassInstance")
 
 
-class InputSource(ABC, Generic[PlanT]):
+class InputSource(ProvesAgain, Generic[PlanT]):
     """Measures from wherever the flange is; nobody touches anything.
 
     Attributes:

@@ -3,7 +3,10 @@
 from collections.abc import Callable
 
 from robolink.calibration import CalibrationResult, VerifyResult
+from robolink.errors import ConfigError
+from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
+from robolink.procedures.proving.kept_proof import KeepsProof, KeptProof
 from robolink.procedures.source import MeasurementContext, MovingSource, TouchesFurther
 from robolink.runner import Procedure
 
@@ -78,6 +81,25 @@ class LazySource:
     ) -> VerifyResult:
         """Prove the new tip; see :class:`~robolink.procedures.MovingSource`."""
         return self._source.verify(context, tool, result, tip=tip, tolerance_mm=tolerance_mm)
+
+    def proof(
+        self,
+        context: MeasurementContext,
+        tool: int,
+        result: CalibrationResult,
+        *,
+        tip: ToolOffset,
+        tolerance_mm: float,
+    ) -> KeptProof:
+        """Return the proof of what was measured; see :class:`~robolink.procedures.KeepsProof`.
+
+        Raises:
+            ConfigError: The source proves in a way that cannot be kept.
+        """
+        source = self._source
+        if not isinstance(source, KeepsProof):
+            raise ConfigError(tr("This measurement has no turn test that can be made later."))
+        return source.proof(context, tool, result, tip=tip, tolerance_mm=tolerance_mm)
 
     @property
     def adds_touch(self) -> bool | None:

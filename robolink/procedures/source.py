@@ -19,6 +19,7 @@ class MeasurementContext:
         controller: The controller, connected.
         operator: The person at the cell.
         start: Flange pose at the start of the change; limits lie about it.
+        stands: Where the frame then in force was after the last step; ``None`` before any.
 
     Args:
         controller: See above.
@@ -56,6 +57,7 @@ class MeasurementContext:
         self.controller = controller
         self.operator = operator
         self.start = start
+        self.stands: Pose | None = None
         self._settings = settings
         self._offers = offers
         self._on_step: Callable[[StepDone], None] | None = None
@@ -125,13 +127,18 @@ class MeasurementContext:
             group,
             self.operator,
             self._settings(start, tip),
-            on_step=self._on_step,
+            on_step=self._stepped,
             camera=camera,
             offers=self._offers,
             # About a new tip nothing is repeated: its value is written and not yet proved.
             repeats=tip is None,
             types=self._types and tip is None,
         )
+
+    def _stepped(self, done: StepDone) -> None:
+        self.stands = done.pose or self.stands
+        if self._on_step is not None:
+            self._on_step(done)
 
 
 class TipSource(Protocol):

@@ -17,7 +17,7 @@ from robolink.model import Path, Pose
 from robolink.procedures.approach import offset_z
 from robolink.procedures.pin.touch_plan import TouchPlan, fresh_seed, plain_pose
 from robolink.procedures.pin.witnessed import WitnessedTouches
-from robolink.runner import Move, Procedure, TouchedAt
+from robolink.runner import Move, Procedure, TouchedAt, TouchSubject
 
 if TYPE_CHECKING:
     from robolink.calibration import Floats, SurfaceStandoffs  # numpy, which a look does without
@@ -162,6 +162,9 @@ class SurfaceTouches(WitnessedTouches):
 
     def _distances_mm(self) -> list[float]:
         return [math.hypot(*touch.standoff_mm) for touch in self.taken]
+
+    def _subject(self, arrival: Pose | None) -> TouchSubject:
+        return replace(super()._subject(arrival), surface=True)
 
     @property
     def _seed(self) -> int | None:

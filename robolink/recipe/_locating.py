@@ -54,7 +54,7 @@ def _record_needed(recipe: Recipe) -> bool:
 def _with_place(recipe: Recipe, station: Station) -> Recipe:
     place = {"x_mm": station.x_mm, "y_mm": station.y_mm, "z_mm": station.z_mm}
     if None in place.values():
-        raise _unknown(recipe, tr("its place is not known"))
+        raise _unknown(recipe, tr("Its place is not known."))
     given = {**place, "sigma_mm": station.sigma_mm}
     return recipe.model_copy(update={"station": recipe.station.model_copy(update=given)})
 
@@ -70,17 +70,17 @@ def _known(recipe: Recipe, stations: Mapping[str, Station]) -> Station:
     kind = recipe.source.of_method.needs.station
     station = stations.get(recipe.station.id)
     if station is None:
-        raise _unknown(recipe, tr("no station of that name is known"))
+        raise _unknown(recipe, tr("No station of that name is known."))
     if station.kind is not kind:
         raise _unknown(
-            recipe, tr("it is of kind {kind}, not {wanted}", kind=station.kind, wanted=kind)
+            recipe, tr("It is of kind {kind}, not {wanted}.", kind=station.kind, wanted=kind)
         )
     return station
 
 
 def _unknown(recipe: Recipe, why: str) -> ConfigError:
     return ConfigError(
-        tr("The recipe does not say where {id} is, and {why}.", id=recipe.station.id, why=why),
+        tr("The recipe does not say where {id} is. {why}", id=recipe.station.id, why=why),
         remedy=tr(
             "Say it in the recipe or in the cell file, learn it with "
             "'robolink cell station learn', or "

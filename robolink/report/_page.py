@@ -8,7 +8,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from robolink.messages import declared, spoken, tr
+from robolink.messages import tr
 from robolink.report._markup import drawing, plain, rounded
 from robolink.report._values import Report
 from robolink.report.pictures.fit import fit_drawings
@@ -65,8 +65,6 @@ def templates() -> Environment:
     )
     environment.globals |= {
         "tr": tr,
-        "declared": declared,
-        "filled": filled,
         "figure": figure,
         "drawn": drawn,
         "drawings": drawings,
@@ -84,11 +82,6 @@ def templates() -> Environment:
 def figure(value: float, digits: int = 3) -> Markup:
     """Return a number: rounded to the eye, whole for a program that reads the page."""
     return Markup('<data value="{}">{}</data>').format(repr(float(value)), rounded(value, digits))
-
-
-def filled(sentence: str, **values: object) -> Markup:
-    """Return a declared sentence with figures in it, which keep their whole value."""
-    return Markup(spoken(sentence)).format(**values)
 
 
 def drawn(one: Drawing) -> Markup:

@@ -29,6 +29,7 @@ class TouchSubject:
         retakes: Whether an earlier touch may be made again from here, alone; else all of them are
             begun again from the first.
         types: Whether the pose may be typed in place of being read.
+        surface: Whether a surface is touched, and not a pin.
     """
 
     number: int = 0
@@ -39,6 +40,7 @@ class TouchSubject:
     proof: bool = False
     retakes: bool = False
     types: bool = False
+    surface: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -68,8 +68,10 @@ class Settler:
             text = tr("{holds} The change is complete.", holds=sentence)
             done = _finding(marker, Verdict.DONE, text, steps, now)
             return replace(done, entries=(*done.entries, *kept_later(marker, now)))
-        why = tr("nobody verified it") if all(new) else tr("the change is not complete")
-        text = tr("{holds} Written, but {why}.", holds=sentence, why=why)
+        if all(new):
+            text = tr("{holds} Written, but nobody verified it.", holds=sentence)
+        else:
+            text = tr("{holds} Written, but the change is not complete.", holds=sentence)
         numbers = ", ".join(
             str(step.tool) for step, is_old in zip(steps, old, strict=True) if not is_old
         )

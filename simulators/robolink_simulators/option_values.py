@@ -76,6 +76,6 @@ def _value(name: str, text: str, hint: Any) -> object:  # noqa: ANN401 - a type 
 
 def _refused(name: str, text: str, allowed: str) -> ConfigError:
     return ConfigError(
-        tr("The simulator option {name} cannot be {value!r}.", name=name, value=text),
+        tr("The option {name} cannot be {value!r}.", name=name, value=text),
         remedy=tr("It takes: {allowed}.", allowed=allowed),
     )

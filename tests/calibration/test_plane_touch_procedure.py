@@ -135,9 +135,10 @@ def proved(plate, result: PlaneTouchResult, tip, *, axes):
     left = ToolOffset(*np.subtract(tip.components()[:3], LENGTHS).tolist())
     procedure = verify_on_plane(
         PLAN,
-        result,
+        result.plane,
         here=frame,
         tip=ToolOffset(),
+        frame=result.offset,
         tilt_deg=30.0,
         axes=axes,
         tolerance_mm=0.1,

@@ -9,7 +9,7 @@ import pytest
 from robolink.calibration import rotation_of
 from robolink.errors import CalibrationError
 from robolink.methods import SphereSurvey, measure_sphere_touch
-from robolink.methods.sphere_touch.proof import verify_on_sphere
+from robolink.methods.sphere_touch.proof import TouchedSphere, verify_on_sphere
 from robolink.methods.sphere_touch.survey import LEAST_COUNT
 from robolink.model import Pose, ToolOffset
 from tests.calibration._surface_person import PLAN, STORED, TIP, Ball, SurfacePerson, slips
@@ -129,9 +129,10 @@ def test_the_proof_on_a_sphere_shows_a_tip_that_slipped_in_any_direction(axes, a
     procedure = verify_on_sphere(
         PLAN,
         SphereSurvey(10.0),
-        result,
+        TouchedSphere(result.reference_point_mm, result.radius_mm),
         here=frame,
         tip=ToolOffset(),
+        frame=result.offset,
         axes=axes,
         tolerance_mm=0.1,
         u_mm=0.01,

@@ -18,6 +18,7 @@ from tests.calibration._tilting_person import turned_deg
 from tests.calibration.test_sphere_touch_procedure import over_top
 
 KINDS = ("plane", "sphere")
+LONG = pytest.mark.soak
 UPRIGHTS = {"plane": 3, "sphere": 4}
 COUNT = 12
 _BALL = Ball(10.0)
@@ -95,7 +96,7 @@ def stands_upright(person):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("again", [0, 2, 7])
+@pytest.mark.parametrize("again", [0, pytest.param(2, marks=LONG), 7])
 def test_from_the_values_one_touch_is_made_again_in_its_place_and_tilt(kind, again):
     person = Undecided(kind, slips={again: 0.1})
     before = measured(kind, person)
@@ -122,7 +123,7 @@ def test_one_that_is_made_again_at_its_standoff_is_refused_as_any_other(kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize(("at", "number"), [(3, 1), (6, 5), (9, 2)])
+@pytest.mark.parametrize(("at", "number"), [(3, 1), pytest.param(6, 5, marks=LONG), (9, 2)])
 def test_at_a_touch_an_earlier_one_is_made_again_and_the_others_stay(kind, at, number):
     person = Undecided(kind, slips={number - 1: 0.1}, back={at: number})
     result = measured(kind, person)

@@ -190,6 +190,6 @@ def test_a_failed_verification_is_reported_with_its_drifts(simulator, capsys, tm
     page = page_of(tmp_path / "page.html")
     assert (code, document["error"]["kind"]) == (8, "VerifyError")
     # So small a tolerance lies within what the touches themselves scatter.
-    verdict = "<strong>Not decided, which does not pass: "
+    verdict = "Not decided, which does not pass: "
     for said in ("The turn test failed", "is back.", verdict):
         assert said in page

@@ -158,9 +158,9 @@ def test_a_recipe_names_beams_and_a_surface_by_their_stations_and_may_end_early(
 @pytest.mark.parametrize(
     ("source", "station", "z", "why"),
     [
-        ('kind = "beams"', "BEAMS-99", "kept", "no station of that name is known"),
+        ('kind = "beams"', "BEAMS-99", "kept", "No station of that name is known"),
         ('kind = "beams"', "PLATE", "kept", "of kind touch, not beams"),
-        ('kind = "two-pose"', "PIN-07", "measured", "its place is not known"),
+        ('kind = "two-pose"', "PIN-07", "measured", "Its place is not known"),
     ],
 )
 def test_a_station_that_nobody_can_place_stops_the_recipe_first(

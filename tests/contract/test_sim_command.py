@@ -126,8 +126,8 @@ def test_options_password_and_state_reach_the_simulator(tmp_path):
         (("--option", "terminator=tab"), "cannot be 'tab'"),
         (("--robot", "R2D2"), "no simulated robot"),
         (("--tcp", "0.0.0.0:0"), "other machines"),
-        (("--tcp", "127.0.0.1"), "no address"),
-        (("--tcp", "127.0.0.1:70000"), "no address"),
+        (("--tcp", "127.0.0.1"), "not an address"),
+        (("--tcp", "127.0.0.1:70000"), "not an address"),
         (("--password-env", "NOT_SET_ANYWHERE"), "holds no password"),
     ],
 )

@@ -2,12 +2,14 @@
 
 import io
 import re
+from dataclasses import fields
 from string import Formatter
 
 import pytest
 from babel.messages.pofile import read_po
 from robolink_cli.console.columns import columns, filled
 
+from robolink.model import ControllerState, ControllerStatus, Hand
 from tests.packaging.test_catalogue import CATALOGUE
 from tools.sentences import collect
 
@@ -137,3 +139,12 @@ def test_a_bracket_is_not_left_alone_at_the_end_of_a_line():
         assert all(columns(line) <= width for line in lines)
         assert not [line for line in lines if line.endswith(("(", "["))]
         assert "".join(lines).replace(" ", "") == said.replace(" ", "")
+
+
+def test_what_a_machine_can_be_said_to_be_has_a_word(translated):
+    said = dict(translated)
+    flags = [field.name.replace("_", " ") for field in fields(ControllerStatus)]
+    codes = [*ControllerState, *flags, *(f"{hand} hand" for hand in Hand)]
+    assert len(codes) > 20
+    shown_otherwise = {"code", "unpowered"}  # a number; the state "without power"
+    assert [code for code in codes if not said.get(str(code)) and code not in shown_otherwise] == []

@@ -96,6 +96,17 @@ def test_a_record_keeps_the_english_of_what_a_person_was_shown(marked):
     assert storable(pickle.loads(pickle.dumps(said))) == storable(said)
 
 
+def test_no_blank_stands_behind_a_chinese_full_stop():
+    messages.install({"Moved.": "\u79fb\u52a8\u3002", "Written.": "\u5199\u5165\u3002"}.__getitem__)
+    try:
+        both = joined(" ", (tr("Moved."), tr("Written.")))
+    finally:
+        messages.install(None)
+    assert both == "\u79fb\u52a8\u3002\u5199\u5165\u3002"
+    assert storable(both) == "Moved. Written."
+    assert joined(" ", ("", "Moved.")) == " Moved."
+
+
 def test_a_translation_with_a_wrong_placeholder_leaves_the_english_sentence():
     messages.install(lambda sentence: "{wrong} mm")
     try:

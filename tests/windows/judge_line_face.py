@@ -13,7 +13,7 @@ def console(opened):
     console.type("1\r")
     console.rest(0.5)
     console.type("3\r")
-    console.see("No row is open.")
+    console.see("All rows are confirmed.")
     return console
 
 

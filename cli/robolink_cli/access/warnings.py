@@ -141,7 +141,7 @@ def _unfinished(marker: "Marker", url: str, now: str) -> str:
         remedy = tr('Next: robolink -c "{url}" recover', url=url)
     else:
         remedy = tr(
-            "This puts tool {tool} back, with the power mode and speed of then: "
+            "This puts tool {tool} back, with the earlier power mode and speed: "
             'robolink -c "{url}" recover',
             url=url,
             tool=before,

@@ -10,7 +10,7 @@ import click
 
 from robolink import __version__
 from robolink.errors import ConfigError
-from robolink.messages import declared, tr
+from robolink.messages import declared, joined, tr
 from robolink_cli.console.render import note
 
 if TYPE_CHECKING:
@@ -230,5 +230,5 @@ def _ending(error: BaseException | None, tool: int) -> str:
     look = tr("'robolink tool get {tool}' shows what tool {tool} holds.", tool=tool)
     if isinstance(error, OutcomeUnknownError) or not isinstance(error, RobolinkError):
         said = error if isinstance(error, RobolinkError) else tr("It was interrupted.")
-        return f"{said} {look}"
+        return joined(" ", (str(said), look))
     return str(error)

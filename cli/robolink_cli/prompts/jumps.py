@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
 import click
 
 from robolink.errors import DeclinedError
-from robolink.messages import declared, tr
+from robolink.messages import declared, joined, tr
 from robolink_cli.console.render import json_is_on
 from robolink_cli.prompts.questions import asked, on_terminal
 
@@ -153,4 +153,4 @@ def _figure(tool: int, jump: "Jump", allowed: Allowed) -> str:
                 limit=allowed.angle_deg,
             )
         )
-    return " ".join(sentences)
+    return joined(" ", sentences)

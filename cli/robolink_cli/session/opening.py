@@ -10,7 +10,7 @@ import click
 import robolink
 from robolink.errors import ConfigError, ControllerError, RobolinkError
 from robolink.interrupts import EndedBy, ended_by
-from robolink.messages import tr
+from robolink.messages import joined, tr
 from robolink.standing import UNTOUCHED, Standing, note_standing, standing_after
 from robolink_cli.access.cell import (
     require_expected_robot,
@@ -152,7 +152,7 @@ def _saying_what_is_left(
         note_unsettled(controller, [m for m in left if m.operation not in known], named)
         if trouble is not None:
             # After the work: nothing that the journal has to say stands before it.
-            note(f"{trouble.what} {_unrecorded()}")
+            note(joined(" ", (trouble.what, _unrecorded())))
 
 
 def _record_for_nobody(controller: "Controller") -> None:

@@ -2,7 +2,7 @@
 
 from robolink.backup import ToolState, read_tools
 from robolink.errors import ConfigError, NotReadyError
-from robolink.messages import tr
+from robolink.messages import joined, tr
 from robolink.model import Controller
 from robolink_cli.access.capabilities import require_epson
 
@@ -24,7 +24,7 @@ def find_tools(controller: Controller, *, published: bool) -> ToolState:
             return read_tools(controller)
         except NotReadyError as error:
             hint = tr("With the companion program in the project, --published works now too.")
-            error.remedy = " ".join((error.remedy, hint))
+            error.remedy = joined(" ", (error.remedy, hint))
             raise
     found = require_epson(controller, tr("published tools")).published_tools()
     if found is None:

@@ -3,10 +3,11 @@
 from contextlib import suppress
 
 from robolink.errors import JournalError, LeaseHeldError, RobolinkError
-from robolink.messages import tr
+from robolink.messages import joined, tr
 from robolink.stopping import leave_note
 from robolink.transport import parse_url
 from robolink_cli.access.only_cell import which_cell
+from robolink_cli.console.machine_words import state_word
 from robolink_cli.stopping.request import StopRequest
 from robolink_cli.stopping.stop_first import StopOutcome, is_beside_another, who_asks
 
@@ -37,7 +38,7 @@ class Telling:
     def sentence(self) -> str:
         """Return what a person is told of a stop that ended well."""
         outcome = self._outcome
-        named, state = _shown(outcome.url), outcome.state
+        named, state = _shown(outcome.url), state_word(outcome.state)
         if outcome.holder:
             return tr(
                 "{controller} stands still; its state is: {state}. {holder} was working on "
@@ -89,7 +90,7 @@ class Telling:
         try:
             log.look()
         except LeaseHeldError as held:
-            error.what = f"{error.what} {held.what}"
+            error.what = joined(" ", (error.what, held.what))
             error.remedy = tr(
                 "The stop is not confirmed: press the emergency stop, or stop it at that "
                 "computer, which alone can."

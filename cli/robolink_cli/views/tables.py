@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from robolink.messages import tr
 from robolink.model import of_no_tool
+from robolink_cli.console.machine_words import hand_words, power_words, state_word
 from robolink_cli.console.render import say, table
 from robolink_cli.views.documents import number, offset_cells
 
@@ -15,18 +16,18 @@ _SAID = ("controller", "state", "code", "text")
 
 def show_status(payload: Mapping[str, object]) -> None:
     """Print the state in words, then the flags that are on, then what else is known."""
-    say(f"{payload['controller']}: {payload['state']}")
+    say(f"{payload['controller']}: {state_word(payload['state'])}")
     if payload["code"]:
         text = payload.get("text", "")
         say(tr("  code {code:04d} {text}", code=payload["code"], text=text).rstrip())
     on = [key for key, value in payload.items() if value is True and key != "motors_on"]
-    say(tr("  flags: {flags}", flags=", ".join(on).replace("_", " ") or tr("none")))
+    say(tr("  flags: {flags}", flags=", ".join(map(state_word, on)) or tr("none")))
     if "power" in payload:
         _show_epson(payload)
         return
     for key in [name for name in payload if name not in _SAID]:
         if payload[key] not in (None, "") and not isinstance(payload[key], bool):
-            say(f"  {key.replace('_', ' ')}: {payload[key]}")
+            say(f"  {state_word(key)}: {payload[key]}")
 
 
 def _show_epson(payload: Mapping[str, object]) -> None:
@@ -37,10 +38,10 @@ def _show_epson(payload: Mapping[str, object]) -> None:
     if payload["selected_tool"] is not None:
         say(
             tr(
-                "  tool {tool} selected; motors {motors}, power {power}",
+                "  tool {tool} selected; motors {motors}, {power}",
                 tool=payload["selected_tool"],
                 motors=tr("on") if payload["motors_on"] else tr("off"),
-                power=payload["power"],
+                power=power_words(payload["power"]),
             )
         )
     elif payload["published_selected_tool"] is not None:
@@ -67,7 +68,13 @@ def show_pose(payload: Mapping[str, object]) -> None:
     elif payload["hand"] is None:
         title = tr("tool {tool}", tool=payload["tool"])
     else:
-        title = tr("tool {tool} in local {local}, hand {hand}", **payload)
+        hand = hand_words(payload["hand"])
+        title = tr(
+            "tool {tool} in local {local}, {hand}",
+            tool=payload["tool"],
+            local=payload["local"],
+            hand=hand,
+        )
     table(title, AXES, [offset_cells(payload)])
     joints, axes = payload.get("joints"), payload.get("axes")
     if isinstance(joints, Sequence):

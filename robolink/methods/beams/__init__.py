@@ -10,7 +10,7 @@ from robolink.methods.declaration.site import Site
 from robolink.stations import StationKind
 
 if TYPE_CHECKING:
-    from robolink.procedures import TipSource
+    from robolink.procedures import KeptProof, TipSource
 
 
 def _source(parameters: BeamsParameters, site: Site) -> "TipSource":
@@ -25,6 +25,12 @@ def _source(parameters: BeamsParameters, site: Site) -> "TipSource":
         )
         station = replace(stated, z_mm=parameters.z_mm)
     return BeamsSource(beam_station(station), parameters, sigma_mm=site.sigma_mm)
+
+
+def _proof() -> "type[KeptProof]":
+    from robolink.methods.beams.proof import CrossingTest
+
+    return CrossingTest
 
 
 METHOD = Method(
@@ -42,4 +48,5 @@ METHOD = Method(
     needs=Needs(station=StationKind.BEAMS),
     source=_source,
     unmeasured_z=declared('cannot be "measured" with beams; write "typed" or "kept"'),
+    proof=_proof,
 )

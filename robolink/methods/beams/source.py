@@ -1,14 +1,18 @@
 """Two crossed light beams in the cell; nobody has to touch anything."""
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
-from robolink.calibration import CalibrationResult, VerifyResult, seen_from, tip_pose
+from robolink.calibration import CalibrationResult, tip_pose
 from robolink.messages import tr
 from robolink.methods.beams.parameters import BeamsParameters
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import InputSource, MeasurementContext
 from robolink.runner import Procedure
 from robolink.stations import BeamStation
+
+if TYPE_CHECKING:
+    from robolink.methods.beams.proof import CrossingTest
 
 _HALF_A_TURN_DEG = 180.0
 
@@ -46,29 +50,32 @@ class BeamsSource(InputSource[BeamsParameters]):
 
         return measure_beams(self.station, plan, here=here, stored=stored, sigma_mm=self.sigma_mm)
 
-    def verify(
+    def proof(
         self,
-        context: MeasurementContext,
+        context: MeasurementContext,  # noqa: ARG002 - nothing of it is read
         tool: int,
         result: CalibrationResult,
         *,
         tip: ToolOffset,
         tolerance_mm: float,
-    ) -> VerifyResult:
-        """Cross again at another U; see :class:`~robolink.procedures.MovingSource`."""
+    ) -> "CrossingTest":
+        """Return the proof at another U; see :class:`~robolink.procedures.KeepsProof`."""
         from robolink.calibration import toward_zero
-        from robolink.methods.beams.procedure import verify_by_crossing  # numpy
+        from robolink.methods.beams.proof import CrossingTest  # numpy
 
-        context.controller.tools.select(tool)
         # Half a turn on shows an error twofold; where that was measured already, half of it.
         turn_deg = self.plan.turn_deg / 2 if self.plan.turn_deg else _HALF_A_TURN_DEG
         measured_deg = tip_pose(result.inputs[-1], result.offset, tool=tool).u_deg
-        procedure = verify_by_crossing(
-            self.station,
-            self.plan,
-            here=context.controller.groups[0].pose(),
-            angles_deg=(toward_zero(measured_deg, turn_deg),),
+        station = self.station
+        return CrossingTest(
+            tool=tool,
+            written=result.offset,
+            tip=tip,
             tolerance_mm=tolerance_mm,
-            aside=seen_from(result.offset, tip),
+            beams=station.beams,
+            z_mm=station.z_mm,
+            inputs=station.inputs,
+            off_when_broken=station.off_when_broken,
+            plan=self.plan,
+            angles_deg=(toward_zero(measured_deg, turn_deg),),
         )
-        return context.run(procedure, tip=result.offset)

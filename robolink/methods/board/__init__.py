@@ -10,7 +10,7 @@ from robolink.methods.declaration.site import Site
 from robolink.stations import StationKind
 
 if TYPE_CHECKING:
-    from robolink.procedures import TipSource
+    from robolink.procedures import KeptProof, TipSource
 
 
 def _source(parameters: BoardParameters, site: Site) -> "TipSource":
@@ -22,6 +22,12 @@ def _source(parameters: BoardParameters, site: Site) -> "TipSource":
     return BoardSource(
         sensor, station, drawing, parameters.look, sigma_mm=site.sigma_mm, retake=parameters.retake
     )
+
+
+def _proof() -> "type[KeptProof]":
+    from robolink.methods.board.proof import BoardTest
+
+    return BoardTest
 
 
 METHOD = Method(
@@ -38,4 +44,5 @@ METHOD = Method(
     needs=Needs(station=StationKind.CAMERA, sensor=True, place=PLACE),
     source=_source,
     unmeasured_z=UNMEASURED_Z,
+    proof=_proof,
 )

@@ -1,8 +1,9 @@
 """A board that the gripper holds, seen by an up-looking camera whose pixels are known."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
-from robolink.calibration import BoardDrawing, CalibrationResult, VerifyResult, seen_from, tip_pose
+from robolink.calibration import BoardDrawing, CalibrationResult
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import (
@@ -10,12 +11,14 @@ from robolink.procedures import (
     CalibratedCameraSource,
     LookPlan,
     MeasurementContext,
-    angles_between,
-    calibrated_camera,
     camera_error_of,
+    proof_angles,
 )
 from robolink.runner import Procedure
 from robolink.sensing import sensor_name
+
+if TYPE_CHECKING:
+    from robolink.methods.board.proof import BoardTest
 
 _TWO_ANGLES = LookPlan(turns_deg=TWO_ANGLES_DEG)
 
@@ -66,31 +69,28 @@ class BoardSource(CalibratedCameraSource):
             retake=self.retake,
         )
 
-    def verify(
+    def proof(
         self,
-        context: MeasurementContext,
+        context: MeasurementContext,  # noqa: ARG002 - nothing of it is read
         tool: int,
         result: CalibrationResult,
         *,
         tip: ToolOffset,
         tolerance_mm: float,
-    ) -> VerifyResult:
-        """Look again at other angles; see :class:`~robolink.procedures.MovingSource`."""
-        from robolink.methods.board.procedure import verify_board  # numpy
+    ) -> "BoardTest":
+        """Return the proof at other angles; see :class:`~robolink.procedures.KeepsProof`."""
+        from robolink.methods.board.proof import BoardTest  # numpy
 
-        # The tool's own U turned with the board, so the joint stands where it stood.
-        measured_deg = [tip_pose(pose, result.offset, tool=tool).u_deg for pose in result.inputs]
-        turned = replace(seen_from(result.offset, tip), u_deg=tip.u_deg - result.offset.u_deg)
-        with calibrated_camera(self.sensor, self.station) as camera:
-            context.controller.tools.select(tool)
-            procedure = verify_board(
-                self.station,
-                self.plan,
-                self.board,
-                here=context.controller.groups[0].pose(),
-                angles_deg=angles_between(measured_deg),
-                tolerance_mm=tolerance_mm,
-                camera_error_mm=camera_error_of(result),
-                aside=turned,
-            )
-            return context.run(procedure, tip=result.offset, camera=camera)
+        return BoardTest(
+            tool=tool,
+            written=result.offset,
+            tip=tip,
+            tolerance_mm=tolerance_mm,
+            sensor=self.sensor,
+            station=self.station,
+            plan=self.plan,
+            # The tool's own U turned with the board, so the joint stands where it stood.
+            angles_deg=proof_angles(result, tool),
+            camera_error_mm=camera_error_of(result),
+            board=self.board,
+        )

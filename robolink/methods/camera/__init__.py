@@ -10,7 +10,7 @@ from robolink.methods.declaration.site import Site
 from robolink.stations import StationKind
 
 if TYPE_CHECKING:
-    from robolink.procedures import TipSource
+    from robolink.procedures import KeptProof, TipSource
 
 
 def _source(parameters: CameraParameters, site: Site) -> "TipSource":
@@ -20,6 +20,12 @@ def _source(parameters: CameraParameters, site: Site) -> "TipSource":
     return CameraSource(
         sensor, station, parameters.look, sigma_mm=site.sigma_mm, retake=parameters.retake
     )
+
+
+def _proof() -> "type[KeptProof]":
+    from robolink.methods.camera.proof import LookTest
+
+    return LookTest
 
 
 METHOD = Method(
@@ -36,4 +42,5 @@ METHOD = Method(
     needs=Needs(station=StationKind.CAMERA, sensor=True, place=PLACE),
     source=_source,
     unmeasured_z=UNMEASURED_Z,
+    proof=_proof,
 )

@@ -1,20 +1,23 @@
 """An up-looking camera in the cell whose pixels are known; nobody has to touch anything."""
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
-from robolink.calibration import CalibrationResult, VerifyResult, seen_from, tip_pose
+from robolink.calibration import CalibrationResult
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import (
     CalibratedCameraSource,
     LookPlan,
     MeasurementContext,
-    angles_between,
-    calibrated_camera,
     camera_error_of,
+    proof_angles,
 )
 from robolink.runner import Procedure
 from robolink.sensing import sensor_name
+
+if TYPE_CHECKING:
+    from robolink.methods.camera.proof import LookTest
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,28 +66,26 @@ class CameraSource(CalibratedCameraSource):
             retake=self.retake,
         )
 
-    def verify(
+    def proof(
         self,
-        context: MeasurementContext,
+        context: MeasurementContext,  # noqa: ARG002 - nothing of it is read
         tool: int,
         result: CalibrationResult,
         *,
         tip: ToolOffset,
         tolerance_mm: float,
-    ) -> VerifyResult:
-        """Look again at other angles; see :class:`~robolink.procedures.MovingSource`."""
-        from robolink.procedures import verify_by_looking  # numpy
+    ) -> "LookTest":
+        """Return the proof at other angles; see :class:`~robolink.procedures.KeepsProof`."""
+        from robolink.methods.camera.proof import LookTest  # numpy
 
-        measured_deg = [tip_pose(pose, result.offset, tool=tool).u_deg for pose in result.inputs]
-        with calibrated_camera(self.sensor, self.station) as camera:
-            context.controller.tools.select(tool)
-            procedure = verify_by_looking(
-                self.station,
-                self.plan,
-                here=context.controller.groups[0].pose(),
-                angles_deg=angles_between(measured_deg),
-                tolerance_mm=tolerance_mm,
-                camera_error_mm=camera_error_of(result),
-                aside=seen_from(result.offset, tip),
-            )
-            return context.run(procedure, tip=result.offset, camera=camera)
+        return LookTest(
+            tool=tool,
+            written=result.offset,
+            tip=tip,
+            tolerance_mm=tolerance_mm,
+            sensor=self.sensor,
+            station=self.station,
+            plan=self.plan,
+            angles_deg=proof_angles(result, tool),
+            camera_error_mm=camera_error_of(result),
+        )

@@ -1,25 +1,23 @@
 """An up-looking camera whose place and scale are unknown: found together with the tip."""
 
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
-from robolink.calibration import (
-    CalibrationResult,
-    VerifyResult,
-    offset_sigma_mm,
-    seen_from,
-    tip_pose,
-)
+from robolink.calibration import CalibrationResult, offset_sigma_mm
 from robolink.messages import tr
 from robolink.methods.camera_affine.parameters import CameraAffineParameters
 from robolink.model import Pose, TipSensor, ToolOffset
-from robolink.procedures import MeasurementContext, angles_between, pixel_camera
+from robolink.procedures import MeasurementContext, ProvesAgain, pixel_camera, proof_angles
 from robolink.runner import Procedure
 from robolink.sensing import sensor_name
 from robolink.stations import CameraStation, Found, StationKind
 
+if TYPE_CHECKING:
+    from robolink.methods.camera.proof import LookTest
+
 
 @dataclass(frozen=True, slots=True)
-class CameraAffineSource:
+class CameraAffineSource(ProvesAgain):
     """Measures X and Y of a tip, and the camera that sees it, in one pattern of looks.
 
     Attributes:
@@ -109,30 +107,32 @@ class CameraAffineSource:
             sigma_mm=self.sigma_mm,
         )
 
-    def verify(
+    def proof(
         self,
-        context: MeasurementContext,
+        context: MeasurementContext,  # noqa: ARG002 - nothing of it is read
         tool: int,
         result: CalibrationResult,
         *,
         tip: ToolOffset,
         tolerance_mm: float,
-    ) -> VerifyResult:
-        """Look again at other angles; see :class:`~robolink.procedures.MovingSource`."""
+    ) -> "LookTest":
+        """Return the proof at other angles; see :class:`~robolink.procedures.KeepsProof`.
+
+        Raises:
+            TypeError: The result is not that of a camera that was found.
+        """
         from robolink.calibration import CameraCalibration
-        from robolink.procedures import verify_by_looking  # numpy
+        from robolink.methods.camera.proof import LookTest  # numpy
 
         if not isinstance(result, CameraCalibration):
             raise TypeError(f"no camera was found by {result.method}")
-        measured_deg = [tip_pose(pose, result.offset, tool=tool).u_deg for pose in result.inputs]
-        with pixel_camera(self.sensor) as camera:
-            context.controller.tools.select(tool)
-            procedure = verify_by_looking(
-                replace(self.station, model=result.camera),
-                self.plan.look,
-                here=context.controller.groups[0].pose(),
-                angles_deg=angles_between(measured_deg),
-                tolerance_mm=tolerance_mm,
-                aside=seen_from(result.offset, tip),
-            )
-            return context.run(procedure, tip=result.offset, camera=camera)
+        return LookTest(
+            tool=tool,
+            written=result.offset,
+            tip=tip,
+            tolerance_mm=tolerance_mm,
+            sensor=self.sensor,
+            station=replace(self.station, model=result.camera),
+            plan=self.plan.look,
+            angles_deg=proof_angles(result, tool),
+        )

@@ -16,7 +16,7 @@ from robolink.stations import StationKind
 
 if TYPE_CHECKING:
     from robolink.methods.declaration.site import Site
-    from robolink.procedures import PoseMethod, TipSource
+    from robolink.procedures import KeptProof, PoseMethod, TipSource
 
 
 @dataclass(frozen=True, slots=True)
@@ -242,6 +242,8 @@ class Method(Generic[P]):
         by_reference: Whether basis "difference" compares with a reference that a run records.
         unmeasured_z: Why ``z = "measured"`` is refused, empty where Z can be measured.
         formerly: How recipes named it before.
+        proof: Returns the type of its proof, a frozen dataclass, so that one which a change left
+            open can be read back; ``None`` where it has none of its own.
     """
 
     name: str
@@ -257,6 +259,7 @@ class Method(Generic[P]):
     by_reference: bool = True
     unmeasured_z: str = ""
     formerly: tuple[Former, ...] = ()
+    proof: "Callable[[], type[KeptProof]] | None" = None
 
     @property
     def only_z(self) -> bool:

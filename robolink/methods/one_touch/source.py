@@ -3,13 +3,14 @@
 from dataclasses import dataclass, field, replace
 from typing import Self
 
-from robolink.calibration import CalibrationResult, VerifyResult, tip_pose
+from robolink.calibration import CalibrationResult, tip_pose
 from robolink.messages import tr
 from robolink.methods.one_touch.procedure import measure_one_touch
 from robolink.methods.one_touch.solvers import Absolute, Difference
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import (
     MeasurementContext,
+    ProvesAgain,
     TouchPlan,
     TurnTest,
     contact_pose,
@@ -21,7 +22,7 @@ HALF_A_TURN_DEG = 180.0
 
 
 @dataclass(frozen=True, slots=True)
-class OneTouchSource:
+class OneTouchSource(ProvesAgain):
     """Measures X, Y and Z by one touch of a pin whose place is known.
 
     Attributes:
@@ -96,24 +97,16 @@ class OneTouchSource:
             solve=lambda touch: self.solver.solve([touch], stored),
         )
 
-    def verify(
+    def proof(
         self,
-        context: MeasurementContext,
+        context: MeasurementContext,  # noqa: ARG002 - nothing of it is read
         tool: int,
         result: CalibrationResult,
         *,
         tip: ToolOffset,
         tolerance_mm: float,
-    ) -> VerifyResult:
-        """Turn half a turn about the new tip; see :class:`~robolink.procedures.MovingSource`."""
-        context.controller.tools.select(tool)
-        test = self.turn_test(tool, result, tip=tip, tolerance_mm=tolerance_mm)
-        return context.run(test.steps(), tip=result.offset)
-
-    def turn_test(
-        self, tool: int, result: CalibrationResult, *, tip: ToolOffset, tolerance_mm: float
     ) -> TurnTest:
-        """Return the test of what was measured; see :class:`~robolink.procedures.TurnsAboutPin`."""
+        """Return the test by half a turn; see :class:`~robolink.procedures.KeepsProof`."""
         from robolink.calibration import toward_zero  # numpy, which a look does without
 
         measured_deg = tip_pose(result.inputs[-1], result.offset, tool=tool).u_deg

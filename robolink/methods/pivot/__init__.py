@@ -9,7 +9,7 @@ from robolink.methods.pivot.parameters import PivotParameters
 from robolink.stations import StationKind
 
 if TYPE_CHECKING:
-    from robolink.procedures import PoseMethod, TipSource
+    from robolink.procedures import KeptProof, PoseMethod, TipSource
 
 
 def _source(parameters: PivotParameters, site: Site) -> "TipSource":
@@ -29,6 +29,12 @@ def _from_poses(_parameters: PivotParameters, site: Site) -> "PoseMethod":
     from robolink.methods.pivot.source import PivotTouches
 
     return PivotTouches(site.sigma_mm)
+
+
+def _proof() -> "type[KeptProof]":
+    from robolink.methods.pivot.proof import TiltTest
+
+    return TiltTest
 
 
 METHOD = Method(
@@ -54,4 +60,5 @@ METHOD = Method(
         typed=declared("A pose X,Y,Z,U,V,W in mm and degrees; give it three times or more."),
         path=declared("A file of poses that state X to W."),
     ),
+    proof=_proof,
 )

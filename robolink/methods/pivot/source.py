@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar, Final
 
-from robolink.calibration import CalibrationResult, VerifyResult, tilted_from
+from robolink.calibration import CalibrationResult
 from robolink.errors import CalibrationError, ConfigError
 from robolink.messages import tr
 from robolink.model import Controller, Pose, ToolOffset
@@ -19,6 +19,7 @@ from robolink.procedures import (
 from robolink.runner import Procedure, TouchedAt
 
 if TYPE_CHECKING:
+    from robolink.methods.pivot.proof import TiltTest
     from robolink.methods.pivot.tilts import Tilt
 
 _LEAST_AXES: Final = 5
@@ -56,35 +57,31 @@ class PivotSource(PinSource):
             tilt=self._tilt_deg,
         )
 
-    def verify(
+    def proof(
         self,
-        context: MeasurementContext,
+        context: MeasurementContext,  # noqa: ARG002 - nothing of it is read
         tool: int,
         result: CalibrationResult,
         *,
         tip: ToolOffset,
         tolerance_mm: float,
-    ) -> VerifyResult:
-        """Tilt about the new tip; see :class:`~robolink.procedures.MovingSource`."""
-        from robolink.methods.pivot.procedure import verify_by_tilting  # numpy
-        from robolink.methods.pivot.tilts import OverPin, proving_tilts
+    ) -> "TiltTest":
+        """Return the tilt test; see :class:`~robolink.procedures.KeepsProof`."""
+        from robolink.methods.pivot.proof import TiltTest  # numpy
+        from robolink.procedures.pin.tilting_proof import upright_of
 
-        context.controller.tools.select(tool)
         x_mm, y_mm, z_mm = result.reference_point_mm
-        over = OverPin(
-            context.controller.groups[0].pose(),
-            (x_mm, y_mm, z_mm),
-            tip=tilted_from(result.offset, tip),
-            frame=result.offset,
-        )
-        procedure = verify_by_tilting(
-            self.touch,
-            over=over,
-            tilts=proving_tilts(self._tilt_deg),
+        return TiltTest(
+            tool=tool,
+            written=result.offset,
+            tip=tip,
             tolerance_mm=tolerance_mm,
+            touch=self.touch,
+            pin_mm=(x_mm, y_mm, z_mm),
+            tilt_deg=self._tilt_deg,
             u_mm=drift_uncertainty_mm(self.touch, result),
+            upright=upright_of(result, result.offset, tool),
         )
-        return context.run(procedure, tip=result.offset)
 
     @property
     def adds_touch(self) -> bool:

@@ -9,7 +9,7 @@ from robolink.methods.plane_touch.parameters import PlaneTouchParameters
 from robolink.stations import StationKind
 
 if TYPE_CHECKING:
-    from robolink.procedures import PoseMethod, TipSource
+    from robolink.procedures import KeptProof, PoseMethod, TipSource
 
 
 def _source(parameters: PlaneTouchParameters, site: Site) -> "TipSource":
@@ -30,6 +30,12 @@ def _from_poses(_parameters: PlaneTouchParameters, site: Site) -> "PoseMethod":
     from robolink.methods.plane_touch.source import PlaneTouches
 
     return PlaneTouches(site.sigma_mm)
+
+
+def _proof() -> "type[KeptProof]":
+    from robolink.methods.plane_touch.proof import PlaneTest
+
+    return PlaneTest
 
 
 METHOD = Method(
@@ -55,4 +61,5 @@ METHOD = Method(
         typed=declared("A pose X,Y,Z,U,V,W in mm and degrees; give it seven times or more."),
         path=declared("A file of poses that state X to W."),
     ),
+    proof=_proof,
 )

@@ -2,9 +2,9 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
-from robolink.calibration import CalibrationResult, VerifyResult, tilted_from
+from robolink.calibration import CalibrationResult
 from robolink.messages import tr
 from robolink.methods.pivot.source import require_known_tip
 from robolink.methods.plane_touch.survey import PlaneSurvey
@@ -18,6 +18,9 @@ from robolink.procedures import (
     drift_uncertainty_mm,
 )
 from robolink.runner import Procedure, TouchedAt
+
+if TYPE_CHECKING:
+    from robolink.methods.plane_touch.proof import PlaneTest
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,30 +56,38 @@ class PlaneTouchSource(TouchSource):
         """What to do when a measurement makes the tip jump."""
         return tr("Check that all touches were on the same flat surface, and that it is fixed.")
 
-    def verify(
+    def proof(
         self,
-        context: MeasurementContext,
+        context: MeasurementContext,  # noqa: ARG002 - nothing of it is read
         tool: int,
         result: CalibrationResult,
         *,
         tip: ToolOffset,
         tolerance_mm: float,
-    ) -> VerifyResult:
-        """Touch the plane in other tilts; see :class:`~robolink.procedures.MovingSource`."""
-        from robolink.methods.plane_touch.proof import verify_on_plane  # numpy
+    ) -> "PlaneTest":
+        """Return the proof in other tilts; see :class:`~robolink.procedures.KeepsProof`.
 
-        context.controller.tools.select(tool)
-        procedure = verify_on_plane(
-            self.touch,
-            result,
-            here=context.controller.groups[0].pose(),
-            tip=tilted_from(result.offset, tip),
+        Raises:
+            TypeError: The result is not that of a plane.
+        """
+        from robolink.calibration import PlaneTouchResult
+        from robolink.methods.plane_touch.proof import PlaneTest  # numpy
+        from robolink.procedures.pin.tilting_proof import upright_of
+
+        if not isinstance(result, PlaneTouchResult):
+            raise TypeError("the plane that was touched is a part of the result")
+        return PlaneTest(
+            tool=tool,
+            written=result.offset,
+            tip=tip,
+            tolerance_mm=tolerance_mm,
+            touch=self.touch,
+            plane=result.plane,
             tilt_deg=self.survey.tilt_deg,
             axes=self.axes,
-            tolerance_mm=tolerance_mm,
             u_mm=drift_uncertainty_mm(self.touch, result),
+            upright=upright_of(result, result.offset, tool),
         )
-        return context.run(procedure, tip=result.offset)
 
     def _steps(self, stored: ToolOffset | None, *, live: bool) -> Procedure[CalibrationResult]:
         """Return the steps.

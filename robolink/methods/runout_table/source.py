@@ -1,14 +1,18 @@
 """An up-looking camera that sees a tip all round, for the constant offset and what it leaves."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
 
-from robolink.calibration import CalibrationResult, VerifyResult
+from robolink.calibration import CalibrationResult
 from robolink.messages import tr
 from robolink.methods.camera.source import CameraSource
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import MeasurementContext
 from robolink.runner import Procedure
 from robolink.sensing import sensor_name
+
+if TYPE_CHECKING:
+    from robolink.methods.camera.proof import LookTest
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +41,7 @@ class RunoutTableSource(CameraSource):
             retake=self.retake,
         )
 
-    def verify(
+    def proof(
         self,
         context: MeasurementContext,
         tool: int,
@@ -45,17 +49,14 @@ class RunoutTableSource(CameraSource):
         *,
         tip: ToolOffset,
         tolerance_mm: float,
-    ) -> VerifyResult:
-        """Look again at other angles, where the tip has to be where the table says."""
+    ) -> "LookTest":
+        """Return the proof at other angles, where the tip has to be where the table says."""
         from robolink.calibration import RunoutTableResult  # numpy
+        from robolink.methods.runout_table.proof import WobbleTest
 
         # "slots" makes the class anew, so the short form of super() would not find it.
-        seen = CameraSource.verify(self, context, tool, result, tip=tip, tolerance_mm=tolerance_mm)
+        looks = CameraSource.proof(self, context, tool, result, tip=tip, tolerance_mm=tolerance_mm)
         if not isinstance(result, RunoutTableResult):
-            return seen
-        drifts = []
-        for drift in seen.drifts:
-            # The table counts U of the flange, the proof that of the new tool.
-            dx_mm, dy_mm = result.table.at(drift.u_deg - result.offset.u_deg)
-            drifts.append(replace(drift, dx_mm=drift.dx_mm - dx_mm, dy_mm=drift.dy_mm - dy_mm))
-        return replace(seen, drifts=tuple(drifts))
+            return looks
+        plain = {field.name: getattr(looks, field.name) for field in fields(looks)}
+        return WobbleTest(**plain, table=result.table)

@@ -9,7 +9,7 @@ from robolink.methods.sphere_touch.parameters import SphereTouchParameters
 from robolink.stations import StationKind
 
 if TYPE_CHECKING:
-    from robolink.procedures import PoseMethod, TipSource
+    from robolink.procedures import KeptProof, PoseMethod, TipSource
 
 
 def _source(parameters: SphereTouchParameters, site: Site) -> "TipSource":
@@ -30,6 +30,12 @@ def _from_poses(_parameters: SphereTouchParameters, site: Site) -> "PoseMethod":
     from robolink.methods.sphere_touch.source import SphereTouches
 
     return SphereTouches(site.sigma_mm)
+
+
+def _proof() -> "type[KeptProof]":
+    from robolink.methods.sphere_touch.proof import SphereTest
+
+    return SphereTest
 
 
 METHOD = Method(
@@ -57,4 +63,5 @@ METHOD = Method(
         typed=declared("A pose X,Y,Z,U,V,W in mm and degrees; give it eight times or more."),
         path=declared("A file of poses that state X to W."),
     ),
+    proof=_proof,
 )

@@ -9,7 +9,7 @@ from robolink.methods.two_pose.parameters import TwoPoseParameters
 from robolink.stations import StationKind
 
 if TYPE_CHECKING:
-    from robolink.procedures import PoseMethod, TipSource
+    from robolink.procedures import KeptProof, PoseMethod, TipSource
 
 
 def _source(parameters: TwoPoseParameters, site: Site) -> "TipSource":
@@ -22,6 +22,12 @@ def _from_poses(_parameters: TwoPoseParameters, site: Site) -> "PoseMethod":
     from robolink.methods.two_pose.source import TwoTouches
 
     return TwoTouches(site.sigma_mm)
+
+
+def _proof() -> "type[KeptProof]":
+    from robolink.procedures import TurnTest
+
+    return TurnTest
 
 
 METHOD = Method(
@@ -47,4 +53,5 @@ METHOD = Method(
     ),
     tells_height=True,
     formerly=(Former(kind="operator", method="two_pose", usual=True),),
+    proof=_proof,
 )

@@ -9,7 +9,7 @@ from robolink.methods.z_touch.parameters import ZTouchParameters
 from robolink.stations import StationKind
 
 if TYPE_CHECKING:
-    from robolink.procedures import TipSource
+    from robolink.procedures import KeptProof, TipSource
 
 
 def _source(parameters: ZTouchParameters, site: Site) -> "TipSource":
@@ -21,6 +21,12 @@ def _source(parameters: ZTouchParameters, site: Site) -> "TipSource":
         input=parameters.input, off_when_touched=parameters.off_when_touched if stated else None
     )
     return ZTouchSource(touch_station(station), parameters, sigma_mm=site.sigma_mm)
+
+
+def _proof() -> "type[KeptProof]":
+    from robolink.methods.z_touch.proof import ProbeTest
+
+    return ProbeTest
 
 
 METHOD = Method(
@@ -44,4 +50,5 @@ METHOD = Method(
     source=_source,
     tells_height=True,
     formerly=(Former(kind="touch"),),
+    proof=_proof,
 )

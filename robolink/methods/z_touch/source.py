@@ -1,18 +1,18 @@
 """A surface in the cell that switches an input when a tip touches it."""
 
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
-from robolink.calibration import (
-    CalibrationResult,
-    VerifyResult,
-    seen_from,
-)
+from robolink.calibration import CalibrationResult, tip_pose
 from robolink.messages import tr
 from robolink.methods.z_touch.parameters import ZTouchParameters
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import InputSource, MeasurementContext
 from robolink.runner import Procedure
 from robolink.stations import TouchStation
+
+if TYPE_CHECKING:
+    from robolink.methods.z_touch.proof import ProbeTest
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +62,7 @@ class ZTouchSource(InputSource[ZTouchParameters]):
             deceleration_mm_s2=self.deceleration_mm_s2,
         )
 
-    def verify(
+    def proof(
         self,
         context: MeasurementContext,
         tool: int,
@@ -70,23 +70,24 @@ class ZTouchSource(InputSource[ZTouchParameters]):
         *,
         tip: ToolOffset,
         tolerance_mm: float,
-    ) -> VerifyResult:
-        """Touch again at another U; see :class:`~robolink.procedures.MovingSource`."""
+    ) -> "ProbeTest":
+        """Return the proof at another U; see :class:`~robolink.procedures.KeepsProof`."""
         from robolink.calibration import toward_zero
-        from robolink.methods.z_touch.procedure import verify_by_touching  # numpy
+        from robolink.methods.z_touch.proof import ProbeTest  # numpy
 
-        context.controller.tools.select(tool)
-        here = context.controller.groups[0].pose()
-        procedure = verify_by_touching(
-            self.station,
-            self.plan,
-            here=here,
-            angles_deg=(toward_zero(here.u_deg, self.plan.proof_turn_deg),),
+        here = context.stands or context.controller.groups[0].pose()
+        # After a measurement that is the flange; else whatever is in force.
+        frame = here if here.tool == tool else tip_pose(here, result.offset, tool=tool)
+        return ProbeTest(
+            tool=tool,
+            written=result.offset,
+            tip=tip,
             tolerance_mm=tolerance_mm,
-            aside=seen_from(result.offset, tip),
+            station=self.station,
+            plan=self.plan,
+            angles_deg=(toward_zero(frame.u_deg, self.plan.proof_turn_deg),),
             deceleration_mm_s2=_told_braking(context),
         )
-        return context.run(procedure, tip=result.offset)
 
 
 def _told_braking(context: MeasurementContext) -> float | None:

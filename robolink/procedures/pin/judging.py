@@ -20,6 +20,7 @@ TOUCH_CODES: Final = (
     "still_moving",
     "old_reading",
     "turned_too_little",
+    "not_upright",
     "mixed_tool",
 )
 """Why touches do not count, in a measurement and in a proof."""

@@ -1,17 +1,18 @@
 """What every measurement has in common in which a person brings a tip into contact."""
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any, Protocol, Self, cast, runtime_checkable
 
-from robolink.calibration import CalibrationResult, VerifyResult, tip_pose
+from robolink.calibration import CalibrationResult, tip_pose
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
 from robolink.procedures.pin.proof import contact_pose, drift_uncertainty_mm
 from robolink.procedures.pin.touch_plan import TouchPlan
 from robolink.procedures.pin.turn_test import TurnTest
+from robolink.procedures.proving.kept_proof import ProvesAgain
 from robolink.procedures.source import MeasurementContext
 from robolink.runner import Procedure, TouchedAt
 
@@ -28,7 +29,7 @@ class TouchesPin(Protocol):
         """Return the same source with another plan of its touches."""
 
 
-class TouchSource(ABC):
+class TouchSource(ProvesAgain):
     """Measures by touches that a person makes.
 
     Attributes:
@@ -119,24 +120,16 @@ class ManualPinSource(PinSource):
 
     __slots__ = ()
 
-    def verify(
+    def proof(
         self,
-        context: MeasurementContext,
+        context: MeasurementContext,  # noqa: ARG002 - nothing of it is read
         tool: int,
         result: CalibrationResult,
         *,
         tip: ToolOffset,
         tolerance_mm: float,
-    ) -> VerifyResult:
-        """Turn about the new tip; see :class:`~robolink.procedures.MovingSource`."""
-        context.controller.tools.select(tool)
-        test = self.turn_test(tool, result, tip=tip, tolerance_mm=tolerance_mm)
-        return context.run(test.steps(), tip=result.offset)
-
-    def turn_test(
-        self, tool: int, result: CalibrationResult, *, tip: ToolOffset, tolerance_mm: float
     ) -> TurnTest:
-        """Return the test of what was measured; see :class:`~robolink.procedures.TurnsAboutPin`."""
+        """Return the turn test; see :class:`~robolink.procedures.KeepsProof`."""
         angles = [tip_pose(pose, result.offset, tool=tool).u_deg for pose in result.inputs]
         return TurnTest(
             tool=tool,

@@ -2,39 +2,50 @@
 
 import math
 from dataclasses import dataclass, replace
-from typing import Protocol, runtime_checkable
+from typing import ClassVar
 
-from robolink.calibration import CalibrationResult, Drift, VerifyResult
-from robolink.model import Pose, ToolOffset
+from robolink.calibration import Drift, VerifyResult
+from robolink.model import Pose
 from robolink.procedures.pin.proof import place_on_pin, verify_by_turning
 from robolink.procedures.pin.touch_plan import TouchPlan
 from robolink.procedures.pin.touches import PinTouches
+from robolink.procedures.proving.kept_proof import KeptProof
+from robolink.procedures.source import MeasurementContext
 from robolink.runner import Procedure
 
+_MOVES_PER_ANGLE = 3
+"""Over the pin, down beside it, off it again."""
 
-@dataclass(frozen=True, slots=True)
-class TurnTest:
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TurnTest(KeptProof):
     """All that a turn test at a pin needs; nothing of it is read from the robot.
 
     Attributes:
-        tool: Number of the tool that was written, and is in force in the test.
         touch: Lift, clearance, contact input.
         contact: Pose of the new tool's tip on the pin, as the measurement implies it.
         angles_deg: Tool angles U at which the tip is brought back onto the pin.
-        tolerance_mm: Largest drift that passes, with its guard band.
         u_mm: Standard uncertainty of the drift that one touch shows.
-        written: The offset that was written.
-        tip: Where the tip was found.
     """
 
-    tool: int
+    method: ClassVar[str] = "two-pose"
+
     touch: TouchPlan
     contact: Pose
     angles_deg: tuple[float, ...]
-    tolerance_mm: float
     u_mm: float
-    written: ToolOffset
-    tip: ToolOffset
+
+    def moves(self, here: Pose) -> int:  # noqa: ARG002 - it begins where the person touches
+        """Return how many movements there are; see :meth:`KeptProof.moves`."""
+        return 1 + _MOVES_PER_ANGLE * len(self.angles_deg)
+
+    def prove(self, context: MeasurementContext) -> VerifyResult:
+        """Make it; see :meth:`KeptProof.prove`."""
+        return context.run(self.steps(), tip=self.written)
+
+    def prove_after_a_break(self, context: MeasurementContext) -> VerifyResult:
+        """Make it; see :meth:`KeptProof.prove_after_a_break`."""
+        return context.run(self.steps_after_a_break(), tip=self.written)
 
     def steps(self) -> Procedure[VerifyResult]:
         """Return the steps right after the measurement: the tip is lifted and over the pin.
@@ -72,32 +83,3 @@ class TurnTest:
         # The arm stands as the person left it; it is not to change its hand over the pin.
         contact = replace(self.contact, hand=first.hand, posture=first.posture)
         return (yield from replace(self, contact=contact).steps())
-
-
-@runtime_checkable
-class TurnsAboutPin(Protocol):
-    """A source whose proof is a turn test at a pin that a person touches."""
-
-    def turn_test(
-        self, tool: int, result: CalibrationResult, *, tip: ToolOffset, tolerance_mm: float
-    ) -> TurnTest:
-        """Return the test of what was measured.
-
-        Args:
-            tool: The tool that is written.
-            result: What was measured, with the offset that is written.
-            tip: Where the tip was found.
-            tolerance_mm: Largest drift that passes.
-
-        Example:
-            >>> from robolink.calibration import solve_two_pose
-            >>> from robolink.methods import TwoPoseSource
-            >>> from robolink.model import Pose, ToolOffset
-            >>> from robolink.testing import PaperCell
-            >>> touches = Pose(298, 99, -20, 0), Pose(322, 91, -20, 180)
-            >>> result = solve_two_pose(*touches, stored=ToolOffset(12, -3.5, -20))
-            >>> test = TwoPoseSource().turn_test(1, result, tip=result.offset, tolerance_mm=0.2)
-            >>> cell = PaperCell(Pose(310, 95, -30, 0), ToolOffset(0.1), (310, 95, -40))
-            >>> round(cell.run(test.steps()).max_drift_mm, 3)
-            0.1
-        """

@@ -32,6 +32,9 @@ _UNDECODABLE: Final = "backslashreplace"
 _MAX_CODE_DIGITS: Final = 5
 _MAX_CODE: Final = 99_999
 
+_SHORT: Final = 32
+"""Bytes of a request that is kept to be recognised."""
+
 _A_REQUEST: Final = rb"(\$(?:%s)(?=[,\r\n]))" % b"|".join(c.name.encode() for c in COMMANDS)
 _BEHIND_REQUEST: Final = re.compile(_A_REQUEST, re.IGNORECASE)
 _BEHIND_STATEMENT: Final = re.compile(rb'"' + _A_REQUEST, re.IGNORECASE)
@@ -69,6 +72,18 @@ def read_answer(line: bytes, encoding: str) -> Reply | Refusal:
 
 def read_request(line: bytes, encoding: str) -> Request | BadRequest:
     """Read what a host sends; what makes no sense becomes the refusal it deserves."""
+    if len(line) <= _SHORT and b"," not in line:
+        return _read_bare_request(line, encoding)
+    return _read_request(line, encoding)
+
+
+@lru_cache(maxsize=256)
+def _read_bare_request(line: bytes, encoding: str) -> Request | BadRequest:
+    """Read one without parameters, so without a password; polls are always the same few."""
+    return _read_request(line, encoding)
+
+
+def _read_request(line: bytes, encoding: str) -> Request | BadRequest:
     text = line.decode(encoding, _UNDECODABLE)
     if text[:1] != "$":
         return BadRequest(_echo(text), ErrorCode.NO_DOLLAR)
@@ -90,6 +105,8 @@ def next_request(data: bytes | bytearray, start: int) -> int:
     That is a ``$``, the name of a command, and what ends a name; a lone ``$`` ends names of
     strings. Behind an Execute it follows the closing quote, for a statement may print anything.
     """
+    if data.find(b"$", start) < 0:
+        return -1
     pattern = _BEHIND_STATEMENT if data[:9].lower() == b"$execute," else _BEHIND_REQUEST
     found = pattern.search(data, start)
     return -1 if found is None else found.start(1)
@@ -146,12 +163,7 @@ def write_reply(reply: Reply, encoding: str) -> bytes:
     if not (reply.name.isascii() and reply.name.isalnum()):
         raise _unsendable(reply, tr("its name is not made of ASCII letters and digits"))
     if reply.text is None:
-        payload = ",".join(reply.fields)
-        if not reply.fields or payload.count(",") != len(reply.fields) - 1:
-            raise _unsendable(reply, tr("it needs at least one field, and no comma in any"))
-        if payload.startswith(_QUOTE) or _breaks_line(payload):
-            raise _unsendable(reply, tr("a quote or a line end would be taken for a frame"))
-        return _encoded(reply, f"#{reply.name},{payload}", encoding)
+        return _write_fields(reply, encoding)
     if reply.fields:
         raise _unsendable(reply, tr("it has both fields and a text"))
     if '"\r' in reply.text or '"\n' in reply.text:
@@ -160,6 +172,17 @@ def write_reply(reply: Reply, encoding: str) -> bytes:
     if len(text) > _MAX_TEXT:
         raise _unsendable(reply, tr("its text is longer than {limit} bytes", limit=_MAX_TEXT))
     return b'#%s,"%s"' % (reply.name.encode("ascii"), text)
+
+
+@lru_cache(maxsize=256)
+def _write_fields(reply: Reply, encoding: str) -> bytes:
+    """Write one without a text; a poll is given the same few over and over."""
+    payload = ",".join(reply.fields)
+    if not reply.fields or payload.count(",") != len(reply.fields) - 1:
+        raise _unsendable(reply, tr("it needs at least one field, and no comma in any"))
+    if payload.startswith(_QUOTE) or _breaks_line(payload):
+        raise _unsendable(reply, tr("a quote or a line end would be taken for a frame"))
+    return _encoded(reply, f"#{reply.name},{payload}", encoding)
 
 
 def write_refusal(refusal: Refusal, encoding: str) -> bytes:

@@ -84,10 +84,11 @@ def status_fields(flags: StatusFlags, code: int, digits: Literal[10, 11] = 11) -
             tr("The status code {code} does not fit into four digits.", code=code),
             remedy=tr("Use 0 to 9999."),
         )
-    return _word(_in_order(flags))[-digits:], f"{code:04d}"
+    return _fields(flags, code, digits)
 
 
 @lru_cache(maxsize=512)
-def _word(in_order: tuple[bool, ...]) -> str:
-    """Return the flags as digits; a poll shows the same few over and over."""
-    return "".join("01"[flag] for flag in in_order)
+def _fields(flags: StatusFlags, code: int, digits: int) -> tuple[str, str]:
+    """Write flags and code; a poll shows the same few over and over."""
+    word = "".join("01"[flag] for flag in _in_order(flags))
+    return word[-digits:], f"{code:04d}"

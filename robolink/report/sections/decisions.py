@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from robolink.calibration import GUARD_FACTOR, DriftVerdict, VerifyResult
-from robolink.messages import declared, tr
+from robolink.messages import tr
 from robolink.report._values import Outcome, Report
 
 
@@ -14,14 +14,14 @@ class Proof:
 
     Attributes:
         result: What came of it.
-        verdict: That in a sentence, with places for the largest drift and the limit.
+        undecided: Whether it neither passed nor failed.
         rule: By which rule it was decided, one sentence.
         guarded: Whether a guard band was taken off the tolerance.
         heights: Whether the drift has a height.
     """
 
     result: VerifyResult
-    verdict: str
+    undecided: bool
     rule: str
     guarded: bool
     heights: bool
@@ -33,16 +33,12 @@ def proof(report: Report) -> Proof | None:
     if result is None:
         return None
     guarded = any(drift.u_mm for drift in result.drifts)
-    if result.passed:
-        verdict = declared("Passed: {drift} mm off at most, limit {limit} mm.")
-    elif result.verdict is DriftVerdict.UNDECIDED:
-        verdict = declared(
-            "Not decided, which does not pass: {drift} mm off at most, limit {limit} mm."
-        )
-    else:
-        verdict = declared("Failed: {drift} mm off at most, limit {limit} mm.")
     return Proof(
-        result, verdict, _rule(guarded=guarded), guarded, any(d.dz_mm for d in result.drifts)
+        result,
+        undecided=result.verdict is DriftVerdict.UNDECIDED,
+        rule=_rule(guarded=guarded),
+        guarded=guarded,
+        heights=any(drift.dz_mm for drift in result.drifts),
     )
 
 

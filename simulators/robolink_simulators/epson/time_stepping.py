@@ -48,7 +48,11 @@ class TimeStepping(RequestTaking, ABC):
         if not self._begun:
             return None
         if self._settled_ns == -1 or self._settled_ns != self._known_ns or self._at_work:
-            self._next_ns, self._known_ns = self._found_next(), self._settled_ns
+            return self._look_ahead()
+        return self._next_ns
+
+    def _look_ahead(self) -> int | None:
+        self._next_ns, self._known_ns = self._found_next(), self._settled_ns
         return self._next_ns
 
     def _found_next(self) -> int | None:
@@ -77,11 +81,13 @@ class TimeStepping(RequestTaking, ABC):
             return True
         if now_ns < self._now_ns or self._at_work or not self._links.settled:
             return False
-        change = self.next_change()
+        known = self._settled_ns != -1 and self._settled_ns == self._known_ns
+        change = self._next_ns if known else self._look_ahead()
         if change is not None and change <= now_ns:
             return False
+        if now_ns > self._now_ns:
+            self.machine.advance(now_ns)
         self._now_ns = self._settled_ns = self._known_ns = now_ns
-        self.machine.advance(now_ns)
         return True
 
     @property

@@ -14,12 +14,24 @@ class DepartingReplies:
         stalled_until_ns: Until when it carries nothing; 0 for a link that works.
     """
 
+    __slots__ = (
+        "_held",
+        "_waiting",
+        "half_open",
+        "stalled_until_ns",
+    )
+
     def __init__(self) -> None:
         # Mostly one or none: an empty deque would take 760 bytes of each connection.
         self._waiting: list[tuple[int, bytes | LinkEnd | None]] = []
         self._held: list[HeldBack] = []
         self.half_open = False
         self.stalled_until_ns = 0
+
+    @property
+    def idle(self) -> bool:
+        """Whether nothing waits, and the link carries what is posted."""
+        return not (self._waiting or self.half_open or self.stalled_until_ns)
 
     def depart(self, departures: Sequence[Departure], now_ns: int) -> bool:
         """Let replies leave as planned; False when the device has ended the link with them."""
@@ -43,6 +55,11 @@ class DepartingReplies:
     def take(self, now_ns: int) -> bytes:
         """Take what has left by now."""
         ready = b""
+        if len(self._waiting) == 1 and self._due(now_ns):  # as in nearly every exchange
+            only = self._waiting[0][1]
+            if isinstance(only, bytes):
+                self._waiting.clear()
+                return only
         while self._due(now_ns) and isinstance(data := self._waiting[0][1], bytes):
             ready += data
             del self._waiting[0]

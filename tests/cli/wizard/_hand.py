@@ -30,7 +30,7 @@ class LineHand:
         self.terminal.wait_for("then y to start; n = leave")
         for key in ("1", "3"):
             self.type(key)
-            self.terminal.wait_for(r"First: \[3\]|is open")
+            self.terminal.wait_for(r"First: \[3\]|are confirmed")
         self.type("y")
 
     def left_mm(self):

@@ -2,6 +2,7 @@
 
 import time
 from dataclasses import replace
+from math import cos, radians, sin
 
 from robolink_cli.wizard.check_list import CheckPoint, CheckSubject, Mark
 from robolink_cli.wizard.flow import advance
@@ -35,12 +36,16 @@ def fit_subject(*off_mm, worst=None):
     rows = tuple(
         FitRow(
             number,
-            tr("Touch {number} at {where}", number=number, where=tr("U {u:.1f}", u=90.0 * number)),
-            (off, 0.0),
+            tr(
+                "Touch {number} at {where}",
+                number=number,
+                where=tr("U {u:.1f}", u=90.0 * (number - 1)),
+            ),
+            (off * cos(radians(90.0 * number)), off * sin(radians(90.0 * number))),
         )
         for number, off in enumerate(off_mm, start=1)
     )
-    return FitSubject(rows, 0.016, half95_mm=0.021, next_mm=0.015, worst=worst, limit_mm=0.15)
+    return FitSubject(rows, 0.066, half95_mm=0.074, next_mm=0.063, worst=worst, limit_mm=0.15)
 
 
 def write_subject(*tools):
@@ -48,7 +53,7 @@ def write_subject(*tools):
     old = ToolOffset(11.998, -3.502, -20.0)
     result = solve_two_pose(first, second, stored=old)
     proposals = tuple(Proposal(tool, old, result) for tool in tools)
-    verdict = LimitVerdict("implausible_change", tr("Change of the tip"), 0.65, 2.0)
+    verdict = LimitVerdict("implausible_change", tr("Change of the tip"), 0.391, 2.0)
     return WriteSubject(proposals, ((verdict,),) * len(tools))
 
 
@@ -66,7 +71,8 @@ CHECK = CheckSubject(
 class Sitting:
     """A state, and what was sent from it; time passes by hand."""
 
-    def __init__(self, state=None):
+    def __init__(self, state=None, in_tool=0):
+        self.here = replace(ARRIVAL, tool=in_tool)
         self.state = state or WizardState(HEADER)
         self.sent, self.now, self.number = [], 10.0, 0
 
@@ -80,10 +86,10 @@ class Sitting:
         if subject is not None:
             self.happens(WasRegarded(subject))
         self.happens(WasAsked(self.number, text, kind, self.now))
-        self.reads(ARRIVAL)
+        self.reads(self.here)
         self.waits()
         self.now += 1.0
-        return self.reads(ARRIVAL)
+        return self.reads(self.here)
 
     def waits(self):
         return self.happens(WaitsForAnswer(self.number, self.now))

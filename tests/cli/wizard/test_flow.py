@@ -18,6 +18,7 @@ from robolink_cli.wizard.happenings import (
     WasTold,
     WizardCommand,
 )
+from robolink_cli.wizard.screens.touching import instruction
 from robolink_cli.wizard.state import STEP_SIZES, LastScreen
 
 from robolink.model import Path as Way
@@ -439,3 +440,17 @@ def test_what_nobody_had_a_screen_to_read_is_kept_for_the_end():
     for one in (WasTold("Lifting."), WasRegarded(going), WasTold("settled")):
         hand.happens(one)
     assert hand.state.fresh == ("settled",)
+
+
+@pytest.mark.parametrize(
+    "subject",
+    [
+        touch_subject(surface=True),
+        touch_subject(surface=True, proof=True),
+        touch_subject(number=1, proof=True, arrival=None),
+    ],
+    ids=["a surface", "a surface in the proof", "the first contact after a break"],
+)
+def test_what_is_no_pin_is_named_by_whoever_asks_for_it(subject):
+    hand = Sitting().asked(subject, text="Jog the tip onto the top of the sphere.")
+    assert instruction(hand.state) == "Jog the tip onto the top of the sphere."

@@ -44,7 +44,7 @@ def moving():
     here = Pose(349.3, 442.9, -60.0, 43.2, tool=0)
     hand = Sitting().happens(WasRead(Reading(10.0, "ready", pose=here, axes=SCARA)))
     going = MoveSubject(
-        Pose(300.0, 400.0, -60.0, 90.0, tool=0), Way.JOINT, 20.0, "Turning to U 90.0."
+        Pose(300.0, 400.0, -60.0, 90.0, tool=0), Way.JOINT, 20.0, tr("Turning in the air.")
     )
     return hand.happens(WasRegarded(going))
 
@@ -58,7 +58,8 @@ def touching():
 
 def choosing():
     rows = ("line3   EPSON T6-602S", "line4   EPSON T6-602S", "mixer   SoftMotion")
-    return Sitting().asked(ChoiceSubject("Choose", (), rows), Question.TEXT, "Which cell?")
+    subject = ChoiceSubject(tr("Choose"), (), rows)
+    return Sitting().asked(subject, Question.TEXT, tr("Which cell?"))
 
 
 def done():
@@ -85,16 +86,22 @@ def checking():
         CheckPoint(Mark.OK, tr("Controller answers: {name}", name="T6-602S, T6S0012345, 7.5.4")),
         CheckPoint(Mark.OK, tr("Emergency stop released, guard closed, no program running")),
         CheckPoint(Mark.TO_DO, tr("Motors are off"), "7", tr("Switch them on")),
+        CheckPoint(
+            Mark.YOU,
+            tr("The new nozzle is mounted and tight; tip and pin are clean"),
+            "1",
+            tr("Yes"),
+        ),
         CheckPoint(Mark.YOU, tr("Nobody in the cell, hoses free"), "3", tr("Yes")),
     )
-    return Sitting().asked(CheckSubject(points, plan), Question.YES_NO).keys("3")
+    return Sitting().asked(CheckSubject(points, plan), Question.YES_NO).keys("1", "3")
 
 
 def recovering():
     """What was written and never tested; reading alone decides nothing."""
     options = (
         tr("The old one. Put the old value back."),
-        tr("The new one. Keep the new value; nobody has tested it."),
+        tr("The new one. Make the turn test, then keep the new value."),
         tr("I cannot tell. Stay blocked; call an engineer."),
     )
     found = tr("What we read: {sentence}", sentence="Tool 1 = X 12.324 Y -3.729 Z -20.512")
@@ -146,7 +153,7 @@ SCREENS = {
     "moving": moving,
     "touch": touching,
     "first touch": lambda: Sitting().asked(touch_subject(number=1, arrival=None)),
-    "turn test": lambda: Sitting().asked(touch_subject(proof=True, total=None)),
+    "turn test": lambda: Sitting(in_tool=1).asked(touch_subject(proof=True, total=None)),
     "fit": lambda: Sitting().asked(
         fit_subject(0.006, 0.004, 0.131, 0.007, worst=2), Question.YES_NO
     ),

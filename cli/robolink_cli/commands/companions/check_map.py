@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import click
 
 from robolink.errors import ConfigError, DeclinedError
-from robolink.messages import tr
+from robolink.messages import joined, tr
 from robolink_cli.console.render import note, say, table
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.operator_identity import signature_of
@@ -139,11 +139,12 @@ def _compared(controller: "PlcMapController", values: "MapValues", shows: tuple[
     except MapDiffersError as error:
         held = revoke(controller.who().name, controller.register_map)
         if held is not None:
-            error.remedy = " ".join(
+            error.remedy = joined(
+                " ",
                 (
                     tr("The confirmation by {by} of {at} is taken back.", by=held.by, at=held.at),
                     error.remedy,
-                )
+                ),
             )
         raise
 

@@ -6,10 +6,11 @@ from pathlib import Path
 
 from robolink.errors import ConfigError
 from robolink.files.durable import state_folder
-from robolink.messages import tr
+from robolink.messages import spoken, tr
 from robolink_cli.commands.computer.doctor_finding import Level, Remark, guarded
 from robolink_cli.commands.computer.requirements import check_name, check_versions
 from robolink_cli.commands.computer.serial_ports import serial_ports
+from robolink_cli.console.columns import padded
 
 
 def check_up() -> list[Remark]:
@@ -31,7 +32,7 @@ def check_up() -> list[Remark]:
 def in_words(remarks: Sequence[Remark]) -> Iterator[str]:
     """Yield the lines that a person reads, the verdict last."""
     for remark in remarks:
-        yield f"{remark.level:4}  {remark.subject}: {remark.what}"
+        yield f"{padded(spoken(remark.level), 4)}  {remark.subject}: {remark.what}"
         if remark.remedy:
             yield f"      {remark.remedy}"
     if any(remark.level is Level.BAD for remark in remarks):

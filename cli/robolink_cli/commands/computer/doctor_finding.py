@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TypeVar
 
-from robolink.messages import tr
+from robolink.messages import declared, tr
 
 FoundT = TypeVar("FoundT")
 
@@ -13,9 +13,9 @@ FoundT = TypeVar("FoundT")
 class Level(StrEnum):
     """How bad it is; only BAD keeps robolink from working."""
 
-    OK = "ok"
-    WARN = "warn"
-    BAD = "bad"
+    OK = declared("ok")
+    WARN = declared("warn")
+    BAD = declared("bad")
 
 
 @dataclass(frozen=True, slots=True)

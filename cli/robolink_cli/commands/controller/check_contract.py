@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from robolink.errors import ConfigError, DeclinedError
-from robolink.messages import declared, tr
+from robolink.messages import declared, joined, tr
 from robolink_cli.console.render import note, say, table
 from robolink_cli.options.consent import yes_option
 from robolink_cli.options.shared import controller_argument
@@ -241,7 +241,7 @@ def _agree(controller: "Controller", asked: _Asked) -> None:
         )
     )
     if asked.step_mm is not None:
-        agree_to_motion(" ".join(said), yes=asked.yes)
+        agree_to_motion(joined(" ", said), yes=asked.yes)
         return
     heed_what_was_left(yes=asked.yes, in_tool=False)
     if not asked.yes:
@@ -250,7 +250,7 @@ def _agree(controller: "Controller", asked: _Asked) -> None:
                 tr("A tool would be written for the checks, but there is nobody to ask."),
                 remedy=tr("Add --yes when nobody uses the controller, or run it on a terminal."),
             )
-        questions.require_yes(" ".join(said))
+        questions.require_yes(joined(" ", said))
 
 
 def _write_junit(path: Path, identity: str, found: "Sequence[CheckOutcome]") -> None:

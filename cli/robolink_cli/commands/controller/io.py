@@ -8,6 +8,7 @@ import click
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli.access.capabilities import io_of, require_epson
+from robolink_cli.console.machine_words import io_words
 from robolink_cli.console.render import say
 from robolink_cli.options.consent import dry_run_option, yes_option
 from robolink_cli.prompts.questions import agree
@@ -83,7 +84,7 @@ def set_bit(
 ) -> None:
     """Switch an output or a memory bit, and read it back. An output may move something."""
     on = switch == "on"
-    kind = tr("memory bit") if memory else tr("output")
+    kind = io_words("memory" if memory else "output")
     with open_controller(context) as controller:
         preview, change = _switching(controller, memory=memory)
         if dry_run:
@@ -124,12 +125,12 @@ def _switching(
 def _shown(kind: str, size: str, at: int, value: int) -> str:
     if size == "bit":
         state = tr("on") if value else tr("off")
-        return tr("{kind} {at}: {state}", kind=kind, at=at, state=state)
+        return tr("{kind} {at}: {state}", kind=io_words(kind), at=at, state=state)
     width = 8 if size == "byte" else 16
     return tr(
         "{kind} {size} {at}: {value} (bits {high} to {low}: {bits})",
-        kind=kind,
-        size=size,
+        kind=io_words(kind),
+        size=tr("byte") if size == "byte" else tr("word"),
         at=at,
         value=value,
         high=at * width + width - 1,

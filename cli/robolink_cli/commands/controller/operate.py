@@ -7,6 +7,7 @@ import click
 from robolink.messages import tr
 from robolink.model import Act
 from robolink_cli.access.capabilities import preferences_of, require_epson, require_softmotion
+from robolink_cli.console.machine_words import state_word
 from robolink_cli.console.render import note, say
 from robolink_cli.options.consent import dry_run_option, yes_option
 from robolink_cli.options.shared import shared_options
@@ -127,7 +128,9 @@ def reset(context: CliContext, dry_run: bool, yes: bool) -> None:
     context.emit(
         "reset",
         payload,
-        lambda: say(tr("The reset was carried out; the controller is: {state}.", state=state)),
+        lambda: say(
+            tr("The reset was carried out; the controller is: {state}.", state=state_word(state))
+        ),
     )
 
 

@@ -22,7 +22,7 @@ def chosen_at_desk(controller: Controller) -> str | None:
     Raises:
         DeclinedError: The person leaves; everything stays as it is.
     """
-    from robolink.nozzle_change import open_turn_tests
+    from robolink.nozzle_change import open_turn_tests, untested_sentences
 
     desk = present_desk()
     if desk is None:
@@ -34,7 +34,11 @@ def chosen_at_desk(controller: Controller) -> str | None:
     answers = (OLD, NEW, BLOCKED) if written else (OLD, BLOCKED)
     subject = ChoiceSubject(
         tr("Recover"),
-        (*(row for one in findings for row in _rows(one)), *_selected(controller)),
+        (
+            *(row for one in findings for row in _rows(one)),
+            *untested_sentences(controller),
+            *_selected(controller),
+        ),
         tuple(
             _option(answer, written=bool(written), tests=bool(open_turn_tests(controller)))
             for answer in answers

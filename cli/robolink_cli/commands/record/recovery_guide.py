@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
 DECLINED: Final = 9
 LEFT: Final = 6
-_MOVES_PER_ANGLE: Final = 3
-"""Over the pin, down beside it, off it again."""
 _NOTHING: Final = declared("Nothing is left unfinished on this controller.")
 
 
@@ -55,6 +53,8 @@ class Guide:
         Raises:
             RobolinkError: A step failed; the rest stays open.
         """
+        if self._keep:
+            self._tell_untested()
         if not self._tests:
             return self._settled()
         with self._controller.outcomes.hold(tr("recover")):
@@ -64,6 +64,13 @@ class Guide:
                 return Recovery((*done.settled, *tests.made()), ())
             findings = look(self._controller, keep=True)
             return Recovery(done.settled, findings)
+
+    def _tell_untested(self) -> None:
+        """Say of each new value that no turn test can prove now why, and what does."""
+        from robolink.nozzle_change import untested_sentences
+
+        for sentence in untested_sentences(self._controller):
+            note(sentence)
 
     def _settled(self, *, later: Collection[str] = ()) -> Recovery:
         done = recover(
@@ -236,14 +243,14 @@ class TurnTests:
 
     def _agreed(self, tests: "tuple[OpenTurnTest, ...]") -> None:
         settings = tests[0].settings
-        box = settings.box
+        box, here = settings.box, self._controller.groups[0].pose()
+        tools = ", ".join(str(one.test.tool) for one in tests)
         agree_to_procedure(
             self._controller,
-            tr(
-                "to test tool {tool}, from the pin that you jog the tip onto",
-                tool=", ".join(str(one.test.tool) for one in tests),
-            ),
-            moves=sum(1 + _MOVES_PER_ANGLE * len(one.test.angles_deg) for one in tests),
+            tr("to test tool {tool}, from where you jog the tip into contact", tool=tools)
+            if tests[0].test.by_touch
+            else tr("to test tool {tool}, straight up from where it stands first", tool=tools),
+            moves=sum(one.test.moves(here) for one in tests),
             speed_mm_s=settings.speed_mm_s,
             box_mm=box.x_max_mm - box.x_min_mm,
             yes=False,

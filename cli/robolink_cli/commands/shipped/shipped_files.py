@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from robolink.errors import ConfigError
-from robolink.messages import tr
+from robolink.messages import joined, tr
 
 _CHECKOUT: Final = Path(__file__).parents[4]
 SCHEMA: Final = "recipe.schema.json"
@@ -40,7 +40,8 @@ def require_one_of(name: str, names: Sequence[str], *, remedy: str) -> None:
     near = get_close_matches(name, names, n=3) or [one for one in names if name in one][:3]
     hint = tr("Is one of these meant: {names}?", names=", ".join(near)) if near else ""
     raise ConfigError(
-        tr("There is no {name!r} here.", name=name), remedy=" ".join(filter(None, (hint, remedy)))
+        tr("There is no {name!r} here.", name=name),
+        remedy=joined(" ", filter(None, (hint, remedy))),
     )
 
 

@@ -1,6 +1,7 @@
 """The two rows that stand above every screen."""
 
 from robolink.messages import tr
+from robolink_cli.console.machine_words import state_word
 from robolink_cli.wizard.state import WizardState
 
 
@@ -21,7 +22,7 @@ def status_row(state: WizardState, now_s: float) -> str:
         tool = "   " + tr("tool {n} selected", n=reading.pose.tool)
     age = tr("reading {s} s", s=f"{max(0.0, now_s - reading.at_s):.1f}")
     power = tr("power LOW")
-    return f"{reading.state.upper()}   {power}{tool}   {age}"
+    return f"{state_word(reading.state).upper()}   {power}{tool}   {age}"
 
 
 def mm(value: float) -> str:

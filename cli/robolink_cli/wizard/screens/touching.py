@@ -41,12 +41,16 @@ def touch_title(touch: TouchSubject | None) -> str:
 def instruction(state: WizardState) -> str:
     """Return what the person is to do."""
     touch, question = state.touch, state.question
-    if touch is not None and touch.number and touch.proof:
-        return tr("Jog the tip onto the pin again. We measure how far it was off.")
+    said = question.text if question is not None else ""
     asks = question is not None and question.kind is Question.PLACE
-    if touch is not None and touch.number and asks:
-        return tr("Jog the tip onto the pin.")
-    return question.text if question is not None else ""
+    if touch is None or not touch.number:
+        return said
+    # What is no pin is named by whoever asks; so is the first contact after a break.
+    if asks and (touch.surface or (touch.proof and touch.arrival is None)):
+        return said
+    if touch.proof:
+        return tr("Jog the tip onto the pin again. We measure how far it was off.")
+    return tr("Jog the tip onto the pin.") if asks else said
 
 
 def _what(state: WizardState, touch: TouchSubject | None) -> list[str]:

@@ -60,7 +60,7 @@ class EpsonActs:
                 self._group.settings.slow_down(MotionProfile())
             if self._group.motors_on() is not on:
                 raise ReadBackError(
-                    tr("The motors are not {wanted}.", wanted=tr("on") if on else tr("off")),
+                    tr("The motors are not on.") if on else tr("The motors are not off."),
                     remedy=tr("Look at the controller; nothing was repeated."),
                     controller=self._link.identity,
                     request=name,

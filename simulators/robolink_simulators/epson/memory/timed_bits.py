@@ -6,6 +6,8 @@ from robolink_simulators.epson.memory.bits import BitBank
 class TimedBits:
     """Remembers which bit changes when."""
 
+    __slots__ = ("_planned",)
+
     def __init__(self) -> None:
         self._planned: list[tuple[int, BitBank, int, bool]] = []
 

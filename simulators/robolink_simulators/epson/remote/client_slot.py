@@ -24,6 +24,13 @@ class ClientSlot:
         wire_time: By which it is counted.
     """
 
+    __slots__ = (
+        "_heard_ns",
+        "_timeout_ns",
+        "_wire_time",
+        "client",
+    )
+
     def __init__(self, remote_timeout_s: float, wire_time: WireTime) -> None:
         self._timeout_ns = round(remote_timeout_s * NS_PER_S)
         self._wire_time = wire_time

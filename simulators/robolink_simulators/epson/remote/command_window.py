@@ -14,6 +14,15 @@ class SpelWindow:
     after one, docs/reference/epson.md 1.5); an aborted one does not (assumed).
     """
 
+    __slots__ = (
+        "_aborted",
+        "_aborting",
+        "_condition",
+        "_interpreter",
+        "_options",
+        "_running",
+    )
+
     def __init__(
         self, interpreter: Interpreter, condition: Condition, options: EpsonOptions
     ) -> None:

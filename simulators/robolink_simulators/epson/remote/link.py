@@ -71,7 +71,26 @@ class EpsonServerLink:
 
     A client that has not logged in within the login time-out is cut off, and so is one that
     stays after its logout (assumed).
+
+    Attributes:
+        dialect: How frames are written; ``None`` for Remote Ethernet.
+        over: Whether the controller knows of no connection here any more.
     """
+
+    __slots__ = (
+        "_anonymous_since_ns",
+        "_codec",
+        "_controller",
+        "_hung_up",
+        "_late",
+        "_outbox",
+        "_serial",
+        "_silent_since_ns",
+        "_turned_on",
+        "_wire_time",
+        "dialect",
+        "over",
+    )
 
     def __init__(
         self, controller: ServedRequest, now_ns: int, *, dialect: Dialect | None = None
@@ -93,7 +112,7 @@ class EpsonServerLink:
         self._outbox = DepartingReplies()
         self._late: list[Request | BadRequest] = []
         self._hung_up = False
-        self._over = False
+        self.over = False
         self._wire_time = controller.wire_time
         self._anonymous_since_ns: int | None = self._wire_time.at(now_ns)
         self._silent_since_ns: int | None = None
@@ -101,22 +120,17 @@ class EpsonServerLink:
     @property
     def closed(self) -> bool:
         """Whether the controller has ended this connection, after what is outgoing."""
-        return self._outbox.ended(self._controller.now_ns)
+        return not self._outbox.idle and self._outbox.ended(self._controller.now_ns)
 
     @property
     def reset(self) -> bool:
         """Whether it has ended it with a reset."""
         return self._outbox.reset(self._controller.now_ns)
 
-    @property
-    def over(self) -> bool:
-        """Whether the controller knows of no connection here any more."""
-        return self._over
-
     def receive(self, data: bytes, now_ns: int) -> None:
         """Take bytes from the client; ``b""`` means that it is gone."""
         self._controller.advance(now_ns)
-        if self._over or self._outbox.half_open:
+        if self.over or self._outbox.half_open:
             return
         if not data:
             self._hung_up = True
@@ -130,7 +144,7 @@ class EpsonServerLink:
     @property
     def drained(self) -> bool:
         """Whether nothing will happen on this connection any more."""
-        return self._over and self._outbox.empty(self._controller.now_ns)
+        return self.over and self._outbox.empty(self._controller.now_ns)
 
     def outgoing(self) -> bytes:
         """Take what is ready for the client, ``b""`` for nothing."""
@@ -138,9 +152,12 @@ class EpsonServerLink:
 
     def next_change(self) -> int | None:
         """Return when something leaves, or when the login time-out passes."""
-        leaving = self._outbox.next_change(self._controller.now_ns)
-        if leaving is not None:
-            return leaving
+        if not self._outbox.idle:
+            leaving = self._outbox.next_change(self._controller.now_ns)
+            if leaving is not None:
+                return leaving
+        if self._anonymous_since_ns is None and self._silent_since_ns is None:
+            return None
         login_ns, silent_ns = self._login_deadline(), self._silence_ends_ns()
         if login_ns is None or silent_ns is None:
             return silent_ns if login_ns is None else login_ns
@@ -164,7 +181,7 @@ class EpsonServerLink:
 
     def answer(self, exchange: PendingRequest, event: Reply | Refusal) -> None:
         """Let an answer leave, as the faults planned for it allow."""
-        if self._over:
+        if self.over:
             return
         try:
             reply = self._codec.send(event)
@@ -184,7 +201,7 @@ class EpsonServerLink:
 
     def cut(self) -> None:
         """End the connection from the controller's side, after what is on its way."""
-        if not self._over:
+        if not self.over:
             self._outbox.post(None, self._controller.now_ns)
             self._end()
 
@@ -200,7 +217,7 @@ class EpsonServerLink:
     def _catch_up(self) -> None:
         late, self._late = self._late, []
         for event in late:
-            if not self._over:
+            if not self.over:
                 self._controller.take_late(self, event)
         try:
             self._serve()
@@ -210,7 +227,7 @@ class EpsonServerLink:
 
     def _leave(self) -> None:
         """Let the controller notice that the client is gone, once it can."""
-        if self._hung_up and not self._over and not self._stalled:
+        if self._hung_up and not self.over and not self._stalled:
             self._end()
 
     def _depart(self, departures: Sequence[Departure]) -> None:
@@ -220,8 +237,10 @@ class EpsonServerLink:
     def _read(self, data: bytes) -> None:
         self._codec.receive_data(data)
         self._serve()
-        if self._serial or self._controller.options.requests_end_with_silence:
-            begun = self._codec.bytes_held
+        if not (self._serial or self._controller.options.requests_end_with_silence):
+            return
+        begun = self._codec.bytes_held
+        if begun or self._silent_since_ns is not None:
             self._silent_since_ns = self._wire_time.at(self._controller.now_ns) if begun else None
             self._controller.listening()
 
@@ -232,7 +251,7 @@ class EpsonServerLink:
         self._serve()
 
     def _serve(self) -> None:
-        while not (self._over or self._stalled or self._outbox.half_open):
+        while not (self.over or self._stalled or self._outbox.half_open):
             if (event := self._codec.next_event()) is NEED_DATA:
                 return
             if isinstance(event, Opening):
@@ -243,7 +262,7 @@ class EpsonServerLink:
                 self._controller.take(self, event)
 
     def _end(self) -> None:
-        self._over = True
+        self.over = True
         self._anonymous_since_ns = self._silent_since_ns = None
         self._controller.forget(self)
 

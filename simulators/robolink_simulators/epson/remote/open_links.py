@@ -6,13 +6,18 @@ from robolink_simulators.epson.remote.link import EpsonServerLink
 class OpenLinks:
     """Holds connections until nothing will happen on them any more."""
 
+    __slots__ = ("_links",)
+
     def __init__(self) -> None:
         self._links: list[EpsonServerLink] = []
 
     @property
     def settled(self) -> bool:
         """Whether none has ended, of which something may still be on its way."""
-        return not any(link.over for link in self._links)
+        for link in self._links:  # noqa: SIM110 - asked in every exchange: a generator costs more
+            if link.over:
+                return False
+        return True
 
     def add(self, link: EpsonServerLink) -> None:
         """Hold one more."""

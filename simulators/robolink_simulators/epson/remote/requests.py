@@ -57,6 +57,18 @@ class RequestTaking(HostedDevice, ABC):
         if not self._slot.hears(link, cuts=self.options.second_client == "closed"):
             return
         faults = self.faults.take(shown, LinkKind.EPSON_SERIAL if link.dialect else None)
+        if faults:
+            self._take_disturbed(link, event, shown, faults)
+        else:
+            self._carry_out(link, event, shown, ())
+
+    def _take_disturbed(
+        self,
+        link: EpsonServerLink,
+        event: Request | BadRequest,
+        shown: str,
+        faults: tuple[Fault, ...],
+    ) -> None:
         silence = self.options.requests_end_with_silence
         heard = arriving(link, event, faults, self.faults, unterminated=silence)
         if heard is None:

@@ -32,6 +32,15 @@ class Service:
         password: What Login must carry; empty for none.
     """
 
+    __slots__ = (
+        "_condition",
+        "_desk",
+        "_options",
+        "_password",
+        "_slot",
+        "_window",
+    )
+
     def __init__(
         self,
         desk: CommandDesk,

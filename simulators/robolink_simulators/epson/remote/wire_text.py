@@ -20,6 +20,8 @@ def shown_request(event: Request | BadRequest) -> str:
 def shown_reply(reply: bytes) -> str:
     """Return a reply without its terminator."""
     text = reply.decode("latin-1").rstrip("\r\n")
+    if text[:1] != "!":
+        return text
     # The refusal of a login that could not be read repeats it, password and all.
     mistyped = "login" in text.lower() and text[1:6].lower() + text[6:7] != "login,"
-    return "***" if mistyped and text.startswith("!") else text
+    return "***" if mistyped else text

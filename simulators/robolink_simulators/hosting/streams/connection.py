@@ -50,9 +50,9 @@ class Connection:
         """Send what is ready, then close if the device has ended the link."""
         if self.finished:
             return
-        self._unsent += self._link.outgoing()
-        if self._unsent:
-            self._send()
+        data = self._link.outgoing()
+        if data or self._unsent:
+            self._send(self._unsent + data)
         if self._link.closed and not self._unsent:
             self._close(reset=isinstance(self._link, ResettableLink) and self._link.reset)
 
@@ -62,11 +62,11 @@ class Connection:
             self._link.receive(b"", now_ns)
             self._close()
 
-    def _send(self) -> None:
+    def _send(self, data: bytes) -> None:
         try:
-            self._unsent = self._unsent[self._client.send(self._unsent) :]
+            self._unsent = data[self._client.send(data) :]
         except BlockingIOError:
-            pass
+            self._unsent = data
         except OSError:
             self._unsent = b""  # the next read finds the end
         if len(self._unsent) > _MOST_UNSENT:

@@ -1,8 +1,8 @@
 """The one thread that serves every simulated controller of this process, thousands of them.
 
 Theory of operation. A device is bytes in, bytes out, and an instant at which it does something
-by itself, so serving it blocks nowhere: one selector tells whose bytes have come, one heap whose
-instant. Other threads ask for something by a queue and a byte that wakes the selector. The thread
+by itself, so serving it blocks nowhere: one queue tells whose bytes have come (``readiness``), one
+heap whose instant. Other threads ask for something by a list and a byte that wakes it. The thread
 begins with the first host and ends with the last. Whatever a hook of a simulator does in it holds
 up all that this process serves, so it must never wait for another one of them.
 """
@@ -18,8 +18,10 @@ from heapq import heapify, heappop, heappush
 from time import monotonic
 from typing import Final, Protocol
 
+from robolink_simulators.hosting.streams.readiness import make_readiness
+
 Served = Callable[[int, int], None]
-"""Deals with what the selector saw; is given the events and the simulated time."""
+"""Deals with what was seen; is given the events and the simulated time."""
 
 _LONGEST_SLEEP_S: Final = 3600.0
 _SPARE_ENTRIES: Final = 64
@@ -50,18 +52,18 @@ class LoopHost(Protocol):
 
 
 class ServingLoop:
-    """One thread and one selector; see the module.
+    """One thread; see the module.
 
     Attributes:
-        selector: What is watched; the data of each key is a host and what it has called.
+        watched: What is watched; registered with each are a host and what it has called.
     """
 
     def __init__(self) -> None:
         self._alarm, self._waker = socket.socketpair()
         self._waker.setblocking(False)
         self._alarm.setblocking(False)
-        self.selector = selectors.DefaultSelector()
-        self.selector.register(self._alarm, selectors.EVENT_READ, None)
+        self.watched = make_readiness()
+        self.watched.register(self._alarm, selectors.EVENT_READ, None)
         self._gate = threading.Lock()
         self._asked: deque[Callable[[], None]] = deque()
         self._alarmed = self._ended = False
@@ -112,15 +114,15 @@ class ServingLoop:
     def _run(self) -> None:
         try:
             while not self._ended:
-                for key, events in self.selector.select(self._patience_s()):
-                    if key.data is not None:
-                        host, served = key.data
+                for entry, events in self.watched.ready(self._patience_s()):
+                    if entry is not None:
+                        host, served = entry
                         self._step(host, served, events)
                 self._do_asked()
                 self._look_at_overdue()
             self._do_asked()
         finally:
-            self.selector.close()
+            self.watched.close()
             self._alarm.close()
             self._waker.close()
 

@@ -63,10 +63,13 @@ class TcpHost(WireHost):
 
     def flush(self) -> None:
         """See :meth:`WireHost.flush`."""
-        for number, connection in tuple(self._connections.items()):
+        ended = False
+        for connection in self._connections.values():
             connection.flush()
-            if connection.finished:
-                del self._connections[number]
+            ended = ended or connection.finished
+        if ended:
+            left = self._connections.items()
+            self._connections = {number: one for number, one in left if not one.finished}
 
     def shut(self, now_ns: int) -> None:
         """See :meth:`WireHost.shut`."""

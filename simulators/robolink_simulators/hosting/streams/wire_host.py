@@ -1,4 +1,4 @@
-"""What serves a device over anything that a selector can watch, in the thread of all of them."""
+"""What serves a device over anything that can be watched, in the thread of all of them."""
 
 from abc import abstractmethod
 from contextlib import AbstractContextManager
@@ -14,7 +14,6 @@ from robolink_simulators.hosting.streams.serving_loop import (
 )
 
 if TYPE_CHECKING:
-    import selectors
     import socket
 
 
@@ -102,12 +101,12 @@ class WireHost(ClosedAtExit):
 
     def watch(self, what: "socket.socket | int", events: int, served: Served) -> None:
         """Have something called when one of the events is seen; in the thread of the loop."""
-        self._loop.selector.register(what, events, (self, served))
+        self._loop.watched.register(what, events, (self, served))
 
     def watch_for(self, what: "socket.socket | int", events: int, served: Served) -> None:
         """Look for other events from now on."""
-        self._loop.selector.modify(what, events, (self, served))
+        self._loop.watched.modify(what, events, (self, served))
 
-    def watch_no_more(self, what: "socket.socket | int") -> "selectors.SelectorKey":
+    def watch_no_more(self, what: "socket.socket | int") -> None:
         """Forget something before it is closed."""
-        return self._loop.selector.unregister(what)
+        self._loop.watched.unregister(what)

@@ -64,6 +64,6 @@ def options_from_text(pairs: Mapping[str, str]) -> PlcOptions:
 def _require_positive(name: str, value: float) -> None:
     if not 0 < value <= _LONGEST_CYCLE_US:
         raise ConfigError(
-            tr("The simulator option {name} cannot be {value!r}.", name=name, value=value),
+            tr("The option {name} cannot be {value!r}.", name=name, value=value),
             remedy=tr("Give a number above 0, up to {most}.", most=_LONGEST_CYCLE_US),
         )

@@ -7,6 +7,7 @@ from typing import Any
 
 from robolink_simulators.cell.clock import EXCHANGE_S, SteeredClock
 from robolink_simulators.control.cell import AnySimulator, ControlledCell
+from robolink_simulators.hosting.garbage import RareFullCollections
 from robolink_simulators.plc import PlcSimulator
 
 from robolink.messages import tr
@@ -100,6 +101,7 @@ def serve_alone(kind: SimulatedKind, life: ServedLife, given: Options) -> None:
     simulator = kind.make(**given)
     with ExitStack() as stack:
         stopped = stack.enter_context(Termination(life))
+        stack.enter_context(RareFullCollections())
         served = kind.serve(stack, simulator, given, person=True)
         cells = {"cell": served.controlled}
         control = stack.enter_context(controlled(cells, life, allow_remote=given["allow_remote"]))

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from robolink_simulators.control.cell import AnySimulator
+from robolink_simulators.hosting.garbage import RareFullCollections
 
 from robolink.errors import ConfigError, ConnectError, RobolinkError
 from robolink.messages import joined, tr
@@ -51,6 +52,7 @@ def run_cells(path: Path, cells: Sequence[PlannedCell], life: ServedLife) -> Non
     simulators = made(cells)
     with ExitStack() as stack:
         stopped = stack.enter_context(Termination(life))
+        stack.enter_context(RareFullCollections())
         served = {cell.name: _served(stack, cell, simulators[cell.name]) for cell in cells}
         allowed = any(cell.given["allow_remote"] for cell in cells)
         controls = {name: one.controlled for name, one in served.items()}

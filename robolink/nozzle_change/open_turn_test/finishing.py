@@ -1,16 +1,13 @@
-"""The turn test of a change that was cut off between its write and its proof.
+"""Taking a change up again for its turn test.
 
-A change leaves in its durable marker what its turn test needs. Whoever finds the marker open later
-takes the change up again: its marker, and no other, then lets the robot move, and stays until the
-verdict. So a process that is killed in the test leaves what it found
+Its marker, and no other, lets the robot move, and stays until the verdict: a process that is killed
+in the test leaves what it found
 (docs/decisions/0060-a-change-is-taken-up-again-for-its-turn-test.md).
 """
 
-import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import astuple, dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from robolink.calibration import VerifyResult
 from robolink.errors import (
@@ -25,87 +22,14 @@ from robolink.errors import (
 from robolink.messages import joined, tr
 from robolink.model import Controller, Finding, Marker, MarkerKind, Verdict
 from robolink.nozzle_change._acceptance import require_proved
-from robolink.nozzle_change._plan import Limits, ToolPlan
-from robolink.nozzle_change._proposal import Proposal
 from robolink.nozzle_change._records import verification_entry
-from robolink.procedures import (
-    TOUCH_CODES,
-    MeasurementContext,
-    TurnsAboutPin,
-    TurnTest,
-)
-from robolink.runner import Operator, Runner, RunSettings
+from robolink.nozzle_change.open_turn_test.marking import OpenTurnTest, tests_of
+from robolink.procedures import TOUCH_CODES, MeasurementContext
+from robolink.runner import Operator
 from robolink.transaction import Settler
 
-if TYPE_CHECKING:
-    from pydantic import TypeAdapter
-
-_KEY: Final = "turn_tests"
 _OUT_OF_REACH: Final = (OutcomeUnknownError, TransportError, RemoteProtocolError, LeaseLostError)
 """After these nothing can be put back here: the link is gone, or the right to write."""
-
-
-@dataclass(frozen=True, slots=True)
-class OpenTurnTest:
-    """What a change keeps of the turn test of one tool until it is made.
-
-    Attributes:
-        test: The test.
-        settings: Limits and speeds, about where the flange was when the change began.
-    """
-
-    test: TurnTest
-    settings: RunSettings
-
-
-def marked_turn_tests(
-    context: MeasurementContext, limits: Limits, proposals: Sequence[tuple[ToolPlan, Proposal]]
-) -> dict[str, object]:
-    """Return what the marker of a change keeps of its turn tests, plain JSON.
-
-    Nothing, where one of its tools is proved in another way, or not at all.
-
-    Args:
-        context: Where the change began.
-        limits: Where and how fast the robot may go.
-        proposals: What is to be written.
-    """
-    tests: list[OpenTurnTest] = []
-    for plan, proposal in proposals:
-        source, start = plan.moving, context.start
-        if start is None or not plan.verify or not isinstance(source, TurnsAboutPin):
-            return {}
-        test = source.turn_test(
-            proposal.tool,
-            proposal.result,
-            tip=proposal.tip,
-            tolerance_mm=plan.criteria.drift_tolerance_mm,
-        )
-        settings = limits.settings(start, proposal.result.offset)
-        if not all(map(math.isfinite, astuple(settings.box))):
-            return {}
-        tests.append(OpenTurnTest(test, settings))
-    return {_KEY: _adapter().dump_python(tuple(tests), mode="json")}
-
-
-def open_turn_tests(controller: Controller) -> dict[str, tuple[OpenTurnTest, ...]]:
-    """Return the turn tests that open changes still lack, by the operations of their markers.
-
-    Only of changes whose tools all hold the new values now. Reads only.
-
-    Args:
-        controller: The controller, connected.
-
-    Raises:
-        RobolinkError: It cannot be read.
-    """
-    settler = Settler(controller, keep=True)
-    found = {}
-    for marker in controller.outcomes.open_markers():
-        tests = _tests_of(marker)
-        if tests and settler.examine(marker).verdict is Verdict.DONE:
-            found[marker.operation] = tests
-    return found
 
 
 def finish_by_turn_test(
@@ -184,7 +108,7 @@ def finish_by_turn_test(
             controller.preserved(tr("turn test")),
             _put_back_unless_kept(controller, marker),
         ):
-            for one in _tests_of(marker):
+            for one in tests_of(marker):
                 _prove(controller, one, operator, tell)
             Settler(controller, keep=True).settle(finding)
     finally:
@@ -199,7 +123,7 @@ def _open(controller: Controller, operation: str) -> tuple[Marker, Finding]:
         OutcomeUnknownError: There is nothing that could be tested.
     """
     for marker in controller.outcomes.open_markers():
-        if marker.operation == operation and _tests_of(marker):
+        if marker.operation == operation and tests_of(marker):
             finding = Settler(controller, keep=True).examine(marker)
             if finding.verdict is Verdict.DONE:
                 return marker, finding
@@ -223,9 +147,11 @@ def _prove(
     """
     tool = one.test.tool
     controller.tools.select(tool)
-    runner = Runner(controller, controller.groups[0], operator, one.settings)
+    context = MeasurementContext(
+        controller, operator, start=None, settings=lambda _start, _tip: one.settings
+    )
     try:
-        result = runner.run(one.test.steps_after_a_break())
+        result = one.test.prove_after_a_break(context)
     except CalibrationError as error:
         if error.code not in TOUCH_CODES:
             raise
@@ -270,27 +196,9 @@ def _put_back(controller: Controller, marker: Marker) -> str:
         return joined(" ", (error.what, _stays_open()))
     finally:
         controller.outcomes.change = str(marker.details.get("change", ""))
-    tools = ", ".join(str(one.test.tool) for one in _tests_of(marker))
+    tools = ", ".join(str(one.test.tool) for one in tests_of(marker))
     return tr("The old value of tool {tool} is back.", tool=tools)
 
 
 def _stays_open() -> str:
     return tr("The change stays open. Next: 'robolink recover'.")
-
-
-def _tests_of(marker: Marker) -> tuple[OpenTurnTest, ...]:
-    """Return what a marker keeps; nothing where it is not that of such a change, or unreadable."""
-    kept, tools = marker.details.get(_KEY), marker.details.get("tools")
-    if marker.kind is not MarkerKind.CHANGE or not kept or not isinstance(tools, dict):
-        return ()
-    try:
-        tests = _adapter().validate_python(kept)
-    except ValueError:
-        return ()
-    return tests if {str(one.test.tool) for one in tests} == set(tools) else ()
-
-
-def _adapter() -> "TypeAdapter[tuple[OpenTurnTest, ...]]":
-    from pydantic import TypeAdapter  # only a change that is open, or begins, needs it
-
-    return TypeAdapter(tuple[OpenTurnTest, ...])

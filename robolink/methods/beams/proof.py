@@ -1,0 +1,49 @@
+"""The proof of a tip by crossing beams again, as a value."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from robolink.calibration import Beam, VerifyResult, seen_from
+from robolink.methods.beams.parameters import BeamsParameters
+from robolink.methods.beams.procedure import verify_by_crossing
+from robolink.model import Pose
+from robolink.procedures import PlacedProof
+from robolink.runner import Procedure
+from robolink.stations import BeamStation
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CrossingTest(PlacedProof):
+    """All that a proof by two beams needs.
+
+    Attributes:
+        beams, z_mm, inputs, off_when_broken: Where they are and what they switch; see
+            :class:`~robolink.stations.BeamStation`.
+        plan: How they are crossed.
+        angles_deg: U of the new tool at which they are.
+    """
+
+    method: ClassVar[str] = "beams"
+    by_touch: ClassVar[bool] = False
+
+    beams: tuple[Beam, Beam]
+    z_mm: float
+    inputs: tuple[int, int]
+    off_when_broken: bool
+    plan: BeamsParameters
+    angles_deg: tuple[float, ...]
+
+    def steps(self, here: Pose) -> Procedure[VerifyResult]:
+        """Return the steps from wherever the frame is."""
+        return verify_by_crossing(
+            BeamStation(self.beams, self.z_mm, self.inputs, self.off_when_broken),
+            self.plan,
+            here=here,
+            angles_deg=self.angles_deg,
+            tolerance_mm=self.tolerance_mm,
+            aside=seen_from(self.written, self.tip),
+        )
+
+    def steps_after_a_break(self, here: Pose) -> Procedure[VerifyResult]:
+        """Return the same steps: they begin straight up."""
+        return self.steps(here)

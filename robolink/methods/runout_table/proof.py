@@ -1,0 +1,32 @@
+"""The proof of a wobbling tip: it has to be where its table says."""
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+from robolink.calibration import RunoutTable, VerifyResult
+from robolink.methods.camera.proof import LookTest
+from robolink.procedures import MeasurementContext
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WobbleTest(LookTest):
+    """A proof by a camera of a tip that wobbles.
+
+    Attributes:
+        table: How far the tip is beside its place, by U of the flange.
+    """
+
+    method: ClassVar[str] = "runout-table"
+
+    table: RunoutTable
+
+    def prove(self, context: MeasurementContext) -> VerifyResult:
+        """Make it; see :meth:`~robolink.procedures.KeptProof.prove`."""
+        # "slots" makes the class anew, so the short form of super() would not find it.
+        seen = LookTest.prove(self, context)
+        drifts = []
+        for drift in seen.drifts:
+            # The table counts U of the flange, the proof that of the new tool.
+            dx_mm, dy_mm = self.table.at(drift.u_deg - self.written.u_deg)
+            drifts.append(replace(drift, dx_mm=drift.dx_mm - dx_mm, dy_mm=drift.dy_mm - dy_mm))
+        return replace(seen, drifts=tuple(drifts))

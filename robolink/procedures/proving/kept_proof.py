@@ -1,0 +1,177 @@
+"""What a proof is made from, as plain values: at once, or by whoever takes a change up again."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar, Protocol, runtime_checkable
+
+from robolink.calibration import CalibrationResult, VerifyResult
+from robolink.model import Pose, ToolOffset
+from robolink.procedures.source import MeasurementContext
+from robolink.runner import Move, Procedure, Seek, foreseen_steps
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KeptProof(ABC):
+    """The proof of one tool. What derives from it is a frozen dataclass of plain values.
+
+    A change writes it down in its durable marker before it writes the offset
+    (docs/decisions/0060-a-change-is-taken-up-again-for-its-turn-test.md).
+
+    Attributes:
+        method: Name of the calibration method that declares its type.
+        by_touch: Whether a person touches in it; else a sensor looks, and nobody is asked.
+        tool: Number of the tool that was written.
+        written: The offset that was written.
+        tip: Where the tip was found; it differs where a difference was written.
+        tolerance_mm: Largest drift that passes.
+    """
+
+    method: ClassVar[str]
+    by_touch: ClassVar[bool] = True
+
+    tool: int
+    written: ToolOffset
+    tip: ToolOffset
+    tolerance_mm: float
+
+    @abstractmethod
+    def moves(self, here: Pose) -> int:
+        """Return how many movements the robot makes by itself after a break, as it is foreseen.
+
+        Args:
+            here: Where the frame of the new tool is.
+        """
+
+    @property
+    def obstacle(self) -> str:
+        """Why it cannot be kept, as a code; empty where it can."""
+        return ""
+
+    @abstractmethod
+    def prove(self, context: MeasurementContext) -> VerifyResult:
+        """Make it right after the write, where the measurement left the tip; the tool is selected.
+
+        Raises:
+            CalibrationError, LimitError: It cannot be made.
+        """
+
+    @abstractmethod
+    def prove_after_a_break(self, context: MeasurementContext) -> VerifyResult:
+        """Make it where nobody knows any more where the tip is; the tool is selected.
+
+        Raises:
+            CalibrationError, LimitError: It cannot be made.
+        """
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlacedProof(KeptProof):
+    """A proof whose steps begin where the frame in force is."""
+
+    def prove(self, context: MeasurementContext) -> VerifyResult:
+        """Make it; see :meth:`KeptProof.prove`."""
+        return context.run(self.steps(_here(context)), tip=self.written)
+
+    def prove_after_a_break(self, context: MeasurementContext) -> VerifyResult:
+        """Make it; see :meth:`KeptProof.prove_after_a_break`."""
+        return context.run(self.steps_after_a_break(_here(context)), tip=self.written)
+
+    def moves(self, here: Pose) -> int:
+        """Return how many movements there are; see :meth:`KeptProof.moves`."""
+        return movements(self.steps_after_a_break(here), here)
+
+    @abstractmethod
+    def steps(self, here: Pose) -> Procedure[VerifyResult]:
+        """Return the steps right after the measurement.
+
+        Args:
+            here: Where the frame of the new tool is.
+        """
+
+    @abstractmethod
+    def steps_after_a_break(self, here: Pose) -> Procedure[VerifyResult]:
+        """Return the steps from wherever the robot stands now.
+
+        Args:
+            here: Where the frame of the new tool is.
+        """
+
+
+@runtime_checkable
+class KeepsProof(Protocol):
+    """A source whose proof can be made after a break, too."""
+
+    def proof(
+        self,
+        context: MeasurementContext,
+        tool: int,
+        result: CalibrationResult,
+        *,
+        tip: ToolOffset,
+        tolerance_mm: float,
+    ) -> KeptProof:
+        """Return the proof of what was measured.
+
+        Args:
+            context: What to work with; nothing moves.
+            tool: The tool that is written.
+            result: What was measured, with the offset that is written.
+            tip: Where the tip was found.
+            tolerance_mm: Largest drift that passes.
+
+        Example:
+            >>> from robolink.calibration import solve_two_pose
+            >>> from robolink.methods import TwoPoseSource
+            >>> from robolink.model import Pose, ToolOffset
+            >>> from robolink.testing import PaperCell
+            >>> touches = Pose(298, 99, -20, 0), Pose(322, 91, -20, 180)
+            >>> result = solve_two_pose(*touches, stored=ToolOffset(12, -3.5, -20))
+            >>> proof = TwoPoseSource().proof(
+            ...     None, 1, result, tip=result.offset, tolerance_mm=0.2
+            ... )
+            >>> cell = PaperCell(Pose(310, 95, -30, 0), ToolOffset(0.1), (310, 95, -40))
+            >>> round(cell.run(proof.steps()).max_drift_mm, 3)
+            0.1
+        """
+
+
+class ProvesAgain(ABC):
+    """A source that proves by a :class:`KeptProof`, at once and after a break alike."""
+
+    __slots__ = ()
+
+    def verify(
+        self,
+        context: MeasurementContext,
+        tool: int,
+        result: CalibrationResult,
+        *,
+        tip: ToolOffset,
+        tolerance_mm: float,
+    ) -> VerifyResult:
+        """Prove the new tip; see :class:`~robolink.procedures.MovingSource`."""
+        context.controller.tools.select(tool)
+        proof = self.proof(context, tool, result, tip=tip, tolerance_mm=tolerance_mm)
+        return proof.prove(context)
+
+    @abstractmethod
+    def proof(
+        self,
+        context: MeasurementContext,
+        tool: int,
+        result: CalibrationResult,
+        *,
+        tip: ToolOffset,
+        tolerance_mm: float,
+    ) -> KeptProof:
+        """Return the proof of what was measured; see :class:`KeepsProof`."""
+
+
+def movements(steps: Procedure[VerifyResult], here: Pose) -> int:
+    """Return how many movements of the robot's own some steps have, as they are foreseen."""
+    foreseen = foreseen_steps(steps, here)
+    return sum(isinstance(one.step, (Move, Seek)) for one in foreseen)
+
+
+def _here(context: MeasurementContext) -> Pose:
+    return context.controller.groups[0].pose()

@@ -1,0 +1,119 @@
+"""After a process that was killed between write and proof: the page of a recovery, on a terminal.
+
+The measurement is a process of its own, killed with SIGKILL in the first movement of its proof; the
+recovery is the real command on a pseudo terminal, with a hand at its keys.
+"""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+from contextlib import contextmanager
+from dataclasses import replace
+
+import pytest
+from robolink_cli import main
+from robolink_simulators.assist.port import serve_assist
+from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.epson.options import EpsonOptions
+from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+
+from robolink.journal import open_journal
+from tests.cli.wizard._screen import ScreenHand
+
+pytestmark = [pytest.mark.simulator_only, pytest.mark.soak, pytest.mark.timeout(300)]
+
+FULL = ("n-angle", "--station", "PIN-07", "--count", "3")
+METHODS = {"n-angle": FULL, "one-touch": ("one-touch", "--station", "PIN-07")}
+
+
+@contextmanager
+def served():
+    simulator = EpsonSimulator(seed=7, options=EpsonOptions(remote_timeout_s=0.0))
+    clock = ScaledClock(10.0)
+    with serve_tcp(simulator, clock=clock) as host, serve_assist(simulator, clock=clock) as eyes:
+        yield simulator, host.url, eyes.url
+
+
+CONTACTS = {"n-angle": 3, "one-touch": 2}
+"""One that shows where the tip is, and the angles of the test."""
+
+
+def command(url, eyes, method):
+    return ["-c", url, "calibrate", *METHODS[method], "--tool", "1", "--assist", eyes, "--yes"]
+
+
+def killed_in_its_proof(simulator, words):
+    """Run a command in a process of its own; end it in its first movement after the write."""
+    seen, held = [], threading.Event()
+
+    def hold(_number, request):
+        if request.startswith('$Execute,"TLSet 1, XY'):
+            seen.append(request)
+        elif seen and request.startswith('$Execute,"Go '):
+            os.kill(process.pid, signal.SIGKILL)
+            held.set()
+
+    with simulator.lock:
+        simulator.on_request = hold
+    code = "from robolink_cli.main import main; main()"
+    paths = {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+    process = subprocess.Popen(
+        [sys.executable, "-c", code, *words],
+        env=os.environ | paths,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+    )
+    said = process.communicate(timeout=120)[1].decode()
+    with simulator.lock:
+        simulator.on_request = None
+    assert held.is_set(), said
+    assert process.returncode == -signal.SIGKILL
+
+
+def chosen_and_tested(hand):
+    hand.see("Look at the robot: which needle is mounted")
+    hand.see("The new one. Make the turn test, then keep the new value.")
+    hand.rest(0.4)
+    hand.press(["\x1b[B", "\x1b[B", "5"])
+    hand.start()
+    contacts = 0
+    while True:
+        found = hand.see(r"Jog the tip onto the pin|settled|DONE|STOPPED")[0]
+        contacts += found.startswith("Jog")
+        if not found.startswith("Jog"):
+            return contacts
+        hand.jog()
+        hand.press(["5"])
+        hand.see("moving|Please wait|settled|DONE|STOPPED")
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_new_needle_is_chosen_tested_and_kept(method, tmp_path, monkeypatch):
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
+    with served() as (simulator, url, eyes):
+        assert main.run(command(url, eyes, "n-angle")) == 0
+        tip, before = simulator.world.tips[1], simulator.machine.tools.get(1)
+        simulator.world.tips[1] = replace(tip, x_mm=tip.x_mm + 0.4, y_mm=tip.y_mm - 0.3)
+        killed_in_its_proof(simulator, command(url, eyes, method))
+        new = simulator.machine.tools.get(1)
+        assert new != before
+        written = []
+
+        def watched(_number, request):
+            written.extend([request] if "TLSet 1, XY" in request else [])
+
+        with simulator.lock:
+            simulator.on_request = watched
+        hand = ScreenHand(["-c", url, "recover", "--take-over", "it was killed"], simulator)
+        try:
+            assert chosen_and_tested(hand) == CONTACTS[method]
+            assert hand.end() == 0, hand.text
+        finally:
+            hand.close()
+        assert simulator.machine.tools.get(1) == new
+        assert written == [], "the value is there already"
+        assert simulator.machine.tools.selected == 1
+    assert open_journal().open_markers() == ()

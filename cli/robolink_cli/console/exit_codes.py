@@ -36,9 +36,9 @@ _ENDINGS: Final = {
 MEANINGS: Final[dict[int, str]] = {
     DONE: "done",
     DIFFERENT: (
-        "`tool compare` found a difference; `journal verify` found a damaged record; something "
-        "stands out in `journal drift`; `cell doctor`, `cell ports` or `cell check` found "
-        "something to see to"
+        "`tool compare` found a difference; `journal verify` found a damaged record; `journal drift` "
+        "found something that stands out; `cell doctor`, `cell ports` or `cell check` found "
+        "something that needs attention"
     ),
     USAGE: "the command, a file, a setting, the journal or an installed package is wrong",
     3: "the controller is not reached, or the link broke",
@@ -50,7 +50,7 @@ MEANINGS: Final[dict[int, str]] = {
     9: "a person said no, or was not there to say yes",
     10: "a stop ended it",
     BUG: "a defect in robolink",
-    HUNG_UP: "the window was closed, or the line to it is gone (SIGHUP)",
+    HUNG_UP: "the window was closed, or the connection to it was lost (SIGHUP)",
     INTERRUPTED: "interrupted (Ctrl-C)",
     READER_LEFT: "whoever read the output has left",
     TERMINATED: "terminated (SIGTERM)",
@@ -162,7 +162,7 @@ def _ending_in_words(by: EndedBy) -> str:
     if by is EndedBy.TERMINATED:
         return tr("Terminated (SIGTERM).")
     if by is EndedBy.HUNG_UP:
-        return tr("The window was closed, or the line to it is gone (SIGHUP).")
+        return tr("The window was closed, or the connection to it was lost (SIGHUP).")
     if by is EndedBy.OUTPUT_CLOSED:
         return tr("Nobody reads the output any more, so the command was ended.")
     return tr("You stopped it (Ctrl-C).")

@@ -1,6 +1,7 @@
 """Thousands of simulated EPSON controllers on real sockets, served by one process.
 
-Two thousand are opened; a client logs in to each and asks it once. Then a thousand are asked by a
+Two thousand are opened; a client logs in to each and asks it once. As many are served by
+``robolink sim run``. Then a thousand are asked by a
 client in a process of its own, each again as soon as it has answered, by one selector and nothing
 else: what is measured is the simulators. Where there are two CPUs each side has one.
 """
@@ -19,6 +20,7 @@ from typing import Any, Final
 from urllib.parse import urlsplit
 
 from benchmarks.links.served_fleet import allow_descriptors
+from benchmarks.links.sim_run import measure_sim_run
 from benchmarks.table import Amount, Figure
 
 OPENED: Final = 2_000
@@ -57,6 +59,7 @@ def measure_fleet() -> Iterator[Figure]:
     ):
         floor = Amount(limit, value.unit)
         yield Figure(name, value, wanted, floor, value.value / limit, 1.0)
+    yield from measure_sim_run(OPENED, WANTED_OPEN_S, WANTED_KIB)
     load = measured_load(ASKED, SECONDS)
     rate = (Amount(load.per_s, "/s"), wanted, Amount(WANTED_PER_S, "/s"))
     yield Figure(f"exchanges over {ASKED} connections", *rate, WANTED_PER_S / load.per_s, 1.0)

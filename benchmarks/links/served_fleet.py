@@ -31,9 +31,9 @@ def main(count: int) -> None:
             host.close()
 
 
-def resident_kib() -> float:
-    """Return how much memory of this process is resident, by the kernel's own account."""
-    with open("/proc/self/smaps_rollup", encoding="ascii") as lines:
+def resident_kib(pid: int | str = "self") -> float:
+    """Return how much memory of a process is resident, by the kernel's own account."""
+    with open(f"/proc/{pid}/smaps_rollup", encoding="ascii") as lines:
         return float(next(line for line in lines if line.startswith("Rss:")).split()[1])
 
 

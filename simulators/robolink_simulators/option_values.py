@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
+from functools import lru_cache
 from typing import Any, Final, Literal, get_args, get_origin, get_type_hints
 
 from robolink.errors import ConfigError
@@ -44,9 +45,16 @@ def values_from_text(
     Raises:
         ConfigError: A value does not fit its field.
     """
-    hints = get_type_hints(options)
+    if not pairs:
+        return {}
+    hints = _hints(options)
     names = [field.name for field in fields(options) if prefix + field.name in pairs]
     return {name: _value(prefix + name, pairs[prefix + name], hints[name]) for name in names}
+
+
+@lru_cache(maxsize=16)
+def _hints(options: type) -> Mapping[str, Any]:
+    return get_type_hints(options)
 
 
 def _value(name: str, text: str, hint: Any) -> object:  # noqa: ANN401 - a type annotation

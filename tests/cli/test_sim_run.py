@@ -6,12 +6,14 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 from robolink_cli import main
 from robolink_cli.commands.simulate.run.cells_file import KINDS, read_cells
 from robolink_cli.commands.simulate.run.declared_keys import DeclaredKeys
+from robolink_cli.commands.simulate.run.running import made
 from robolink_cli.commands.simulate.sim import sim
 from robolink_simulators.control.client import ControlClient
 
@@ -289,3 +291,17 @@ def test_in_the_background_they_end_with_the_shell_that_started_them(file, tmp_p
     os.kill(pid, 0)
     shell.communicate("\n")
     assert ended(pid)
+
+
+def test_a_cell_of_a_file_is_made_when_it_is_first_used(file):
+    text = HEAD + '[cells.many]\nkind = "epson"\ntcp = "127.0.0.1:0"\nrobot = "C8-C901S,T6-602S"\n'
+    (cell,) = read_cells(file(text), sim.commands)
+    (simulator,) = made([cell]).values()
+    with ExitStack() as stack:
+        served = cell.kind.serve(stack, simulator, cell.given, person=cell.assist)
+        document = served.document("http://127.0.0.1:1")
+        assert document["robot"] == "C8-C901S"
+        assert "machine" not in vars(simulator)
+        with robolink.connect(str(document["url"])) as controller:
+            controller.status()
+        assert vars(simulator)["machine"].model.name == document["robot"]

@@ -262,6 +262,11 @@ class EpsonSimulator(TimeStepping):
         """See :attr:`~robolink_simulators.device.hosted.HostedDevice.machine_name`."""
         return " ".join((self.kind, *(model.name for model in self._models)))
 
+    @property
+    def robot_name(self) -> str:
+        """Name of the model of robot 1; to ask for it makes nothing."""
+        return self._models[0].name
+
     def counters(self) -> dict[str, int]:
         """See :meth:`~robolink_simulators.device.hosted.HostedDevice.counters`."""
         return {

@@ -8,6 +8,7 @@ tests run with each). Evidence marks: [D] document, [R] transcript of a real con
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Final, Literal
 
@@ -353,6 +354,13 @@ def options_from_text(pairs: Mapping[str, str]) -> EpsonOptions:
     Raises:
         ConfigError: An option is unknown, or a value does not fit it.
     """
+    return _options(tuple(sorted(pairs.items())))
+
+
+@lru_cache(maxsize=64)
+def _options(in_order: tuple[tuple[str, str], ...]) -> EpsonOptions:
+    """Make them once for all controllers with the same ones: thousands of a fleet."""
+    pairs = dict(in_order)
     require_known(pairs, option_names(), kind="EPSON")
     numbers = values_from_text(SpelNumbers, pairs, prefix=_NUMBERS)
     own = values_from_text(EpsonOptions, pairs)

@@ -59,7 +59,7 @@ def make_epson(
         password=password_in(password_env),
         options=habits(options, profile),
         state_path=state,
-        world=world_from(world),
+        world=world_from(world) if world else None,  # which need not be made to be judged
     )
     surroundings = ProjectSurroundings(vision, lines, folder)
     load_programs(simulator, programs, points, surroundings, cell=cell)
@@ -89,14 +89,14 @@ def _place(
 
 
 def _title(simulator: EpsonSimulator) -> str:
-    robot, seed = simulator.machine.model.name, simulator.seed
+    robot, seed = simulator.robot_name, simulator.seed
     return tr("SIMULATED EPSON {robot} (seed {seed}). No robot moves.", robot=robot, seed=seed)
 
 
 EPSON_KIND: Final = SimulatedKind(
     make_epson,
     _place,
-    lambda simulator: {"robot": simulator.machine.model.name},
+    lambda simulator: {"robot": simulator.robot_name},
     _title,
 )
 """``sim epson``."""

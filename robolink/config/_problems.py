@@ -71,7 +71,7 @@ def _sentence(
 def _unknown(key: str, known: Sequence[str]) -> str:
     if _SECRET.search(key):
         return tr(
-            "looks like a password, which never stands in a cell file; name a password_file that "
-            "only you can read, or a password_env"
+            "looks like a password, and a cell file must not hold one; name a "
+            "password_file that only you can read, or a password_env"
         )
     return is_not_known(key, known)

@@ -193,8 +193,8 @@ def _remarks(found: Identity, meeting: _Meeting) -> tuple[str, ...]:
     if not (found.own or meeting.before):
         said.append(
             tr(
-                "{address} does not say who it is, so it is known by its address: {name}. "
-                "Another controller at that address would be taken for it.",
+                "{address} does not say who it is, so it is known by its address: "
+                "{name}. Another controller at that address would be mistaken for it.",
                 address=found.address,
                 name=found.name,
             )

@@ -157,12 +157,12 @@ def left_unverified(tools: Sequence[int], *, marked: bool) -> str:
     numbers = ", ".join(map(str, tools))
     if not marked:
         return tr(
-            "Tool {numbers} may hold the new value, which nobody verified; 'robolink recover' "
-            "reads what it holds.",
+            "Tool {numbers} may hold the new value, which was never tested; 'robolink "
+            "recover' reads what it holds.",
             numbers=numbers,
         )
     return tr(
-        "Tool {numbers} may hold the new value, which nobody verified; 'robolink recover' "
-        "puts the old one back.",
+        "Tool {numbers} may hold the new value, which was never tested; 'robolink "
+        "recover' puts the old one back.",
         numbers=numbers,
     )

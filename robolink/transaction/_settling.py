@@ -69,7 +69,7 @@ class Settler:
             done = _finding(marker, Verdict.DONE, text, steps, now)
             return replace(done, entries=(*done.entries, *kept_later(marker, now)))
         if all(new):
-            text = tr("{holds} Written, but nobody verified it.", holds=sentence)
+            text = tr("{holds} Written, but never tested.", holds=sentence)
         else:
             text = tr("{holds} Written, but the change is not complete.", holds=sentence)
         numbers = ", ".join(

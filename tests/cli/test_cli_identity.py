@@ -37,7 +37,7 @@ def test_the_other_spelling_is_said_once_and_shows_what_is_open(served, capsys):
     simulator.machine.tools.select(0)
     code, _, err = run(capsys, "-c", by_name, "status")
     assert code == 0
-    assert f"{by_name} leads to epson:" in err
+    assert f"{by_name} is epson:" in err
     assert "calibration of tool 1" in err
     assert "one controller, one record" not in run(capsys, "-c", by_name, "status")[2]
     stood = simulator.machine.tip()

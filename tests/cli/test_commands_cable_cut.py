@@ -38,7 +38,7 @@ def check(cell: NozzleCell, nth: int) -> bool:
     assert cell.simulator.machine.arm.moves_started <= nth
     cell.check_nothing_else_was_written()
     if cell.simulator.machine.flash_writes:
-        assert "Tool 1 may hold the new value, which nobody verified" in cut.err
+        assert "Tool 1 may hold the new value, which was never tested" in cut.err
     check_the_next_command_says_what_is_left(cell, unknown=moving == [True])
     check_motion_is_blocked_until_recovered(cell)
     assert cell.moves_requested == nth + 1

@@ -70,8 +70,8 @@ REFUSED = entry(
 BACK = entry(EntryKind.ROLLED_BACK, "The old value was written back.", **VALUES, value=OLD)
 
 ENDS = {
-    "verified": ((CALIBRATION, *WRITTEN, PASSED, DONE), "Written, read back and verified"),
-    "written": ((*WRITTEN, DONE), "Written and read back, not verified"),
+    "verified": ((CALIBRATION, *WRITTEN, PASSED, DONE), "Written, read back and tested"),
+    "written": ((*WRITTEN, DONE), "Written and read back, not tested"),
     "skipped": ((CALIBRATION, DONE), "Stored already, nothing was written"),
     "proposed": ((CALIBRATION,), "A proposal, nothing was written"),
     "declined": ((CALIBRATION, DECLINED), "Declined, nothing was written"),

@@ -85,7 +85,7 @@ def test_a_write_from_poses_is_reported(command, tmp_path):
     check_numbers(page, document["impact"])
     for value in [*document["before"].values(), *document["proposed"].values()]:
         assert f'<data value="{float(value)!r}">' in page
-    assert "Written and read back, not verified" in page
+    assert "Written and read back, not tested" in page
     assert "It was not proved by turning about the new tip." in page
     assert "typed poses; taught with tool 0" in page
 
@@ -180,7 +180,7 @@ def test_a_live_calibration_is_reported_with_its_drifts(simulator, capsys, tmp_p
     page = page_of(tmp_path / "page.html")
     assert (code, document["report"]) == (0, "page.html")
     check_numbers(page, document["impact"])
-    assert "Written, read back and verified" in page
+    assert "Written, read back and tested" in page
     for drift in document["verification"]["drifts"]:
         assert f'<data value="{drift["distance_mm"]!r}">' in page
 

@@ -218,7 +218,7 @@ def test_at_a_desk_the_page_shows_what_is_read_and_marks_nothing(cell, answer, c
     assert desk.asked == ["Look at the robot: which needle is mounted?", *listed]
     page = next(one for one in desk.pages if isinstance(one, ChoiceSubject))
     assert page.marked is None
-    assert any("Written, but nobody verified it." in row for row in page.above)
+    assert any("Written, but never tested." in row for row in page.above)
     assert len(page.options) == 3
     assert page.options[1] == "The new one. Make the turn test, then keep the new value."
     if listed:

@@ -5,9 +5,11 @@ from html.parser import HTMLParser
 
 import pytest
 
+from robolink import messages
 from robolink.calibration import Drift, VerifyResult, impact_on
 from robolink.errors import ConfigError
 from robolink.files.named import require_free
+from robolink.locale.languages import speak
 from robolink.model import ControllerFacts, Hand, Pose, ToolOffset
 from robolink.report import Outcome, Report, render, save
 
@@ -215,8 +217,8 @@ def test_points_that_cannot_be_judged_are_counted_and_named():
 
 
 OUTCOMES = {
-    Outcome.VERIFIED: "Written, read back and verified",
-    Outcome.WRITTEN: "Written and read back, not verified",
+    Outcome.VERIFIED: "Written, read back and tested",
+    Outcome.WRITTEN: "Written and read back, not tested",
     Outcome.SKIPPED: "Stored already, nothing was written",
     Outcome.PROPOSED: "A proposal, nothing was written",
     Outcome.DECLINED: "Declined, nothing was written",
@@ -240,6 +242,24 @@ def test_the_drifts_are_shown_with_what_is_allowed():
     page = Page(render(report(verification=VerifyResult(drifts, 0.2))))
     assert "Failed: 0.500 mm off at most, limit 0.200 mm." in page.text
     assert "90.000 0.300 -0.400 0.500" in page.text
+
+
+def test_a_page_names_its_language_and_keeps_its_figures_whole_in_it():
+    drifts = (Drift(90, 0.1, 0.0), Drift(0, 0.01, 0.0))
+    shown = report(verification=VerifyResult(drifts, 0.2))
+    english = render(shown)
+    speak("zh")
+    try:
+        chinese = render(shown)
+    finally:
+        messages.install(None)
+    for page, language, verdict in (
+        (english, "en", "Passed: "),
+        (chinese, "zh-CN", "\u901a\u8fc7\uff1a"),
+    ):
+        assert f'<html lang="{language}">' in page
+        assert verdict in page
+        assert '<data value="0.1">0.100</data> mm' in page
 
 
 def test_a_file_is_written_over_only_when_told(tmp_path):

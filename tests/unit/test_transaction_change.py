@@ -182,7 +182,7 @@ def test_a_link_that_is_gone_leaves_the_change_to_recover(cell):
     with cell.connected() as controller:
         with pytest.raises(OutcomeUnknownError) as lost:
             change_tools(controller, wanted(1, 2), tell=told.append)
-    sentence = "Tool 1, 2 may hold the new value, which nobody verified; 'robolink recover' puts"
+    sentence = "Tool 1, 2 may hold the new value, which was never tested; 'robolink recover' puts"
     assert sentence in lost.value.remedy
     assert sentence in told[0]
     kinds = {marker.kind for _, marker in cell.journal.open_markers()}

@@ -65,8 +65,8 @@ def require_within_reach(poses: Sequence[Pose], robot: RobotReach) -> None:
     if max(radii) < robot.least_mm:
         raise _suspect(
             tr(
-                "All positions lie within {radius:.3f} mm of the base axis, where this robot "
-                "cannot stand.",
+                "All positions are within {radius:.3f} mm of the base axis, where "
+                "this robot cannot reach.",
                 radius=max(radii),
             )
         )

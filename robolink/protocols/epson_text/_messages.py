@@ -181,7 +181,7 @@ def _write_fields(reply: Reply, encoding: str) -> bytes:
     if not reply.fields or payload.count(",") != len(reply.fields) - 1:
         raise _unsendable(reply, tr("it needs at least one field, and no comma in any"))
     if payload.startswith(_QUOTE) or _breaks_line(payload):
-        raise _unsendable(reply, tr("a quote or a line end would be taken for a frame"))
+        raise _unsendable(reply, tr("a quote or a line end would be mistaken for a frame"))
     return _encoded(reply, f"#{reply.name},{payload}", encoding)
 
 

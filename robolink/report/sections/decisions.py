@@ -66,8 +66,8 @@ def limits_rule(report: Report) -> str:
     if not report.judgements:
         return ""
     return tr(
-        "Decision rule of the limits: what is found is compared with what is allowed as it stands; "
-        "one that is exceeded refuses the measurement."
+        "Decision rule of the limits: what is found is compared directly with what is "
+        "allowed; the measurement is refused when one of them is exceeded."
     )
 
 

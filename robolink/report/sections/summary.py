@@ -141,8 +141,8 @@ def _gauges(reports: Sequence[Report]) -> Iterator[tuple[str, str]]:
 
 def _verdict(outcome: Outcome) -> str:
     return {
-        Outcome.VERIFIED: tr("Written, read back and verified"),
-        Outcome.WRITTEN: tr("Written and read back, not verified"),
+        Outcome.VERIFIED: tr("Written, read back and tested"),
+        Outcome.WRITTEN: tr("Written and read back, not tested"),
         Outcome.SKIPPED: tr("Stored already, nothing was written"),
         Outcome.PROPOSED: tr("A proposal, nothing was written"),
         Outcome.DECLINED: tr("Declined, nothing was written"),

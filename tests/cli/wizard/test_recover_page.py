@@ -16,6 +16,7 @@ import pytest
 from robolink_cli import main
 from robolink_simulators.assist.port import serve_assist
 from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.cell.tip_switches import TouchPlate
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
@@ -26,7 +27,7 @@ from tests.cli.wizard._screen import ScreenHand
 pytestmark = [pytest.mark.simulator_only, pytest.mark.soak, pytest.mark.timeout(300)]
 
 FULL = ("n-angle", "--station", "PIN-07", "--count", "3")
-METHODS = {"n-angle": FULL, "one-touch": ("one-touch", "--station", "PIN-07")}
+METHODS = {"n-angle": FULL, "one-touch": ("one-touch", "--station", "PIN-07"), "z-touch": ()}
 
 
 @contextmanager
@@ -37,12 +38,22 @@ def served():
         yield simulator, host.url, eyes.url
 
 
-CONTACTS = {"n-angle": 3, "one-touch": 2}
-"""One that shows where the tip is, and the angles of the test."""
+CONTACTS = {"n-angle": 3, "one-touch": 2, "z-touch": 0}
+"""One that shows where the tip is, and the angles of the test; none where a sensor sees it."""
 
 
 def command(url, eyes, method):
-    return ["-c", url, "calibrate", *METHODS[method], "--tool", "1", "--assist", eyes, "--yes"]
+    person = () if method == "z-touch" else ("--assist", eyes)
+    return ["-c", url, "calibrate", *METHODS[method], "--tool", "1", *person, "--yes"]
+
+
+def with_a_plate(simulator):
+    """Put a plate beside the tip that switches an input; return the words that say where it is."""
+    x_mm, y_mm, z_mm = simulator.world.tip_mm()
+    plate = (x_mm - 5.0, y_mm + 5.0, z_mm - 7.0)
+    simulator.world.connect(5, TouchPlate(plate[2]))
+    at = ",".join(f"{value:.3f}" for value in plate)
+    return ("z-touch", "--station", "PLATE", "--at", at, "--input", "5", "--no-retake")
 
 
 def killed_in_its_proof(simulator, words):
@@ -94,9 +105,13 @@ def chosen_and_tested(hand):
 def test_the_new_needle_is_chosen_tested_and_kept(method, tmp_path, monkeypatch):
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
     with served() as (simulator, url, eyes):
-        assert main.run(command(url, eyes, "n-angle")) == 0
+        monkeypatch.setitem(METHODS, "z-touch", with_a_plate(simulator))
+        if method == "one-touch":
+            assert main.run(command(url, eyes, "n-angle")) == 0
         tip, before = simulator.world.tips[1], simulator.machine.tools.get(1)
-        simulator.world.tips[1] = replace(tip, x_mm=tip.x_mm + 0.4, y_mm=tip.y_mm - 0.3)
+        simulator.world.tips[1] = replace(
+            tip, x_mm=tip.x_mm + 0.4, y_mm=tip.y_mm - 0.3, z_mm=tip.z_mm - 0.3
+        )
         killed_in_its_proof(simulator, command(url, eyes, method))
         new = simulator.machine.tools.get(1)
         assert new != before

@@ -15,6 +15,7 @@ from prompt_toolkit.application import Application
 from prompt_toolkit.input import Input, create_input
 from prompt_toolkit.input.typeahead import clear_typeahead
 from prompt_toolkit.key_binding import KeyBindings, KeyPress, KeyPressEvent
+from prompt_toolkit.keys import Keys
 from prompt_toolkit.layout import FormattedTextControl, Layout, Window
 from prompt_toolkit.output import Output, create_output
 
@@ -151,8 +152,10 @@ class FullFace:
         if not self._state.has_field or self._state.writing is not None or more.strip("\n"):
             self._happens(TooFast())
             return
-        for key in (*line, *(["c-m"] if ends else [])):
-            self._press(key, key)
+        for key in line:
+            self._press(key, KeyPress(key))
+        if ends:
+            self._press(Keys.ControlM.value, KeyPress(Keys.ControlM))
 
     def _fills(self, key: str, text: str) -> bool:
         """Tell whether a key goes into the field at once; what writes goes through the gate."""

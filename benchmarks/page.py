@@ -31,14 +31,16 @@ TITLES: Final = {
 NOTES: Final = {
     "fleet": "Controllers are made when they are first used, so opening them is cheap; both states"
     "\nare shown. The client is a bare selector in a process of its own.",
-    "virtual-time": "The real driver, every check, a record in memory: a change is some 590 exchanges with the"
-    "\nsimulated controller and 25 movements, of which each is announced, limited, watched and"
-    "\nrecorded as on a real robot. The wanted figures come from toy cells that ask once a simulated"
-    "\nsecond. Of the exchanges 223 ask for the status, 78 for the tool in force, and some 190 set or"
-    "\nread back power, speed and motors before a movement; what is promised before each movement"
-    "\nrests on them, so all are sent. By a profile the simulated controller takes half of the time"
-    "\n(a tenth of all: reading 26 statements that are new each time), the protocol at both ends an"
-    "\neighth, the driver a tenth, the record a twentieth; no part stands out.",
+    "virtual-time": "The real driver, every check, a record in memory: a change is some 590"
+    "\nexchanges with the simulated controller and 25 movements, of which each is"
+    "\nannounced, limited, watched and recorded as on a real robot. The wanted"
+    "\nfigures come from toy cells that ask once a simulated second. Of the"
+    "\nexchanges 223 ask for the status, 78 for the tool in force, and some 190 set"
+    "\nor read back power, speed and motors before a movement; what is promised"
+    "\nbefore each movement rests on them, so all are sent. By a profile the"
+    "\nsimulated controller takes half of the time (a tenth of all: reading 26"
+    "\nstatements that are new each time), the protocol at both ends an eighth, the"
+    "\ndriver a tenth, the record a twentieth; no part stands out.",
 }
 """What has to be known to read the figures of a case."""
 

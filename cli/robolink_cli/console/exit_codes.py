@@ -36,9 +36,9 @@ _ENDINGS: Final = {
 MEANINGS: Final[dict[int, str]] = {
     DONE: "done",
     DIFFERENT: (
-        "`tool compare` found a difference; `journal verify` found a damaged record; `journal "
-        "drift` shows something conspicuous; `cell doctor`, `cell ports` or `cell check` found "
-        "something to see to"
+        "`tool compare` found a difference; `journal verify` found a damaged record; "
+        "`journal drift` shows something conspicuous; `cell doctor`, `cell ports` or "
+        "`cell check` found something to see to"
     ),
     USAGE: "the command, a file, a setting, the journal or an installed package is wrong",
     3: "the controller was not reached, or the link broke",

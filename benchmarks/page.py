@@ -29,6 +29,11 @@ TITLES: Final = {
 }
 
 NOTES: Final = {
+    "transaction": "Both sides make two durable commits. In ours each holds what a recovery needs:"
+    "\nmarker, lease, head of the chain, entries and their indexes; that is 27 KiB of"
+    "\nthe write-ahead file in place of 8. In memory (the least of 1,500 writes) a"
+    "\nwrite takes 0.39 ms of the processor: the record 0.22, the three exchanges 0.04,"
+    "\nvalues, checks and comparisons the rest.",
     "fleet": "Controllers are made when they are first used, so opening them is cheap; both states"
     "\nare shown. The client is a bare selector in a process of its own.",
     "virtual-time": "The real driver, every check, a record in memory: a change is some 550"
@@ -36,6 +41,10 @@ NOTES: Final = {
     "\nlimited, watched and recorded as on a real robot. The wanted figures come from toy cells"
     "\nthat ask once a simulated second; the time of a change is spread over driver, protocol,"
     "\nsimulator and record, and no part of it stands out.",
+    "solvers": "Where lstsq with covariance is the floor, it begins with arrays. A calibration"
+    "\nis given poses with a hand, a tool and a local each: of 1,000 poses on four"
+    "\naxes, to read and compare these takes 115 us, a quarter of the whole. Either"
+    "\nside uses one thread, and the two are measured a pair at a time.",
 }
 """What has to be known to read the figures of a case."""
 

@@ -89,26 +89,26 @@ def in_english(text: str) -> str:
 
 def plain(value: object) -> object:
     """Return plain values, mappings and lists with every sentence in them in English."""
-    if type(value) in _AS_THEY_ARE:  # most of a record, and far quicker than what follows
+    kind = type(value)
+    if kind in _AS_THEY_ARE:  # most of a record, and far quicker than what follows
         return value
     match value:
         case str():
             return in_english(value)
         case Mapping():
-            return {key: plain(one) for key, one in value.items()}
+            return {
+                key: one if type(one) in _AS_THEY_ARE else plain(one) for key, one in value.items()
+            }
         case list() | tuple():
-            return type(value)([plain(one) for one in value]) if _is_bare(value) else value
+            if kind not in (list, tuple):  # a class of one's own, such as a named tuple
+                return value
+            return kind([one if type(one) in _AS_THEY_ARE else plain(one) for one in value])
         case _:
             return value
 
 
 _AS_THEY_ARE: Final = frozenset({str, float, int, bool, type(None)})
 """Types of values that no language changes; a sentence is a type of its own."""
-
-
-def _is_bare(value: object) -> bool:
-    """Tell a list or tuple from a class of one's own, such as a named tuple."""
-    return type(value) in (list, tuple)
 
 
 def _translated(

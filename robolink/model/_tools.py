@@ -15,6 +15,8 @@ _MOST: Final = 1e9
 """Beyond what any tool has in any unit, rounding included. A round number whose words are in
 another order is far below; of any other one in six lies in between."""
 
+_NUMBERS: Final = frozenset({float, int})
+
 _COMPONENTS: Final = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
 
 
@@ -36,7 +38,10 @@ class ToolOffset:
     w_deg: float = 0.0
 
     def __post_init__(self) -> None:
-        for name, value in zip(_COMPONENTS, self.components(), strict=True):
+        values = self.components()
+        if _NUMBERS.issuperset(map(type, values)) and all(map(math.isfinite, values)):
+            return  # nearly always; what is another kind of number is looked at one by one
+        for name, value in zip(_COMPONENTS, values, strict=True):
             if not isinstance(value, (int, float)) or not math.isfinite(value):
                 raise ConfigError(
                     tr("{name} is not a number: {value!r}.", name=name, value=value),

@@ -88,12 +88,12 @@ def require_answers(answers: Answers, recipe: Recipe) -> None:
     """Refuse, before anything is sent, to run where a question would find nobody.
 
     Raises:
-        ConfigError: Names what is missing.
+        DeclinedError: Nobody is there to say it; names what is missing.
     """
     options = ", ".join(dict.fromkeys(answers.missing(recipe)))
     if options:
-        raise ConfigError(
-            tr("The recipe asks questions, and nobody can be asked here."),
+        raise DeclinedError(
+            tr("The recipe asks questions, but there is nobody to ask."),
             remedy=tr("Run it on a terminal, or answer beforehand: {options}.", options=options),
         )
 

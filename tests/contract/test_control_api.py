@@ -9,6 +9,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
+from robolink_cli import main
 from robolink_simulators.cell.clock import SteeredClock
 from robolink_simulators.control import server as served_api
 from robolink_simulators.control.acts.registry import ACTS
@@ -138,6 +139,15 @@ def test_an_answer_is_lost_as_often_as_was_asked_for(at, cells, monkeypatch, tmp
     assert control.do("log", after=asked[0]["number"])["lines"][0]["number"] > asked[0]["number"]
     assert control.do("clear_faults")["pending"] == []
     assert simulator.faults.pending == ()
+
+
+def test_sim_ctl_does_an_act_from_a_shell(cells, at, capsys):
+    control, _ = at("a")
+    control.do("set_clock", factor=0)
+    then = control.do("clock")["simulated_s"]
+    assert main.run(["sim", "ctl", "--at", cells.url_of("a"), "step", "seconds=2", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["simulated_s"] == pytest.approx(then + 2)
+    assert control.do("clock")["simulated_s"] == pytest.approx(then + 2)
 
 
 def test_time_is_paused_stepped_and_hastened(at):

@@ -6,7 +6,7 @@ name that is damaged it would block nobody, so whoever is about to change someth
 """
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from hashlib import sha256
 from typing import Final, NamedTuple
 
@@ -77,16 +77,17 @@ class MarkerRows:
             "request": storable(marker.request),
             "begun_at": storable(marker.begun_at),
         }
+        # As it will be read: other keys and numbers than JSON's are told apart no more.
+        details = json.loads(canonical(plain(marker.details)))
         stored = _Stored(
             controller=values["of_controller"],
             operation=values["of_operation"],
             kind=values["kind"],
             request=values["request"],
             begun_at=values["begun_at"],
-            # As it will be read: other keys and numbers than JSON's are told apart no more.
-            details=canonical(json.loads(canonical(plain(marker.details)))),
+            details=canonical(details),
         )
-        values["details"] = _with_sum(stored)
+        values["details"] = _with_sum(stored, details)
         if self._runner.run(_INSERT, values):
             return True
         self._runner.run(_UPDATE, values)
@@ -104,9 +105,9 @@ class MarkerRows:
         """
         for row in self._runner.rows(_SELECT, {"of_controller": storable(controller)}):
             old = _Stored(*row)
-            details = canonical(_marker(old).details)
-            new = old._replace(controller=storable(to), details=details)
-            values = {**_same(old.controller, old.operation), "details": _with_sum(new)}
+            details = _marker(old).details
+            new = old._replace(controller=storable(to), details=canonical(details))
+            values = {**_same(old.controller, old.operation), "details": _with_sum(new, details)}
             self._runner.run(_RENAME, {**values, "to_controller": new.controller})
 
     def of(self, *names: str) -> tuple[Marker, ...]:
@@ -151,9 +152,9 @@ def _marker(row: _Stored) -> Marker:
     return Marker(row.operation, kind, row.request, row.begun_at, details)
 
 
-def _with_sum(row: _Stored) -> str:
-    """Return the details of a marker, which have no checksum yet, with one."""
-    return canonical({**json.loads(row.details), _SUM: _sum_of(row)})
+def _with_sum(row: _Stored, details: Mapping[str, object]) -> str:
+    """Return the details of a marker, which its row holds without a checksum, with one."""
+    return canonical({**details, _SUM: _sum_of(row)})
 
 
 def _sum_of(fields: Sequence[str]) -> str:

@@ -50,9 +50,9 @@ MEANINGS: Final[dict[int, str]] = {
     9: "a person said no, or was not there to say yes",
     10: "a stop ended it",
     BUG: "a defect in robolink",
-    HUNG_UP: "the window was closed, or the line to it is gone (SIGHUP)",
+    HUNG_UP: "the window was closed, or the connection to it was lost (SIGHUP)",
     INTERRUPTED: "interrupted (Ctrl-C)",
-    READER_LEFT: "whoever read the output has left",
+    READER_LEFT: "the program that read the output has ended",
     TERMINATED: "terminated (SIGTERM)",
 }
 """What each exit code says; docs/exit-codes.md has the same table."""

@@ -80,3 +80,31 @@ def wall_time() -> "datetime":
     from datetime import UTC, datetime  # as above
 
     return datetime.fromtimestamp(ambient.wall_s(), UTC)
+
+
+def local_label(at: str) -> str:
+    """Return a wall-clock label as the clock on the wall shows it: ``2026-11-23 14:58 (UTC+1)``.
+
+    For screens only: records keep UTC.
+
+    Args:
+        at: ISO 8601 with its zone; what is none, as in a damaged record, is returned as it is.
+
+    Example:
+        >>> from robolink.timing import local_label
+        >>> local_label("unknown")
+        'unknown'
+    """
+    from datetime import datetime, timedelta  # as above
+
+    try:
+        local = datetime.fromisoformat(at)
+        if local.tzinfo is None:
+            return at
+        local = local.astimezone()
+    except (ValueError, OverflowError, OSError):  # Windows knows no zone before 1970
+        return at
+    minutes = (local.utcoffset() or timedelta()) // timedelta(minutes=1)
+    hours, rest = divmod(abs(minutes), 60)
+    ahead = f"{'-' if minutes < 0 else '+'}{hours}" if minutes else ""
+    return f"{local:%Y-%m-%d %H:%M} (UTC{ahead}{f':{rest:02d}' if rest else ''})"

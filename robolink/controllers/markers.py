@@ -23,7 +23,7 @@ from robolink.messages import tr
 from robolink.model import Ledger, Marker, MarkerKind, NewEntry, OutcomeLog, new_operation
 from robolink.standing import note_standing
 from robolink.stop_latch import StopLatch
-from robolink.timing import wall_label
+from robolink.timing import local_label, wall_label
 
 _PROCEDURES: Final = frozenset({MarkerKind.SELECTION, MarkerKind.CHANGE})
 
@@ -196,7 +196,7 @@ class MarkerStore:
                     "finish.",
                     request=request,
                     earlier=marker.request,
-                    when=marker.begun_at,
+                    when=local_label(marker.begun_at),
                 ),
                 remedy=tr("Next: 'robolink recover'. The robot stays blocked until then."),
                 controller=self._identity,

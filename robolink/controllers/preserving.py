@@ -22,6 +22,7 @@ from robolink.model import (
     ToolTable,
     Verdict,
 )
+from robolink.timing import local_label
 from robolink.ways import Way, way
 
 
@@ -148,7 +149,7 @@ def tool_before(marker: Marker) -> int:
 def not_understood(marker: Marker) -> ConfigError:
     """Return the error for the marker of a procedure that something else has written."""
     return ConfigError(
-        tr("What was left unfinished at {when} cannot be read.", when=marker.begun_at),
+        tr("What was left unfinished at {when} cannot be read.", when=local_label(marker.begun_at)),
         remedy=tr("Select the right tool by hand, then {forget}.", forget=way(Way.FORGET_MARKER)),
     )
 

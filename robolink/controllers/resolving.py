@@ -18,6 +18,7 @@ from robolink.model import (
     put_right,
     read_offset,
 )
+from robolink.timing import local_label
 from robolink.ways import Way, way
 
 _KINDS = {
@@ -134,7 +135,10 @@ class MarkerResolver:
         if "tool" in marker.details:
             return examine_write(self._tools, marker)
         raise ConfigError(
-            tr("What was left unfinished at {when} cannot be read.", when=marker.begun_at),
+            tr(
+                "What was left unfinished at {when} cannot be read.",
+                when=local_label(marker.begun_at),
+            ),
             remedy=tr("Look at the controller, then {forget}.", forget=way(Way.FORGET_MARKER)),
         )
 

@@ -20,6 +20,7 @@ from robolink.model import (
     ToolOffset,
 )
 from robolink.stations import find_stations
+from robolink.timing import local_label
 from robolink.transaction import changed_since
 
 
@@ -111,7 +112,7 @@ def _unsettled(controller: Controller) -> Iterator[InspectionFinding]:
             marker.operation[:8],
             tr(
                 "Not finished since {when}: {request}.",
-                when=marker.begun_at,
+                when=local_label(marker.begun_at),
                 request=marker.request,
             ),
             tr("Next: robolink recover"),

@@ -8,6 +8,7 @@ from robolink.errors import LeaseHeldError
 from robolink.journal._processes import LeaseHolder
 from robolink.messages import tr
 from robolink.model import EntryKind, NewEntry
+from robolink.timing import local_label
 
 LEASE_S: Final = 10.0
 """A holder that gave no sign of life for so long may be replaced."""
@@ -58,7 +59,7 @@ class LeaseSighting:
                 "{sign}.",
                 holder=describe(self.who()),
                 controller=controller,
-                since=self.taken_at,
+                since=local_label(self.taken_at),
                 purpose=self.purpose,
                 sign=last_sign,
             ),
@@ -79,7 +80,7 @@ class LeaseSighting:
         said = tr(
             "{holder} has been at work on this controller since {since}: {purpose}.",
             holder=describe(self.who()),
-            since=self.taken_at,
+            since=local_label(self.taken_at),
             purpose=self.purpose,
         )
         return f"{said} {alive}"

@@ -168,7 +168,7 @@ def verify_on_surface(
         CalibrationError: ``not_tilted``, and ``not_touched`` or ``typed_ahead`` with the tip drawn
             back.
     """
-    drive = SurfaceDrive(plan, over, SurfaceTouches(plan, proof=True))
+    drive = SurfaceDrive(plan, over, SurfaceTouches(plan, limit_mm=tolerance_mm))
     proof = SurfaceProof(over.pose(UPRIGHT, 0.0), tolerance_mm, u_mm)
     said = tr("Jog the tip onto the surface again. We measure how far it was off.")
     for left in reversed(range(1 + MOST_MORE)):

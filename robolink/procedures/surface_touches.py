@@ -29,7 +29,7 @@ class SurfaceTouches(WitnessedTouches):
     Args:
         plan: Lift, clearance, contact input.
         total: How many touches are planned, ``None`` where nobody knows.
-        proof: Whether they are those of a proof.
+        limit_mm: Largest drift that passes where they are those of a proof, else ``None``.
         retakes: Whether whoever makes them hears of one that is to be made again, alone.
 
     Example:
@@ -49,10 +49,10 @@ class SurfaceTouches(WitnessedTouches):
         plan: TouchPlan,
         *,
         total: int | None = None,
-        proof: bool = False,
+        limit_mm: float | None = None,
         retakes: bool = False,
     ) -> None:
-        super().__init__(plan, total=total, proof=proof, retakes=retakes)
+        super().__init__(plan, total=total, limit_mm=limit_mm, retakes=retakes)
         self._drawing: SurfaceStandoffs | None = None
 
     @property

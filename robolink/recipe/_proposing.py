@@ -10,6 +10,7 @@ from robolink.model import ToolOffset, angle_difference_deg, rotate_xy
 from robolink.nozzle_change import Proposal
 from robolink.recipe._reference import Reference, reference_details
 from robolink.recipe.file.recipe import Recipe
+from robolink.timing import local_label
 from robolink.ways import Way, way
 
 
@@ -93,7 +94,7 @@ def _moved(reference: Reference, tip: ToolOffset, shown: Collection[str]) -> Too
 
 
 def _as_moved(reference: Reference, offset: ToolOffset, shown: Collection[str]) -> str:
-    value, at = reference.value, reference.at
+    value, at = reference.value, local_label(reference.at)
     dx, dy = offset.x_mm - value.x_mm, offset.y_mm - value.y_mm
     if "u_deg" in shown:
         return tr(
@@ -133,7 +134,10 @@ def _height(
     if reference.contact_z_mm is None:
         raise CalibrationError(
             "reference_outdated",
-            tr("The reference of {at} does not say how high the contact was.", at=reference.at),
+            tr(
+                "The reference of {at} does not say how high the contact was.",
+                at=local_label(reference.at),
+            ),
             remedy=tr("Take a new reference with {reference}.", reference=way(Way.REFERENCE)),
         )
     return offset.z_mm - (height - reference.contact_z_mm)

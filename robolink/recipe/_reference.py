@@ -20,6 +20,7 @@ from robolink.model import (
     plain_offset,
     read_offset,
 )
+from robolink.timing import local_label
 from robolink.ways import Way, way
 
 _KINDS = (EntryKind.CALIBRATION, EntryKind.DONE, EntryKind.DECISION)
@@ -82,7 +83,7 @@ def find_reference(controller: Controller, tool: int, station: str) -> Reference
             tool=tool,
             stored=describe_offset(stored),
             station=station,
-            at=newest.at,
+            at=local_label(newest.at),
             value=describe_offset(newest.value),
         ),
         remedy=tr(

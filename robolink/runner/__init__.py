@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from robolink.runner._jog_steps import jog_target as jog_target
     from robolink.runner._jog_steps import parse_decimal as parse_decimal
     from robolink.runner._jog_steps import parse_steps as parse_steps
+    from robolink.runner._jog_steps import refuse_decimal_comma as refuse_decimal_comma
     from robolink.runner._operator import Operator as Operator
     from robolink.runner._operator import Question as Question
     from robolink.runner._place_question import AGAIN as AGAIN
@@ -68,7 +69,7 @@ __getattr__ = lazy_exports(
         "_arm_ahead": "ArmAhead",
         "_capture": "FINEST_STEP NotYet SETTLING_S",
         "_foreseeing": "ForeseenStep considered first_clear foreseen_steps nothing_in_the_way",
-        "_jog_steps": "jog_target parse_decimal parse_steps",
+        "_jog_steps": "jog_target parse_decimal parse_steps refuse_decimal_comma",
         "_operator": "Operator Question",
         "_place_question": "AGAIN MOST_REFUSED TakenAgainError inputs_of",
         "_runner": "POLL_S Runner StepDone ask_for_pose",

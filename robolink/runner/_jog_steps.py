@@ -11,11 +11,13 @@ from robolink.model import Path, Pose, angle_difference_deg
 from robolink.runner._settings import RunSettings
 
 _STEP: Final = re.compile(
-    r"\s*([xyzu])\s*([+-])\s*([0-9]{1,4}(?:[.,][0-9]{1,3})?)"
+    r"\s*([xyzu])\s*([+-])\s*([0-9]{1,4}(?:\.[0-9]{1,3})?)"
     r"(?=[\s;xyzu]|,(?![0-9])|$)\s*[,;]?",
     re.ASCII,
 )
 """Axis, sign, number; a comma before a digit is a decimal comma, any other parts two steps."""
+
+_COMMA: Final = re.compile(r"([xyzu]\s*[+-]\s*[0-9]+),([0-9])", re.ASCII)
 
 _PLAIN: Final = str.maketrans(
     dict.fromkeys("\u2010\u2011\u2012\u2013\u2014\u2212", "-")
@@ -164,14 +166,15 @@ def parse_decimal(text: str) -> float:
 def parse_steps(text: str) -> dict[str, float]:
     """Read jog steps like ``x+0.1 y-0.05 u+5``: axis, sign, decimal number.
 
-    Blanks may stand anywhere between them, the number may have a decimal comma, and minus signs
-    and letters may be those of any keyboard: ``x + 0,1``. The sign is never left out, because a
-    number without one may be meant as a position.
+    Blanks may stand anywhere between them, and minus signs and letters may be those of any
+    keyboard: ``x + 0.1``. The sign is never left out, because a number without one may be meant as
+    a position. A decimal comma is refused: a comma also parts two steps.
 
     Raises:
         ConfigError: Anything else, or an axis twice.
     """
-    plain = text.translate(_PLAIN).lower().strip()
+    refuse_decimal_comma(text)
+    plain = _narrow(text)
     deltas: dict[str, float] = {}
     at = 0
     while at < len(plain):
@@ -186,11 +189,34 @@ def parse_steps(text: str) -> dict[str, float]:
                     "Give each axis once, for example x+0.1 z-0.5, and the rest in the next step."
                 ),
             )
-        deltas[axis] = float(sign + number.replace(",", "."))
+        deltas[axis] = float(sign + number)
         at = match.end()
     if not deltas:
         raise ConfigError(tr("No jog step was given."), remedy=tr("For example: x+0.1 z-0.5"))
     return deltas
+
+
+def refuse_decimal_comma(text: str) -> None:
+    """Refuse jog steps whose numbers are written with a comma: it parts two steps as well.
+
+    Raises:
+        ConfigError: A number has one; the sentence says how to write it.
+
+    Example:
+        >>> from robolink.runner import refuse_decimal_comma
+        >>> refuse_decimal_comma("x+0.1, z-0.5")  # it parts two steps here
+    """
+    plain = _narrow(text)
+    pointed = _COMMA.sub(r"\1.\2", plain)
+    if pointed != plain:
+        raise ConfigError(
+            tr("Write the decimal point as '.': {step}. Nothing moved.", step=pointed),
+            remedy=tr("For example: x+0.1 z-0.5"),
+        )
+
+
+def _narrow(text: str) -> str:
+    return text.translate(_PLAIN).lower().strip()
 
 
 def _no_step(word: str) -> ConfigError:

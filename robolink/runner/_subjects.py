@@ -25,7 +25,7 @@ class TouchSubject:
         first_z_mm: Height of the first touch of an upright tool, ``None`` where nothing is
             compared with it.
         contact: The input that shows contact.
-        proof: Whether it is a touch of the turn test.
+        limit_mm: How far the tip may be off where it is a touch of the turn test, else ``None``.
         retakes: Whether an earlier touch may be made again from here, alone; else all of them are
             begun again from the first.
         types: Whether the pose may be typed in place of being read.
@@ -37,10 +37,15 @@ class TouchSubject:
     arrival: Pose | None = None
     first_z_mm: float | None = None
     contact: InputEdge | None = None
-    proof: bool = False
+    limit_mm: float | None = None
     retakes: bool = False
     types: bool = False
     surface: bool = False
+
+    @property
+    def proof(self) -> bool:
+        """Whether it is a touch of the turn test."""
+        return self.limit_mm is not None
 
 
 @dataclass(frozen=True, slots=True)

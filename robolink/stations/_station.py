@@ -7,7 +7,7 @@ from enum import StrEnum
 from typing import Final
 
 from robolink.messages import tr
-from robolink.timing import wall_time
+from robolink.timing import local_label, wall_time
 
 AGREEING_MM: Final = 2.0
 """So far may the cell file be from what was learnt: a search finds the station still."""
@@ -170,7 +170,7 @@ class Station:
             "else correct the cell file.",
             id=self.id,
             apart=self.apart_mm,
-            at=self.found_at,
+            at=local_label(self.found_at),
             entry=self.entry,
         )
 

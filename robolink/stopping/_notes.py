@@ -21,7 +21,7 @@ from robolink.files.durable import (
     write_whole,
 )
 from robolink.messages import tr
-from robolink.timing import wall_label
+from robolink.timing import local_label, wall_label
 
 _KIND = "stops"
 
@@ -57,9 +57,14 @@ class StopNote:
                 "{who} told {url} to stop on {when}, and did not see it come to rest.",
                 who=self.who,
                 url=self.url,
-                when=self.when,
+                when=local_label(self.when),
             )
-        return tr("{who} stopped {url} on {when}.", who=self.who, url=self.url, when=self.when)
+        return tr(
+            "{who} stopped {url} on {when}.",
+            who=self.who,
+            url=self.url,
+            when=local_label(self.when),
+        )
 
     def is_about(self, name: str) -> bool:
         """Tell whether it may be about the controller ``name``; in doubt it is."""

@@ -13,6 +13,7 @@ from robolink.model import (
     describe_offset,
     read_offset,
 )
+from robolink.timing import local_label
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +46,7 @@ class ChangedSince:
             "Tool {tool} holds {now}; on {at} it was left with {recorded}.",
             tool=self.tool,
             now=describe_offset(self.now),
-            at=self.at,
+            at=local_label(self.at),
             recorded=describe_offset(self.recorded),
         )
         distance = self.distance_mm

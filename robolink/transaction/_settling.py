@@ -18,6 +18,7 @@ from robolink.model import (
     put_right,
     read_offset,
 )
+from robolink.timing import local_label
 from robolink.transaction._orders import forgotten, kept_later, order_of
 from robolink.transaction._put_back import Step, put_back
 from robolink.ways import Way, way
@@ -236,7 +237,10 @@ def _steps(marker: Marker) -> list[Step]:
         ]
     except (KeyError, TypeError, ValueError) as error:
         raise ConfigError(
-            tr("What was left unfinished at {when} cannot be read.", when=marker.begun_at),
+            tr(
+                "What was left unfinished at {when} cannot be read.",
+                when=local_label(marker.begun_at),
+            ),
             remedy=tr(
                 "Compare the tools with a backup, then {forget}.", forget=way(Way.FORGET_MARKER)
             ),

@@ -19,6 +19,7 @@ from robolink.model import (
     new_operation,
     require_engineer,
 )
+from robolink.timing import local_label
 from robolink.transaction._change import change_tools
 from robolink.transaction._history import changed_since, last_proof
 from robolink.transaction._put_back import Step
@@ -102,7 +103,7 @@ def plan_undo(
         "undo the change {change} of tool {tool}, made on {at}",
         change=undone[:8],
         tool=numbers,
-        at=entries[0].at,
+        at=local_label(entries[0].at),
     )
     details = {"undone_change": undone, "entries": [entry.number for entry in entries]}
     return _plan(controller, wanted, sentence, details, newest=entries)
@@ -178,7 +179,7 @@ def _plan_to(controller: Controller, number: int, tool: int | None) -> UndoPlan:
         "bring tool {tool} back to what entry {number} of {at} proved",
         tool=proved,
         number=number,
-        at=entry.at,
+        at=local_label(entry.at),
     )
     details = {"back_to_entry": number}
     return _plan(controller, {proved: offset_of(entry, "value")}, sentence, details)
@@ -228,5 +229,5 @@ def _changed_again(controller: Controller, newest: Collection[Recorded]) -> Iter
             yield tr(
                 "Tool {tool} was changed again later, last on {at}: that is undone as well.",
                 tool=tool,
-                at=last.at,
+                at=local_label(last.at),
             )

@@ -11,7 +11,7 @@ from robolink.methods import measure_two_pose
 from robolink.model import Path, Pose, ToolOffset, WorkBox, rotate_xy
 from robolink.nozzle_change import foresee
 from robolink.procedures import DriftProof, TouchPlan, contact_pose, verify_by_turning
-from robolink.runner import Ask, Consider, Move, Notify, RunSettings, TouchedAt
+from robolink.runner import Ask, Consider, Move, Notify, RunSettings, TouchedAt, TouchSubject
 
 PIN = (310.0, 95.0, -40.0)
 PLAN = TouchPlan(lift_mm=10, clearance_mm=2)
@@ -122,6 +122,19 @@ def test_a_right_offset_shows_no_drift():
     assert outcome.max_drift_mm < 1e-9
     assert outcome.passed
     assert {step.target.tool for step in person.log if isinstance(step, Move)} == {3}
+
+
+def limits_shown(person):
+    subjects = [step.subject for step in person.log if isinstance(step, Ask)]
+    return {subject.limit_mm for subject in subjects if isinstance(subject, TouchSubject)}
+
+
+def test_each_touch_of_the_turn_test_is_asked_for_with_the_limit_of_the_test():
+    tip = ToolOffset(12.3, -3.9, -20)
+    _, person = verified(tip, tip, tolerance_mm=0.17)
+    assert limits_shown(person) == {0.17}
+    _, person = measured(tip, tip)
+    assert limits_shown(person) == {None}
 
 
 def test_an_offset_error_shows_as_drift_and_fails():

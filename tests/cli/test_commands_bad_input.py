@@ -121,6 +121,10 @@ NUMBERS = {
     "infinity": (["tool", "set", "1", "--u", "inf"], "u_deg is not a number"),
     "no component": (["tool", "set", "1"], "No component was given"),
     "no jog step": (["jog", "--yes", "x0.1"], "is not a step"),
+    "jog with a decimal comma": (
+        ["jog", "--yes", "x+0,1"],
+        "Write the decimal point as '.': x+0.1. Nothing moved.",
+    ),
     "jog NaN": (["jog", "--yes", "x+nan"], "is not a step"),
     "too large a step": (["jog", "--yes", "x+50"], "more than one step may be"),
     "clearance above the lift": (

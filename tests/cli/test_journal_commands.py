@@ -7,6 +7,7 @@ import sys
 
 import pytest
 from robolink_cli import main
+from robolink_cli.views.journal import detail_rows
 
 from robolink.model import EntryKind
 from tests.cli._recorded_changes import (
@@ -100,10 +101,39 @@ def test_an_entry_as_a_document_has_its_units_in_its_keys_and_the_stored_details
 def test_an_entry_is_shown_with_all_its_fields_and_poses(run, recorded):
     code, out, _ = run("journal", "show", "1")
     assert code == 0
-    for words in ("change up to 2 mm", "measured", "Ann", "N-1", "L-7", "12.250", "rms mm: 0.0125"):
+    for words in ("change up to 2 mm", "measured", "Ann", "N-1", "L-7", "12.250", "rms: 0.0125 mm"):
         assert words in out
     assert "1 1.500 2.000 -3.000 90.000 - - right" in " ".join(out.split())
     assert recorded.entry(1).hash in out
+
+
+def test_what_was_recorded_is_shown_a_row_a_value_with_its_unit():
+    details = {
+        "facts": {"firmware": "7.5.1", "axes": ["X", "Y"]},
+        "budget": {"rows": [{"name": "pin", "u_mm": 0.005}, {"name": "jog", "share_percent": 62}]},
+        "speed_s_mm_s": [50, 50.0, None],
+        "residuals_mm": [[0.01, -0.01], [0.02, 0.0]],
+        "power_high": False,
+        "u_deg": 0,
+        "said_s": "no figure",
+        "gauges": [],
+        "evidence": None,
+        "remarks": "",
+    }
+    rows = [f"{name}: {said}" for key in details for name, said in detail_rows(key, details[key])]
+    assert rows == [
+        "facts firmware: 7.5.1",
+        "facts axes: X, Y",
+        "budget rows 1 name: pin",
+        "budget rows 1 u: 0.005 mm",
+        "budget rows 2 name: jog",
+        "budget rows 2 share: 62 %",
+        "speed s: 50, 50, - mm/s",
+        "residuals: 0.01, -0.01; 0.02, 0 mm",
+        "power high: no",
+        "u: 0 deg",
+        "said s: no figure",
+    ]
 
 
 @pytest.mark.parametrize("name", [FIRST, FIRST[:6], FIRST[:5].upper()])

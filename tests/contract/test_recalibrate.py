@@ -253,7 +253,7 @@ def test_a_dry_run_shows_the_requests_and_sends_none(cell):
 
 def test_z_is_typed_for_each_tool(cell, recipe):
     missing = cell.run("recalibrate", recipe(TOUCH, z="typed"), "--yes")
-    assert missing.code == 2
+    assert missing.code == 9
     assert "--z 1=MM" in missing.err
     wrong = assisted(cell, recipe(TOUCH, z="typed"), "--z", "1=long")
     assert wrong.code == 2

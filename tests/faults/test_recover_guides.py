@@ -9,6 +9,7 @@ from robolink_cli.prompts.present import sitting_at
 from robolink_cli.wizard.choices import ChoiceSubject
 
 from robolink.model import Marker, MarkerKind
+from robolink.timing import local_label
 from tests.faults import _recipe_instants
 from tests.faults._epson_recipe_cell import EpsonRecipeCell
 from tests.faults._what_stands import COMMANDS, Disturbed
@@ -163,7 +164,7 @@ def test_what_nobody_can_read_takes_a_word_too(cell):
     log.close()
     left = cell.run("recover")
     assert left.code == 6, left.err
-    assert f"What was left unfinished at {WHEN} cannot be read." in left.err
+    assert f"What was left unfinished at {local_label(WHEN)} cannot be read." in left.err
     assert {marker.request for marker in cell.open_markers()} >= {"something newer"}
     assert cell.run("recover", "--yes").code == 0
     assert cell.open_markers() == ()

@@ -1,6 +1,7 @@
 """What a person may answer, how a jog step may be typed, and that no question is for ever."""
 
 import os
+import re
 import sys
 from itertools import count, cycle
 
@@ -100,13 +101,12 @@ def test_what_is_neither_is_asked_once_more_and_is_a_no_then(controller, lines, 
 @pytest.mark.parametrize(
     ("text", "deltas"),
     [
-        ("x+0,1", {"x": 0.1}),
         ("x + 0.1", {"x": 0.1}),
         ("x +0.1 y-0.5", {"x": 0.1, "y": -0.5}),
         ("X+1,Y-2", {"x": 1.0, "y": -2.0}),
-        ("x+0,5, z-0,25", {"x": 0.5, "z": -0.25}),
+        ("x+0.5, z-0.25", {"x": 0.5, "z": -0.25}),
         ("z\u22120.1", {"z": -0.1}),
-        ("\uff58\uff0b\uff10\uff0c\uff11\u3000\uff59\uff0d\uff11", {"x": 0.1, "y": -1.0}),
+        ("\uff58\uff0b\uff10\uff0e\uff11\u3000\uff59\uff0d\uff11", {"x": 0.1, "y": -1.0}),
     ],
 )
 def test_a_step_is_understood_however_it_is_spaced_and_signed(text, deltas):
@@ -115,13 +115,29 @@ def test_a_step_is_understood_however_it_is_spaced_and_signed(text, deltas):
 
 @pytest.mark.parametrize(
     "text",
-    ["x0.1", "x+0.1\u00b2", "x+0,1234", "x+0.1.2", "x+1,  5", "+x1", "x+", "x+-1", "y"],
+    ["x0.1", "x+0.1\u00b2", "x+0.1234", "x+0.1.2", "x+1,  5", "+x1", "x+", "x+-1", "y"],
 )
 def test_what_could_be_meant_otherwise_is_not_guessed(text):
     with pytest.raises(
         ConfigError,
         match=r"is not a step\. A step is x\+0\.1: axis, sign, number, with a point\. Axes are",
     ):
+        parse_steps(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "pointed"),
+    [
+        ("x+0,1", "x+0.1"),
+        ("X + 0,1", "x + 0.1"),
+        ("x+0.5, z-0,25", "x+0.5, z-0.25"),
+        ("\uff58\uff0b\uff10\uff0c\uff11", "x+0.1"),
+        ("x+1,5", "x+1.5"),
+    ],
+)
+def test_a_decimal_comma_is_refused_with_the_step_as_it_is_to_be_written(text, pointed):
+    said = f"Write the decimal point as '.': {pointed}. Nothing moved."
+    with pytest.raises(ConfigError, match=f"^{re.escape(said)}"):
         parse_steps(text)
 
 
@@ -132,7 +148,7 @@ def test_an_axis_that_is_there_twice_is_named(text):
 
 
 def test_after_each_jog_a_person_reads_that_it_is_done_how_far_and_where(controller):
-    typist = Typist("x + 0,5 z-1", "u+2", "")
+    typist = Typist("x + 0.5 z-1", "u+2", "")
     before = controller.groups[0].pose()
     after = runner_with(controller, typist).run(ask_for_pose("Jog."))
     assert len(typist.shown) == 2

@@ -3,6 +3,7 @@
 import pytest
 
 from robolink.model import EntryKind, NewEntry, ToolOffset, plain_offset
+from robolink.timing import local_label
 from robolink.transaction import (
     ChangedSince,
     ToolChange,
@@ -57,7 +58,8 @@ def test_a_tool_that_somebody_else_changed_is_shown_with_when_how_far_and_why(co
     proof = last_proof(controller, 1)
     assert proof is not None
     assert found.sentence.startswith(
-        f"Tool 1 holds X 12.250 Y -2.950 Z -20.400 U 0.000; on {proof.at} it was left with X 12.250"
+        f"Tool 1 holds X 12.250 Y -2.950 Z -20.400 U 0.000; on {local_label(proof.at)} it was left "
+        "with X 12.250"
     )
     assert "That is 0.500 mm away." in found.sentence
     assert "TLSet at its start" in found.sentence

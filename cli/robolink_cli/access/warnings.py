@@ -4,6 +4,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from robolink.messages import tr
+from robolink.timing import local_label
 from robolink_cli.console.render import note
 
 if TYPE_CHECKING:
@@ -62,14 +63,14 @@ def marker_notice(marker: "Marker", url: str) -> str:
     if marker.kind is MarkerKind.CHANGE:
         return tr(
             'Not finished since {when}: {request}.\n  Next: robolink -c "{url}" recover',
-            when=marker.begun_at,
+            when=local_label(marker.begun_at),
             request=marker.request,
             url=url,
         )
     return tr(
         "Sent {when} without a clear answer: {request}. It may or may not have run, so the "
         'robot stays blocked.\n  Next: robolink -c "{url}" recover',
-        when=marker.begun_at,
+        when=local_label(marker.begun_at),
         request=marker.request,
         url=url,
     )
@@ -125,7 +126,11 @@ def _selected_now(controller: "Controller", marker: "Marker") -> str:
 def _unfinished(marker: "Marker", url: str, now: str) -> str:
     before = str(marker.details.get("tool", "?"))
     parts = [
-        tr("Not finished since {when}: {request}.", when=marker.begun_at, request=marker.request)
+        tr(
+            "Not finished since {when}: {request}.",
+            when=local_label(marker.begun_at),
+            request=marker.request,
+        )
     ]
     if now == before:
         parts.append(tr("Tool {tool} is selected, as before.", tool=now))

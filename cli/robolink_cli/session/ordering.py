@@ -9,6 +9,7 @@ from click.core import ParameterSource
 
 from robolink.errors import ConfigError
 from robolink.messages import declared, tr
+from robolink.timing import local_label
 from robolink_cli.console.render import say
 
 if TYPE_CHECKING:
@@ -110,7 +111,7 @@ def show_done(order: "Order") -> None:
             "Order {order} was carried out on {at}, as change {change}; nothing was moved or "
             "written now.",
             order=order.id,
-            at=order.done.at,
+            at=local_label(order.done.at),
             change=order.done.change[:8],
         )
     )

@@ -1,6 +1,6 @@
 """What the journal's commands show: payloads, and the tables made from them."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from typing import Final
 
@@ -32,6 +32,17 @@ _PLAIN: Final = (
     *("tolerance", "verdict"),
 )
 _LISTS: Final = ("poses", "drifts", "tools")
+
+_UNITS: Final = {
+    "_mm_s": "mm/s",
+    "_deg_s": "deg/s",
+    "_mm": "mm",
+    "_deg": "deg",
+    "_percent": "%",
+    "_ms": "ms",
+    "_s": "s",
+}
+"""End of a recorded name to the unit that it stands for, the longer ends first."""
 
 
 def entry_payload(entry: Recorded, *, as_stored: bool = False) -> dict[str, object]:
@@ -100,7 +111,7 @@ def show_list(entries: Sequence[Recorded], *, all_controllers: bool) -> None:
 def show_entry(entry: Recorded) -> None:
     """Print all that an entry says."""
     shown: dict[str, object] = {
-        tr("time"): entry.at,
+        tr("time (UTC)"): short_time(entry.at),
         tr("controller"): entry.controller,
         tr("kind"): entry.kind,
         tr("tool"): "" if entry.tool is None else entry.tool,
@@ -117,12 +128,35 @@ def show_entry(entry: Recorded) -> None:
         if value != "":
             say(f"  {name}: {value}")
     for name, value in with_method_name_now(entry.details).items():
-        if name not in (*_VALUES, *_LISTS) and value not in (None, [], "", {}):
-            say(f"  {name.replace('_', ' ')}: {_plain(value)}")
+        if name not in (*_VALUES, *_LISTS):
+            for row, said in detail_rows(name, value):
+                say(f"  {row}: {said}")
     _show_values(entry)
     _show_poses(entry.details.get("poses"))
     _show_drifts(entry.details.get("drifts"))
     say()
+
+
+def detail_rows(name: str, value: object) -> Iterator[tuple[str, str]]:
+    """Yield what was recorded under ``name`` as rows: what it is, and its value with its unit.
+
+    What has parts has a row for each, named after the whole: ``facts firmware``, ``rows 2 name``.
+    What is empty has none.
+
+    Args:
+        name: As it is recorded, its unit at the end.
+        value: Plain JSON.
+    """
+    if isinstance(value, Mapping):
+        for key, part in value.items():
+            yield from detail_rows(f"{name} {key}", part)
+    elif isinstance(value, list) and any(isinstance(part, Mapping) for part in value):
+        for number, part in enumerate(value, start=1):
+            yield from detail_rows(f"{name} {number}", part)
+    elif value not in (None, [], ""):
+        end = next((end for end in _UNITS if name.endswith(end) and _is_figures(value)), "")
+        said = _plain(value) + (f" {_UNITS[end]}" if end else "")
+        yield name.removesuffix(end).replace("_", " "), said
 
 
 def said_in(entry: Recorded) -> str:
@@ -212,7 +246,18 @@ def figure(value: object) -> str:
     return f"{round(value, 3) + 0.0:.3f}" if isinstance(value, (int, float)) else "-"
 
 
+def _is_figures(value: object) -> bool:
+    if isinstance(value, list):
+        return all(map(_is_figures, value))
+    return value is None or (isinstance(value, (int, float)) and not isinstance(value, bool))
+
+
 def _plain(value: object) -> str:
     if isinstance(value, list):
-        return ", ".join(_plain(part) for part in value)
+        rows = any(isinstance(part, list) for part in value)
+        return ("; " if rows else ", ").join(map(_plain, value))
+    if isinstance(value, bool):
+        return tr("yes") if value else tr("no")
+    if value is None:
+        return "-"
     return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -8,6 +8,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import EntryKind, Recorded
 from robolink.stations import Station, find_station, find_stations
+from robolink.timing import local_label
 from robolink_cli.console.render import say, table
 from robolink_cli.session.context import CliContext
 from robolink_cli.views.documents import number
@@ -176,7 +177,10 @@ def _found(station: Station) -> str:
     if not station.learnt:
         return station.how
     return tr(
-        "{how}, {at}, entry {entry}", how=station.how, at=station.found_at, entry=station.entry
+        "{how}, {at}, entry {entry}",
+        how=station.how,
+        at=local_label(station.found_at),
+        entry=station.entry,
     )
 
 

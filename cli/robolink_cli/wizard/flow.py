@@ -7,9 +7,17 @@ is refused here is what the runner would refuse too, said before it is sent.
 import math
 from dataclasses import replace
 
+from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.nozzle_change import ChangeReport
-from robolink.runner import SETTLING_S, FitSubject, JogSubject, MoveSubject, Question
+from robolink.runner import (
+    SETTLING_S,
+    FitSubject,
+    JogSubject,
+    MoveSubject,
+    Question,
+    refuse_decimal_comma,
+)
 from robolink_cli.wizard.check_list import CheckSubject
 from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.happenings import (
@@ -30,7 +38,7 @@ from robolink_cli.wizard.happenings import (
     WasTold,
     WizardCommand,
 )
-from robolink_cli.wizard.keys import folded, meaning_of, number_in, pose_in, step_of, with_point
+from robolink_cli.wizard.keys import folded, meaning_of, number_in, pose_in, step_of
 from robolink_cli.wizard.questions_flow import answered_by_key, answered_by_line, into_field
 from robolink_cli.wizard.state import (
     ARMED_AFTER_S,
@@ -337,10 +345,10 @@ def _line_at_place(state: WizardState, line: LineTyped, meaning: str) -> Advance
     if typed is not None:
         begun, _ = _begin_pose(state)
         return _pose_typed(replace(begun, typing=False), typed) if begun.typing else (begun, [])
-    pointed = with_point(line.text)
-    if pointed is not None:
-        said = tr("Write the decimal point as '.': {step}. Nothing moved.", step=pointed)
-        return state.says(said), []
+    try:
+        refuse_decimal_comma(line.text)
+    except ConfigError as error:
+        return state.says(error.what), []
     return _jog(state, folded(line.text), line.at_s)
 
 

@@ -1,6 +1,5 @@
 """What keys and words mean: the keypad with and without NumLock, and two languages of words."""
 
-import re
 import unicodedata
 from typing import Final
 
@@ -43,8 +42,6 @@ _WORDS: Final = {
 }
 _MEANINGS: Final = {word: meaning for meaning, words in _WORDS.items() for word in words.split()}
 
-_COMMA: Final = re.compile(r"([xyzu]\s*[+-]\s*\d+),(\d)")
-
 
 def folded(text: str) -> str:
     """Return typed text in narrow letters: a Chinese input method sends wide ones."""
@@ -72,12 +69,6 @@ def pose_in(text: str) -> str | None:
     """Return the numbers behind ``pose``, ``None`` where the line is none."""
     word, _, rest = folded(text).partition(" ")
     return rest if word in ("pose", "位姿") else None
-
-
-def with_point(text: str) -> str | None:
-    """Return a step with its decimal comma written as a point; ``None`` where it has none."""
-    plain = folded(text)
-    return _COMMA.sub(r"\1.\2", plain) if _COMMA.search(plain) else None
 
 
 def step_of(key: str, size: float, quarters: int) -> str | None:

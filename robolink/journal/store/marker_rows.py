@@ -18,6 +18,7 @@ from robolink.journal.store.prepared import UNLESS_THERE, Prepared, StatementRun
 from robolink.journal.store.tables import MARKERS
 from robolink.messages import plain, tr
 from robolink.model import Marker, MarkerKind
+from robolink.timing import local_label
 
 
 class _Stored(NamedTuple):
@@ -145,7 +146,7 @@ def _marker(row: _Stored) -> Marker:
                 "have been written by a newer robolink. Check the robot's selected "
                 "tool and its tool offsets by hand, then move the journal away.",
                 request=row.request,
-                when=row.begun_at,
+                when=local_label(row.begun_at),
             ),
             controller=row.controller,
         ) from error

@@ -19,6 +19,7 @@ from robolink.model import (
     describe_offset,
     read_offset,
 )
+from robolink.timing import local_label
 from robolink.ways import Way, way
 
 KEPT = (EntryKind.DONE, EntryKind.DECISION)
@@ -107,7 +108,7 @@ def find_last_touch(controller: Controller, tool: int, station: str) -> LastTouc
                 tool=tool,
                 stored=describe_offset(stored),
                 station=station,
-                at=newest.at,
+                at=local_label(newest.at),
                 value=describe_offset(newest.value),
             ),
             remedy=tr(

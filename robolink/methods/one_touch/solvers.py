@@ -10,6 +10,7 @@ from robolink.errors import CalibrationError, ConfigError
 from robolink.messages import tr
 from robolink.methods.one_touch.last_touch import LastTouch, find_last_touch
 from robolink.model import Controller, Pose, ToolOffset
+from robolink.timing import local_label
 from robolink.ways import Way, way
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ class Difference:
     @property
     def sentence(self) -> str:
         """How the touch is used, for a report."""
-        return tr("the difference from the last touch, of {at}", at=self.last.at)
+        return tr("the difference from the last touch, of {at}", at=local_label(self.last.at))
 
     def solve(self, flange: Sequence[Pose], stored: ToolOffset | None) -> CalibrationResult:
         """Solve exactly one touch; see :class:`~robolink.procedures.PoseMethod`."""

@@ -177,7 +177,7 @@ def verify_by_tilting(
         (False, True)
     """
     tilts = yield from proving_in_reach(over, tilts, plan.lift_mm)
-    swing = _Swing(plan, over, PinTouches(plan, planar=False, proof=True))
+    swing = _Swing(plan, over, PinTouches(plan, planar=False, limit_mm=tolerance_mm))
     proof = DriftProof(tolerance_mm, plan.u_drift_mm if u_mm is None else u_mm)
     by_place = {over.pose(tilt, 0.0).u_deg: tilt for tilt in tilts}
     for tilt in tilts:

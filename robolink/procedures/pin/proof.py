@@ -71,7 +71,7 @@ def verify_by_turning(
         >>> shown.passed, round(shown.max_drift_mm, 3)
         (False, 0.5)
     """
-    turning = _Turning(plan, contact, written, tip)
+    turning = _Turning(plan, contact, tolerance_mm, written, tip)
     angles_deg = yield from first_clear(
         [tuple(angles_deg), tuple(_nearer(contact.u_deg, angle) for angle in angles_deg)],
         turning.on_paper,
@@ -101,16 +101,22 @@ class _Turning:
     Args:
         plan: Lift, clearance, contact input.
         contact: Pose of the new tool's tip on the pin.
+        limit_mm: Largest drift that passes.
         written: The offset in force.
         tip: Where the tip was found.
     """
 
     def __init__(
-        self, plan: TouchPlan, contact: Pose, written: ToolOffset, tip: ToolOffset
+        self,
+        plan: TouchPlan,
+        contact: Pose,
+        limit_mm: float,
+        written: ToolOffset,
+        tip: ToolOffset,
     ) -> None:
-        self._plan, self._contact = plan, contact
+        self._plan, self._contact, self._limit_mm = plan, contact, limit_mm
         self._written, self._tip = written, tip
-        self._touches = PinTouches(plan, proof=True)
+        self._touches = PinTouches(plan, limit_mm=limit_mm)
         self._count = 0
 
     def shown(self, angle_deg: float) -> Procedure[tuple[Pose, TouchedAt]]:
@@ -128,7 +134,7 @@ class _Turning:
     def on_paper(self, angles_deg: Sequence[float]) -> Procedure[None]:
         """Take all, as it is foreseen."""
         nominal = replace(self._plan, nominal=True)
-        paper = _Turning(nominal, self._contact, self._written, self._tip)
+        paper = _Turning(nominal, self._contact, self._limit_mm, self._written, self._tip)
         for angle_deg in angles_deg:
             yield from paper.shown(angle_deg)
 

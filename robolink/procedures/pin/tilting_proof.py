@@ -56,7 +56,9 @@ class TiltingProof(PlacedProof):
         the robot would come down too near, or somewhere else.
         """
         instruction, lifting = self._first()
-        subject = TouchSubject(number=1, contact=self.touch.contact, proof=True)
+        subject = TouchSubject(
+            number=1, contact=self.touch.contact, limit_mm=self.touch.clearance_mm
+        )
         answer: Pose = yield Ask(
             instruction, contact=self.touch.contact, subject=subject, judge=self._not_upright
         )

@@ -35,7 +35,7 @@ class PinTouches(WitnessedTouches):
         comes_down: Whether the tip is known well enough to come down to the clearance; else it
             stops at the lift, and the person jogs the whole approach.
         total: How many touches are planned, ``None`` where nobody knows.
-        proof: Whether they are those of a proof.
+        limit_mm: Largest drift that passes where they are those of a proof, else ``None``.
         retakes: Whether whoever makes them hears of one that is to be made again, alone.
 
     Example:
@@ -56,10 +56,10 @@ class PinTouches(WitnessedTouches):
         planar: bool = True,
         comes_down: bool = True,
         total: int | None = None,
-        proof: bool = False,
+        limit_mm: float | None = None,
         retakes: bool = False,
     ) -> None:
-        super().__init__(plan, total=total, proof=proof, retakes=retakes)
+        super().__init__(plan, total=total, limit_mm=limit_mm, retakes=retakes)
         self._planar = planar
         self._low_mm = plan.clearance_mm if comes_down else plan.lift_mm
         self._comes_down = comes_down
@@ -155,7 +155,7 @@ class PinTouches(WitnessedTouches):
 
     @property
     def _may_be_typed(self) -> bool:
-        return not self._proof
+        return self._limit_mm is None
 
     @property
     def _compares_heights(self) -> bool:

@@ -73,7 +73,7 @@ class TurnTest(KeptProof):
         Raises:
             CalibrationError, LimitError: As :func:`~robolink.procedures.verify_by_turning`.
         """
-        first = yield from PinTouches(self.touch, proof=True).first()
+        first = yield from PinTouches(self.touch, limit_mm=self.touch.clearance_mm).first()
         place = place_on_pin(self.contact, first.u_deg, self.written, self.tip)
         apart = (first.x_mm - place.x_mm, first.y_mm - place.y_mm, first.z_mm - place.z_mm)
         if math.hypot(*apart) > self.touch.clearance_mm:

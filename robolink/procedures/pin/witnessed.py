@@ -27,7 +27,7 @@ class WitnessedTouches(ABC):
     Args:
         plan: Lift, clearance, contact input.
         total: How many touches are planned, ``None`` where nobody knows.
-        proof: Whether they are those of a proof.
+        limit_mm: Largest drift that passes where they are those of a proof, else ``None``.
         retakes: Whether whoever makes them hears of one that is to be made again, alone.
     """
 
@@ -36,12 +36,12 @@ class WitnessedTouches(ABC):
         plan: TouchPlan,
         *,
         total: int | None = None,
-        proof: bool = False,
+        limit_mm: float | None = None,
         retakes: bool = False,
     ) -> None:
         self._plan = plan
         self._total = total
-        self._proof = proof
+        self._limit_mm = limit_mm
         self._retakes = retakes
         self._taken: dict[Hashable, TouchedAt] = {}
         self._numbers: dict[Hashable, int] = {}
@@ -135,7 +135,7 @@ class WitnessedTouches(ABC):
             arrival=arrival,
             first_z_mm=first.z_mm if first is not None and self._compares_heights else None,
             contact=self._plan.contact,
-            proof=self._proof,
+            limit_mm=self._limit_mm,
             retakes=self._retakes,
             types=self._may_be_typed,
         )

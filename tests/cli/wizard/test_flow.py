@@ -258,7 +258,7 @@ def test_one_more_touch_is_offered_beside_the_worst():
 
 def test_the_first_touch_and_the_turn_test_are_not_begun_again():
     assert at_touch(number=1, arrival=None).keys("/").sent == []
-    assert at_touch(proof=True).keys("/").sent == []
+    assert at_touch(limit_mm=0.2).keys("/").sent == []
     assert at_touch().keys("/").sent == ["again"]
 
 
@@ -450,8 +450,8 @@ def test_what_nobody_had_a_screen_to_read_is_kept_for_the_end():
     "subject",
     [
         touch_subject(surface=True),
-        touch_subject(surface=True, proof=True),
-        touch_subject(number=1, proof=True, arrival=None),
+        touch_subject(surface=True, limit_mm=0.2),
+        touch_subject(number=1, limit_mm=0.2, arrival=None),
     ],
     ids=["a surface", "a surface in the proof", "the first contact after a break"],
 )

@@ -153,7 +153,7 @@ SCREENS = {
     "moving": moving,
     "touch": touching,
     "first touch": lambda: Sitting().asked(touch_subject(number=1, arrival=None)),
-    "turn test": lambda: Sitting(in_tool=1).asked(touch_subject(proof=True, total=None)),
+    "turn test": lambda: Sitting(in_tool=1).asked(touch_subject(limit_mm=0.2, total=None)),
     "fit": lambda: Sitting().asked(
         fit_subject(0.006, 0.004, 0.131, 0.007, worst=2), Question.YES_NO
     ),

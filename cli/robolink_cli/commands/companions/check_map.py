@@ -7,6 +7,7 @@ import click
 
 from robolink.errors import ConfigError, DeclinedError
 from robolink.messages import joined, tr
+from robolink.timing import local_label
 from robolink_cli.console.render import note, say, table
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.operator_identity import signature_of
@@ -120,7 +121,7 @@ def _check_values(context: CliContext, shows: tuple[str, ...]) -> None:
                 tr(
                     "Confirmed by {by} at {at}: {compared}",
                     by=confirmed.by,
-                    at=confirmed.at,
+                    at=local_label(confirmed.at),
                     compared=confirmed.compared,
                 )
             )
@@ -142,7 +143,11 @@ def _compared(controller: "PlcMapController", values: "MapValues", shows: tuple[
             error.remedy = joined(
                 " ",
                 (
-                    tr("The confirmation by {by} of {at} is taken back.", by=held.by, at=held.at),
+                    tr(
+                        "The confirmation by {by} of {at} is taken back.",
+                        by=held.by,
+                        at=local_label(held.at),
+                    ),
                     error.remedy,
                 ),
             )

@@ -7,6 +7,7 @@ from pathlib import Path
 from robolink.errors import ConfigError
 from robolink.files.durable import state_folder
 from robolink.messages import spoken, tr
+from robolink.timing import local_label
 from robolink_cli.commands.computer.doctor_finding import Level, Remark, guarded
 from robolink_cli.commands.computer.requirements import check_name, check_versions
 from robolink_cli.commands.computer.serial_ports import serial_ports
@@ -169,7 +170,7 @@ def check_journal() -> Iterator[Remark]:
             tr(
                 "{identity}, since {when}: {request}",
                 identity=identity,
-                when=marker.begun_at,
+                when=local_label(marker.begun_at),
                 request=marker.request,
             ),
             journal.log(identity).at_work()

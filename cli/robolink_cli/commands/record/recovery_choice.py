@@ -4,6 +4,7 @@ from typing import Final
 
 from robolink.messages import tr
 from robolink.model import Controller, Finding, MarkerKind, Verdict
+from robolink.timing import local_label
 from robolink.transaction import look
 from robolink_cli.prompts.present import present_desk
 from robolink_cli.wizard.choices import ChoiceSubject, choose
@@ -66,7 +67,7 @@ def _rows(finding: Finding) -> list[str]:
     return [
         tr(
             "What happened: {when}  {request}",
-            when=finding.marker.begun_at,
+            when=local_label(finding.marker.begun_at),
             request=finding.marker.request,
         ),
         tr("What we read: {sentence}", sentence=finding.sentence),

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 from robolink.errors import ControllerError
 from robolink.messages import declared, spoken, tr
 from robolink.model import Controller, Finding, MarkerKind, Pose
+from robolink.timing import local_label
 from robolink.transaction import Recovery, Settler, look, recover
 from robolink_cli.console.render import json_is_on, note, say
 from robolink_cli.prompts.operator import operator_at
@@ -204,7 +205,7 @@ def _foretell(finding: Finding) -> None:
 
 
 def _show(finding: Finding) -> None:
-    note(f"{finding.marker.begun_at}  {finding.marker.request}\n  {finding.sentence}")
+    note(f"{local_label(finding.marker.begun_at)}  {finding.marker.request}\n  {finding.sentence}")
 
 
 class TurnTests:

@@ -55,8 +55,11 @@ def instruction(state: WizardState) -> str:
 
 def _what(state: WizardState, touch: TouchSubject | None) -> list[str]:
     lines = [instruction(state)]
-    if touch is not None and touch.proof:
-        lines.append(tr("If it is off by more than the limit, the old value comes back by itself."))
+    if touch is not None and touch.limit_mm is not None:
+        limit = mm(touch.limit_mm)
+        lines.append(
+            tr("Limit {mm} mm. If it is off by more, the old value comes back by itself.", mm=limit)
+        )
     return lines
 
 

@@ -5,6 +5,7 @@ from robolink.controllers.epson.io.variables import EpsonVariables, equal_values
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Finding, Marker, Value, Verdict
+from robolink.timing import local_label
 from robolink.ways import Way, way
 
 
@@ -31,7 +32,10 @@ class PendingValues:
                 now = self._variables.read(name, kind)
             case _:
                 raise ConfigError(
-                    tr("What was left unfinished at {when} cannot be read.", when=marker.begun_at),
+                    tr(
+                        "What was left unfinished at {when} cannot be read.",
+                        when=local_label(marker.begun_at),
+                    ),
                     remedy=tr(
                         "Look at the controller, then {forget}.", forget=way(Way.FORGET_MARKER)
                     ),

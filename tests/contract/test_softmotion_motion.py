@@ -62,8 +62,10 @@ def test_a_joint_move_turns_the_tool(group):
 
 def test_four_movements_may_be_under_way_and_a_fifth_has_to_wait(cell, group):
     start = group.pose()
-    ways = [above(start, by_mm) for by_mm in (1.0, 2.0, 1.0, 0.0)]
-    motions = [group.move_to(way, QUICK, box=ANYWHERE) for way in ways]
+    ways = [above(start, by_mm) for by_mm in (2.0, 3.0, 1.0, 0.0)]
+    # The first lasts long enough for a busy computer to send the others meanwhile.
+    motions = [group.move_to(ways[0], SLOW, box=ANYWHERE)]
+    motions += [group.move_to(way, QUICK, box=ANYWHERE) for way in ways[1:]]
     with pytest.raises(BusyError, match="four movements"):
         group.move_to(start, QUICK, box=ANYWHERE)
     assert [motion.wait(timeout_s=10) for motion in motions] == [MotionOutcome.ARRIVED] * 4

@@ -152,7 +152,7 @@ def test_a_machine_that_does_not_tell_which_tool_is_in_force_selects_none():
     machine = MemoryMachine(tools={1: ToolOffset(1.0)})
     machine.selected = None  # type: ignore[assignment]
     with MemoryController(machine) as controller:
-        with pytest.raises(RejectedError, match="does not tell"):
+        with pytest.raises(RejectedError, match="does not report"):
             controller.tools.select(1)
         with controller.preserved("a procedure"):
             controller.tools.write(1, ToolOffset(2.0), expected=ToolOffset(1.0))

@@ -61,7 +61,7 @@ def check(cell, failing, number):
         left = {marker.kind for marker in cell.open_markers()}
         assert left <= {MarkerKind.SELECTION, MarkerKind.HISTORY}
         if cell.tool_1 != OLD_TIP:
-            assert "Tool 1 holds" in shown.err.splitlines()[-1]
+            assert "Tool 1 now holds" in shown.err.splitlines()[-1]
             assert cell.run("journal", "list", "--kind", "done").out.count(" done ") == 1
         return
     assert "cannot be used: the disk is full" in shown.err
@@ -71,7 +71,7 @@ def check(cell, failing, number):
     if kept:
         # It was measured, verified and put on record before.
         assert "change of tool 1" not in [marker.request for marker in cell.open_markers()]
-        assert "Tool 1 holds" in said
+        assert "Tool 1 now holds" in said
     assert cell.open_markers() != ()
     # Its lease could not be given up either; here the process lives on.
     assert cell.run("recover", "--take-over", "it has ended").code in (0, DOUBT)

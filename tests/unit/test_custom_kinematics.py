@@ -219,7 +219,7 @@ def test_a_class_without_an_orientation_image_moves_and_takes_no_tool():
         (f"{HERE}:MissingRail", "bring it elsewhere"),
         (f"{HERE}:NoSuchClass", "There is no class"),
         ("no_such_module:Rail", "There is no class"),
-        (f"{HERE}:EXAMPLE", "is no class"),
+        (f"{HERE}:EXAMPLE", "is not a class"),
         (f"{HERE}:OrientationDof", "cannot be made"),
         (f"{HERE}:OrientationSpace", "cannot be made"),
         (f"{HERE}:Empty", "lacks methods"),

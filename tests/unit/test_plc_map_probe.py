@@ -160,7 +160,7 @@ def test_a_register_list_starts_a_map_that_only_lacks_what_no_list_says(tmp_path
         ("name,address\nTool1_X,nowhere\n", "line 2 .Tool1_X.: it has no place"),
         ("name,register\nTool1_X,50001\n", "line 2 .Tool1_X.: it has no place"),
         ("name,address,type\nTool1_X,5,STRING\n", "'STRING' is not known"),
-        ("name,address,scale\nTool1_X,5,much\n", "no number"),
+        ("name,address,scale\nTool1_X,5,much\n", "is not a number"),
     ],
 )
 def test_a_register_list_that_cannot_be_used_says_why(tmp_path, text, words):

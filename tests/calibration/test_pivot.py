@@ -127,7 +127,7 @@ def test_turning_about_one_axis_names_the_axis_and_offers_the_plane():
     with refused("rank_deficient") as caught:
         solve_pivot(poses)
     assert "along Z" in caught.value.what
-    assert "n_angle" in caught.value.remedy
+    assert "n-angle" in caught.value.remedy
 
 
 def test_an_oblique_axis_is_told_by_its_direction():

@@ -48,6 +48,7 @@ def test_exact_touches_give_tip_and_plane_and_the_tip_keeps_clear(start, lean_de
 
 
 @pytest.mark.soak
+@pytest.mark.timeout(300)
 def test_the_interval_holds_the_truth_about_as_often_as_it_says():
     held = total = 0
     for seed in range(200):

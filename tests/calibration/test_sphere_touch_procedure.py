@@ -52,6 +52,7 @@ def test_exact_touches_give_tip_and_sphere_and_the_tip_keeps_clear(turned, axes)
 
 
 @pytest.mark.soak
+@pytest.mark.timeout(300)
 def test_the_interval_of_a_sphere_holds_the_truth_about_as_often_as_it_says():
     held = total = 0
     ball = Ball(10.0)

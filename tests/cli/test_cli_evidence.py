@@ -77,7 +77,7 @@ def test_a_file_that_cannot_be_written_is_a_mistake_of_the_person(cell, tmp_path
     target = str(tmp_path / "no such folder" / "file")
     assert main.run(["verify-controller", "--profile", target]) == 2
     assert main.run(["--record", target, "status"]) == 2
-    assert "nothing was sent" in capsys.readouterr().err
+    assert "Nothing was sent" in capsys.readouterr().err
 
 
 def test_a_recording_holds_the_dialogue_and_not_the_password(cell, tmp_path):

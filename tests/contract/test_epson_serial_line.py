@@ -171,7 +171,7 @@ def test_a_line_that_never_falls_silent_is_not_opened():
     thread = threading.Thread(target=chatter)
     thread.start()
     try:
-        with pytest.raises(RobolinkError, match="silent"):
+        with pytest.raises(RobolinkError, match="is never quiet"):
             robolink.connect(f"epson+serial://{cable.near}?baud=9600")
     finally:
         ended.set()

@@ -45,8 +45,7 @@ from robolink.methods import (
     ZTouchSource,
     informative_tilts,
 )
-from robolink.methods.pivot.proof import TiltTest
-from robolink.model import EntryKind, MarkerKind, Pose, ToolOffset
+from robolink.model import EntryKind, MarkerKind, Pose
 from robolink.nozzle_change import (
     ChangePlan,
     Listener,
@@ -57,7 +56,6 @@ from robolink.nozzle_change import (
     untested_sentences,
 )
 from robolink.procedures import LazySource, TouchPlan
-from robolink.runner import Ask, TouchedAt
 from robolink.sensing import open_sensor
 from robolink.transaction import recover
 from tests.contract._camera_cell import camera_station, furnish
@@ -332,28 +330,3 @@ def test_where_no_proof_can_be_made_it_is_said_why_and_what_does(
             assert any(m.kind is MarkerKind.CHANGE for m in controller.outcomes.open_markers())
             assert open_turn_tests(controller) == {}
             assert untested_sentences(controller)[-1] == sentence
-
-
-def test_a_tool_that_leans_is_not_taken_for_the_first_contact():
-    upright = Pose(0.0, 0.0, 0.0, 30.0, 0.0, 180.0, tool=1)
-    tip = ToolOffset(12.0, -4.0, -20.0)
-    test = TiltTest(
-        tool=1,
-        written=tip,
-        tip=tip,
-        tolerance_mm=0.2,
-        touch=TouchPlan(),
-        pin_mm=(310.0, 95.0, -40.0),
-        tilt_deg=20.0,
-        u_mm=0.02,
-        upright=upright,
-    )
-    ask = next(test.steps_after_a_break(upright))
-    assert isinstance(ask, Ask)
-    assert ask.judge
-    turned = replace(upright, u_deg=upright.u_deg + 140.0)
-    assert ask.judge(TouchedAt.of(turned)) is None
-    told = ask.judge(TouchedAt.of(replace(turned, v_deg=12.0)))
-    assert told
-    assert told.code == "not_upright"
-    assert "The tool leans 12 deg. Jog it upright first" in told.sentence

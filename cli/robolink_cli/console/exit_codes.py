@@ -36,23 +36,23 @@ _ENDINGS: Final = {
 MEANINGS: Final[dict[int, str]] = {
     DONE: "done",
     DIFFERENT: (
-        "`tool compare` found a difference; `journal verify` found a damaged record; something "
-        "stands out in `journal drift`; `cell doctor`, `cell ports` or `cell check` found "
-        "something to see to"
+        "`tool compare` found a difference; `journal verify` found a damaged record; "
+        "`journal drift` found something that stands out; `cell doctor`, `cell ports` or "
+        "`cell check` found something that needs attention"
     ),
     USAGE: "the command, a file, a setting, the journal or an installed package is wrong",
-    3: "the controller is not reached, or the link broke",
+    3: "the controller was not reached, or the link broke",
     4: "the two sides do not understand each other",
     5: "the controller, or a check of its state, said no",
-    UNKNOWN: "a write or a movement stands unproved; `robolink recover` comes next",
+    UNKNOWN: "the end of a write or a movement is not proved; `robolink recover` comes next",
     7: "the measurements do not support a result",
-    8: "the proof failed, or its touches were not made; the old value was put back",
+    8: "the turn test failed, or its touches were not made; the old value was put back",
     9: "a person said no, or was not there to say yes",
     10: "a stop ended it",
     BUG: "a defect in robolink",
-    HUNG_UP: "the window was closed, or the line to it is gone (SIGHUP)",
+    HUNG_UP: "the window was closed, or the connection to it was lost (SIGHUP)",
     INTERRUPTED: "interrupted (Ctrl-C)",
-    READER_LEFT: "whoever read the output has left",
+    READER_LEFT: "the program that read the output has ended",
     TERMINATED: "terminated (SIGTERM)",
 }
 """What each exit code says; docs/exit-codes.md has the same table."""
@@ -162,7 +162,7 @@ def _ending_in_words(by: EndedBy) -> str:
     if by is EndedBy.TERMINATED:
         return tr("Terminated (SIGTERM).")
     if by is EndedBy.HUNG_UP:
-        return tr("The window was closed, or the line to it is gone (SIGHUP).")
+        return tr("The window was closed, or the connection to it was lost (SIGHUP).")
     if by is EndedBy.OUTPUT_CLOSED:
         return tr("Nobody reads the output any more, so the command was ended.")
     return tr("You stopped it (Ctrl-C).")

@@ -7,7 +7,8 @@ Whoever finds the marker open later takes the change up again
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass
-from typing import TYPE_CHECKING, Final, TypeVar
+from functools import cache
+from typing import TYPE_CHECKING, Any, Final, TypeVar, cast
 
 from robolink.errors import ConfigError
 from robolink.methods import find_method
@@ -140,6 +141,11 @@ def _read(kept: Mapping[str, object]) -> OpenTurnTest:
 
 
 def _adapter(kind: type[KeptT]) -> "TypeAdapter[KeptT]":
+    return _made_adapter(cast("type", kind))
+
+
+@cache
+def _made_adapter(kind: type) -> "TypeAdapter[Any]":
     from pydantic import TypeAdapter  # only a change that is open, or begins, needs it
 
     return TypeAdapter(kind)

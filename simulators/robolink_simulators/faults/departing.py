@@ -55,6 +55,8 @@ class DepartingReplies:
     def take(self, now_ns: int) -> bytes:
         """Take what has left by now."""
         ready = b""
+        if not self._waiting:
+            return ready
         if len(self._waiting) == 1 and self._due(now_ns):  # as in nearly every exchange
             only = self._waiting[0][1]
             if isinstance(only, bytes):

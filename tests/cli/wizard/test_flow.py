@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.happenings import (
     HasEnded,
     KeyPressed,
@@ -18,6 +19,7 @@ from robolink_cli.wizard.happenings import (
     WasTold,
     WizardCommand,
 )
+from robolink_cli.wizard.screens.choosing import choice_screen
 from robolink_cli.wizard.screens.touching import instruction
 from robolink_cli.wizard.state import STEP_SIZES, LastScreen
 
@@ -32,6 +34,8 @@ from tests.cli.wizard._people import (
     touch_subject,
     write_subject,
 )
+
+CHOICES = ("The old one.", "The new one.", "I cannot tell.")
 
 
 def at_touch(**more):
@@ -454,3 +458,13 @@ def test_what_nobody_had_a_screen_to_read_is_kept_for_the_end():
 def test_what_is_no_pin_is_named_by_whoever_asks_for_it(subject):
     hand = Sitting().asked(subject, text="Jog the tip onto the top of the sphere.")
     assert instruction(hand.state) == "Jog the tip onto the top of the sphere."
+
+
+def test_what_is_chosen_from_is_seen_however_much_there_is_to_be_read_above():
+    subject = ChoiceSubject("Recover", ("What we read: " + "one tool more. " * 12,) * 6, CHOICES)
+    hand = Sitting().asked(subject, kind=Question.TEXT, text="Which needle is mounted?")
+    rows = choice_screen(hand.state, subject, hand.now).rows()
+    assert len(rows) == 24
+    text = "\n".join(rows)
+    assert all(option in text for option in CHOICES)
+    assert any(row.strip() == "..." for row in rows)

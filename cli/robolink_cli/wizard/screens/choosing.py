@@ -1,17 +1,26 @@
 """Screens (a) and (j): a list of which one is chosen."""
 
+from typing import Final
+
 from robolink.messages import tr
 from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.screens.layout import BODY, Screen, broken
 from robolink_cli.wizard.screens.rows import status_row, title_row
 from robolink_cli.wizard.state import WizardState
 
+_LEAST_SHOWN: Final = 3
+"""So many options stand on the screen, however much there is to be read above them."""
+
 
 def choice_screen(state: WizardState, subject: ChoiceSubject, now_s: float) -> Screen:
     """Return the screen of a list; where it is longer than the screen, the part about the mark."""
     assert state.question is not None  # noqa: S101 - looked at by whoever calls
     above = [row for line in subject.above for row in broken(line)]
-    room = max(3, BODY - len(above) - 2)
+    most = BODY - 2 - min(_LEAST_SHOWN, len(subject.options))
+    if len(above) > most:
+        # What is chosen from has to be seen.
+        above = [*above[: most - 1], "..."]
+    room = max(_LEAST_SHOWN, BODY - len(above) - 2)
     first = max(0, min((state.marked or 0) - room // 2, len(subject.options) - room))
     rows = []
     for index, option in enumerate(subject.options[first : first + room], start=first):

@@ -7,7 +7,7 @@ is (assumed: a real one needs a few milliseconds to come to rest).
 import math
 import random
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import accumulate
 from typing import Final
 
@@ -59,15 +59,20 @@ class Travelled:
 class _Travel:
     start_ns: int
     legs: tuple[Leg, ...]
+    ends_ns: tuple[int, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        # Once: each poll of a movement asks for them several times.
+        totals = accumulate(leg.duration_ns for leg in self.legs)
+        object.__setattr__(self, "ends_ns", tuple(self.start_ns + total for total in totals))
 
     @property
     def end_ns(self) -> int:
-        return self.start_ns + sum(leg.duration_ns for leg in self.legs)
+        return self.ends_ns[-1] if self.ends_ns else self.start_ns
 
     def looks(self, since_ns: int, now_ns: int) -> list[int]:
         """Return when to look at the joints so that each one's last way of turning is seen."""
-        ends = [self.start_ns + total for total in accumulate(leg.duration_ns for leg in self.legs)]
-        instants = {t for end in (*ends, now_ns) for t in (end - _LOOK_BACK_NS, end)}
+        instants = {t for end in (*self.ends_ns, now_ns) for t in (end - _LOOK_BACK_NS, end)}
         return sorted(t for t in instants if since_ns < t <= now_ns)
 
     def braked(self, now_ns: int) -> "_Travel":

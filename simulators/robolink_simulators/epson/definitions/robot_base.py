@@ -4,8 +4,6 @@ Points, locals, areas and what is printed count from the base; joints, XYLim and
 robot.
 """
 
-from dataclasses import astuple
-
 from robolink_simulators.epson.definitions.local_frames import Coordinates, Local
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
@@ -31,8 +29,8 @@ class RobotBase:
     @property
     def coordinates(self) -> Coordinates:
         """Where it stands: X, Y, Z in mm and U, V, W in degrees."""
-        x, y, z, u, v, w, _ = astuple(self._place)
-        return (x, y, z, u, v, w)
+        at = self._place
+        return (at.x_mm, at.y_mm, at.z_mm, at.u_deg, at.v_deg, at.w_deg)
 
     @property
     def moved(self) -> bool:

@@ -56,21 +56,22 @@ NOTES: Final = {
 _TOP: Final = """# Performance
 
 `make bench` measures all of this and writes this page; `make bench ONLY=fleet` runs one part and
-prints it. Figures with their numbers stand in `build/bench.json` afterwards. Each figure is a
-median and stands beside a floor (the least that the work cannot do without), a peer (what others
-offer) or what is wanted; both were measured in the same run, in turn, and the ratio is ours over
-theirs, so less is better everywhere. Where a rate is wanted, the ratio is the wanted one over the
-reached one. Ratios compare within a run, microseconds with nothing.
+prints it. `build/bench.json` then has all measured numbers. Each figure is a median. It is compared
+with a floor (the least work that the task needs), a peer (what others offer) or a
+wanted value. Floor or peer is measured in the same run, in turn with ours. The ratio is ours over
+theirs, so less is always better; where a rate is wanted, it is the wanted rate over ours. Compare
+ratios, and only within a run: the times depend on the machine.
 
-Before and after each part the same small work is timed. When it ever took more than {spread:g}
-times as long as at its fastest, the machine did something else meanwhile: nothing is published,
-and `make bench` ends with 3. `NOISY=yes` publishes all the same, and this page says so.
+Before and after each part the same small piece of work is timed. If it ever took more than
+{spread:g} times its fastest time, the machine was doing something else as well: nothing is
+published, and `make bench` ends with 3. `NOISY=yes` publishes all the same, and this page then
+says so.
 """
 
 _GROWTH: Final = """
 ## How it grows
 
-Both axes by powers of ten.
+Both axes are logarithmic.
 """
 
 

@@ -16,14 +16,14 @@ _OPENING: Final = """\
 # Calibration methods
 
 This page is made from the code: `python -m robolink.methods.page > docs/methods.md`.
-[calibrate.md](calibrate.md) says how to choose and what to look out for, [recipes.md](recipes.md)
-what else a recipe says.
+[Calibrating a tool](calibrate.md) says how to choose a method and what to look out for;
+[Recipes](recipes.md) says what else is in a recipe.
 
-A method has one name. It is the command `robolink calibrate NAME`, the `kind` of a recipe's
-`[source]`, and its folder in `robolink/methods`. Its parameters are options of the command and keys
-of `[source]`, with the same limits, which are inclusive; a value beyond them is refused before
-anything moves. Lengths are mm, angles degrees. Besides, every command has `--station`, `--sigma`
-and the options of its help page.
+A method has one name. It is used in the command `robolink calibrate NAME`, as the `kind` in the
+`[source]` table of a recipe, and for the method's folder in `robolink/methods`. Its parameters are
+options of the command and keys of `[source]`, with the same limits. Limits are inclusive; a value
+outside them is refused before anything moves. Lengths are in mm, angles in degrees. Every command
+also has `--station`, `--sigma` and the other options of its help page.
 """
 _STATIONS: Final = {
     "pin": "a pin",

@@ -12,11 +12,11 @@ _OPENING: Final = """\
 # Every key of a recipe
 
 This page is made from the code: `python -m robolink.recipe.page > docs/recipe-keys.md`.
-[Recipes](recipes.md) says how one is written, and which decisions have no default.
+[Recipes](recipes.md) says how to write one, and which decisions have no default.
 
-Limits are inclusive. Lengths are mm, angles degrees. Poses are of the flange (Tool 0), in base
-coordinates. The keys at the top stand above the first line with a `[table]`; what a `[source]` may
-say besides its `kind` is the method's own: [methods](methods.md).
+Limits are inclusive. Lengths are in mm, angles in degrees. Poses are those of the flange (Tool 0),
+in base coordinates. The keys at the top go above the first line with a `[table]`. Which keys a
+`[source]` has besides its `kind` depends on the method: [methods](methods.md).
 """
 
 _TABLES: Final = {

@@ -73,8 +73,8 @@ class BeamsParameters(MethodParameters):
         Option(metavar="DEG"),
         Help(
             declared(
-                "By how much U differs at a second measurement, so that moved beams do no harm; 0 "
-                "for none."
+                "By how much U differs at a second measurement, so that moved beams do no harm; "
+                "0 for no second one."
             )
         ),
     ] = 0.0
@@ -96,7 +96,7 @@ class BeamsParameters(MethodParameters):
         Ge(1),
         Le(50),
         MM,
-        Help(declared("How far from where the beams cross each of them is crossed.")),
+        Help(declared("How far from their crossing point the tip crosses each of the beams.")),
     ] = 5.0
     dip_mm: Annotated[
         float, Ge(0.2), Le(20), MM, Help(declared("How far below the beams the end of the tip is."))
@@ -107,7 +107,10 @@ class BeamsParameters(MethodParameters):
         Le(20),
         MM,
         Help(
-            declared("How much deeper the shaft is measured too, to tell a bent needle; 0 for not.")
+            declared(
+                "How much deeper the shaft is measured as well, to find a bent needle; 0 to "
+                "leave it out."
+            )
         ),
     ] = 3.0
     max_lean_deg: Annotated[
@@ -122,7 +125,7 @@ class BeamsParameters(MethodParameters):
         Ge(1),
         Le(100),
         MM,
-        Help(declared("How far above the beams the tip comes, goes and turns.")),
+        Help(declared("How far above the beams the tip arrives, leaves and turns.")),
     ] = 10.0
     crossing_mm_s: Annotated[
         float,
@@ -132,7 +135,8 @@ class BeamsParameters(MethodParameters):
         Option(flag="--crossing-speed"),
         Help(
             declared(
-                "How fast the tip crosses a beam; the faster, the later it stops past an edge."
+                "How fast the tip crosses a beam; the faster it is, the further past an edge it "
+                "stops."
             )
         ),
     ] = 5.0
@@ -144,7 +148,7 @@ class BeamsParameters(MethodParameters):
     retake: Annotated[
         bool,
         Option(flag="--retake/--no-retake", default=True),
-        Help(declared("Whether the crossing that fits worst is offered to be made again.")),
+        Help(declared("Whether robolink offers to make the crossing that fits worst again.")),
     ] = False
 
     @property

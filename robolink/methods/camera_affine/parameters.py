@@ -27,9 +27,7 @@ class CameraAffineParameters(LookParameters):
     new_camera: Annotated[
         bool,
         Help(
-            declared(
-                "Camera, lens or mount were changed: do not compare with the last calibration."
-            )
+            declared("Camera, lens or mount was changed: do not compare with the last calibration.")
         ),
     ] = False
     mm_per_px: Annotated[
@@ -38,9 +36,9 @@ class CameraAffineParameters(LookParameters):
         Option(flag="--mm-per-px", metavar="XX,XY,YX,YY", moves=False),
         Help(
             declared(
-                "What a pixel was in the base when the camera was found last; a camera that "
-                "differs is refused. Else the station's record says so, and without that nothing "
-                "is compared."
+                "What a pixel was in the base when the camera was last found; a camera that "
+                "differs is refused. Without it the station's record counts; without a record "
+                "nothing is compared."
             )
         ),
     ] = None

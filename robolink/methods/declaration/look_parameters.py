@@ -89,12 +89,12 @@ class LookParameters(MethodParameters):
         Ge(0),
         Le(10),
         MM,
-        Help(declared("From how far beside every place is approached, always from the same side.")),
+        Help(declared("How far beside each place its approach begins, always on the same side.")),
     ] = 1.0
     retake: Annotated[
         bool,
         Option(flag="--retake/--no-retake", default=True),
-        Help(declared("Whether the look that fits worst is offered to be taken again.")),
+        Help(declared("Whether robolink offers to take the look that fits worst again.")),
     ] = False
 
     @property

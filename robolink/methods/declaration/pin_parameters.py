@@ -24,7 +24,7 @@ from robolink.procedures import TouchPlan
 Retake = Annotated[
     bool,
     Option(flag="--retake/--no-retake", default=True),
-    Help(declared("Whether the touch that fits worst is offered to be made again.")),
+    Help(declared("Whether robolink offers to make the touch that fits worst again.")),
 ]
 """Whether the worst touch is offered again when all are made."""
 
@@ -41,14 +41,16 @@ class PinParameters(MethodParameters):
         Ge(0.5),
         Le(50),
         MM,
-        Help(declared("How far above the pin the tip stops at least; the rest is the person's.")),
+        Help(
+            declared(
+                "Least distance above the pin at which the robot stops; a person jogs the rest."
+            )
+        ),
     ] = 2.0
     contact_input: Annotated[
         InputNumber | None,
         Option(metavar="N"),
-        Help(
-            declared("Number of the input that shows contact of tip and pin, where there is one.")
-        ),
+        Help(declared("Number of the input that shows contact of tip and pin, if there is one.")),
     ] = None
     off_in_contact: Annotated[
         bool,
@@ -85,9 +87,9 @@ class UprightPinParameters(PinParameters):
         Option(moves=False),
         Help(
             declared(
-                "Where the heights of the touches show that the tip is longer or shorter: ask a "
-                "person, write Z by the difference, or keep Z. Where nobody can be asked, ask "
-                "means that nothing is written."
+                "What happens when the heights of the touches show a longer or shorter tip: ask "
+                "a person, write Z by the difference, or keep Z. If nobody can be asked, ask "
+                "writes nothing."
             )
         ),
     ] = "ask"

@@ -28,16 +28,16 @@ class SurfaceParameters(PinParameters):
         Le(50),
         MM,
         Help(
-            declared("How far from the surface the tip stops at least; the rest is the person's.")
+            declared(
+                "Least distance from the surface at which the robot stops; a person jogs the rest."
+            )
         ),
     ] = 2.0
     contact_input: Annotated[
         InputNumber | None,
         Option(metavar="N"),
         Help(
-            declared(
-                "Number of the input that shows contact of tip and surface, where there is one."
-            )
+            declared("Number of the input that shows contact of tip and surface, if there is one.")
         ),
     ] = None
     tilt_deg: Annotated[
@@ -46,7 +46,7 @@ class SurfaceParameters(PinParameters):
         Le(45),
         DEGREES,
         Option(metavar="DEG"),
-        Help(declared("How far the tool leans, against the first touch.")),
+        Help(declared("How far the tool leans, relative to the first touch.")),
     ] = 30.0
 
     retake: Retake = False

@@ -35,9 +35,7 @@ class NAngleParameters(UprightPinParameters):
         DEGREES,
         Option(flag="--angles", metavar="0,120,.."),
         Help(
-            declared(
-                "In place of a count: U of each touch, counted from the first one, which is 0."
-            )
+            declared("Instead of a count: U of each touch, relative to the first one, which is 0.")
         ),
     ] = None
     until_mm: Annotated[

@@ -17,7 +17,7 @@ class OneTouchParameters(PinParameters):
     basis: Annotated[
         Literal["difference", "absolute"],
         Option(flag="--absolute", chooses="absolute", moves=False, from_recipe="basis"),
-        Help(declared("Trust the place of the pin, and not the last touch of this tool on it.")),
+        Help(declared("Trust the place of the pin, not the last touch of this tool on it.")),
     ] = "difference"
     max_changes: Annotated[
         int,
@@ -35,7 +35,7 @@ class OneTouchParameters(PinParameters):
         Ge(1),
         Le(100),
         MM,
-        Help(declared("How far above the pin the tip comes, goes and turns.")),
+        Help(declared("How far above the pin the tip arrives, leaves and turns.")),
     ] = 10.0
     clearance_mm: Annotated[
         float,
@@ -44,7 +44,8 @@ class OneTouchParameters(PinParameters):
         MM,
         Help(
             declared(
-                "How far above the pin the old tip would stop: more than the new one may be longer."
+                "How far above the pin the old tip would stop; give more than the new one can be"
+                " longer."
             )
         ),
     ] = 5.0

@@ -31,7 +31,7 @@ class PivotParameters(PinParameters):
         Le(45),
         DEGREES,
         Option(metavar="DEG"),
-        Help(declared("How far the tool leans in the others, against the first one.")),
+        Help(declared("How far the tool leans in the other touches, relative to the first one.")),
     ] = 20.0
     lift_mm: Annotated[
         float,

@@ -19,9 +19,7 @@ class PointsParameters(MethodParameters):
     method: Annotated[
         Literal["two-pose", "n-angle"],
         Option(moves=False),
-        Help(
-            declared("Two points for each tool, or three and more of which each checks the others.")
-        ),
+        Help(declared("Two points for each tool, or three and more that check each other.")),
     ] = "two-pose"
     taught_tool: Annotated[
         int,

@@ -37,7 +37,10 @@ class SphereTouchParameters(SurfaceParameters):
         MM,
         Option(metavar="MM"),
         Help(
-            declared("About the radius of the sphere: it guides the robot; the true one is found.")
+            declared(
+                "Approximate radius of the sphere. It guides the robot; the true radius is "
+                "measured."
+            )
         ),
     ] = _USUAL_MM
 

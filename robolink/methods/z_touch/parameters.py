@@ -46,8 +46,9 @@ class ZTouchParameters(MethodParameters):
         Option(metavar="2,1,.."),
         Help(
             declared(
-                "Speed of each touch; two that differ tell the latency of the trigger, three in "
-                "four touches or more also how far the robot runs on while it brakes."
+                "Speed of each touch. Two different speeds show the latency of the trigger; "
+                "three speeds in four touches or more also show how far the robot moves while it"
+                " brakes."
             )
         ),
     ] = (2.0, 1.0, 2.0, 1.0)
@@ -56,14 +57,19 @@ class ZTouchParameters(MethodParameters):
         Ge(0.5),
         Le(20),
         MM,
-        Help(declared("How far above the expected touch the tip begins to seek it.")),
+        Help(declared("How far above the expected touch the tip begins to search for it.")),
     ] = 3.0
     beyond_mm: Annotated[
         float,
         Ge(0.1),
         Le(10),
         MM,
-        Help(declared("How far below it the search ends; a new tip may be shorter by less.")),
+        Help(
+            declared(
+                "How far below the expected touch the search ends; "
+                "a new tip can be shorter by less."
+            )
+        ),
     ] = 2.0
     back_off_mm: Annotated[
         float, Ge(0.2), Le(10), MM, Help(declared("How far the tip is lifted after each touch."))
@@ -73,7 +79,7 @@ class ZTouchParameters(MethodParameters):
         Ge(1),
         Le(100),
         MM,
-        Help(declared("How far above the surface the tip comes, goes and turns.")),
+        Help(declared("How far above the surface the tip arrives, leaves and turns.")),
     ] = 10.0
     proof_turn_deg: Annotated[
         float,
@@ -96,7 +102,7 @@ class ZTouchParameters(MethodParameters):
     retake: Annotated[
         bool,
         Option(flag="--retake/--no-retake", default=True),
-        Help(declared("Whether the touch that fits worst is offered to be made again.")),
+        Help(declared("Whether robolink offers to make the touch that fits worst again.")),
     ] = False
 
     @property

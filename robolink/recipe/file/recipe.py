@@ -45,8 +45,8 @@ class Recipe(Table):
     """Where Z of the offset comes from: "measured" on the pin, "typed" by the person each time,
     or "kept", which the person confirms each time."""
     verify: bool | None = None
-    """Whether the robot turns about the new tip after the write. It does so wherever it moves
-    unless this is false."""
+    """Whether the robot turns about the new tip after the write. If the robot moves at all, it
+    does so unless this is false."""
     source: Annotated[MethodTable, AnyKind()]
     """Where the measurements come from."""
     station: StationTable

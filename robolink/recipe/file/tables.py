@@ -68,8 +68,8 @@ class StationTable(Table):
     """Name of the pin or gauge; it goes on record with every measurement. What this table does not
     say about its place comes from the station of that name in the cell file and the journal."""
     x_mm: float | None = None
-    """X of the pin's end, for the record, of where the surface is touched, or of where a camera
-    looks; base, mm; together with y_mm."""
+    """X of the pin's end (for the record only), of the place where the surface is touched, or of
+    the place where a camera looks; base, mm; together with y_mm."""
     y_mm: float | None = None
     """Y of the same; base, mm; together with x_mm."""
     z_mm: float | None = None
@@ -120,8 +120,8 @@ class Tool(Table):
     name: Line | None = None
     """What people call it."""
     approach: FlangePose | None = None
-    """Flange pose from which it is measured: tip some mm beside the pin and above it. Without it,
-    it is measured from where the robot is."""
+    """Flange pose from which the tool is measured: tip some mm beside the pin and above it. Without
+    it, the tool is measured from where the robot is."""
     retreat: FlangePose | None = None
     """Flange pose to which the robot goes after the measurement."""
     points: Annotated[tuple[PointNumber, ...], Field(strict=False, min_length=2)] | None = None
@@ -180,9 +180,9 @@ class RefusalTable(Table):
     """What follows when a measurement is not believed."""
 
     action: Literal["stop", "measure_again"] = "stop"
-    """End the change with the old values in force, or measure that tool again."""
+    """End the change with the old values, or measure that tool again."""
     attempts: Annotated[int, Field(ge=2, le=5)] | None = None
-    """How often a tool is measured at most; 2 when it is not said."""
+    """How often a tool is measured at most; 2 if this is left out."""
 
 
 class Prompt(Table):

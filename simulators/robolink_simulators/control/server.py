@@ -352,7 +352,10 @@ class _Handler(BaseHTTPRequestHandler):
             code = HTTPStatus.METHOD_NOT_ALLOWED
         self._refuse(
             HTTPStatus(code),
-            tr("What came is no request that is answered here: {cause}.", cause=HTTPStatus(code).phrase),
+            tr(
+                "What came is no request that is answered here: {cause}.",
+                cause=HTTPStatus(code).phrase,
+            ),
         )
 
     def log_message(self, *_: object) -> None:

@@ -124,7 +124,9 @@ def show_impact(tool: int, impact: "Impact") -> None:
         for entry in impact.entries
     ]
     if rows:
-        table(tr("where the tip of tool {tool} will be, compared with now", tool=tool), columns, rows)
+        table(
+            tr("where the tip of tool {tool} will be, compared with now", tool=tool), columns, rows
+        )
     if impact.largest is not None:
         say(
             tr(

@@ -108,7 +108,9 @@ def _text(desk: "AskingDesk", controller: "Controller", question: str) -> str:
     while (answer := desk.poll(POLL_S)) is None:
         controller.status()
     if answer == "q":
-        raise DeclinedError(tr("You did not start it."), remedy=tr("To start, give the same command again."))
+        raise DeclinedError(
+            tr("You did not start it."), remedy=tr("To start, give the same command again.")
+        )
     return answer
 
 
@@ -138,7 +140,9 @@ def _answer_to_list(
         controller.status()
     if answer in ("y", SWITCH_ON):
         return answer
-    raise DeclinedError(tr("You did not start it."), remedy=tr("To start, give the same command again."))
+    raise DeclinedError(
+        tr("You did not start it."), remedy=tr("To start, give the same command again.")
+    )
 
 
 def _points(controller: "Controller", purpose: str, *, tried: bool) -> "list[CheckPoint]":

@@ -61,15 +61,22 @@ def check_before_start(
     desk = present_desk()
     assert desk is not None  # noqa: S101 - looked at by whoever calls
     heed_what_was_left(yes=False)
-    plan = tr(
-        "The robot will move by itself {n} times: power LOW, up to {v} mm/s, at most {d} mm from "
-        "here.",
-        n=moves,
-        v=f"{speed_mm_s:g}",
-        d=f"{box_mm:g}",
-    )
-    while _answer_to_list(desk, controller, purpose, plan) != "y":
+    foreseen = {"n": moves, "v": f"{speed_mm_s:g}", "d": f"{box_mm:g}"}
+    if controller.capabilities.low_power:
+        plan = tr(
+            "The robot will move by itself {n} times: power LOW, up to {v} mm/s, at most {d} mm "
+            "from here.",
+            **foreseen,
+        )
+    else:
+        plan = tr(
+            "The robot will move by itself {n} times: up to {v} mm/s, at most {d} mm from here.",
+            **foreseen,
+        )
+    tried = False
+    while _answer_to_list(desk, controller, purpose, plan, tried=tried) != "y":
         controller.motors(True)
+        tried = True
 
 
 def name_the_needle(
@@ -105,16 +112,26 @@ def _text(desk: "AskingDesk", controller: "Controller", question: str) -> str:
     return answer
 
 
-def _answer_to_list(desk: "AskingDesk", controller: "Controller", purpose: str, plan: str) -> str:
+def _answer_to_list(
+    desk: "AskingDesk", controller: "Controller", purpose: str, plan: str, *, tried: bool
+) -> str:
     """Show the list; return ``y``, or that the motors are to be switched on.
+
+    Args:
+        desk: Where.
+        controller: The controller, connected.
+        purpose: What it moves for, in words.
+        plan: What it will do, a sentence.
+        tried: Whether it was told before to switch them on: asking once more would not help.
 
     Raises:
         DeclinedError: The person leaves.
+        NotReadyError: Nothing can move now, and no key of the list changes that.
     """
     from robolink.runner import POLL_S, Question
     from robolink_cli.wizard.check_list import SWITCH_ON, CheckSubject
 
-    points = tuple(_points(controller, purpose))
+    points = tuple(_points(controller, purpose, tried=tried))
     desk.regard(CheckSubject(points, plan))
     desk.ask(tr("Start moving"), Question.YES_NO)
     while (answer := desk.poll(POLL_S)) is None:
@@ -124,7 +141,7 @@ def _answer_to_list(desk: "AskingDesk", controller: "Controller", purpose: str, 
     raise DeclinedError(tr("You did not start it."), remedy=tr("Nothing moved."))
 
 
-def _points(controller: "Controller", purpose: str) -> "list[CheckPoint]":
+def _points(controller: "Controller", purpose: str, *, tried: bool) -> "list[CheckPoint]":
     from robolink_cli.wizard.check_list import CheckPoint, Mark
 
     motors_off = False
@@ -132,12 +149,12 @@ def _points(controller: "Controller", purpose: str) -> "list[CheckPoint]":
         controller.groups[0].require_able(purpose)
     except NotReadyError as error:
         motors_off = error.reason is NotReadyReason.MOTORS_OFF and controller.capabilities.motors
-        if not motors_off:
+        if not motors_off or tried:
             raise
     terms = controller.groups[0].terms()
     points = [
         CheckPoint(Mark.OK, tr("Controller answers: {name}", name=_name(controller))),
-        CheckPoint(Mark.OK, tr("Emergency stop released, guard closed, no program running")),
+        *([CheckPoint(Mark.OK, terms.able)] if terms.able else ()),
         CheckPoint(Mark.OK, terms.watch),
     ]
     if motors_off:

@@ -108,7 +108,9 @@ def _text(desk: "AskingDesk", controller: "Controller", question: str) -> str:
     while (answer := desk.poll(POLL_S)) is None:
         controller.status()
     if answer == "q":
-        raise DeclinedError(tr("You did not start it."), remedy=tr("Nothing moved."))
+        raise DeclinedError(
+            tr("You did not start it."), remedy=tr("To start, give the same command again.")
+        )
     return answer
 
 
@@ -146,7 +148,9 @@ def _answer_to_list(
     if answer == "y":
         controller.groups[0].require_able(purpose)
         return answer
-    raise DeclinedError(tr("You did not start it."), remedy=tr("Nothing moved."))
+    raise DeclinedError(
+        tr("You did not start it."), remedy=tr("To start, give the same command again.")
+    )
 
 
 def _motors_are_off(controller: "Controller", purpose: str, *, tried: bool) -> bool:

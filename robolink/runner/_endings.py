@@ -30,6 +30,7 @@ class EndingWatch:
 
     Example:
         >>> from robolink.model import ControllerStatus
+        >>> from robolink.runner import EndingWatch
         >>> watch = EndingWatch()
         >>> watch.obstacle(ControllerStatus(remote=True, ready=True))
         ''

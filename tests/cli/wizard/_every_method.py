@@ -15,7 +15,7 @@ import click
 from robolink_cli.prompts.operator import AssistedOperator
 from robolink_cli.prompts.present import sitting_at
 from robolink_cli.session.check_before_start import check_before_start
-from robolink_cli.wizard.check_list import CheckSubject
+from robolink_cli.wizard.check_list import CheckSubject, Mark
 from robolink_cli.wizard.desk import Desk
 from robolink_cli.wizard.faces.effects import carry_out
 from robolink_cli.wizard.flow import advance
@@ -131,6 +131,15 @@ class FlowHand:
                 self.answer()
             elif isinstance(self.state.subject, MoveSubject) and self.state.question is None:
                 self.meet("moving")
+            elif self.broken and self.has_to_do():
+                self.press("stop")
+
+    def has_to_do(self) -> bool:
+        """Tell whether the list says by now that something has to be done first."""
+        subject = self.state.subject
+        if self.state.ending or not isinstance(subject, CheckSubject):
+            return False
+        return any(point.mark is Mark.TO_DO for point in subject.points)
 
     def meet(self, moment: str) -> bool:
         """Note a moment; tell whether it is the one at which something else is done."""

@@ -110,9 +110,16 @@ def before_of(method):
         return stored(cell)
 
 
+def press_the_stop(hand):
+    """Press it, and jog on: a PLC whose drives were never seen with power shows it then."""
+    hand.cell.simulator.panel.press_estop()
+    if hand.state.at_place:
+        hand.type("z+0.1")
+
+
 ENDS = {
     "link": lambda hand: hand.cell.simulator.panel.cut_link(),
-    "estop": lambda hand: hand.cell.simulator.panel.press_estop(),
+    "estop": press_the_stop,
     "nobody": lambda hand: hand.desk.leave(),
 }
 

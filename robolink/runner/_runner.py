@@ -26,7 +26,7 @@ from robolink.model import (
     Pose,
     TipSensor,
 )
-from robolink.runner._endings import as_measurement, ended_by
+from robolink.runner._endings import EndingWatch, as_measurement
 from robolink.runner._foreseeing import considered
 from robolink.runner._jog_steps import jog_target, parse_steps, typed_pose, way_in_words
 from robolink.runner._operator import Operator, Question
@@ -126,7 +126,7 @@ class Runner:
         self._camera = camera
         self._offers = offers
         self._types = types
-        self._runs = False
+        self._runs, self._ending = False, EndingWatch()
         self._repeats_left = _MOST_REPEATS if offers and repeats else 0
 
     def run(self, procedure: Procedure[T]) -> T:
@@ -372,7 +372,7 @@ class Runner:
         self._require_going()
         status = self._controller.status()
         self._runs = status.running
-        obstacle = ended_by(status)
+        obstacle = self._ending.obstacle(status)
         if obstacle:
             raise ControllerFaultError(
                 tr("{obstacle} The job has ended.", obstacle=obstacle),

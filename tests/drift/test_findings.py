@@ -1,10 +1,11 @@
 """What stands out in the course of a cell's tools, and what does not."""
 
 from collections import Counter
+from dataclasses import replace
 
 import pytest
 
-from robolink.drift import charts_of, findings_in
+from robolink.drift import DriftCode, charts_of, findings_in
 from robolink.errors import ConfigError
 from tests.drift._courses import course, found
 
@@ -19,6 +20,10 @@ def most(seed_codes):
 
 def after(count, **kwargs):
     return most([found(course(seed, count, **kwargs)) for seed in SEEDS])
+
+
+def said_of(changes):
+    return findings_in(charts_of(changes), changes)
 
 
 def test_a_steady_cell_shows_nothing():
@@ -83,6 +88,33 @@ def test_fewer_than_twenty_changes_draw_no_limits():
     assert found(jump) == set()
     with pytest.raises(ConfigError, match="cannot rest on 1"):
         charts_of(jump, baseline=1)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_large_shift_is_said_after_four_changes_whatever_was_before(seed):
+    """Values that happened to lie on the same side before it are no part of it."""
+    slipped = course(seed, 29, shift=lambda index, _: (0.2 * (index >= 25), 0, 0))
+    (said,) = (one for one in said_of(slipped) if one.code == DriftCode.MOUNT_SHIFTED)
+    assert said.shift_mm["x"] == pytest.approx(0.2, abs=0.05)
+    assert said.since == slipped[25].at
+    moved = course(seed, 29, tools=2, pin=lambda index: 0.3 * (index >= 26))
+    (said,) = (one for one in said_of(moved) if one.code == DriftCode.PIN_MOVED)
+    assert said.since == moved[2 * 26].at
+
+
+def test_one_bad_touch_at_the_end_hides_no_slipping_mount():
+    slipping = course(4, 36, shift=lambda index, _: (0.1 * (index >= 26), 0, 0))
+    slipping[-1] = replace(slipping[-1], tip_mm={**slipping[-1].tip_mm, "x": 13.0})
+    (said,) = (one for one in said_of(slipping) if one.code == DriftCode.MOUNT_SHIFTED)
+    assert said.since == slipping[26].at
+
+
+@pytest.mark.parametrize(("by_mm", "codes"), [(0.5, {"mount_shifted"}), (0.001, set())])
+def test_a_cell_that_showed_the_same_digits_each_time_shifts_too(by_mm, codes):
+    first = course(1, 1)[0]
+    same = [replace(first, number=n, nozzle=f"N{n}") for n in range(1, 26)]
+    off = {**first.tip_mm, "x": first.tip_mm["x"] + by_mm}
+    assert found([*same, *(replace(one, tip_mm=off) for one in same[:4])]) == codes
 
 
 def test_equal_values_have_no_limits_and_say_nothing():

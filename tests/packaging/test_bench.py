@@ -1,6 +1,8 @@
 """The figures that are published: each by its case, and none from a busy machine."""
 
+import importlib
 import json
+import os
 import sys
 from xml.etree import ElementTree
 
@@ -55,6 +57,12 @@ def test_a_machine_that_was_slow_once_is_not_quiet():
     assert floors.quiet
     floors.taken_us.append(95.0 * SPREAD * 1.05)
     assert not floors.quiet
+
+
+def test_the_processes_that_are_measured_keep_their_bytecode(monkeypatch):
+    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
+    importlib.reload(bench)
+    assert "PYTHONDONTWRITEBYTECODE" not in os.environ
 
 
 @pytest.mark.parametrize("quiet", [True, False])

@@ -14,7 +14,7 @@ from robolink_cli.session.motion_consent import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from robolink.model import Controller
+    from robolink.model import Controller, MotionTerms
     from robolink_cli.prompts.present import AskingDesk
     from robolink_cli.wizard.check_list import CheckPoint
 
@@ -108,7 +108,9 @@ def _text(desk: "AskingDesk", controller: "Controller", question: str) -> str:
     while (answer := desk.poll(POLL_S)) is None:
         controller.status()
     if answer == "q":
-        raise DeclinedError(tr("You did not start it."), remedy=tr("Nothing moved."))
+        raise DeclinedError(
+            tr("You did not start it."), remedy=tr("To start, give the same command again.")
+        )
     return answer
 
 
@@ -131,33 +133,51 @@ def _answer_to_list(
     from robolink.runner import POLL_S, Question
     from robolink_cli.wizard.check_list import SWITCH_ON, CheckSubject
 
-    points = tuple(_points(controller, purpose, tried=tried))
-    desk.regard(CheckSubject(points, plan))
+    off = _motors_are_off(controller, purpose, tried=tried)
+    name, terms = _name(controller), controller.groups[0].terms()
+    desk.regard(CheckSubject(_points(name, terms, off=off), plan))
     desk.ask(tr("Start moving"), Question.YES_NO)
     while (answer := desk.poll(POLL_S)) is None:
-        controller.status()
-    if answer in ("y", SWITCH_ON):
+        now = _motors_are_off(controller, purpose, tried=tried)
+        if now is not off:
+            # The list says what is so now; what the person has confirmed stays confirmed.
+            off = now
+            desk.regard(CheckSubject(_points(name, terms, off=off), plan))
+    if answer == SWITCH_ON:
         return answer
-    raise DeclinedError(tr("You did not start it."), remedy=tr("Nothing moved."))
+    if answer == "y":
+        controller.groups[0].require_able(purpose)
+        return answer
+    raise DeclinedError(
+        tr("You did not start it."), remedy=tr("To start, give the same command again.")
+    )
 
 
-def _points(controller: "Controller", purpose: str, *, tried: bool) -> "list[CheckPoint]":
-    from robolink_cli.wizard.check_list import CheckPoint, Mark
+def _motors_are_off(controller: "Controller", purpose: str, *, tried: bool) -> bool:
+    """Tell whether the motors are off, which a key of the list changes.
 
-    motors_off = False
+    Raises:
+        NotReadyError: Something else stands in the way, or that key was pressed before.
+    """
     try:
         controller.groups[0].require_able(purpose)
     except NotReadyError as error:
-        motors_off = error.reason is NotReadyReason.MOTORS_OFF and controller.capabilities.motors
-        if not motors_off or tried:
+        off = error.reason is NotReadyReason.MOTORS_OFF and controller.capabilities.motors
+        if not off or tried:
             raise
-    terms = controller.groups[0].terms()
+        return True
+    return False
+
+
+def _points(name: str, terms: "MotionTerms", *, off: bool) -> "tuple[CheckPoint, ...]":
+    from robolink_cli.wizard.check_list import CheckPoint, Mark
+
     points = [
-        CheckPoint(Mark.OK, tr("Controller answers: {name}", name=_name(controller))),
+        CheckPoint(Mark.OK, tr("Controller answers: {name}", name=name)),
         *([CheckPoint(Mark.OK, terms.able)] if terms.able else ()),
         CheckPoint(Mark.OK, terms.watch),
     ]
-    if motors_off:
+    if off:
         points.append(CheckPoint(Mark.TO_DO, tr("Motors are off"), "7", tr("Switch them on")))
     else:
         points.append(CheckPoint(Mark.OK, tr("Motors are on")))
@@ -165,7 +185,7 @@ def _points(controller: "Controller", purpose: str, *, tried: bool) -> "list[Che
     clear = tr("Nobody in the cell, hoses free")
     points.append(CheckPoint(Mark.YOU, new, "1", tr("Yes")))
     points.append(CheckPoint(Mark.YOU, clear, "3", tr("Yes")))
-    return points
+    return tuple(points)
 
 
 def _name(controller: "Controller") -> str:

@@ -159,3 +159,9 @@ def show_steps(steps: object) -> None:
             say(f"       {request}")
         if step["refusal"]:
             say(f"       {step['refusal']}")
+    say(
+        tr(
+            "These steps measure. What is written afterwards, and the turn test if there is one, "
+            "depend on the result."
+        )
+    )

@@ -22,7 +22,7 @@ from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 import robolink
-from robolink.errors import DeclinedError
+from robolink.errors import DeclinedError, NotReadyError
 from robolink.runner import Question
 from tests.cli.wizard._people import HEADER, Sitting, touch_subject, write_subject
 
@@ -111,6 +111,31 @@ def test_power_and_motors_are_those_of_the_controller():
         assert going is not None
         assert (seen.motors, seen.low_power) == (True, False)
         assert (going.motors, going.low_power) == (True, True)
+
+
+class Presser(Desk):
+    """Presses the emergency stop while the list is read, and waits for what comes of it."""
+
+    def __init__(self, simulator):
+        super().__init__()
+        self.simulator, self.polled = simulator, 0
+
+    def poll(self, wait_s):
+        self.polled += 1
+        assert self.polled < 3, "the list goes on saying that the emergency stop is released"
+        self.simulator.panel.press_estop()
+
+
+def test_a_list_does_not_go_on_saying_what_is_no_longer_so():
+    simulator = EpsonSimulator(seed=7)
+    with (
+        serve_tcp(simulator, clock=ScaledClock(10.0)) as host,
+        robolink.connect(host.url) as controller,
+        click.Context(click.Command("change")),
+        sitting_at(Presser(simulator)),
+        pytest.raises(NotReadyError, match="emergency stop is pressed"),
+    ):
+        check_before_start(controller, "to look", moves=2, speed_mm_s=20.0, box_mm=60.0)
 
 
 class Leaver(Desk):

@@ -167,9 +167,24 @@ def jogging():
     )
 
 
+JOBS = ChoiceSubject(
+    "Choose",
+    (),
+    ("needle   (needle-one-touch.toml)", "two-nozzles   (two.toml)"),
+    details=(
+        ("Touch one pin at two angles of U, half a turn apart.", "Tool: 1"),
+        (
+            "Touch a known pin once: X, Y and Z, for a change of the needle.",
+            "Tool: 1, 2",
+            "Last change with it from here: 2026-11-20 16:12 (UTC+1), needle N-0417",
+        ),
+    ),
+)
+
 SCREENS = {
     "free jog": jogging,
     "choose": choosing,
+    "choose job": lambda: Sitting().asked(JOBS, Question.TEXT, tr("Which job?")).keys("2"),
     "check": lambda: Sitting(motors=False).asked(CHECK, Question.YES_NO).keys("1"),
     "moving": moving,
     "touch": touching,

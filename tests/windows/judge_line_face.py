@@ -36,6 +36,7 @@ def test_a_person_types_steps_is_refused_an_unjogged_touch_and_stops(console, si
     assert simulator.machine.flash_writes == 0
 
 
+@pytest.mark.parametrize("pace", [1.0])
 def test_half_a_line_that_was_typed_too_early_is_no_part_of_the_answer(console, simulator):
     console.type("y\r")
     console.see("Moving to")

@@ -96,6 +96,8 @@ def test_keys_of_a_pipe_jog_take_and_write():
             time.sleep(0.35)
             paste(source, "5")
             time.sleep(0.1)
+            source.send_text("6\x1b[200~813\r\x1b[201~")  # as a console hands a scan on
+            time.sleep(0.1)
             assert answers == ["N-7"]
             source.send_text("4006381333931\r\n")
             time.sleep(0.3)

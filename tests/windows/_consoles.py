@@ -112,9 +112,9 @@ class WindowsConsole(HandAtScreen):
         """Have a key pressed and released."""
         self._keys.sendall(f"{key}\n".encode())
 
-    def type(self, text: str) -> None:
+    def type(self, text: str, *, later_s: float = 1.0) -> None:
         """Write to the terminal, for wine's own console to make keys of; a person types later."""
-        self.rest(1.0)
+        self.rest(later_s)
         os.write(self._terminal, text.encode())
 
     def close(self) -> None:

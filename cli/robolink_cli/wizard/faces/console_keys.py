@@ -42,14 +42,19 @@ class TimedConsole(TimedKeys):
         self._last = (self._quiet_s, self._quiet_s)
 
     def look(self) -> bool:
-        """Take the keys that are there; tell whether there were any. Any thread may look."""
+        """Take what is there; tell whether there was anything. Any thread may look.
+
+        A lone Esc is no key yet: only when the loop has been told does it ask for what is left.
+        """
         with self._lock:
             before_s = self._now_s()
             if not self._waits():
                 self._quiet_s = before_s
                 return False
-            keys, quiet_s = self._source.read_keys(), self._quiet_s
-            return self._keep(keys, self._now_s(), quiet_s)
+            keys = self._source.read_keys()
+            self._last = (self._now_s(), self._quiet_s)
+            self._keep(keys)
+            return True
 
     def quiet(self) -> float | None:
         """See :meth:`~robolink_cli.wizard.faces.arrivals.ArrivalReader.quiet`."""
@@ -69,7 +74,7 @@ class TimedConsole(TimedKeys):
     def flush_keys(self) -> list[KeyPress]:
         """Return what is no longer taken for the beginning of a longer key."""
         with self._lock:
-            self._keep(self._source.flush_keys(), *self._last)
+            self._keep(self._source.flush_keys())
         return self.read_keys()
 
     @contextmanager
@@ -93,12 +98,9 @@ class TimedConsole(TimedKeys):
             over.set()
             thread.join()
 
-    def _keep(self, keys: list[KeyPress], at_s: float, quiet_s: float) -> bool:
-        """Keep keys with their time; tell whether there are any."""
-        if keys:
-            self._last = (at_s, quiet_s)
-            self._came += [TimedPress(one, at_s, quiet_s) for one in keys]
-        return bool(keys)
+    def _keep(self, keys: list[KeyPress]) -> None:
+        """Keep keys with the time at which the last of them came."""
+        self._came += [TimedPress(one, *self._last) for one in keys]
 
 
 def fine_clock() -> Callable[[], float]:

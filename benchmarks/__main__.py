@@ -13,6 +13,10 @@ import sys
 # other work has the second processor a floor takes seven times as long as with one thread.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+# What is installed has its bytecode. A shell that forbids to write it would have every process
+# that is measured compile whatever changed since it last was allowed.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path

@@ -26,6 +26,7 @@ CANARIES = Watch()
 for _name in ("LC_ALL", "LC_MESSAGES", "LANG"):
     if os.environ.get(_name):
         os.environ[_name] = "C.UTF-8"
+os.environ.pop("LANGUAGE", None)
 
 
 def pytest_sessionstart():

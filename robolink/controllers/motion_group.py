@@ -79,6 +79,14 @@ class MotionGroupCore(ABC):
         """Read the positions of the axes; none where this kind does not tell them."""
         return {}
 
+    def motors_on(self) -> bool | None:
+        """Read whether its motors are on; none where this kind does not tell it."""
+        return None
+
+    def low_power(self) -> bool | None:
+        """Read whether it moves with little power; none where this kind has no such mode."""
+        return None
+
     def move_until_input(
         self, target: Pose, edge: InputEdge, *, speed_mm_s: float, box: WorkBox
     ) -> MotionUntilInput:

@@ -12,10 +12,14 @@ from typing import Final, Literal, TypeAlias
 
 from robolink.calibration import LEAST_BASELINE, ControlChart, control_chart
 from robolink.drift.history import MeasuredChange
+from robolink.drift.significance import likeliest_split
 from robolink.errors import ConfigError
 from robolink.messages import tr
 
 Quantity: TypeAlias = Literal["tip", "pin", "turn test"]
+
+_DIGIT_MM: Final = 0.001
+"""The last digit of a position; values that scatter by less differ by chance in it."""
 
 _LEAST: Final = 2
 """One value has no scatter, and draws no chart."""
@@ -87,13 +91,21 @@ class Chart:
 
     @property
     def shifted(self) -> tuple[ChartPoint, ...]:
-        """The values since the mean went to the side where it is outside now; none while inside."""
+        """The values since it shifted; none while the weighted mean is inside its limits.
+
+        When that was is told by the split that leaves the least scatter on both sides (the most
+        likely one for normal values), among those since the mean went to the side where it is
+        outside now. That alone would count what happened to lie on this side before, and hide a
+        large shift in scatter of its own making.
+        """
         if not self.last.mean_outside:
             return ()
         judged = self.judged
         above = [point.mean_mm is not None and point.mean_mm > self.centre_mm for point in judged]
         stays = next((n for n, side in enumerate(reversed(above)) if side != above[-1]), len(above))
-        return judged[len(judged) - stays :]
+        earliest = len(self.counted) - stays
+        values = [point.value_mm for point in self.counted]
+        return self.counted[likeliest_split(values, earliest) :]
 
     @property
     def shift_mm(self) -> float:
@@ -153,11 +165,15 @@ def _values(change: MeasuredChange) -> Iterable[tuple[_Key, float]]:
 def _chart(key: _Key, points: Sequence[ChartPoint], baseline: int) -> Chart:
     numbers = [point.value_mm for point in points if not point.repeat]
     first = min(baseline, len(numbers))
-    found = control_chart(numbers[:first], numbers[first:])
+    # A cell that showed the same digits each time, and then does not, has scatter after all.
+    differs = any(number != numbers[0] for number in numbers)
+    floor_mm = _DIGIT_MM if differs else 0.0
+    found = control_chart(numbers[:first], numbers[first:], least_sigma_mm=floor_mm)
     if found.limits is not None:
         low, high = found.limits
         within = [min(max(number, low), high) for number in numbers[first:]]
-        found = replace(control_chart(numbers[:first], within), points_out=found.points_out)
+        inner = control_chart(numbers[:first], within, least_sigma_mm=floor_mm)
+        found = replace(inner, points_out=found.points_out)
     return Chart(
         *key,
         points=tuple(_judged(points, first, found)),

@@ -8,7 +8,7 @@ false alarm; the levels are chosen for that, and what they come to was measured 
 
 import math
 from collections.abc import Sequence
-from statistics import fmean, variance
+from statistics import fmean, median, variance
 from typing import Final
 
 from robolink.calibration import student_t
@@ -36,6 +36,30 @@ def shift_is_sure(before: Sequence[float], since: Sequence[float]) -> bool:
     sigma = math.sqrt(max(pooled, _RESOLUTION_MM**2) * (1 / first + 1 / then))
     limit = student_t(1 - LEVEL / (2 * (dof + 1)), dof)
     return abs(fmean(since) - fmean(before)) > limit * sigma
+
+
+def likeliest_split(values: Sequence[float], earliest: int) -> int:
+    """Return the index from which the later values most likely have another mean.
+
+    The split with the least sum of squares about the two means, which is the maximum likelihood
+    for normal values of one variance; of medians of three neighbours, which keep a step as it is
+    and leave out a single bad touch.
+
+    Args:
+        values: Three values or more, in the order of time.
+        earliest: The first index that is thought of; 1 or more.
+    """
+    steady = [median(values[max(0, i - 1) : i + 2]) for i in range(1, len(values) - 1)]
+    steady = [values[0], *steady, median(values[-3:])]
+    mean, before = fmean(steady), math.fsum(steady[:earliest])
+    best, found = -1.0, earliest
+    for first in range(earliest, len(steady)):
+        # The sum of squares between the parts: by as much as it is larger, the rest is smaller.
+        between = (before - first * mean) ** 2 * (1 / first + 1 / (len(steady) - first))
+        if between > best:
+            best, found = between, first
+        before += steady[first]
+    return found
 
 
 def value_is_unusual(before: Sequence[float], value: float) -> bool:

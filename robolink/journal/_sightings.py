@@ -55,7 +55,7 @@ class LeaseSighting:
         """
         return LeaseHeldError(
             tr(
-                "{holder} has had {controller} since {since} for {purpose!r}; last sign of life "
+                "{holder} is working on {controller} since {since}: {purpose}. Last sign of life: "
                 "{sign}.",
                 holder=describe(self.who()),
                 controller=controller,

@@ -98,12 +98,15 @@ class Capabilities:
     Attributes:
         pose_while_moving: Whether a position can be read while a movement is under way; else the
             one line to the controller is waited on.
+        low_power: Whether each movement is made in a power mode of the controller's that is
+            gentle.
     """
 
     tool_write: bool = False
     motion: bool = False
     motors: bool = False
     pose_while_moving: bool = False
+    low_power: bool = False
     io: bool = False
     points: bool = False
     variables: bool = False

@@ -222,7 +222,7 @@ def _said(proposal: Proposal, why: str, *, attended: bool) -> Proposal:
         note = tr("{why} Z was measured by the height of the touches, and may be wrong.", why=why)
     else:
         doubted = replace(result, notes=(*result.notes, "length_not_observable"))
-        note = tr("{why} It is not known whether the tip is as long as before; Z is kept.", why=why)
+        note = tr("{why} The length of the tip cannot be checked; Z is kept.", why=why)
     return replace(proposal, result=doubted, notes=(*proposal.notes, note))
 
 

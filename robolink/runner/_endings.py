@@ -21,6 +21,33 @@ def ended_by(status: ControllerStatus) -> str:
     return ""
 
 
+class EndingWatch:
+    """Looks for what ends a procedure while a person is asked.
+
+    A controller that tells of its drives has lost them when they had power before: an emergency
+    stop of a PLC shows in nothing else. Where they never had power, a person moves the machine in
+    another way.
+
+    Example:
+        >>> from robolink.model import ControllerStatus
+        >>> from robolink.runner import EndingWatch
+        >>> watch = EndingWatch()
+        >>> watch.obstacle(ControllerStatus(remote=True, ready=True))
+        ''
+        >>> watch.obstacle(ControllerStatus(remote=True, unpowered=True))
+        'The motors went off.'
+    """
+
+    def __init__(self) -> None:
+        self._had_power = False
+
+    def obstacle(self, status: ControllerStatus) -> str:
+        """Return why nothing goes on, empty where it does."""
+        off = status.unpowered or status.disabled
+        lost, self._had_power = off and self._had_power, self._had_power or not off
+        return ended_by(status) or (tr("The motors went off.") if lost else "")
+
+
 @contextmanager
 def as_measurement() -> Iterator[None]:
     """Let an input that has switched too early count as a bad measurement."""

@@ -30,6 +30,9 @@ _MARKER: Final = "robolink"
 _CELLS: Final = pytest.StashKey[list["SimulatedCell"]]()
 """The simulated cells of a test."""
 
+_NOT_PASSED: Final = pytest.StashKey[bool]()
+"""Of a test that has failed already, or was skipped."""
+
 Factory = Callable[..., "SimulatedCell"]
 """Makes one more cell: takes what the marker takes, and ``medium``."""
 
@@ -60,13 +63,25 @@ def pytest_runtest_makereport(
     item: pytest.Item,
     call: pytest.CallInfo[None],  # noqa: ARG001 - part of the hook
 ) -> Any:  # noqa: ANN401 - what the hook gives
-    """Attach wire log, seed and state of the simulated cells to a test that failed."""
+    """Attach wire log, seed and state of the simulated cells to a test that failed.
+
+    They are sections of what is printed, and properties of the test: those stand in the file
+    that ``--junitxml`` writes.
+    """
     report: pytest.TestReport = yield
     cells: list[SimulatedCell] | None = item.stash.get(_CELLS, None)
     if report.failed and cells:
         from robolink_simulators.testkit.report import sections_of
 
-        report.sections += sections_of(cells)
+        sections = sections_of(cells)
+        report.sections += sections
+        if not item.stash.get(_NOT_PASSED, False):
+            # The report of the teardown takes these up; pytest writes its properties.
+            item.user_properties += sections
+            if report.when == "teardown":
+                report.user_properties += sections
+    if not report.passed:
+        item.stash[_NOT_PASSED] = True
     return report
 
 
@@ -123,6 +138,9 @@ def _robolink_own(
     seed = request.config.getoption("--robolink-seed")
     with ExitStack() as stack:
         yield OwnFolder(stack, tmp_path_factory.mktemp("robolink-cell"), seed, cells)
+    unplayed = [what for cell in cells for what in cell.operator.unplayed()]
+    if unplayed and not request.node.stash.get(_NOT_PASSED, False):
+        pytest.fail("\n".join(unplayed), pytrace=False)
 
 
 @pytest.fixture
@@ -131,7 +149,7 @@ def epson_factory(request: pytest.FixtureRequest, _robolink_own: "OwnFolder") ->
     from robolink_simulators.testkit.making import make_epson
 
     def make(*, medium: str = "sim", person: bool = False, **given: Any) -> "SimulatedCell":  # noqa: ANN401 - as the marker
-        asked = _asked(request, given)
+        asked = _asked(request, "epson", given, medium)
         return make_epson(_robolink_own, asked, medium, _clock_of(request), person=person)
 
     return make
@@ -143,7 +161,7 @@ def softmotion_factory(request: pytest.FixtureRequest, _robolink_own: "OwnFolder
     from robolink_simulators.testkit.making import make_softmotion
 
     def make(*, medium: str = "sim", person: bool = False, **given: Any) -> "SimulatedCell":  # noqa: ANN401 - as the marker
-        asked = _asked(request, given)
+        asked = _asked(request, "softmotion", given, medium)
         return make_softmotion(_robolink_own, asked, medium, _clock_of(request), person=person)
 
     return make
@@ -155,7 +173,7 @@ def plc_factory(request: pytest.FixtureRequest, _robolink_own: "OwnFolder") -> F
     from robolink_simulators.testkit.making import make_plc
 
     def make(*, medium: str = "modbus-tcp", **given: Any) -> "SimulatedCell":  # noqa: ANN401 - as the marker
-        return make_plc(_robolink_own, _asked(request, given), medium)
+        return make_plc(_robolink_own, _asked(request, "plc", given, medium), medium)
 
     return make
 
@@ -175,7 +193,8 @@ def epson_tcp(epson_factory: Factory, request: pytest.FixtureRequest) -> "Simula
 
     The marker's ``speed`` makes it faster.
     """
-    given = {} if _asked(request, {}).speed is not None else {"speed": 1.0}
+    marked = _asked(request, "epson", {}, "tcp").speed
+    given = {} if marked is not None else {"speed": 1.0}
     return epson_factory(medium="tcp", person=True, **given)
 
 
@@ -249,15 +268,29 @@ def epson_replay(
         pytest.fail("\n".join(differences), pytrace=False)
 
 
-def _asked(request: pytest.FixtureRequest, given: dict[str, Any]) -> "CellRequest":
-    from robolink_simulators.testkit.asked import CellRequest
+def _asked(
+    request: pytest.FixtureRequest, kind: str, given: dict[str, Any], medium: str
+) -> "CellRequest":
+    from robolink_simulators.testkit.asked import (
+        HEEDED,
+        CellRequest,
+        require_heeded,
+        require_time_of_its_own,
+    )
 
     asked: dict[str, Any] = {}
-    for marker in reversed(list(request.node.iter_markers(_MARKER))):
+    of_test: dict[str, Any] = {}
+    for node, marker in reversed(list(request.node.iter_markers_with_node(_MARKER))):
         if marker.args:
             raise pytest.UsageError("the marker robolink takes names: robolink(seed=3)")
         asked |= marker.kwargs
-    return CellRequest.of(asked | given)
+        # The marker of a module or a class may be meant for the cells of other tests in it.
+        of_test |= marker.kwargs if node is request.node else {}
+    wanted = CellRequest.of(asked | given)
+    require_time_of_its_own(medium, given)
+    require_heeded(given, (kind,))
+    require_heeded(of_test, [it for it in HEEDED if f"{it}_factory" in request.fixturenames])
+    return wanted
 
 
 def _clock_of(request: pytest.FixtureRequest) -> "ManualClock | None":

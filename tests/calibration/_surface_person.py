@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from robolink.calibration import rotation_of
-from robolink.model import Pose, ToolOffset
+from robolink.model import Path, Pose, ToolOffset
 from robolink.procedures import TouchPlan
 from robolink.runner import Ask, Consider, Move, Notify, TouchedAt
 
@@ -76,6 +76,9 @@ class SurfacePerson:
         surface: What is touched.
         tip: Where the tip really is.
         hover: Returns how far from the surface touch ``number`` ends, given the height before.
+
+    ``lowest`` is how near the tip came in any movement, ``flown`` at the ends of those that are not
+    straight, ``swung`` how far it went sideways while the tool was tilted.
     """
 
     def __init__(self, surface, *, start=START, sigma_mm=0.01, seed=1, tip=TIP, hover=None):
@@ -84,6 +87,7 @@ class SurfacePerson:
         self._here, self._sigma_mm = start, sigma_mm
         self._hover = hover or (lambda _number, _height: 0.0)
         self.touches, self.moves, self.lowest = [], [], math.inf
+        self.flown, self.swung = math.inf, 0.0
 
     def run(self, procedure):
         """Answer every step; return the result."""
@@ -104,12 +108,21 @@ class SurfacePerson:
             case Consider():
                 return ("",) * len(step.moves)
             case Move():
-                self._here = step.target
-                self.moves.append(step)
-                self.lowest = min(self.lowest, self.surface.height(self.tip_at(self._here)))
+                self._went(step)
                 return self._here
             case Ask():
                 return self._touched()
+
+    def _went(self, step):
+        before, after = self.tip_at(self._here), self.tip_at(step.target)
+        heights = self.surface.height(before), self.surface.height(after)
+        self.lowest = min(self.lowest, heights[1])
+        if step.path is Path.JOINT:
+            self.flown = min(self.flown, *heights)
+        if "Tilting" in step.purpose:
+            self.swung = max(self.swung, math.dist(before[:2], after[:2]))
+        self._here = step.target
+        self.moves.append(step)
 
     def _touched(self):
         at = self.tip_at(self._here)

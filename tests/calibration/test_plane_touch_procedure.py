@@ -10,6 +10,8 @@ from robolink.errors import CalibrationError
 from robolink.methods import OverPin, PlaneSurvey, Tilt, measure_plane_touch
 from robolink.methods.plane_touch.proof import verify_on_plane
 from robolink.model import Pose, ToolOffset
+from robolink.procedures import SurfaceProof
+from robolink.runner import TouchedAt
 from tests.calibration._surface_person import PLAN, START, STORED, TIP, Plate, SurfacePerson, slips
 
 DOWN = Pose(300.0, 100.0, -20.0, -150.0, 0.0, 180.0, tool=0)
@@ -123,6 +125,10 @@ def test_the_proof_shows_a_tip_that_slipped_in_any_direction(axes, lean_deg, asi
     plate, result = measured_once(axes, lean_deg)
     slipped = ToolOffset(*(np.array(LENGTHS) + aside))
     found = proved(plate, result, slipped, axes=axes)
+    (drift,) = found.drifts
+    # In the base, as the tool stood before any tilt; the frame is turned as the flange is.
+    seen = rotation_of(START).T @ (drift.dx_mm, drift.dy_mm, drift.dz_mm)
+    assert seen == pytest.approx(aside, abs=1e-6)
     assert found.passed is not any(aside)
     assert found.max_drift_mm == pytest.approx(float(np.linalg.norm(aside)), abs=1e-6)
 
@@ -145,4 +151,26 @@ def proved(plate, result: PlaneTouchResult, tip, *, axes):
         tolerance_mm=0.1,
         u_mm=0.01,
     )
-    return SurfacePerson(plate, start=frame, sigma_mm=0.0, tip=left).run(procedure)
+    person = SurfacePerson(plate, start=frame, sigma_mm=0.0, tip=left)
+    shown = person.run(procedure)
+    assert person.flown > PLAN.lift_mm - 4.0
+    return shown
+
+
+def test_a_drift_near_the_tolerance_is_touched_at_every_place_twice_more_and_is_no_pass():
+    plate, result = measured_once(6, 0.0)
+    slipped = ToolOffset(LENGTHS[0] + 0.095, *LENGTHS[1:])
+    found = proved(plate, result, slipped, axes=6)
+    assert len(found.inputs) == 3 * 4
+    assert not found.passed
+
+
+def test_touches_of_a_surface_that_show_nothing_in_some_direction_prove_nothing():
+    """All upright on a level plane: the tip may be anywhere sideways."""
+    proof = SurfaceProof(START, tolerance_mm=0.1, u_mm=0.01)
+    for u_deg in (0.0, 40.0, 80.0, 120.0):
+        place = Pose(300.0, 100.0, -40.0, u_deg)
+        proof.add(place, TouchedAt.of(place), (0.0, 0.0, 1.0))
+    assert proof.drift().distance_mm < 1e-9
+    assert proof.undecided()
+    assert not proof.result().passed

@@ -93,6 +93,31 @@ def test_tab_in_bash_offers_what_fits(shell_environment, words, offered):
         assert all(word.startswith(words[-1]) for word in done.stdout.split())
 
 
+@pytest.mark.skipif(shutil.which("bash") is None, reason="no bash on this machine")
+def test_a_name_with_blanks_and_signs_is_one_word_in_bash(shell_environment):
+    names = ("PIN 07", "it's", "P*", "$HOME", "\u9488")
+    cells = shell_environment["ROBOLINK_CONFIG"]
+    with open(cells, "a", encoding="utf-8") as file:
+        for name in names:
+            file.write(f'[cells.line3.stations."{name}"]\nkind = "pin"\n')
+    script = (
+        'eval "$(robolink expert completion bash)"; cd /\n'
+        "COMP_WORDS=(robolink -c line3 cell station show ''); COMP_CWORD=6\n"
+        "_robolink_completion robolink\n"
+        'for one in "${COMPREPLY[@]}"; do eval "set -- $one"; printf "%s|%s\\n" "$#" "$1"; done\n'
+    )
+    done = subprocess.run(
+        ["bash", "-c", script],
+        env={**shell_environment, "LC_ALL": "C.UTF-8", "PYTHONUTF8": "1"},
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        timeout=30,
+        check=True,
+    )
+    assert {f"1|{name}" for name in names} <= set(done.stdout.splitlines()), done.stdout
+
+
 @pytest.fixture
 def offered(tmp_path, monkeypatch):
     """What TAB offers in a folder with two cells, a recipe and a journal."""

@@ -53,6 +53,12 @@ def levels(remarks):
     return [(remark.subject, remark.level) for remark in remarks]
 
 
+def test_what_only_developers_install_is_not_named(monkeypatch):
+    requires = ["sphinx<10,>=9; extra == 'docs'", "mypy; extra == 'dev'", "psycopg; extra == 'pg'"]
+    install(monkeypatch, {"robolink": "0.1.0"}, requires)
+    assert levels(check_versions())[1:] == [("psycopg", Level.OK)]
+
+
 def test_a_healthy_computer_is_told_so(capsys, tmp_path):
     assert main.run(["doctor", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)

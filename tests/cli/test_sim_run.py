@@ -74,13 +74,12 @@ def test_every_option_of_a_command_is_a_key_of_its_table(kind):
 
 def test_a_table_means_what_the_command_line_means(file, tmp_path):
     typed = [
-        *("--tcp=127.0.0.1:5001", "--serial=pty", "--baud=9600", "--robot=T6-602S,C8-C901S"),
+        *("--serial=pty", "--baud=9600", "--robot=T6-602S,C8-C901S"),
         *("--option=terminator=cr", "--option=companion=true", "--world=eye_sigma_mm=0.5"),
         *("--com=2=/dev/pts/9", "--allow-remote", "--speed=0.5", "--exchange=0.25", "--seed=4"),
         *(f"--state={tmp_path / 'a.json'}", f"--program={MAP}", f"--program={MAP}"),
     ]
     table = {
-        "tcp": "127.0.0.1:5001",
         "serial": "pty",
         "baud": 9600,
         "robot": "T6-602S,C8-C901S",
@@ -99,6 +98,10 @@ def test_a_table_means_what_the_command_line_means(file, tmp_path):
     given = DeclaredKeys(command, tmp_path).values(table, lambda *said: objections.append(said))
     assert objections == []
     assert given == command.make_context("sim", typed).params
+    there = {"tcp": "127.0.0.1:5001"}
+    placed = DeclaredKeys(command, tmp_path).values(there, lambda *said: objections.append(said))
+    assert objections == []
+    assert placed == command.make_context("sim", ["--tcp=127.0.0.1:5001"]).params
 
 
 def test_a_fleet_counts_ports_seeds_nodes_and_names_up(file, tmp_path):
@@ -150,6 +153,10 @@ tcp = "127.0.0.1:6012"
             "line 4, cells.a.tcp: 'here' is not an address",
         ),
         ('[cells.a]\nkind = "epson"\nserial = "com"', "line 4, cells.a.serial: 'com' is not 'pty'"),
+        (
+            '[cells.a]\nkind = "epson"\ntcp = "127.0.0.1:0"\nserial = "pty"',
+            "line 2, cells.a: --serial stands in place of --tcp",
+        ),
         ('[cells.a]\nkind = "epson"\nallow_remote = 1', "line 4, cells.a.allow_remote: must be"),
         ('[cells.a]\nkind = "epson"\noption = ["a=1"]', "line 4, cells.a.option: must be a table"),
         ('[cells.a]\nkind = "epson"\nprogram = "m.prg"', "line 4, cells.a.program: must be a list"),
@@ -190,6 +197,14 @@ def test_what_is_wrong_is_told_with_line_and_key(file, tables, told):
     with pytest.raises(ConfigError) as refused:
         read_cells(file(HEAD + tables), sim.commands)
     assert told in str(refused.value)
+
+
+def test_cells_on_serial_lines_share_no_port(file):
+    line = 'kind = "epson"\nserial = "pty"\n'
+    cells = read_cells(file(f"{HEAD}[cells.a]\n{line}[cells.b]\n{line}count = 2\n"), sim.commands)
+    assert [(cell.name, cell.given["address"]) for cell in cells] == [
+        *(("a", None), ("b-1", None), ("b-2", None))
+    ]
 
 
 def test_all_that_is_wrong_is_told_at_once_and_nothing_is_served(file, capsys):

@@ -212,10 +212,76 @@ def test_a_client_in_any_language_is_told_what_went_wrong(cells):
     too_long = b" " * (LONGEST_REQUEST + 1)
     assert raw(cells, "POST", f"{post}/truth", too_long)[0] == 413
     assert raw(cells, "POST", f"{post}/truth", headers=[("Content-Length", "x")])[0] == 411
+    assert raw(cells, "POST", f"{post}/step", b'{"seconds": 1, "seconds": 2}')[0] == 400
+    asked_twice = "after=1&after=2"
+    for query in (asked_twice, "after=", "nothing=", "&".join(f"a{n}=1" for n in range(60))):
+        assert raw(cells, "GET", f"{base}/cells/a/log?{query}")[0] == 400
+    for path in ("", "/openapi.json", "/cells/a"):
+        assert raw(cells, "GET", f"{base}{path}?nothing=1")[0] == 400
+    assert raw(cells, "GET", f"{base}/cells/a/truth", b"{}")[0] == 400
     status, told = raw(cells, "POST", f"{post}/raise_error")
     assert (status, told["ok"], told["schema"]) == (400, False, "robolink/control/1")
     assert told["error"]
     assert told["remedy"]
+
+
+def exchanged(cells, sent, *, then_closes=False):
+    """Send bytes as they are, and return the head and the document of the answer."""
+    parts = urlsplit(cells.url)
+    with socket.create_connection((parts.hostname, parts.port), 10) as connection:
+        connection.sendall(sent)
+        if then_closes:
+            connection.shutdown(socket.SHUT_WR)
+        reply = http.client.HTTPResponse(connection, method=sent.partition(b" ")[0].decode())
+        reply.begin()
+        return reply, json.loads(reply.read() or b"null")
+
+
+@pytest.mark.parametrize("body", [b"", b'{"number": 3}'])
+def test_a_request_that_ends_early_is_not_carried_out(cells, at, body):
+    _, simulator = at("a")
+    act = "set_input" if body else "press_estop"
+    head = f"POST {urlsplit(cells.url).path}/cells/a/{act} HTTP/1.1\r\nContent-Length: 90\r\n\r\n"
+    reply, told = exchanged(cells, head.encode() + body, then_closes=True)
+    assert (reply.status, told["ok"]) == (400, False)
+    assert not simulator.condition.estop_pressed
+    assert not simulator.machine.inputs.get(3)
+
+
+@pytest.mark.parametrize(
+    ("sent", "status"),
+    [
+        (b"hello\r\n\r\n", 400),
+        (b"GET / HTTP/3.0\r\n\r\n", 505),
+        (b"PUT /the-token/v1 HTTP/1.1\r\n\r\n", 405),
+        (b"HEAD /the-token/v1 HTTP/1.1\r\n\r\n", 405),
+        (b"GET /" + b"a" * 70_000 + b" HTTP/1.1\r\n\r\n", 414),
+        (b"GET / HTTP/1.1\r\n" + b"A: 1\r\n" * 200 + b"\r\n", 431),
+        (b"POST / HTTP/1.1\r\nContent-Length: 2\r\nContent-Length: 9\r\n\r\n{}", 411),
+        (b"GET / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n", 411),
+    ],
+)
+def test_what_is_no_request_is_answered_in_json_too(cells, sent, status):
+    reply, told = exchanged(cells, sent)
+    assert reply.status == status
+    assert reply.headers["Content-Type"] == "application/json"
+    assert reply.headers["Connection"] == "close"
+    if b"HEAD" not in sent:
+        assert (told["schema"], told["ok"]) == ("robolink/control/1", False)
+
+
+def test_an_old_client_is_answered_and_cut_off(cells):
+    path = f"{urlsplit(cells.url).path}/cells/a/counters"
+    reply, told = exchanged(cells, f"GET {path} HTTP/1.0\r\n\r\n".encode())
+    assert (reply.status, told["ok"], reply.headers["Connection"]) == (200, True, "close")
+
+
+def test_a_simulator_that_fails_says_so(cells, at, monkeypatch):
+    _, simulator = at("a")
+    monkeypatch.setattr(simulator, "counters", lambda: 1 / 0)
+    status, told = raw(cells, "GET", f"{urlsplit(cells.url).path}/cells/a/counters")
+    assert (status, told["ok"]) == (500, False)
+    assert "ZeroDivisionError" in told["error"]
 
 
 def test_who_does_not_show_the_token_learns_nothing(cells):

@@ -2,8 +2,10 @@
 
 import subprocess
 import sys
+from xml.etree import ElementTree
 
 import pytest
+from robolink_simulators.device.wire_record import MOST_LINES, WireRecord
 from robolink_simulators.testkit.asked import CellRequest
 
 import robolink
@@ -126,13 +128,29 @@ def test_a_program_that_does_not_fit_is_refused(program, softmotion_factory, req
         (program / "RL_Kept.st").unlink()
         softmotion_factory(program=program)
     for kind in ("epson", "plc"):
-        with pytest.raises(ConfigError, match="Only a simulated SoftMotion PLC"):
+        with pytest.raises(ConfigError, match="pays heed to 'program'"):
             request.getfixturevalue(f"{kind}_factory")(program=program)
 
 
 @pytest.mark.parametrize(
     ("given", "words"),
-    [({"robots": "C8"}, "has no parameter 'robots'"), ({"true_tool": (1, 2)}, "three lengths")],
+    [
+        ({"robots": "C8"}, "has no parameter 'robots'"),
+        ({"true_tool": (1, 2)}, r"true_tool .* cannot be \(1, 2\)"),
+        ({"true_tool": 5}, "true_tool .* cannot be 5"),
+        ({"seed": "3"}, "seed .* cannot be '3'"),
+        ({"seed": -1}, "seed .* cannot be -1"),
+        ({"seed": True}, "seed .* cannot be True"),
+        ({"speed": "fast"}, "speed .* cannot be 'fast'"),
+        ({"speed": 1001}, "speed .* cannot be 1001"),
+        ({"speed": float("nan")}, "speed .* cannot be nan"),
+        ({"password": 7}, "password .* cannot be 7"),
+        ({"options": "terminator=cr"}, "options .* cannot be 'terminator=cr'"),
+        ({"world": [1]}, "world .* cannot be"),
+        ({"faults": {"action": "drop_reply"}}, "faults .* cannot be"),
+        ({"robot": None}, "robot .* cannot be None"),
+        ({"map": 3}, "map .* cannot be 3"),
+    ],
 )
 def test_what_cannot_be_asked_for_is_refused(given, words, epson_factory):
     with pytest.raises(ConfigError, match=words):
@@ -141,6 +159,47 @@ def test_what_cannot_be_asked_for_is_refused(given, words, epson_factory):
         epson_factory(**given)
     with pytest.raises(ConfigError, match="cannot be served over 'carrier pigeon'"):
         epson_factory(medium="carrier pigeon")
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "value"),
+    [
+        ("epson", "kinematics", "Kin_5Axes"),
+        ("epson", "map", "machine.toml"),
+        ("softmotion", "robot", "C8-C901S"),
+        ("softmotion", "password", "a"),
+        ("plc", "world", {}),
+        ("plc", "true_tool", (1, 2, 3)),
+        ("plc", "options", {}),
+    ],
+)
+def test_what_a_kind_pays_no_heed_to_is_refused(kind, name, value, request):
+    with pytest.raises(ConfigError, match=f"kind \\({kind}\\) pays heed to '{name}'"):
+        request.getfixturevalue(f"{kind}_factory")(**{name: value})
+
+
+def test_a_speed_is_for_cells_on_a_port(epson_factory, softmotion_factory):
+    for make in (epson_factory, softmotion_factory):
+        with pytest.raises(ConfigError, match="only while somebody waits"):
+            make(speed=5)
+
+
+def test_a_long_wire_is_counted_whole(epson_sim):
+    write(epson_sim)
+    record = epson_sim.simulator.log
+    for _ in range(MOST_LINES):
+        record.append((0, ">", "$GetStatus"))
+    epson_sim.wire.assert_sent("TLSet 2, XY", times=1)
+    with pytest.raises(AssertionError, match="was sent 1 times"):
+        epson_sim.wire.assert_not_sent("TLSet 2, XY")
+    # One that has lost a line says nothing of how often something was sent.
+    epson_sim.simulator.log = short = WireRecord(2)
+    for text in ("$Reset", "$GetStatus", "$GetStatus"):
+        short.append((0, ">", text))
+    for asked in (epson_sim.wire.assert_not_sent, epson_sim.wire.assert_sent):
+        with pytest.raises(AssertionError, match="Only the last 2 lines"):
+            asked("$Reset")
+    assert epson_sim.wire.requests == ("$GetStatus", "$GetStatus")
 
 
 def test_time_stands_still_until_somebody_steps_it(virtual_clock, epson_sim, softmotion_sim):
@@ -167,6 +226,8 @@ def test_a_person_does_what_the_script_says_when_the_wire_gives_the_cue(epson_si
     with robolink.connect(epson_sim.url) as controller:
         controller.status()
     assert [act for act, _ in epson_sim.operator.failed] == ["restore"]
+    epson_sim.operator.forget()  # or the test fails for it
+    assert epson_sim.operator.unplayed() == []
 
 
 def test_what_crossed_the_wire_and_what_moved_is_asserted(epson_sim):
@@ -255,6 +316,32 @@ def test_passes(epson_sim):
 @pytest.mark.robolink(colour="red")
 def test_asks_for_what_there_is_not(epson_sim):
     pass
+
+@pytest.mark.robolink(kinematics="Kin_5Axes")
+def test_asks_for_what_this_kind_does_not_have(epson_sim):
+    pass
+
+@pytest.mark.robolink(kinematics="Kin_5Axes", robot="C8-C901S")
+class TestMarkedTogether:
+    def test_of_one_kind(self, epson_sim):
+        assert epson_sim.simulator.robot_name == "C8-C901S"
+
+    @pytest.mark.robolink(kinematics="Kin_Gantry3")
+    def test_of_both(self, epson_sim, softmotion_sim):
+        assert softmotion_sim.simulator.machine_name.endswith("Kin_Gantry3")
+
+def test_whose_cue_never_came(epson_sim):
+    epson_sim.operator.when("TLSet", "press_estop")
+
+def test_whose_person_could_not_do_it(epson_sim):
+    import robolink
+    epson_sim.operator.when("GetStatus", "restore", name="nothing")
+    with robolink.connect(epson_sim.url) as controller:
+        controller.status()
+
+def test_that_is_skipped_in_the_middle(epson_sim):
+    epson_sim.operator.when("TLSet", "press_estop")
+    pytest.skip("for another reason")
 """
 
 
@@ -270,6 +357,7 @@ def test_a_test_that_fails_shows_wire_seed_and_state(tmp_path):
             "--robolink-seed",
             "7",
             "--strict-markers",
+            "--junitxml=report.xml",
         ],
         cwd=tmp_path,
         capture_output=True,
@@ -278,12 +366,30 @@ def test_a_test_that_fails_shows_wire_seed_and_state(tmp_path):
         timeout=60,
     )
     shown = done.stdout
-    assert "1 failed, 2 passed, 1 error" in shown
+    assert "1 failed, 6 passed, 1 skipped, 4 errors" in shown
     assert "robolink: " not in shown  # no header
     assert "robolink wire: epson T6-602S, seed 7, epson+sim://pytest-" in shown
     assert "robolink state: softmotion Kin_Scara3_Z, seed 7" in shown
     assert "> $GetStatus" in shown
     assert '"pin_mm"' in shown
-    assert shown.count("robolink wire: epson") == 1
+    assert shown.count("robolink wire: epson") == 3
     assert "has no parameter 'colour'" in shown
     assert "(nothing moved)" in shown
+    assert "kind (epson) pays heed to 'kinematics'" in shown
+    assert "No request came that contains 'TLSet', at which press_estop was to be done." in shown
+    assert "restore could not be done: There is no snapshot 'nothing'." in shown
+    attached = properties(tmp_path / "report.xml", "test_fails")
+    assert [name.partition(":")[0] for name in attached] == [
+        *("robolink wire", "robolink motions", "robolink state") * 2
+    ]
+    wire, *_ = attached.values()
+    assert "> $GetStatus" in wire
+    late = properties(tmp_path / "report.xml", "test_whose_cue_never_came")
+    assert len(late) == 3
+    assert properties(tmp_path / "report.xml", "test_passes") == {}
+
+
+def properties(path, test):
+    """Return what a file for a pipeline holds of a test, by name."""
+    found = ElementTree.parse(path).getroot().iterfind(f".//testcase[@name='{test}']//property")
+    return {one.get("name"): one.get("value") for one in found}

@@ -1,11 +1,13 @@
 """What stands out in the course of a cell's tools, and what does not."""
 
 from collections import Counter
+from dataclasses import replace
 
 import pytest
 
-from robolink.drift import charts_of, findings_in
+from robolink.drift import DriftCode, charts_of, findings_in, measured_changes
 from robolink.errors import ConfigError
+from robolink.model import EntryKind, Recorded, Signature, ToolOffset, plain_offset
 from tests.drift._courses import course, found
 
 SEEDS = range(8)
@@ -19,6 +21,10 @@ def most(seed_codes):
 
 def after(count, **kwargs):
     return most([found(course(seed, count, **kwargs)) for seed in SEEDS])
+
+
+def said_of(changes):
+    return findings_in(charts_of(changes), changes)
 
 
 def test_a_steady_cell_shows_nothing():
@@ -85,8 +91,80 @@ def test_fewer_than_twenty_changes_draw_no_limits():
         charts_of(jump, baseline=1)
 
 
+@pytest.mark.parametrize("seed", range(40))
+def test_a_large_shift_is_said_after_four_changes_whatever_was_before(seed):
+    """Values that happened to lie on the same side before it are no part of it."""
+    slipped = course(seed, 29, shift=lambda index, _: (0.2 * (index >= 25), 0, 0))
+    (said,) = (one for one in said_of(slipped) if one.code == DriftCode.MOUNT_SHIFTED)
+    assert said.shift_mm["x"] == pytest.approx(0.2, abs=0.05)
+    assert said.since == slipped[25].at
+    moved = course(seed, 29, tools=2, pin=lambda index: 0.3 * (index >= 26))
+    (said,) = (one for one in said_of(moved) if one.code == DriftCode.PIN_MOVED)
+    assert said.since == moved[2 * 26].at
+
+
+def test_one_bad_touch_at_the_end_hides_no_slipping_mount():
+    slipping = course(4, 36, shift=lambda index, _: (0.1 * (index >= 26), 0, 0))
+    slipping[-1] = replace(slipping[-1], tip_mm={**slipping[-1].tip_mm, "x": 13.0})
+    (said,) = (one for one in said_of(slipping) if one.code == DriftCode.MOUNT_SHIFTED)
+    assert said.since == slipping[26].at
+
+
+@pytest.mark.parametrize(("by_mm", "codes"), [(0.5, {"mount_shifted"}), (0.001, set())])
+def test_a_cell_that_showed_the_same_digits_each_time_shifts_too(by_mm, codes):
+    first = course(1, 1)[0]
+    same = [replace(first, number=n, nozzle=f"N{n}") for n in range(1, 26)]
+    off = {**first.tip_mm, "x": first.tip_mm["x"] + by_mm}
+    assert found([*same, *(replace(one, tip_mm=off) for one in same[:4])]) == codes
+
+
 def test_equal_values_have_no_limits_and_say_nothing():
     changes = course(1, 25)
     frozen = [changes[0]] * 25
     assert {chart.sigma_mm for chart in charts_of(frozen) if chart.quantity == "pin"} == {0.0}
     assert found(frozen) == set()
+
+
+def test_a_turn_test_that_becomes_worse_is_told_and_one_that_becomes_better_is_not():
+    for by_mm, told in ((0.06, {"turn_test_grows"}), (-0.06, set())):
+        changed = [
+            [
+                replace(
+                    change, turn_test_mm=0.1 + (change.turn_test_mm or 0.0) + by_mm * (at >= 25)
+                )
+                for at, change in enumerate(course(seed, 32))
+            ]
+            for seed in SEEDS
+        ]
+        assert most(found(changes) for changes in changed) == told
+
+
+def entry(number, kind, tool, **details):
+    return Recorded(
+        number=number,
+        at="2026-01-01T08:00:00.000Z",
+        controller="cell",
+        kind=kind,
+        change="a1",
+        operation="",
+        tool=tool,
+        tolerance="",
+        verdict="",
+        details=details,
+        signature=Signature(),
+        previous="",
+        hash="",
+    )
+
+
+def test_a_change_that_was_taken_back_in_the_end_says_nothing_of_any_of_its_tools():
+    """The first tool was kept already when the second one failed."""
+    tip = plain_offset(ToolOffset(12.0, -4.0, -20.0))
+    measured = [
+        entry(tool, EntryKind.CALIBRATION, tool, tip=tip, measured=["x_mm", "y_mm"])
+        for tool in (1, 2)
+    ]
+    kept = entry(3, EntryKind.DONE, 1)
+    assert [one.tool for one in measured_changes([*measured, kept], lambda _: False)] == [1]
+    back = entry(4, EntryKind.ROLLED_BACK, 2)
+    assert measured_changes([*measured, kept, back], lambda _: False) == []

@@ -5,6 +5,7 @@ Rows F71, F73 and F74 of the catalogue.
 
 import ipaddress
 import os
+import re
 import socket
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -13,6 +14,8 @@ from pathlib import Path
 import pytest
 from robolink_simulators.assist.port import serve_assist
 from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.control.cell import ControlledCell
+from robolink_simulators.control.server import ControlServer
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
@@ -65,6 +68,7 @@ def everything_served() -> Iterator[
     with ExitStack() as stack:
         url = stack.enter_context(serve_tcp(epson, clock=clock)).url
         stack.enter_context(serve_assist(epson, clock=clock))
+        stack.enter_context(ControlServer({"epson": ControlledCell(epson, clock)}))
         stack.enter_context(serve_modbus_tcp(plc, clock=clock))
         stack.enter_context(serve_plc(PlcSimulator(load_map(MAP), seed=2), MAP, clock=clock))
         controller = stack.enter_context(robolink.connect(url))
@@ -83,7 +87,7 @@ def no_local_sockets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("no_local_sockets")
 def test_f73_every_port_that_is_opened_is_one_of_this_computer_alone():
     with everything_served() as (_, _, opened):
-        assert len(opened) == 5
+        assert len(opened) == 6
         assert {address for address, _ in opened} == {"127.0.0.1"}
 
 
@@ -91,6 +95,8 @@ PAGES = (
     b"POST / HTTP/1.1\r\nHost: evil.example\r\nOrigin: http://evil.example\r\n"
     b"Content-Type: text/plain\r\nContent-Length: 400\r\n\r\n",
     b"GET / HTTP/1.1\r\nHost: localhost\r\nOrigin: null\r\nUpgrade: websocket\r\n\r\n",
+    b"POST /guessed/v1/cells/epson/press_estop HTTP/1.1\r\nHost: localhost\r\n"
+    b"Origin: http://evil.example\r\nContent-Length: 0\r\n\r\n",
 )
 BODY = (
     b'{"do": "press_estop"}\n$Login,\r\n$Execute,"TLSet 1, XY(1,2,3,0)"\r\n$SetMotorsOn,1\r\n'
@@ -99,12 +105,13 @@ BODY = (
 
 
 @pytest.mark.fault("F74")
-@pytest.mark.parametrize("page", PAGES, ids=["post", "websocket"])
+@pytest.mark.parametrize("page", PAGES, ids=["post", "websocket", "guessed token"])
 @pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="there is no /proc/net here")
 @pytest.mark.usefixtures("no_local_sockets")
 def test_f74_a_page_of_somebody_else_gets_nothing_done_at_any_port(page):
     with everything_served() as (epson, plc, opened):
         tools, started = epson.machine.tools.defined(), plc.plc.group.movements_started
+        web = 0
         for address, port in opened:
             with socket.create_connection((address, port), timeout=5) as browser:
                 browser.sendall(page + BODY)
@@ -116,7 +123,9 @@ def test_f74_a_page_of_somebody_else_gets_nothing_done_at_any_port(page):
                         heard += piece
                 except (TimeoutError, ConnectionResetError):
                     pass
-                assert b"HTTP" not in heard
+                web += b"HTTP" in heard
+                assert set(re.findall(rb"HTTP/1\.1 (\d)", heard)) <= {b"4"}
+        assert web == 1  # the control API, and it refuses
         assert not epson.condition.estop_pressed
         assert epson.machine.tools.defined() == tools
         assert plc.plc.group.movements_started == started

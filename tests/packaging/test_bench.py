@@ -1,6 +1,8 @@
 """The figures that are published: each by its case, and none from a busy machine."""
 
+import importlib
 import json
+import os
 import sys
 from xml.etree import ElementTree
 
@@ -12,6 +14,8 @@ from benchmarks.cases import CASES
 from benchmarks.pictures import Growth, picture
 from benchmarks.quiet import SPREAD, Floors
 from benchmarks.table import Amount, Figure
+from benchmarks.work.asked_cells import WRITE_S, lived
+from robolink.journal import EntryKind, memory_journal
 
 SLOW = Figure("a stop", Amount(30.0, "ms"), "a floor", Amount(10.0, "ms"), 3.0, 2.5)
 QUICK = Figure("a look", Amount(1.234, "us"), "a floor", Amount(1.0, "us"), 1.234, 1.3)
@@ -35,6 +39,13 @@ def test_each_case_is_there_and_has_its_title_on_the_page():
         assert f"\n## {page.TITLES[name]}\n" in written
 
 
+def test_cells_in_virtual_time_are_asked_each_second_and_written_to_each_minute():
+    (factor,) = lived(3, WRITE_S, 1)
+    assert factor > 0
+    entries = list(memory_journal("bench-asked-3").entries(kinds=[EntryKind.DONE]))
+    assert len({entry.controller for entry in entries}) == len(entries) == 3
+
+
 def test_a_ratio_over_its_goal_is_missed_and_without_a_goal_neither():
     assert (SLOW.met, QUICK.met, Figure("x", Amount(1, "s")).met) == (False, True, None)
     assert SLOW.cells()[3:] == ("30.0 ms", "3.00", "<= 2.50", "missed")
@@ -46,6 +57,12 @@ def test_a_machine_that_was_slow_once_is_not_quiet():
     assert floors.quiet
     floors.taken_us.append(95.0 * SPREAD * 1.05)
     assert not floors.quiet
+
+
+def test_the_processes_that_are_measured_keep_their_bytecode(monkeypatch):
+    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
+    importlib.reload(bench)
+    assert "PYTHONDONTWRITEBYTECODE" not in os.environ
 
 
 @pytest.mark.parametrize("quiet", [True, False])

@@ -10,6 +10,7 @@ from robolink.errors import (
     ToolError,
 )
 from robolink.model import EntryKind, Marker, MarkerKind, PersonRole, ToolOffset
+from robolink.timing import local_label
 from robolink.transaction import ToolChange, Wanted, change_tools, plan_undo, undo
 from tests.unit._transaction_cell import NEW, OLD, OTHER, UNDEFINED, tool_cell, wanted
 
@@ -93,7 +94,7 @@ def test_a_value_that_somebody_else_wrote_is_left_alone_and_told_with_time_and_d
     with pytest.raises(ToolChangedError) as caught:
         plan_undo(controller)
     left_at = cell.entries(EntryKind.DONE)[-1].at
-    assert left_at in caught.value.what
+    assert local_label(left_at) in caught.value.what
     assert "mm away" in caught.value.what
     assert "TLSet" in caught.value.what
     assert cell.tools[1] == OTHER

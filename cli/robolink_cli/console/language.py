@@ -21,6 +21,8 @@ _FOR_MACHINES: Final = ("--json", "--jsonl")
 """What is read by programs is in English, whoever started them."""
 
 _SYSTEM: Final = ("LC_ALL", "LC_MESSAGES", "LANG")
+_RATHER: Final = "LANGUAGE"
+_BARE: Final = ("", "C", "POSIX")
 _KEY: Final = "language"
 _SAMPLE: Final = {"zh": "\u673a\u5668\u4eba"}
 
@@ -114,8 +116,21 @@ def chosen_language(arguments: Sequence[str], environment: Mapping[str, str]) ->
     for name in (_typed(arguments), environment.get(VARIABLE), _from_files(environment)):
         if name:
             return language_named(name) or ENGLISH
+    return _of_system(environment) or ENGLISH
+
+
+def _of_system(environment: Mapping[str, str]) -> str | None:
+    """Return the language that the system is set to, ``None`` for one that we do not have.
+
+    LANGUAGE names those that a person would rather read, the best first; like gettext, it is heard
+    only where the locale is no bare C (GNU gettext manual, "Specifying a Priority List").
+    """
     name = next((environment[key] for key in _SYSTEM if environment.get(key)), "")
-    return language_named(name or _of_windows()) or ENGLISH
+    rather = environment.get(_RATHER, "") if name.partition(".")[0] not in _BARE else ""
+    for one in filter(None, rather.split(":")):
+        if (known := language_named(one)) is not None:
+            return known
+    return language_named(name or _of_windows())
 
 
 def _typed(arguments: Sequence[str]) -> str:

@@ -124,11 +124,13 @@ def show_impact(tool: int, impact: "Impact") -> None:
         for entry in impact.entries
     ]
     if rows:
-        table(tr("where tool {tool}'s tip will be, against now", tool=tool), columns, rows)
+        table(
+            tr("where the tip of tool {tool} will be, compared with now", tool=tool), columns, rows
+        )
     if impact.largest is not None:
         say(
             tr(
-                "  largest: {distance:.3f} mm at P{point}; only points driven with tool {tool}",
+                "  largest: {distance:.3f} mm at P{point}, if tool {tool} is used there",
                 distance=impact.largest.distance_mm,
                 point=impact.largest.number,
                 tool=tool,

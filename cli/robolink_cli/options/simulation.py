@@ -8,10 +8,14 @@ from pathlib import Path
 from typing import Any, Final, TypeVar, cast
 
 import click
+from click.core import ParameterSource
 
 from robolink.messages import declared, tr
 from robolink_cli.console.help_sections import HelpSection
 from robolink_cli.console.render import note
+
+Judged = Callable[[click.Context, click.Parameter, Any], Any]
+"""Is told an option and what was given for it; returns that, or refuses it."""
 
 DEFAULT_ADDRESS: Final = "127.0.0.1:5020"
 """Where Modbus TCP is served when no bus is named."""
@@ -130,12 +134,15 @@ def life_options(function: F) -> F:
     return cast("F", command)
 
 
-def tcp_option(default: str | None, help_text: str) -> Callable[[F], F]:
+def tcp_option(
+    default: str | None, help_text: str, callback: Judged | None = None
+) -> Callable[[F], F]:
     """Return what adds ``--tcp``: the network address of a simulated controller.
 
     Args:
         default: Where it listens when nothing is said, ``None`` where other buses may be meant.
         help_text: What is served there.
+        callback: Judges what was given.
     """
     return click.option(
         "--tcp",
@@ -144,12 +151,32 @@ def tcp_option(default: str | None, help_text: str) -> Callable[[F], F]:
         default=default,
         show_default=default is not None,
         help=help_text,
+        callback=callback,
     )
 
 
-def serial_option(help_text: str) -> Callable[[F], F]:
-    """Return what adds ``--serial``: the serial line of a simulated controller."""
-    return click.option("--serial", type=click.Choice(["pty"]), help=help_text)
+def serial_option(help_text: str, callback: Judged | None = None) -> Callable[[F], F]:
+    """Return what adds ``--serial``: the serial line of a simulated controller.
+
+    Args:
+        help_text: What is served there.
+        callback: Judges what was given.
+    """
+    return click.option("--serial", type=click.Choice(["pty"]), help=help_text, callback=callback)
+
+
+def one_place(context: click.Context, given: click.Parameter, value: Any) -> Any:  # noqa: ANN401 - of either
+    """Refuse ``--tcp`` beside ``--serial``, for a controller that has one of them.
+
+    Where it has the serial line, the usual address is none: several cells may be without one.
+
+    Raises:
+        click.UsageError: Both were given.
+    """
+    sources = map(context.get_parameter_source, ("address", "serial"))
+    if all(source is ParameterSource.COMMANDLINE for source in sources):
+        raise click.UsageError(tr("--serial stands in place of --tcp: give one of them."))
+    return None if given.name == "address" and context.params.get("serial") else value
 
 
 def modbus_options(function: F) -> F:

@@ -12,9 +12,9 @@ from robolink_cli.session.motion_consent import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
 
-    from robolink.model import Controller
+    from robolink.model import Controller, MotionTerms
     from robolink_cli.prompts.present import AskingDesk
     from robolink_cli.wizard.check_list import CheckPoint
 
@@ -27,6 +27,7 @@ def agree_to_procedure(
     speed_mm_s: float,
     box_mm: float,
     yes: bool,
+    tools: "Sequence[int]" = (),
 ) -> None:
     """Have a person agree to a procedure in which the robot moves by itself.
 
@@ -37,6 +38,7 @@ def agree_to_procedure(
         speed_mm_s: How fast at most.
         box_mm: How far at most.
         yes: Whether the answer was given beforehand.
+        tools: Numbers of the tools that are measured: the list says how they were left.
 
     Raises:
         NotReadyError: Nothing can move now.
@@ -46,11 +48,19 @@ def agree_to_procedure(
         question = motion_question(controller, purpose, speed_mm_s=speed_mm_s, box_mm=box_mm)
         agree_to_motion(question, yes=yes)
         return
-    check_before_start(controller, purpose, moves=moves, speed_mm_s=speed_mm_s, box_mm=box_mm)
+    check_before_start(
+        controller, purpose, moves=moves, speed_mm_s=speed_mm_s, box_mm=box_mm, tools=tools
+    )
 
 
 def check_before_start(
-    controller: "Controller", purpose: str, *, moves: int, speed_mm_s: float, box_mm: float
+    controller: "Controller",
+    purpose: str,
+    *,
+    moves: int,
+    speed_mm_s: float,
+    box_mm: float,
+    tools: "Sequence[int]" = (),
 ) -> None:
     """Have the person at the desk go through the list; arguments as above.
 
@@ -61,15 +71,22 @@ def check_before_start(
     desk = present_desk()
     assert desk is not None  # noqa: S101 - looked at by whoever calls
     heed_what_was_left(yes=False)
-    plan = tr(
-        "The robot will move by itself {n} times: power LOW, up to {v} mm/s, at most {d} mm from "
-        "here.",
-        n=moves,
-        v=f"{speed_mm_s:g}",
-        d=f"{box_mm:g}",
-    )
-    while _answer_to_list(desk, controller, purpose, plan) != "y":
+    foreseen = {"n": moves, "v": f"{speed_mm_s:g}", "d": f"{box_mm:g}"}
+    if controller.capabilities.low_power:
+        plan = tr(
+            "The robot will move by itself {n} times: power LOW, up to {v} mm/s, at most {d} mm "
+            "from here.",
+            **foreseen,
+        )
+    else:
+        plan = tr(
+            "The robot will move by itself {n} times: up to {v} mm/s, at most {d} mm from here.",
+            **foreseen,
+        )
+    tried, left = False, tools_as_left(controller, tools)
+    while _answer_to_list(desk, controller, purpose, plan, left, tried=tried) != "y":
         controller.motors(True)
+        tried = True
 
 
 def name_the_needle(
@@ -101,46 +118,118 @@ def _text(desk: "AskingDesk", controller: "Controller", question: str) -> str:
     while (answer := desk.poll(POLL_S)) is None:
         controller.status()
     if answer == "q":
-        raise DeclinedError(tr("You did not start it."), remedy=tr("Nothing moved."))
+        raise DeclinedError(
+            tr("You did not start it."), remedy=tr("To start, give the same command again.")
+        )
     return answer
 
 
-def _answer_to_list(desk: "AskingDesk", controller: "Controller", purpose: str, plan: str) -> str:
+def _answer_to_list(
+    desk: "AskingDesk",
+    controller: "Controller",
+    purpose: str,
+    plan: str,
+    left: tuple[str, ...],
+    *,
+    tried: bool,
+) -> str:
     """Show the list; return ``y``, or that the motors are to be switched on.
+
+    Args:
+        desk: Where.
+        controller: The controller, connected.
+        purpose: What it moves for, in words.
+        plan: What it will do, a sentence.
+        left: How tools were left, sentences.
+        tried: Whether it was told before to switch them on: asking once more would not help.
 
     Raises:
         DeclinedError: The person leaves.
+        NotReadyError: Nothing can move now, and no key of the list changes that.
     """
     from robolink.runner import POLL_S, Question
     from robolink_cli.wizard.check_list import SWITCH_ON, CheckSubject
 
-    points = tuple(_points(controller, purpose))
-    desk.regard(CheckSubject(points, plan))
+    off = _motors_are_off(controller, purpose, tried=tried)
+    name, terms = _name(controller), controller.groups[0].terms()
+    desk.regard(CheckSubject(_points(name, terms, left, off=off), plan))
     desk.ask(tr("Start moving"), Question.YES_NO)
     while (answer := desk.poll(POLL_S)) is None:
-        controller.status()
-    if answer in ("y", SWITCH_ON):
+        now = _motors_are_off(controller, purpose, tried=tried)
+        if now is not off:
+            # The list says what is so now; what the person has confirmed stays confirmed.
+            off = now
+            desk.regard(CheckSubject(_points(name, terms, left, off=off), plan))
+    if answer == SWITCH_ON:
         return answer
-    raise DeclinedError(tr("You did not start it."), remedy=tr("Nothing moved."))
+    if answer == "y":
+        controller.groups[0].require_able(purpose)
+        return answer
+    raise DeclinedError(
+        tr("You did not start it."), remedy=tr("To start, give the same command again.")
+    )
 
 
-def _points(controller: "Controller", purpose: str) -> "list[CheckPoint]":
-    from robolink_cli.wizard.check_list import CheckPoint, Mark
+def _motors_are_off(controller: "Controller", purpose: str, *, tried: bool) -> bool:
+    """Tell whether the motors are off, which a key of the list changes.
 
-    motors_off = False
+    Raises:
+        NotReadyError: Something else stands in the way, or that key was pressed before.
+    """
     try:
         controller.groups[0].require_able(purpose)
     except NotReadyError as error:
-        motors_off = error.reason is NotReadyReason.MOTORS_OFF and controller.capabilities.motors
-        if not motors_off:
+        off = error.reason is NotReadyReason.MOTORS_OFF and controller.capabilities.motors
+        if not off or tried:
             raise
-    terms = controller.groups[0].terms()
+        return True
+    return False
+
+
+def tools_as_left(controller: "Controller", tools: "Sequence[int]") -> tuple[str, ...]:
+    """Return a sentence of each tool that holds what was proved to be in it last.
+
+    One that holds something else was told of already, one without a record says nothing.
+
+    Args:
+        controller: The controller, connected.
+        tools: Numbers of the tools.
+    """
+    from robolink.model import describe_offset
+    from robolink.timing import local_label
+    from robolink.transaction import changed_since, last_proof
+
+    said = []
+    for tool in tools:
+        now, last = controller.tools.read(tool), last_proof(controller, tool)
+        if now is None or last is None or changed_since(controller, tool, now) is not None:
+            continue
+        facts = {"t": tool, "value": describe_offset(now), "when": local_label(last.at)}
+        nozzle = last.signature.nozzle
+        said.append(
+            tr(
+                "Tool {t} is as the last change left it: {value}. {when}, needle {id}.",
+                **facts,
+                id=nozzle,
+            )
+            if nozzle
+            else tr("Tool {t} is as the last change left it: {value}. {when}.", **facts)
+        )
+    return tuple(said)
+
+
+def _points(
+    name: str, terms: "MotionTerms", left: tuple[str, ...], *, off: bool
+) -> "tuple[CheckPoint, ...]":
+    from robolink_cli.wizard.check_list import CheckPoint, Mark
+
     points = [
-        CheckPoint(Mark.OK, tr("Controller answers: {name}", name=_name(controller))),
-        CheckPoint(Mark.OK, tr("Emergency stop released, guard closed, no program running")),
+        CheckPoint(Mark.OK, tr("Controller answers: {name}", name=name)),
+        *([CheckPoint(Mark.OK, terms.able)] if terms.able else ()),
+        *(CheckPoint(Mark.OK, sentence) for sentence in left),
         CheckPoint(Mark.OK, terms.watch),
     ]
-    if motors_off:
+    if off:
         points.append(CheckPoint(Mark.TO_DO, tr("Motors are off"), "7", tr("Switch them on")))
     else:
         points.append(CheckPoint(Mark.OK, tr("Motors are on")))
@@ -148,7 +237,7 @@ def _points(controller: "Controller", purpose: str) -> "list[CheckPoint]":
     clear = tr("Nobody in the cell, hoses free")
     points.append(CheckPoint(Mark.YOU, new, "1", tr("Yes")))
     points.append(CheckPoint(Mark.YOU, clear, "3", tr("Yes")))
-    return points
+    return tuple(points)
 
 
 def _name(controller: "Controller") -> str:

@@ -22,14 +22,15 @@ def watched_at_desk(controller: "Controller") -> Iterator[None]:
     if desk is None:
         yield
         return
-    from robolink_cli.wizard.glance import following, glancing_at
+    from robolink_cli.wizard.glance import ControllerGlance
     from robolink_cli.wizard.happenings import CellIs
 
     if _says_it_is_simulated(controller):
         desk.regard(CellIs(simulated=True))
-    before, desk.glance = desk.glance, glancing_at(controller)
+    glance = ControllerGlance(controller)
+    before, desk.glance = desk.glance, glance.at_rest
     try:
-        with desk.following(following(controller)):
+        with desk.following(glance.on_the_way):
             yield
     finally:
         desk.glance = before

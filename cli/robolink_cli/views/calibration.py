@@ -4,9 +4,11 @@ from collections.abc import Mapping, Sequence
 
 from robolink.calibration import VerifyResult, known_doubts
 from robolink.messages import tr
+from robolink.model import ToolOffset, ToolReceipt, describe_offset
 from robolink.nozzle_change import LimitVerdict, PlannedStep, Proposal, ToolReport
 from robolink.runner import TeachPrompt
 from robolink_cli.console.render import note, say
+from robolink_cli.prompts.present import present_desk
 from robolink_cli.views.documents import (
     offset_payload,
     proposal_payload,
@@ -33,6 +35,17 @@ def show_proposal(proposal: Proposal) -> None:
         show_residuals(result)
     for sentence in known_doubts(result.warnings):
         say(f"  ! {sentence}")
+
+
+def tell_written(receipt: ToolReceipt) -> None:
+    """Tell whoever is guided what the controller reads back, before the turn test is made."""
+    if present_desk() is None:
+        return
+    value = describe_offset(receipt.read_back or ToolOffset())
+    told = tr(
+        "Written. The controller now has tool {tool} = {value}.", tool=receipt.tool, value=value
+    )
+    note(told)
 
 
 def show_verdicts(verdicts: Sequence[LimitVerdict]) -> None:
@@ -146,3 +159,9 @@ def show_steps(steps: object) -> None:
             say(f"       {request}")
         if step["refusal"]:
             say(f"       {step['refusal']}")
+    say(
+        tr(
+            "These steps measure. What is written afterwards, and the turn test if there is one, "
+            "depend on the result."
+        )
+    )

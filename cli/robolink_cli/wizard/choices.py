@@ -20,6 +20,7 @@ class ChoiceSubject:
         marked: Index of the one that is marked first; ``None`` where nothing says which.
         does: What the main key is called.
         leaves: What the stop key is called.
+        enters: Whether ENTER takes the marked row as the main key does; not where a row writes.
     """
 
     step: str
@@ -28,6 +29,7 @@ class ChoiceSubject:
     marked: int | None = 0
     does: str = ""
     leaves: str = ""
+    enters: bool = True
 
 
 def choose(

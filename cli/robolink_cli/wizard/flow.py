@@ -172,6 +172,8 @@ def _asked(state: WizardState, asked: WasAsked) -> WizardState:
         reading=reading,
         question=asked,
         fresh=(),
+        heard=state.fresh,
+        page=0,
         waits=False,
         typed="",
         typing=False,
@@ -211,6 +213,16 @@ def _armed(state: WizardState, at_s: float) -> bool:
     return state.question is not None and at_s - state.question.at_s >= ARMED_AFTER_S
 
 
+def _too_early(state: WizardState, key: KeyPressed) -> bool:
+    """Tell whether a key belongs to something that began before the field could be seen.
+
+    What is left of a code whose beginning was dropped would be another code.
+    """
+    unasked = not state.waits and not state.typed  # what was answered already is not asked anew
+    early = unasked or not _armed(state, key.at_s)
+    return early or key.at_s - state.early_s < ARMED_AFTER_S
+
+
 def _last_key(state: WizardState, ended: LastScreen, key: KeyPressed) -> Advanced:
     """Leave the last screen, or begin again; ENTER does neither."""
     if key.at_s - ended.at_s < ARMED_AFTER_S:
@@ -229,6 +241,9 @@ def _key(state: WizardState, key: KeyPressed) -> Advanced:
         return _stop(state)
     if stops_at_once(state, key.name):
         return _stop(state)
+    if state.has_field and _too_early(state, key):
+        said = tr("Typed too early, so nothing of it was taken. Please once more.")
+        return replace(state, early_s=key.at_s, typed="", message=said), []
     if state.question is None or not state.waits or not _armed(state, key.at_s):
         if state.at_place and key.name == "main" and not state.waits:
             return state.says(tr("Wait: the robot is still moving.")), []

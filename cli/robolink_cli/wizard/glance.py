@@ -1,51 +1,82 @@
-"""Looks at the controller while a person is asked: what the second row of a screen shows."""
+"""Looks at the controller, at rest and on the way: what the second row of a screen shows."""
 
 import time
-from collections.abc import Callable
+from typing import Final
 
 from robolink.errors import ControllerError
 from robolink.model import Controller
 from robolink_cli.wizard.happenings import Reading
 
+_SELDOM_S: Final = 3.0
+"""So often motors and power mode are read at rest: only a person or a program here changes them."""
 
-def glancing_at(controller: Controller) -> Callable[[], Reading | None]:
-    """Return what looks at a controller, and says what it saw.
+
+class ControllerGlance:
+    """Looks at one controller, and says what it saw; what was not read is not said.
 
     A broken link is not swallowed: whoever asks is told of it, as by any other exchange.
-    """
-    group = controller.groups[0]
 
-    def look() -> Reading | None:
-        status = controller.status()
+    Args:
+        controller: The controller, connected.
+    """
+
+    def __init__(self, controller: Controller) -> None:
+        self._controller = controller
+        self._group = controller.groups[0]
+        self._can = controller.capabilities
+        self._motors: bool | None = None
+        self._low_power: bool | None = None
+        self._seldom_s = -_SELDOM_S
+
+    def at_rest(self) -> Reading | None:
+        """Look while a person is asked."""
+        status = self._controller.status()
         halted = status.emergency_stop or status.guard_open or status.fault or status.serious_fault
         # What comes next tells why: a position is no more of interest then.
         if halted:
+            self._seldom_s = -_SELDOM_S
             return Reading(time.monotonic(), status.state, halted=True)
         try:
-            pose = group.pose()
-            axes = _joints(group.axes())
+            pose = self._group.pose()
+            axes = _joints(self._group.axes())
+            self._look_seldom()
         except ControllerError:
             return Reading(time.monotonic(), status.state)
-        return Reading(time.monotonic(), status.state, pose=pose, axes=axes)
+        return Reading(
+            time.monotonic(),
+            status.state,
+            pose=pose,
+            axes=axes,
+            motors=self._motors,
+            low_power=self._low_power,
+        )
 
-    return look
+    def on_the_way(self) -> Reading | None:
+        """Look while a movement is under way, beside whoever waits for it.
 
+        Status can be asked meanwhile on every kind; the position only where the kind says so. The
+        driver has proved the power mode before the movement began.
+        """
+        status = self._controller.status()
+        tells = self._can.pose_while_moving
+        self._motors = True if self._can.motors else None
+        self._low_power = True if self._can.low_power else None
+        return Reading(
+            time.monotonic(),
+            status.state,
+            pose=self._group.pose() if tells else None,
+            axes=_joints(self._group.axes()) if tells else (),
+            motors=self._motors,
+            low_power=self._low_power,
+        )
 
-def following(controller: Controller) -> Callable[[], Reading | None]:
-    """Return what looks at a controller while a movement is under way, beside whoever waits for it.
-
-    Status can be asked meanwhile on every kind; the position only where the kind says so.
-    """
-    group = controller.groups[0]
-    tells = controller.capabilities.pose_while_moving
-
-    def look() -> Reading | None:
-        status = controller.status()
-        pose = group.pose() if tells else None
-        axes = _joints(group.axes()) if tells else ()
-        return Reading(time.monotonic(), status.state, pose=pose, axes=axes)
-
-    return look
+    def _look_seldom(self) -> None:
+        now_s = time.monotonic()
+        if now_s - self._seldom_s < _SELDOM_S:
+            return
+        self._motors = self._group.motors_on() if self._can.motors else None
+        self._low_power = self._group.low_power() if self._can.low_power else None
+        self._seldom_s = now_s
 
 
 def _joints(axes: object) -> tuple[float, ...]:

@@ -22,6 +22,9 @@ class Reading:
         pose: Where the frame in force is, ``None`` where it was not read.
         axes: Joint angles, in degrees, where they were read.
         follows: Whether the pose is that of now; else it is where a movement began.
+        motors: Whether the motors are on, ``None`` where that was not read.
+        low_power: Whether the controller is in Power Low, ``None`` where that was not read or
+            there is no such thing.
     """
 
     at_s: float
@@ -30,6 +33,8 @@ class Reading:
     pose: Pose | None = None
     axes: tuple[float, ...] = ()
     follows: bool = True
+    motors: bool | None = None
+    low_power: bool | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -114,6 +114,8 @@ def _choice_key(state: WizardState, subject: ChoiceSubject, key: KeyPressed) -> 
         return replace(state, marked=0 if marked is None else min(marked + 1, last), message="")
     if key.name == "8":
         return replace(state, marked=last if marked is None else max(marked - 1, 0), message="")
+    if key.name == "enter" and not subject.enters:
+        return state.says(tr("ENTER does nothing here. [5] does what the marked row says."))
     if key.name in ("5", "main", "enter"):
         return state.says(tr("Mark a row first.")) if marked is None else str(marked + 1)
     return state
@@ -137,6 +139,8 @@ def _write_key(state: WizardState, subject: WriteSubject, key: KeyPressed) -> An
         return _write(state, subject, folded(state.typed), said_no=False)
     if key.name == "n":
         return "n"
+    if key.name in (".", "delete"):
+        return replace(state, page=state.page + 1, message="")
     word = {"/": BACK, "+": MORE}.get(key.name, "")
     if word in offered_words(subject):
         return word
@@ -170,7 +174,7 @@ def _check(state: WizardState, subject: CheckSubject, word: str) -> Answered:
         checked = state.checked ^ {word}
         return replace(state, checked=checked, message=_left_open(subject, checked))
     if word != "main":
-        return state.says(tr("Confirm each row first; then [5] starts."))
+        return state.says(tr("Confirm each row first, by its number."))
     left = subject.open_keys(state.checked)
     return state.says(_left_open(subject, state.checked)) if left else "y"
 

@@ -114,6 +114,9 @@ class WizardState:
         marked: Index of the marked row of a list.
         remarks: What was told last, oldest first.
         fresh: What of it was told since the last question, so that nobody had a screen to read it.
+        heard: What was told before the present question: its screen shows it.
+        page: Which part of a longer screen is shown, from 0.
+        early_s: When the last key came that was too early for the field, ``-inf`` for none.
         message: The row above the keys.
         ending: Whether the work was told to end.
         impact: What the new value does at taught points, ``None`` where none were named.
@@ -137,6 +140,9 @@ class WizardState:
     marked: int | None = None
     remarks: tuple[str, ...] = ()
     fresh: tuple[str, ...] = ()
+    heard: tuple[str, ...] = ()
+    page: int = 0
+    early_s: float = -math.inf
     message: str = ""
     ending: bool = False
     impact: "Impact | None" = None

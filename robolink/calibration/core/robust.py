@@ -172,12 +172,14 @@ def _best_set(
             memory[key] = agreement.of_fit(kept)
         return memory[key]
 
-    best = _best_samples(agreement, samples, known_mm)
-    starts = agreement.of_samples(samples[best])
+    starts = _best_samples(agreement, samples, known_mm)
     threshold_mm = known_mm
     if threshold_mm is None:
         threshold_mm = _estimated(agreement, robust, starts[0], refit)
-    ends = (_settled(distances, threshold_mm, refit) for distances in starts)
+    inside = starts <= threshold_mm * _WIDER[0]
+    # Where it begins is all that decides where it ends; good samples begin with the same set.
+    different = {mask.tobytes(): mask for mask in inside}.values()
+    ends = (_settled(mask, threshold_mm, refit) for mask in different)
     # Python keeps the first among equals: the sample with the least cost.
     return min(
         ((-int(kept.sum()), squares, kept) for kept, squares in filter(None, ends)),
@@ -186,20 +188,25 @@ def _best_set(
     )
 
 
-def _best_samples(agreement: Agreement, samples: Indices, threshold_mm: float | None) -> Indices:
-    """Return the samples that explain the poses best, the best first.
+def _best_samples(agreement: Agreement, samples: Indices, threshold_mm: float | None) -> Floats:
+    """Return the distances of the samples that explain the poses best, the best first.
 
     Against a known threshold as many poses as possible and among equals the tightest; without one
     the least median decides.
     """
-    costs = []
+    costs, rows = [], []
     for part in _parts(samples, agreement.count):
         distances = agreement.of_samples(part)
         if threshold_mm is None:
-            costs.append(np.median(distances, axis=1))
+            cost = np.median(distances, axis=1)
         else:
-            costs.append((np.minimum(distances / threshold_mm, 1.0) ** 2).sum(axis=1))
-    return np.argsort(np.concatenate(costs), kind="stable")[:REFINED]
+            cost = (np.minimum(distances / threshold_mm, 1.0) ** 2).sum(axis=1)
+        best = np.argsort(cost, kind="stable")[:REFINED]
+        costs.append(cost[best])
+        rows.append(distances[best])
+    best = np.argsort(np.concatenate(costs), kind="stable")[:REFINED]
+    chosen: Floats = np.concatenate(rows)[best]
+    return chosen
 
 
 def _parts(samples: Indices, count: int) -> Iterable[Indices]:
@@ -227,21 +234,17 @@ def _estimated(
 
 
 def _settled(
-    distances: Floats, threshold_mm: float, refit: Callable[[Mask], Floats | None]
+    inside: Mask, threshold_mm: float, refit: Callable[[Mask], Floats | None]
 ) -> tuple[Mask, float] | None:
-    """Refine a sample until its set stays; return the set and its sum of squares."""
-    kept: Mask | None = None
-    for step in range(MOST_REFITS):
-        limit = threshold_mm * _WIDER[min(step, len(_WIDER) - 1)]
-        inside = distances <= limit
-        if step >= len(_WIDER) and kept is not None and np.array_equal(inside, kept):
-            break
+    """Refine the poses near a sample until their set stays; return it and its sum of squares."""
+    for step in range(1, MOST_REFITS + 1):
         refined = refit(inside)
         if refined is None:
             return None
         kept, distances = inside, refined
-    if kept is None:
-        return None
+        inside = distances <= threshold_mm * _WIDER[min(step, len(_WIDER) - 1)]
+        if step >= len(_WIDER) and np.array_equal(inside, kept):
+            break
     chosen = distances[kept]
     return kept, float(chosen @ chosen)
 

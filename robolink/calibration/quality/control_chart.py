@@ -64,6 +64,7 @@ def control_chart(
     *,
     weight: float = USUAL_LAMBDA,
     ewma_width: float = USUAL_WIDTH,
+    least_sigma_mm: float = 0.0,
 ) -> ControlChart:
     """Return what later values say against a baseline, both in the order of time.
 
@@ -72,6 +73,8 @@ def control_chart(
         values_mm: Those after them.
         weight: Lambda of the weighted mean: the share of the newest value.
         ewma_width: Its limits, in its own standard deviations.
+        least_sigma_mm: What sigma is at least, as a baseline may show less scatter than its
+            values have digits.
 
     Raises:
         CalibrationError: ``too_few_values``: fewer than two in the baseline; ``non_finite``.
@@ -87,7 +90,7 @@ def control_chart(
     _check(baseline_mm, values_mm, weight, ewma_width)
     centre = math.fsum(baseline_mm) / len(baseline_mm)
     ranges = [abs(b - a) for a, b in pairwise(baseline_mm)]
-    sigma = math.fsum(ranges) / len(ranges) / _MEAN_RANGE
+    sigma = max(math.fsum(ranges) / len(ranges) / _MEAN_RANGE, least_sigma_mm)
     notes = ("short_baseline",) if len(baseline_mm) < LEAST_BASELINE else ()
     if sigma == 0:
         notes = (*notes, "no_scatter")

@@ -127,7 +127,7 @@ _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
         "Too few touches to see whether something moved meanwhile; six or more would show it."
     ),
     "touches_not_witnessed": lambda: tr(
-        "Nobody saw these touches being made: the poses were taught, typed or in a file."
+        "Nobody saw these touches being made: the poses were taught, typed or read from a file."
     ),
     "length_changed": lambda: tr("The length of the tool has changed."),
     "length_not_observable": lambda: tr(

@@ -77,6 +77,7 @@ class EpsonController(ControllerCore):
             tool_write=True,
             motion=True,
             motors=True,
+            low_power=True,
             io=True,
             points=True,
             variables=True,

@@ -52,9 +52,7 @@ class OneTouchSource(ProvesAgain):
         stored: ToolOffset | None,
     ) -> CalibrationResult:
         """Touch and solve; see :class:`~robolink.procedures.MovingSource`."""
-        context.controller.tools.select(0)
-        here = context.controller.groups[0].pose()
-        return context.run(self._steps(stored, here, self.touch))
+        return context.measure(lambda here: self._steps(stored, here, self.touch))
 
     def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
         """Return the steps of a measurement; see :class:`~robolink.procedures.MovingSource`."""

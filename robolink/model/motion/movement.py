@@ -171,10 +171,14 @@ class MotionTerms:
     Attributes:
         who: What moves, and in which mode, to be followed by "will move".
         watch: Who stops it when this computer falls silent, one sentence.
+        able: What was looked at and lets it move, as :meth:`MotionGroup.require_able` does; empty
+            where this kind of controller tells nothing of it. It holds also while the motors are
+            off.
     """
 
     who: str
     watch: str
+    able: str = ""
 
 
 class MotionGroup(Protocol):
@@ -323,6 +327,12 @@ class MotionGroup(Protocol):
 
     def axes(self) -> Mapping[str, tuple[float, ...]]:
         """Read the positions of the axes, by the names of what they count in."""
+
+    def motors_on(self) -> bool | None:
+        """Read whether its motors are on, ``None`` where this kind does not tell it."""
+
+    def low_power(self) -> bool | None:
+        """Read whether it moves with little power, ``None`` where this kind has no such mode."""
 
     def stop(self) -> None:
         """Stop it; may be called from any thread, at any time, more than once."""

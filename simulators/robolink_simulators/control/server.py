@@ -35,6 +35,7 @@ SCHEMA: Final = "robolink/control/1"
 MOST_CLIENTS: Final = 64
 LONGEST_REQUEST: Final = 65_536
 _SILENCE_S: Final = 60.0
+_MOST_ASKED: Final = 50
 
 _Reply = tuple[HTTPStatus, dict[str, Any]]
 
@@ -125,16 +126,24 @@ class ControlServer(ClosedAtExit):
             return HTTPStatus.BAD_REQUEST, _error(error.what, error.remedy)
         except (SpelRefusal, BlockRefused) as refused:
             return HTTPStatus.CONFLICT, _error(str(refused))
+        except Exception as error:
+            # Whoever asked is told, else its client waits for an answer that never comes.
+            return HTTPStatus.INTERNAL_SERVER_ERROR, _error(
+                tr("The simulator failed: {cause}.", cause=f"{type(error).__name__}: {error}")
+            )
 
     def _found(self, method: str, path: list[str], given: dict[str, Any]) -> _Reply:
         match path:
             case [version, "openapi.json"] if version == VERSION:
+                _require_nothing(given)
                 return HTTPStatus.OK, json.loads(
                     files("robolink_simulators.control").joinpath("openapi.json").read_bytes()
                 )
             case [version] if version == VERSION:
+                _require_nothing(given)
                 return HTTPStatus.OK, _ok({"cells": {it: self._about(it) for it in self.cells}})
             case [version, "cells", name] if version == VERSION and name in self.cells:
+                _require_nothing(given)
                 return HTTPStatus.OK, _ok(self._about(name))
             case [version, "cells", name, act] if version == VERSION and name in self.cells:
                 return self._acted(method, self.cells[name], act, given)
@@ -175,15 +184,46 @@ def _given(method: str, query: str, body: bytes) -> dict[str, Any]:
         ConfigError: It is neither.
     """
     if method == "GET":
-        return {name: _value(text) for name, text in parse_qsl(query, max_num_fields=50)}
+        try:
+            asked = parse_qsl(query, keep_blank_values=True, max_num_fields=_MOST_ASKED)
+        except ValueError as error:
+            raise ConfigError(
+                tr("The request asks for too much."),
+                remedy=tr("Give {most} values or fewer.", most=_MOST_ASKED),
+            ) from error
+        return _each_once([(name, _value(text)) for name, text in asked])
     try:
-        given = json.loads(body) if body.strip() else {}
+        given = json.loads(body, object_pairs_hook=_each_once) if body.strip() else {}
     except (ValueError, RecursionError):
         given = None
     if not isinstance(given, dict):
         raise ConfigError(
             tr("The request is not a JSON object."),
             remedy=tr("Give it as {example}.", example="{}"),
+        )
+    return given
+
+
+def _require_nothing(given: dict[str, Any]) -> None:
+    for name in given:
+        raise ConfigError(
+            tr("Nothing is known here by the name {name!r}.", name=name[:80]),
+            remedy=tr("Only an act takes values."),
+        )
+
+
+def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return what was given by name.
+
+    Raises:
+        ConfigError: A name stands there twice, and one of its values would be lost.
+    """
+    given = dict(pairs)
+    if len(given) < len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise ConfigError(
+            tr("{name!r} is given twice.", name=twice[:80]), remedy=tr("Give it once.")
         )
     return given
 
@@ -266,17 +306,57 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         """Look."""
-        self._answer("GET", b"")
+        body = self._body()
+        if body:
+            self._refuse(
+                HTTPStatus.BAD_REQUEST,
+                tr("A GET has its values behind the question mark, not in a body."),
+            )
+        elif body is not None:
+            self._answer("GET", b"")
 
     def do_POST(self) -> None:
         """Act."""
-        length = self.headers.get("Content-Length", "0")
-        if not (length.isascii() and length.isdigit()) or "Transfer-Encoding" in self.headers:
+        body = self._body()
+        if body is not None:
+            self._answer("POST", body)
+
+    def _body(self) -> bytes | None:
+        """Return what came with the request; ``None`` where it was refused for that."""
+        lengths = self.headers.get_all("Content-Length", ["0"])
+        length = lengths[0]
+        if (
+            len(lengths) > 1
+            or not (length.isascii() and length.isdigit())
+            or "Transfer-Encoding" in self.headers
+        ):
             self._refuse(HTTPStatus.LENGTH_REQUIRED, tr("The request says no Content-Length."))
         elif len(length) > 9 or int(length) > LONGEST_REQUEST:
             self._refuse(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, tr("The request is too long."))
+        elif len(body := self.rfile.read(int(length))) < int(length):
+            # Its sender is gone in the middle: what it wanted done, nobody knows.
+            self._refuse(HTTPStatus.BAD_REQUEST, tr("The request ended early."))
         else:
-            self._answer("POST", self.rfile.read(int(length)))
+            return body
+        return None
+
+    def send_error(
+        self,
+        code: int,
+        message: str | None = None,  # noqa: ARG002 - part of the signature
+        explain: str | None = None,  # noqa: ARG002 - part of the signature
+    ) -> None:
+        """Answer what is no request, or one of another method, in JSON as everything else."""
+        self.request_version = self.protocol_version  # or it would get no head
+        if code == HTTPStatus.NOT_IMPLEMENTED:
+            code = HTTPStatus.METHOD_NOT_ALLOWED
+        self._refuse(
+            HTTPStatus(code),
+            tr(
+                "What came is no request that is answered here: {cause}.",
+                cause=HTTPStatus(code).phrase,
+            ),
+        )
 
     def log_message(self, *_: object) -> None:
         """Print nothing: the URL holds the token."""
@@ -294,7 +374,10 @@ class _Handler(BaseHTTPRequestHandler):
         self.send_header("Content-Type", "application/json")
         self.send_header("Content-Length", str(len(data)))
         self.send_header("Cache-Control", "no-store")
+        if status == HTTPStatus.METHOD_NOT_ALLOWED:
+            self.send_header("Allow", "GET, POST")
         if self.close_connection:
             self.send_header("Connection", "close")
         self.end_headers()
-        self.wfile.write(data)
+        if self.command != "HEAD":
+            self.wfile.write(data)

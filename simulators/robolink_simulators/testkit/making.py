@@ -53,7 +53,6 @@ def make_epson(
     from robolink_simulators.epson.device import EpsonSimulator
     from robolink_simulators.epson.options import options_from_text
 
-    request.require_no_program()
     simulator = EpsonSimulator(
         request.robot,
         seed=_seed(own, request),
@@ -159,7 +158,6 @@ def make_plc(own: OwnFolder, request: CellRequest, medium: str) -> SimulatedCell
     from robolink.register_maps import load_map
     from robolink_simulators.plc import PlcSimulator, serve_plc, serve_plc_line
 
-    request.require_no_program()
     path = written_map(own.folder) if request.map is None else Path(request.map)
     simulator = PlcSimulator(load_map(path), seed=_seed(own, request))
     time = _served_clock(request, SERVED_SPEED)

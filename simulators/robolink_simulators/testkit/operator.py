@@ -18,6 +18,9 @@ class _Cue:
 class ScriptedOperator:
     """Does acts of the control API (docs/control-api.md), at once or on a cue of the wire.
 
+    A test whose script was not played to its end has tried something else than it says: the
+    fixtures let it fail, unless it drops the script by :meth:`forget`.
+
     Args:
         cell: Where.
 
@@ -60,8 +63,16 @@ class ScriptedOperator:
         """How many cues have not come yet."""
         return len(self._cues)
 
+    def unplayed(self) -> list[str]:
+        """Return what of the script was not done, each as a sentence."""
+        late = [
+            f"No request came that contains {cue.match!r}, at which {cue.act} was to be done."
+            for cue in self._cues
+        ]
+        return late + [f"{act} could not be done: {why}" for act, why in self.failed]
+
     def forget(self) -> None:
-        """Drop the script."""
+        """Drop the script, what was done, and what could not be."""
         self._cues.clear()
         self.done.clear()
         self.failed.clear()

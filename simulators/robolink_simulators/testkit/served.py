@@ -10,11 +10,15 @@ from pathlib import Path
 from typing import Any, Final
 
 from robolink_simulators.control.cell import AnySimulator, ControlledCell
+from robolink_simulators.device.wire_record import WireRecord
 from robolink_simulators.testkit.looks import MotionLook, WireLook
 from robolink_simulators.testkit.operator import ScriptedOperator
 
 _COMMAND_S: Final = 120.0
 _FIRST: Final = "as it was given to the test"
+
+MOST_LINES: Final = 200_000
+"""So many lines of its wire are held: what counts requests must not have lost one."""
 
 
 @dataclass(frozen=True)
@@ -153,6 +157,7 @@ class OwnFolder:
         recipe: Path | None = None,
     ) -> SimulatedCell:
         """Return the cell of a simulator that is served, and remember it."""
+        simulator.log = WireRecord(MOST_LINES)  # nobody has asked it anything yet
         controlled = ControlledCell(simulator, clock, urls)
         url = next(iter(urls.values()))
         cell = SimulatedCell(url, simulator, controlled, assist=assist, recipe=recipe)

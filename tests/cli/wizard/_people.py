@@ -95,7 +95,8 @@ class Sitting:
         return self.happens(WaitsForAnswer(self.number, self.now))
 
     def reads(self, pose):
-        return self.happens(WasRead(Reading(self.now, "ready", pose=pose)))
+        reading = Reading(self.now, "ready", pose=pose, motors=True, low_power=True)
+        return self.happens(WasRead(reading))
 
     def key(self, name, text=""):
         return self.happens(KeyPressed(name, text, self.now))

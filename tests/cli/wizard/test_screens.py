@@ -7,7 +7,14 @@ from pathlib import Path
 import pytest
 from robolink_cli.wizard.check_list import CheckPoint, CheckSubject, Mark
 from robolink_cli.wizard.choices import ChoiceSubject
-from robolink_cli.wizard.happenings import HasEnded, Reading, TaughtPoints, WasRead, WasRegarded
+from robolink_cli.wizard.happenings import (
+    HasEnded,
+    Reading,
+    TaughtPoints,
+    WasRead,
+    WasRegarded,
+    WasTold,
+)
 from robolink_cli.wizard.screens.drawing import screen_of
 from robolink_cli.wizard.screens.ending import ended_of
 from robolink_cli.wizard.screens.layout import broken
@@ -42,7 +49,8 @@ SCARA = (70.0, -40.0, 0.0, 0.0)
 
 def moving():
     here = Pose(349.3, 442.9, -60.0, 43.2, tool=0)
-    hand = Sitting().happens(WasRead(Reading(10.0, "ready", pose=here, axes=SCARA)))
+    seen = Reading(10.0, "ready", pose=here, axes=SCARA, motors=True, low_power=True)
+    hand = Sitting().happens(WasRead(seen))
     going = MoveSubject(
         Pose(300.0, 400.0, -60.0, 90.0, tool=0), Way.JOINT, 20.0, tr("Turning in the air.")
     )
@@ -76,8 +84,8 @@ def done():
 def checking():
     """The list as the commands make it."""
     plan = tr(
-        "The robot will move by itself {n} times: power LOW, up to {v} mm/s, at most {d} mm from "
-        "here.",
+        "The robot will move by itself {n} times: power LOW, up to {v} mm/s, at most {d} mm "
+        "from here.",
         n=6,
         v=20,
         d=150,
@@ -97,6 +105,17 @@ def checking():
     return Sitting().asked(CheckSubject(points, plan), Question.YES_NO).keys("1", "3")
 
 
+def remarked():
+    """What was found out before the list is read on it."""
+    hand = Sitting()
+    for said in (
+        tr("Station {station} is not known yet: a full calibration there finds it.", station="P"),
+        tr("There is no earlier touch to make again."),
+    ):
+        hand.happens(WasTold(said))
+    return hand.asked(CHECK, Question.YES_NO)
+
+
 def recovering():
     """What was written and never tested; reading alone decides nothing."""
     options = (
@@ -110,6 +129,7 @@ def recovering():
         (found, tr("Tool {t} is selected.", t=0)),
         options,
         marked=None,
+        enters=False,
         does=tr("Do it"),
         leaves=tr("Leave it blocked"),
     )
@@ -176,6 +196,8 @@ SCREENS = {
         .asked(replace(write_subject(1), stations={1: ("PIN-07",)}), Question.YES_NO)
     ),
     "two tools": lambda: Sitting().asked(write_subject(1, 2), Question.YES_NO),
+    "five tools": lambda: Sitting().asked(write_subject(1, 2, 3, 4, 5), Question.YES_NO),
+    "check remarks": remarked,
     "question": lambda: Sitting().asked(None, Question.YES_NO, "Is the valve shut?"),
     "text": lambda: Sitting().asked(None, Question.TEXT, "Id of the new needle?").keys(*"N-0418"),
     "working": Sitting,

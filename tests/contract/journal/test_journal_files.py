@@ -19,6 +19,14 @@ from tests.contract.journal._acts import marker
 
 ROOT = Path(__file__).parents[3]
 NOBODY = 65534
+LOG_PAGES = 200
+PRAGMAS = {
+    "journal_mode": "wal",
+    "synchronous": 2,
+    "foreign_keys": 1,
+    "busy_timeout": 3000,
+    "wal_autocheckpoint": LOG_PAGES,
+}
 
 
 @pytest.fixture
@@ -72,14 +80,18 @@ def test_commits_are_durable_and_writers_do_not_block_readers(path, open_anew):
     with journal._store.read() as tables:
         pragmas = {
             name: tables.connection.exec_driver_sql(f"PRAGMA {name}").scalar_one()
-            for name in ("journal_mode", "synchronous", "foreign_keys", "busy_timeout")
+            for name in PRAGMAS
         }
-    assert pragmas == {
-        "journal_mode": "wal",
-        "synchronous": 2,
-        "foreign_keys": 1,
-        "busy_timeout": 3000,
-    }
+    assert pragmas == PRAGMAS
+
+
+def test_the_write_ahead_log_is_written_over_and_not_made_longer_for_ever(path, open_anew):
+    log = open_anew(str(path)).log("cell")
+    for number in range(60):
+        log.begin(marker(f"write {number}"))
+        log.clear(f"write {number}", NewEntry(EntryKind.RAW))
+    pages = path.with_name(path.name + "-wal").stat().st_size / (2048 + 24)
+    assert LOG_PAGES < pages < 2 * LOG_PAGES
 
 
 def test_one_process_opens_a_place_once_and_memory_is_shared_by_name(path):

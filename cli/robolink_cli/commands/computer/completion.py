@@ -1,8 +1,15 @@
 """completion SHELL: the script that makes TAB work."""
 
+from typing import Final
+
 import click
 
 from robolink.messages import tr
+
+_UNQUOTED: Final = "COMPREPLY+=($value)"
+_QUOTED: Final = 'COMPREPLY+=("$(printf %q "$value")")'
+"""click's script for bash hands over a name as it is: one with a blank would be two words, one with
+a star would be files."""
 
 
 @click.command()
@@ -27,4 +34,5 @@ def completion(shell: str) -> None:
             remedy=tr("Install click 8.5 or later."),
         )
     root = click.get_current_context().find_root().command
-    click.echo(made(root, {}, "robolink", "_ROBOLINK_COMPLETE").source())
+    script = made(root, {}, "robolink", "_ROBOLINK_COMPLETE").source()
+    click.echo(script.replace(_UNQUOTED, _QUOTED) if shell == "bash" else script)

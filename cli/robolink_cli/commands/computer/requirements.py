@@ -16,7 +16,7 @@ _REQUIREMENT: Final = re.compile(
     r"(?P<name>[\w.-]+)\s*(\[[^]]*])?\s*\(?(?P<range>[^;()]*)\)?"
     r"(;.*extra\s*==\s*['\"](?P<extra>[^'\"]+)['\"].*)?"
 )
-_DEVELOPMENT: Final = "dev"
+_DEVELOPMENT: Final = frozenset({"dev", "docs"})
 
 
 class Requirement(NamedTuple):
@@ -131,7 +131,7 @@ def _python(versions: str) -> Remark:
 
 def _required(text: str) -> Iterator[Remark]:
     wanted = requirement(text)
-    if wanted.extra != _DEVELOPMENT:
+    if wanted.extra not in _DEVELOPMENT:
         yield _package(wanted)
 
 

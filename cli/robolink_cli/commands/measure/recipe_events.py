@@ -98,6 +98,9 @@ class Progress(Listener):
 
     def wrote(self, receipt: ToolReceipt) -> None:
         """Tell of a write."""
+        from robolink_cli.views.calibration import tell_written
+
+        tell_written(receipt)
         self.tool = receipt.tool
         self._events.emit("write", **receipt_payload(receipt))
 

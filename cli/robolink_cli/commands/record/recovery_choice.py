@@ -47,6 +47,7 @@ def chosen_at_desk(controller: Controller) -> str | None:
         marked=None,
         does=tr("Do it"),
         leaves=tr("Leave it blocked"),
+        enters=False,
     )
     question = (
         tr("Look at the robot: which needle is mounted?")

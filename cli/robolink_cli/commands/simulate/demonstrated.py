@@ -90,8 +90,8 @@ class AcceptedChange(DemonstratedChange):
         show_report(self.report)
         say(
             tr(
-                "The true tip is at X {x:.3f} Y {y:.3f}: found with an error of {error:.3f} mm, "
-                "by {exchanges} exchanges. Checked against the simulator, not a robot.",
+                "The true tip is at X {x:.3f} Y {y:.3f}; the result is {error:.3f} mm off, after "
+                "{exchanges} exchanges. Checked against the simulator, not a robot.",
                 x=self.truth.x_mm,
                 y=self.truth.y_mm,
                 error=self.error_mm,

@@ -14,6 +14,7 @@ from robolink_cli.options.simulation import (
     SECTIONS,
     ServedLife,
     life_options,
+    one_place,
     project_options,
     serial_option,
     simulation_options,
@@ -47,9 +48,10 @@ sim.add_command(sim_run)
     sections=SECTIONS,
     short_help="Serve a simulated EPSON controller until Ctrl-C.",
 )
-@tcp_option("127.0.0.1:5000", declared("Where to listen; port 0 takes a free one."))
+@tcp_option("127.0.0.1:5000", declared("Where to listen; port 0 takes a free one."), one_place)
 @serial_option(
-    declared("Remote RS232 on a pseudo terminal, whose path is printed, in place of --tcp.")
+    declared("Remote RS232 on a pseudo terminal, whose path is printed, in place of --tcp."),
+    one_place,
 )
 @click.option(
     "--baud",

@@ -1,5 +1,7 @@
 """Which screen a state shows."""
 
+from dataclasses import replace
+
 from robolink.messages import tr
 from robolink.nozzle_change import WriteSubject
 from robolink.runner import FitSubject, Question
@@ -30,20 +32,32 @@ def screen_of(state: WizardState, now_s: float) -> Screen:
     if question is None:
         return moving_screen(state, now_s)
     if state.at_place:
-        return touch_screen(state, now_s)
+        return _with_heard(state, touch_screen(state, now_s))
     if isinstance(subject, ChoiceSubject):
-        return choice_screen(state, subject, now_s)
+        return _with_heard(state, choice_screen(state, subject, now_s))
     if question.kind is Question.YES_NO:
         match subject:
             case WriteSubject():
                 return values_screen(state, subject)
             case CheckSubject():
-                return check_screen(state, subject, now_s)
+                return _with_heard(state, check_screen(state, subject, now_s))
             case FitSubject():
                 return fit_screen(state, subject)
             case _:
                 pass
     return _question_screen(state, now_s)
+
+
+def _with_heard(state: WizardState, screen: Screen) -> Screen:
+    """Return a screen with what was told before it, as much as there is room for, the last first.
+
+    The work says it between two questions, when there is no screen that anybody could read.
+    """
+    rows = [row for remark in state.heard for row in broken(remark) if row.strip()]
+    room = screen.room() - 1
+    if not rows or room < 1:
+        return screen
+    return replace(screen, lines=(*screen.lines, "", *rows[-room:]))
 
 
 def _question_screen(state: WizardState, now_s: float) -> Screen:

@@ -17,7 +17,12 @@ def done_lines(state: WizardState, report: ChangeReport) -> list[str]:
     """Return what was reached."""
     needle = state.header.needle
     lines = [line for one in report.tools for line in _tool_lines(one, needle)]
-    lines.append(tr("Record: change {id} in the journal", id=report.change[:8]))
+    record = tr(
+        'Record: change {id}. To read it: robolink -c "{cell}" journal report {id}',
+        cell=state.header.cell,
+        id=report.change[:8],
+    )
+    lines.append(record)
     if any(one.receipt is not None for one in report.tools):
         back = tr(
             'To take it back: robolink -c "{cell}" undo {id}',

@@ -30,6 +30,12 @@ class Screen:
     status: str = ""
     message: str = ""
 
+    def room(self) -> int:
+        """Return how many rows of the body are free, two left for a message."""
+        used = sum(1 for line in self.lines for _ in broken(line))
+        keys = sum(1 for _ in key_rows(self.actions))
+        return HEIGHT - 1 - bool(self.status) - 2 - keys - 2 - used
+
     def rows(self) -> list[str]:
         """Return the rows, each at most 80 columns, 24 at most."""
         left, right = self.title

@@ -26,7 +26,8 @@ def moving_screen(state: WizardState, now_s: float) -> Screen:
     drawn = [""] * ROWS
     if state.pose is not None and state.reading is not None:
         drawn = picture(state.pose, state.reading.axes, subject.target)
-    told = _told(subject, state.pose)
+    low_power = state.reading is not None and state.reading.low_power is True
+    told = _told(subject, state.pose, low_power=low_power)
     lines = [
         padded(left, COLUMNS + 4) + right
         for left, right in zip(drawn, [*told, *[""] * (ROWS - len(told))], strict=True)
@@ -43,7 +44,7 @@ def moving_screen(state: WizardState, now_s: float) -> Screen:
     )
 
 
-def _told(subject: MoveSubject, here: Pose | None) -> list[str]:
+def _told(subject: MoveSubject, here: Pose | None, *, low_power: bool) -> list[str]:
     """Return what the movement is, in short rows beside the picture."""
     target = subject.target
     lines = [tr("^ Y"), "|", tr("+---> X"), "", tr("Now:   {purpose}", purpose=subject.purpose)]
@@ -55,11 +56,19 @@ def _told(subject: MoveSubject, here: Pose | None) -> list[str]:
             lines.append(
                 tr("U:     {u} to {to} deg", u=f"{here.u_deg:.1f}", to=f"{target.u_deg:.1f}")
             )
-    if subject.path is Path.STRAIGHT:
-        lines.append(tr("Up to {v} mm/s, power LOW", v=f"{subject.speed_mm_s:g}"))
-    else:
-        lines.append(tr("Slow turn of the joints, power LOW"))
+    lines.append(_how_fast(subject, low_power=low_power))
     return lines
+
+
+def _how_fast(subject: MoveSubject, *, low_power: bool) -> str:
+    """Return how fast it goes, and in which power mode where that was read."""
+    speed = f"{subject.speed_mm_s:g}"
+    if subject.path is not Path.STRAIGHT:
+        slow = tr("Slow turn of the joints")
+        return tr("Slow turn of the joints, power LOW") if low_power else slow
+    if low_power:
+        return tr("Up to {v} mm/s, power LOW", v=speed)
+    return tr("Up to {v} mm/s", v=speed)
 
 
 def sentence_of(subject: MoveSubject, here: Pose | None) -> str:

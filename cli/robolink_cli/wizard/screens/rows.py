@@ -1,7 +1,10 @@
 """The two rows that stand above every screen."""
 
+from collections.abc import Iterator
+
 from robolink.messages import tr
 from robolink_cli.console.machine_words import state_word
+from robolink_cli.wizard.happenings import Reading
 from robolink_cli.wizard.state import WizardState
 
 
@@ -21,8 +24,16 @@ def status_row(state: WizardState, now_s: float) -> str:
     if reading.pose is not None and reading.pose.tool is not None:
         tool = "   " + tr("tool {n} selected", n=reading.pose.tool)
     age = tr("reading {s} s", s=f"{max(0.0, now_s - reading.at_s):.1f}")
-    power = tr("power LOW")
-    return f"{state_word(reading.state).upper()}   {power}{tool}   {age}"
+    known = "".join(f"   {word}" for word in _switched(reading))
+    return f"{state_word(reading.state).upper()}{known}{tool}   {age}"
+
+
+def _switched(reading: Reading) -> Iterator[str]:
+    """Yield what was read of motors and power; what was not read is not said."""
+    if reading.motors is not None:
+        yield tr("motors on") if reading.motors else tr("motors OFF")
+    if reading.low_power is not None:
+        yield tr("power LOW") if reading.low_power else tr("power HIGH")
 
 
 def mm(value: float) -> str:

@@ -11,6 +11,7 @@ from robolink_cli.wizard.screens.checking import mark_of
 from robolink_cli.wizard.screens.fitting import fit_lines
 from robolink_cli.wizard.screens.rows import mm
 from robolink_cli.wizard.screens.touching import instruction, touch_title
+from robolink_cli.wizard.screens.values import taught_lines
 from robolink_cli.wizard.state import WizardState
 
 
@@ -29,6 +30,8 @@ def told_before(state: WizardState) -> list[str]:
                 for point in subject.points
             ]
             return [*points, subject.plan, tr("Keep a hand near the emergency stop.")]
+        case WriteSubject() as subject:
+            return [line for line in taught_lines(state, subject) if line]
         case _:
             return []
 

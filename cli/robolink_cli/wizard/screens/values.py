@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from robolink.calibration import Impact  # numpy, which a touch does without
 
 _HEAD = 18
+_ROOM = BODY - 2
 
 
 def values_screen(state: WizardState, subject: WriteSubject) -> Screen:
@@ -22,22 +23,37 @@ def values_screen(state: WizardState, subject: WriteSubject) -> Screen:
     typed = tr(
         "To write, type the tool number, then [*] or Space.   Tool: {typed}_", typed=state.typed
     )
+    shown, pages = _shown(state, subject)
+    onward = ((".", tr("The rest")),) if pages > 1 else ()
     return Screen(
         title_row(state, tr("New values")),
-        (*_shown(state, subject), "", typed),
-        (("*", tr("Write")), *_further(subject), ("Esc", tr("Do not write"))),
+        (*shown, "", typed),
+        (("*", tr("Write")), *_further(subject), *onward, ("Esc", tr("Do not write"))),
         message=state.message,
     )
 
 
-def _shown(state: WizardState, subject: WriteSubject) -> list[str]:
-    """Return what stands above the field, as much as leaves room for it and a message."""
-    lines = [*value_lines(subject), *_taught(state, subject)]
+def _shown(state: WizardState, subject: WriteSubject) -> tuple[list[str], int]:
+    """Return what stands above the field, and in how many parts all of it would.
+
+    Room is left for the field, a message and a second row of keys. Nothing is left out: before a
+    write a person reads all of it.
+    """
+    lines = [*value_lines(subject), *taught_lines(state, subject)]
     rows = [row for line in lines for row in broken(line)]
-    return rows[: BODY - 3]
+    if len(rows) > _ROOM:
+        rows = [row for row in rows if row.strip()]
+    if len(rows) <= _ROOM:
+        return rows, 1
+    size = _ROOM - 1
+    pages = -(-len(rows) // size)
+    page = state.page % pages
+    part = rows[page * size : (page + 1) * size]
+    told = tr("Part {k} of {n}; [.] shows the rest.", k=page + 1, n=pages)
+    return [*part, *[""] * (size - len(part)), told], pages
 
 
-def _taught(state: WizardState, subject: WriteSubject) -> list[str]:
+def taught_lines(state: WizardState, subject: WriteSubject) -> list[str]:
     """Return what the write does where a program goes, and what was found with the tool."""
     lines = [
         tr(

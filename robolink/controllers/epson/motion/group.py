@@ -128,8 +128,14 @@ class EpsonGroup(MotionGroupCore):
             )
             watch = joined(" ", (watch, moved))
         return MotionTerms(
-            tr("Robot {number}, in Power Low,", number=spel.parse_integer(number)), watch
+            tr("Robot {number}, in Power Low,", number=spel.parse_integer(number)),
+            watch,
+            tr("Emergency stop released, guard closed, no program running"),
         )
+
+    def low_power(self) -> bool:
+        """Read whether the controller is in Power Low, as it is for each movement from here."""
+        return not self.settings.power_high()
 
     def base(self) -> tuple[float, ...] | None:
         """Read where the base stands that positions count from.

@@ -73,6 +73,7 @@ class SoftMotionGroup(MotionGroupCore):
         return MotionTerms(
             tr("The axis group of {identity}", identity=self._mailbox.identity),
             tr("The PLC halts it if this computer falls silent for half a second."),
+            tr("The machine permits movements by this computer"),
         )
 
     def motors_on(self) -> bool:

@@ -124,6 +124,16 @@ def _parser() -> Lark:
     )
 
 
+def prepare() -> None:
+    """Make ready what the first statement needs.
+
+    That takes a third of a second of the processor, once in a process. Who serves a controller to
+    clients that wait in real time does it first: on a busy machine the first request would else
+    be answered after seconds, when its client has given up.
+    """
+    _parser()
+
+
 @lru_cache(maxsize=1024)
 def parse(text: str) -> tuple[Statement, ...]:
     """Return the statements in one line, separated by semicolons.

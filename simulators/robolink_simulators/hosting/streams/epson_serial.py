@@ -7,6 +7,7 @@ from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.options import serial_dialect
 from robolink_simulators.epson.remote.link import EpsonServerLink
+from robolink_simulators.epson.spel.parse import prepare
 from robolink_simulators.hosting.streams.line_host import LineHost
 from robolink_simulators.hosting.streams.serial_cable import no_pseudo_terminal
 
@@ -59,6 +60,7 @@ class EpsonLineHost(LineHost):
     def __init__(self, simulator: EpsonSimulator, *, clock: ScaledClock, baud: int) -> None:
         face = SerialFace(simulator)
         super().__init__(face, clock=clock, lock=simulator.lock, baud=baud)
+        prepare()
         self._simulator = simulator
         options = {"baud": str(baud or _SHOWN_BAUD), **_told(serial_dialect(simulator.options))}
         self.url = f"epson+serial://{self.cable.near}?{urlencode(options)}"

@@ -2,6 +2,7 @@
 
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.epson.spel.parse import prepare
 from robolink_simulators.hosting.streams.tcp_host import TcpHost as TcpHost
 
 
@@ -49,6 +50,7 @@ class _EpsonHost(TcpHost):
             lock=simulator.lock,
             allow_remote=allow_remote,
         )
+        prepare()
         self._simulator = simulator
         simulator.url = self.url
         simulator.keep_time(clock)

@@ -6,7 +6,7 @@ from robolink.nozzle_change import AcceptanceCriteria, Listener, Proposal
 from robolink_cli.options.impact import ImpactRequest, judge
 from robolink_cli.options.report import ReportDraft
 from robolink_cli.prompts.present import present_desk
-from robolink_cli.views.calibration import show_proposal, show_verdicts
+from robolink_cli.views.calibration import show_proposal, show_verdicts, tell_written
 
 
 class CalibrationListener(Listener):
@@ -31,7 +31,8 @@ class CalibrationListener(Listener):
             self._points = self._request.read(controller)
 
     def wrote(self, receipt: ToolReceipt) -> None:
-        """Note it for the report."""
+        """Note it for the report, and tell whoever is guided."""
+        tell_written(receipt)
         self._draft.note_result(receipt)
 
     def verified(self, tool: int, result: VerifyResult) -> None:  # noqa: ARG002 - one tool only

@@ -78,7 +78,13 @@ class DeclaredKeys:
                     wrong(key, error.message)
                 except ConfigError as error:
                     wrong(key, error.what)
-        return self._command.make_context("sim", line).params if good else {}
+        if not good:
+            return {}
+        try:
+            return self._command.make_context("sim", line).params
+        except click.UsageError as error:  # options that do not go together
+            object_to("", error.message)
+            return {}
 
     def _typed(self, option: click.Option, given: object) -> list[str]:
         """Return what would be typed for a value, if the option takes it.

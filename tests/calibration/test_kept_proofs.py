@@ -1,0 +1,223 @@
+"""A proof as a source makes it, where another offset was written than the tip that was found.
+
+So it is with a difference to a reference (docs/recipes.md): the frame in force is beside the tip,
+and turning about it moves the tip. Each proof passes for the tip that was found, and for no other.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from robolink.calibration import Beam, BoardDrawing, Pin, rotation_of, tip_pose
+from robolink.methods import (
+    Absolute,
+    BeamsSource,
+    BoardSource,
+    CameraSource,
+    NAngleSource,
+    OneTouchSource,
+    PivotSource,
+    PlaneSurvey,
+    PlaneTouchSource,
+    SphereSurvey,
+    SphereTouchSource,
+    TwoPoseSource,
+    ZTouchSource,
+    informative_tilts,
+)
+from robolink.methods.plane_touch.proof import PlaneTest
+from robolink.methods.sphere_touch.proof import SphereTest
+from robolink.model import Path, Pose, SpotUnit, ToolOffset
+from robolink.nozzle_change import Limits
+from robolink.procedures import MeasurementContext, TouchPlan
+from robolink.procedures.pin.tilting_proof import TiltingProof
+from robolink.runner import Ask, Move, TouchedAt
+from robolink.stations import BeamStation, CameraStation, TouchStation
+from robolink.testing import MemoryController, PaperCell
+from tests.calibration._surface_person import Ball, Plate
+
+HERE = Pose(300.0, 100.0, 20.0, 0.0, tool=0)
+STORED = ToolOffset(12.0, -4.0, -20.0, 35.0)
+TRUE = ToolOffset(12.3, -3.9, -20.4, 35.0)
+"""Where the tip is. The tool is turned against the flange, so that axes mixed up show."""
+
+ASIDE = {"x_mm": 1.7, "y_mm": -1.1, "z_mm": 1.8}
+"""By so much another value is written: that of a reference."""
+
+SURFACES = PlaneTest, SphereTest
+PIN = (310.0, 95.0, -40.0)
+BOARD = BoardDrawing.of_two(40)
+BEAMS = BeamStation((Beam(300, 80, 0), Beam(300, 80, 90)), -30, inputs=(3, 4), off_when_broken=True)
+WITH_BEAMS = {3: lambda at: abs(at[1] - 80) >= 0.4, 4: lambda at: abs(at[0] - 300) >= 0.4}
+ON_PLATE = {5: lambda at: at[2] < -50}
+STATION = CameraStation(300, 80, -30)
+OFF_MM = 0.3, -0.5
+"""What the camera is off by, which a measurement at several angles finds."""
+
+
+class Eye:
+    """A camera that answers in millimetres; what it sees the paper cell says."""
+
+    identity, unit, resolution_px, settle_s = "eye", SpotUnit.BASE_MM, None, 0.0
+
+    def see(self, mark=0):
+        raise NotImplementedError(mark)
+
+    def close(self):
+        pass
+
+
+class Cell(PaperCell):
+    """A paper cell whose camera is off, and in which a proof works as in a change."""
+
+    written: ToolOffset | None = None
+
+    def run(self, procedure, *, tip=None, camera=None):
+        assert tip == self.written, "limits lie about the new tip, and nothing is repeated"
+        return super().run(procedure)
+
+    def pose(self):
+        return self.here
+
+    @property
+    def controller(self):
+        return SimpleNamespace(groups=[self])
+
+    def _shown(self, step):
+        found = super()._shown(step)
+        made = replace(TouchedAt.of(found, seconds=4.0), arrival=self.here)
+        assert step.judge is None or step.judge(made) is None, "nothing speaks against it"
+        return found
+
+    def _seen(self, step):
+        seen = super()._seen(step)
+        spot = replace(seen.spot, x=seen.spot.x + OFF_MM[0], y=seen.spot.y + OFF_MM[1])
+        return replace(seen, spot=spot)
+
+
+def onto(surface):
+    return lambda at: tuple((at + surface.way(at)).tolist())
+
+
+@dataclass(frozen=True)
+class Case:
+    """A source, and the paper cell in which it measures; ``slip`` is what its proof has to see."""
+
+    source: Any
+    cell: dict[str, Any]
+    slip: str = "x_mm"
+
+
+CASES = {
+    "two-pose": Case(TwoPoseSource(), {"touched": PIN}),
+    "n-angle": Case(NAngleSource((120.0, 240.0)), {"touched": PIN}),
+    "one-touch": Case(OneTouchSource(Absolute(Pin(*PIN), 0.02)), {"touched": PIN}),
+    "pivot": Case(PivotSource(informative_tilts(4, 20.0)), {"touched": PIN}),
+    "plane-touch": Case(
+        PlaneTouchSource(TouchPlan(), PlaneSurvey(9), axes=6),
+        {"touched": onto(Plate(15.0, 50.0, point=PIN))},
+        "z_mm",
+    ),
+    "sphere-touch": Case(
+        SphereTouchSource(TouchPlan(), SphereSurvey(10.0, 11), axes=6),
+        {"touched": onto(Ball(10.0, centre=(310.0, 95.0, -50.0)))},
+        "z_mm",
+    ),
+    "camera": Case(CameraSource(Eye(), STATION), {}),
+    "board": Case(BoardSource(Eye(), STATION, BOARD), {}),
+    "beams": Case(BeamsSource(BEAMS), {"switches": WITH_BEAMS}),
+    "z-touch": Case(ZTouchSource(TouchStation(320, 60, -50, 5)), {"switches": ON_PLATE}, "z_mm"),
+}
+
+
+def paper(case, here, tip):
+    """Return a cell in which a frame holds a tip, and a board if that is what is measured."""
+    of_board = isinstance(case.source, BoardSource)
+    marks = dict(enumerate(BOARD.seen_from(tip), start=1)) if of_board else None
+    return Cell(here, tip, marks=marks, **case.cell)
+
+
+def seen_from(frame, flange, tip):
+    """Return where a tip of the flange is, seen from a frame, by plain matrices."""
+    place = rotation_of(flange) @ tip.components()[:3] + flange.coordinates()[:3]
+    x_mm, y_mm, z_mm = (rotation_of(frame).T @ (place - frame.coordinates()[:3])).tolist()
+    return ToolOffset(x_mm, y_mm, z_mm)
+
+
+@pytest.fixture(scope="module")
+def measured():
+    """Return each measurement, made once, and where its flange is then."""
+    made: dict[str, Any] = {}
+
+    def measure(method):
+        if method not in made:
+            case = CASES[method]
+            cell = paper(case, HERE, TRUE)
+            result = cell.run(case.source.procedure(STORED, HERE))
+            made[method] = result, cell.here
+        return made[method]
+
+    return measure
+
+
+def kept(case, result, flange):
+    """Return the proof of a difference that was written, and that offset."""
+    found = result.offset
+    aside = ASIDE | ({"u_deg": 4.0} if "u_deg" in result.measured else {})
+    written = replace(found, **{name: getattr(found, name) + by for name, by in aside.items()})
+    controller = MemoryController()
+    nobody: Any = None
+    context = MeasurementContext(controller, nobody, start=flange, settings=Limits().settings)
+    context.stands = flange
+    proof = case.source.proof(
+        context, 1, replace(result, offset=written), tip=found, tolerance_mm=0.1
+    )
+    return proof, written
+
+
+def moved_away(flange):
+    """Return where somebody brought it meanwhile: the tip over the pin again, and turned."""
+    turned = replace(flange, u_deg=flange.u_deg - 110.0)
+    x_mm, y_mm, z_mm = (PIN - rotation_of(turned) @ TRUE.components()[:3]).tolist()
+    return replace(turned, x_mm=x_mm, y_mm=y_mm, z_mm=z_mm + 15.0)
+
+
+def apart_deg(one, other):
+    cosine = (np.trace(rotation_of(one).T @ rotation_of(other)) - 1) / 2
+    return math.degrees(math.acos(min(1.0, max(-1.0, float(cosine)))))
+
+
+@pytest.mark.parametrize("after_a_break", [False, True], ids=["at once", "after a break"])
+@pytest.mark.parametrize("method", CASES)
+def test_a_difference_that_was_written_is_proved_by_the_tip_that_was_found(
+    method, after_a_break, measured
+):
+    case = CASES[method]
+    result, flange = measured(method)
+    proof, written = kept(case, result, flange)
+    flange = moved_away(flange) if after_a_break else flange
+    frame = tip_pose(flange, written, tool=1)
+    tip = replace(seen_from(frame, flange, TRUE), u_deg=TRUE.u_deg - written.u_deg)
+    slipped = replace(tip, **{case.slip: getattr(tip, case.slip) + 0.4})
+    found = []
+    for one in (tip, slipped):
+        cell = paper(case, frame, one)
+        cell.written = written
+        found.append(proof.prove_after_a_break(cell) if after_a_break else proof.prove(cell))
+        asked = [step.foreseen for step in cell.steps if isinstance(step, Ask) and step.foreseen]
+        before = [tip_pose(pose, written, tool=1) for pose in result.inputs]
+        fresh = [min(apart_deg(at, pose) for pose in before) > 10.0 for at in asked]
+        # A pin is touched once more where it was touched; a surface only as it never was.
+        assert all(fresh) if isinstance(proof, SURFACES) else any(fresh) or not proof.by_touch
+    right, wrong = found
+    assert right.passed
+    assert right.max_drift_mm < 1e-3
+    assert not wrong.passed
+    assert wrong.max_drift_mm > 0.3
+    if after_a_break and isinstance(proof, TiltingProof):
+        assert [type(step) for step in cell.steps[:2]] == [Ask, Move], "a person shows it first"
+        assert cell.steps[1].path is Path.STRAIGHT

@@ -1,0 +1,264 @@
+"""A whole change through the flow, by every method that moves: a hand, and what breaks it off.
+
+The work runs in its thread against a simulated cell in virtual time, and asks at a desk; here its
+questions go through the flow, and a simulated person's answers come back as keys and lines. No
+terminal: what is drawn is looked at by the program.
+"""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+import click
+from robolink_cli.prompts.operator import AssistedOperator
+from robolink_cli.prompts.present import sitting_at
+from robolink_cli.session.check_before_start import check_before_start
+from robolink_cli.wizard.check_list import CheckSubject, Mark
+from robolink_cli.wizard.desk import Desk
+from robolink_cli.wizard.faces.effects import carry_out
+from robolink_cli.wizard.flow import advance
+from robolink_cli.wizard.glance import ControllerGlance
+from robolink_cli.wizard.happenings import (
+    Happening,
+    HasEnded,
+    KeyPressed,
+    LineTyped,
+    TooFast,
+    WaitsForAnswer,
+)
+from robolink_cli.wizard.screens.drawing import screen_of
+from robolink_cli.wizard.screens.ending import ended_of
+from robolink_cli.wizard.screens.told import told_before, told_question
+from robolink_cli.wizard.state import Header, WizardState
+from robolink_cli.wizard.work import Work
+from robolink_simulators.assist.port import InProcessEyes
+from wcwidth import wcswidth
+
+import robolink
+from robolink.model import ControllerState, ToolOffset
+from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan, WriteSubject
+from robolink.runner import FitSubject, MoveSubject
+from tests.contract.test_calibrate_pivot import QUICK
+from tests.contract.test_proof_after_a_break import CASES
+
+TOOL = 1
+HEADER = Header("line3", "Change needle", command="robolink -c line3 change a.toml")
+
+ABORTS = ("check", "touch", "second touch", "moving", "write", "turn test")
+"""At which moments a change is broken off."""
+
+NEVER_TOUCHED = ("camera", "camera-affine", "runout-table", "board", "beams", "z-touch")
+"""Methods in which nobody touches anything."""
+
+LONGEST_S = 60.0
+
+
+def moments_of(method: str) -> tuple[str, ...]:
+    """Return those of :data:`ABORTS` that come in a change by a method."""
+    touched = ("touch", "second touch", "turn test")
+    if method in NEVER_TOUCHED:
+        return tuple(one for one in ABORTS if one not in touched)
+    return tuple(one for one in ABORTS if (method, one) != ("one-touch", "second touch"))
+
+
+@dataclass
+class FlowHand:
+    """Goes through a change.
+
+    Attributes:
+        cell: The simulated cell.
+        desk: Where the work asks.
+        lines: Whether it types lines, and does not press keys.
+        break_at: The moment at which it does something else.
+        breaks: What it does then.
+        broken: Whether it has.
+        seen: The moments that came, in their order.
+        state: What the screens are drawn from.
+        sent: How many answers or commands were sent.
+        error: What ended the work.
+    """
+
+    cell: Any
+    desk: Desk
+    lines: bool
+    break_at: str = ""
+    breaks: Callable[["FlowHand"], None] = lambda _hand: None
+    broken: bool = False
+    seen: list[str] = field(default_factory=list)
+    state: WizardState = field(default_factory=lambda: WizardState(HEADER))
+    sent: int = 0
+    error: BaseException | None = None
+
+    def __post_init__(self) -> None:
+        eyes = InProcessEyes(self.cell.simulator)
+        self.person = AssistedOperator.with_eyes(
+            eyes, lambda _text: None, way_mm=12.0, clock=self.cell.clock
+        )
+        self.asked = 0
+
+    def happens(self, happening: Happening) -> None:
+        self.state, effects = advance(self.state, happening)
+        self.sent += len(effects)
+        carry_out(self.desk, effects)
+        look_at(self.state)
+
+    def press(self, *names: str) -> None:
+        for name in names:
+            at_s = time.monotonic() + 0.35
+            self.happens(KeyPressed(name, name if len(name) == 1 else "", at_s))
+
+    def type(self, line: str) -> None:
+        self.happens(LineTyped(line, time.monotonic() + 0.35))
+
+    def idle(self) -> None:
+        """Do what never answers anything: ENTER, blanks, a scanner."""
+        before = self.sent
+        self.happens(TooFast())
+        if self.lines:
+            self.type("")
+            self.type("   ")
+        else:
+            self.press("enter", "enter")
+        assert self.sent == before, (self.state.question, self.state.subject)
+
+    def take_in(self) -> None:
+        """Take what happened, and answer what is waited for."""
+        for one in self.desk.happened():
+            self.happens(one)
+            if isinstance(one, WaitsForAnswer):
+                self.answer()
+            elif isinstance(self.state.subject, MoveSubject) and self.state.question is None:
+                self.meet("moving")
+            elif self.broken and self.has_to_do():
+                self.press("stop")
+
+    def has_to_do(self) -> bool:
+        """Tell whether the list says by now that something has to be done first."""
+        subject = self.state.subject
+        if self.state.ending or not isinstance(subject, CheckSubject):
+            return False
+        return any(point.mark is Mark.TO_DO for point in subject.points)
+
+    def meet(self, moment: str) -> bool:
+        """Note a moment; tell whether it is the one at which something else is done."""
+        self.seen.append(moment)
+        if moment != self.break_at or self.broken:
+            return self.broken
+        self.broken = True
+        self.breaks(self)
+        return True
+
+    def answer(self) -> None:
+        state, question = self.state, self.state.question
+        assert question is not None
+        self.cell.clock.sleep(0.5)
+        if question.number != self.asked:
+            self.asked = question.number
+            if self.meet(self.moment()):
+                return
+            self.idle()
+            if state.at_place:
+                self.person.ask(question.text, question.kind)
+        if self.broken:
+            return
+        if state.at_place:
+            self.at_place()
+        elif isinstance(state.subject, CheckSubject):
+            self.say(["1", "3", "5"], ["1", "3", "y"])
+        elif isinstance(state.subject, WriteSubject):
+            self.say(["1", "*"], ["1"])
+        elif isinstance(state.subject, FitSubject):
+            self.say(["3" if "3" in offered(state) else "5"], ["n"])
+        else:
+            self.say(["1"], ["y"])
+
+    def moment(self) -> str:
+        state = self.state
+        if state.touch is not None and state.touch.number:
+            if state.touch.proof:
+                return "turn test"
+            return "touch" if state.touch.number == 1 else "second touch"
+        if isinstance(state.subject, CheckSubject):
+            return "check"
+        return "write" if isinstance(state.subject, WriteSubject) else "other"
+
+    def at_place(self) -> None:
+        """Type the steps of a person who sees the tip; take it by a key or a word."""
+        word = None
+        while word is None:
+            word = self.person.poll(0.05)
+        if word not in ("done", ""):
+            self.type(word)
+        elif self.lines:
+            self.type("\u8bb0\u5f55")
+        else:
+            self.press("5")
+
+    def say(self, keys: list[str], lines: list[str]) -> None:
+        if self.lines:
+            for line in lines:
+                self.type(line)
+        else:
+            self.press(*keys)
+
+
+def offered(state: WizardState) -> str:
+    """Return the keys of a screen."""
+    return "".join(key for key, _ in screen_of(state, time.monotonic()).actions)
+
+
+def look_at(state: WizardState) -> None:
+    """Look at a screen: it fits a terminal, and names a way out."""
+    screen = screen_of(state, time.monotonic())
+    rows = screen.rows()
+    assert len(rows) <= 24
+    assert max(map(wcswidth, rows)) <= 80, rows
+    assert screen.actions
+    told_before(state)
+    told_question(state)
+
+
+@contextmanager
+def changing(method: str, *, lines: bool, **breaks: Any) -> Iterator[tuple[FlowHand, Any]]:
+    """Carry a change by a method out; yields the hand, and the cell, when it has ended."""
+    case = CASES[method]
+    with case.cell() as cell:
+        desk = Desk()
+        hand = FlowHand(cell, desk, lines, **breaks)
+        with click.Context(click.Command("change")), sitting_at(desk):
+            work = Work(lambda: whole_change(cell, case, desk))
+            work.start()
+            end_s = time.monotonic() + LONGEST_S
+            while not work.ended:
+                hand.take_in()
+                work.wait(0.001)
+                assert time.monotonic() < end_s, (hand.state.question, hand.seen[-3:])
+            hand.take_in()
+        hand.error = work.error
+        last = ended_of(hand.state, work.error, time.monotonic())
+        if last is not None:
+            hand.happens(HasEnded(last))
+        yield hand, cell
+
+
+def whole_change(cell: Any, case: Any, desk: Desk) -> None:
+    """Do what the command does, from the check list on."""
+    with robolink.connect(cell.url) as controller:
+        desk.glance = ControllerGlance(controller).at_rest
+        tool = ToolPlan(TOOL, case.source(cell), approach=case.approach)
+        if controller.capabilities.motors:
+            controller.motors(True)
+        check_before_start(controller, "to measure", moves=9, speed_mm_s=20.0, box_mm=100.0)
+        change = NozzleChange(controller, ChangePlan((tool,), QUICK), operator=desk)
+        desk.regard(change.run())
+
+
+def stored(cell: Any) -> ToolOffset | None:
+    """Return what the controller holds in the tool, by a connection of its own."""
+    cell.simulator.panel.release_estop()
+    with robolink.connect(cell.url) as controller:
+        if controller.status().state is not ControllerState.READY:
+            controller.reset_fault()
+        return controller.tools.read(TOOL)

@@ -1,0 +1,196 @@
+"""What a person at the screen reads, and what ENTER and a key that is too early do not do."""
+
+from dataclasses import replace
+
+import click
+import pytest
+from robolink_cli.prompts.present import sitting_at
+from robolink_cli.session.check_before_start import check_before_start
+from robolink_cli.wizard.check_list import CheckSubject
+from robolink_cli.wizard.choices import ChoiceSubject
+from robolink_cli.wizard.desk import Desk
+from robolink_cli.wizard.glance import ControllerGlance
+from robolink_cli.wizard.happenings import Reading, WasAsked, WasRegarded, WasTold
+from robolink_cli.wizard.screens.drawing import screen_of
+from robolink_cli.wizard.screens.rows import status_row
+from robolink_cli.wizard.screens.told import told_before
+from robolink_cli.wizard.state import WizardState
+from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
+from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
+
+import robolink
+from robolink.errors import DeclinedError, NotReadyError
+from robolink.journal import Signature, memory_journal
+from robolink.model import ToolOffset, describe_offset
+from robolink.runner import Question
+from robolink.transaction import Wanted, change_tools
+from tests.cli.wizard._people import HEADER, Sitting, touch_subject, write_subject
+
+OLD_OR_NEW = ChoiceSubject("Recover", (), ("The old one.", "The new one."), None, enters=False)
+
+
+def test_enter_does_not_do_what_a_marked_row_of_a_recovery_says():
+    hand = Sitting().asked(OLD_OR_NEW, Question.TEXT).keys("2").key("enter")
+    assert hand.sent == [], "it would write"
+    assert "ENTER does nothing here" in hand.state.message
+    assert hand.keys("5").sent == ["1"]
+    cells = replace(OLD_OR_NEW, enters=True)
+    assert Sitting().asked(cells, Question.TEXT).keys("2").key("enter").sent == ["1"]
+
+
+def asked_for_an_id():
+    hand = Sitting().happens(WasRegarded(None))
+    return hand.happens(WasAsked(1, "Id?", Question.TEXT, hand.now)).waits()
+
+
+@pytest.mark.parametrize("first_s", [0.0, 0.1, 0.29])
+def test_a_code_that_begins_before_its_field_could_be_seen_is_dropped_whole(first_s):
+    hand = asked_for_an_id()
+    hand.now += first_s
+    for key in (*"N-0418", "enter"):
+        hand.key(key, key if len(key) == 1 else "")
+        hand.now += 0.03
+    assert hand.sent == [], hand.state.typed
+    assert hand.state.typed == ""
+    assert "Typed too early" in hand.state.message
+    hand.now += 0.31
+    for key in (*"N-0418", "enter", "enter"):
+        hand.key(key, key if len(key) == 1 else "")
+        hand.now += 0.03
+    assert hand.sent == ["N-0418"]
+    assert hand.state.message == ""
+
+
+def test_what_was_told_between_two_questions_is_read_on_the_next_screen():
+    for subject, kind in ((touch_subject(), Question.PLACE), (OLD_OR_NEW, Question.TEXT)):
+        hand = Sitting().happens(WasTold("Tool 1 is not what the last calibration left."))
+        hand.asked(subject, kind)
+        text = "\n".join(screen_of(hand.state, hand.now).rows())
+        assert "not what the last calibration left" in text
+        hand.asked(subject, kind)
+        assert "last calibration" not in "\n".join(screen_of(hand.state, hand.now).rows())
+
+
+@pytest.mark.parametrize("count", range(1, 16))
+def test_nothing_of_a_proposal_is_left_out_before_it_is_written(count):
+    subject = write_subject(*range(1, count + 1))
+    stations = dict.fromkeys(range(1, count + 1), ("PIN-07",))
+    hand = Sitting().asked(replace(subject, stations=stations), Question.YES_NO)
+    seen = ""
+    for _ in range(12):
+        rows = screen_of(hand.state, hand.now).rows()
+        assert len(rows) == 24
+        seen += "\n".join(rows)
+        assert "To write, type" in rows[-5] + "".join(rows)
+        hand.keys(".")
+    for tool in range(1, count + 1):
+        assert f" Tool {tool} " in seen
+        assert f"Stations found with tool {tool}: 1" in seen
+    assert any("Stations found with tool 1" in row for row in told_before(hand.state))
+    assert count > 1 or "Where a program goes with tool 1" in seen
+    assert count > 1 or "error this write removes" in seen
+
+
+def test_the_state_row_says_nothing_that_was_not_read():
+    state = WizardState(HEADER, reading=Reading(10.0, "ready"))
+    assert status_row(state, 10.0) == "READY   reading 0.0 s"
+    state = WizardState(HEADER, reading=Reading(10.0, "ready", motors=False, low_power=False))
+    assert status_row(state, 10.0) == "READY   motors OFF   power HIGH   reading 0.0 s"
+
+
+def test_power_and_motors_are_those_of_the_controller():
+    simulator = EpsonSimulator(seed=7)
+    simulator.machine.power_high = True
+    with (
+        serve_tcp(simulator, clock=ScaledClock(10.0)) as host,
+        robolink.connect(host.url) as controller,
+    ):
+        glance = ControllerGlance(controller)
+        seen, going = glance.at_rest(), glance.on_the_way()
+        assert seen is not None
+        assert going is not None
+        assert (seen.motors, seen.low_power) == (True, False)
+        assert (going.motors, going.low_power) == (True, True)
+
+
+class Presser(Desk):
+    """Presses the emergency stop while the list is read, and waits for what comes of it."""
+
+    def __init__(self, simulator):
+        super().__init__()
+        self.simulator, self.polled = simulator, 0
+
+    def poll(self, wait_s):
+        self.polled += 1
+        assert self.polled < 3, "the list goes on saying that the emergency stop is released"
+        self.simulator.panel.press_estop()
+
+
+def test_a_list_does_not_go_on_saying_what_is_no_longer_so():
+    simulator = EpsonSimulator(seed=7)
+    with (
+        serve_tcp(simulator, clock=ScaledClock(10.0)) as host,
+        robolink.connect(host.url) as controller,
+        click.Context(click.Command("change")),
+        sitting_at(Presser(simulator)),
+        pytest.raises(NotReadyError, match="emergency stop is pressed"),
+    ):
+        check_before_start(controller, "to look", moves=2, speed_mm_s=20.0, box_mm=60.0)
+
+
+class Leaver(Desk):
+    """Looks at the list, and leaves."""
+
+    def poll(self, wait_s):
+        return "n"
+
+
+def listed(controller, *tools):
+    """Return the texts of the check list, and its plan."""
+    desk = Leaver()
+    with click.Context(click.Command("change")), sitting_at(desk), pytest.raises(DeclinedError):
+        check_before_start(
+            controller, "to look", moves=2, speed_mm_s=20.0, box_mm=60.0, tools=tools
+        )
+    (subject,) = (
+        one.subject
+        for one in desk.happened()
+        if isinstance(one, WasRegarded) and isinstance(one.subject, CheckSubject)
+    )
+    return " ".join((*(point.text for point in subject.points), subject.plan))
+
+
+def test_a_list_claims_of_a_plc_only_what_its_mailbox_tells():
+    with (
+        serve_tcp(EpsonSimulator(seed=7), clock=ScaledClock(10.0)) as host,
+        robolink.connect(host.url) as controller,
+    ):
+        said = listed(controller)
+        assert "guard closed" in said
+        assert "power LOW" in said
+    with (
+        serve_modbus_tcp(SoftMotionSimulator(seed=3)) as plc,
+        robolink.connect(plc.url) as controller,
+    ):
+        controller.motors(True)
+        said = listed(controller)
+        assert "guard" not in said
+        assert "LOW" not in said
+        assert "permits movements" in said
+
+
+def test_a_list_says_how_a_tool_was_left_and_nothing_of_one_that_somebody_changed():
+    simulator, new = EpsonSimulator(seed=7), ToolOffset(12.5, -3.0, -20.0)
+    with serve_tcp(simulator, clock=ScaledClock(10.0)) as host:
+        log = memory_journal(host.url).log(host.url, signature=Signature(nozzle="N-0417"))
+        with robolink.connect(host.url, outcomes=log) as controller:
+            assert "as the last change left it" not in listed(controller, 1)
+            change_tools(controller, [Wanted(1, new, controller.tools.read(1))])
+            said = listed(controller, 1)
+            assert f"Tool 1 is as the last change left it: {describe_offset(new)}." in said
+            assert "needle N-0417" in said
+            simulator.machine.tools.set(1, ToolOffset(12.6, -3.0, -20.0))
+            assert "as the last change left it" not in listed(controller, 1)

@@ -127,7 +127,9 @@ class FullFace:
 
         bindings.add("<any>", eager=True)(pressed)
         bindings.add("escape", eager=True)(pressed)
-        bindings.add("<bracketed-paste>", eager=True)(self._pasted)
+        bindings.add("<bracketed-paste>", eager=True)(
+            lambda event: self._pasted(event.key_sequence[0])
+        )
         return bindings
 
     def _press(self, key: str, press: KeyPress) -> None:
@@ -142,12 +144,11 @@ class FullFace:
         for one in self._gate.press(key, at_s, quiet_s, stops=stops):
             self._happens(self._pressed(one))
 
-    def _pasted(self, event: KeyPressEvent) -> None:
+    def _pasted(self, press: KeyPress) -> None:
         """Take what came at once: one line into a field, as a Windows console hands a scan on.
 
         prompt_toolkit makes a paste of keys that its reader finds in one look, ENTER among them.
         """
-        press = event.key_sequence[0]
         line, ends, more = press.data.replace("\r", "\n").partition("\n")
         if not self._state.has_field or self._state.writing is not None or more.strip("\n"):
             # A key just before it is the beginning of the same burst.

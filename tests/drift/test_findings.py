@@ -103,6 +103,17 @@ def test_a_large_shift_is_said_after_four_changes_whatever_was_before(seed):
     assert said.since == moved[2 * 26].at
 
 
+def test_the_limits_of_the_mean_widen_as_textbooks_say():
+    """Montgomery: L sigma sqrt(lambda / (2 - lambda) (1 - (1 - lambda)^(2 i)))."""
+    (chart,) = (one for one in charts_of(course(1, 26)) if one.axis == "z")
+    for count, point in enumerate(chart.judged, start=1):
+        share = 0.2 / 1.8 * (1 - 0.8 ** (2 * count))
+        assert point.mean_reach_mm == pytest.approx(2.86 * chart.sigma_mm * share**0.5)
+    assert chart.mean_limits_mm is not None
+    reach = chart.judged[-1].mean_reach_mm
+    assert chart.mean_limits_mm[1] - chart.centre_mm == pytest.approx(reach)
+
+
 def test_one_bad_touch_at_the_end_hides_no_slipping_mount():
     slipping = course(4, 36, shift=lambda index, _: (0.1 * (index >= 26), 0, 0))
     slipping[-1] = replace(slipping[-1], tip_mm={**slipping[-1].tip_mm, "x": 13.0})

@@ -109,7 +109,7 @@ def require_words(words: Sequence[int], count: int) -> tuple[int, ...]:
     Raises:
         ValueError: They are not; a mistake of the caller.
     """
-    if len(words) != count or not all(0 <= word <= 0xFFFF for word in words):
+    if len(words) != count or (count and (min(words) < 0 or max(words) > 0xFFFF)):
         message = f"not {count} words of 0..65535"
         raise ValueError(message)
     return tuple(words)

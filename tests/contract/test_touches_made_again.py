@@ -163,6 +163,15 @@ def test_a_touch_made_again_is_judged_as_any_other(cell):
     assert refused.value.code == "touch_heights_differ"
 
 
+def test_a_change_that_is_implausible_once_a_touch_was_made_again_is_refused(cell):
+    before = cell.stored
+    aside = ["x+5", "x+0.1", ""]  # half of it is what the tip would move
+    with pytest.raises(CalibrationError) as refused:
+        change(cell, TwoPoseSource(), touches={3: aside}, writes=["back"])
+    assert refused.value.code == "implausible_change"
+    assert cell.stored == before
+
+
 def test_stations_that_were_found_with_a_tool_are_named_before_it_is_written(cell):
     from robolink.nozzle_change._station_check import found_with
     from robolink.stations import Found, StationKind, station_entry

@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import pytest
 
-from robolink.drift import DriftCode, charts_of, findings_in
+from robolink.drift import DriftCode, charts_of, findings_in, measured_changes
 from robolink.errors import ConfigError
+from robolink.model import EntryKind, Recorded, Signature, ToolOffset, plain_offset
 from tests.drift._courses import course, found
 
 SEEDS = range(8)
@@ -122,3 +123,48 @@ def test_equal_values_have_no_limits_and_say_nothing():
     frozen = [changes[0]] * 25
     assert {chart.sigma_mm for chart in charts_of(frozen) if chart.quantity == "pin"} == {0.0}
     assert found(frozen) == set()
+
+
+def test_a_turn_test_that_becomes_worse_is_told_and_one_that_becomes_better_is_not():
+    for by_mm, told in ((0.06, {"turn_test_grows"}), (-0.06, set())):
+        changed = [
+            [
+                replace(
+                    change, turn_test_mm=0.1 + (change.turn_test_mm or 0.0) + by_mm * (at >= 25)
+                )
+                for at, change in enumerate(course(seed, 32))
+            ]
+            for seed in SEEDS
+        ]
+        assert most(found(changes) for changes in changed) == told
+
+
+def entry(number, kind, tool, **details):
+    return Recorded(
+        number=number,
+        at="2026-01-01T08:00:00.000Z",
+        controller="cell",
+        kind=kind,
+        change="a1",
+        operation="",
+        tool=tool,
+        tolerance="",
+        verdict="",
+        details=details,
+        signature=Signature(),
+        previous="",
+        hash="",
+    )
+
+
+def test_a_change_that_was_taken_back_in_the_end_says_nothing_of_any_of_its_tools():
+    """The first tool was kept already when the second one failed."""
+    tip = plain_offset(ToolOffset(12.0, -4.0, -20.0))
+    measured = [
+        entry(tool, EntryKind.CALIBRATION, tool, tip=tip, measured=["x_mm", "y_mm"])
+        for tool in (1, 2)
+    ]
+    kept = entry(3, EntryKind.DONE, 1)
+    assert [one.tool for one in measured_changes([*measured, kept], lambda _: False)] == [1]
+    back = entry(4, EntryKind.ROLLED_BACK, 2)
+    assert measured_changes([*measured, kept, back], lambda _: False) == []

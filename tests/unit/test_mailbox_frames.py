@@ -1,5 +1,7 @@
 """EPSON's angles and the PLC's are the same rotation; scipy is the oracle."""
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
@@ -95,3 +97,10 @@ def test_frames_that_differ_are_told_apart(place):
     x, y, z, a, b, c = (value + 1e-5 * (n == place) for n, value in enumerate(one))
     assert not frames_match(one, (x, y, z, a, b, c), tolerance=1e-9)
     assert frames_match(one, (x, y, z, a, b, c), tolerance=2e-5)
+
+
+@pytest.mark.parametrize("place", range(6))
+def test_what_is_no_number_is_equal_to_nothing(place):
+    x, y, z, a, b, c = (math.nan if at == place else 10.0 * at for at in range(6))
+    frame = (x, y, z, a, b, c)
+    assert not frames_match(frame, frame, tolerance=1e9)

@@ -10,6 +10,7 @@ orientation: the first angle may be any, the others follow from it.
 """
 
 from math import atan2, cos, degrees, hypot, radians, sin
+from operator import eq
 from typing import Final
 
 from robolink.protocols.mailbox.blocks.layout import Six
@@ -67,9 +68,15 @@ def frames_match(one: Six, other: Six, *, tolerance: float) -> bool:
         True
     """
     lengths = zip(one[:3], other[:3], strict=True)
+    if not all(abs(a - b) <= tolerance for a, b in lengths):
+        return False
+    if all(
+        map(eq, one[3:], other[3:])
+    ):  # two tuples are equal where both hold one and the same NaN
+        return True
     rows = zip(_of_zyz(*one[3:]), _of_zyz(*other[3:]), strict=True)
     elements = (pair for row in rows for pair in zip(*row, strict=True))
-    return all(abs(a - b) <= tolerance for pairs in (lengths, elements) for a, b in pairs)
+    return all(abs(a - b) <= tolerance for a, b in elements)
 
 
 def _of_uvw(u_deg: float, v_deg: float, w_deg: float) -> _Matrix:

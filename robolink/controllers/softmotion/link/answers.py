@@ -1,5 +1,6 @@
 """What a PLC's refusals and ends mean, in words, with what to do about them."""
 
+from functools import lru_cache
 from typing import Final, NamedTuple
 
 from robolink.errors import (
@@ -40,13 +41,20 @@ class Ended(NamedTuple):
 
 def describe(command: Command) -> str:
     """Return a command as a person may read it: its number, its name, and what it carries."""
-    name = command.opcode.name if isinstance(command.opcode, Opcode) else ""
-    operands = list(command.operands)
-    while operands and not operands[-1]:
-        operands.pop()
-    words = [str(int(command.opcode)), name, *(str(operand) for operand in operands)]
-    if command.opcode in _POSED:
-        words.append("(" + " ".join(f"{value + 0.0:.6g}" for value in command.pose) + ")")
+    opcode = command.opcode
+    name = opcode.name if isinstance(opcode, Opcode) else ""
+    pose = command.pose if opcode in _POSED else ()
+    return _in_words(int(opcode), name, command.operands, pose)
+
+
+@lru_cache(maxsize=64)  # a write asks for its own some four times
+def _in_words(opcode: int, name: str, operands: tuple[int, ...], pose: tuple[float, ...]) -> str:
+    carried = [str(int(operand)) for operand in operands]
+    while carried and carried[-1] == "0":
+        carried.pop()
+    words = [str(opcode), name, *carried]
+    if pose:
+        words.append("(" + " ".join(f"{value + 0.0:.6g}" for value in pose) + ")")
     return " ".join(word for word in words if word)
 
 

@@ -22,7 +22,8 @@ class Answer:
     words: Words = field(default=(0,) * _WORDS)
 
     def __post_init__(self) -> None:
-        if len(self.words) != _WORDS or not all(0 <= word <= 0xFFFF for word in self.words):
+        words = self.words
+        if len(words) != _WORDS or min(words) < 0 or max(words) > 0xFFFF:
             raise BlockError(BlockFault.LENGTH)
 
     @classmethod

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
+from functools import lru_cache
 from operator import attrgetter
 from typing import Final, NamedTuple
 
@@ -112,12 +113,11 @@ def decode_response(words: Sequence[int]) -> Response:
     values = RESPONSE.unpack(words)
     _require_whole(words, values["version"], values["ack_head"], values.pop("ack_tail"))
     del values["crc"]
-    ends = values["finished"]
     return Response(
         **values
         | {
             "answer": Answer(tuple(words[RESPONSE.at("answer")])),
-            "finished": tuple(_finished(*ends[n : n + 3]) for n in range(0, len(ends), 3)),
+            "finished": _finished(values["finished"]),
             "state": known(CommandState, values["state"]),
             "error_class": known(ErrorClass, values["error_class"]),
             "opcode_echo": known(Opcode, values["opcode_echo"]),
@@ -139,5 +139,9 @@ def _require_whole(words: Sequence[int], version: int, head: int, tail: int) -> 
         raise BlockError(BlockFault.CRC)
 
 
-def _finished(sequence: int, state: int, error_class: int) -> Finished:
-    return Finished(sequence, known(CommandState, state), known(ErrorClass, error_class))
+@lru_cache(maxsize=64)  # they stay the same from one snapshot to most others
+def _finished(ends: tuple[int, ...]) -> tuple[Finished, ...]:
+    return tuple(
+        Finished(sequence, known(CommandState, state), known(ErrorClass, error_class))
+        for sequence, state, error_class in zip(ends[::3], ends[1::3], ends[2::3], strict=True)
+    )

@@ -24,7 +24,7 @@ from wcwidth import wcswidth
 
 from robolink import messages
 from robolink.calibration import Drift, VerifyResult, impact_on
-from robolink.errors import DeclinedError
+from robolink.errors import DeclinedError, OutcomeUnknownError
 from robolink.locale.languages import translator
 from robolink.messages import tr
 from robolink.model import Path as Way
@@ -151,6 +151,16 @@ def stopped():
     note_standing(error, Standing(moved=True, selected=1, selected_before=1))
     command = "robolink -c line3 change needle-22g.toml"
     return ended(Header("line3", "Change needle", command=command), error)
+
+
+def test_a_job_that_was_refused_for_an_earlier_one_names_recover_last():
+    error = OutcomeUnknownError("Not done.", remedy="Next: 'robolink recover'.")
+    shown = ended(
+        Header("line3", "Change needle", command="robolink -c line3 change n.toml"), error
+    )
+    last = shown.state.ended
+    assert last is not None
+    assert last.lines[-1] == 'Next: robolink -c "line3" recover'
 
 
 def ended(header, error=None, report=None):

@@ -88,7 +88,9 @@ def chosen_and_tested(hand):
     hand.see("Look at the robot: which needle is mounted")
     hand.see("The new one. Make the turn test, then keep the new value.")
     hand.rest(0.4)
-    hand.press(["\x1b[B", "\x1b[B", "5"])
+    hand.press(["\x1b[B", "\x1b[B", "\r"])
+    hand.see("ENTER does nothing here")
+    hand.press(["5"])
     hand.start()
     contacts = 0
     while True:

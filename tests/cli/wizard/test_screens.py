@@ -259,6 +259,22 @@ def test_a_screen_fits_a_terminal_and_its_layout_is_ascii(name, language):
 
 
 @pytest.mark.parametrize("name", SCREENS)
+@pytest.mark.parametrize("language", ["en", "zh"], indirect=True)
+def test_nothing_of_a_screen_is_too_wide_for_its_place(name, language):
+    """A screen cuts what is too wide, so what is drawn always fits: here it is what is meant to."""
+    hand = SCREENS[name]()
+    screen = screen_of(hand.state, hand.now)
+    left, right = screen.title
+    assert wcswidth(left) + 1 + wcswidth(right) <= 80
+    assert wcswidth(screen.status) <= 80
+    keys = [f"[{key}] {does}" for key, does in screen.actions]
+    assert sum(map(wcswidth, keys)) + 2 * (len(keys) - 1) <= 80, "a second row of keys"
+    for line in screen.lines:
+        # Sentences are broken; what stands in columns would be torn.
+        assert "   " not in line.strip() or wcswidth(line.rstrip()) <= 80, line
+
+
+@pytest.mark.parametrize("name", SCREENS)
 def test_a_screen_is_the_stored_one(name, request):
     hand = SCREENS[name]()
     drawn = "\n".join(screen_of(hand.state, hand.now).rows()) + "\n"

@@ -17,6 +17,7 @@ from robolink_simulators.hosting.in_process.epson import simulator_named, unregi
 
 import robolink
 from benchmarks.table import Amount, Figure
+from benchmarks.work.asked_cells import measured_asking
 from robolink.journal import memory_journal
 from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
 
@@ -63,7 +64,7 @@ class RecalibratedCell:
 
 
 def measure_virtual_time() -> Iterator[Figure]:
-    """Yield how much faster than real time fleets of cells recalibrate in one process.
+    """Yield how much faster than real time fleets of cells recalibrate, and are asked.
 
     A change of one cell costs what it costs among a hundred: the figure of a fleet is that of
     the cells measured here, by their number.
@@ -88,6 +89,7 @@ def measure_virtual_time() -> Iterator[Figure]:
             wanted / times,
             1.0,
         )
+    yield from measured_asking()
 
 
 def changed(cells: int, changes: int) -> tuple[float, float]:

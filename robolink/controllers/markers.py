@@ -192,8 +192,7 @@ class MarkerStore:
         for marker in unsettled:
             raise OutcomeUnknownError(
                 tr(
-                    "{request!r} was not sent: an earlier job ({earlier!r}, {when}) did not "
-                    "finish.",
+                    "Not done: {request}. An earlier job ({earlier}, {when}) did not finish.",
                     request=request,
                     earlier=marker.request,
                     when=local_label(marker.begun_at),

@@ -6,7 +6,7 @@ from typing import Protocol, TypeVar, runtime_checkable
 
 from robolink.calibration import CalibrationResult, VerifyResult
 from robolink.model import Controller, ControllerSensor, Pose, TipSensor, ToolOffset
-from robolink.runner import Operator, Procedure, Runner, RunSettings, StepDone
+from robolink.runner import EndingWatch, Operator, Procedure, Runner, RunSettings, StepDone
 from robolink.stations import Found
 
 T = TypeVar("T")
@@ -61,6 +61,7 @@ class MeasurementContext:
         self._settings = settings
         self._offers = offers
         self._on_step: Callable[[StepDone], None] | None = None
+        self._ending = EndingWatch()
 
     @contextmanager
     def telling(self, on_step: Callable[[StepDone], None]) -> Iterator[None]:
@@ -133,6 +134,7 @@ class MeasurementContext:
             # About a new tip nothing is repeated: its value is written and not yet proved.
             repeats=tip is None,
             types=self._types and tip is None,
+            ending=self._ending,
         )
 
     def _stepped(self, done: StepDone) -> None:

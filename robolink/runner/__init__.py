@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from robolink.runner._capture import FINEST_STEP as FINEST_STEP
     from robolink.runner._capture import SETTLING_S as SETTLING_S
     from robolink.runner._capture import NotYet as NotYet
+    from robolink.runner._endings import EndingWatch as EndingWatch
     from robolink.runner._foreseeing import ForeseenStep as ForeseenStep
     from robolink.runner._foreseeing import considered as considered
     from robolink.runner._foreseeing import first_clear as first_clear
@@ -68,6 +69,7 @@ __getattr__ = lazy_exports(
     {
         "_arm_ahead": "ArmAhead",
         "_capture": "FINEST_STEP NotYet SETTLING_S",
+        "_endings": "EndingWatch",
         "_foreseeing": "ForeseenStep considered first_clear foreseen_steps nothing_in_the_way",
         "_jog_steps": "jog_target parse_decimal parse_steps refuse_decimal_comma",
         "_operator": "Operator Question",

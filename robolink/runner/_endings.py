@@ -27,6 +27,15 @@ class EndingWatch:
     A controller that tells of its drives has lost them when they had power before: an emergency
     stop of a PLC shows in nothing else. Where they never had power, a person moves the machine in
     another way.
+
+    Example:
+        >>> from robolink.model import ControllerStatus
+        >>> from robolink.runner import EndingWatch
+        >>> watch = EndingWatch()
+        >>> watch.obstacle(ControllerStatus(remote=True, ready=True))
+        ''
+        >>> watch.obstacle(ControllerStatus(remote=True, unpowered=True))
+        'The motors went off.'
     """
 
     def __init__(self) -> None:

@@ -92,8 +92,8 @@ class Runner:
         offers: Whether the person is asked about offers; else each is declined unasked.
         repeats: Whether the person is also asked to repeat a step that ended because this
             computer fell silent. It is for measuring, where nothing was written yet.
-        types: Whether the person may type the pose of a touch that says it may be typed; what
-            rests on it has to be proved by touches.
+        types: Whether a pose may be typed where its touch says so; touches have to prove it.
+        ending: Looks for what ends it, ``None`` for one of its own.
 
     Example:
         >>> from robolink.model import Path, Pose, WorkBox
@@ -117,6 +117,7 @@ class Runner:
         offers: bool = True,
         repeats: bool = False,
         types: bool = False,
+        ending: EndingWatch | None = None,
     ) -> None:
         self._controller = controller
         self._group = group
@@ -126,7 +127,7 @@ class Runner:
         self._camera = camera
         self._offers = offers
         self._types = types
-        self._runs, self._ending = False, EndingWatch()
+        self._runs, self._ending = False, ending or EndingWatch()
         self._repeats_left = _MOST_REPEATS if offers and repeats else 0
 
     def run(self, procedure: Procedure[T]) -> T:

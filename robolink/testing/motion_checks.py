@@ -4,10 +4,21 @@ from dataclasses import replace
 from typing import Final
 
 from robolink.errors import LimitError, NotReadyError, StoppedError
-from robolink.model import Controller, MotionOutcome, MotionProfile, Path, Pose, WorkBox
+from robolink.model import (
+    Controller,
+    Jump,
+    MotionOutcome,
+    MotionProfile,
+    Path,
+    Pose,
+    ToolOffset,
+    WorkBox,
+)
 from robolink.testing.subject import Check, Subject, refused, require
 
 _SLACK_MM: Final = 0.1
+_SLACK_DEG: Final = 0.1
+_LOOKED_S: Final = 0.3
 _TIMEOUT_S: Final = 30.0
 _PROFILE: Final = MotionProfile(Path.STRAIGHT, speed_mm_s=10.0)
 
@@ -23,8 +34,7 @@ def a_movement_arrives(subject: Subject) -> None:
             require(motion.target == target, "a motion says where it goes")
             outcome = motion.wait(timeout_s=_TIMEOUT_S)
             require(outcome is MotionOutcome.ARRIVED, "a movement that ends by itself arrives")
-            off_mm = abs(group.pose().z_mm - target.z_mm)
-            require(off_mm < _SLACK_MM, f"it stands where it was sent: {off_mm:.3f} mm off")
+            _is_at(controller, target, "it stands where it was sent")
         require(not controller.outcomes.open_markers(), "nothing is left open")
 
 
@@ -72,6 +82,9 @@ def a_stop_ends_a_movement(subject: Subject) -> None:
             motion.wait(timeout_s=_TIMEOUT_S)
         with refused(StoppedError, "after a stop nothing moves"):
             group.move_to(start, _PROFILE, box=box)
+        rest = group.pose()
+        controller.clock.sleep(_LOOKED_S)
+        _is_at(controller, rest, "what was stopped stands still")
 
 
 def _raised(pose: Pose, by_mm: float) -> Pose:
@@ -84,8 +97,15 @@ def _around(pose: Pose, subject: Subject) -> WorkBox:
 
 
 def _stands(controller: Controller, start: Pose) -> None:
-    off_mm = abs(controller.groups[0].pose().z_mm - start.z_mm)
-    require(off_mm < _SLACK_MM, f"nothing has moved: {off_mm:.3f} mm off")
+    _is_at(controller, start, "nothing has moved")
+
+
+def _is_at(controller: Controller, wanted: Pose, promise: str) -> None:
+    """Require a place in all directions, and the orientation there."""
+    here, there = controller.groups[0].pose().coordinates(), wanted.coordinates()
+    off = Jump.between(ToolOffset(*there), ToolOffset(*here))
+    at = off.length_mm < _SLACK_MM and off.angle_deg < _SLACK_DEG
+    require(at, f"{promise}: {off.length_mm:.3f} mm and {off.angle_deg:.3f} deg off")
 
 
 MOVING_CHECKS: Final[tuple[Check, ...]] = (

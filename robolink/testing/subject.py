@@ -5,7 +5,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 
 from robolink.errors import RobolinkError
-from robolink.model import Controller
+from robolink.model import Controller, ToolOffset
 
 
 class ContractBrokenError(AssertionError):
@@ -32,19 +32,31 @@ class Subject:
     def kept(self) -> Iterator[Controller]:
         """Connect for a block, and put back the tool and what is selected at its end."""
         with self.connect() as controller:
-            tools = controller.tools
-            before, selected = tools.read(self.tool), tools.selected()
+            before, selected = controller.tools.read(self.tool), controller.tools.selected()
             try:
                 yield controller
             finally:
-                controller.release_stop()
-                now = tools.read(self.tool)
-                if before is not None:
-                    tools.write(self.tool, before, expected=now)
-                if selected is not None and tools.selected() != selected:
-                    tools.select(selected)
-                if before is None and now is not None:
-                    tools.clear(self.tool, expected=now, then_select=selected or 0)
+                self.put_back(controller, before, selected)
+
+    def put_back(
+        self, controller: Controller, before: ToolOffset | None, selected: int | None
+    ) -> None:
+        """Give the tool what it held, and select what was selected.
+
+        Args:
+            controller: A connection to the controller.
+            before: What the tool held, ``None`` where it was not defined.
+            selected: The tool that was in force, ``None`` where the kind tells of none.
+        """
+        controller.release_stop()
+        tools = controller.tools
+        now = tools.read(self.tool)
+        if before is not None:
+            tools.write(self.tool, before, expected=now)
+        if selected is not None and tools.selected() != selected:
+            tools.select(selected)
+        if before is None and now is not None:
+            tools.clear(self.tool, expected=now, then_select=selected or 0)
 
     @contextmanager
     def movable(self) -> Iterator[Controller]:

@@ -1,6 +1,7 @@
 """Promises about writing: compared, sent once, read back, held back by a stop."""
 
 import threading
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
 from typing import Final
@@ -17,8 +18,17 @@ from robolink.errors import (
     ToolError,
     UndefinedToolError,
 )
-from robolink.model import ANY, Controller, MarkerKind, ToolOffset
+from robolink.model import ANY, Controller, Jump, MarkerKind, ToolOffset
 from robolink.testing.subject import Check, Subject, refused, require
+
+_COMPONENTS: Final = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
+_WHOLE: Final = dict(zip(_COMPONENTS, (10.125, -20.375, 30.625, 15.5, -2.25, 1.75), strict=True))
+"""A value that is another one if any of its components is lost, rounded to tenths or negated."""
+
+_TOLD_APART: Final = 0.1
+"""Values that differ by this, in mm or degrees, are two: a tip would be seen to be elsewhere."""
+
+_TIP_SLACK_MM: Final = 0.1
 
 
 def a_write_is_read_back(subject: Subject) -> None:
@@ -32,6 +42,67 @@ def a_write_is_read_back(subject: Subject) -> None:
         require(tools.same(receipt.read_back, wanted), "the receipt holds what was read back")
         require(tools.same(tools.read(subject.tool), wanted), "the new value is there")
         require(not controller.outcomes.open_markers(), "nothing is left open")
+
+
+def every_component_is_kept(subject: Subject) -> None:
+    """A length that is rounded, or an angle that is lost, puts the tip somewhere else."""
+    with subject.kept() as controller:
+        tools = controller.tools
+        wanted, held = _written_whole(controller, subject.tool)
+        require(tools.same(tools.read(subject.tool), wanted), "all that was written is there")
+        for name in held:
+            other = replace(wanted, **{name: getattr(wanted, name) + _TOLD_APART})
+            require(not tools.same(wanted, other), f"values {_TOLD_APART} apart in {name} differ")
+
+
+def a_write_lasts(subject: Subject) -> None:
+    """The next connection, which may be tomorrow's, finds what this one wrote."""
+    with subject.connect() as controller:
+        before, selected = controller.tools.read(subject.tool), controller.tools.selected()
+        wanted = another_offset(before)
+        controller.tools.write(subject.tool, wanted, expected=before)
+    with subject.connect() as controller:
+        try:
+            found = controller.tools.read(subject.tool)
+            require(controller.tools.same(found, wanted), "a new connection finds the new value")
+        finally:
+            subject.put_back(controller, before, selected)
+
+
+def the_other_tools_are_left_alone(subject: Subject) -> None:
+    """They hold the nozzles of other programs."""
+    with subject.kept() as controller:
+        tools = controller.tools
+        before, selected = tools.read_all(), tools.selected()
+        value = another_offset(before.get(subject.tool))
+        tools.write(subject.tool, value, expected=ANY)
+        _same_but_one(controller, before, subject.tool, "a write")
+        require(tools.selected() == selected, "a write selects no tool")
+        with suppress(ToolError, RejectedError):  # where a kind cannot forget a tool
+            tools.clear(subject.tool, expected=value)
+        _same_but_one(controller, before, subject.tool, "a clear")
+
+
+def the_tip_is_that_of_the_selected_tool(subject: Subject) -> None:
+    """A tool that is selected in name only is a crash: the tip is told as far off as it is."""
+    with subject.kept() as controller:
+        tools = controller.tools
+        if not controller.capabilities.motion or tools.selected() is None:
+            return
+        value = another_offset(tools.read(subject.tool))
+        tools.write(subject.tool, value, expected=ANY)
+        places = []
+        try:
+            for tool in (0, subject.tool):
+                tools.select(tool)
+                places.append(controller.groups[0].pose())
+        except RejectedError:
+            return  # the machine alone selects, and said so
+        flange, tip = (ToolOffset(*pose.coordinates()) for pose in places)
+        off_mm = Jump.between(flange, tip).length_mm
+        length_mm = Jump.between(ToolOffset(), value).length_mm
+        told = f"a tip that is {length_mm:.3f} mm from the flange is told {off_mm:.3f} mm from it"
+        require(abs(off_mm - length_mm) < _TIP_SLACK_MM, told)
 
 
 def what_is_there_already_is_not_written_again(subject: Subject) -> None:
@@ -177,6 +248,35 @@ def another_offset(value: ToolOffset | None) -> ToolOffset:
     return ToolOffset(10.0, 20.0, 30.0) if value is None else replace(value, x_mm=value.x_mm + 0.5)
 
 
+def _written_whole(controller: Controller, tool: int) -> tuple[ToolOffset, tuple[str, ...]]:
+    """Write a value with as many components as this kind holds; return it, and their names.
+
+    Raises:
+        RobolinkError: It takes none, or a write that it took did not end as it should.
+    """
+    tools, before = controller.tools, controller.tools.read(tool)
+    for held in (_COMPONENTS, _COMPONENTS[:4], _COMPONENTS[:3]):
+        wanted = ToolOffset(**{name: _WHOLE[name] for name in held})
+        try:
+            tools.write(tool, wanted, expected=before)
+        except RobolinkError:
+            # A kind without these angles says so, and has written nothing.
+            if held == _COMPONENTS[:3] or not tools.same(tools.read(tool), before):
+                raise
+        else:
+            return wanted, held
+    raise AssertionError(held)
+
+
+def _same_but_one(
+    controller: Controller, before: Mapping[int, ToolOffset | None], tool: int, act: str
+) -> None:
+    now = controller.tools.read_all()
+    for other, value in before.items():
+        kept = other == tool or controller.tools.same(now.get(other), value)
+        require(kept, f"{act} of tool {tool} leaves tool {other} as it was")
+
+
 def _write(
     controller: Controller,
     tool: int,
@@ -197,6 +297,10 @@ class _OursError(Exception):
 
 WRITING_CHECKS: Final[tuple[Check, ...]] = (
     a_write_is_read_back,
+    every_component_is_kept,
+    a_write_lasts,
+    the_other_tools_are_left_alone,
+    the_tip_is_that_of_the_selected_tool,
     what_is_there_already_is_not_written_again,
     an_unexpected_value_is_left_alone,
     the_flange_is_never_written,

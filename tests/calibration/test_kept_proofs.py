@@ -35,7 +35,7 @@ from robolink.model import Path, Pose, SpotUnit, ToolOffset
 from robolink.nozzle_change import Limits
 from robolink.procedures import MeasurementContext, TouchPlan
 from robolink.procedures.pin.tilting_proof import TiltingProof
-from robolink.runner import Ask, Move
+from robolink.runner import Ask, Move, TouchedAt
 from robolink.stations import BeamStation, CameraStation, TouchStation
 from robolink.testing import MemoryController, PaperCell
 from tests.calibration._surface_person import Ball, Plate
@@ -45,7 +45,7 @@ STORED = ToolOffset(12.0, -4.0, -20.0, 35.0)
 TRUE = ToolOffset(12.3, -3.9, -20.4, 35.0)
 """Where the tip is. The tool is turned against the flange, so that axes mixed up show."""
 
-ASIDE = {"x_mm": 1.7, "y_mm": -1.1, "z_mm": 1.4}
+ASIDE = {"x_mm": 1.7, "y_mm": -1.1, "z_mm": 1.8}
 """By so much another value is written: that of a reference."""
 
 SURFACES = PlaneTest, SphereTest
@@ -86,6 +86,12 @@ class Cell(PaperCell):
     @property
     def controller(self):
         return SimpleNamespace(groups=[self])
+
+    def _shown(self, step):
+        found = super()._shown(step)
+        made = replace(TouchedAt.of(found, seconds=4.0), arrival=self.here)
+        assert step.judge is None or step.judge(made) is None, "nothing speaks against it"
+        return found
 
     def _seen(self, step):
         seen = super()._seen(step)
@@ -183,6 +189,21 @@ def moved_away(flange):
 def apart_deg(one, other):
     cosine = (np.trace(rotation_of(one).T @ rotation_of(other)) - 1) / 2
     return math.degrees(math.acos(min(1.0, max(-1.0, float(cosine)))))
+
+
+@pytest.mark.parametrize(
+    ("sensor", "why"),
+    [
+        (Eye(), "camera_open"),
+        ("opcua+tcp://someone:secret@192.168.0.9/tip", "camera_token"),
+        ("opcua+tcp://192.168.0.9/tip", ""),
+    ],
+)
+def test_a_camera_is_kept_by_its_address_where_that_holds_no_secret(sensor, why, measured):
+    result, flange = measured("camera")
+    case = replace(CASES["camera"], source=CameraSource(sensor, STATION))
+    proof, _ = kept(case, result, flange)
+    assert proof.obstacle == why
 
 
 @pytest.mark.parametrize("after_a_break", [False, True], ids=["at once", "after a break"])

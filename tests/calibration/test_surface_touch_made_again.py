@@ -1,6 +1,7 @@
 """One touch of a surface made again: while others follow, at the fit, and from the new values."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,9 +12,9 @@ from robolink.errors import CalibrationError
 from robolink.methods import PlaneSurvey, SphereSurvey, measure_plane_touch, measure_sphere_touch
 from robolink.methods.plane_touch.procedure import go_on_plane_touch
 from robolink.methods.sphere_touch.procedure import go_on_sphere_touch
-from robolink.procedures import SamplingPolicy, touches_of
-from robolink.runner import Ask, Confirm, TakenAgainError
-from tests.calibration._surface_person import PLAN, STORED, TIP, Ball, Plate, SurfacePerson
+from robolink.procedures import SamplingPolicy, SurfaceTouches, touches_of
+from robolink.runner import Ask, Confirm, TakenAgainError, TouchedAt
+from tests.calibration._surface_person import PLAN, START, STORED, TIP, Ball, Plate, SurfacePerson
 from tests.calibration._tilting_person import turned_deg
 from tests.calibration.test_sphere_touch_procedure import over_top
 
@@ -167,6 +168,27 @@ def test_an_upright_touch_that_was_far_off_moves_the_places_that_are_left():
         assert abs(stopped_mm - planned_mm) < 1.0
         across = np.array(touch.standoff_mm) / planned_mm
         assert across @ plate.normal > 0.999, "it comes down along the plane's own normal"
+
+
+def test_beside_a_touch_that_is_made_again_all_others_count():
+    touches = SurfaceTouches(PLAN)
+    places = [TouchedAt.of(replace(START, x_mm=x)) for x in (0.0, 1.0, 2.0, 3.0)]
+    touches.adopt(dict(enumerate(places)))
+    assert touches.taken == tuple(places)
+    assert touches.others(1) == (places[0], *places[2:])
+    assert touches.others(7) == tuple(places)
+
+
+def test_an_upright_touch_of_a_ball_that_was_off_moves_the_places_that_are_left():
+    def expected(person):
+        return [
+            np.subtract(touch.arrival.coordinates()[:3], touch.standoff_mm)
+            for touch in measured("sphere", person).inputs[-4:]
+        ]
+
+    right = expected(Undecided("sphere", back={9: 2}))
+    mended = expected(Undecided("sphere", slips={1: 0.3}, back={9: 2}))
+    assert np.abs(np.subtract(right, mended)).max() < 0.1
 
 
 @pytest.mark.parametrize("kind", KINDS)

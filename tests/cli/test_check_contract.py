@@ -101,10 +101,10 @@ def test_told_to_it_writes_and_moves_and_puts_everything_back(
     assert main.run(line) == 0
     told = capsys.readouterr()
     document = json.loads(told.out)
-    assert (document["kept"], len(document["checks"])) == (True, 24)
+    assert (document["kept"], len(document["checks"])) == (True, 28)
     assert "recover" not in told.err
     suite = ElementTree.fromstring(report.read_bytes())
-    assert (suite.get("tests"), suite.get("failures"), len(suite)) == ("24", "0", 24)
+    assert (suite.get("tests"), suite.get("failures"), len(suite)) == ("28", "0", 28)
     after = cell.truth()
     assert (after["stored"], after["selected_tool"]) == (before["stored"], before["selected_tool"])
     cell.wire.assert_sent("TLSet 2, XY" if kind == "epson" else "WRITE_TOOL")

@@ -160,4 +160,5 @@ def test_a_machine_that_does_not_tell_which_tool_is_in_force_selects_none():
 
 
 def test_the_whole_suite_passes_on_a_controller_in_memory():
-    check_controller(Subject(MemoryController))
+    machine = MemoryMachine()
+    check_controller(Subject(lambda: MemoryController(machine)))

@@ -70,6 +70,9 @@ def test_what_was_typed_before_a_question_or_during_a_jog_answers_nothing(start,
         "is not a step. A step is .*: axis, sign, number, with a point. Axes are x, y, z"
     )
     terminal.press(b"\n")
+    terminal.wait_for("ENTER alone does nothing")
+    assert terminal.command.poll() is None
+    terminal.press(b"done\n")
     assert terminal.end() == 0
     assert arm.moves_started == 1
 

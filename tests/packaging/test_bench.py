@@ -14,6 +14,8 @@ from benchmarks.cases import CASES
 from benchmarks.pictures import Growth, picture
 from benchmarks.quiet import SPREAD, Floors
 from benchmarks.table import Amount, Figure
+from benchmarks.work.asked_cells import WRITE_S, lived
+from robolink.journal import EntryKind, memory_journal
 
 SLOW = Figure("a stop", Amount(30.0, "ms"), "a floor", Amount(10.0, "ms"), 3.0, 2.5)
 QUICK = Figure("a look", Amount(1.234, "us"), "a floor", Amount(1.0, "us"), 1.234, 1.3)
@@ -35,6 +37,13 @@ def test_each_case_is_there_and_has_its_title_on_the_page():
         source = (page.ROOT / "benchmarks" / f"{where.replace('.', '/')}.py").read_text()
         assert f"def measure_{where.rpartition('.')[2]}(" in source
         assert f"\n## {page.TITLES[name]}\n" in written
+
+
+def test_cells_in_virtual_time_are_asked_each_second_and_written_to_each_minute():
+    (factor,) = lived(3, WRITE_S, 1)
+    assert factor > 0
+    entries = list(memory_journal("bench-asked-3").entries(kinds=[EntryKind.DONE]))
+    assert len({entry.controller for entry in entries}) == len(entries) == 3
 
 
 def test_a_ratio_over_its_goal_is_missed_and_without_a_goal_neither():

@@ -120,3 +120,18 @@ def test_the_index_names_every_page_once():
     named = re.findall(r"\]\(([\w.-]+\.md)", index)
     pages = {page.name for page in (ROOT / "docs").glob("*.md")} - {"README.md"}
     assert sorted(named) == sorted(pages)
+
+
+def test_the_chinese_sheet_has_the_keys_commands_figures_and_pictures_of_the_english_one():
+    def facts(name: str) -> tuple[list[str], ...]:
+        text = (ROOT / "docs" / name).read_text(encoding="utf-8")
+        commands = [one.replace("--lang zh ", "") for one in CODE.findall(text)]
+        return (
+            re.findall(r"`([!-~])`", text),
+            commands,
+            re.findall(r"\d[\d.]* mm", text),
+            re.findall(r"pictures/([\w-]+)(?:\.zh)?\.svg", text),
+            re.findall(r"^\|", text, re.M),
+        )
+
+    assert facts("technician.zh.md") == facts("technician.md")

@@ -2,7 +2,6 @@
 
 import json
 import re
-import tomllib
 from pathlib import Path
 
 import pytest
@@ -56,12 +55,6 @@ def spelled(value, *, required):
 
 def test_the_shipped_schema_is_not_stale():
     assert json.loads(SHIPPED.read_text(encoding="utf-8")) == json_schema(), AGAIN
-
-
-def test_the_wheel_brings_the_schema():
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    included = project["tool"]["hatch"]["build"]["targets"]["wheel"]["force-include"]
-    assert included["docs/recipe.schema.json"] == "robolink/recipe/recipe.schema.json"
 
 
 def test_only_keywords_of_draft_4_are_used():

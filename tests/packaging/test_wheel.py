@@ -15,6 +15,7 @@ from pathlib import Path
 
 import pytest
 from robolink_cli import main
+from robolink_cli.commands.shipped.shipped_files import pages_folder, recipe_schema
 
 import robolink
 from tools.package_page import package_page, urls
@@ -104,6 +105,8 @@ def test_the_wheel_brings_the_pages_and_the_recipes_to_begin_with(wheel, names):
         f"robolink_cli/recipes/{path.name}": path
         for path in (ROOT / "examples" / "recipes").glob("*.toml")
     }
+    schema = recipe_schema().relative_to(pages_folder())  # where `recipe new` looks for it
+    shipped[f"robolink_cli/docs/{schema.as_posix()}"] = ROOT / "docs" / "recipe.schema.json"
     assert len(shipped) > 60
     assert {
         name for name, path in shipped.items() if wheel.read(name) != path.read_bytes()

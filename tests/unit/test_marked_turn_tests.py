@@ -10,7 +10,15 @@ import pytest
 
 from robolink.methods import TwoPoseSource, measure_two_pose
 from robolink.model import Marker, MarkerKind, Pose, ToolOffset, WorkBox
-from robolink.nozzle_change import AcceptanceCriteria, Limits, Proposal, ToolPlan
+from robolink.nozzle_change import (
+    AcceptanceCriteria,
+    ChangePlan,
+    Limits,
+    NozzleChange,
+    Proposal,
+    ToolPlan,
+)
+from robolink.nozzle_change._measuring import offer_of
 from robolink.nozzle_change.open_turn_test import marking
 from robolink.procedures import MeasurementContext, TouchPlan
 from robolink.testing import MemoryController, PaperCell
@@ -70,6 +78,22 @@ def test_a_change_whose_tools_are_not_all_tested_by_it_has_no_test(tools, kind):
     kept = marked(1)
     assert read_back(kept, 1)
     assert read_back(kept, *tools, kind=kind) == ()
+
+
+def test_touches_are_gone_back_to_where_one_tool_was_measured_and_no_other():
+    """The others were measured already, with what was mounted then."""
+    assert offer_of(proposals(1))
+    assert offer_of(proposals(1, 2)) is None
+
+
+@pytest.mark.parametrize(("verified", "typed"), [((True, True), True), ((True, False), False)])
+def test_poses_are_typed_only_where_a_test_by_touches_follows_for_each_tool(verified, typed):
+    plans = [
+        plan for tool, test in enumerate(verified, 1) for plan, _ in proposals(tool, verify=test)
+    ]
+    nobody: Any = None
+    change = NozzleChange(MemoryController(), ChangePlan(tuple(plans)), operator=nobody)
+    assert change._context(write=True).runner()._types is typed
 
 
 @pytest.mark.parametrize(

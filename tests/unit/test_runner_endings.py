@@ -3,7 +3,7 @@
 import pytest
 
 from robolink.model import ControllerStatus
-from robolink.runner._endings import EndingWatch
+from robolink.runner import EndingWatch
 
 ON = ControllerStatus(remote=True, ready=True)
 

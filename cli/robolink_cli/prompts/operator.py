@@ -38,6 +38,7 @@ class TerminalOperator:
     def __init__(self, show: Callable[[str], None]) -> None:
         self._show = show
         self._lines: Lines | None = None
+        self._kind = Question.PLACE
 
     def tell(self, text: str) -> None:
         """Show a line."""
@@ -49,6 +50,7 @@ class TerminalOperator:
         """Show what is wanted and how to answer."""
         if self._lines is None:
             self._lines = open_lines()
+        self._kind = kind
         self._forget(QUIET_S)
         self._show(f"{question} [{_how(kind)}]")
 
@@ -60,12 +62,17 @@ class TerminalOperator:
         """
         assert self._lines is not None  # noqa: S101 - a question is shown before it is answered
         try:
-            return self._lines.next(wait_s)
+            line = self._lines.next(wait_s)
         except EOFError as error:
             raise DeclinedError(
                 tr("The keyboard is gone. Nothing was answered for you."),
                 remedy=tr("Run it on a terminal, or with --assist on a simulator."),
             ) from error
+        if line is None or line.strip() or self._kind in (Question.YES_NO, Question.TEXT):
+            return line
+        # Scanners send ENTER, and hands do by mistake: it records no place.
+        self._show(tr("ENTER alone does nothing. When it is there: done."))
+        return None
 
     def _forget(self, quiet_s: float) -> None:
         assert self._lines is not None  # noqa: S101 - looked at by whoever calls

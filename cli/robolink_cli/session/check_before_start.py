@@ -12,7 +12,7 @@ from robolink_cli.session.motion_consent import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
 
     from robolink.model import Controller, MotionTerms
     from robolink_cli.prompts.present import AskingDesk
@@ -27,6 +27,7 @@ def agree_to_procedure(
     speed_mm_s: float,
     box_mm: float,
     yes: bool,
+    tools: "Sequence[int]" = (),
 ) -> None:
     """Have a person agree to a procedure in which the robot moves by itself.
 
@@ -37,6 +38,7 @@ def agree_to_procedure(
         speed_mm_s: How fast at most.
         box_mm: How far at most.
         yes: Whether the answer was given beforehand.
+        tools: Numbers of the tools that are measured: the list says how they were left.
 
     Raises:
         NotReadyError: Nothing can move now.
@@ -46,11 +48,19 @@ def agree_to_procedure(
         question = motion_question(controller, purpose, speed_mm_s=speed_mm_s, box_mm=box_mm)
         agree_to_motion(question, yes=yes)
         return
-    check_before_start(controller, purpose, moves=moves, speed_mm_s=speed_mm_s, box_mm=box_mm)
+    check_before_start(
+        controller, purpose, moves=moves, speed_mm_s=speed_mm_s, box_mm=box_mm, tools=tools
+    )
 
 
 def check_before_start(
-    controller: "Controller", purpose: str, *, moves: int, speed_mm_s: float, box_mm: float
+    controller: "Controller",
+    purpose: str,
+    *,
+    moves: int,
+    speed_mm_s: float,
+    box_mm: float,
+    tools: "Sequence[int]" = (),
 ) -> None:
     """Have the person at the desk go through the list; arguments as above.
 
@@ -73,8 +83,8 @@ def check_before_start(
             "The robot will move by itself {n} times: up to {v} mm/s, at most {d} mm from here.",
             **foreseen,
         )
-    tried = False
-    while _answer_to_list(desk, controller, purpose, plan, tried=tried) != "y":
+    tried, left = False, tools_as_left(controller, tools)
+    while _answer_to_list(desk, controller, purpose, plan, left, tried=tried) != "y":
         controller.motors(True)
         tried = True
 
@@ -115,7 +125,13 @@ def _text(desk: "AskingDesk", controller: "Controller", question: str) -> str:
 
 
 def _answer_to_list(
-    desk: "AskingDesk", controller: "Controller", purpose: str, plan: str, *, tried: bool
+    desk: "AskingDesk",
+    controller: "Controller",
+    purpose: str,
+    plan: str,
+    left: tuple[str, ...],
+    *,
+    tried: bool,
 ) -> str:
     """Show the list; return ``y``, or that the motors are to be switched on.
 
@@ -124,6 +140,7 @@ def _answer_to_list(
         controller: The controller, connected.
         purpose: What it moves for, in words.
         plan: What it will do, a sentence.
+        left: How tools were left, sentences.
         tried: Whether it was told before to switch them on: asking once more would not help.
 
     Raises:
@@ -135,14 +152,14 @@ def _answer_to_list(
 
     off = _motors_are_off(controller, purpose, tried=tried)
     name, terms = _name(controller), controller.groups[0].terms()
-    desk.regard(CheckSubject(_points(name, terms, off=off), plan))
+    desk.regard(CheckSubject(_points(name, terms, left, off=off), plan))
     desk.ask(tr("Start moving"), Question.YES_NO)
     while (answer := desk.poll(POLL_S)) is None:
         now = _motors_are_off(controller, purpose, tried=tried)
         if now is not off:
             # The list says what is so now; what the person has confirmed stays confirmed.
             off = now
-            desk.regard(CheckSubject(_points(name, terms, off=off), plan))
+            desk.regard(CheckSubject(_points(name, terms, left, off=off), plan))
     if answer == SWITCH_ON:
         return answer
     if answer == "y":
@@ -169,12 +186,47 @@ def _motors_are_off(controller: "Controller", purpose: str, *, tried: bool) -> b
     return False
 
 
-def _points(name: str, terms: "MotionTerms", *, off: bool) -> "tuple[CheckPoint, ...]":
+def tools_as_left(controller: "Controller", tools: "Sequence[int]") -> tuple[str, ...]:
+    """Return a sentence of each tool that holds what was proved to be in it last.
+
+    One that holds something else was told of already, one without a record says nothing.
+
+    Args:
+        controller: The controller, connected.
+        tools: Numbers of the tools.
+    """
+    from robolink.model import describe_offset
+    from robolink.timing import local_label
+    from robolink.transaction import changed_since, last_proof
+
+    said = []
+    for tool in tools:
+        now, last = controller.tools.read(tool), last_proof(controller, tool)
+        if now is None or last is None or changed_since(controller, tool, now) is not None:
+            continue
+        facts = {"t": tool, "value": describe_offset(now), "when": local_label(last.at)}
+        nozzle = last.signature.nozzle
+        said.append(
+            tr(
+                "Tool {t} is as the last change left it: {value}. {when}, needle {id}.",
+                **facts,
+                id=nozzle,
+            )
+            if nozzle
+            else tr("Tool {t} is as the last change left it: {value}. {when}.", **facts)
+        )
+    return tuple(said)
+
+
+def _points(
+    name: str, terms: "MotionTerms", left: tuple[str, ...], *, off: bool
+) -> "tuple[CheckPoint, ...]":
     from robolink_cli.wizard.check_list import CheckPoint, Mark
 
     points = [
         CheckPoint(Mark.OK, tr("Controller answers: {name}", name=name)),
         *([CheckPoint(Mark.OK, terms.able)] if terms.able else ()),
+        *(CheckPoint(Mark.OK, sentence) for sentence in left),
         CheckPoint(Mark.OK, terms.watch),
     ]
     if off:

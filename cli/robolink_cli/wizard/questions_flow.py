@@ -174,7 +174,7 @@ def _check(state: WizardState, subject: CheckSubject, word: str) -> Answered:
         checked = state.checked ^ {word}
         return replace(state, checked=checked, message=_left_open(subject, checked))
     if word != "main":
-        return state.says(tr("Confirm each row first; then [5] starts."))
+        return state.says(tr("Confirm each row first, by its number."))
     left = subject.open_keys(state.checked)
     return state.says(_left_open(subject, state.checked)) if left else "y"
 

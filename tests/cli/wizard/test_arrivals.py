@@ -104,6 +104,14 @@ def test_a_key_does_not_count_while_another_waits_to_be_read(terminal):
     assert gate.due(reader.quiet() or 0.0) == []
 
 
+def test_it_is_not_quiet_while_a_key_waits_to_be_taken(terminal):
+    terminal.key("5", 1.0)
+    terminal.until(1.2)
+    assert terminal.reader.quiet() is None
+    assert terminal.reader.taken()
+    assert terminal.reader.quiet() == 1.2
+
+
 def test_a_descriptor_that_is_closed_ends_the_reading():
     read, write = os.pipe()
     reader = ArrivalReader(read)

@@ -137,6 +137,7 @@ def test_a_write_takes_the_number_of_the_tool(typed, sent):
     hand = Sitting().asked(write_subject(1), Question.YES_NO).keys(*typed)
     assert hand.sent == ([sent] if sent else [])
     assert sent or "Nothing was written" in hand.state.message
+    assert sent or hand.state.typed == ""
 
 
 def test_the_numbers_of_several_tools_are_typed_all():
@@ -155,6 +156,10 @@ def test_a_start_waits_for_every_point_of_the_list():
     done = CHECK.__class__(tuple(p for p in CHECK.points if p.key != "7"), CHECK.plan)
     hand = Sitting().asked(done, Question.YES_NO).keys("1", "3", "5")
     assert hand.sent == ["y"]
+    # Who comes back into the cell takes the row back.
+    hand = Sitting().asked(done, Question.YES_NO).keys("1", "3", "3", "5")
+    assert hand.sent == []
+    assert "First: [3]." in hand.state.message
 
 
 def test_the_worst_touch_is_offered_first_only_where_it_stands_out():
@@ -314,6 +319,22 @@ def test_a_typed_pose_is_gone_after_a_step_and_where_none_is_taken():
     assert "Nothing was taken." in three.state.message
     assert three.keys("5").sent == []
     assert at_touch(types=True).keys(".").key("stop").sent == ["q"]
+
+
+def test_nothing_of_one_touch_counts_for_the_next():
+    """Neither a pose that was typed and not taken, nor the steps that were made."""
+    hand = at_touch(types=True).jogs("z-0.1").line("pose 1 2 3 4")
+    hand.asked(touch_subject(types=True)).keys("5")
+    assert hand.sent == []
+    assert "still stands where the robot put it" in hand.state.message
+    going = MoveSubject(ARRIVAL, Way.JOINT, 20.0, "Moving to where tool 2 is measured.")
+    hand = at_touch().jogs("z-0.1").happens(WasRegarded(going))
+    hand.asked(touch_subject(number=1, arrival=None)).keys("5")
+    assert hand.sent == []
+
+
+def test_a_line_while_the_robot_moves_is_no_step():
+    assert at_touch().line("x+0.1").line("x+0.1").sent == ["x+0.1"]
 
 
 NAMES = [*"0123456789+-*/nyqt. ", "main", "stop", "enter", "backspace"]

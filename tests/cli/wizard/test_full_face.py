@@ -5,6 +5,7 @@ import signal
 import termios
 import threading
 import time
+from dataclasses import replace
 from io import StringIO
 
 import click
@@ -12,7 +13,11 @@ import pyte
 import pytest
 from prompt_toolkit.data_structures import Size
 from prompt_toolkit.input import create_pipe_input
+from prompt_toolkit.key_binding import KeyPress
+from prompt_toolkit.keys import Keys
 from prompt_toolkit.output.vt100 import Vt100_Output
+from robolink_cli.wizard.desk import Desk
+from robolink_cli.wizard.faces.arrivals import TimedPress
 from robolink_cli.wizard.faces.full import FullFace
 from robolink_cli.wizard.happenings import Reading
 from robolink_cli.wizard.state import Header, WizardState
@@ -25,7 +30,14 @@ from robolink.errors import DeclinedError
 from robolink.model import Pose
 from robolink.runner import JogSubject, Question
 from robolink.standing import Standing
-from tests.cli.wizard._people import ARRIVAL, HEADER, touch_subject, until, write_subject
+from tests.cli.wizard._people import (
+    ARRIVAL,
+    HEADER,
+    Sitting,
+    touch_subject,
+    until,
+    write_subject,
+)
 from tests.cli.wizard._screen import ScreenHand
 
 pytestmark = pytest.mark.simulator_only
@@ -58,8 +70,6 @@ def paste(source, text):
 
 def test_keys_of_a_pipe_jog_take_and_write():
     """One face, one work: a pasted id, touch, burst, write."""
-    from robolink_cli.wizard.desk import Desk
-
     desk, answers, pose = Desk(), [], [ARRIVAL]
     desk.glance = lambda: Reading(time.monotonic(), "ready", pose=pose[0])
 
@@ -96,6 +106,8 @@ def test_keys_of_a_pipe_jog_take_and_write():
             time.sleep(0.35)
             paste(source, "5")
             time.sleep(0.1)
+            source.send_text("6\x1b[200~813\r\x1b[201~")  # as a console hands a scan on
+            time.sleep(0.1)
             assert answers == ["N-7"]
             source.send_text("4006381333931\r\n")
             time.sleep(0.3)
@@ -121,6 +133,36 @@ def test_keys_of_a_pipe_jog_take_and_write():
             face.thread.join(5.0)
     assert work.error is None, work.error
     assert answers == ["N-7", "z-0.1", "done", "y"]
+
+
+def test_two_keys_of_a_hand_count_though_the_screen_was_drawn_for_longer():
+    """Both are taken by the loop at once; when they came their reader noted."""
+    hand = Sitting().asked(touch_subject())
+    with create_pipe_input() as source:
+        face = FullFace(source, Vt100_Output(StringIO(), lambda: Size(24, 80), term="xterm"))
+        face._desk, face._state = Desk(), hand.state
+        for key, at_s, quiet_s in (("+", hand.now, hand.now), ("6", hand.now + 1, hand.now + 0.9)):
+            face._press(key, TimedPress(KeyPress(key), at_s, quiet_s))
+        assert face._state.jogging.size == hand.state.jogging.size + 1
+
+
+@pytest.mark.parametrize("keys", ["1*", "1*\r", "*"], ids=repr)
+@pytest.mark.parametrize("pasted", [False, True])
+def test_what_comes_at_once_never_writes(keys, pasted):
+    """The number stands in its field already; only a key alone writes."""
+    desk, hand = Desk(), Sitting().asked(write_subject(1), Question.YES_NO).keys("1")
+    with create_pipe_input() as source:
+        face = FullFace(source, Vt100_Output(StringIO(), lambda: Size(24, 80), term="xterm"))
+        face._desk = desk
+        face._state = replace(hand.state, typed="" if keys[0] == "1" else "1")
+        if pasted:
+            face._pasted(KeyPress(Keys.BracketedPaste, keys))
+        for key in "" if pasted else f"{keys}7":
+            face._press("c-m" if key == "\r" else key, KeyPress(key))
+        for one in face._gate.due(time.monotonic() + 1.0):
+            face._happens(face._pressed(one))
+        assert face._state.waits, "nothing was answered"
+        assert desk.poll(0.0) is None
 
 
 @pytest.mark.parametrize(("keys", "again"), [(("\r", "5"), True), (("\r", "0"), False)])

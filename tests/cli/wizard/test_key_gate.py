@@ -45,6 +45,21 @@ def test_what_stops_is_never_dropped(key):
     assert passed(("1", 0.5), ("2", 0.501), (key, 0.502), ("3", 0.503))[0][:1] == [key]
 
 
+@pytest.mark.parametrize("key", ["escape", "c-c"])
+def test_a_key_that_waited_is_gone_with_a_stop(key):
+    assert passed(("5", 0.5), (key, 0.51))[0] == [key]
+
+
+def test_after_a_burst_a_key_counts_only_where_its_end_was_seen():
+    """The thread that reads had no turn from the burst on until this key was there."""
+    for key, quiet_s, counts in (("5", 1.002, []), ("2", 1.02, []), ("5", 1.15, ["5"])):
+        gate = KeyGate()
+        assert gate.press("1", 1.0) == []
+        assert gate.press("2", 1.001) == []
+        assert gate.press(key, 1.2, quiet_s) == []
+        assert [one.key for one in gate.due(1.3)] == counts
+
+
 @pytest.mark.parametrize(
     ("key", "name"),
     [

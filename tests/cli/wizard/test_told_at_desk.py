@@ -23,7 +23,10 @@ from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 import robolink
 from robolink.errors import DeclinedError, NotReadyError
+from robolink.journal import Signature, memory_journal
+from robolink.model import ToolOffset, describe_offset
 from robolink.runner import Question
+from robolink.transaction import Wanted, change_tools
 from tests.cli.wizard._people import HEADER, Sitting, touch_subject, write_subject
 
 OLD_OR_NEW = ChoiceSubject("Recover", (), ("The old one.", "The new one."), None, enters=False)
@@ -145,11 +148,13 @@ class Leaver(Desk):
         return "n"
 
 
-def listed(controller):
+def listed(controller, *tools):
     """Return the texts of the check list, and its plan."""
     desk = Leaver()
     with click.Context(click.Command("change")), sitting_at(desk), pytest.raises(DeclinedError):
-        check_before_start(controller, "to look", moves=2, speed_mm_s=20.0, box_mm=60.0)
+        check_before_start(
+            controller, "to look", moves=2, speed_mm_s=20.0, box_mm=60.0, tools=tools
+        )
     (subject,) = (
         one.subject
         for one in desk.happened()
@@ -175,3 +180,17 @@ def test_a_list_claims_of_a_plc_only_what_its_mailbox_tells():
         assert "guard" not in said
         assert "LOW" not in said
         assert "permits movements" in said
+
+
+def test_a_list_says_how_a_tool_was_left_and_nothing_of_one_that_somebody_changed():
+    simulator, new = EpsonSimulator(seed=7), ToolOffset(12.5, -3.0, -20.0)
+    with serve_tcp(simulator, clock=ScaledClock(10.0)) as host:
+        log = memory_journal(host.url).log(host.url, signature=Signature(nozzle="N-0417"))
+        with robolink.connect(host.url, outcomes=log) as controller:
+            assert "as the last change left it" not in listed(controller, 1)
+            change_tools(controller, [Wanted(1, new, controller.tools.read(1))])
+            said = listed(controller, 1)
+            assert f"Tool 1 is as the last change left it: {describe_offset(new)}." in said
+            assert "needle N-0417" in said
+            simulator.machine.tools.set(1, ToolOffset(12.6, -3.0, -20.0))
+            assert "as the last change left it" not in listed(controller, 1)

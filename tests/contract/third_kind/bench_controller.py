@@ -78,7 +78,7 @@ class BenchTools(ToolTableCore):
     def _request(self, tool: int, requested: ToolOffset | None) -> str:
         if requested is None:
             return f"DROP {tool}"
-        return " ".join(("SET", str(tool), *map(str, requested.components()[:4])))
+        return " ".join(("SET", str(tool), *map(str, requested.components())))
 
     def _stored(self, tool: int) -> ToolOffset | None:
         numbers = self._link.ask(f"TOOL {tool}")

@@ -61,7 +61,7 @@ class BenchServer:
             return "OK ready"
         if name == "TOOL":
             offset = machine.tools.get(int(numbers[0]))
-            return "OK" if offset is None else _line(*offset.components()[:4])
+            return "OK" if offset is None else _line(*offset.components())
         if name == "SET":
             machine.tools[int(numbers[0])] = ToolOffset(*numbers[1:])
         elif name == "DROP":

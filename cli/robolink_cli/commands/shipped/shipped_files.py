@@ -10,7 +10,6 @@ from robolink.errors import ConfigError
 from robolink.messages import joined, tr
 
 _CHECKOUT: Final = Path(__file__).parents[4]
-SCHEMA: Final = "recipe.schema.json"
 
 
 def pages_folder() -> Path:
@@ -25,8 +24,7 @@ def recipes_folder() -> Path:
 
 def recipe_schema() -> Path:
     """Return the JSON Schema of a recipe, for editors."""
-    packaged = Path(str(files("robolink.recipe").joinpath(SCHEMA)))
-    return packaged if packaged.is_file() else _CHECKOUT / "docs" / SCHEMA
+    return pages_folder() / "recipe.schema.json"
 
 
 def require_one_of(name: str, names: Sequence[str], *, remedy: str) -> None:

@@ -208,6 +208,7 @@ def _measure(
             speed_mm_s=frame.limits.speed_mm_s,
             box_mm=frame.limits.box.x_max_mm,
             yes=frame.yes,
+            tools=(live.tool,),
         )
         payload = live.run()
         # Now, because Ctrl-C may come before the logout is answered.

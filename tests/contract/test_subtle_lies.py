@@ -1,0 +1,145 @@
+"""Machines that lie in a subtle way: the contract of a controller finds each, and names it."""
+
+import re
+import time
+from dataclasses import replace
+
+import pytest
+
+from robolink import ToolOffset
+from robolink.testing import (
+    MOVING_CHECKS,
+    READING_CHECKS,
+    WRITING_CHECKS,
+    MemoryController,
+    MemoryMachine,
+    Subject,
+    outcomes,
+)
+
+SPARE = 3
+FIRST = {1: ToolOffset(12.0, -3.5, -20.0), 4: ToolOffset(5.0, 5.0, 5.0)}
+
+
+class LosesAnAngle(MemoryMachine):
+    def store(self, tool, offset):
+        MemoryMachine.store(self, tool, offset and replace(offset, u_deg=0.0))
+
+
+class TurnsASign(MemoryMachine):
+    def store(self, tool, offset):
+        MemoryMachine.store(self, tool, offset and replace(offset, u_deg=-offset.u_deg))
+
+
+class RoundsToTenths(MemoryMachine):
+    def store(self, tool, offset):
+        MemoryMachine.store(self, tool, offset and replace(offset, y_mm=round(offset.y_mm, 1)))
+
+
+class WritesTheNextToo(MemoryMachine):
+    def store(self, tool, offset):
+        MemoryMachine.store(self, tool, offset)
+        MemoryMachine.store(self, tool + 1, offset)
+
+
+class SelectsWhatItWrites(MemoryMachine):
+    def store(self, tool, offset):
+        MemoryMachine.store(self, tool, offset)
+        self.selected = tool if offset else self.selected
+
+
+class SelectsInNameOnly(MemoryMachine):
+    named = 1
+
+    def select(self, tool):
+        self.named = tool
+
+    def in_force(self):
+        return self.named
+
+
+class ArrivesBeside(MemoryMachine):
+    def go(self, target):
+        MemoryMachine.go(self, replace(target, x_mm=target.x_mm + 0.3))
+
+
+class ArrivesTurned(MemoryMachine):
+    def go(self, target):
+        MemoryMachine.go(self, replace(target, u_deg=target.u_deg + 1.0))
+
+
+class GoesOnAfterAStop(MemoryMachine):
+    """Says that it rests as soon as it is told to, and ends the movement all the same."""
+
+    target, ends_s, told = None, 0.0, False
+
+    def go(self, target):
+        self.target, self.ends_s, self.told = target, time.monotonic() + 0.1, False
+
+    def pose(self):
+        if self.target is not None and time.monotonic() > self.ends_s:
+            MemoryMachine.go(self, self.target)
+            self.target = None
+        return MemoryMachine.pose(self)
+
+    def moving(self):
+        self.pose()
+        return self.target is not None and not self.told
+
+    def halt(self):
+        self.told = True
+
+
+def found(connect):
+    every = [*READING_CHECKS, *WRITING_CHECKS, *MOVING_CHECKS]
+    return {one.name: one.broken for one in outcomes(Subject(connect, tool=SPARE), every)}
+
+
+@pytest.mark.parametrize(
+    ("kind", "check", "words"),
+    [
+        (LosesAnAngle, "every_component_is_kept", "U 15.500, but reads back as"),
+        (TurnsASign, "every_component_is_kept", "U 15.500, but reads back as .* U -15.500"),
+        (RoundsToTenths, "every_component_is_kept", "Y -20.375 .* but reads back as .* Y -20.4"),
+        (WritesTheNextToo, "the_other_tools_are_left_alone", "leaves tool 4 as it was"),
+        (SelectsWhatItWrites, "the_other_tools_are_left_alone", "a write selects no tool"),
+        (SelectsInNameOnly, "the_tip_is_that_of_the_selected_tool", "37.417 mm from the flange"),
+        (ArrivesBeside, "a_movement_arrives", "0.300 mm and 0.000 deg off"),
+        (ArrivesTurned, "a_movement_arrives", "1.000 deg off"),
+        (GoesOnAfterAStop, "a_stop_ends_a_movement", "stands still: 1.000 mm"),
+    ],
+)
+def test_a_machine_that_lies_is_found(kind, check, words):
+    machine = kind(tools=dict(FIRST), selected=1)
+    broken = found(lambda: MemoryController(machine, identity=f"memory+object://{kind.__name__}"))
+    assert {name for name, what in broken.items() if what} >= {check}
+    assert re.search(words, broken[check])
+
+
+def test_a_machine_that_forgets_what_a_connection_wrote_is_found():
+    def connect():
+        machine = MemoryMachine(tools=dict(FIRST), selected=1)
+        return MemoryController(machine, identity="memory+object://forgetful")
+
+    assert found(connect)["a_write_lasts"] == "a new connection finds the new value"
+
+
+def test_a_driver_that_takes_all_values_for_the_same_is_found():
+    machine = MemoryMachine(tools={**FIRST, SPARE: ToolOffset(1.0)}, selected=1)
+
+    def connect():
+        controller = MemoryController(machine, identity="memory+object://lenient")
+        real = controller.tools.same
+        controller.tools.same = lambda a, b: real(  # type: ignore[method-assign]
+            a and replace(a, u_deg=0), b and replace(b, u_deg=0)
+        )
+        return controller
+
+    assert found(connect)["every_component_is_kept"] == "values 0.1 apart in u_deg differ"
+
+
+def test_a_machine_that_keeps_its_promises_is_not_blamed():
+    machine = MemoryMachine(tools=dict(FIRST), selected=1)
+    broken = found(lambda: MemoryController(machine, identity="memory+object://honest"))
+    assert {name for name, what in broken.items() if what} == set()
+    assert machine.tools == FIRST

@@ -26,6 +26,10 @@ _STATE: Final = ("ROBOLINK_STATE_DIR", "ROBOLINK_JOURNAL")
 """What says where the journal, the backups and the like are kept."""
 
 _OF_THE_DEVELOPER: Final = {name: os.environ.get(name) for name in _STATE}
+
+_BEFORE: Final = {name: os.environ[name] for name in os.environ if name.startswith("ROBOLINK_")}
+"""What robolink was told before pytest began."""
+
 _MARKER: Final = "robolink"
 _CELLS: Final = pytest.StashKey[list["SimulatedCell"]]()
 """The simulated cells of a test."""
@@ -137,7 +141,8 @@ def _robolink_own(
     cells = request.node.stash.setdefault(_CELLS, [])
     seed = request.config.getoption("--robolink-seed")
     with ExitStack() as stack:
-        yield OwnFolder(stack, tmp_path_factory.mktemp("robolink-cell"), seed, cells)
+        own = tmp_path_factory.mktemp("robolink-cell")
+        yield OwnFolder(stack, own, seed, cells, _BEFORE)
     unplayed = [what for cell in cells for what in cell.operator.unplayed()]
     if unplayed and not request.node.stash.get(_NOT_PASSED, False):
         pytest.fail("\n".join(unplayed), pytrace=False)

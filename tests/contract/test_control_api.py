@@ -212,7 +212,8 @@ def test_a_client_in_any_language_is_told_what_went_wrong(cells):
     too_long = b" " * (LONGEST_REQUEST + 1)
     assert raw(cells, "POST", f"{post}/truth", too_long)[0] == 413
     assert raw(cells, "POST", f"{post}/truth", headers=[("Content-Length", "x")])[0] == 411
-    assert raw(cells, "POST", f"{post}/step", b'{"seconds": 1, "seconds": 2}')[0] == 400
+    status, told = raw(cells, "POST", f"{post}/step", b'{"seconds": 1, "seconds": 2}')
+    assert (status, told["error"]) == (400, "'seconds' is given twice.")
     asked_twice = "after=1&after=2"
     for query in (asked_twice, "after=", "nothing=", "&".join(f"a{n}=1" for n in range(60))):
         assert raw(cells, "GET", f"{base}/cells/a/log?{query}")[0] == 400

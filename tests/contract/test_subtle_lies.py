@@ -130,7 +130,7 @@ def test_a_driver_that_takes_all_values_for_the_same_is_found():
     def connect():
         controller = MemoryController(machine, identity="memory+object://lenient")
         real = controller.tools.same
-        controller.tools.same = lambda a, b: real(
+        controller.tools.same = lambda a, b: real(  # type: ignore[method-assign]
             a and replace(a, u_deg=0), b and replace(b, u_deg=0)
         )
         return controller

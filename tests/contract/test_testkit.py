@@ -1,5 +1,6 @@
 """What the fixtures of the pytest plugin bring, as an integrator's tests use it."""
 
+import os
 import subprocess
 import sys
 from xml.etree import ElementTree
@@ -313,6 +314,12 @@ def test_fails(epson_sim, softmotion_sim):
 def test_passes(epson_sim):
     pass
 
+def test_a_command_is_told_what_the_test_says_alone(epson_tcp, monkeypatch):
+    told = epson_tcp.run("status")
+    assert told.exit_code == 0, told.messages
+    monkeypatch.setenv("ROBOLINK_PASSWORD", "of-the-test")
+    assert epson_tcp.run("status").exit_code != 0
+
 @pytest.mark.robolink(colour="red")
 def test_asks_for_what_there_is_not(epson_sim):
     pass
@@ -360,13 +367,14 @@ def test_a_test_that_fails_shows_wire_seed_and_state(tmp_path):
             "--junitxml=report.xml",
         ],
         cwd=tmp_path,
+        env={**os.environ, "ROBOLINK_PASSWORD": "of-another-cell"},
         capture_output=True,
         text=True,
         check=False,
         timeout=60,
     )
     shown = done.stdout
-    assert "1 failed, 6 passed, 1 skipped, 4 errors" in shown
+    assert "1 failed, 7 passed, 1 skipped, 4 errors" in shown
     assert "robolink: " not in shown  # no header
     assert "robolink wire: epson T6-602S, seed 7, epson+sim://pytest-" in shown
     assert "robolink state: softmotion Kin_Scara3_Z, seed 7" in shown

@@ -194,6 +194,8 @@ def _given(method: str, query: str, body: bytes) -> dict[str, Any]:
         return _each_once([(name, _value(text)) for name, text in asked])
     try:
         given = json.loads(body, object_pairs_hook=_each_once) if body.strip() else {}
+    except ConfigError:  # which is a ValueError too
+        raise
     except (ValueError, RecursionError):
         given = None
     if not isinstance(given, dict):

@@ -32,6 +32,8 @@ class SimulatedCell:
         assist: ``assist+tcp://TOKEN@127.0.0.1:PORT``, or the URL itself in the process:
             through it robolink sees and asks the person. ``None`` where nobody was asked for.
         recipe: A recipe that fits the cell; ``None`` where none was asked for.
+        left_out: Variables of the environment that :meth:`run` hands on only where they hold
+            something else by then.
         wire: What crossed the wire.
         motions: What was moved.
         operator: The person, who follows a script.
@@ -42,6 +44,7 @@ class SimulatedCell:
     controlled: ControlledCell
     assist: str | None = None
     recipe: Path | None = None
+    left_out: Mapping[str, str] = field(default_factory=dict)
     operator: ScriptedOperator = field(init=False)
 
     def __post_init__(self) -> None:
@@ -93,10 +96,12 @@ class SimulatedCell:
         """Run robolink on this cell, in a process of its own: ``run("change", str(recipe))``.
 
         It is told where the person is where it takes ``--assist``: give ``*cell.by_hand`` then.
+        Of the environment it finds what the test set, and nothing that robolink was told before
+        pytest began: a password or a language of the tester's own is for another cell.
         """
         done = subprocess.run(
             [sys.executable, "-m", "robolink_cli", "--json", "-c", self.url, *arguments],
-            env=_environment(),
+            env=self._environment(),
             stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,
@@ -104,6 +109,12 @@ class SimulatedCell:
             check=False,
         )
         return EndedCommand(done.returncode, done.stdout, done.stderr)
+
+    def _environment(self) -> Mapping[str, str]:
+        found = {
+            name: value for name, value in os.environ.items() if self.left_out.get(name) != value
+        }
+        return {**found, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
 
     @property
     def by_hand(self) -> tuple[str, ...]:
@@ -126,11 +137,6 @@ class EndedCommand:
     messages: str
 
 
-def _environment() -> Mapping[str, str]:
-    paths = os.pathsep.join(path for path in sys.path if path)
-    return {**os.environ, "PYTHONPATH": paths}
-
-
 @dataclass(frozen=True, slots=True)
 class OwnFolder:
     """Where a factory puts what it serves, and closes it at the end.
@@ -140,12 +146,14 @@ class OwnFolder:
         folder: Of the test.
         seed: Of the test run.
         cells: What was made, for the report of a test that fails.
+        left_out: See :class:`SimulatedCell`.
     """
 
     stack: ExitStack
     folder: Path
     seed: int
     cells: list[SimulatedCell]
+    left_out: Mapping[str, str] = field(default_factory=dict)
 
     def keep(
         self,
@@ -160,6 +168,8 @@ class OwnFolder:
         simulator.log = WireRecord(MOST_LINES)  # nobody has asked it anything yet
         controlled = ControlledCell(simulator, clock, urls)
         url = next(iter(urls.values()))
-        cell = SimulatedCell(url, simulator, controlled, assist=assist, recipe=recipe)
+        cell = SimulatedCell(
+            url, simulator, controlled, assist=assist, recipe=recipe, left_out=self.left_out
+        )
         self.cells.append(cell)
         return cell

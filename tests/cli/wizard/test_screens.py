@@ -102,12 +102,13 @@ def checking():
         ),
         CheckPoint(Mark.YOU, tr("Nobody in the cell, hoses free"), "3", tr("Yes")),
     )
-    return Sitting().asked(CheckSubject(points, plan), Question.YES_NO).keys("1", "3")
+    hand = Sitting(motors=False).asked(CheckSubject(points, plan), Question.YES_NO)
+    return hand.keys("1", "3")
 
 
 def remarked():
     """What was found out before the list is read on it."""
-    hand = Sitting()
+    hand = Sitting(motors=False)
     for said in (
         tr("Station {station} is not known yet: a full calibration there finds it.", station="P"),
         tr("There is no earlier touch to make again."),
@@ -179,7 +180,7 @@ def jogging():
 SCREENS = {
     "free jog": jogging,
     "choose": choosing,
-    "check": lambda: Sitting().asked(CHECK, Question.YES_NO).keys("1"),
+    "check": lambda: Sitting(motors=False).asked(CHECK, Question.YES_NO).keys("1"),
     "moving": moving,
     "touch": touching,
     "first touch": lambda: Sitting().asked(touch_subject(number=1, arrival=None)),

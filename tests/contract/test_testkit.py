@@ -314,11 +314,11 @@ def test_fails(epson_sim, softmotion_sim):
 def test_passes(epson_sim):
     pass
 
-def test_a_command_is_told_what_the_test_says_alone(epson_tcp, monkeypatch):
-    told = epson_tcp.run("status")
-    assert told.exit_code == 0, told.messages
+def test_a_command_is_told_what_the_test_says_alone(epson_sim, monkeypatch):
+    assert "ROBOLINK_PASSWORD" not in epson_sim._environment()
     monkeypatch.setenv("ROBOLINK_PASSWORD", "of-the-test")
-    assert epson_tcp.run("status").exit_code != 0
+    assert epson_sim._environment()["ROBOLINK_PASSWORD"] == "of-the-test"
+    assert "PATH" in epson_sim._environment()
 
 @pytest.mark.robolink(colour="red")
 def test_asks_for_what_there_is_not(epson_sim):

@@ -37,6 +37,7 @@ class ChartPoint:
         outside: Whether it lies outside the limits of single values.
         mean_mm: The weighted mean after it, mm; ``None`` within the baseline.
         mean_outside: Whether that mean lies outside its limits.
+        mean_reach_mm: How far those limits are from the centre, mm; ``None`` as the mean.
     """
 
     value_mm: float
@@ -45,6 +46,7 @@ class ChartPoint:
     outside: bool = False
     mean_mm: float | None = None
     mean_outside: bool = False
+    mean_reach_mm: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -218,5 +220,6 @@ def _judged(points: Sequence[ChartPoint], first: int, found: ControlChart) -> It
                 outside=index in found.points_out,
                 mean_mm=found.centre + mean * found.sigma_mm,
                 mean_outside=abs(mean) > found.ewma_limits[index],
+                mean_reach_mm=found.ewma_limits[index] * found.sigma_mm,
             )
         index += 1

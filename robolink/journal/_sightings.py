@@ -55,8 +55,8 @@ class LeaseSighting:
         """
         return LeaseHeldError(
             tr(
-                "{holder} is working on {controller} since {since}: {purpose}. Last sign of life: "
-                "{sign}.",
+                "{holder} has been working on {controller} since {since}: {purpose}. "
+                "Last sign of life: {sign}.",
                 holder=describe(self.who()),
                 controller=controller,
                 since=local_label(self.taken_at),

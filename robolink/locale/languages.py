@@ -82,12 +82,15 @@ def translator(language: str) -> Callable[[str], str] | None:
 def catalogue(language: str, name: str) -> "GNUTranslations | None":
     """Return a catalogue, compiled anew where its source is newer; ``None`` if there is none.
 
+    One that is damaged, as after a full disk, counts as none: a command then speaks English.
+
     Args:
         language: One of :data:`LANGUAGES` that has a folder.
         name: :data:`OURS` or :data:`CLICK`.
     """
     import gettext
     import io
+    import struct
 
     source = os.path.join(FOLDER, TERRITORY[language], "LC_MESSAGES", f"{name}.po")
     compiled = os.path.splitext(source)[0] + ".mo"
@@ -99,7 +102,7 @@ def catalogue(language: str, name: str) -> "GNUTranslations | None":
     try:
         with open(compiled, "rb") as file:
             return gettext.GNUTranslations(file)
-    except OSError:
+    except (OSError, struct.error, UnicodeError, LookupError):
         return None
 
 

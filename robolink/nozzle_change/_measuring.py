@@ -8,7 +8,7 @@ from typing import Final
 
 from robolink.calibration import CalibrationResult
 from robolink.errors import CalibrationError, ConfigError, RobolinkError
-from robolink.messages import tr
+from robolink.messages import joined, tr
 from robolink.model import EntryKind, NewEntry, Pose, ToolOffset
 from robolink.nozzle_change._plan import ToolPlan
 from robolink.nozzle_change._proposal import Listener, Moment, Proposal
@@ -16,6 +16,7 @@ from robolink.nozzle_change._records import calibration_entry, decision_entry, r
 from robolink.procedures import MeasurementContext, TouchesFurther, approach_path, touches_of
 from robolink.runner import AGAIN, BACK, MORE, Ask, Confirm, Look, Seek, StepDone
 from robolink.stations import find_stations
+from robolink.ways import Way, way
 
 MOST_ANEW: Final = 5
 """So often a person may begin the touches of one tool anew."""
@@ -24,6 +25,10 @@ MOST_ANEW: Final = 5
 MOST_FURTHER: Final = 3
 """So often touches are gone back to from one proposal: who touches until it fits has measured
 nothing."""
+
+
+_INSTRUMENT: Final = frozenset({"no_edge", "sensor_failed", "tip_not_seen", "fiducial_not_seen"})
+"""Codes of measurements that ended because a sensor or camera showed nothing."""
 
 
 class Measuring:
@@ -55,6 +60,7 @@ class Measuring:
                 by_hand = error.code == AGAIN and anew > 0
                 self._listener.refused(plan.tool, error, again=by_hand or left > 0)
                 if not by_hand and not left:
+                    _name_another_way(error)
                     raise
                 anew, left = (anew - 1, left) if by_hand else (anew, left - 1)
 
@@ -219,3 +225,15 @@ def offer_of(measured: Sequence[tuple[ToolPlan, Proposal]]) -> FurtherOffer | No
     last = len(result.inputs) - 1
     worst = max(range(len(distances)), key=distances.__getitem__) if distances else last
     return FurtherOffer(worst, adds)
+
+
+def _name_another_way(error: CalibrationError) -> None:
+    """Say in the remedy how a tool is measured where an instrument has failed for good."""
+    if error.code not in _INSTRUMENT:
+        return
+    another = tr(
+        "If it has failed: 'robolink calibrate two-pose' measures by touch, or with poses that "
+        "you type ({poses}).",
+        poses=way(Way.GIVEN_POSES),
+    )
+    error.remedy = joined(" ", (error.remedy, another))

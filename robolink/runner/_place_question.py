@@ -318,8 +318,5 @@ def inputs_of(controller: Controller) -> DigitalIo:
 
 
 def ended_by_operator() -> DeclinedError:
-    """Return the end that a person asked for."""
-    return DeclinedError(
-        tr("You stopped it."),
-        remedy=tr("Nothing was written."),
-    )
+    """Return the end that a person asked for; who puts a value back says so himself."""
+    return DeclinedError(tr("You stopped it."), remedy=tr("The robot stands still."))

@@ -191,6 +191,21 @@ def apart_deg(one, other):
     return math.degrees(math.acos(min(1.0, max(-1.0, float(cosine)))))
 
 
+@pytest.mark.parametrize(
+    ("sensor", "why"),
+    [
+        (Eye(), "camera_open"),
+        ("opcua+tcp://someone:secret@192.168.0.9/tip", "camera_token"),
+        ("opcua+tcp://192.168.0.9/tip", ""),
+    ],
+)
+def test_a_camera_is_kept_by_its_address_where_that_holds_no_secret(sensor, why, measured):
+    result, flange = measured("camera")
+    case = replace(CASES["camera"], source=CameraSource(sensor, STATION))
+    proof, _ = kept(case, result, flange)
+    assert proof.obstacle == why
+
+
 @pytest.mark.parametrize("after_a_break", [False, True], ids=["at once", "after a break"])
 @pytest.mark.parametrize("method", CASES)
 def test_a_difference_that_was_written_is_proved_by_the_tip_that_was_found(

@@ -4,10 +4,11 @@ from dataclasses import replace
 
 import pytest
 
+from robolink.calibration import solve_n_angle
 from robolink.errors import CalibrationError
 from robolink.methods.n_angle.procedure import _came_from_mm
 from robolink.model import InputEdge, Pose
-from robolink.procedures import PinTouches, TouchPlan
+from robolink.procedures import PinTouches, TouchPlan, drift_uncertainty_mm
 from robolink.runner import Ask, Move, Notify, TouchedAt
 
 PLAN = TouchPlan(seed=3)
@@ -93,6 +94,15 @@ def test_who_gives_up_or_goes_back_leaves_the_tip_lifted():
     assert step.target.z_mm == pytest.approx(arrival.z_mm + PLAN.lift_mm)
     with pytest.raises(CalibrationError):
         steps.send(step.target)
+
+
+def test_a_scatter_from_few_touches_makes_a_drift_no_surer():
+    poses = [Pose(298, 99, -20, 0), Pose(306, 83, -20, 90), Pose(322, 91, -20, 180)]
+    few = solve_n_angle(poses)
+    assert few.sigma_mm is not None
+    assert few.sigma_mm < PLAN.u_drift_mm / 2
+    assert drift_uncertainty_mm(PLAN, few) == PLAN.u_drift_mm
+    assert drift_uncertainty_mm(PLAN, solve_n_angle(poses, sigma_mm=0.004)) == 0.004
 
 
 def test_the_side_from_which_a_touch_was_made_is_that_on_which_the_robot_stopped():

@@ -188,10 +188,10 @@ def test_a_sensor_measures_after_a_yes_and_nothing_is_written(cells, simulator, 
     assert "nothing is written" in asked[0]
     assert simulator.machine.arm.moves_started > 0
     tip = simulator.world.tips[1]
-    simulator.machine.tools.set(1, replace(tip, x_mm=tip.x_mm + 0.4))
+    simulator.machine.tools.set(1, replace(tip, x_mm=tip.x_mm + 0.16))
     code, document = cells("--measure", "beams.toml")
     assert (code, found(document)) == (1, ["tip_moved"])
-    assert "0.4" in document["cells"][0]["findings"][0]["sentence"]
+    assert "limit 0.100 mm" in document["cells"][0]["findings"][0]["sentence"]
     assert not [text for _, way, text in simulator.log if way == ">" and "TLSet 1," in text]
     assert set(simulator.machine.tools.defined()) == set(before)
     assert simulator.machine.tools.selected == 1
@@ -207,6 +207,7 @@ def test_nothing_moves_without_a_person_s_yes(cells, simulator, watched, tmp_pat
     code, document = cells("--measure", "beams.toml")
     assert (code, document["cells"][0]["error"]["kind"]) == (9, "DeclinedError")
     assert document["cells"][0]["tools"]["1"]["x_mm"] == 12.0
+    assert (document["ok"], document["cells"][0]["ok"]) == (False, False), "nobody looked further"
     assert simulator.machine.arm.moves_started == moves
     assert [entry.verdict for entry in recorded()] == ["In order."]
 

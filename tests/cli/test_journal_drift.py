@@ -102,6 +102,9 @@ def test_a_slipping_mount_is_said_drawn_and_ends_with_1(run):
     ]
     assert sum(line[10:].count("X") for line in drawn) >= 3
     assert max(map(len, drawn)) <= 72
+    said = re.search(r"Weighted mean ([\d.]+) mm, outside its limits ([\d.]+) to ([\d.]+) mm", out)
+    assert said is not None
+    assert float(said[2]) < float(said[3]) < float(said[1])
     (cell,) = json.loads(run("--json")[1])["controllers"]
     (finding,) = cell["findings"]
     assert finding["code"] == "mount_shifted"
@@ -135,6 +138,11 @@ def test_the_page_has_every_chart_and_escapes_what_people_typed(run, tmp_path):
     assert (code, f"Page: {page}" in out) == (1, True)
     assert text.count("<svg") == 5
     assert text.count('class="largest"') >= 3
+    # Two lines of limits beside each weighted mean, one point a judged value.
+    limits = re.findall(r'<polyline[^>]*points="([^"]*)"[^>]*class="mean-limit"', text)
+    limits += re.findall(r'<polyline[^>]*class="mean-limit"[^>]*points="([^"]*)"', text)
+    assert len(limits) == 2 * text.count('class="mean"') == 10
+    assert {len(one.split()) for one in limits} == {12}
     assert "Tool 1 has moved sideways" in text
     assert "<script" not in text
     assert run("--page", str(page))[0] == 2, "a file that is there stays"

@@ -70,7 +70,7 @@ def test_it_stops_and_says_that_it_stands(moving, stop):
     code, out, err = stop()
     assert code == 0
     assert out == f"{moving.url} stands still; its state is: ready.\n"
-    assert "Nothing moves with --yes before" in err
+    assert "Nothing moves with --yes until" in err
     assert "without a clear answer" in err  # the movement of the client that died
 
 

@@ -1,10 +1,11 @@
 """A change of two tools is taken up again for its turn tests, while things are not as they were."""
 
+import signal
 from dataclasses import replace
 
 import pytest
 
-from robolink.errors import OutcomeUnknownError, VerifyError
+from robolink.errors import OutcomeUnknownError, StoppedError, VerifyError
 from robolink.methods import TwoPoseSource
 from robolink.model import ToolOffset
 from robolink.nozzle_change import finish_by_turn_test, open_turn_tests
@@ -83,6 +84,37 @@ def test_nothing_moves_where_a_tool_holds_another_value_by_then(later):
             assert len(controller.outcomes.open_markers()) == 1
     assert machine.arm.motions.added == before
     assert later.asked == []
+
+
+def test_under_a_stop_nothing_is_begun_and_nothing_put_back(later):
+    broken_off(later, TwoPoseSource())
+    machine = later.cell.simulator.machine
+    with later.connected() as controller:
+        operation = settled(controller)
+        before = machine.arm.motions.added, machine.flash_writes
+        controller.stop()
+        with pytest.raises(StoppedError):
+            finish_by_turn_test(controller, operation, later.person())
+        assert len(controller.outcomes.open_markers()) == 1
+    assert (machine.arm.motions.added, machine.flash_writes) == before
+    assert later.asked == []
+
+
+def test_ctrl_c_while_the_old_value_is_put_back_waits_until_it_is(later):
+    (old,) = broken_off(later, TwoPoseSource())
+    slips(later)
+
+    def pressed(_number, request):
+        if "TLSet 1," in request:
+            signal.raise_signal(signal.SIGINT)
+
+    with later.connected() as controller:
+        operation = settled(controller)
+        later.cell.simulator.on_request = pressed
+        with pytest.raises((KeyboardInterrupt, VerifyError)):
+            finish_by_turn_test(controller, operation, later.person())
+        assert controller.tools.same(controller.tools.read(1), old)
+        assert controller.outcomes.open_markers() == ()
 
 
 def test_a_value_that_somebody_else_writes_during_the_test_stays(later):

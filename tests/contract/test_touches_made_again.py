@@ -4,6 +4,7 @@ A touch that slipped is what they go back to, so that what is made again has to 
 """
 
 import math
+from functools import partial
 from typing import Any
 
 import pytest
@@ -11,9 +12,15 @@ from robolink_cli.prompts.operator import AssistedOperator
 from robolink_simulators.assist.port import InProcessEyes
 
 import robolink
+from robolink.calibration import NeedleLimits
 from robolink.errors import CalibrationError, DeclinedError
 from robolink.journal import EntryKind
-from robolink.methods import NAngleSource, TwoPoseSource
+from robolink.methods import (
+    NAngleSource,
+    OneTouchSource,
+    TwoPoseSource,
+    difference_from_last,
+)
 from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
 from robolink.procedures import SamplingPolicy
 from robolink.runner import Question
@@ -170,6 +177,35 @@ def test_a_change_that_is_implausible_once_a_touch_was_made_again_is_refused(cel
         change(cell, TwoPoseSource(), touches={3: aside}, writes=["back"])
     assert refused.value.code == "implausible_change"
     assert cell.stored == before
+
+
+def changed_on_the_pin(cell, source, *, writes=(), length="keep"):
+    """Change the nozzle on a pin by name; ``source`` may need the controller."""
+    with robolink.connect(cell.cell.url) as controller:
+        person = Undecided.at(cell, controller, writes=writes)
+        tool = ToolPlan(1, source(controller), verify=False, pin="PIN-07", length=length)
+        NozzleChange(controller, ChangePlan((tool,)), operator=person).run()
+
+
+def test_a_length_that_changed_is_followed_also_where_a_touch_was_made_again(cell):
+    changed_on_the_pin(cell, lambda _: TwoPoseSource())
+    before = cell.stored
+    cell.lengthen(0.6)
+    changed_on_the_pin(cell, lambda _: TwoPoseSource(), writes=["back"], length="difference")
+    assert cell.stored.z_mm - before.z_mm == pytest.approx(-0.6, abs=0.2)
+
+
+def test_one_touch_that_is_made_again_starts_from_what_is_stored(cell):
+    """From what the first one proposed it would add the same difference once more."""
+
+    def compared(controller):
+        last = partial(difference_from_last, controller, 1, "PIN-07", sigma_mm=0.03)
+        return OneTouchSource(last(limits=NeedleLimits()))
+
+    changed_on_the_pin(cell, lambda _: TwoPoseSource())
+    cell.lengthen(0.4, 0.5, -0.4)
+    changed_on_the_pin(cell, compared, writes=["back"])
+    check_written(cell, within_mm=0.2)
 
 
 def test_stations_that_were_found_with_a_tool_are_named_before_it_is_written(cell):

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from robolink.drift import DriftCode, charts_of, findings_in, measured_changes
+from robolink.drift import DriftCode, charts_of, drift_of, findings_in, measured_changes
 from robolink.errors import ConfigError
 from robolink.model import EntryKind, Recorded, Signature, ToolOffset, plain_offset
 from tests.drift._courses import course, found
@@ -103,6 +103,17 @@ def test_a_large_shift_is_said_after_four_changes_whatever_was_before(seed):
     assert said.since == moved[2 * 26].at
 
 
+def test_the_limits_of_the_mean_widen_as_textbooks_say():
+    """Montgomery: L sigma sqrt(lambda / (2 - lambda) (1 - (1 - lambda)^(2 i)))."""
+    (chart,) = (one for one in charts_of(course(1, 26)) if one.axis == "z")
+    for count, point in enumerate(chart.judged, start=1):
+        share = 0.2 / 1.8 * (1 - 0.8 ** (2 * count))
+        assert point.mean_reach_mm == pytest.approx(2.86 * chart.sigma_mm * share**0.5)
+    assert chart.mean_limits_mm is not None
+    reach = chart.judged[-1].mean_reach_mm
+    assert chart.mean_limits_mm[1] - chart.centre_mm == pytest.approx(reach)
+
+
 def test_one_bad_touch_at_the_end_hides_no_slipping_mount():
     slipping = course(4, 36, shift=lambda index, _: (0.1 * (index >= 26), 0, 0))
     slipping[-1] = replace(slipping[-1], tip_mm={**slipping[-1].tip_mm, "x": 13.0})
@@ -168,3 +179,28 @@ def test_a_change_that_was_taken_back_in_the_end_says_nothing_of_any_of_its_tool
     assert [one.tool for one in measured_changes([*measured, kept], lambda _: False)] == [1]
     back = entry(4, EntryKind.ROLLED_BACK, 2)
     assert measured_changes([*measured, kept, back], lambda _: False) == []
+
+
+def test_what_was_measured_counts_and_not_the_difference_that_was_written():
+    measured = entry(
+        1,
+        EntryKind.CALIBRATION,
+        1,
+        tip=plain_offset(ToolOffset(12.0, -4.0, -20.0)),
+        proposed=plain_offset(ToolOffset(13.0, -5.0, -20.0)),
+        measured=["x_mm", "y_mm"],
+    )
+    (change,) = measured_changes([measured, entry(2, EntryKind.DONE, 1)], lambda _: False)
+    assert change.tip_mm == {"x": 12.0, "y": -4.0}
+
+
+def test_the_course_of_one_tool_is_of_that_tool_alone():
+    tip = plain_offset(ToolOffset(12.0, -4.0, -20.0))
+    entries = [
+        entry(number, kind, tool, tip=tip, measured=["x_mm"])
+        for tool in (1, 2)
+        for number, kind in enumerate((EntryKind.CALIBRATION, EntryKind.DONE), 2 * tool)
+    ]
+    for tool in (1, 2):
+        cell = drift_of("cell", entries, finds_pin=lambda _: False, tool=tool)
+        assert [one.tool for one in cell.changes] == [tool]

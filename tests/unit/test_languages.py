@@ -151,6 +151,16 @@ def test_a_catalogue_is_compiled_again_when_its_source_changed(tmp_path, monkeyp
     assert said() == "已停止。"
 
 
+@pytest.mark.parametrize("damage", [b"", b"\xde\x12", b"\xde\x12\x04\x95" + b"\xff" * 24])
+def test_a_damaged_catalogue_leaves_english(damage, tmp_path, monkeypatch):
+    folder = tmp_path / "zh_CN" / "LC_MESSAGES"
+    folder.mkdir(parents=True)
+    (folder / "robolink.mo").write_bytes(damage)
+    monkeypatch.setattr(languages, "FOLDER", str(tmp_path))
+    assert languages.translator("zh") is None
+    assert languages.speak("zh") is False
+
+
 def test_a_language_without_a_catalogue_leaves_english(tmp_path, monkeypatch):
     monkeypatch.setattr(languages, "FOLDER", str(tmp_path))
     assert languages.speak("zh") is False

@@ -25,11 +25,15 @@ Opener = Callable[..., WindowsConsole]
 
 @contextmanager
 def cell_for_windows(
-    python: WindowsPython, simulator: EpsonSimulator, state: Mapping[str, str], folder: Path
+    python: WindowsPython,
+    simulator: EpsonSimulator,
+    state: Mapping[str, str],
+    folder: Path,
+    pace: float,
 ) -> Iterator[Opener]:
-    """Serve a simulator; yield what runs a command on it in a console of Windows."""
+    """Serve a simulator at a pace; yield what runs a command on it in a console of Windows."""
     consoles: list[WindowsConsole] = []
-    with serve_tcp(simulator, clock=ScaledClock(10.0)) as host:
+    with serve_tcp(simulator, clock=ScaledClock(pace)) as host:
         (folder / "robolink.toml").write_text(CELL.format(url=host.url))
         (folder / "needle.toml").write_bytes(RECIPE.read_bytes())
 

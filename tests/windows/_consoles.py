@@ -16,12 +16,15 @@ from typing import Final, Literal
 import pyte
 from robolink_simulators.assist.port import InProcessEyes
 from robolink_simulators.epson.device import EpsonSimulator
+from wcwidth import wcwidth
 
 from tests.cli.wizard._hand_at_screen import HandAtScreen
 from tests.windows._windows_python import WindowsPython
 
 Way = Literal["calls", "sequences"]
-PATIENCE_S: Final = 45.0
+PATIENCE_S: Final = 300.0
+"""Long, because the judges go beside other work, and a console that wine draws is slow."""
+
 _SCRIPT: Final = Path(__file__).with_name("_windows_console.py")
 
 
@@ -41,6 +44,7 @@ class WindowsConsole(HandAtScreen):
     """
 
     longest_s = PATIENCE_S
+    pause_s = 0.3
 
     def __init__(
         self,
@@ -91,13 +95,26 @@ class WindowsConsole(HandAtScreen):
                 self._over = True
         return not self._over
 
+    @property
+    def text(self) -> str:
+        """Return what stands there.
+
+        Of a wide character over whose first half another was drawn, the second is a blank.
+        """
+        for row in self.screen.buffer.values():
+            for column in range(self.screen.columns):
+                before = row[column - 1].data if column else ""
+                if not row[column].data and wcwidth(before[:1] or " ") != 2:
+                    row[column] = self.screen.default_char
+        return "\n".join(self.screen.display)
+
     def send(self, key: str) -> None:
         """Have a key pressed and released."""
         self._keys.sendall(f"{key}\n".encode())
 
-    def type(self, text: str) -> None:
+    def type(self, text: str, *, later_s: float = 1.0) -> None:
         """Write to the terminal, for wine's own console to make keys of; a person types later."""
-        self.rest(1.0)
+        self.rest(later_s)
         os.write(self._terminal, text.encode())
 
     def close(self) -> None:

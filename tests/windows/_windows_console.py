@@ -19,6 +19,7 @@ import socket
 import struct
 import sys
 import threading
+import time
 from ctypes import wintypes
 from importlib import import_module
 from typing import Any
@@ -121,6 +122,10 @@ def hand(connection: socket.socket) -> None:
         elif name.startswith("burst "):
             for one in name.removeprefix("burst ").split("+"):
                 press(one, released=True)
+        elif name.startswith("scan "):
+            for one in name.removeprefix("scan "):
+                press(one, released=True)
+                time.sleep(0.008)
         elif name.startswith("held "):
             press(name.removeprefix("held "), released=False)
         else:
@@ -164,6 +169,16 @@ def without_sequences() -> None:
     keys._is_win_vt100_input_enabled = lambda: False
 
 
+def begin_reading() -> None:
+    """Have wine's console read its terminal, which it does only after a first look at a record.
+
+    ``GetNumberOfConsoleInputEvents``, and with it ``kbhit``, tell of no key before that.
+    """
+    record, found = ctypes.create_string_buffer(20), wintypes.DWORD()
+    handle = wintypes.HANDLE(kernel32.GetStdHandle(_INPUT))
+    kernel32.PeekConsoleInputW(handle, record, 1, ctypes.byref(found))
+
+
 def main(way: str, port: str, *arguments: str) -> None:
     """Run robolink in this console."""
     connection = socket.create_connection(("127.0.0.1", int(port)))
@@ -171,6 +186,7 @@ def main(way: str, port: str, *arguments: str) -> None:
         sys.kept_writer = write_to(connection)  # type: ignore[attr-defined]
     else:
         without_sequences()
+    begin_reading()
     threading.Thread(target=hand, args=(connection,), daemon=True).start()
     sys.argv[1:] = arguments
     from robolink_cli.entry import main as robolink

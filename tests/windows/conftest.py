@@ -29,11 +29,21 @@ def simulator() -> EpsonSimulator:
 
 
 @pytest.fixture
+def pace() -> float:
+    """How many times faster than real time that controller lives."""
+    return 10.0
+
+
+@pytest.fixture
 def opened(
-    windows: WindowsPython, simulator: EpsonSimulator, state: dict[str, str], tmp_path: Path
+    windows: WindowsPython,
+    simulator: EpsonSimulator,
+    state: dict[str, str],
+    tmp_path: Path,
+    pace: float,
 ) -> Iterator[Opener]:
     """What runs a command at that controller in a console of Windows."""
-    with cell_for_windows(windows, simulator, state, tmp_path) as opener:
+    with cell_for_windows(windows, simulator, state, tmp_path, pace) as opener:
         yield opener
 
 

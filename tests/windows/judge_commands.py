@@ -25,10 +25,62 @@ def test_a_nozzle_is_changed_on_both_simulated_controllers(windows, state):
     assert told.stdout.count("Checked against the simulator, not a robot.") == 2
 
 
-@pytest.mark.parametrize("command", ["doctor", "ports"])
-def test_a_probe_that_fails_is_a_line_and_no_defect(windows, state, command):
-    told = windows.run("-m", "robolink_cli", "cell", command, **state)
-    assert told.returncode != 70, told.stdout + told.stderr
+PROBES = {"python", "click", "state", "cells", "keyring", "serial", "journal"}
+
+
+def state_on_no_drive(folder):
+    return {"ROBOLINK_STATE_DIR": "Q:\\robolink"}
+
+
+def state_that_is_a_file(folder):
+    (folder / "state").write_bytes(b"")
+    return {}
+
+
+def journal_of_garbage(folder):
+    (folder / "state").mkdir()
+    (folder / "state" / "journal.db").write_bytes(b"garbage" * 1000)
+    return {}
+
+
+def cell_file_of_garbage(folder):
+    (folder / "robolink.toml").write_bytes(b"\xff\xfe\x00[cells")
+    return {}
+
+
+def nothing_wrong(folder):
+    return {}
+
+
+BROKEN = [
+    nothing_wrong,
+    state_on_no_drive,
+    state_that_is_a_file,
+    journal_of_garbage,
+    cell_file_of_garbage,
+]
+
+
+@pytest.mark.parametrize("broken", BROKEN, ids=lambda broken: broken.__name__)
+def test_a_probe_that_fails_is_a_line_of_doctor_beside_the_others(windows, state, tmp_path, broken):
+    more = state | broken(tmp_path)
+    told = windows.run("-m", "robolink_cli", "--json", "cell", "doctor", cwd=tmp_path, **more)
+    assert "A defect in robolink" not in told.stdout + told.stderr
+    assert told.returncode == (0 if broken is nothing_wrong else 1), told.stdout + told.stderr
+    found = json.loads(told.stdout)["checks"]
+    assert {one["subject"] for one in found} >= PROBES
+    bad = [one["subject"] for one in found if one["level"] == "bad"]
+    assert bool(bad) == (broken is not nothing_wrong), found
+
+
+@pytest.mark.parametrize("broken", BROKEN, ids=lambda broken: broken.__name__)
+@pytest.mark.parametrize("command", ["ports", "list"])
+def test_what_else_looks_at_this_computer_ends_without_a_defect(
+    windows, state, tmp_path, broken, command
+):
+    more = state | broken(tmp_path)
+    told = windows.run("-m", "robolink_cli", "cell", command, cwd=tmp_path, **more)
+    assert told.returncode in (0, 1, 2), told.stdout + told.stderr
     assert "A defect in robolink" not in told.stdout + told.stderr
 
 

@@ -36,10 +36,11 @@ def test_a_person_types_steps_is_refused_an_unjogged_touch_and_stops(console, si
     assert simulator.machine.flash_writes == 0
 
 
+@pytest.mark.parametrize("pace", [1.0])
 def test_half_a_line_that_was_typed_too_early_is_no_part_of_the_answer(console, simulator):
     console.type("y\r")
     console.see("Moving to")
-    console.type("sto")
+    console.type("sto", later_s=0.0)
     console.see("take, stop, or help.")
     console.type("p\r")
     console.see("> p|'p'|p ")

@@ -1,6 +1,7 @@
 """A whole needle change by keys on the full screen, in both ways in which Windows draws one."""
 
 import re
+import time
 
 import pytest
 
@@ -83,17 +84,42 @@ def test_keys_without_numlock_jog_a_held_one_ends_with_its_release_and_escape_st
 
 
 @BOTH
+def test_a_code_that_is_scanned_while_somebody_jogs_moves_nothing(opened, simulator, way):
+    console = opened(way, "robot", "jog", "--keys")
+    console.see("everybody out of the cell")
+    console.rest(0.6)
+    console.press(["1"])
+    console.see("Step")
+    console.rest(0.6)
+    for how in ("scan 4468136931", "burst 4+6+9+enter", "scan 6842679", "burst 4+6+8+2") * 3:
+        console.send(how)
+        console.see("Too fast for a hand")
+        console.rest(1.0)
+        assert simulator.machine.arm.moves_started == 0, how
+    console.press(["6"])
+    end_s = time.monotonic() + console.longest_s
+    while not simulator.machine.arm.moves_started and time.monotonic() < end_s:
+        console.rest(0.2)
+    assert simulator.machine.arm.moves_started == 1
+
+
+@BOTH
 def test_the_screens_are_straight_in_chinese(opened, simulator, way):
     console = opened(way, "change", "needle.toml", language="zh")
     scan(console)
     console.see(r"开始移动")
+    console.see(r"(?s)\n-{80} *\n.*\n-{80} *\n")
+    assert sum(row.startswith("-") for row in console.text.split("\n")) == 2
     console.rest(0.6)
-    rules = [row for row in console.screen.display if row.startswith("-")]
-    assert [row.rstrip() for row in rules] == ["-" * 80] * 2
-    console.press(["1", "3", "5"])
+    console.press(["1"])
+    console.see("还有 1 项")
+    console.press(["3"])
+    console.rest(1.0)
+    console.press(["5"])
     console.see("第 1 次触碰")
     console.rest(0.6)
     if way == "sequences":
+        console.see("模拟 *\n")
         assert columns_of(console, "模拟") == (76, 80)
         assert columns_of(console, "停止")[1] == 80
     console.press(["escape"])

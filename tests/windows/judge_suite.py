@@ -14,7 +14,7 @@ LIST: Final = tomllib.loads((Path(__file__).parent / "named_list.toml").read_tex
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("group", LIST["group"], ids=lambda group: group["name"])
 def test_the_named_files_pass(windows, suite, group):
-    options = ["-p", "no:cacheprovider", "-q", "-o", "timeout=1800"]
+    options = ["-p", "no:cacheprovider", "-q", "-rs", "-o", "timeout=1800"]
     options += [f"--deselect={test}" for test in group.get("without", {})]
     done = subprocess.run(
         windows.command("-m", "pytest", *options, *group["files"]),
@@ -31,4 +31,6 @@ def test_the_named_files_pass(windows, suite, group):
     counted = re.search(r"(\d+) passed", done.stdout)
     assert counted, done.stdout[-2000:]
     assert int(counted[1]) >= group["at_least"]
-    print(f"{group['name']}: {done.stdout.strip().splitlines()[-1]}")  # noqa: T201 - the figures
+    lines = done.stdout.strip().splitlines()
+    why = [line for line in lines if line.startswith("SKIPPED")]
+    print(f"{group['name']}: {lines[-1]}", *why, sep="\n  ")  # noqa: T201 - the figures

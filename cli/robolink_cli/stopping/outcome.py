@@ -65,8 +65,8 @@ class Telling:
         if outcome.error is None:
             told.append(
                 tr(
-                    "Nothing moves with --yes before 'robolink robot reset' or "
-                    "'robolink robot release'."
+                    "Nothing moves with --yes until 'robolink robot reset' or "
+                    "'robolink robot release' is given."
                 )
             )
         return [*taken, *told]

@@ -84,6 +84,20 @@ class KeyGate:
         self._held = self._last
         return done
 
+    def burst(self, at_s: float, quiet_s: float | None = None) -> list[CountedKey]:
+        """Take several keys that came in one piece, of which none counts.
+
+        Args:
+            at_s: They had come by then.
+            quiet_s: As of :meth:`press`.
+
+        Returns:
+            The key before them, where it counts.
+        """
+        done = self.press("", at_s, quiet_s)
+        self._held, self._burst_s = None, at_s
+        return done
+
     def due(self, at_s: float) -> list[CountedKey]:
         """Return the key that counts because nothing had followed it by a time."""
         if self._held is None or at_s - self._held.at_s < ALONE_S:

@@ -52,8 +52,8 @@ def _caption(chart: Chart) -> str:
         text = tr("No limits: they need 20 measured changes, there are {n}.", n=chart.baseline)
     else:
         text = tr(
-            "Dashed: limits of single values, from the first {n}. Line: their weighted mean. "
-            "Red: outside.",
+            "Dashed: limits of single values, from the first {n}. Line: their weighted mean, "
+            "dotted: its limits. Red: outside.",
             n=chart.baseline,
         )
     hidden = len(chart.points) - MOST_POINTS
@@ -108,10 +108,24 @@ class _ControlPlot:
         drawn = " ".join(f"{x:.2f},{y:.2f}" for x, y in means)
         if means:
             yield element("polyline", points=drawn, class_="mean")
+            yield from self._mean_limits()
         for number, point in enumerate(self._points):
             kind = "largest" if point.outside else "old" if point.repeat else "point"
             radius = 1.8 if point.repeat else 2.8
             yield element("g", circle(self._at(number, point.value_mm), radius), class_=kind)
+            if point.mean_outside and point.mean_mm is not None:
+                yield element("g", circle(self._at(number, point.mean_mm), 1.8), class_="largest")
+
+    def _mean_limits(self) -> Iterator[Element]:
+        """Yield the limits of the weighted mean, which widen with each value after the first."""
+        for side in (1, -1):
+            ends = [
+                self._at(number, self._chart.centre_mm + side * point.mean_reach_mm)
+                for number, point in enumerate(self._points)
+                if point.mean_reach_mm is not None
+            ]
+            drawn = " ".join(f"{x:.2f},{y:.2f}" for x, y in ends)
+            yield element("polyline", points=drawn, class_="mean-limit")
 
     def _at(self, number: int, value_mm: float) -> Place:
         across = self._width * (number + 0.5) / len(self._points)

@@ -253,6 +253,7 @@ class EpsonSimulator(TimeStepping):
         self.advance(now_ns)
         link = EpsonServerLink(self, now_ns, dialect=dialect)
         self._links.add(link)
+        self._after_act()  # whoever never logs in is cut off at a time that nobody foresaw
         if self._slot.client is not None and self.options.second_client == "closed":
             link.cut()
         return link

@@ -61,7 +61,11 @@ class HandAtScreen:
         """Confirm what the list asks, and start."""
         self.see(r"Start moving \(2 open\)")
         self.rest(0.4)
-        self.press(["1", "3", "5"])
+        self.press(["1"])
+        self.see(r"Start moving \(1 open\)")
+        self.press(["3"])
+        self.see(r"Start moving(?! \()")
+        self.press(["5"])
 
     def left_mm(self):
         assert self.eyes is not None
@@ -102,6 +106,7 @@ class HandAtScreen:
             while self.left_mm()[axis] == before and time.monotonic() < end_s:
                 self.rest(0.03)
             self.rest(0.15)
+        raise AssertionError(f"the tip does not come nearer by {plus} and {minus}\n{self.text}")
 
     def touch(self):
         self.see("Jog the tip onto the pin")

@@ -71,7 +71,8 @@ CHECK = CheckSubject(
 class Sitting:
     """A state, and what was sent from it; time passes by hand."""
 
-    def __init__(self, state=None, in_tool=0):
+    def __init__(self, state=None, in_tool=0, *, motors=True):
+        self.motors = motors
         self.here = replace(ARRIVAL, tool=in_tool)
         self.state = state or WizardState(HEADER)
         self.sent, self.now, self.number = [], 10.0, 0
@@ -95,7 +96,7 @@ class Sitting:
         return self.happens(WaitsForAnswer(self.number, self.now))
 
     def reads(self, pose):
-        reading = Reading(self.now, "ready", pose=pose, motors=True, low_power=True)
+        reading = Reading(self.now, "ready", pose=pose, motors=self.motors, low_power=True)
         return self.happens(WasRead(reading))
 
     def key(self, name, text=""):

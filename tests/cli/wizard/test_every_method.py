@@ -147,5 +147,24 @@ def test_what_ends_it_from_outside_writes_nothing_new(method, moment, end, langu
         check_language(hand, language)
 
 
+def blind(hand):
+    """Start, with a sensor whose cable has come off."""
+    world = hand.cell.simulator.world
+    for number in (3, 4, 5):
+        world.disconnect(number)
+    hand.broken = False
+    hand.break_at = ""
+    hand.press("1", "3", "5")
+
+
+@pytest.mark.parametrize("method", [soaked("beams"), soaked("z-touch", kept=True)])
+def test_an_instrument_that_failed_names_the_way_with_typed_poses(method):
+    with changing(method, lines=False, break_at="check", breaks=blind) as (hand, cell):
+        assert isinstance(hand.error, RobolinkError)
+        assert hand.state.ended is not None
+        assert any("poses that you type" in line for line in hand.state.ended.lines)
+        check_as_before(cell, before_of(method))
+
+
 def test_each_way_to_break_off_comes_in_some_method():
     assert {moment for name in CASES for moment in moments_of(name)} == set(ABORTS)

@@ -14,6 +14,7 @@ import pytest
 from prompt_toolkit.data_structures import Size
 from prompt_toolkit.input import create_pipe_input
 from prompt_toolkit.key_binding import KeyPress
+from prompt_toolkit.keys import Keys
 from prompt_toolkit.output.vt100 import Vt100_Output
 from robolink_cli.wizard.desk import Desk
 from robolink_cli.wizard.faces.arrivals import TimedPress
@@ -105,6 +106,8 @@ def test_keys_of_a_pipe_jog_take_and_write():
             time.sleep(0.35)
             paste(source, "5")
             time.sleep(0.1)
+            source.send_text("6\x1b[200~813\r\x1b[201~")  # as a console hands a scan on
+            time.sleep(0.1)
             assert answers == ["N-7"]
             source.send_text("4006381333931\r\n")
             time.sleep(0.3)
@@ -153,7 +156,7 @@ def test_what_comes_at_once_never_writes(keys, pasted):
         face._desk = desk
         face._state = replace(hand.state, typed="" if keys[0] == "1" else "1")
         if pasted:
-            face._pasted(keys)
+            face._pasted(KeyPress(Keys.BracketedPaste, keys))
         for key in "" if pasted else f"{keys}7":
             face._press("c-m" if key == "\r" else key, KeyPress(key))
         for one in face._gate.due(time.monotonic() + 1.0):

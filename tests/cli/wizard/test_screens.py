@@ -24,7 +24,7 @@ from wcwidth import wcswidth
 
 from robolink import messages
 from robolink.calibration import Drift, VerifyResult, impact_on
-from robolink.errors import DeclinedError
+from robolink.errors import DeclinedError, OutcomeUnknownError
 from robolink.locale.languages import translator
 from robolink.messages import tr
 from robolink.model import Path as Way
@@ -102,12 +102,13 @@ def checking():
         ),
         CheckPoint(Mark.YOU, tr("Nobody in the cell, hoses free"), "3", tr("Yes")),
     )
-    return Sitting().asked(CheckSubject(points, plan), Question.YES_NO).keys("1", "3")
+    hand = Sitting(motors=False).asked(CheckSubject(points, plan), Question.YES_NO)
+    return hand.keys("1", "3")
 
 
 def remarked():
     """What was found out before the list is read on it."""
-    hand = Sitting()
+    hand = Sitting(motors=False)
     for said in (
         tr("Station {station} is not known yet: a full calibration there finds it.", station="P"),
         tr("There is no earlier touch to make again."),
@@ -152,6 +153,16 @@ def stopped():
     return ended(Header("line3", "Change needle", command=command), error)
 
 
+def test_a_job_that_was_refused_for_an_earlier_one_names_recover_last():
+    error = OutcomeUnknownError("Not done.", remedy="Next: 'robolink recover'.")
+    shown = ended(
+        Header("line3", "Change needle", command="robolink -c line3 change n.toml"), error
+    )
+    last = shown.state.ended
+    assert last is not None
+    assert last.lines[-1] == 'Next: robolink -c "line3" recover'
+
+
 def ended(header, error=None, report=None):
     hand = Sitting().asked(touch_subject()).happens(WasRegarded(header))
     if report is not None:
@@ -169,7 +180,7 @@ def jogging():
 SCREENS = {
     "free jog": jogging,
     "choose": choosing,
-    "check": lambda: Sitting().asked(CHECK, Question.YES_NO).keys("1"),
+    "check": lambda: Sitting(motors=False).asked(CHECK, Question.YES_NO).keys("1"),
     "moving": moving,
     "touch": touching,
     "first touch": lambda: Sitting().asked(touch_subject(number=1, arrival=None)),

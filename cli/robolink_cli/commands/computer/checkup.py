@@ -45,7 +45,9 @@ def in_words(remarks: Sequence[Remark]) -> Iterator[str]:
 def check_state_folder() -> Iterator[Remark]:
     """See whether backups can be kept; without one nothing is ever written."""
     folder = state_folder("backups")
-    existing = next(path for path in (folder, *folder.parents) if path.exists())
+    # On Windows not even the drive need be there.
+    above = (path for path in (folder, *folder.parents) if path.exists())
+    existing = next(above, Path(folder.anchor))
     if not (existing.is_dir() and os.access(existing, os.W_OK | os.X_OK)):
         yield Remark(
             "state",

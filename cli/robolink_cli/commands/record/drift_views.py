@@ -48,6 +48,8 @@ def _show_cell(cell: CellDrift, *, all_plots: bool) -> None:
             say(f"\n{chart_title(chart)}")
             for line in plot_lines(chart):
                 say(line)
+            if told := mean_line(chart):
+                say(told)
     for finding in cell.findings:
         say(f"\n{finding.sentence}\n  {finding.remedy}")
 
@@ -100,6 +102,17 @@ def plot_lines(chart: Chart) -> Iterator[str]:
         cells = (_mark(p) if row_of(p.value_mm) == row else ground for p in points)
         label = f"{named[row]:9.3f} " if row in named else " " * 10
         yield (label + "".join(cells)).rstrip()
+
+
+def mean_line(chart: Chart) -> str:
+    """Return the weighted mean and its limits; empty where there is none."""
+    last, limits = chart.last, chart.mean_limits_mm
+    if last.mean_mm is None or limits is None:
+        return ""
+    facts = {"mean": f"{last.mean_mm:.3f}", "low": f"{limits[0]:.3f}", "high": f"{limits[1]:.3f}"}
+    if last.mean_outside:
+        return tr("Weighted mean {mean} mm, outside its limits {low} to {high} mm.", **facts)
+    return tr("Weighted mean {mean} mm, within its limits {low} to {high} mm.", **facts)
 
 
 def _mark(point: ChartPoint) -> str:

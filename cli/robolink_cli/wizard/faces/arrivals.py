@@ -24,10 +24,10 @@ from prompt_toolkit.key_binding import KeyPress
 
 from robolink_cli.wizard.key_gate import ALONE_S
 
-_TICK_S: Final = 0.005
+TICK_S: Final = 0.005
 """So often it is looked whether nothing follows, until that is known."""
 
-_WATCHED_S: Final = ALONE_S + 2 * _TICK_S
+_WATCHED_S: Final = ALONE_S + 2 * TICK_S
 _MOST_BYTES: Final = 1024
 
 
@@ -111,7 +111,7 @@ class ArrivalReader:
 
         def follow() -> None:
             while not self.over:
-                waits_s = _TICK_S if self.watched else None
+                waits_s = TICK_S if self.watched else None
                 if end in _readable(self._fd, end, wait_s=waits_s):
                     return
                 if self.look():
@@ -140,15 +140,55 @@ class TimedPress(KeyPress):
         self.at_s, self.quiet_s = at_s, quiet_s
 
 
-class TimedInput(Input):
-    """The keys of another input, each with its time.
+class TimedKeys(Input):
+    """The keys of another input, each with its time; all else is left to that one.
 
     Args:
-        source: Where they come from: a terminal, or a pipe, of a POSIX system.
+        source: Where they come from.
     """
 
     def __init__(self, source: Input) -> None:
         self._source = source
+
+    def quiet(self) -> float | None:
+        """See :meth:`ArrivalReader.quiet`."""
+        raise NotImplementedError
+
+    def detach(self) -> AbstractContextManager[None]:
+        """Nothing is run in place of a screen."""
+        return nullcontext()
+
+    @property
+    def closed(self) -> bool:
+        """Whether the stream has ended."""
+        return self._source.closed
+
+    def fileno(self) -> int:
+        """Return the descriptor of the source."""
+        return self._source.fileno()
+
+    def typeahead_hash(self) -> str:
+        """Return the name under which keys of the source are kept."""
+        return self._source.typeahead_hash()
+
+    def raw_mode(self) -> AbstractContextManager[None]:
+        """Let each key through as it is pressed."""
+        return self._source.raw_mode()
+
+    def cooked_mode(self) -> AbstractContextManager[None]:
+        """Let whole lines through."""
+        return self._source.cooked_mode()
+
+
+class TimedInput(TimedKeys):
+    """The keys of a terminal, or a pipe, of a POSIX system, each with its time.
+
+    Args:
+        source: The terminal.
+    """
+
+    def __init__(self, source: Input) -> None:
+        super().__init__(source)
         self._reader = ArrivalReader(source.fileno())
         self._decoder = codecs.getincrementaldecoder("utf-8")("surrogateescape")
         self._pressed: list[KeyPress] = []
@@ -192,35 +232,10 @@ class TimedInput(Input):
         with self._reader.following(came):
             yield
 
-    def detach(self) -> AbstractContextManager[None]:
-        """Nothing is run in place of a screen."""
-        return nullcontext()
-
     @property
     def closed(self) -> bool:
         """Whether the stream has ended."""
         return self._closed
-
-    def fileno(self) -> int:
-        """Return the descriptor of the source."""
-        return self._source.fileno()
-
-    def typeahead_hash(self) -> str:
-        """Return the name under which keys of the source are kept."""
-        return self._source.typeahead_hash()
-
-    def raw_mode(self) -> AbstractContextManager[None]:
-        """Let each key through as it is pressed."""
-        return self._source.raw_mode()
-
-    def cooked_mode(self) -> AbstractContextManager[None]:
-        """Let whole lines through."""
-        return self._source.cooked_mode()
-
-
-def timed(source: Input) -> Input:
-    """Return an input whose keys have their time, where this system can tell (POSIX)."""
-    return TimedInput(source) if os.name == "posix" else source
 
 
 def _readable(*descriptors: int, wait_s: float | None = 0.0) -> list[int]:

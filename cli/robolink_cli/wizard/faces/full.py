@@ -23,7 +23,8 @@ from robolink.interrupts import EndedBy, ended_by
 from robolink_cli.console.output import visible
 from robolink_cli.prompts.lines import open_lines
 from robolink_cli.wizard.desk import Desk
-from robolink_cli.wizard.faces.arrivals import TimedInput, TimedPress, timed
+from robolink_cli.wizard.faces.arrivals import TimedKeys, TimedPress
+from robolink_cli.wizard.faces.console_keys import timed
 from robolink_cli.wizard.faces.effects import carry_out, leaves
 from robolink_cli.wizard.faces.lines import LineFace
 from robolink_cli.wizard.flow import advance, stops_at_once
@@ -98,7 +99,7 @@ class FullFace:
 
     def _alone(self, now_s: float) -> list[Happening]:
         """Return what is known of keys because nothing followed them."""
-        quiet_s = self._input.quiet() if isinstance(self._input, TimedInput) else now_s
+        quiet_s = self._input.quiet() if isinstance(self._input, TimedKeys) else now_s
         if quiet_s is None:
             return []
         found: list[Happening] = [self._pressed(one) for one in self._gate.due(quiet_s)]
@@ -126,13 +127,13 @@ class FullFace:
 
         bindings.add("<any>", eager=True)(pressed)
         bindings.add("escape", eager=True)(pressed)
-        bindings.add("<bracketed-paste>", eager=True)(lambda event: self._pasted(event.data))
+        bindings.add("<bracketed-paste>", eager=True)(
+            lambda event: self._pasted(event.key_sequence[0])
+        )
         return bindings
 
     def _press(self, key: str, press: KeyPress) -> None:
-        data, at_s, quiet_s = press.data, time.monotonic(), None
-        if isinstance(press, TimedPress):
-            at_s, quiet_s = press.at_s, press.quiet_s
+        data, (at_s, quiet_s) = press.data, _when(press)
         if self._state.has_field and _writes(key):
             # A field takes bursts: scanners fill it in.
             text = data if data.isprintable() and name_of(key) not in ("enter", "backspace") else ""
@@ -143,14 +144,16 @@ class FullFace:
         for one in self._gate.press(key, at_s, quiet_s, stops=stops):
             self._happens(self._pressed(one))
 
-    def _pasted(self, text: str) -> None:
+    def _pasted(self, press: KeyPress) -> None:
         """Take what came at once: one line into a field, as a Windows console hands a scan on.
 
         prompt_toolkit makes a paste of keys that its reader finds in one look, ENTER among them.
         """
-        line, ends, more = text.replace("\r", "\n").partition("\n")
+        line, ends, more = press.data.replace("\r", "\n").partition("\n")
         if not self._state.has_field or self._state.writing is not None or more.strip("\n"):
-            self._happens(TooFast())
+            # A key just before it is the beginning of the same burst.
+            for one in self._gate.burst(*_when(press)):
+                self._happens(self._pressed(one))
             return
         for key in line:
             self._press(key, KeyPress(key))
@@ -185,6 +188,13 @@ class FullFace:
             termios: Any = import_module("termios")
             with suppress(termios.error):
                 termios.tcflush(self._input.fileno(), termios.TCIFLUSH)
+
+
+def _when(press: KeyPress) -> tuple[float, float | None]:
+    """Return by when a key had come, and when it surely had not, where that is known."""
+    if isinstance(press, TimedPress):
+        return press.at_s, press.quiet_s
+    return time.monotonic(), None
 
 
 def _writes(key: str) -> bool:

@@ -1,6 +1,6 @@
 """Screens (h) and (i): what stands at the end, shown as the last screen and kept as lines."""
 
-from robolink.errors import DeclinedError, RobolinkError
+from robolink.errors import DeclinedError, OutcomeUnknownError, RobolinkError
 from robolink.messages import tr
 from robolink.model import describe_offset, describe_standing
 from robolink.nozzle_change import ChangeReport, ToolReport
@@ -120,8 +120,8 @@ def _where(state: WizardState) -> list[str]:
 
 
 def _next(state: WizardState, error: RobolinkError) -> list[str]:
-    """Return the one command to go on with, where it is known."""
-    if standing_after(error).left_open:
+    """Return the one command to go on with, where it is known; a blocked robot takes no other."""
+    if standing_after(error).left_open or isinstance(error, OutcomeUnknownError):
         command = f'robolink -c "{state.header.cell}" recover'
     else:
         command = state.header.command

@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from robolink.calibration import Beam, BoardDrawing, Pin, rotation_of, tip_pose
+from robolink.calibration import Beam, BoardDrawing, Pin, rotation_of, tip_pose, uvw_deg
 from robolink.methods import (
     Absolute,
+    AxisTeachPlan,
     BeamsSource,
     BoardSource,
     CameraSource,
@@ -23,9 +24,11 @@ from robolink.methods import (
     PivotSource,
     PlaneSurvey,
     PlaneTouchSource,
+    SixPointSource,
     SphereSurvey,
     SphereTouchSource,
     TwoPoseSource,
+    ZTouchParameters,
     ZTouchSource,
     informative_tilts,
 )
@@ -117,6 +120,9 @@ CASES = {
     "n-angle": Case(NAngleSource((120.0, 240.0)), {"touched": PIN}),
     "one-touch": Case(OneTouchSource(Absolute(Pin(*PIN), 0.02)), {"touched": PIN}),
     "pivot": Case(PivotSource(informative_tilts(4, 20.0)), {"touched": PIN}),
+    "six-point": Case(
+        SixPointSource(informative_tilts(4, 20.0), ways=AxisTeachPlan(10.0)), {"touched": PIN}
+    ),
     "plane-touch": Case(
         PlaneTouchSource(TouchPlan(), PlaneSurvey(9), axes=6),
         {"touched": onto(Plate(15.0, 50.0, point=PIN))},
@@ -191,6 +197,13 @@ def apart_deg(one, other):
     return math.degrees(math.acos(min(1.0, max(-1.0, float(cosine)))))
 
 
+def test_the_proof_of_a_length_turns_on_from_u_of_the_tool(measured):
+    result, flange = measured("z-touch")
+    proof, written = kept(CASES["z-touch"], result, flange)
+    turn_deg = ZTouchParameters().proof_turn_deg
+    assert proof.angles_deg == pytest.approx((flange.u_deg + written.u_deg - turn_deg,))
+
+
 @pytest.mark.parametrize(
     ("sensor", "why"),
     [
@@ -228,6 +241,11 @@ def test_a_difference_that_was_written_is_proved_by_the_tip_that_was_found(
         fresh = [min(apart_deg(at, pose) for pose in before) > 10.0 for at in asked]
         # A pin is touched once more where it was touched; a surface only as it never was.
         assert all(fresh) if isinstance(proof, SURFACES) else any(fresh) or not proof.by_touch
+        if proof.method == "pivot":
+            own = rotation_of(Pose(0.0, 0.0, 0.0, *written.components()[3:]))
+            for move in (step.target for step in cell.steps if isinstance(step, Move)):
+                # A robot of five axes leans its tool about the flange's own Y alone.
+                assert uvw_deg(rotation_of(move) @ own.T)[2] == pytest.approx(0.0, abs=1e-6)
     right, wrong = found
     assert right.passed
     assert right.max_drift_mm < 1e-3

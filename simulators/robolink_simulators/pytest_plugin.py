@@ -123,11 +123,23 @@ def robolink_journal(
 
 
 @pytest.fixture
-def virtual_clock() -> "ManualClock":
-    """The time of the cells in the process: it stands still until somebody waits or steps it."""
+def virtual_clock(request: pytest.FixtureRequest) -> Iterator["ManualClock"]:
+    """The time of the cells in the process: it stands still until somebody waits or steps it.
+
+    A test all of whose cells are on a port has stepped the time of none: it fails.
+    """
     from robolink_simulators.cell.clock import ManualClock
 
-    return ManualClock()
+    clock = ManualClock()
+    yield clock
+    cells = request.node.stash.get(_CELLS, [])
+    kept = not cells or any(cell.clock is clock for cell in cells)
+    if not kept and not request.node.stash.get(_NOT_PASSED, False):
+        pytest.fail(
+            "No cell of this test keeps the time of virtual_clock: on a port, each has its own, "
+            "which cell.do('step', seconds=2) steps.",
+            pytrace=False,
+        )
 
 
 @pytest.fixture

@@ -11,7 +11,9 @@ from pathlib import Path
 import pytest
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson import EpsonOptions, EpsonSimulator
+from robolink_simulators.epson.spel import parse
 from robolink_simulators.faults import Fault, FaultAction
+from robolink_simulators.hosting.streams.epson_serial import serve_serial
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 
 from robolink.errors import ConfigError, ConnectError
@@ -237,3 +239,12 @@ def test_a_taken_port_is_named():
         port = int(host.url.rpartition(":")[2])
         with pytest.raises(ConnectError, match=str(port)):
             serve_tcp(EpsonSimulator(), port=port)
+
+
+@pytest.mark.parametrize("serve", [serve_tcp, serve_serial])
+def test_no_client_waits_until_statements_can_be_read(serve, monkeypatch):
+    """That takes a third of a second, and several of them on a busy machine."""
+    made = []
+    monkeypatch.setattr(parse, "_parser", lambda: made.append("the parser"))
+    with serve(EpsonSimulator()):
+        assert made == ["the parser"]

@@ -314,11 +314,11 @@ def test_fails(epson_sim, softmotion_sim):
 def test_passes(epson_sim):
     pass
 
-def test_a_command_is_told_what_the_test_says_alone(epson_tcp, monkeypatch):
-    told = epson_tcp.run("status")
-    assert told.exit_code == 0, told.messages
+def test_a_command_is_told_what_the_test_says_alone(epson_sim, monkeypatch):
+    assert "ROBOLINK_PASSWORD" not in epson_sim._environment()
     monkeypatch.setenv("ROBOLINK_PASSWORD", "of-the-test")
-    assert epson_tcp.run("status").exit_code != 0
+    assert epson_sim._environment()["ROBOLINK_PASSWORD"] == "of-the-test"
+    assert "PATH" in epson_sim._environment()
 
 @pytest.mark.robolink(colour="red")
 def test_asks_for_what_there_is_not(epson_sim):
@@ -345,6 +345,13 @@ def test_whose_person_could_not_do_it(epson_sim):
     epson_sim.operator.when("GetStatus", "restore", name="nothing")
     with robolink.connect(epson_sim.url) as controller:
         controller.status()
+
+def test_whose_clock_is_that_of_no_cell(virtual_clock, epson_factory):
+    epson_factory(medium="tcp")
+    virtual_clock.advance(3.0)
+
+def test_one_of_whose_cells_keeps_the_clock(virtual_clock, epson_sim, epson_tcp):
+    virtual_clock.advance(3.0)
 
 def test_that_is_skipped_in_the_middle(epson_sim):
     epson_sim.operator.when("TLSet", "press_estop")
@@ -374,17 +381,18 @@ def test_a_test_that_fails_shows_wire_seed_and_state(tmp_path):
         timeout=60,
     )
     shown = done.stdout
-    assert "1 failed, 7 passed, 1 skipped, 4 errors" in shown
+    assert "1 failed, 9 passed, 1 skipped, 5 errors" in shown
     assert "robolink: " not in shown  # no header
     assert "robolink wire: epson T6-602S, seed 7, epson+sim://pytest-" in shown
     assert "robolink state: softmotion Kin_Scara3_Z, seed 7" in shown
     assert "> $GetStatus" in shown
     assert '"pin_mm"' in shown
-    assert shown.count("robolink wire: epson") == 3
+    assert shown.count("robolink wire: epson") == 4
     assert "has no parameter 'colour'" in shown
     assert "(nothing moved)" in shown
     assert "kind (epson) pays heed to 'kinematics'" in shown
     assert "No request came that contains 'TLSet', at which press_estop was to be done." in shown
+    assert "No cell of this test keeps the time of virtual_clock" in shown
     assert "restore could not be done: There is no snapshot 'nothing'." in shown
     attached = properties(tmp_path / "report.xml", "test_fails")
     assert [name.partition(":")[0] for name in attached] == [

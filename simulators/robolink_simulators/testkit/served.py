@@ -31,7 +31,8 @@ class SimulatedCell:
         controlled: The same, for acts of the control API.
         assist: ``assist+tcp://TOKEN@127.0.0.1:PORT``, or the URL itself in the process:
             through it robolink sees and asks the person. ``None`` where nobody was asked for.
-        recipe: A recipe that fits the cell; ``None`` where none was asked for.
+        recipe: A recipe for the pin of the cell, by two poses: for an arm that can turn its
+            tool. ``None`` where none was asked for.
         left_out: Variables of the environment that :meth:`run` hands on only where they hold
             something else by then.
         wire: What crossed the wire.

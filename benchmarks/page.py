@@ -30,12 +30,12 @@ TITLES: Final = {
 
 NOTES: Final = {
     "transaction": "Both sides make two durable commits. In ours each holds what a recovery needs:"
-    "\nmarker, lease, head of the chain, entries and their indexes; that is 27 KiB of"
-    "\nthe write-ahead file in place of 8. In memory (the least of 1,500 writes) a"
-    "\nwrite takes 0.39 ms of the processor: the record 0.22, the three exchanges 0.04,"
-    "\nvalues, checks and comparisons the rest. The floor's write-ahead file becomes longer"
-    "\nwith each commit; ours is written over from its start after some ten writes,"
-    "\nwhich takes the disk a little more than half the time.",
+    "\nmarker, lease, head of the chain, entries and their indexes; together they put"
+    "\n27 KiB into the write-ahead file, the floor's commits 8. In memory (the least of"
+    "\n1,500 writes) a write takes 0.39 ms of processor time: 0.22 for the record, 0.04"
+    "\nfor the three exchanges, the rest for values, checks and comparisons. The floor's"
+    "\nwrite-ahead file grows with each commit; ours starts again from its beginning"
+    "\nafter some ten writes, which takes the disk a little more than half the time.",
     "fleet": "Controllers are made when they are first used, so opening them is cheap; both states"
     "\nare shown. The client is a bare selector in a process of its own.",
     "virtual-time": "The real driver, every check, a record in memory: a change is some 590"
@@ -50,10 +50,10 @@ NOTES: Final = {
     "\nsimulated controller takes half of the time (a tenth of all: reading 26"
     "\nstatements that are new each time), the protocol at both ends an eighth, the"
     "\ndriver a tenth, the record a twentieth; no part stands out.",
-    "solvers": "Where lstsq with covariance is the floor, it begins with arrays. A calibration"
-    "\nis given poses with a hand, a tool and a local each: of 1,000 poses on four"
-    "\naxes, to read and compare these takes 115 us, a quarter of the whole. Either"
-    "\nside uses one thread, and the two are measured a pair at a time.",
+    "solvers": "Where lstsq with covariance is the floor, it starts from arrays. A calibration"
+    "\ngets poses, each with a hand, a tool and a local: to read and compare these"
+    "\ntakes 115 us for 1,000 poses on four axes, a quarter of the whole. Each side"
+    "\nuses one thread, and the two are measured in turn, one pair at a time.",
 }
 """What has to be known to read the figures of a case."""
 

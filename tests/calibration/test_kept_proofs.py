@@ -12,9 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from robolink.calibration import Beam, BoardDrawing, Pin, rotation_of, tip_pose
+from robolink.calibration import Beam, BoardDrawing, Pin, rotation_of, tip_pose, uvw_deg
 from robolink.methods import (
     Absolute,
+    AllRoundPlan,
+    AxisTeachPlan,
     BeamsSource,
     BoardSource,
     CameraSource,
@@ -23,9 +25,12 @@ from robolink.methods import (
     PivotSource,
     PlaneSurvey,
     PlaneTouchSource,
+    RunoutTableSource,
+    SixPointSource,
     SphereSurvey,
     SphereTouchSource,
     TwoPoseSource,
+    ZTouchParameters,
     ZTouchSource,
     informative_tilts,
 )
@@ -59,6 +64,9 @@ OFF_MM = 0.3, -0.5
 """What the camera is off by, which a measurement at several angles finds."""
 
 
+ALL_ROUND = AllRoundPlan(turns_deg=tuple(30.0 * step for step in range(12)))
+
+
 class Eye:
     """A camera that answers in millimetres; what it sees the paper cell says."""
 
@@ -75,6 +83,7 @@ class Cell(PaperCell):
     """A paper cell whose camera is off, and in which a proof works as in a change."""
 
     written: ToolOffset | None = None
+    wobble_mm = 0.0
 
     def run(self, procedure, *, tip=None, camera=None):
         assert tip == self.written, "limits lie about the new tip, and nothing is repeated"
@@ -95,8 +104,12 @@ class Cell(PaperCell):
 
     def _seen(self, step):
         seen = super()._seen(step)
-        spot = replace(seen.spot, x=seen.spot.x + OFF_MM[0], y=seen.spot.y + OFF_MM[1])
-        return replace(seen, spot=spot)
+        # A tip that runs out is beside its place as the flange is turned, twice a turn.
+        own_deg = self.written.u_deg if self.written else 0.0
+        twice = 2 * math.radians(self.here.u_deg - own_deg)
+        x_mm = seen.spot.x + OFF_MM[0] + self.wobble_mm * math.cos(twice)
+        y_mm = seen.spot.y + OFF_MM[1] + self.wobble_mm * math.sin(twice)
+        return replace(seen, spot=replace(seen.spot, x=x_mm, y=y_mm))
 
 
 def onto(surface):
@@ -110,6 +123,7 @@ class Case:
     source: Any
     cell: dict[str, Any]
     slip: str = "x_mm"
+    wobble_mm: float = 0.0
 
 
 CASES = {
@@ -117,6 +131,9 @@ CASES = {
     "n-angle": Case(NAngleSource((120.0, 240.0)), {"touched": PIN}),
     "one-touch": Case(OneTouchSource(Absolute(Pin(*PIN), 0.02)), {"touched": PIN}),
     "pivot": Case(PivotSource(informative_tilts(4, 20.0)), {"touched": PIN}),
+    "six-point": Case(
+        SixPointSource(informative_tilts(4, 20.0), ways=AxisTeachPlan(10.0)), {"touched": PIN}
+    ),
     "plane-touch": Case(
         PlaneTouchSource(TouchPlan(), PlaneSurvey(9), axes=6),
         {"touched": onto(Plate(15.0, 50.0, point=PIN))},
@@ -129,6 +146,7 @@ CASES = {
     ),
     "camera": Case(CameraSource(Eye(), STATION), {}),
     "board": Case(BoardSource(Eye(), STATION, BOARD), {}),
+    "runout-table": Case(RunoutTableSource(Eye(), STATION, ALL_ROUND), {}, wobble_mm=0.25),
     "beams": Case(BeamsSource(BEAMS), {"switches": WITH_BEAMS}),
     "z-touch": Case(ZTouchSource(TouchStation(320, 60, -50, 5)), {"switches": ON_PLATE}, "z_mm"),
 }
@@ -138,7 +156,9 @@ def paper(case, here, tip):
     """Return a cell in which a frame holds a tip, and a board if that is what is measured."""
     of_board = isinstance(case.source, BoardSource)
     marks = dict(enumerate(BOARD.seen_from(tip), start=1)) if of_board else None
-    return Cell(here, tip, marks=marks, **case.cell)
+    cell = Cell(here, tip, marks=marks, **case.cell)
+    cell.wobble_mm = case.wobble_mm
+    return cell
 
 
 def seen_from(frame, flange, tip):
@@ -191,6 +211,13 @@ def apart_deg(one, other):
     return math.degrees(math.acos(min(1.0, max(-1.0, float(cosine)))))
 
 
+def test_the_proof_of_a_length_turns_on_from_u_of_the_tool(measured):
+    result, flange = measured("z-touch")
+    proof, written = kept(CASES["z-touch"], result, flange)
+    turn_deg = ZTouchParameters().proof_turn_deg
+    assert proof.angles_deg == pytest.approx((flange.u_deg + written.u_deg - turn_deg,))
+
+
 @pytest.mark.parametrize(
     ("sensor", "why"),
     [
@@ -228,9 +255,15 @@ def test_a_difference_that_was_written_is_proved_by_the_tip_that_was_found(
         fresh = [min(apart_deg(at, pose) for pose in before) > 10.0 for at in asked]
         # A pin is touched once more where it was touched; a surface only as it never was.
         assert all(fresh) if isinstance(proof, SURFACES) else any(fresh) or not proof.by_touch
+        if proof.method == "pivot":
+            own = rotation_of(Pose(0.0, 0.0, 0.0, *written.components()[3:]))
+            for move in (step.target for step in cell.steps if isinstance(step, Move)):
+                # A robot of five axes leans its tool about the flange's own Y alone.
+                assert uvw_deg(rotation_of(move) @ own.T)[2] == pytest.approx(0.0, abs=1e-6)
     right, wrong = found
     assert right.passed
-    assert right.max_drift_mm < 1e-3
+    # Between two looks of its table a runout is known by interpolation.
+    assert right.max_drift_mm < (0.03 if case.wobble_mm else 1e-3)
     assert not wrong.passed
     assert wrong.max_drift_mm > 0.3
     if after_a_break and isinstance(proof, TiltingProof):

@@ -2,14 +2,15 @@
 
 import math
 import random
+from typing import Any
 
 import pytest
 
-from robolink.calibration import planar_sigma_gain
+from robolink.calibration import Touch, planar_sigma_gain, solve_z_touch
 from robolink.errors import CalibrationError
 from robolink.methods import measure_n_angle, most_informative_order
 from robolink.model import Pose, ToolOffset, rotate_xy
-from robolink.procedures import SamplingPolicy, TouchPlan
+from robolink.procedures import SamplingPolicy, TouchPlan, finalize_samples
 from robolink.runner import Ask, Confirm, Consider, Move, Notify
 
 TIP = ToolOffset(12.3, -3.9, -20.0)
@@ -167,3 +168,44 @@ def test_the_interval_of_an_early_end_holds_the_truth_about_as_often_as_it_says(
         held += sum(abs(e) <= h for e, h in zip(errors, result.half_width95, strict=True))
         total += 2
     assert least < held / total < most, held / total
+
+
+class Pair:
+    """Two touches of a plate that check each other alone; implements ``Sampler``."""
+
+    known = "Z"
+
+    def __init__(self):
+        self.taken_at = []
+
+    def counted(self, count):
+        return f"{count} touches"
+
+    def which(self, number, taken):
+        return f"Touch {number}"
+
+    def take(self, place):
+        self.taken_at.append(place)
+        yield from ()
+        return Touch(-30.0 - place / 100, 2.0)
+
+    def away(self):
+        yield from ()
+
+    def solve(self, taken):
+        return solve_z_touch(taken, -50.0, latency_s=0.01)
+
+
+def test_of_two_that_check_each_other_it_is_the_other_s_turn():
+    """Nobody can tell which of them is off; the first alone would be made again for ever."""
+    pair, offered, answer = Pair(), list[str](), None
+    steps: Any = finalize_samples(
+        pair, [0, 10], [Touch(-30.0, 2.0), Touch(-30.1, 2.0)], retake=True
+    )
+    with pytest.raises(StopIteration):
+        while True:
+            step = steps.send(answer)
+            answer = isinstance(step, Confirm)
+            offered += [step.question[:7]] if answer else []
+    assert offered == ["Touch 1", "Touch 2", "Touch 1"]
+    assert pair.taken_at == [0, 10, 0]

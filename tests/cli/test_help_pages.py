@@ -4,8 +4,11 @@ import re
 
 import click
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from robolink_cli import main
 from robolink_cli.console.columns import columns
+from robolink_cli.console.help_pages import WideHelpFormatter
 
 from robolink import messages
 
@@ -46,3 +49,26 @@ def test_a_page_is_shown_as_a_terminal_holds_it(shown):
     assert wide == []
     assert [one for one in lines if one[1].endswith("...") and "robolink" not in one[1]] == []
     assert [one for one in lines if CODE_WORDS.match(one[1])] == []
+
+
+WORDS = st.lists(st.text("ab-.\t\n \x1b[é", max_size=9), max_size=6).map(" ".join)
+
+
+@given(
+    width=st.integers(40, 70),
+    indent=st.integers(0, 2),
+    rows=st.lists(st.tuples(WORDS, WORDS), min_size=1, max_size=3),
+)
+@settings(deadline=None, max_examples=60)
+def test_a_page_without_wide_characters_is_click_s_own(width, indent, rows):
+    written = []
+    for formatter in (click.HelpFormatter(width=width), WideHelpFormatter(width=width)):
+        for _ in range(indent):
+            formatter.indent()
+        formatter.write_dl(rows)
+        for name, said in rows:
+            formatter.write_text(said)
+            formatter.write_usage(name[:9], said)
+            formatter.write_usage("p", said, prefix=name[:9])
+        written.append(formatter.getvalue())
+    assert written[0] == written[1]

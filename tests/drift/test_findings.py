@@ -5,7 +5,10 @@ from dataclasses import replace
 
 import pytest
 
+from robolink.calibration import student_t
 from robolink.drift import DriftCode, charts_of, drift_of, findings_in, measured_changes
+from robolink.drift.mounted import mounted_trend
+from robolink.drift.significance import LEVEL, slope_of
 from robolink.errors import ConfigError
 from robolink.model import EntryKind, Recorded, Signature, ToolOffset, plain_offset
 from tests.drift._courses import course, found
@@ -204,3 +207,20 @@ def test_the_course_of_one_tool_is_of_that_tool_alone():
     for tool in (1, 2):
         cell = drift_of("cell", entries, finds_pin=lambda _: False, tool=tool)
         assert [one.tool for one in cell.changes] == [tool]
+
+
+def test_a_slope_is_told_from_the_level_on_that_was_chosen_on_both_sides():
+    """Just below the limit nothing is told: each look is one more chance of a false alarm."""
+    limit = student_t(1 - LEVEL / 2, 4)
+    for share, told in ((0.97, None), (1.03, {"z"})):
+        low, high = 0.0, 1.0
+        for _ in range(60):  # the less scatter, the steeper
+            scatter = (low + high) / 2
+            values = [0.01 * at + scatter * (-1) ** (at // 2) for at in range(6)]
+            low, high = (scatter, high) if slope_of(values)[1] > share * limit else (low, scatter)
+        changes = [
+            replace(change, nozzle="N-1", tip_mm={"z": value})
+            for change, value in zip(course(1, 6), values, strict=True)
+        ]
+        trend = mounted_trend(changes)
+        assert (trend and set(trend.moved_mm)) == told

@@ -20,6 +20,7 @@ class ChoiceSubject:
         marked: Index of the one that is marked first; ``None`` where nothing says which.
         does: What the main key is called.
         leaves: What the stop key is called.
+        details: What is to be read of each option while it is marked; empty for nothing.
         enters: Whether ENTER takes the marked row as the main key does; not where a row writes.
     """
 
@@ -29,6 +30,7 @@ class ChoiceSubject:
     marked: int | None = 0
     does: str = ""
     leaves: str = ""
+    details: tuple[tuple[str, ...], ...] = ()
     enters: bool = True
 
 

@@ -88,17 +88,25 @@ def chosen_and_tested(hand):
     hand.see("Look at the robot: which needle is mounted")
     hand.see("The new one. Make the turn test, then keep the new value.")
     hand.rest(0.4)
-    hand.press(["\x1b[B", "\x1b[B", "5"])
+    for key, seen in (
+        ("\x1b[B", "> The old"),
+        ("\x1b[B", "> The new"),
+        ("\r", "ENTER does nothing"),
+    ):
+        hand.press([key])
+        hand.see(seen)
+        hand.rest(0.2)
+    hand.press(["5"])
     hand.start()
     contacts = 0
     while True:
-        found = hand.see(r"Jog the tip onto the pin|settled|DONE|STOPPED")[0]
+        found = hand.see(r"Jog the tip onto the pin|Everything is settled|DONE|STOPPED")[0]
         contacts += found.startswith("Jog")
         if not found.startswith("Jog"):
             return contacts
         hand.jog()
         hand.press(["5"])
-        hand.see("moving|Please wait|settled|DONE|STOPPED")
+        hand.see("moving|Please wait|Everything is settled|DONE|STOPPED")
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -177,9 +177,24 @@ def jogging():
     )
 
 
+JOBS = ChoiceSubject(
+    "Choose",
+    (),
+    ("needle   (needle-one-touch.toml)", "two-nozzles   (two.toml)"),
+    details=(
+        ("Touch one pin at two angles of U, half a turn apart.", "Tool: 1"),
+        (
+            "Touch a known pin once: X, Y and Z, for a change of the needle.",
+            "Tool: 1, 2",
+            "Last change with it from here: 2026-11-20 16:12 (UTC+1), needle N-0417",
+        ),
+    ),
+)
+
 SCREENS = {
     "free jog": jogging,
     "choose": choosing,
+    "choose job": lambda: Sitting().asked(JOBS, Question.TEXT, tr("Which job?")).keys("2"),
     "check": lambda: Sitting(motors=False).asked(CHECK, Question.YES_NO).keys("1"),
     "moving": moving,
     "touch": touching,
@@ -241,6 +256,22 @@ def test_a_screen_fits_a_terminal_and_its_layout_is_ascii(name, language):
         assert character.isascii() or unicodedata.east_asian_width(character) != "A", character
     told = [*told_before(hand.state), told_question(hand.state)]
     assert all(character.isascii() for character in "".join(told)) or language != "en"
+
+
+@pytest.mark.parametrize("name", SCREENS)
+@pytest.mark.parametrize("language", ["en", "zh"], indirect=True)
+def test_nothing_of_a_screen_is_too_wide_for_its_place(name, language):
+    """A screen cuts what is too wide, so what is drawn always fits: here it is what is meant to."""
+    hand = SCREENS[name]()
+    screen = screen_of(hand.state, hand.now)
+    left, right = screen.title
+    assert wcswidth(left) + 1 + wcswidth(right) <= 80
+    assert wcswidth(screen.status) <= 80
+    keys = [f"[{key}] {does}" for key, does in screen.actions]
+    assert sum(map(wcswidth, keys)) + 2 * (len(keys) - 1) <= 80, "a second row of keys"
+    for line in screen.lines:
+        # Sentences are broken; what stands in columns would be torn.
+        assert "   " not in line.strip() or wcswidth(line.rstrip()) <= 80, line
 
 
 @pytest.mark.parametrize("name", SCREENS)

@@ -1,9 +1,11 @@
 """What a person at the screen reads, and what ENTER and a key that is too early do not do."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import click
 import pytest
+from robolink_cli.commands.measure.choosing import choose_recipe
 from robolink_cli.prompts.present import sitting_at
 from robolink_cli.session.check_before_start import check_before_start
 from robolink_cli.wizard.check_list import CheckSubject
@@ -23,11 +25,14 @@ from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 import robolink
 from robolink.errors import DeclinedError, NotReadyError
-from robolink.journal import Signature, memory_journal
+from robolink.journal import EntryKind, NewEntry, Signature, memory_journal, open_log
 from robolink.model import ToolOffset, describe_offset
+from robolink.recipe import load_recipe
 from robolink.runner import Question
 from robolink.transaction import Wanted, change_tools
 from tests.cli.wizard._people import HEADER, Sitting, touch_subject, write_subject
+
+RECIPES = Path(__file__).parents[3] / "examples" / "recipes"
 
 OLD_OR_NEW = ChoiceSubject("Recover", (), ("The old one.", "The new one."), None, enters=False)
 
@@ -194,3 +199,41 @@ def test_a_list_says_how_a_tool_was_left_and_nothing_of_one_that_somebody_change
             assert "needle N-0417" in said
             simulator.machine.tools.set(1, ToolOffset(12.6, -3.0, -20.0))
             assert "as the last change left it" not in listed(controller, 1)
+
+
+def test_lines_say_of_each_job_what_it_does():
+    jobs = replace(OLD_OR_NEW, details=(("It writes.",), ("It tests.",)))
+    hand = Sitting().asked(jobs, Question.TEXT)
+    assert told_before(hand.state) == [
+        "  1 The old one.",
+        "    It writes.",
+        "  2 The new one.",
+        "    It tests.",
+    ]
+
+
+def test_a_job_is_chosen_by_what_it_does_and_when_it_did_so_last(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    recipe = RECIPES / "needle-one-touch.toml"
+    (tmp_path / "a.toml").write_text(recipe.read_text(encoding="utf-8"), encoding="utf-8")
+    name = load_recipe(tmp_path / "a.toml").name
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
+
+    def offered():
+        desk = Leaver()
+        with pytest.raises(DeclinedError):
+            choose_recipe(desk, None)
+        (subject,) = (
+            one.subject
+            for one in desk.happened()
+            if isinstance(one, WasRegarded) and isinstance(one.subject, ChoiceSubject)
+        )
+        return subject.details[0]
+
+    assert offered()[0] == "Touch a known pin once: X, Y and Z, for a change of the needle."
+    assert offered()[1] == "Tool: 1"
+    assert len(offered()) == 2
+    log = open_log("x", durable=True, signature=Signature(recipe=name, nozzle="N-7"))
+    log.append(NewEntry(EntryKind.DONE, tool=1))
+    log.close()
+    assert "needle N-7" in offered()[2]

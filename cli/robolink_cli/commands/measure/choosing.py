@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from robolink.errors import ConfigError, DeclinedError
-from robolink.messages import tr
+from robolink.messages import spoken, tr
 from robolink_cli.prompts.present import AskingDesk, present_desk
 from robolink_cli.wizard.choices import ChoiceSubject, choose
 
@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from robolink.config import Cell
     from robolink.recipe import LoadedRecipe
     from robolink_cli.session.context import CliContext
+
+_LOOKED_AT: Final = 500
+"""So many of the newest changes are looked at for the last one with a recipe."""
 
 _FOLDERS: Final = ("", "recipes")
 """Where recipes are looked for, beside the cell file and in the working folder."""
@@ -97,8 +100,36 @@ def choose_recipe(desk: AskingDesk, cell: "Cell | None") -> "LoadedRecipe":
             ),
         )
     rows = tuple(f"{one.name}   ({one.path.name})" for one in loaded)
-    subject = ChoiceSubject(tr("Choose"), (), rows)
+    details = tuple(_told_of(one) for one in loaded)
+    subject = ChoiceSubject(tr("Choose"), (), rows, details=details)
     return loaded[choose(desk, tr("Which job?"), subject, _nothing)]
+
+
+def _told_of(loaded: "LoadedRecipe") -> tuple[str, ...]:
+    """Return what a recipe does, for which tools, and when it did so last on this computer."""
+    from robolink.errors import RobolinkError
+    from robolink.journal import open_journal
+    from robolink.model import EntryKind
+    from robolink.timing import local_label
+
+    recipe = loaded.recipe
+    said = [
+        spoken(recipe.source.of_method.summary),
+        tr("Tool: {numbers}", numbers=", ".join(str(one.number) for one in recipe.tools)),
+    ]
+    try:
+        entries = open_journal(read_only=True).entries(kinds=(EntryKind.DONE,), limit=_LOOKED_AT)
+        last = next((one for one in entries if one.signature.recipe == loaded.name), None)
+    except (RobolinkError, OSError):
+        last = None  # a list of jobs needs no record
+    if last is None:
+        return tuple(said)
+    when, nozzle = local_label(last.at), last.signature.nozzle
+    if nozzle:
+        said.append(tr("Last change with it from here: {when}, needle {id}", when=when, id=nozzle))
+    else:
+        said.append(tr("Last change with it from here: {when}", when=when))
+    return tuple(said)
 
 
 def _recipes(cell: "Cell | None") -> list[Path]:

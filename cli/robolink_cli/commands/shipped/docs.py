@@ -1,8 +1,10 @@
 """docs: the pages that come with robolink, read without a network."""
 
+import re
 import shutil
 import sys
 from pathlib import Path
+from typing import Final
 
 import click
 
@@ -10,6 +12,9 @@ from robolink.messages import tr
 from robolink_cli.console.render import emit_json, json_is_on, say, say_listed
 from robolink_cli.console.tolerance import is_terminal
 from robolink_cli.session.context import json_option
+
+_COMMENT: Final = re.compile(r"<!--.*?-->\n*", re.DOTALL)
+"""For whoever edits a page; a browser does not show it either."""
 
 
 def _complete_page(_: click.Context, __: click.Parameter, start: str) -> list[str]:
@@ -86,6 +91,6 @@ def _show(text: str) -> None:
     if is_terminal(sys.stdout) and is_terminal(sys.stdin):
         from robolink_cli.commands.shipped.page_lines import page_lines
 
-        click.echo_via_pager(page_lines(text, shutil.get_terminal_size().columns))
+        click.echo_via_pager(page_lines(_COMMENT.sub("", text), shutil.get_terminal_size().columns))
     else:
         say(text.rstrip("\n"))

@@ -20,7 +20,8 @@ def choice_screen(state: WizardState, subject: ChoiceSubject, now_s: float) -> S
     if len(above) > most:
         # What is chosen from has to be seen.
         above = [*above[: most - 1], "..."]
-    room = max(_LEAST_SHOWN, BODY - len(above) - 2)
+    told = [row for line in _details(state, subject) for row in broken(line)]
+    room = max(_LEAST_SHOWN, BODY - len(above) - 2 - (len(told) + 1 if told else 0))
     first = max(0, min((state.marked or 0) - room // 2, len(subject.options) - room))
     rows = []
     for index, option in enumerate(subject.options[first : first + room], start=first):
@@ -33,8 +34,15 @@ def choice_screen(state: WizardState, subject: ChoiceSubject, now_s: float) -> S
     )
     return Screen(
         title_row(state, subject.step),
-        (*above, "", state.question.text, *rows),
+        (*above, "", state.question.text, *rows, *(["", *told] if told else ())),
         keys,
         status=status_row(state, now_s) if state.reading is not None else "",
         message=state.message,
     )
+
+
+def _details(state: WizardState, subject: ChoiceSubject) -> tuple[str, ...]:
+    """Return what is to be read of the marked option."""
+    if state.marked is None or not subject.details:
+        return ()
+    return subject.details[state.marked]

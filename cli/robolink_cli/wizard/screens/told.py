@@ -21,7 +21,11 @@ def told_before(state: WizardState) -> list[str]:
         case FitSubject() as fit:
             return fit_lines(fit)
         case ChoiceSubject() as subject:
-            rows = [f"  {number} {one}" for number, one in enumerate(subject.options, start=1)]
+            rows = []
+            for index, option in enumerate(subject.options):
+                rows.append(f"  {index + 1} {option}")
+                details = subject.details[index] if subject.details else ()
+                rows += [f"    {detail}" for detail in details]
             return [*subject.above, *rows]
         case CheckSubject() as subject:
             points = [

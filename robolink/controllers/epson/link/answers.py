@@ -123,7 +123,7 @@ def _stopped(status: ControllerStatus) -> tuple[NotReadyReason, str, str] | None
     if status.emergency_stop:
         return (
             NotReadyReason.EMERGENCY_STOP,
-            tr("The emergency stop is pressed."),
+            tr("The emergency stop is pressed, or was released without a reset."),
             tr("Remove the danger, release the emergency stop, then run 'robolink robot reset'."),
         )
     if status.fault:

@@ -26,7 +26,8 @@ from robolink import messages
 from robolink.calibration import Drift, VerifyResult, impact_on
 from robolink.errors import DeclinedError, OutcomeUnknownError
 from robolink.locale.languages import translator
-from robolink.messages import tr
+from robolink.messages import spoken, tr
+from robolink.methods import find_method
 from robolink.model import Path as Way
 from robolink.model import Pose, ToolReceipt, WorkBox
 from robolink.nozzle_change import ChangeReport, ToolReport
@@ -177,24 +178,32 @@ def jogging():
     )
 
 
-JOBS = ChoiceSubject(
-    "Choose",
-    (),
-    ("needle   (needle-one-touch.toml)", "two-nozzles   (two.toml)"),
-    details=(
-        ("Touch one pin at two angles of U, half a turn apart.", "Tool: 1"),
-        (
-            "Touch a known pin once: X, Y and Z, for a change of the needle.",
-            "Tool: 1, 2",
-            "Last change with it from here: 2026-11-20 16:12 (UTC+1), needle N-0417",
+def jobs():
+    """Which job, with what is on record of each."""
+    needle, two = "needle   (needle-one-touch.toml)", "two-nozzles   (two.toml)"
+    when = "2026-11-20 16:12 (UTC+1)"
+    summaries = (spoken(find_method(name).summary) for name in ("one-touch", "two-pose"))
+    subject = ChoiceSubject(
+        tr("Choose"),
+        (),
+        (f"{needle}   {tr('about {n} min', n=3)}", two),
+        details=tuple(
+            (
+                summary,
+                tr("Tool: {numbers}", numbers="1"),
+                tr("Last change with it from here: {when}, needle {id}", when=when, id="N-0417"),
+                tr("A full calibration is due after {n} more changes.", n=6),
+            )
+            for summary in summaries
         ),
-    ),
-)
+    )
+    return Sitting().asked(subject, Question.TEXT, tr("Which job?"))
+
 
 SCREENS = {
     "free jog": jogging,
     "choose": choosing,
-    "choose job": lambda: Sitting().asked(JOBS, Question.TEXT, tr("Which job?")).keys("2"),
+    "choose job": jobs,
     "check": lambda: Sitting(motors=False).asked(CHECK, Question.YES_NO).keys("1"),
     "moving": moving,
     "touch": touching,

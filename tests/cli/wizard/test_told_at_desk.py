@@ -227,21 +227,41 @@ def test_a_job_is_chosen_by_what_it_does_and_when_it_did_so_last(tmp_path, monke
     name = load_recipe(tmp_path / "a.toml").name
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
 
-    def offered():
+    def offered(rows=False):
         desk = Leaver()
         with pytest.raises(DeclinedError):
-            choose_recipe(desk, None)
+            choose_recipe(desk, None, "epson+tcp://x:5000?timeout=3")
         (subject,) = (
             one.subject
             for one in desk.happened()
             if isinstance(one, WasRegarded) and isinstance(one.subject, ChoiceSubject)
         )
-        return subject.details[0]
+        return subject.options if rows else subject.details[0]
 
     assert offered()[0] == "Touch a known pin once: X, Y and Z, for a change of the needle."
     assert offered()[1] == "Tool: 1"
     assert len(offered()) == 2
     log = open_log("x", durable=True, signature=Signature(recipe=name, nozzle="N-7"))
-    log.append(NewEntry(EntryKind.DONE, tool=1))
+    log.append(NewEntry(EntryKind.DONE, tool=1, details={"took_s": 600.0}))
     log.close()
     assert "needle N-7" in offered()[2]
+    assert "about" not in offered(rows=True)[0], "of another cell, and nobody knows how long"
+    here = open_log("epson+tcp://x:5000", durable=True, signature=Signature(recipe=name))
+    touch = {
+        "station": "PIN-07", "x_mm": 1.0, "y_mm": 2.0, "z_mm": 3.0, "u_deg": 0.0,
+        "sigma_mm": 0.01, "changes": 13, "full_sigma_mm": 0.01, "touch_sigma_mm": 0.02,
+    }  # fmt: skip
+    value = [12.0, -3.5, -20.0, 0.0, 0.0, 0.0]
+    for seconds, changes in ((130.0, 14), (170.0, 15), (900.0, 16)):
+        details = {"touch": touch | {"changes": changes}, "value": value, "took_s": seconds}
+        here.append(NewEntry(EntryKind.DONE, change=f"c{changes}", tool=1, details=details))
+    assert offered(rows=True)[0].endswith(f"{name}   (a.toml)   about 3 min"), "170 s, the median"
+    assert offered()[-1] == "A full calibration is due after 4 more changes."
+    for more, said in ((19, "after one more change."), (20, "now."), (31, "now.")):
+        details = {"touch": touch | {"changes": more}, "value": value}
+        here.append(NewEntry(EntryKind.DONE, tool=1, details=details))
+        assert offered()[-1] == f"A full calibration is due {said}"
+    # Somebody wrote another value since: the method would refuse, and says why itself.
+    here.append(NewEntry(EntryKind.READ_BACK, tool=1, details={"value": [1.0, *value[1:]]}))
+    assert "due" not in offered()[-1]
+    here.close()

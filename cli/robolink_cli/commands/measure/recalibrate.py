@@ -131,7 +131,7 @@ def _chosen(context: CliContext, recipe: Path | None) -> "tuple[CliContext, Load
         return at, named
     desk = present_desk()
     assert desk is not None  # noqa: S101 - looked at by whoever calls
-    loaded = choose_recipe(desk, at.cell)
+    loaded = choose_recipe(desk, at.cell, at.url)
     desk.regard(header_of(at, tr("Change needle"), *_as_typed(loaded.path)))
     return at, loaded
 

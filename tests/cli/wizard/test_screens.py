@@ -94,6 +94,14 @@ def checking():
     points = (
         CheckPoint(Mark.OK, tr("Controller answers: {name}", name="T6-602S, T6S0012345, 7.5.4")),
         CheckPoint(Mark.OK, tr("Emergency stop released, guard closed, no program running")),
+        CheckPoint(
+            Mark.OK,
+            tr(
+                "All {n} tools are saved: backup of {when}",
+                n=15,
+                when="2026-11-20 13:58 (UTC+1)",
+            ),
+        ),
         CheckPoint(Mark.TO_DO, tr("Motors are off"), "7", tr("Switch them on")),
         CheckPoint(
             Mark.YOU,
@@ -116,6 +124,13 @@ def remarked():
     ):
         hand.happens(WasTold(said))
     return hand.asked(CHECK, Question.YES_NO)
+
+
+def unsaved():
+    """A row that is worth knowing, for which nothing waits."""
+    missing = tr("The tools are not saved: this computer has no backup of this controller")
+    points = (CheckPoint(Mark.LOOK, missing), *CHECK.points)
+    return Sitting().asked(replace(CHECK, points=points), Question.YES_NO)
 
 
 def recovering():
@@ -204,6 +219,7 @@ SCREENS = {
     "free jog": jogging,
     "choose": choosing,
     "choose job": jobs,
+    "check without backup": unsaved,
     "check": lambda: Sitting(motors=False).asked(CHECK, Question.YES_NO).keys("1"),
     "moving": moving,
     "touch": touching,

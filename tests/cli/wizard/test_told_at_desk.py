@@ -8,11 +8,12 @@ import pytest
 from robolink_cli.commands.measure.choosing import choose_recipe
 from robolink_cli.prompts.present import sitting_at
 from robolink_cli.session.check_before_start import check_before_start
-from robolink_cli.wizard.check_list import CheckSubject
+from robolink_cli.wizard.check_list import CheckPoint, CheckSubject, Mark
 from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.desk import Desk
 from robolink_cli.wizard.glance import ControllerGlance
 from robolink_cli.wizard.happenings import Reading, WasAsked, WasRegarded, WasTold
+from robolink_cli.wizard.screens.checking import point_rows
 from robolink_cli.wizard.screens.drawing import screen_of
 from robolink_cli.wizard.screens.rows import status_row
 from robolink_cli.wizard.screens.told import told_before
@@ -24,11 +25,13 @@ from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 import robolink
+from robolink.backup import keep_first_backup, load, save
 from robolink.errors import DeclinedError, NotReadyError
 from robolink.journal import EntryKind, NewEntry, Signature, memory_journal, open_log
 from robolink.model import ToolOffset, describe_offset
 from robolink.recipe import load_recipe
 from robolink.runner import Question
+from robolink.timing import local_label
 from robolink.transaction import Wanted, change_tools
 from tests.cli.wizard._people import HEADER, Sitting, touch_subject, write_subject
 
@@ -193,6 +196,35 @@ def test_a_list_claims_of_a_plc_only_what_its_mailbox_tells():
         assert "guard" not in said
         assert "LOW" not in said
         assert "permits movements" in said
+
+
+def test_a_list_says_which_backup_there_is_on_this_computer(tmp_path, monkeypatch):
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
+    with serve_tcp(EpsonSimulator(seed=7), clock=ScaledClock(10.0)) as host:
+        with robolink.connect(host.url) as controller:
+            said = listed(controller)
+            assert "The tools are not saved: this computer has no backup" in said
+            path = keep_first_backup(controller)
+            assert path is not None
+            kept = load(path)
+            save(replace(kept, saved_at="2026-11-20T12:58:00.000Z"), path, replace=True)
+            when = local_label("2026-11-20T12:58:00.000Z")
+            assert f"All 15 tools are saved: backup of {when}" in listed(controller)
+            path.write_text("{", encoding="utf-8")
+            said = listed(controller)
+            assert "The tools are not saved: " in said
+            assert str(path) in said
+            path.unlink()
+            assert "has no backup of this controller" in listed(controller)
+        with robolink.connect("epson+sim://no-backup") as controller:
+            assert "what is simulated ends with this command" in listed(controller)
+
+
+def test_a_backup_that_is_missing_keeps_nobody_from_starting():
+    points = (CheckPoint(Mark.LOOK, "No backup."), CheckPoint(Mark.YOU, "Clear.", "3", "Yes"))
+    hand = Sitting().asked(CheckSubject(points, ""), Question.YES_NO)
+    assert point_rows(points[0], frozenset())[0].split()[0] == "LOOK"
+    assert hand.keys("3", "5").sent == ["y"]
 
 
 def test_a_list_says_how_a_tool_was_left_and_nothing_of_one_that_somebody_changed():

@@ -6,7 +6,7 @@ import pytest
 def test_the_full_screen_is_drawn_takes_keys_and_is_left(opened):
     console = opened("calls", "change", "needle.toml")
     console.see("Scan the id of the new needle.")
-    console.see("READY   power LOW   tool 1 selected   reading")
+    console.see("READY   motors on   power LOW   tool 1 selected   reading")
     console.see(r"\A *line3   Change needle .*\n.*\n-{80} *\n(.*\n)+-{80} *\n")
     console.see(r"\n\[Enter\] Done +\[Esc\] STOP *\n")
     assert sum(row.startswith("-") for row in console.text.split("\n")) == 2

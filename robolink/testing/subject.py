@@ -47,6 +47,17 @@ class Subject:
             controller: A connection to the controller.
             before: What the tool held, ``None`` where it was not defined.
             selected: The tool that was in force, ``None`` where the kind tells of none.
+
+        Example:
+            >>> from robolink import ToolOffset
+            >>> from robolink.testing import MemoryController, MemoryMachine, Subject
+            >>> machine = MemoryMachine(tools={1: ToolOffset(12, -3.5, -20)}, selected=1)
+            >>> subject = Subject(lambda: MemoryController(machine), tool=2)
+            >>> with subject.connect() as controller:
+            ...     receipt = controller.tools.write(2, ToolOffset(1, 2, 3), expected=None)
+            ...     subject.put_back(controller, before=None, selected=1)
+            ...     print(controller.tools.read(2))
+            None
         """
         controller.release_stop()
         tools = controller.tools

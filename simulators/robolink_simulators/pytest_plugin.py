@@ -46,7 +46,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group = parser.getgroup("robolink")
     group.addoption(
         "--robolink-seed",
-        type=int,
+        type=_seed,
         default=1,
         metavar="N",
         help="seed of the simulated controllers (default: 1)",
@@ -283,6 +283,13 @@ def epson_replay(
     ]
     if differences:
         pytest.fail("\n".join(differences), pytrace=False)
+
+
+def _seed(text: str) -> int:
+    seed = int(text)
+    if seed < 0:  # for chance, -3 would be 3 once more
+        raise ValueError(text)
+    return seed
 
 
 def _asked(

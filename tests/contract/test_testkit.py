@@ -6,6 +6,7 @@ import sys
 from xml.etree import ElementTree
 
 import pytest
+from robolink_simulators import pytest_plugin
 from robolink_simulators.device.wire_record import MOST_LINES, WireRecord
 from robolink_simulators.testkit.asked import CellRequest
 
@@ -177,6 +178,12 @@ def test_what_cannot_be_asked_for_is_refused(given, words, epson_factory):
 def test_what_a_kind_pays_no_heed_to_is_refused(kind, name, value, request):
     with pytest.raises(ConfigError, match=f"kind \\({kind}\\) pays heed to '{name}'"):
         request.getfixturevalue(f"{kind}_factory")(**{name: value})
+
+
+def test_a_seed_below_zero_would_be_another_one_again():
+    assert pytest_plugin._seed("7") == 7
+    with pytest.raises(ValueError, match="-3"):
+        pytest_plugin._seed("-3")
 
 
 def test_a_speed_is_for_cells_on_a_port(epson_factory, softmotion_factory):

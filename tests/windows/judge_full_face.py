@@ -10,6 +10,7 @@ def test_the_full_screen_is_drawn_takes_keys_and_is_left(opened):
     console.see(r"\A *line3   Change needle .*\n.*\n-{80} *\n(.*\n)+-{80} *\n")
     console.see(r"\n\[Enter\] Done +\[Esc\] STOP *\n")
     assert sum(row.startswith("-") for row in console.text.split("\n")) == 2
+    console.rest(0.5)
     console.type("N-7")
     console.see("> N-7_")
     console.type("\r")

@@ -8,6 +8,7 @@ def console(opened):
     """``change --plain`` up to the first touch."""
     console = opened("calls", "change", "needle.toml", "--plain", rows=60)
     console.see("Scan the id of the new needle.")
+    console.rest(0.5)
     console.type("N-0418\r")
     console.see("Type the number of a row")
     console.type("1\r")

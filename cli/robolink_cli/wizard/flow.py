@@ -342,6 +342,9 @@ def _line(state: WizardState, line: LineTyped) -> Advanced:
         return _stop(state)
     if question is None or not state.waits:
         return state, []
+    if typed and not isinstance(state.subject, ChoiceSubject) and not _armed(state, line.at_s):
+        # The end of a code that a scanner began before the question was there is another code.
+        return state.says(tr("Typed too early, so nothing of it was taken. Please once more.")), []
     if state.at_place:
         return _line_at_place(state, line, meaning)
     return _taken(state, answered_by_line(state, line.text))

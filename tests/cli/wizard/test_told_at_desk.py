@@ -69,6 +69,14 @@ def test_a_code_that_begins_before_its_field_could_be_seen_is_dropped_whole(firs
     assert hand.state.message == ""
 
 
+def test_the_end_of_a_code_that_began_too_early_is_no_line_either():
+    hand = asked_for_an_id().line("18")
+    assert hand.sent == []
+    assert "Typed too early" in hand.state.message
+    hand.now += 0.31
+    assert hand.line("N-0418").sent == ["N-0418"]
+
+
 def test_what_was_told_between_two_questions_is_read_on_the_next_screen():
     for subject, kind in ((touch_subject(), Question.PLACE), (OLD_OR_NEW, Question.TEXT)):
         hand = Sitting().happens(WasTold("Tool 1 is not what the last calibration left."))

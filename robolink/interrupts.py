@@ -111,11 +111,18 @@ class _Handler:
         return taken
 
     def leave(self, numbers: list[int], *, for_good: bool = False) -> None:
-        """Watch them for one less; the last one gives them back, or lets nobody hear them."""
+        """Watch them for one less; the last one gives them back.
+
+        Where the process ends nobody is to hear them, not even a session that was left open.
+        """
         for number in numbers:
             self._watchers[number] -= 1
-            if not self._watchers[number] and signal.getsignal(number) == self._came:
-                signal.signal(number, signal.SIG_IGN if for_good else _usual(number))
+            if signal.getsignal(number) != self._came:
+                continue
+            if for_good:
+                signal.signal(number, signal.SIG_IGN)
+            elif not self._watchers[number]:
+                signal.signal(number, _usual(number))
 
     def begin_command(self) -> EndedBy | None:
         """Let one ending count from now on; return what has ended the command around it."""

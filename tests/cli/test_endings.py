@@ -71,14 +71,21 @@ def test_what_nohup_ignores_stays_ignored():
         signal.signal(signal.SIGHUP, before)
 
 
-def test_a_process_that_ends_then_is_not_killed_by_a_late_signal():
+@pytest.mark.parametrize("session", ["closed", "left open"])
+def test_a_process_that_ends_then_is_not_killed_by_a_late_signal(session):
     before = {each: signal.getsignal(each) for each in CODES}
+    gate = InterruptGate()
     try:
         with one_ending(last=True):
-            pass
+            gate.open()
+            if session == "closed":
+                gate.close()
+        ignored = [signal.getsignal(each) for each in CODES]
+        assert ignored == [signal.SIG_IGN] * len(CODES)
         for each in CODES:
             signal.raise_signal(each)
     finally:
+        gate.close()
         for each, handler in before.items():
             signal.signal(each, handler)
 

@@ -15,7 +15,7 @@ from robolink.calibration import LengthChange, TipShift, chain_of, judge_shifts
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.methods import find_last_touch
-from robolink.model import Controller, EntryKind
+from robolink.model import Controller, EntryKind, Pose, ToolOffset
 from robolink.nozzle_change._pin_record import tells_height, touch_details, touch_heights_mm
 from robolink.nozzle_change._plan import ToolPlan
 from robolink.nozzle_change._proposal import Proposal
@@ -42,6 +42,7 @@ class KnownHeight:
         z_from: Where the Z came from that it goes back to.
         aside_mm: How far aside the pin may be found before it counts as moved; ``None`` for what
             its scatter says.
+        same_tool: Whether the last touch of the same tool tells it.
     """
 
     place_mm: tuple[float, float, float]
@@ -49,6 +50,7 @@ class KnownHeight:
     sigma_mm: float = 0.0
     z_from: str = "kept"
     aside_mm: float | None = None
+    same_tool: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +94,7 @@ def known_height(
         last = find_last_touch(controller, tool, pin)
     except CalibrationError:
         return _of_station(controller, pin) or _of_cell_file(stated)
-    return KnownHeight(last.place_mm, last.touches, z_from=last.z_from)
+    return KnownHeight(last.place_mm, last.touches, z_from=last.z_from, same_tool=True)
 
 
 def settle_lengths(
@@ -145,8 +147,6 @@ def _chained(controller: Controller, plan: ToolPlan, proposal: Proposal) -> Prop
 
 def _told(controller: Controller, plan: ToolPlan, proposal: Proposal) -> _Told:
     """Return what the heights tell, or why they tell nothing; empty where nobody asks them."""
-    from robolink.calibration import length_change  # numpy, late
-
     if proposal.before is None or proposal.z_from == "typed" or not tells_height(proposal.result):
         return _Told()
     # A Z that was made from a stated height cannot be compared with it.
@@ -160,17 +160,43 @@ def _told(controller: Controller, plan: ToolPlan, proposal: Proposal) -> _Told:
         return _Told(why=tr("Nothing on record says how high the pin is."))
     if known is None:
         return _Told(why=tr("No pin was named.") if plan.moving else "")
-    pose = proposal.result.inputs[-1]
-    change = length_change(
+    heights, inputs = touch_heights_mm(proposal), proposal.result.inputs
+    change = change_against(controller, plan.pin, known, heights, proposal.offset, inputs)
+    return _Told(change, known)
+
+
+def change_against(
+    controller: Controller,
+    pin: str,
+    known: KnownHeight,
+    heights_mm: Sequence[float],
+    stored: ToolOffset,
+    touches: Sequence[Pose],
+) -> LengthChange:
+    """Compare how high touches put a pin with what is known of it.
+
+    Args:
+        controller: Whose record tells how well touches repeat.
+        pin: Name of the pin.
+        known: How high it is.
+        heights_mm: How high each touch puts it, if the tip is as long as the value says; base.
+        stored: That value.
+        touches: The flange at all touches, upright alike.
+
+    Raises:
+        CalibrationError: ``touch_heights_differ``, ``non_finite``.
+    """
+    from robolink.calibration import length_change  # numpy, late
+
+    return length_change(
         [known.place_mm[2]] * known.touches,
-        touch_heights_mm(proposal),
-        stored_z_mm=proposal.offset.z_mm,
-        v_deg=pose.v_deg,
-        w_deg=pose.w_deg,
-        sigma_z_mm=touch_sigma_z_mm(controller, plan.pin, touched_by(proposal.result.inputs)),
+        heights_mm,
+        stored_z_mm=stored.z_mm,
+        v_deg=touches[-1].v_deg,
+        w_deg=touches[-1].w_deg,
+        sigma_z_mm=touch_sigma_z_mm(controller, pin, touched_by(touches)),
         u_place_mm=known.sigma_mm,
     )
-    return _Told(change, known)
 
 
 def _moved(known: KnownHeight, plan: ToolPlan, proposal: Proposal) -> bool:

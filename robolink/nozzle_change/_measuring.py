@@ -10,6 +10,7 @@ from robolink.calibration import CalibrationResult
 from robolink.errors import CalibrationError, ConfigError, RobolinkError
 from robolink.messages import joined, tr
 from robolink.model import EntryKind, NewEntry, Pose, ToolOffset
+from robolink.nozzle_change._first_touch import told_by_first_touch
 from robolink.nozzle_change._plan import ToolPlan
 from robolink.nozzle_change._proposal import Listener, Moment, Proposal
 from robolink.nozzle_change._records import calibration_entry, decision_entry, refusal_entry
@@ -103,7 +104,7 @@ class Measuring:
         self.go_to(plan.approach, tr("Moving to where tool {tool} is measured.", tool=tool))
         self._listener.moment(Moment.BEFORE_MEASURE, context, tool)
         before = context.controller.tools.read(tool)
-        with self._watched(plan):
+        with self._watched(plan, before):
             result, notes = told_of_typed(plan.named(measure(before)))
             plan.criteria.judge_fit(result)
             rests_on = self._station_record(plan.station)
@@ -138,7 +139,7 @@ class Measuring:
         return {"station_record": {"station": name, "entry": known.entry, "at": known.found_at}}
 
     @contextmanager
-    def _watched(self, plan: ToolPlan) -> Iterator[None]:
+    def _watched(self, plan: ToolPlan, before: ToolOffset | None) -> Iterator[None]:
         """Tell of each step; when the measurement ends early, keep its poses on record."""
         poses: list[Pose] = []
         log = self._context.controller.outcomes
@@ -151,6 +152,8 @@ class Measuring:
                 details = {"question": done.step.question, "tool": plan.tool}
                 log.append(decision_entry(answer, **details))
             self._listener.step(plan.tool, done)
+            if told := told_by_first_touch(self._context.controller, plan, before, done):
+                self._context.operator.tell(told)
 
         with self._context.telling(on_step):
             try:

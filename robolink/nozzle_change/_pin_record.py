@@ -66,7 +66,13 @@ def require_pin_in_base(station: str, result: CalibrationResult) -> None:
 def touch_heights_mm(proposal: Proposal) -> list[float]:
     """Return how high each touch puts the pin, if the tip is as long as the value says; base."""
     value = proposal.offset
-    return [pose.z_mm + _turned(pose, value)[2] for pose in _kept_inputs(proposal.result)]
+    return [contact_of(pose, value)[2] for pose in _kept_inputs(proposal.result)]
+
+
+def contact_of(pose: Pose, offset: ToolOffset) -> tuple[float, float, float]:
+    """Return where a touch puts the pin, if the tip is where an offset says; base."""
+    x_mm, y_mm, z_mm = _turned(pose, offset)
+    return pose.x_mm + x_mm, pose.y_mm + y_mm, pose.z_mm + z_mm
 
 
 def _kept_inputs(result: CalibrationResult) -> list[Pose]:
@@ -89,7 +95,7 @@ def pin_mm(proposal: Proposal) -> tuple[float, float, float]:
     x_mm, y_mm = result.reference_point_mm[:2]
     if len(result.reference_point_mm) == 3:
         return x_mm, y_mm, result.reference_point_mm[2]
-    heights = [pose.z_mm + _turned(pose, tip)[2] for pose in _kept_inputs(result)]
+    heights = [contact_of(pose, tip)[2] for pose in _kept_inputs(result)]
     return x_mm, y_mm, fmean(heights)
 
 

@@ -24,12 +24,26 @@ def arm(tmp_path, monkeypatch):
         yield cell
 
 
+def seen_at_touch_1(err):
+    """Return by how much the needle was said to be longer, mm; said between two touches, once."""
+    before, said, after = err.partition("The needle seems ")
+    assert said, err
+    assert "The needle seems" not in after
+    assert "Jog the tip onto the pin again" not in before
+    assert "Turning in the air." in after
+    mm, _, way = after.partition(" mm ")
+    assert way.startswith(("longer than the old one", "shorter than the old one"))
+    return float(mm) * (1 if way.startswith("longer") else -1)
+
+
 def station_z(arm):
     return arm.recorded(EntryKind.STATION)[0].details["z_mm"]
 
 
 def test_z_follows_the_heights_or_is_kept_where_that_was_decided(arm):
-    assert arm.calibrate("n-angle", *THREE, NO_PROOF).code == 0
+    first = arm.calibrate("n-angle", *THREE, NO_PROOF)
+    assert first.code == 0
+    assert "needle seems" not in first.err, "nothing is on record that it could be seen against"
     before = arm.stored
     arm.lengthen(-0.5)
     followed = arm.calibrate("n-angle", *THREE, "--if-length-changed", "difference")
@@ -39,10 +53,12 @@ def test_z_follows_the_heights_or_is_kept_where_that_was_decided(arm):
     assert told["changed"]
     assert told["written"] == "difference"
     assert "length_changed" in followed.document["warnings"]
+    assert seen_at_touch_1(followed.err) == pytest.approx(-0.5, abs=0.2)
     # Now Z is right for this tip, and there is nothing to say.
     again = arm.calibrate("n-angle", *THREE)
     assert again.code == 0, again.err
     assert not again.document["length"]["changed"]
+    assert "seems about as long as the old one: touch 1 shows no" in again.err
     assert again.document["warnings"] == ["few_poses"]
     # Kept knowingly it stays, and that is on record.
     before = arm.stored
@@ -134,6 +150,7 @@ def test_a_pin_of_known_height_shows_that_another_tool_s_z_is_wrong(arm):
     followed_z = arm.held(2)
     assert followed_z is not None
     assert followed_z.z_mm == pytest.approx(arm.stored.z_mm, abs=0.15)
+    assert "shorter than the stored value says" in followed.err
     # The height of the pin stays what it was: tool 2 followed it.
     heights = [entry.details["z_mm"] for entry in arm.recorded(EntryKind.STATION)]
     assert heights[0] == heights[1]

@@ -65,6 +65,17 @@ def touching():
     return hand
 
 
+def length_seen():
+    """What touch 1 showed stands on the screen of touch 2."""
+    said = tr(
+        "The needle seems {mm} mm longer than the old one (touch 1 alone: +-{half} mm, if the pin "
+        "is where it was).",
+        mm="0.51",
+        half="0.14",
+    )
+    return Sitting().happens(WasTold(said)).asked(touch_subject(retakes=True, types=True))
+
+
 def choosing():
     rows = ("line3   EPSON T6-602S", "line4   EPSON T6-602S", "mixer   SoftMotion")
     subject = ChoiceSubject(tr("Choose"), (), rows)
@@ -238,6 +249,7 @@ SCREENS = {
         replace(fit_subject(0.006, 0.004, 0.131, 0.007, worst=2), more=True), Question.YES_NO
     ),
     "touch again": lambda: Sitting().asked(touch_subject(number=3, retakes=True, types=True)),
+    "length seen": length_seen,
     "touch typed": lambda: (
         Sitting().asked(touch_subject(types=True)).keys(".").keys(*"250.112 199.954")
     ),

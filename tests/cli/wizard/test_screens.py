@@ -25,7 +25,7 @@ from wcwidth import wcswidth
 from robolink import messages
 from robolink.calibration import Drift, VerifyResult, impact_on
 from robolink.errors import DeclinedError, OutcomeUnknownError
-from robolink.locale.languages import translator
+from robolink.locale.languages import CHINESE, ENGLISH, translator
 from robolink.messages import spoken, tr
 from robolink.methods import find_method
 from robolink.model import Path as Way
@@ -78,7 +78,7 @@ def length_seen():
 
 def choosing():
     rows = ("line3   EPSON T6-602S", "line4   EPSON T6-602S", "mixer   SoftMotion")
-    subject = ChoiceSubject(tr("Choose"), (), rows)
+    subject = ChoiceSubject(tr("Choose"), (), rows, other=other_one())
     return Sitting().asked(subject, Question.TEXT, tr("Which cell?"))
 
 
@@ -204,6 +204,11 @@ def jogging():
     )
 
 
+def other_one():
+    """Return the language that the key changes to."""
+    return CHINESE if tr("Next") == "Next" else ENGLISH
+
+
 def jobs():
     """Which job, with what is on record of each."""
     needle, two = "needle   (needle-one-touch.toml)", "two-nozzles   (two.toml)"
@@ -222,6 +227,7 @@ def jobs():
             )
             for summary in summaries
         ),
+        other=other_one(),
     )
     return Sitting().asked(subject, Question.TEXT, tr("Which job?"))
 

@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     from robolink.runner._steps import TakenStep as TakenStep
     from robolink.runner._steps import TeachPrompt as TeachPrompt
     from robolink.runner._steps import TouchedAt as TouchedAt
+    from robolink.runner._subjects import AngleShown as AngleShown
     from robolink.runner._subjects import FitRow as FitRow
     from robolink.runner._subjects import FitSubject as FitSubject
     from robolink.runner._subjects import GuidedOperator as GuidedOperator
@@ -78,7 +79,7 @@ __getattr__ = lazy_exports(
         "_settings": "RunSettings",
         "_steps": "Ask Confirm Consider Look Move Notify Procedure Seek SeenAt Step TakenStep "
         "TeachPrompt TouchedAt",
-        "_subjects": "FitRow FitSubject GuidedOperator JogRange JogSubject MoveSubject "
+        "_subjects": "AngleShown FitRow FitSubject GuidedOperator JogRange JogSubject MoveSubject "
         "TouchSubject regard",
         "_yes_no": "BACK MORE ask_yes_no ask_yes_no_or yes_or_no",
     },

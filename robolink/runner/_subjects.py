@@ -14,6 +14,22 @@ from robolink.runner._operator import Operator
 
 
 @dataclass(frozen=True, slots=True)
+class AngleShown:
+    """What the touches of a turn test at one angle have shown.
+
+    Attributes:
+        u_deg: The angle U of the tool.
+        off_mm: How far off the tip was there; of several touches, their mean.
+        within: Whether that is surely inside the limit, or surely outside; ``None`` for so near to
+            it that it is touched again.
+    """
+
+    u_deg: float
+    off_mm: float
+    within: bool | None
+
+
+@dataclass(frozen=True, slots=True)
 class TouchSubject:
     """A place to which a person brings the tip.
 
@@ -30,6 +46,8 @@ class TouchSubject:
             begun again from the first.
         types: Whether the pose may be typed in place of being read.
         surface: Whether a surface is touched, and not a pin.
+        earlier: What the touches of the turn test before this one have shown, each angle once, as
+            far as one angle alone shows something.
     """
 
     number: int = 0
@@ -41,6 +59,7 @@ class TouchSubject:
     retakes: bool = False
     types: bool = False
     surface: bool = False
+    earlier: tuple[AngleShown, ...] = ()
 
     @property
     def proof(self) -> bool:

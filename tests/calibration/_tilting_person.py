@@ -55,6 +55,7 @@ class Person:
         self._stiff = stiff
         self.reaches = reaches
         self.steps, self.touches, self.offers, self.told = [], [], [], []
+        self.subjects = []
 
     def run(self, procedure, tip=TIP):
         """Answer every step; return the result."""
@@ -83,6 +84,7 @@ class Person:
                 x, y, z = (PIN + error - rotation_of(self._here) @ tip.components()[:3]).tolist()
                 self._here = replace(self._here, x_mm=x, y_mm=y, z_mm=z)
                 self.touches.append(self._here)
+                self.subjects.append(step.subject)
                 return self._here
             case Move():
                 angles = ("u_deg", "v_deg", "w_deg") if self._stiff else ()

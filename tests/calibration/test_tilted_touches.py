@@ -166,3 +166,7 @@ def test_tilting_about_a_wrong_tip_shows_its_error_in_height_too(error):
     )
     assert all((abs(drift.dz_mm) > 0.05) is any(error) for drift in result.drifts)
     assert len(person.touches) == 2
+    first, second = (subject.earlier for subject in person.subjects)
+    assert first == ()
+    (shown,) = second
+    assert (shown.off_mm, shown.within) == (result.drifts[0].distance_mm, not any(error))

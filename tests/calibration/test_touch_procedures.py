@@ -170,6 +170,34 @@ def test_a_drift_too_near_to_the_tolerance_is_touched_again_and_does_not_pass(
     assert len(outcome.drifts) == 2
 
 
+def earlier_shown(person):
+    """Return what stood beside each question of a turn test, off rounded to 0.01 mm."""
+    subjects = [step.subject for step in person.log if isinstance(step, Ask)]
+    return [
+        [(one.u_deg, round(one.off_mm, 2), one.within) for one in subject.earlier]
+        for subject in subjects
+        if isinstance(subject, TouchSubject)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("error_mm", "within", "last"),
+    [(0.10, True, 2), (0.30, False, 2), (0.21, None, 4)],
+)
+def test_each_touch_of_the_turn_test_is_asked_for_with_what_the_earlier_ones_have_shown(
+    error_mm, within, last
+):
+    outcome, person = verified(ToolOffset(12.3 + error_mm, -3.9, -20), ToolOffset(12.3, -3.9, -20))
+    shown = earlier_shown(person)
+    row = [(90.0, error_mm, within), (0.0, error_mm, within)]
+    assert shown[:2] == [[], row[:1]]
+    assert shown[2:] == [row] * (last - 2)
+    # What was shown of an angle is what the verdict counts there.
+    assert [one.distance_mm for one in outcome.drifts] == pytest.approx([error_mm] * 2)
+    _, measuring = measured(ToolOffset(12.3, -3.9, -20), ToolOffset(12, -4, -20))
+    assert earlier_shown(measuring) == [[], []]
+
+
 def test_the_mean_of_touches_at_one_angle_is_surer_and_may_pass():
     proof = DriftProof(tolerance_mm=0.2, u_mm=0.03)
     place = Pose(0.0, 0.0, 0.0, 90.0)

@@ -193,6 +193,7 @@ def verify_by_tilting(
 
 
 def _shown(swing: "_Swing", proof: DriftProof, tilt: Tilt) -> Procedure[None]:
+    swing.touches.tell_of(proof.so_far())
     found = yield from swing.touch(
         tilt,
         tr("Jog the tip onto the pin again. We measure how far it was off."),
@@ -213,7 +214,7 @@ class _Swing:
     def __init__(self, plan: TouchPlan, over: OverPin, touches: PinTouches) -> None:
         self.over = over
         self._plan = plan
-        self._touches = touches
+        self.touches = touches
         self._stands = UPRIGHT
 
     def to(self, goal: Tilt) -> Procedure[None]:
@@ -229,7 +230,7 @@ class _Swing:
         """Tilt in the air, come down beside the pin, let the person touch it, and lift off."""
         yield from self.to(tilt)
         return (
-            yield from self._touches.again(
+            yield from self.touches.again(
                 self.over.pose(tilt, 0.0),
                 key=key,
                 turning=tr("Moving beside the pin."),

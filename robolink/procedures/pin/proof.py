@@ -21,7 +21,7 @@ from robolink.procedures.approach import NO_OFFSET, offset_z
 from robolink.procedures.pin.judging import heights_agree
 from robolink.procedures.pin.touch_plan import TouchPlan, plain_pose
 from robolink.procedures.pin.touches import PinTouches
-from robolink.runner import Notify, Procedure, TouchedAt, first_clear
+from robolink.runner import AngleShown, Notify, Procedure, TouchedAt, first_clear
 
 MOST_MORE: Final = 2
 """Touches that a drift may take which is neither surely inside nor surely outside."""
@@ -79,13 +79,13 @@ def verify_by_turning(
     )
     proof = DriftProof(tolerance_mm, plan.u_drift_mm if u_mm is None else u_mm)
     for angle_deg in angles_deg:
-        proof.add(*(yield from turning.shown(angle_deg)))
+        proof.add(*(yield from turning.shown(angle_deg, proof.so_far())))
     for _ in range(MOST_MORE):
         doubted = proof.undecided()
         if doubted is None:
             break
         yield Notify(proof.told(doubted))
-        proof.add(*(yield from turning.shown(doubted.u_deg)))
+        proof.add(*(yield from turning.shown(doubted.u_deg, proof.so_far())))
     heights_mm = [contact.z_mm, *(touch.z_mm for touch in proof.touches)]
     return proof.result(heights_agree(heights_mm, plan.sigma_in_height_mm))
 
@@ -119,8 +119,11 @@ class _Turning:
         self._touches = PinTouches(plan, limit_mm=limit_mm)
         self._count = 0
 
-    def shown(self, angle_deg: float) -> Procedure[tuple[Pose, TouchedAt]]:
+    def shown(
+        self, angle_deg: float, earlier: tuple[AngleShown, ...] = ()
+    ) -> Procedure[tuple[Pose, TouchedAt]]:
         """Have the pin touched; returns where the tip should have been, and where it was."""
+        self._touches.tell_of(earlier)
         place = place_on_pin(self._contact, angle_deg, self._written, self._tip)
         found = yield from self._touches.again(
             place,
@@ -206,10 +209,21 @@ class DriftProof:
     def undecided(self) -> Drift | None:
         """Return the drift that needs another touch; none where one is outside for sure."""
         drifts = self._drifts()
-        verdicts = [judge_drift(one.distance_mm, one.u_mm, self.tolerance_mm) for one in drifts]
+        verdicts = [self._judged(one) for one in drifts]
         if DriftVerdict.FAILED in verdicts or DriftVerdict.UNDECIDED not in verdicts:
             return None
         return drifts[verdicts.index(DriftVerdict.UNDECIDED)]
+
+    def so_far(self) -> tuple[AngleShown, ...]:
+        """Return what each angle has shown by itself, judged as in the end, in their order."""
+        within = {DriftVerdict.PASSED: True, DriftVerdict.FAILED: False}
+        return tuple(
+            AngleShown(one.u_deg, one.distance_mm, within.get(self._judged(one)))
+            for one in self._drifts()
+        )
+
+    def _judged(self, drift: Drift) -> DriftVerdict:
+        return judge_drift(drift.distance_mm, drift.u_mm, self.tolerance_mm)
 
     def told(self, drift: Drift) -> str:
         """Return why it is touched again."""

@@ -15,7 +15,16 @@ from robolink.messages import tr
 from robolink.model import Pose
 from robolink.procedures.pin.judging import was_jogged
 from robolink.procedures.pin.touch_plan import TouchPlan
-from robolink.runner import Ask, Move, Notify, NotYet, Procedure, TouchedAt, TouchSubject
+from robolink.runner import (
+    AngleShown,
+    Ask,
+    Move,
+    Notify,
+    NotYet,
+    Procedure,
+    TouchedAt,
+    TouchSubject,
+)
 
 MOST_ASKED: Final = 3
 """How often a person is asked for a touch before the refusal ends the measurement."""
@@ -46,6 +55,7 @@ class WitnessedTouches(ABC):
         self._taken: dict[Hashable, TouchedAt] = {}
         self._numbers: dict[Hashable, int] = {}
         self._number = 0
+        self._earlier: tuple[AngleShown, ...] = ()
 
     def shown(self, instruction: str, *, key: Hashable = None) -> Procedure[TouchedAt]:
         """Let the person bring the tip into contact from wherever it is, and lift off.
@@ -120,6 +130,10 @@ class WitnessedTouches(ABC):
         self._taken = dict(touches)
         self._numbers = {key: number for number, key in enumerate(touches, start=1)}
 
+    def tell_of(self, earlier: tuple[AngleShown, ...]) -> None:
+        """Have the next ones asked for with what the touches of a proof have shown so far."""
+        self._earlier = earlier
+
     @property
     def plan(self) -> TouchPlan:
         """Lift, clearance, contact input."""
@@ -138,6 +152,7 @@ class WitnessedTouches(ABC):
             limit_mm=self._limit_mm,
             retakes=self._retakes,
             types=self._may_be_typed,
+            earlier=self._earlier,
         )
 
     @property

@@ -24,7 +24,7 @@ SHOWN = {
     "typed": "touch typed",
     "fit": "fit more",
     "values": "values taught",
-    "turn-test": "turn test",
+    "turn-test": "turn test more",
     "done": "done",
     "stopped": "stopped",
     "recover": "recover",

@@ -31,7 +31,7 @@ from robolink.methods import find_method
 from robolink.model import Path as Way
 from robolink.model import Pose, ToolReceipt, WorkBox
 from robolink.nozzle_change import ChangeReport, ToolReport
-from robolink.runner import JogRange, MoveSubject, Question
+from robolink.runner import AngleShown, JogRange, MoveSubject, Question
 from robolink.standing import Standing, note_standing
 from tests.cli.wizard._people import (
     ARRIVAL,
@@ -74,6 +74,19 @@ def length_seen():
         half="0.14",
     )
     return Sitting().happens(WasTold(said)).asked(touch_subject(retakes=True, types=True))
+
+
+def turning_on():
+    """The third place of a turn test: one angle passed, one is touched once more."""
+    earlier = (AngleShown(90.0, 0.008, True), AngleShown(180.0, 0.093, None))
+    subject = touch_subject(
+        number=3,
+        total=None,
+        limit_mm=0.1,
+        earlier=earlier,
+        arrival=replace(ARRIVAL, u_deg=180.0, tool=1),
+    )
+    return Sitting(in_tool=1).asked(subject)
 
 
 def choosing():
@@ -242,6 +255,7 @@ SCREENS = {
     "touch": touching,
     "first touch": lambda: Sitting().asked(touch_subject(number=1, arrival=None)),
     "turn test": lambda: Sitting(in_tool=1).asked(touch_subject(limit_mm=0.2, total=None)),
+    "turn test more": turning_on,
     "fit": lambda: Sitting().asked(
         fit_subject(0.006, 0.004, 0.131, 0.007, worst=2), Question.YES_NO
     ),
@@ -327,6 +341,18 @@ def test_a_screen_is_the_stored_one(name, request):
         path.write_text(drawn, encoding="ascii")
         pytest.fail(f"{path.name} was stored; look at it")
     assert drawn == path.read_text(encoding="ascii")
+
+
+def test_lines_say_what_the_turn_test_has_shown_too():
+    told = told_question(turning_on().state).splitlines()
+    assert told[:2] == [
+        "At U 90.0 it was 0.008 mm off: OK.",
+        "At U 180.0 it was 0.093 mm off: too near to the limit.",
+    ]
+    beyond = touch_subject(limit_mm=0.1, earlier=(AngleShown(90.0, 0.2, False),))
+    assert told_question(Sitting().asked(beyond).state).startswith(
+        "At U 90.0 it was 0.200 mm off: over the limit."
+    )
 
 
 def test_the_picture_finds_the_elbow_by_angles_alone():

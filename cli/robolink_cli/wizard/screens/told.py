@@ -5,13 +5,13 @@ import math
 from robolink.locale.languages import ENGLISH
 from robolink.messages import joined, tr
 from robolink.nozzle_change import WriteSubject
-from robolink.runner import FitSubject, Question
+from robolink.runner import FitSubject, Question, TouchSubject
 from robolink_cli.wizard.check_list import CheckSubject
 from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.screens.checking import mark_of
 from robolink_cli.wizard.screens.fitting import fit_lines
 from robolink_cli.wizard.screens.rows import mm
-from robolink_cli.wizard.screens.touching import instruction, touch_title
+from robolink_cli.wizard.screens.touching import angle_word, instruction, touch_title
 from robolink_cli.wizard.screens.values import taught_lines
 from robolink_cli.wizard.state import WizardState
 
@@ -94,7 +94,17 @@ def _place(state: WizardState) -> str:
         how = tr("Type steps (x+0.1 z-0.5), take, again 1, stop, or help.")
     else:
         how = tr("Type steps (x+0.1 z-0.5), take, stop, or help.")
-    return "\n".join(part for part in (head, here, how) if part)
+    return "\n".join(part for part in (*_angles(touch), head, here, how) if part)
+
+
+def _angles(touch: TouchSubject | None) -> list[str]:
+    """Return what the turn test has shown at each angle so far, a sentence each."""
+    return [
+        tr("At U {u} it was {mm} mm off: {word}.", u=f"{u:.1f}", mm=mm(off), word=word)
+        for u, off, word in (
+            (one.u_deg, one.off_mm, angle_word(one)) for one in (touch.earlier if touch else ())
+        )
+    ]
 
 
 def told_where(state: WizardState) -> str:

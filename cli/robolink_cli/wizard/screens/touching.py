@@ -4,7 +4,7 @@ import math
 
 from robolink.messages import tr
 from robolink.model import angle_difference_deg
-from robolink.runner import JogRange, Question, TouchSubject
+from robolink.runner import AngleShown, JogRange, Question, TouchSubject
 from robolink_cli.console.columns import padded
 from robolink_cli.wizard.screens.layout import Screen, row_of
 from robolink_cli.wizard.screens.rows import mm, signed, status_row, title_row
@@ -12,11 +12,21 @@ from robolink_cli.wizard.state import STEP_SIZES, WizardState
 
 _HEAD = 14
 
+_MOST_ANGLES = 4
+"""So many angles of the turn test stand above the keys; more leave no room for a message."""
+
 
 def touch_screen(state: WizardState, now_s: float) -> Screen:
     """Return the screen on which a person jogs the tip to a place."""
     touch = state.touch
-    lines = [*_what(state, touch), "", *_where(state), *_since(state), *_contact(touch)]
+    lines = [
+        *_what(state, touch),
+        *_angles(touch),
+        "",
+        *_where(state),
+        *_since(state),
+        *_contact(touch),
+    ]
     lines += [*_range(state.free_jog), "", *_keypad(state), *_typing(state)]
     return Screen(
         title_row(state, touch_title(touch)),
@@ -61,6 +71,27 @@ def _what(state: WizardState, touch: TouchSubject | None) -> list[str]:
             tr("Limit {mm} mm. If it is off by more, the old value comes back by itself.", mm=limit)
         )
     return lines
+
+
+def _angles(touch: TouchSubject | None) -> list[str]:
+    """Return what the turn test has shown at each angle so far, the newest, and the one to come."""
+    if touch is None or not touch.earlier:
+        return []
+    rows = [row_of((tr("U"), tr("off by")))]
+    for one in touch.earlier[-_MOST_ANGLES:]:
+        off = f"{mm(one.off_mm)} mm"
+        rows.append(row_of((f"{one.u_deg:.1f}", off), 11) + f"     {angle_word(one)}")
+    if touch.arrival is not None:
+        now = row_of((f"{touch.arrival.u_deg:.1f}", ""), 11)
+        rows.append(now + "     " + tr("jog now"))
+    return rows
+
+
+def angle_word(shown: AngleShown) -> str:
+    """Return what one angle of the turn test says by itself."""
+    if shown.within is None:
+        return tr("too near to the limit")
+    return tr("OK") if shown.within else tr("over the limit")
 
 
 def _where(state: WizardState) -> list[str]:

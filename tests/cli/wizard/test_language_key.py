@@ -145,7 +145,7 @@ def test_each_kind_of_terminal_sends_it_in_its_own_way(sent):
         face = FullFace(source, Vt100_Output(StringIO(), lambda: Size(24, 80), term="xterm"))
         face._desk, face._state = desk, hand.state
         for press in came:
-            face._press(str(press.key.value), press)
+            face._press(str(getattr(press.key, "value", press.key)), press)
         for one in face._gate.due(time.monotonic() + 1.0):
             face._happens(face._pressed(one))
     assert not face._state.waits

@@ -39,6 +39,8 @@ _WORDS: Final = {
     "help": "help ? h 帮助",
     "yes": "y yes j ja 是",
     "no": "n no nein 否",
+    "zh": "chinese zh 中文",
+    "en": "english en 英文",
 }
 _MEANINGS: Final = {word: meaning for meaning, words in _WORDS.items() for word in words.split()}
 

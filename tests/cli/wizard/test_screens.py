@@ -25,7 +25,7 @@ from wcwidth import wcswidth
 from robolink import messages
 from robolink.calibration import Drift, VerifyResult, impact_on
 from robolink.errors import DeclinedError, OutcomeUnknownError
-from robolink.locale.languages import translator
+from robolink.locale.languages import CHINESE, ENGLISH, translator
 from robolink.messages import spoken, tr
 from robolink.methods import find_method
 from robolink.model import Path as Way
@@ -91,7 +91,7 @@ def turning_on():
 
 def choosing():
     rows = ("line3   EPSON T6-602S", "line4   EPSON T6-602S", "mixer   SoftMotion")
-    subject = ChoiceSubject(tr("Choose"), (), rows)
+    subject = ChoiceSubject(tr("Choose"), (), rows, other=other_one())
     return Sitting().asked(subject, Question.TEXT, tr("Which cell?"))
 
 
@@ -217,6 +217,11 @@ def jogging():
     )
 
 
+def other_one():
+    """Return the language that the key changes to."""
+    return CHINESE if tr("Next") == "Next" else ENGLISH
+
+
 def jobs():
     """Which job, with what is on record of each."""
     needle, two = "needle   (needle-one-touch.toml)", "two-nozzles   (two.toml)"
@@ -235,6 +240,7 @@ def jobs():
             )
             for summary in summaries
         ),
+        other=other_one(),
     )
     return Sitting().asked(subject, Question.TEXT, tr("Which job?"))
 

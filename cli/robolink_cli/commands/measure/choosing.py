@@ -1,6 +1,6 @@
 """Which cell and which job: what is asked of whoever typed neither."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -9,12 +9,13 @@ from robolink.messages import spoken, tr
 from robolink_cli.console.columns import columns, padded
 from robolink_cli.prompts.present import AskingDesk, present_desk
 from robolink_cli.session.completing import address_of, is_recipe
-from robolink_cli.wizard.choices import ChoiceSubject, choose
+from robolink_cli.wizard.choices import ChoiceSubject, choose_in_either_language
 
 if TYPE_CHECKING:
     from robolink.config import Cell
     from robolink.recipe import LoadedRecipe, RecipePast
     from robolink_cli.session.context import CliContext
+    from robolink_cli.wizard.state import Header
 
 _WIDE: Final = 78
 """Columns of a row of the list."""
@@ -36,7 +37,8 @@ def context_at_desk(context: "CliContext", job: str) -> "CliContext":
 
     Args:
         context: What it was told.
-        job: What it is called in the first row.
+        job: What it is called in the first row, a sentence that was declared: the person may
+            change the language.
 
     Raises:
         ConfigError: There is no cell, or a cell file is wrong.
@@ -48,13 +50,17 @@ def context_at_desk(context: "CliContext", job: str) -> "CliContext":
     desk = present_desk()
     if context.url is not None or desk is None:
         return context
-    at = context_of_cell(choose_cell(desk).name)
-    desk.regard(header_of(at, job))
+    at = context_of_cell(choose_cell(desk, lambda: header_of(context, spoken(job))).name)
+    desk.regard(header_of(at, spoken(job)))
     return at
 
 
-def choose_cell(desk: AskingDesk) -> "Cell":
+def choose_cell(desk: AskingDesk, head: "Callable[[], Header]") -> "Cell":
     """Have one of the cells of this computer chosen; the only one is taken.
+
+    Args:
+        desk: Where.
+        head: Makes the first row, in the language that is spoken by then.
 
     Raises:
         ConfigError: There is none.
@@ -74,25 +80,56 @@ def choose_cell(desk: AskingDesk) -> "Cell":
     if len(cells) == 1:
         return cells[0]
     rows = tuple(f"{cell.name}   {cell.settings.robot or cell.url}" for cell in cells)
-    subject = ChoiceSubject(tr("Choose"), (), rows)
-    return cells[choose(desk, tr("Which cell?"), subject, _nothing)]
+
+    def ask() -> tuple[str, ChoiceSubject]:
+        desk.regard(head())
+        return tr("Which cell?"), ChoiceSubject(tr("Choose"), (), rows)
+
+    return cells[choose_in_either_language(desk, ask, _nothing)]
 
 
-def choose_recipe(desk: AskingDesk, cell: "Cell | None", url: str | None = None) -> "LoadedRecipe":
+def choose_recipe(
+    desk: AskingDesk,
+    cell: "Cell | None",
+    url: str | None = None,
+    *,
+    head: "Callable[[], Header] | None" = None,
+) -> "LoadedRecipe":
     """Have one of the recipes chosen that stand beside the cell file or here.
 
     Args:
         desk: Where.
         cell: The cell, ``None`` where only a URL is known.
         url: The controller: what is on record of each recipe there is told beside it.
+        head: Makes the first row, in the language that is spoken by then; ``None`` leaves it.
 
     Raises:
         ConfigError: There is none, or it is wrong.
         DeclinedError: The person leaves.
     """
+    paths = _recipes(cell)
+    loaded: list[LoadedRecipe] = []
+
+    def ask() -> tuple[str, ChoiceSubject]:
+        if head is not None:
+            desk.regard(head())
+        loaded[:] = _loaded(desk, paths)
+        pasts = _pasts(loaded, url)
+        details = tuple(_told_of(*one) for one in zip(loaded, pasts, strict=True))
+        rows = _rows_of(loaded, pasts)
+        return tr("Which job?"), ChoiceSubject(tr("Choose"), (), rows, details=details)
+
+    return loaded[choose_in_either_language(desk, ask, _nothing)]
+
+
+def _loaded(desk: AskingDesk, paths: Sequence[Path]) -> "list[LoadedRecipe]":
+    """Return the recipes that are right; of the others the person is told.
+
+    Raises:
+        ConfigError: There is none.
+    """
     from robolink.recipe import load_recipe
 
-    paths = _recipes(cell)
     loaded = []
     for path in paths:
         try:
@@ -107,11 +144,7 @@ def choose_recipe(desk: AskingDesk, cell: "Cell | None", url: str | None = None)
                 "without a recipe: robolink calibrate two-pose --tool N"
             ),
         )
-    pasts = _pasts(loaded, url)
-    rows = _rows_of(loaded, pasts)
-    details = tuple(_told_of(*one) for one in zip(loaded, pasts, strict=True))
-    subject = ChoiceSubject(tr("Choose"), (), rows, details=details)
-    return loaded[choose(desk, tr("Which job?"), subject, _nothing)]
+    return loaded
 
 
 def _pasts(loaded: "list[LoadedRecipe]", url: str | None) -> "tuple[RecipePast, ...]":

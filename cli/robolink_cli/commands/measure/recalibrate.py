@@ -126,12 +126,12 @@ def _chosen(context: CliContext, recipe: Path | None) -> "tuple[CliContext, Load
     from robolink_cli.session.guidance import header_of
 
     named = None if recipe is None else load_recipe(recipe)
-    at = context_at_desk(context, tr("Change needle"))
+    at = context_at_desk(context, declared("Change needle"))
     if named is not None:
         return at, named
     desk = present_desk()
     assert desk is not None  # noqa: S101 - looked at by whoever calls
-    loaded = choose_recipe(desk, at.cell, at.url)
+    loaded = choose_recipe(desk, at.cell, at.url, head=lambda: header_of(at, tr("Change needle")))
     desk.regard(header_of(at, tr("Change needle"), *_as_typed(loaded.path)))
     return at, loaded
 

@@ -17,7 +17,9 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 
-def guided_if_alone(context: CliContext, do: Callable[[], T], *, job: str, alone: bool = True) -> T:
+def guided_if_alone(
+    context: CliContext, do: Callable[[], T], *, job: str, alone: bool = True, steps: int = 0
+) -> T:
     """Do the work of a command; as a wizard where a person sits at the terminal.
 
     Args:
@@ -25,6 +27,7 @@ def guided_if_alone(context: CliContext, do: Callable[[], T], *, job: str, alone
         do: The work.
         job: What it is called in the first row.
         alone: Whether it is a person who is asked, and not a simulator's stand-in for one.
+        steps: How many numbered steps it has, 0 for none.
 
     Raises:
         BaseException: Whatever ended the work.
@@ -33,10 +36,12 @@ def guided_if_alone(context: CliContext, do: Callable[[], T], *, job: str, alone
         return do()
     from robolink_cli.wizard.host import guided
 
-    return guided(header_of(context, job), do)
+    return guided(header_of(context, job, steps=steps), do)
 
 
-def header_of(context: CliContext, job: str, *chosen: str, needle: str = "") -> "Header":
+def header_of(
+    context: CliContext, job: str, *chosen: str, needle: str = "", steps: int = 0
+) -> "Header":
     """Return the first row of a command's screens.
 
     Args:
@@ -44,6 +49,7 @@ def header_of(context: CliContext, job: str, *chosen: str, needle: str = "") -> 
         job: What it is called.
         chosen: What was chosen from a list, as it would be typed behind the command.
         needle: Id of the needle that is mounted.
+        steps: How many numbered steps the job has, 0 for none.
     """
     from robolink_cli.wizard.state import Header
 
@@ -55,6 +61,7 @@ def header_of(context: CliContext, job: str, *chosen: str, needle: str = "") -> 
         simulated="+sim://" in url,
         command=_typed_again(context, chosen),
         needle=needle,
+        steps=steps,
     )
 
 

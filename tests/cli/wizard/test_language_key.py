@@ -158,10 +158,12 @@ def test_f2_on_the_whole_screen(here):
     try:
         hand.see(r"Which cell\?")
         hand.see(r"\[F2\] Chinese")
+        hand.see("1 of 7  Choose")
         hand.rest(0.4)
         hand.press(["\x1bOQ"])
         hand.see("哪 *个 *工 *作 *站")
         hand.see(r"\[F2\] English")
+        hand.see("1/7  选")
         hand.rest(0.4)
         hand.press(["5"])
         hand.see("做 *什 *么")

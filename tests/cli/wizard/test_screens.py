@@ -19,7 +19,7 @@ from robolink_cli.wizard.screens.drawing import screen_of
 from robolink_cli.wizard.screens.ending import ended_of
 from robolink_cli.wizard.screens.layout import broken
 from robolink_cli.wizard.screens.told import told_before, told_question
-from robolink_cli.wizard.state import Header
+from robolink_cli.wizard.state import Header, WizardState
 from wcwidth import wcswidth
 
 from robolink import messages
@@ -175,7 +175,7 @@ def recovering():
         leaves=tr("Leave it blocked"),
     )
     question = tr("Look at the robot: which needle is mounted?")
-    return Sitting().asked(subject, Question.TEXT, question)
+    return Sitting(WizardState(Header("line3", "Recover"))).asked(subject, Question.TEXT, question)
 
 
 def taught():
@@ -213,7 +213,10 @@ def ended(header, error=None, report=None):
 def jogging():
     box = WorkBox.around(ARRIVAL, xy_mm=50.0, below_mm=50.0, above_mm=50.0)
     return (
-        Sitting().asked(JogRange(ARRIVAL, box), text="Jog the tool.").keys("+", "6").jogs("x+0.5")
+        Sitting(WizardState(Header("line3", "Jog")))
+        .asked(JogRange(ARRIVAL, box), text="Jog the tool.")
+        .keys("+", "6")
+        .jogs("x+0.5")
     )
 
 

@@ -1,7 +1,7 @@
 """recalibrate RECIPE.toml: the scripted nozzle change."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import click
 
@@ -17,6 +17,10 @@ from robolink_cli.session.ordering import order_option, require_no_dry_run
 
 if TYPE_CHECKING:
     from robolink.recipe import LoadedRecipe
+    from robolink_cli.wizard.state import Header
+
+_STEPS: Final = 7
+"""Choose, check, on the way, touch, fit, new values, turn test: numbered in the first row."""
 
 
 @click.command()
@@ -115,7 +119,7 @@ def recalibrate(
     with events.closing():
         # An order comes from a program, also where that has a terminal.
         alone = recipe is None or (assist is None and not dry_run and order is None)
-        guided_if_alone(context, change, job=tr("Change needle"), alone=alone)
+        guided_if_alone(context, change, job=tr("Change needle"), alone=alone, steps=_STEPS)
 
 
 def _chosen(context: CliContext, recipe: Path | None) -> "tuple[CliContext, LoadedRecipe]":
@@ -126,14 +130,29 @@ def _chosen(context: CliContext, recipe: Path | None) -> "tuple[CliContext, Load
     from robolink_cli.session.guidance import header_of
 
     named = None if recipe is None else load_recipe(recipe)
-    at = context_at_desk(context, declared("Change needle"))
-    if named is not None:
-        return at, named
+    at = context_at_desk(context, declared("Change needle"), steps=_STEPS)
     desk = present_desk()
+
+    def head(*chosen: str, steps: int = _STEPS) -> "Header":
+        return header_of(at, tr("Change needle"), *chosen, steps=steps)
+
+    if named is not None:
+        if desk is not None:
+            desk.regard(head(steps=steps_of(named)))
+        return at, named
     assert desk is not None  # noqa: S101 - looked at by whoever calls
-    loaded = choose_recipe(desk, at.cell, at.url, head=lambda: header_of(at, tr("Change needle")))
-    desk.regard(header_of(at, tr("Change needle"), *_as_typed(loaded.path)))
+    loaded = choose_recipe(desk, at.cell, at.url, head=head)
+    desk.regard(head(*_as_typed(loaded.path), steps=steps_of(loaded)))
     return at, loaded
+
+
+def steps_of(loaded: "LoadedRecipe") -> int:
+    """Return how many steps of a change are numbered; the last one is the turn test.
+
+    Args:
+        loaded: The recipe.
+    """
+    return _STEPS if loaded.recipe.verifies else _STEPS - 1
 
 
 def _as_typed(path: Path) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ from robolink.locale.languages import ENGLISH
 from robolink.messages import tr
 from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.screens.layout import BODY, Screen, broken
-from robolink_cli.wizard.screens.rows import status_row, title_row
+from robolink_cli.wizard.screens.rows import JobStep, status_row, title_row
 from robolink_cli.wizard.state import WizardState
 
 _LEAST_SHOWN: Final = 3
@@ -35,7 +35,7 @@ def choice_screen(state: WizardState, subject: ChoiceSubject, now_s: float) -> S
         ("0", subject.leaves or tr("Leave")),
     )
     return Screen(
-        title_row(state, subject.step),
+        title_row(state, subject.step, JobStep.CHOOSE),
         (*above, "", state.question.text, *rows, *(["", *told] if told else ())),
         keys,
         status=status_row(state, now_s) if state.reading is not None else "",

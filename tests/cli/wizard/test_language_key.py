@@ -181,7 +181,7 @@ def test_f2_on_the_whole_screen(here):
 def test_a_word_in_the_dialogue_of_lines(here):
     terminal = Terminal("change", "--plain", controlling=True)
     try:
-        terminal.wait_for(r"To read Chinese: chinese")
+        terminal.wait_for(r"or chinese to read Chinese")
         time.sleep(0.4)
         terminal.press("中文\n".encode())
         terminal.wait_for("哪个工作站")

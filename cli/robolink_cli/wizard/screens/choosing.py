@@ -31,7 +31,7 @@ def choice_screen(state: WizardState, subject: ChoiceSubject, now_s: float) -> S
     keys = (
         ("5", subject.does or tr("Next")),
         (tr("arrows"), tr("choose")),
-        *((("F2", _named(subject.other)),) if subject.other else ()),
+        *((("F2", language_label(subject.other)),) if subject.other else ()),
         ("0", subject.leaves or tr("Leave")),
     )
     return Screen(
@@ -43,8 +43,12 @@ def choice_screen(state: WizardState, subject: ChoiceSubject, now_s: float) -> S
     )
 
 
-def _named(language: str) -> str:
-    """Return the name of a language, as who reads it calls it where the screen can show that."""
+def language_label(language: str) -> str:
+    """Return what a language is called beside the key that changes to it.
+
+    Args:
+        language: One of :data:`robolink.locale.languages.LANGUAGES`.
+    """
     return tr("English") if language == ENGLISH else tr("Chinese")
 
 

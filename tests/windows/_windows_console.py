@@ -46,6 +46,7 @@ _CODES = {
     "home": 36,
     "insert": 45,
     "delete": 46,
+    "f2": 113,
 }
 _CHARACTERS = {"escape": (27, "\x1b"), "enter": (13, "\r"), "backspace": (8, "\b")}
 _WITH_SEQUENCES = {
@@ -59,6 +60,7 @@ _WITH_SEQUENCES = {
     "home": "\x1b[H",
     "insert": "\x1b[2~",
     "delete": "\x1b[3~",
+    "f2": "\x1bOQ",
     "escape": "\x1b",
     "enter": "\r",
     "backspace": "\x7f",

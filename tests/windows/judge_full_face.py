@@ -40,3 +40,20 @@ def test_nul_is_no_terminal_though_windows_says_so(opened, redirected):
     console = opened("calls", "change", "needle.toml", redirected=redirected)
     assert console.exit_code() == 9
     assert "-----" not in console.text
+
+
+@pytest.mark.parametrize("way", ["calls", "sequences"])
+def test_f2_changes_the_language_where_the_job_is_chosen(opened, way):
+    console = opened(way, "change")
+    console.see(r"1 of 7  Choose")
+    console.see(r"\[F2\] Chinese")
+    console.rest(0.6)
+    console.send("f2")
+    console.see(r"1/7")
+    console.see(r"\[F2\] English")
+    console.rest(0.6)
+    console.send("f2")
+    console.see(r"Which job\?")
+    console.rest(0.6)
+    console.send("0")
+    assert console.exit_code() == 9

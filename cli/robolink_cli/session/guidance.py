@@ -17,7 +17,14 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 
-def guided_if_alone(context: CliContext, do: Callable[[], T], *, job: str, alone: bool = True) -> T:
+def guided_if_alone(
+    context: CliContext,
+    do: Callable[[], T],
+    *,
+    job: str,
+    alone: bool = True,
+    following: Callable[[], T] | None = None,
+) -> T:
     """Do the work of a command; as a wizard where a person sits at the terminal.
 
     Args:
@@ -25,18 +32,22 @@ def guided_if_alone(context: CliContext, do: Callable[[], T], *, job: str, alone
         do: The work.
         job: What it is called in the first row.
         alone: Whether it is a person who is asked, and not a simulator's stand-in for one.
+        following: What begins for the next tool, with a choice; ``None`` where none can.
 
     Raises:
         BaseException: Whatever ended the work.
     """
     if not alone or not may_be_guided():
         return do()
+    from robolink_cli.access.change_page import page_of_change
     from robolink_cli.wizard.host import guided
 
-    return guided(header_of(context, job), do)
+    return guided(header_of(context, job), do, report=page_of_change, following=following)
 
 
-def header_of(context: CliContext, job: str, *chosen: str, needle: str = "") -> "Header":
+def header_of(
+    context: CliContext, job: str, *chosen: str, needle: str = "", anew: bool = False
+) -> "Header":
     """Return the first row of a command's screens.
 
     Args:
@@ -44,6 +55,7 @@ def header_of(context: CliContext, job: str, *chosen: str, needle: str = "") -> 
         job: What it is called.
         chosen: What was chosen from a list, as it would be typed behind the command.
         needle: Id of the needle that is mounted.
+        anew: Whether the line that began the command was about another job.
     """
     from robolink_cli.wizard.state import Header
 
@@ -53,14 +65,17 @@ def header_of(context: CliContext, job: str, *chosen: str, needle: str = "") -> 
         name,
         job,
         simulated="+sim://" in url,
-        command=_typed_again(context, chosen),
+        command=_typed_again(context, chosen, anew=anew),
         needle=needle,
     )
 
 
-def _typed_again(context: CliContext, chosen: tuple[str, ...]) -> str:
+def _typed_again(context: CliContext, chosen: tuple[str, ...], *, anew: bool) -> str:
     """Return the command line that begins the same job, with what was chosen meanwhile."""
-    words = [*click.get_current_context().meta.get(TYPED, ()), *chosen]
+    typed = () if anew else click.get_current_context().meta.get(TYPED, ())
+    words = [*typed, *chosen]
+    if anew and context.cell is None and context.url is not None:
+        words = ["-c", context.url, *words]
     named = any(word in ("-c", "--controller") or word[:13] == "--controller=" for word in words)
     if context.cell is not None and not named:
         words = ["-c", context.cell.name, *words]

@@ -39,6 +39,9 @@ _WORDS: Final = {
     "help": "help ? h 帮助",
     "yes": "y yes j ja 是",
     "no": "n no nein 否",
+    "report": "report 报告",
+    "next": "next 下一个",
+    "finish": "finish 结束",
 }
 _MEANINGS: Final = {word: meaning for meaning, words in _WORDS.items() for word in words.split()}
 

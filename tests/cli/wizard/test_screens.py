@@ -14,12 +14,13 @@ from robolink_cli.wizard.happenings import (
     WasRead,
     WasRegarded,
     WasTold,
+    WizardCommand,
 )
 from robolink_cli.wizard.screens.drawing import screen_of
 from robolink_cli.wizard.screens.ending import ended_of
 from robolink_cli.wizard.screens.layout import broken
 from robolink_cli.wizard.screens.told import told_before, told_question
-from robolink_cli.wizard.state import Header
+from robolink_cli.wizard.state import Header, WizardState
 from wcwidth import wcswidth
 
 from robolink import messages
@@ -102,7 +103,9 @@ def done():
     proof = VerifyResult((Drift(90.0, 0.006, 0.004), Drift(0.0, 0.002, 0.001)), 0.1)
     tool = ToolReport(proposal, receipt, proof, verdicts)
     header = Header("line3", "Change needle", needle="N-0418")
-    return ended(header, report=ChangeReport("7f3a5c1200", (tool,)))
+    offers = frozenset((WizardCommand.SHOW_REPORT, WizardCommand.NEXT_TOOL))
+    report = ChangeReport("7f3a5c1200", (tool,))
+    return ended(header, report=report, offers=offers)
 
 
 def checking():
@@ -187,8 +190,8 @@ def test_a_job_that_was_refused_for_an_earlier_one_names_recover_last():
     assert last.lines[-1] == 'Next: robolink -c "line3" recover'
 
 
-def ended(header, error=None, report=None):
-    hand = Sitting().asked(touch_subject()).happens(WasRegarded(header))
+def ended(header, error=None, report=None, offers=frozenset()):
+    hand = Sitting(WizardState(header, offers=offers)).asked(touch_subject())
     if report is not None:
         hand.happens(WasRegarded(report))
     return hand.happens(HasEnded(ended_of(hand.state, error, hand.now)))

@@ -50,8 +50,12 @@ def context_at_desk(context: "CliContext", job: str) -> "CliContext":
     return at
 
 
-def choose_cell(desk: AskingDesk) -> "Cell":
+def choose_cell(desk: AskingDesk, marked: str = "") -> "Cell":
     """Have one of the cells of this computer chosen; the only one is taken.
+
+    Args:
+        desk: Where.
+        marked: Name of the one that is marked; empty for the first.
 
     Raises:
         ConfigError: There is none.
@@ -71,7 +75,9 @@ def choose_cell(desk: AskingDesk) -> "Cell":
     if len(cells) == 1:
         return cells[0]
     rows = tuple(f"{cell.name}   {cell.settings.robot or cell.url}" for cell in cells)
-    subject = ChoiceSubject(tr("Choose"), (), rows)
+    names = [cell.name for cell in cells]
+    at = names.index(marked) if marked in names else 0
+    subject = ChoiceSubject(tr("Choose"), (), rows, marked=at)
     return cells[choose(desk, tr("Which cell?"), subject, _nothing)]
 
 

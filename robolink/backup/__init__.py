@@ -12,6 +12,7 @@ from robolink.backup._file import load as load
 from robolink.backup._file import save as save
 from robolink.backup._first import first_backup_path as first_backup_path
 from robolink.backup._first import keep_first_backup as keep_first_backup
+from robolink.backup._first import kept_backup as kept_backup
 from robolink.backup._restore import RestoreChange as RestoreChange
 from robolink.backup._restore import RestorePlan as RestorePlan
 from robolink.backup._restore import plan_restore as plan_restore

@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from robolink.backup._file import save
-from robolink.backup._values import ToolHolder, take_backup
+from robolink.backup._file import load, save
+from robolink.backup._values import Backup, ToolHolder, take_backup
 from robolink.errors import ConfigError
 from robolink.files.durable import file_name, make_folder, state_folder
 from robolink.messages import tr
@@ -40,10 +40,9 @@ def keep_first_backup(
     """
     if not controller.outcomes.durable:
         return None
-    outcomes = controller.outcomes
-    names = (outcomes.robot,) if outcomes.robot else outcomes.names
-    path = first_backup_path(names[0])
-    if any(first_backup_path(name).exists() for name in names):
+    paths = _paths(controller)
+    path = paths[0]
+    if any(one.exists() for one in paths):
         return None
     backup = take_backup(controller)
     # Before it is there: a backup that is not on record is a sign that the record was lost.
@@ -73,3 +72,28 @@ def keep_first_backup(
         )
     )
     return path
+
+
+def kept_backup(controller: ToolHolder) -> Backup | None:
+    """Return the backup of a controller that was made before the first write, read from its file.
+
+    Args:
+        controller: The controller, connected; it is not asked for its tools.
+
+    Returns:
+        ``None`` when there is none on this computer.
+
+    Raises:
+        ConfigError: There is one that cannot be read.
+    """
+    if not controller.outcomes.durable:
+        return None
+    path = next((one for one in _paths(controller) if one.exists()), None)
+    return None if path is None else load(path)
+
+
+def _paths(controller: ToolHolder) -> list[Path]:
+    """Return where the backup may be, by every name of the controller, that of now first."""
+    outcomes = controller.outcomes
+    names = (outcomes.robot,) if outcomes.robot else outcomes.names
+    return [first_backup_path(name) for name in names]

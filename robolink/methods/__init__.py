@@ -57,6 +57,7 @@ if TYPE_CHECKING:
         UprightPinParameters as UprightPinParameters,
     )
     from robolink.methods.declaration.site import Site as Site
+    from robolink.methods.declaration.site import ToolHistory as ToolHistory
     from robolink.methods.declaration.surface_parameters import (
         SurfaceParameters as SurfaceParameters,
     )
@@ -176,7 +177,7 @@ __getattr__ = lazy_exports(
         "points.parameters": "PointsParameters",
         "points.source": "PointsSource PosesFound taught_poses",
         "registry": "METHODS_GROUP all_methods find_method method_names register",
-        "declaration.site": "Site",
+        "declaration.site": "Site ToolHistory",
         "runout_table.parameters": "AllRoundPlan RunoutTableParameters",
         "runout_table.procedure": "measure_runout_table",
         "runout_table.source": "RunoutTableSource",

@@ -106,6 +106,7 @@ class NozzleChange:
         self._earlier = earlier
         self._order, self._describe = order, describe
         self._written: ToolChange | None = None
+        self._began_ns = 0
 
     def run(self, *, write: bool = True) -> ChangeReport:
         """Do it all. Ctrl-C before the last verification has passed leaves the old values.
@@ -129,6 +130,7 @@ class NozzleChange:
         require_clearance(self._plan)
         require_inputs(controller, self._plan)
         controller.outcomes.change = new_operation()
+        self._began_ns = controller.clock.now_ns()
         self._plan = replace(
             self._plan, tools=tuple(one.as_recorded(controller) for one in self._plan.tools)
         )
@@ -274,9 +276,10 @@ class NozzleChange:
     def _write(self, context: MeasurementContext, proposals: Proposals) -> tuple[ToolReport, ...]:
         """Write all, verify each, keep all; an error on the way takes all back."""
         verify = any(plan.verify and plan.moving for plan, _ in proposals)
+        known = [dict(plan.details(proposal)) for plan, proposal in proposals]
         wanted = [
-            Wanted(proposal.tool, proposal.offset, proposal.before, plan.details(proposal))
-            for plan, proposal in proposals
+            Wanted(proposal.tool, proposal.offset, proposal.before, details)
+            for (_, proposal), details in zip(proposals, known, strict=True)
         ]
         drifts: dict[int, VerifyResult | None] = {}
 
@@ -308,6 +311,9 @@ class NozzleChange:
                 self._listener.wrote(receipt)
             for (plan, proposal), receipt in zip(proposals, receipts, strict=True):
                 drifts[receipt.tool] = self._verify(context, plan, proposal, receipt)
+            took_s = round((self._controller.clock.now_ns() - self._began_ns) / 1e9, 1)
+            for details in known:
+                details["took_s"] = took_s
             change.keep(tr("verified") if verify else tr("not verified"))
         self._controller.outcomes.append(*stations_found(self._controller, proposals))
         return reports(receipts)

@@ -13,6 +13,8 @@ from robolink.recipe._loading import load_recipe as load_recipe
 if TYPE_CHECKING:
     from robolink.recipe._answers import Answers as Answers
     from robolink.recipe._answers import require_answers as require_answers
+    from robolink.recipe._past import RecipePast as RecipePast
+    from robolink.recipe._past import pasts_of as pasts_of
     from robolink.recipe._run import RecipeRun as RecipeRun
     from robolink.recipe.file.method_tables import MethodTable as MethodTable
     from robolink.recipe.file.method_tables import method_table as method_table
@@ -34,6 +36,8 @@ if TYPE_CHECKING:
 _LOADED_LATER = {
     "Answers": "_answers",
     "require_answers": "_answers",
+    "RecipePast": "_past",
+    "pasts_of": "_past",
     "RecipeRun": "_run",
     "MethodTable": "file.method_tables",
     "method_table": "file.method_tables",

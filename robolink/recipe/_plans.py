@@ -41,7 +41,7 @@ def plan_of(
         CalibrationError: ``rank_deficient``: this robot cannot tilt its tool.
         ConfigError: This kind of controller has no taught points, or no camera is named.
     """
-    tolerances, parameters = recipe.tolerances, _parameters(recipe)
+    tolerances, parameters = recipe.tolerances, parameters_of(recipe)
     criteria = AcceptanceCriteria(
         max_change_mm=tolerances.jump_mm,
         rms_mm=tolerances.rms_mm,
@@ -78,7 +78,7 @@ def plan_of(
     )
 
 
-def _parameters(recipe: Recipe) -> MethodParameters:
+def parameters_of(recipe: Recipe) -> MethodParameters:
     """Return the parameters, with what stands at the top of the recipe."""
     parameters = recipe.source.parameters
     for one in fields_of(type(parameters)):

@@ -76,6 +76,23 @@ def test_a_stated_scatter_counts_before_that_of_the_last_touch(controller):
         assert solver.sigma_mm == used
 
 
+@pytest.mark.parametrize(("full_mm", "changes"), [(0.03, 3), (0.03, 0), (0.08, 0), (0.08, 4)])
+def test_how_many_changes_are_left_is_what_the_changes_themselves_say(full_mm, changes):
+    limits, sigma_mm = NeedleLimits(tolerance_mm=0.1, max_changes=6), 0.02
+    chain = NeedleChain(math.hypot(full_mm, sigma_mm) if changes else full_mm, changes, full_mm)
+    left, made, place = (
+        chain.changes_left(math.sqrt(2) * sigma_mm, limits, shared_touch=True),
+        0,
+        PIN,
+    )
+    due = bool(changes) and chain.is_due(limits)
+    while not due:
+        last = LastTouch("PIN-07", place, 90.0, STORED, chain, sigma_mm, nozzle="", at="")
+        result: Any = Difference(last, sigma_mm, limits).solve([Pose(298, 99, -20, 0)], STORED)
+        chain, due, made = result.chain, result.full_calibration_due, made + 1
+    assert left == made
+
+
 LAST = LastTouch(
     "PIN-07", PIN, 90.0, STORED, NeedleChain(0.03, 3, 0.01), 0.02, nozzle="", at="", touches=4
 )

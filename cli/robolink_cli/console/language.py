@@ -11,7 +11,15 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Final
 
-from robolink.locale.languages import CLICK, ENGLISH, FOLDER, TERRITORY, language_named, translator
+from robolink.locale.languages import (
+    CHINESE,
+    CLICK,
+    ENGLISH,
+    FOLDER,
+    TERRITORY,
+    language_named,
+    translator,
+)
 from robolink.messages import install, spoken, tr
 
 OPTION: Final = "--lang"
@@ -37,6 +45,26 @@ def language_now() -> str:
     return _now[-1] if _now else ENGLISH
 
 
+_listening: Final[list["_Listener"]] = []
+"""What listens for the command line that is carried out."""
+
+
+def other_language() -> str:
+    """Return the language that a person may change to; empty where the console shows no other."""
+    other = CHINESE if language_now() == ENGLISH else ENGLISH
+    return other if other == ENGLISH or _unshown_here(other) is None else ""
+
+
+def speak_from_now(language: str) -> None:
+    """Speak a language for the rest of this command line; where that cannot be, say why.
+
+    Args:
+        language: One of :data:`robolink.locale.languages.LANGUAGES`.
+    """
+    if _listening:
+        _listening[-1].change_to(language)
+
+
 @contextmanager
 def speaking_for(arguments: Sequence[str]) -> Iterator[None]:
     """Speak the language of one command line, for the block.
@@ -46,9 +74,11 @@ def speaking_for(arguments: Sequence[str]) -> Iterator[None]:
     """
     listener = _Listener(arguments)
     install(listener)
+    _listening.append(listener)
     try:
         yield
     finally:
+        _listening.remove(listener)
         install(None)
         listener.end()
 
@@ -69,7 +99,15 @@ class _Listener:
         return sentence if translate is None else translate(sentence)
 
     def _find(self) -> Callable[[str], str] | None:
-        language = chosen_language(self._arguments, os.environ)
+        return self._begin(chosen_language(self._arguments, os.environ))
+
+    def change_to(self, language: str) -> None:
+        """Speak another language."""
+        self.end()
+        install(None)
+        install(self._begin(language))
+
+    def _begin(self, language: str) -> Callable[[str], str] | None:
         if language == ENGLISH or not _shown_here(language):
             return None
         translate = translator(language)
@@ -95,11 +133,12 @@ class _Listener:
         if self._before is None:
             return
         _now.clear()
+        before, self._before = self._before, None
         import gettext
 
         gettext.textdomain(self._of_click)
-        if self._before:
-            os.environ["LANGUAGE"] = self._before
+        if before:
+            os.environ["LANGUAGE"] = before
         else:
             del os.environ["LANGUAGE"]
 
@@ -198,21 +237,27 @@ def _of_windows() -> str:
 
 def _shown_here(language: str) -> bool:
     """Tell whether the console has the characters, and say why not."""
+    encoding = _unshown_here(language)
+    if encoding is not None:
+        _remark(
+            tr(
+                "This window cannot show Chinese (its encoding is {encoding}), so this is English.",
+                encoding=encoding,
+            )
+        )
+    return encoding is None
+
+
+def _unshown_here(language: str) -> str | None:
+    """Return the encoding of the console that lacks the characters, ``None`` for none."""
     sample = _SAMPLE[language]
     for stream in (sys.stdout, sys.stderr):
         encoding = getattr(stream, "encoding", None)
         try:
             sample.encode(encoding or "utf-8")
         except (UnicodeError, LookupError):
-            _remark(
-                tr(
-                    "This window cannot show Chinese (its encoding is {encoding}), so this is "
-                    "English.",
-                    encoding=encoding,
-                )
-            )
-            return False
-    return True
+            return str(encoding)
+    return None
 
 
 def _remark(sentence: str) -> None:

@@ -83,7 +83,7 @@ def check_before_start(
             "The robot will move by itself {n} times: up to {v} mm/s, at most {d} mm from here.",
             **foreseen,
         )
-    tried, left = False, tools_as_left(controller, tools)
+    tried, left = False, (saved_tools(controller), *_as_left(controller, tools))
     while _answer_to_list(desk, controller, purpose, plan, left, tried=tried) != "y":
         controller.motors(True)
         tried = True
@@ -129,7 +129,7 @@ def _answer_to_list(
     controller: "Controller",
     purpose: str,
     plan: str,
-    left: tuple[str, ...],
+    left: "tuple[CheckPoint, ...]",
     *,
     tried: bool,
 ) -> str:
@@ -140,7 +140,7 @@ def _answer_to_list(
         controller: The controller, connected.
         purpose: What it moves for, in words.
         plan: What it will do, a sentence.
-        left: How tools were left, sentences.
+        left: Whether the tools are saved, and how they were left.
         tried: Whether it was told before to switch them on: asking once more would not help.
 
     Raises:
@@ -186,6 +186,41 @@ def _motors_are_off(controller: "Controller", purpose: str, *, tried: bool) -> b
     return False
 
 
+def saved_tools(controller: "Controller") -> "CheckPoint":
+    """Return the point that says which backup of the tools there is on this computer.
+
+    What it says is read from that file. A missing one keeps nobody from measuring: whatever writes
+    makes it first.
+
+    Args:
+        controller: The controller, connected.
+    """
+    from robolink.backup import kept_backup
+    from robolink.errors import ConfigError
+    from robolink.timing import local_label
+    from robolink_cli.wizard.check_list import CheckPoint, Mark
+
+    if not controller.outcomes.durable:
+        gone = tr("The tools are not saved: what is simulated ends with this command")
+        return CheckPoint(Mark.LOOK, gone)
+    try:
+        backup = kept_backup(controller)
+    except ConfigError as error:
+        return CheckPoint(Mark.LOOK, tr("The tools are not saved: {cause}", cause=error.what))
+    if backup is None:
+        missing = tr("The tools are not saved: this computer has no backup of this controller")
+        return CheckPoint(Mark.LOOK, missing)
+    count, when = len(controller.tools.indices()), local_label(backup.saved_at)
+    return CheckPoint(Mark.OK, tr("All {n} tools are saved: backup of {when}", n=count, when=when))
+
+
+def _as_left(controller: "Controller", tools: "Sequence[int]") -> "Iterator[CheckPoint]":
+    from robolink_cli.wizard.check_list import CheckPoint, Mark
+
+    for sentence in tools_as_left(controller, tools):
+        yield CheckPoint(Mark.OK, sentence)
+
+
 def tools_as_left(controller: "Controller", tools: "Sequence[int]") -> tuple[str, ...]:
     """Return a sentence of each tool that holds what was proved to be in it last.
 
@@ -219,14 +254,14 @@ def tools_as_left(controller: "Controller", tools: "Sequence[int]") -> tuple[str
 
 
 def _points(
-    name: str, terms: "MotionTerms", left: tuple[str, ...], *, off: bool
+    name: str, terms: "MotionTerms", left: "tuple[CheckPoint, ...]", *, off: bool
 ) -> "tuple[CheckPoint, ...]":
     from robolink_cli.wizard.check_list import CheckPoint, Mark
 
     points = [
         CheckPoint(Mark.OK, tr("Controller answers: {name}", name=name)),
         *([CheckPoint(Mark.OK, terms.able)] if terms.able else ()),
-        *(CheckPoint(Mark.OK, sentence) for sentence in left),
+        *left,
         CheckPoint(Mark.OK, terms.watch),
     ]
     if off:

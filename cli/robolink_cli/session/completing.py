@@ -26,7 +26,7 @@ def complete_tool(context: click.Context, parameter: click.Parameter, start: str
     """Return the tools on record for the cell that is named, or all numbers where none is."""
     from robolink.journal import names_on_record
 
-    known = names_on_record(_address(_cell(context))).tools or _TOOLS
+    known = names_on_record(address_of(_cell(context).url)).tools or _TOOLS
     return [str(number) for number in known if str(number).startswith(start)]
 
 
@@ -35,7 +35,7 @@ def complete_station(context: click.Context, parameter: click.Parameter, start: 
     from robolink.journal import names_on_record
 
     cell = _cell(context)
-    names = [*cell.stations, *names_on_record(_address(cell)).stations]
+    names = [*cell.stations, *names_on_record(address_of(cell.url)).stations]
     return [name for name in dict.fromkeys(names) if name.startswith(start)]
 
 
@@ -70,12 +70,12 @@ def _cell(context: click.Context) -> "CellGlimpse":
     return glimpse_of_cell(named) if named and is_cell_name(named) else CellGlimpse(named, ())
 
 
-def _address(cell: "CellGlimpse") -> str:
-    """Return under which address the journal knows a cell; empty where that cannot be told."""
+def address_of(url: str | None) -> str:
+    """Return under which address the journal knows a URL; empty where that cannot be told."""
     from robolink.errors import ConfigError
     from robolink.transport import parse_url
 
     try:
-        return parse_url(cell.url).address if cell.url else ""
+        return parse_url(url).address if url else ""
     except ConfigError:
         return ""

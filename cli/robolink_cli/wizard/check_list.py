@@ -10,6 +10,8 @@ class Mark(StrEnum):
     OK = "ok"
     TO_DO = "to do"
     YOU = "you"
+    LOOK = "look"
+    """Worth knowing; nothing waits for it."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,11 +1,13 @@
 """Something to be chosen from a list."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Final
 
 from robolink.errors import DeclinedError
 from robolink.messages import tr
 from robolink.runner import POLL_S, Question
+from robolink_cli.console.language import other_language, speak_from_now
 from robolink_cli.prompts.present import AskingDesk
 
 
@@ -22,6 +24,7 @@ class ChoiceSubject:
         leaves: What the stop key is called.
         details: What is to be read of each option while it is marked; empty for nothing.
         enters: Whether ENTER takes the marked row as the main key does; not where a row writes.
+        other: The language that a key changes to; empty where none does.
     """
 
     step: str
@@ -32,6 +35,32 @@ class ChoiceSubject:
     leaves: str = ""
     details: tuple[tuple[str, ...], ...] = ()
     enters: bool = True
+    other: str = ""
+
+
+CHANGE_LANGUAGE: Final = "language"
+"""The answer of a person who wants to read the other language."""
+
+
+def choose_in_either_language(
+    desk: AskingDesk, make: Callable[[], tuple[str, ChoiceSubject]], watch: Callable[[], object]
+) -> int:
+    """Have one chosen by a person who may change the language first; return its index.
+
+    Args:
+        desk: Where.
+        make: Makes the question and the list, in the language that is spoken by then.
+        watch: Called while nobody answers.
+
+    Raises:
+        DeclinedError: The person leaves.
+    """
+    while True:
+        question, subject = make()
+        answer = _answered(desk, question, replace(subject, other=other_language()), watch)
+        if answer != CHANGE_LANGUAGE:
+            return _index(answer, subject)
+        speak_from_now(other_language())
 
 
 def choose(
@@ -48,10 +77,20 @@ def choose(
     Raises:
         DeclinedError: The person leaves.
     """
+    return _index(_answered(desk, question, subject, watch), subject)
+
+
+def _answered(
+    desk: AskingDesk, question: str, subject: ChoiceSubject, watch: Callable[[], object]
+) -> str:
     desk.regard(subject)
     desk.ask(question, Question.TEXT)
     while (answer := desk.poll(POLL_S)) is None:
         watch()
+    return answer
+
+
+def _index(answer: str, subject: ChoiceSubject) -> int:
     if answer.isdigit() and 1 <= int(answer) <= len(subject.options):
         return int(answer) - 1
     raise DeclinedError(tr("You left without choosing."), remedy=tr("Nothing was sent."))

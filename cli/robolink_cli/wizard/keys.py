@@ -42,6 +42,8 @@ _WORDS: Final = {
     "report": "report 报告",
     "next": "next 下一个",
     "finish": "finish 结束",
+    "zh": "chinese zh 中文",
+    "en": "english en 英文",
 }
 _MEANINGS: Final = {word: meaning for meaning, words in _WORDS.items() for word in words.split()}
 

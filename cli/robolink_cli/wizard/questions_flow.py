@@ -10,7 +10,7 @@ from robolink.messages import tr
 from robolink.nozzle_change import WriteSubject
 from robolink.runner import BACK, MORE, FitSubject, Question
 from robolink_cli.wizard.check_list import SWITCH_ON, CheckSubject, Mark
-from robolink_cli.wizard.choices import ChoiceSubject
+from robolink_cli.wizard.choices import CHANGE_LANGUAGE, ChoiceSubject
 from robolink_cli.wizard.happenings import KeyPressed, WizardCommand
 from robolink_cli.wizard.keys import folded, meaning_of
 from robolink_cli.wizard.state import ARMED_AFTER_S, LastScreen, WizardState
@@ -68,6 +68,8 @@ def answered_by_line(state: WizardState, line: str) -> Answered:
         return state
     if isinstance(subject, ChoiceSubject):
         word = folded(line)
+        if subject.other and meaning_of(line) == subject.other:
+            return CHANGE_LANGUAGE
         known = word.isdigit() and 1 <= int(word) <= len(subject.options)
         return word if known else state.says(tr("Type the number of a row."))
     if question.kind is Question.TEXT:
@@ -141,6 +143,8 @@ def _choice_key(state: WizardState, subject: ChoiceSubject, key: KeyPressed) -> 
         return replace(state, marked=0 if marked is None else min(marked + 1, last), message="")
     if key.name == "8":
         return replace(state, marked=last if marked is None else max(marked - 1, 0), message="")
+    if key.name == "f2" and subject.other:
+        return CHANGE_LANGUAGE
     if key.name == "enter" and not subject.enters:
         return state.says(tr("ENTER does nothing here. [5] does what the marked row says."))
     if key.name in ("5", "main", "enter"):

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from robolink.calibration.core.dispersion import require_positive
 from robolink.calibration.core.result import CalibrationResult
+from robolink.calibration.core.statistics import student_t95
 from robolink.calibration.quality.update_guard import NEEDLE_LIMIT_MM
 
 
@@ -41,6 +42,38 @@ class NeedleChain:
         known = self.sigma_mm if start is None else start
         sigma_mm = math.hypot(known, difference_sigma_mm) if shared_touch else longer
         return NeedleChain(sigma_mm, self.changes + 1, known if shared_touch else None)
+
+    def is_due(self, limits: "NeedleLimits") -> bool:
+        """Tell whether a full calibration is due: too many changes, or too wide an interval.
+
+        Args:
+            limits: How far differences are trusted.
+        """
+        half95_mm = student_t95(math.inf) * self.sigma_mm
+        return self.changes >= limits.max_changes or half95_mm > limits.tolerance_mm
+
+    def changes_left(
+        self, difference_sigma_mm: float, limits: "NeedleLimits", *, shared_touch: bool = False
+    ) -> int:
+        """Return after how many more differences a full calibration is due; 0 for now.
+
+        Args:
+            difference_sigma_mm: Standard deviation of one difference, as for :meth:`after`.
+            limits: How far differences are trusted.
+            shared_touch: As for :meth:`after`.
+
+        Example:
+            >>> from robolink.calibration import NeedleChain, NeedleLimits
+            >>> limits = NeedleLimits(tolerance_mm=0.1, max_changes=20)
+            >>> NeedleChain(0.02, changes=14).changes_left(0.01, limits, shared_touch=True)
+            6
+        """
+        chain, left = self, 0
+        # How sure a full calibration itself was is no matter of the differences after it.
+        while not (chain.changes and chain.is_due(limits)):
+            chain = chain.after(difference_sigma_mm, shared_touch=shared_touch)
+            left += 1
+        return left
 
 
 @dataclass(frozen=True, slots=True)

@@ -109,7 +109,7 @@ def solve_needle_change(
         for row in range(len(found))
     )
     halves = scatter.half_widths(covariance)
-    due = now.changes >= limits.max_changes or halves[0] > limits.tolerance_mm
+    due = now.is_due(limits)
     others = tuple(n for n in ("z_mm", "u_deg", "v_deg", "w_deg") if n not in found)
     return NeedleChangeResult(
         method="needle_change",

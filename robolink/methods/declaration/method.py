@@ -15,7 +15,7 @@ from robolink.files.toml import Problem
 from robolink.stations import StationKind
 
 if TYPE_CHECKING:
-    from robolink.methods.declaration.site import Site
+    from robolink.methods.declaration.site import Site, ToolHistory
     from robolink.procedures import KeptProof, PoseMethod, TipSource
 
 
@@ -244,6 +244,9 @@ class Method(Generic[P]):
         formerly: How recipes named it before.
         proof: Returns the type of its proof, a frozen dataclass, so that one which a change left
             open can be read back; ``None`` where it has none of its own.
+        changes_left: Tells from the record after how many more changes a full calibration is due,
+            0 for now; it returns ``None`` where the record does not say it, and is ``None`` where
+            each change is a full calibration.
     """
 
     name: str
@@ -260,6 +263,7 @@ class Method(Generic[P]):
     unmeasured_z: str = ""
     formerly: tuple[Former, ...] = ()
     proof: "Callable[[], type[KeptProof]] | None" = None
+    changes_left: "Callable[[P, ToolHistory], int | None] | None" = None
 
     @property
     def only_z(self) -> bool:

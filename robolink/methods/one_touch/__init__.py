@@ -1,14 +1,16 @@
 """one-touch: a pin whose place is known, touched once."""
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from robolink.messages import declared, tr
 from robolink.methods.declaration.method import Former, Method, Needs, PoseHelp
-from robolink.methods.declaration.site import Site
+from robolink.methods.declaration.site import Site, ToolHistory
 from robolink.methods.one_touch.parameters import OneTouchParameters
 from robolink.stations import StationKind
 
 if TYPE_CHECKING:
+    from robolink.calibration import NeedleLimits
     from robolink.methods.one_touch.solvers import Absolute, Difference
     from robolink.procedures import MovingSource, PoseMethod, TipSource
 
@@ -20,21 +22,36 @@ def _solver(parameters: OneTouchParameters, site: Site) -> "Absolute | Differenc
         CalibrationError: ``no_last_touch`` or ``reference_outdated``.
         ConfigError: Nobody knows where the pin is, or nothing tells how well a touch repeats.
     """
-    from robolink.calibration import NeedleLimits
     from robolink.methods.one_touch.solvers import Absolute, difference_from_last
     from robolink.stations import pin_of
 
     if parameters.basis == "absolute":
         # Whoever does not know how sure the pin is cannot say how sure the tip is.
         return Absolute(pin_of(site.station), site.sigma_mm if site.station.sigma_mm else None)
-    limits = NeedleLimits(
-        max_change_mm=site.max_change_mm,
-        tolerance_mm=site.interval_mm or NeedleLimits().tolerance_mm,
-        max_changes=parameters.max_changes,
-    )
+    limits = replace(_limits(parameters, site.interval_mm), max_change_mm=site.max_change_mm)
     return difference_from_last(
         site.controller, site.tool, site.station.id, sigma_mm=site.sigma_mm, limits=limits
     )
+
+
+def _limits(parameters: OneTouchParameters, interval_mm: float | None) -> "NeedleLimits":
+    from robolink.calibration import NeedleLimits
+
+    return NeedleLimits(
+        tolerance_mm=interval_mm or NeedleLimits().tolerance_mm, max_changes=parameters.max_changes
+    )
+
+
+def _changes_left(parameters: OneTouchParameters, history: ToolHistory) -> int | None:
+    if parameters.basis == "absolute":
+        return None
+    from robolink.methods.one_touch.last_touch import newest_touch
+    from robolink.methods.one_touch.solvers import left_of
+
+    last = newest_touch(history.kept, history.station)
+    if last is None or (history.holds is not None and history.holds != last.value):
+        return None  # it would be refused, and says why then
+    return left_of(last, history.sigma_mm, _limits(parameters, history.interval_mm))
 
 
 def _source(parameters: OneTouchParameters, site: Site) -> "TipSource":
@@ -78,4 +95,5 @@ METHOD = Method(
     ),
     by_reference=False,
     formerly=(Former(kind="one_touch"),),
+    changes_left=_changes_left,
 )

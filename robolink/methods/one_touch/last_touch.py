@@ -5,7 +5,7 @@ The offset that is written and the touches that it came from say together where 
 touches the pin shows by how much it differs from the old one (docs/reference/calibration.md 2.9).
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from robolink.calibration import NeedleChain
@@ -84,9 +84,7 @@ def find_last_touch(controller: Controller, tool: int, station: str) -> LastTouc
         (310.0, 95.0, -40.0)
     """
     kept = controller.outcomes.recorded(tool=tool, kinds=KEPT)
-    newest = next(
-        (found for found in (_last_touch(entry, station) for entry in kept) if found), None
-    )
+    newest = newest_touch(kept, station)
     if newest is None:
         raise CalibrationError(
             "no_last_touch",
@@ -117,6 +115,16 @@ def find_last_touch(controller: Controller, tool: int, station: str) -> LastTouc
             ),
         )
     return newest
+
+
+def newest_touch(kept: Iterable[Recorded], station: str) -> LastTouch | None:
+    """Return the newest touch of a tool on a pin that is on record, ``None`` for none.
+
+    Args:
+        kept: Entries of the tool of the kinds :data:`KEPT`, the newest first.
+        station: Name of the pin.
+    """
+    return next((found for found in (_last_touch(entry, station) for entry in kept) if found), None)
 
 
 def _last_touch(entry: Recorded, station: str) -> LastTouch | None:

@@ -120,6 +120,24 @@ class Absolute:
         return solve_one_touch(one_of(flange), self.pin, stored=stored, sigma_mm=self.sigma_mm)
 
 
+def left_of(last: LastTouch, sigma_mm: float | None, limits: NeedleLimits) -> int | None:
+    """Return after how many more such changes a full calibration is due.
+
+    Args:
+        last: The last touch.
+        sigma_mm: Standard deviation of one coordinate of one touch; ``None`` for what the last
+            calibration found.
+        limits: When a full calibration is due.
+
+    Returns:
+        0 for now, ``None`` where nothing tells how well a touch repeats.
+    """
+    sigma = sigma_mm or last.touch_sigma_mm
+    if sigma is None:
+        return None
+    return last.chain.changes_left(math.sqrt(2) * sigma, limits, shared_touch=True)
+
+
 def difference_from_last(
     controller: Controller,
     tool: int,

@@ -17,7 +17,7 @@ from tests.cli.wizard.test_screens import SCREENS
 
 FOLDER = Path(__file__).parents[3] / "docs" / "pictures"
 SHOWN = {
-    "choose": "choose",
+    "choose": "choose job",
     "check": "check list",
     "moving": "moving",
     "touch": "touch again",

@@ -26,8 +26,9 @@ from wcwidth import wcswidth
 from robolink import messages
 from robolink.calibration import Drift, VerifyResult, impact_on
 from robolink.errors import DeclinedError, OutcomeUnknownError
-from robolink.locale.languages import translator
-from robolink.messages import tr
+from robolink.locale.languages import CHINESE, ENGLISH, translator
+from robolink.messages import spoken, tr
+from robolink.methods import find_method
 from robolink.model import Path as Way
 from robolink.model import Pose, ToolReceipt, WorkBox
 from robolink.nozzle_change import ChangeReport, ToolReport
@@ -91,7 +92,7 @@ def turning_on():
 
 def choosing():
     rows = ("line3   EPSON T6-602S", "line4   EPSON T6-602S", "mixer   SoftMotion")
-    subject = ChoiceSubject(tr("Choose"), (), rows)
+    subject = ChoiceSubject(tr("Choose"), (), rows, other=other_one())
     return Sitting().asked(subject, Question.TEXT, tr("Which cell?"))
 
 
@@ -120,6 +121,14 @@ def checking():
     points = (
         CheckPoint(Mark.OK, tr("Controller answers: {name}", name="T6-602S, T6S0012345, 7.5.4")),
         CheckPoint(Mark.OK, tr("Emergency stop released, guard closed, no program running")),
+        CheckPoint(
+            Mark.OK,
+            tr(
+                "All {n} tools are saved: backup of {when}",
+                n=15,
+                when="2026-11-20 13:58 (UTC+1)",
+            ),
+        ),
         CheckPoint(Mark.TO_DO, tr("Motors are off"), "7", tr("Switch them on")),
         CheckPoint(
             Mark.YOU,
@@ -142,6 +151,13 @@ def remarked():
     ):
         hand.happens(WasTold(said))
     return hand.asked(CHECK, Question.YES_NO)
+
+
+def unsaved():
+    """A row that is worth knowing, for which nothing waits."""
+    missing = tr("The tools are not saved: this computer has no backup of this controller")
+    points = (CheckPoint(Mark.LOOK, missing), *CHECK.points)
+    return Sitting().asked(replace(CHECK, points=points), Question.YES_NO)
 
 
 def recovering():
@@ -204,24 +220,39 @@ def jogging():
     )
 
 
-JOBS = ChoiceSubject(
-    "Choose",
-    (),
-    ("needle   (needle-one-touch.toml)", "two-nozzles   (two.toml)"),
-    details=(
-        ("Touch one pin at two angles of U, half a turn apart.", "Tool: 1"),
-        (
-            "Touch a known pin once: X, Y and Z, for a change of the needle.",
-            "Tool: 1, 2",
-            "Last change with it from here: 2026-11-20 16:12 (UTC+1), needle N-0417",
+def other_one():
+    """Return the language that the key changes to."""
+    return CHINESE if tr("Next") == "Next" else ENGLISH
+
+
+def jobs():
+    """Which job, with what is on record of each."""
+    needle, two = "needle   (needle-one-touch.toml)", "two-nozzles   (two.toml)"
+    when = "2026-11-20 16:12 (UTC+1)"
+    summaries = (spoken(find_method(name).summary) for name in ("one-touch", "two-pose"))
+    subject = ChoiceSubject(
+        tr("Choose"),
+        (),
+        (f"{needle}   {tr('about {n} min', n=3)}", two),
+        details=tuple(
+            (
+                summary,
+                tr("Tool: {numbers}", numbers="1"),
+                tr("Last change with it from here: {when}, needle {id}", when=when, id="N-0417"),
+                tr("A full calibration is due after {n} more changes.", n=6),
+            )
+            for summary in summaries
         ),
-    ),
-)
+        other=other_one(),
+    )
+    return Sitting().asked(subject, Question.TEXT, tr("Which job?"))
+
 
 SCREENS = {
     "free jog": jogging,
     "choose": choosing,
-    "choose job": lambda: Sitting().asked(JOBS, Question.TEXT, tr("Which job?")).keys("2"),
+    "choose job": jobs,
+    "check without backup": unsaved,
     "check": lambda: Sitting(motors=False).asked(CHECK, Question.YES_NO).keys("1"),
     "moving": moving,
     "touch": touching,

@@ -11,11 +11,12 @@ from robolink_cli.options.shared import GIVEN, TYPED
 from robolink_cli.prompts.present import sitting_at
 from robolink_cli.session.check_before_start import check_before_start
 from robolink_cli.session.context import context_of_cell
-from robolink_cli.wizard.check_list import CheckSubject
+from robolink_cli.wizard.check_list import CheckPoint, CheckSubject, Mark
 from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.desk import Desk
 from robolink_cli.wizard.glance import ControllerGlance
 from robolink_cli.wizard.happenings import Reading, WasAsked, WasRegarded, WasTold
+from robolink_cli.wizard.screens.checking import point_rows
 from robolink_cli.wizard.screens.drawing import screen_of
 from robolink_cli.wizard.screens.rows import status_row
 from robolink_cli.wizard.screens.told import told_before
@@ -27,11 +28,13 @@ from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 import robolink
+from robolink.backup import keep_first_backup, load, save
 from robolink.errors import DeclinedError, NotReadyError
 from robolink.journal import EntryKind, NewEntry, Signature, memory_journal, open_log
 from robolink.model import ToolOffset, describe_offset
 from robolink.recipe import load_recipe
 from robolink.runner import Question
+from robolink.timing import local_label
 from robolink.transaction import Wanted, change_tools
 from tests.cli.wizard._people import HEADER, Sitting, touch_subject, write_subject
 
@@ -198,6 +201,35 @@ def test_a_list_claims_of_a_plc_only_what_its_mailbox_tells():
         assert "permits movements" in said
 
 
+def test_a_list_says_which_backup_there_is_on_this_computer(tmp_path, monkeypatch):
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
+    with serve_tcp(EpsonSimulator(seed=7), clock=ScaledClock(10.0)) as host:
+        with robolink.connect(host.url) as controller:
+            said = listed(controller)
+            assert "The tools are not saved: this computer has no backup" in said
+            path = keep_first_backup(controller)
+            assert path is not None
+            kept = load(path)
+            save(replace(kept, saved_at="2026-11-20T12:58:00.000Z"), path, replace=True)
+            when = local_label("2026-11-20T12:58:00.000Z")
+            assert f"All 15 tools are saved: backup of {when}" in listed(controller)
+            path.write_text("{", encoding="utf-8")
+            said = listed(controller)
+            assert "The tools are not saved: " in said
+            assert str(path) in said
+            path.unlink()
+            assert "has no backup of this controller" in listed(controller)
+        with robolink.connect("epson+sim://no-backup") as controller:
+            assert "what is simulated ends with this command" in listed(controller)
+
+
+def test_a_backup_that_is_missing_keeps_nobody_from_starting():
+    points = (CheckPoint(Mark.LOOK, "No backup."), CheckPoint(Mark.YOU, "Clear.", "3", "Yes"))
+    hand = Sitting().asked(CheckSubject(points, ""), Question.YES_NO)
+    assert point_rows(points[0], frozenset())[0].split()[0] == "LOOK"
+    assert hand.keys("3", "5").sent == ["y"]
+
+
 def test_a_list_says_how_a_tool_was_left_and_nothing_of_one_that_somebody_changed():
     simulator, new = EpsonSimulator(seed=7), ToolOffset(12.5, -3.0, -20.0)
     with serve_tcp(simulator, clock=ScaledClock(10.0)) as host:
@@ -273,21 +305,41 @@ def test_a_job_is_chosen_by_what_it_does_and_when_it_did_so_last(tmp_path, monke
     name = load_recipe(tmp_path / "a.toml").name
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
 
-    def offered():
+    def offered(rows=False):
         desk = Leaver()
         with pytest.raises(DeclinedError):
-            choose_recipe(desk, None)
+            choose_recipe(desk, None, "epson+tcp://x:5000?timeout=3")
         (subject,) = (
             one.subject
             for one in desk.happened()
             if isinstance(one, WasRegarded) and isinstance(one.subject, ChoiceSubject)
         )
-        return subject.details[0]
+        return subject.options if rows else subject.details[0]
 
     assert offered()[0] == "Touch a known pin once: X, Y and Z, for a change of the needle."
     assert offered()[1] == "Tool: 1"
     assert len(offered()) == 2
     log = open_log("x", durable=True, signature=Signature(recipe=name, nozzle="N-7"))
-    log.append(NewEntry(EntryKind.DONE, tool=1))
+    log.append(NewEntry(EntryKind.DONE, tool=1, details={"took_s": 600.0}))
     log.close()
     assert "needle N-7" in offered()[2]
+    assert "about" not in offered(rows=True)[0], "of another cell, and nobody knows how long"
+    here = open_log("epson+tcp://x:5000", durable=True, signature=Signature(recipe=name))
+    touch = {
+        "station": "PIN-07", "x_mm": 1.0, "y_mm": 2.0, "z_mm": 3.0, "u_deg": 0.0,
+        "sigma_mm": 0.01, "changes": 13, "full_sigma_mm": 0.01, "touch_sigma_mm": 0.02,
+    }  # fmt: skip
+    value = [12.0, -3.5, -20.0, 0.0, 0.0, 0.0]
+    for seconds, changes in ((130.0, 14), (170.0, 15), (900.0, 16)):
+        details = {"touch": touch | {"changes": changes}, "value": value, "took_s": seconds}
+        here.append(NewEntry(EntryKind.DONE, change=f"c{changes}", tool=1, details=details))
+    assert offered(rows=True)[0].endswith(f"{name}   (a.toml)   about 3 min"), "170 s, the median"
+    assert offered()[-1] == "A full calibration is due after 4 more changes."
+    for more, said in ((19, "after one more change."), (20, "now."), (31, "now.")):
+        details = {"touch": touch | {"changes": more}, "value": value}
+        here.append(NewEntry(EntryKind.DONE, tool=1, details=details))
+        assert offered()[-1] == f"A full calibration is due {said}"
+    # Somebody wrote another value since: the method would refuse, and says why itself.
+    here.append(NewEntry(EntryKind.READ_BACK, tool=1, details={"value": [1.0, *value[1:]]}))
+    assert "due" not in offered()[-1]
+    here.close()

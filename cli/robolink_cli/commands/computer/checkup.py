@@ -81,7 +81,7 @@ def check_cell_files() -> Iterator[Remark]:
             yield Remark(
                 "cells",
                 Level.BAD,
-                tr("{path} has {count} errors.", path=path, count=len(problems)),
+                tr("Errors in {path}: {count}.", path=path, count=len(problems)),
                 tr("Run: robolink cell validate"),
             )
         elif _others_may(path, 0o002):

@@ -1,20 +1,24 @@
 """Which cell and which job: what is asked of whoever typed neither."""
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from robolink.errors import ConfigError, DeclinedError
 from robolink.messages import spoken, tr
+from robolink_cli.console.columns import columns, padded
 from robolink_cli.prompts.present import AskingDesk, present_desk
-from robolink_cli.wizard.choices import ChoiceSubject, choose
+from robolink_cli.session.completing import address_of, is_recipe
+from robolink_cli.wizard.choices import ChoiceSubject, choose_in_either_language
 
 if TYPE_CHECKING:
     from robolink.config import Cell
-    from robolink.recipe import LoadedRecipe
+    from robolink.recipe import LoadedRecipe, RecipePast
     from robolink_cli.session.context import CliContext
+    from robolink_cli.wizard.state import Header
 
-_LOOKED_AT: Final = 500
-"""So many of the newest changes are looked at for the last one with a recipe."""
+_WIDE: Final = 78
+"""Columns of a row of the list."""
 
 _FOLDERS: Final = ("", "recipes")
 """Where recipes are looked for, beside the cell file and in the working folder."""
@@ -33,7 +37,8 @@ def context_at_desk(context: "CliContext", job: str) -> "CliContext":
 
     Args:
         context: What it was told.
-        job: What it is called in the first row.
+        job: What it is called in the first row, a sentence that was declared: the person may
+            change the language.
 
     Raises:
         ConfigError: There is no cell, or a cell file is wrong.
@@ -45,16 +50,17 @@ def context_at_desk(context: "CliContext", job: str) -> "CliContext":
     desk = present_desk()
     if context.url is not None or desk is None:
         return context
-    at = context_of_cell(choose_cell(desk).name)
-    desk.regard(header_of(at, job))
+    at = context_of_cell(choose_cell(desk, lambda: header_of(context, spoken(job))).name)
+    desk.regard(header_of(at, spoken(job)))
     return at
 
 
-def choose_cell(desk: AskingDesk, marked: str = "") -> "Cell":
+def choose_cell(desk: AskingDesk, head: "Callable[[], Header]", *, marked: str = "") -> "Cell":
     """Have one of the cells of this computer chosen; the only one is taken.
 
     Args:
         desk: Where.
+        head: Makes the first row, in the language that is spoken by then.
         marked: Name of the one that is marked; empty for the first.
 
     Raises:
@@ -77,20 +83,56 @@ def choose_cell(desk: AskingDesk, marked: str = "") -> "Cell":
     rows = tuple(f"{cell.name}   {cell.settings.robot or cell.url}" for cell in cells)
     names = [cell.name for cell in cells]
     at = names.index(marked) if marked in names else 0
-    subject = ChoiceSubject(tr("Choose"), (), rows, marked=at)
-    return cells[choose(desk, tr("Which cell?"), subject, _nothing)]
+
+    def ask() -> tuple[str, ChoiceSubject]:
+        desk.regard(head())
+        return tr("Which cell?"), ChoiceSubject(tr("Choose"), (), rows, marked=at)
+
+    return cells[choose_in_either_language(desk, ask, _nothing)]
 
 
-def choose_recipe(desk: AskingDesk, cell: "Cell | None") -> "LoadedRecipe":
+def choose_recipe(
+    desk: AskingDesk,
+    cell: "Cell | None",
+    url: str | None = None,
+    *,
+    head: "Callable[[], Header] | None" = None,
+) -> "LoadedRecipe":
     """Have one of the recipes chosen that stand beside the cell file or here.
+
+    Args:
+        desk: Where.
+        cell: The cell, ``None`` where only a URL is known.
+        url: The controller: what is on record of each recipe there is told beside it.
+        head: Makes the first row, in the language that is spoken by then; ``None`` leaves it.
 
     Raises:
         ConfigError: There is none, or it is wrong.
         DeclinedError: The person leaves.
     """
+    paths = _recipes(cell)
+    loaded: list[LoadedRecipe] = []
+
+    def ask() -> tuple[str, ChoiceSubject]:
+        if head is not None:
+            desk.regard(head())
+        loaded[:] = _loaded(desk, paths)
+        pasts = _pasts(loaded, url)
+        details = tuple(_told_of(*one) for one in zip(loaded, pasts, strict=True))
+        rows = _rows_of(loaded, pasts)
+        return tr("Which job?"), ChoiceSubject(tr("Choose"), (), rows, details=details)
+
+    return loaded[choose_in_either_language(desk, ask, _nothing)]
+
+
+def _loaded(desk: AskingDesk, paths: Sequence[Path]) -> "list[LoadedRecipe]":
+    """Return the recipes that are right; of the others the person is told.
+
+    Raises:
+        ConfigError: There is none.
+    """
     from robolink.recipe import load_recipe
 
-    paths = _recipes(cell)
     loaded = []
     for path in paths:
         try:
@@ -105,17 +147,41 @@ def choose_recipe(desk: AskingDesk, cell: "Cell | None") -> "LoadedRecipe":
                 "without a recipe: robolink calibrate two-pose --tool N"
             ),
         )
-    rows = tuple(f"{one.name}   ({one.path.name})" for one in loaded)
-    details = tuple(_told_of(one) for one in loaded)
-    subject = ChoiceSubject(tr("Choose"), (), rows, details=details)
-    return loaded[choose(desk, tr("Which job?"), subject, _nothing)]
+    return loaded
 
 
-def _told_of(loaded: "LoadedRecipe") -> tuple[str, ...]:
-    """Return what a recipe does, for which tools, and when it did so last on this computer."""
+def _pasts(loaded: "list[LoadedRecipe]", url: str | None) -> "tuple[RecipePast, ...]":
+    """Return what is on record of each recipe; nothing where there is no record to be read."""
     from robolink.errors import RobolinkError
     from robolink.journal import open_journal
-    from robolink.model import EntryKind
+    from robolink.recipe import RecipePast, pasts_of
+
+    try:
+        return pasts_of(loaded, open_journal(read_only=True), address_of(url))
+    except (RobolinkError, OSError):
+        return (RecipePast(),) * len(loaded)  # a list of jobs needs no record
+
+
+def _rows_of(loaded: "Sequence[LoadedRecipe]", pasts: "Sequence[RecipePast]") -> tuple[str, ...]:
+    """Return the rows, with how long each job took here, where that is on record."""
+    names = [f"{one.name}   ({one.path.name})" for one in loaded]
+    told = [
+        "" if past.usual_s is None else tr("about {n} min", n=max(1, round(past.usual_s / 60)))
+        for past in pasts
+    ]
+    wide = max(map(columns, names))
+    if wide + 3 + max(map(columns, told)) > _WIDE:
+        # The longest name decides: how long it takes is not cut off.
+        return tuple(
+            f"{time}   {name}" if time else name for name, time in zip(names, told, strict=True)
+        )
+    return tuple(
+        f"{padded(name, wide)}   {time}".rstrip() for name, time in zip(names, told, strict=True)
+    )
+
+
+def _told_of(loaded: "LoadedRecipe", past: "RecipePast") -> tuple[str, ...]:
+    """Return what a recipe does, for which tools, when it did so last, and what is due."""
     from robolink.timing import local_label
 
     recipe = loaded.recipe
@@ -123,24 +189,27 @@ def _told_of(loaded: "LoadedRecipe") -> tuple[str, ...]:
         spoken(recipe.source.of_method.summary),
         tr("Tool: {numbers}", numbers=", ".join(str(one.number) for one in recipe.tools)),
     ]
-    try:
-        entries = open_journal(read_only=True).entries(kinds=(EntryKind.DONE,), limit=_LOOKED_AT)
-        last = next((one for one in entries if one.signature.recipe == loaded.name), None)
-    except (RobolinkError, OSError):
-        last = None  # a list of jobs needs no record
-    if last is None:
-        return tuple(said)
-    when, nozzle = local_label(last.at), last.signature.nozzle
-    if nozzle:
-        said.append(tr("Last change with it from here: {when}, needle {id}", when=when, id=nozzle))
-    else:
-        said.append(tr("Last change with it from here: {when}", when=when))
+    if past.last is not None:
+        when, nozzle = local_label(past.last.at), past.last.signature.nozzle
+        said.append(
+            tr("Last change with it from here: {when}, needle {id}", when=when, id=nozzle)
+            if nozzle
+            else tr("Last change with it from here: {when}", when=when)
+        )
+    if past.changes_left is not None:
+        said.append(_due(past.changes_left))
     return tuple(said)
 
 
-def _recipes(cell: "Cell | None") -> list[Path]:
-    from robolink_cli.session.completing import is_recipe
+def _due(left: int) -> str:
+    if left == 0:
+        return tr("A full calibration is due now.")
+    if left == 1:
+        return tr("A full calibration is due after one more change.")
+    return tr("A full calibration is due after {n} more changes.", n=left)
 
+
+def _recipes(cell: "Cell | None") -> list[Path]:
     roots = [Path.cwd()]
     if cell is not None and "url" in cell.origins:
         roots.insert(0, cell.origins["url"].parent)

@@ -17,6 +17,7 @@ from robolink_cli.session.ordering import order_option, require_no_dry_run
 
 if TYPE_CHECKING:
     from robolink.recipe import LoadedRecipe
+    from robolink_cli.wizard.state import Header
 
 
 @click.command()
@@ -146,12 +147,12 @@ def _chosen(context: CliContext, recipe: Path | None) -> "tuple[CliContext, Load
     from robolink_cli.session.guidance import header_of
 
     named = None if recipe is None else load_recipe(recipe)
-    at = context_at_desk(context, tr("Change needle"))
+    at = context_at_desk(context, declared("Change needle"))
     if named is not None:
         return at, named
     desk = present_desk()
     assert desk is not None  # noqa: S101 - looked at by whoever calls
-    loaded = choose_recipe(desk, at.cell)
+    loaded = choose_recipe(desk, at.cell, at.url, head=lambda: header_of(at, tr("Change needle")))
     desk.regard(header_of(at, tr("Change needle"), *_as_typed(loaded.path)))
     return at, loaded
 
@@ -165,13 +166,16 @@ def _chosen_anew(before: CliContext) -> "tuple[CliContext, LoadedRecipe]":
 
     desk = present_desk()
     assert desk is not None  # noqa: S101 - it is offered at a desk alone
+
+    def head(*typed: str) -> "Header":
+        return header_of(at, tr("Change needle"), *typed, anew=True)
+
     at = before
     if before.cell is not None:
-        name = choose_cell(desk, before.cell.name).name
+        name = choose_cell(desk, head, marked=before.cell.name).name
         at = before if name == before.cell.name else context_of_cell(name, anew=True)
-    loaded = choose_recipe(desk, at.cell)
-    typed = ("change", _as_short_as_it_goes(loaded.path))
-    desk.regard(header_of(at, tr("Change needle"), *typed, anew=True))
+    loaded = choose_recipe(desk, at.cell, at.url, head=head)
+    desk.regard(head("change", _as_short_as_it_goes(loaded.path)))
     return at, loaded
 
 

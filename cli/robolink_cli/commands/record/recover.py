@@ -78,7 +78,7 @@ def recover(
         )
 
     def settle() -> tuple[int, dict[str, object]]:
-        at = context_at_desk(context, tr("Recover"))
+        at = context_at_desk(context, declared("Recover"))
         with open_controller(at, quiet=True, changes=not dry_run) as controller:
             if take_over is not None and not dry_run:
                 controller.outcomes.take_over(take_over)

@@ -26,6 +26,8 @@ def mark_of(point: CheckPoint, checked: frozenset[str]) -> str:
     """Return the word for how a point stands."""
     if point.mark is Mark.OK or point.key in checked:
         return tr("OK")
+    if point.mark is Mark.LOOK:
+        return tr("LOOK")
     return tr("TO DO") if point.mark is Mark.TO_DO else tr("YOU")
 
 

@@ -2,6 +2,7 @@
 
 from typing import Final
 
+from robolink.locale.languages import ENGLISH
 from robolink.messages import tr
 from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.screens.layout import BODY, Screen, broken
@@ -30,6 +31,7 @@ def choice_screen(state: WizardState, subject: ChoiceSubject, now_s: float) -> S
     keys = (
         ("5", subject.does or tr("Next")),
         (tr("arrows"), tr("choose")),
+        *((("F2", _named(subject.other)),) if subject.other else ()),
         ("0", subject.leaves or tr("Leave")),
     )
     return Screen(
@@ -39,6 +41,11 @@ def choice_screen(state: WizardState, subject: ChoiceSubject, now_s: float) -> S
         status=status_row(state, now_s) if state.reading is not None else "",
         message=state.message,
     )
+
+
+def _named(language: str) -> str:
+    """Return the name of a language, as who reads it calls it where the screen can show that."""
+    return tr("English") if language == ENGLISH else tr("Chinese")
 
 
 def _details(state: WizardState, subject: ChoiceSubject) -> tuple[str, ...]:

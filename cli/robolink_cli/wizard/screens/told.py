@@ -2,6 +2,7 @@
 
 import math
 
+from robolink.locale.languages import ENGLISH
 from robolink.messages import joined, tr
 from robolink.nozzle_change import WriteSubject
 from robolink.runner import FitSubject, Question, TouchSubject
@@ -48,7 +49,7 @@ def told_question(state: WizardState) -> str:
     if state.at_place:
         return _place(state)
     if isinstance(subject, ChoiceSubject):
-        return tr("{question} [Type the number of a row. To leave: stop.]", question=question.text)
+        return _choice(question.text, subject)
     if question.kind is Question.TEXT:
         return tr("{question} [Type or scan it, then Enter. To end: stop.]", question=question.text)
     if isinstance(subject, WriteSubject):
@@ -60,6 +61,20 @@ def told_question(state: WizardState) -> str:
     if isinstance(subject, FitSubject) and subject.more:
         return tr("{question} [y, n, or more for one more touch]", question=question.text)
     return tr("{question} [y or n]", question=question.text)
+
+
+def _choice(question: str, subject: ChoiceSubject) -> str:
+    if subject.other == ENGLISH:
+        return tr(
+            "{question} [Type the number of a row. To read English: english. To leave: stop.]",
+            question=question,
+        )
+    if subject.other:
+        return tr(
+            "{question} [Type the number of a row. To read Chinese: chinese. To leave: stop.]",
+            question=question,
+        )
+    return tr("{question} [Type the number of a row. To leave: stop.]", question=question)
 
 
 def _further(subject: WriteSubject) -> list[str]:

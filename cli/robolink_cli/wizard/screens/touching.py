@@ -110,7 +110,10 @@ def _since(state: WizardState) -> list[str]:
     if way is None or pose is None or arrival is None:
         return []
     turned = signed(angle_difference_deg(pose.u_deg, arrival.u_deg), 2)
-    total = tr("{mm} mm, {n} steps", mm=f"{math.hypot(*way):.2f}", n=state.jogging.steps)
+    apart, steps = f"{math.hypot(*way):.2f}", state.jogging.steps
+    total = tr("{mm} mm, {n} steps", mm=apart, n=steps)
+    if steps == 1:
+        total = tr("{mm} mm, 1 step", mm=apart)
     parts = row_of((*map(signed, way), turned))
     name = tr("Since arrival") if touch is not None else tr("Since start")
     lines = [padded(f" {name}", _HEAD) + parts + f"   {total}"]

@@ -1,0 +1,103 @@
+"""What the record says of a recipe before anything is connected: when, how long, what is due."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from statistics import median
+from typing import TYPE_CHECKING, Final
+
+from robolink.methods import KEPT, ToolHistory
+from robolink.model import EntryKind, Recorded, read_offset
+from robolink.recipe._loading import LoadedRecipe
+
+if TYPE_CHECKING:
+    from robolink.journal import Journal
+
+_LOOKED_AT: Final = 1000
+"""So many of the newest entries are looked at for changes with a recipe."""
+
+_LAST: Final = 5
+"""So many of the last changes tell how long one takes."""
+
+
+@dataclass(frozen=True, slots=True)
+class RecipePast:
+    """What is on record of a recipe.
+
+    Attributes:
+        last: The end of the last change with it from this computer, on any controller; ``None``
+            for none.
+        usual_s: How many seconds a change with it takes on this controller, from its first
+            movement to the end of its test: the median of the last ones; ``None`` where it was
+            never done, or no record says how long it took.
+        changes_left: After how many more changes a full calibration is due, 0 for now; of several
+            tools the one that comes first. ``None`` where the record does not say it.
+    """
+
+    last: Recorded | None = None
+    usual_s: float | None = None
+    changes_left: int | None = None
+
+
+def pasts_of(
+    recipes: Sequence[LoadedRecipe], journal: "Journal", address: str
+) -> tuple[RecipePast, ...]:
+    """Return what is on record of each recipe.
+
+    Args:
+        recipes: The recipes.
+        journal: The journal; it is read.
+        address: Under which address the journal knows the controller, empty where none is known:
+            then only ``last`` is told.
+
+    Raises:
+        JournalError: It cannot be read.
+
+    Example:
+        >>> from robolink.journal import memory_journal
+        >>> from robolink.recipe import pasts_of
+        >>> pasts_of([], memory_journal("pasts-example"), "epson+tcp://192.168.0.1:5000")
+        ()
+    """
+    entries = list(journal.entries(kinds=KEPT, limit=_LOOKED_AT))
+    here = journal.names_of(address) if address else ()
+    return tuple(
+        RecipePast(
+            next((one for one in ends if one.kind is EntryKind.DONE), None),
+            _usual_s(one for one in ends if one.controller in here),
+            _changes_left(loaded, journal, address) if address else None,
+        )
+        for loaded in recipes
+        for ends in ([one for one in entries if one.signature.recipe == loaded.name],)
+    )
+
+
+def _usual_s(ends: Iterable[Recorded]) -> float | None:
+    """Return the median of how long the last changes took; each tool's entry says it."""
+    took: dict[str, float] = {}
+    for one in ends:
+        said = one.details.get("took_s")
+        if isinstance(said, int | float) and len(took) < _LAST:
+            took.setdefault(one.change, float(said))
+    return median(took.values()) if took else None
+
+
+def _changes_left(loaded: LoadedRecipe, journal: "Journal", address: str) -> int | None:
+    recipe = loaded.recipe
+    tells = recipe.source.of_method.changes_left
+    if tells is None or journal.robots_of(address):
+        return None  # of several robots it is not known here which one is meant
+    from robolink.recipe._plans import parameters_of
+
+    left = []
+    for tool in recipe.tools:
+        holds = journal.last_value(address, tool.number)
+        history = ToolHistory(
+            station=recipe.station.id,
+            kept=journal.entries(controller=address, tool=tool.number, kinds=KEPT),
+            holds=None if holds is None else read_offset(holds.details.get("value")),
+            sigma_mm=recipe.tolerances.sigma_mm,
+            interval_mm=recipe.tolerances.interval_mm,
+        )
+        left.append(tells(parameters_of(recipe), history))
+    known = [one for one in left if one is not None]
+    return min(known, default=None)

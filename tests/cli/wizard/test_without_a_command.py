@@ -109,6 +109,9 @@ def test_after_a_tool_the_next_one_begins_with_the_choice_and_nothing_moves_befo
             for touch in ("Touch 1 of 2", "Touch 2 of 2"):
                 hand.see(touch)
                 hand.touch()
+            hand.see("exactly as long")
+            hand.rest(0.4)
+            hand.press(["1"])
             hand.see("To write, type the tool number")
             hand.rest(0.4)
             hand.press(["1", "*"])

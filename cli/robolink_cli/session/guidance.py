@@ -39,10 +39,15 @@ def guided_if_alone(
     """
     if not alone or not may_be_guided():
         return do()
-    from robolink_cli.access.change_page import page_of_change
     from robolink_cli.wizard.host import guided
 
-    return guided(header_of(context, job), do, report=page_of_change, following=following)
+    return guided(header_of(context, job), do, report=_page, following=following)
+
+
+def _page(change: str) -> tuple[str, ...]:
+    from robolink_cli.access.change_page import page_of_change  # report and journal, not before
+
+    return page_of_change(change)
 
 
 def header_of(

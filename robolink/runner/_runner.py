@@ -225,7 +225,8 @@ class Runner:
             return self._look(step)
         if isinstance(step, Seek):
             return self._seek(step)
-        going = MoveSubject(step.target, step.path, self._settings.speed_mm_s, step.purpose)
+        speed_mm_s = self._settings.speed_mm_s
+        going = MoveSubject(step.target, step.path, speed_mm_s, step.purpose, step.then)
         regard(self._operator, [going])
         return self.move(step.target, step.path)
 

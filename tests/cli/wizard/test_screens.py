@@ -248,7 +248,25 @@ def jobs():
     return Sitting().asked(subject, Question.TEXT, tr("Which job?"))
 
 
+def coming_down(*, reads=True, **other):
+    """A straight way down of which a good third is left."""
+    start = Pose(300.0, 400.0, -20.0, 90.0, tool=0)
+    target = replace(start, z_mm=-80.0, **other)
+    going = MoveSubject(
+        target,
+        Way.STRAIGHT,
+        8.0,
+        tr("Lowering beside the pin."),
+        tr("You jog the tip into contact."),
+    )
+    seen = Reading(10.0, "ready", pose=replace(start, z_mm=-57.0), motors=True, low_power=True)
+    hand = Sitting().happens(WasRead(replace(seen, pose=start))).happens(WasRegarded(going))
+    return hand.happens(WasRead(seen if reads else replace(seen, pose=None)))
+
+
 SCREENS = {
+    "moving down": coming_down,
+    "moving unseen": lambda: coming_down(reads=False),
     "free jog": jogging,
     "choose": choosing,
     "choose job": jobs,
@@ -356,6 +374,22 @@ def test_lines_say_what_the_turn_test_has_shown_too():
     assert told_question(Sitting().asked(beyond).state).startswith(
         "At U 90.0 it was 0.200 mm off: over the limit."
     )
+
+
+def test_how_long_a_movement_takes_is_said_where_it_is_known():
+    def shown(hand, later_s=0.0):
+        return "\n".join(screen_of(hand.state, hand.now + later_s).rows())
+
+    assert "Still: 23.0 mm, about 3 s" in shown(coming_down())
+    # A controller that tells no position meanwhile: the whole way, from where it began.
+    assert "Way:   60.0 mm in all, about 8 s" in shown(coming_down(reads=False))
+    assert "Still" not in shown(coming_down(), later_s=1.5), "where it is now, nobody knows"
+    # A tool that turns on its way has a speed of its own.
+    for turns in ({"u_deg": 80.0}, {"v_deg": 1.0}, {"w_deg": 1.0}):
+        assert "about" not in shown(coming_down(**turns))
+    assert "about" not in shown(moving())
+    assert "Then" not in shown(moving())
+    assert "Then:  You jog the tip into contact." in shown(coming_down())
 
 
 def test_the_picture_finds_the_elbow_by_angles_alone():

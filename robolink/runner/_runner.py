@@ -1,7 +1,7 @@
 """Takes the steps of a procedure on one motion group."""
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import starmap
 from typing import Final, TypeVar
 
@@ -225,9 +225,8 @@ class Runner:
             return self._look(step)
         if isinstance(step, Seek):
             return self._seek(step)
-        speed_mm_s = self._settings.speed_mm_s
-        going = MoveSubject(step.target, step.path, speed_mm_s, step.purpose, step.then)
-        regard(self._operator, [going])
+        going = MoveSubject(step.target, step.path, self._settings.speed_mm_s, step.purpose)
+        regard(self._operator, [replace(going, then=step.then)])
         return self.move(step.target, step.path)
 
     def _obstacle(self, move: Move, start: Pose | None) -> str:

@@ -227,8 +227,8 @@ def test_what_a_movement_says_will_follow_is_what_follows():
         told = [(one.then, after) for one, after in pairs if one.then]
         assert any(isinstance(after, Ask) for _, after in told)
         for then, after in told:
-            asks = then == "You jog the tip into contact."
-            assert isinstance(after, Ask) if asks else after.purpose == then
+            follows = "You jog the tip into contact." if isinstance(after, Ask) else after.purpose
+            assert then == follows
         # Each way to a touch says so.
         assert all(one.then for one, after in pairs if isinstance(after, Ask))
 

@@ -24,6 +24,7 @@ def guided_if_alone(
     job: str,
     alone: bool = True,
     following: Callable[[], T] | None = None,
+    steps: int = 0,
 ) -> T:
     """Do the work of a command; as a wizard where a person sits at the terminal.
 
@@ -33,6 +34,7 @@ def guided_if_alone(
         job: What it is called in the first row.
         alone: Whether it is a person who is asked, and not a simulator's stand-in for one.
         following: What begins for the next tool, with a choice; ``None`` where none can.
+        steps: How many numbered steps it has, 0 for none.
 
     Raises:
         BaseException: Whatever ended the work.
@@ -41,7 +43,8 @@ def guided_if_alone(
         return do()
     from robolink_cli.wizard.host import guided
 
-    return guided(header_of(context, job), do, report=_page, following=following)
+    head = header_of(context, job, steps=steps)
+    return guided(head, do, report=_page, following=following)
 
 
 def _page(change: str) -> tuple[str, ...]:
@@ -51,7 +54,12 @@ def _page(change: str) -> tuple[str, ...]:
 
 
 def header_of(
-    context: CliContext, job: str, *chosen: str, needle: str = "", anew: bool = False
+    context: CliContext,
+    job: str,
+    *chosen: str,
+    needle: str = "",
+    anew: bool = False,
+    steps: int = 0,
 ) -> "Header":
     """Return the first row of a command's screens.
 
@@ -61,6 +69,7 @@ def header_of(
         chosen: What was chosen from a list, as it would be typed behind the command.
         needle: Id of the needle that is mounted.
         anew: Whether the line that began the command was about another job.
+        steps: How many numbered steps the job has, 0 for none.
     """
     from robolink_cli.wizard.state import Header
 
@@ -72,6 +81,7 @@ def header_of(
         simulated="+sim://" in url,
         command=_typed_again(context, chosen, anew=anew),
         needle=needle,
+        steps=steps,
     )
 
 

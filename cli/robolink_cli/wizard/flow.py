@@ -194,7 +194,8 @@ def _asked(state: WizardState, asked: WasAsked) -> WizardState:
 def _answer(state: WizardState, text: str) -> Advanced:
     """Send an answer; until the work waits again nothing else is taken."""
     assert state.question is not None  # noqa: S101 - looked at by whoever calls
-    sent = replace(state, waits=False, message="")
+    accepted = state.accepted or (state.writing is not None and text == "y")
+    sent = replace(state, waits=False, message="", accepted=accepted)
     return sent, [SendAnswer(state.question.number, text)]
 
 

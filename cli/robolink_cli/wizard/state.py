@@ -66,6 +66,7 @@ class Header:
         simulated: Whether nothing real moves.
         command: What is typed to begin the same job once more, empty where nobody typed it.
         needle: Id of the needle or nozzle, empty where nobody was asked.
+        steps: How many steps the job has that are numbered in that row, 0 for none.
     """
 
     cell: str
@@ -73,6 +74,7 @@ class Header:
     simulated: bool = False
     command: str = ""
     needle: str = ""
+    steps: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +109,7 @@ class WizardState:
         checked: Which points of a check list the person has confirmed.
         carried: Whether the robot has moved by itself: a tip that was not jogged since then stands
             where the robot put it.
+        accepted: Whether the person has let the new values be written.
         jogging: The steps made.
         typed: What stands in the field.
         typing: Whether the field of a pose is open at a touch.
@@ -134,6 +137,7 @@ class WizardState:
     fit: FitSubject | None = None
     checked: frozenset[str] = frozenset()
     carried: bool = False
+    accepted: bool = False
     jogging: Jogging = field(default_factory=Jogging)
     typed: str = ""
     typing: bool = False

@@ -25,7 +25,7 @@ from robolink.nozzle_change import LimitVerdict, Proposal, WriteSubject
 from robolink.runner import FitRow, FitSubject, JogSubject, Question, TouchSubject
 
 ARRIVAL = Pose(249.992, 200.004, -81.563, 90.0, tool=0)
-HEADER = Header("line3", "Needle 22G")
+HEADER = Header("line3", "Needle 22G", steps=7)
 
 
 def touch_subject(**more):

@@ -158,10 +158,12 @@ def test_f2_on_the_whole_screen(here):
     try:
         hand.see(r"Which cell\?")
         hand.see(r"\[F2\] Chinese")
+        hand.see("1 of 7  Choose")
         hand.rest(0.4)
         hand.press(["\x1bOQ"])
         hand.see("哪 *个 *工 *作 *站")
         hand.see(r"\[F2\] English")
+        hand.see("1/7  选")
         hand.rest(0.4)
         hand.press(["5"])
         hand.see("做 *什 *么")
@@ -179,7 +181,7 @@ def test_f2_on_the_whole_screen(here):
 def test_a_word_in_the_dialogue_of_lines(here):
     terminal = Terminal("change", "--plain", controlling=True)
     try:
-        terminal.wait_for(r"To read Chinese: chinese")
+        terminal.wait_for(r"or chinese to read Chinese")
         time.sleep(0.4)
         terminal.press("中文\n".encode())
         terminal.wait_for("哪个工作站")

@@ -54,7 +54,11 @@ def moving():
     seen = Reading(10.0, "ready", pose=here, axes=SCARA, motors=True, low_power=True)
     hand = Sitting().happens(WasRead(seen))
     going = MoveSubject(
-        Pose(300.0, 400.0, -60.0, 90.0, tool=0), Way.JOINT, 20.0, tr("Turning in the air.")
+        Pose(300.0, 400.0, -60.0, 90.0, tool=0),
+        Way.JOINT,
+        20.0,
+        tr("Turning in the air."),
+        tr("Lowering beside the pin."),
     )
     return hand.happens(WasRegarded(going))
 
@@ -178,7 +182,7 @@ def recovering():
         leaves=tr("Leave it blocked"),
     )
     question = tr("Look at the robot: which needle is mounted?")
-    return Sitting().asked(subject, Question.TEXT, question)
+    return Sitting(WizardState(Header("line3", "Recover"))).asked(subject, Question.TEXT, question)
 
 
 def taught():
@@ -216,7 +220,10 @@ def ended(header, error=None, report=None, offers=frozenset()):
 def jogging():
     box = WorkBox.around(ARRIVAL, xy_mm=50.0, below_mm=50.0, above_mm=50.0)
     return (
-        Sitting().asked(JogRange(ARRIVAL, box), text="Jog the tool.").keys("+", "6").jogs("x+0.5")
+        Sitting(WizardState(Header("line3", "Jog")))
+        .asked(JogRange(ARRIVAL, box), text="Jog the tool.")
+        .keys("+", "6")
+        .jogs("x+0.5")
     )
 
 
@@ -388,7 +395,9 @@ def test_how_long_a_movement_takes_is_said_where_it_is_known():
     for turns in ({"u_deg": 80.0}, {"v_deg": 1.0}, {"w_deg": 1.0}):
         assert "about" not in shown(coming_down(**turns))
     assert "about" not in shown(moving())
-    assert "Then" not in shown(moving())
+    lifting = MoveSubject(ARRIVAL, Way.STRAIGHT, 8.0, "Lifting off the pin.")
+    assert "Then" not in shown(moving().happens(WasRegarded(lifting)))
+    assert "Then:  Lowering beside the pin." in shown(moving())
     assert "Then:  You jog the tip into contact." in shown(coming_down())
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 import pytest
 from robolink_cli.commands.measure.choosing import choose_recipe
-from robolink_cli.commands.measure.recalibrate import _chosen_anew
+from robolink_cli.commands.measure.recalibrate import _chosen_anew, steps_of
 from robolink_cli.options.shared import GIVEN, TYPED
 from robolink_cli.prompts.present import sitting_at
 from robolink_cli.session.check_before_start import check_before_start
@@ -18,7 +18,7 @@ from robolink_cli.wizard.glance import ControllerGlance
 from robolink_cli.wizard.happenings import Reading, WasAsked, WasRegarded, WasTold
 from robolink_cli.wizard.screens.checking import point_rows
 from robolink_cli.wizard.screens.drawing import screen_of
-from robolink_cli.wizard.screens.rows import status_row
+from robolink_cli.wizard.screens.rows import JobStep, status_row, title_row
 from robolink_cli.wizard.screens.told import told_before
 from robolink_cli.wizard.state import Header, WizardState
 from robolink_simulators.cell.clock import ScaledClock
@@ -31,9 +31,10 @@ import robolink
 from robolink.backup import keep_first_backup, load, save
 from robolink.errors import DeclinedError, NotReadyError
 from robolink.journal import EntryKind, NewEntry, Signature, memory_journal, open_log
-from robolink.model import ToolOffset, describe_offset
+from robolink.model import Path as Way
+from robolink.model import Pose, ToolOffset, describe_offset
 from robolink.recipe import load_recipe
-from robolink.runner import Question
+from robolink.runner import MoveSubject, Question
 from robolink.timing import local_label
 from robolink.transaction import Wanted, change_tools
 from tests.cli.wizard._people import HEADER, Sitting, touch_subject, write_subject
@@ -343,3 +344,39 @@ def test_a_job_is_chosen_by_what_it_does_and_when_it_did_so_last(tmp_path, monke
     here.append(NewEntry(EntryKind.READ_BACK, tool=1, details={"value": [1.0, *value[1:]]}))
     assert "due" not in offered()[-1]
     here.close()
+
+
+def test_the_step_is_numbered_where_that_cuts_nothing_off():
+    header = replace(HEADER, job="Change needle", simulated=True)
+    state = WizardState(header)
+    assert title_row(state, "Check", JobStep.CHECK)[1] == "2 of 7  Check  SIMULATED"
+    assert title_row(state, "Question")[1] == "Question  SIMULATED"
+    for cell, said in (("c" * 37, "2 of 7  Check  SIMULATED"), ("c" * 38, "Check  SIMULATED")):
+        left, right = title_row(
+            replace(state, header=replace(header, cell=cell)), "Check", JobStep.CHECK
+        )
+        assert (left, right) == (f"{cell}   Change needle", said)
+    assert (
+        title_row(replace(state, header=replace(header, steps=0)), "x", JobStep.CHECK)[1][0] == "x"
+    )
+    shorter = replace(state, header=replace(header, steps=6))
+    assert title_row(shorter, "On the way", JobStep.TURN_TEST)[1].startswith("6 of 6  On the way")
+
+
+@pytest.mark.parametrize(("keys", "number"), [(("1", "*"), "7 of 7"), (("n",), "3 of 7")])
+def test_movements_after_a_write_was_agreed_to_are_those_of_the_turn_test(keys, number):
+    hand = Sitting().asked(CheckSubject((), ""), Question.YES_NO).keys("5")
+    assert hand.sent == ["y"]
+    hand.asked(write_subject(1), Question.YES_NO).keys(*keys)
+    going = MoveSubject(Pose(300.0, 400.0, -60.0, 90.0, tool=0), Way.JOINT, 20.0, "Up.")
+    hand.happens(WasRegarded(going))
+    assert screen_of(hand.state, hand.now).title[1] == f"{number}  On the way"
+
+
+def test_a_recipe_without_a_turn_test_has_one_step_less(tmp_path):
+    text = (RECIPES / "needle-one-touch.toml").read_text(encoding="utf-8")
+    without = text.replace("[source]", "verify = false\n[source]").replace("drift_mm = 0.1", "")
+    for said, number in ((text, 7), (without, 6)):
+        path = tmp_path / "a.toml"
+        path.write_text(said, encoding="utf-8")
+        assert steps_of(load_recipe(path)) == number

@@ -32,13 +32,14 @@ def nobody_to_ask() -> DeclinedError:
     )
 
 
-def context_at_desk(context: "CliContext", job: str) -> "CliContext":
+def context_at_desk(context: "CliContext", job: str, *, steps: int = 0) -> "CliContext":
     """Return what a command was told, with a cell where it names none and somebody is at a desk.
 
     Args:
         context: What it was told.
         job: What it is called in the first row, a sentence that was declared: the person may
             change the language.
+        steps: How many numbered steps it has, 0 for none.
 
     Raises:
         ConfigError: There is no cell, or a cell file is wrong.
@@ -50,8 +51,9 @@ def context_at_desk(context: "CliContext", job: str) -> "CliContext":
     desk = present_desk()
     if context.url is not None or desk is None:
         return context
-    at = context_of_cell(choose_cell(desk, lambda: header_of(context, spoken(job))).name)
-    desk.regard(header_of(at, spoken(job)))
+    cell = choose_cell(desk, lambda: header_of(context, spoken(job), steps=steps))
+    at = context_of_cell(cell.name)
+    desk.regard(header_of(at, spoken(job), steps=steps))
     return at
 
 

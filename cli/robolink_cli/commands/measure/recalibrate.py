@@ -1,7 +1,7 @@
 """recalibrate RECIPE.toml: the scripted nozzle change."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import click
 
@@ -18,6 +18,9 @@ from robolink_cli.session.ordering import order_option, require_no_dry_run
 if TYPE_CHECKING:
     from robolink.recipe import LoadedRecipe
     from robolink_cli.wizard.state import Header
+
+_STEPS: Final = 7
+"""Choose, check, on the way, touch, fit, new values, turn test: numbered in the first row."""
 
 
 @click.command()
@@ -119,6 +122,8 @@ def recalibrate(
         # What was typed is about the tool before: neither its needle nor a consent holds again.
         at, loaded = _chosen_anew(reached[-1])
         reached.append(at)
+        for sentence in loaded.notes:
+            note(sentence)
         Recalibration(
             at,
             loaded,
@@ -136,7 +141,7 @@ def recalibrate(
         job = tr("Change needle")
         # A program that reads what comes of it waits for one result.
         following = None if jsonl or context.json else another
-        guided_if_alone(context, change, job=job, alone=alone, following=following)
+        guided_if_alone(context, change, job=job, alone=alone, following=following, steps=_STEPS)
 
 
 def _chosen(context: CliContext, recipe: Path | None) -> "tuple[CliContext, LoadedRecipe]":
@@ -147,13 +152,19 @@ def _chosen(context: CliContext, recipe: Path | None) -> "tuple[CliContext, Load
     from robolink_cli.session.guidance import header_of
 
     named = None if recipe is None else load_recipe(recipe)
-    at = context_at_desk(context, declared("Change needle"))
-    if named is not None:
-        return at, named
+    at = context_at_desk(context, declared("Change needle"), steps=_STEPS)
     desk = present_desk()
+
+    def head(*chosen: str, steps: int = _STEPS) -> "Header":
+        return header_of(at, tr("Change needle"), *chosen, steps=steps)
+
+    if named is not None:
+        if desk is not None:
+            desk.regard(head(steps=steps_of(named)))
+        return at, named
     assert desk is not None  # noqa: S101 - looked at by whoever calls
-    loaded = choose_recipe(desk, at.cell, at.url, head=lambda: header_of(at, tr("Change needle")))
-    desk.regard(header_of(at, tr("Change needle"), *_as_typed(loaded.path)))
+    loaded = choose_recipe(desk, at.cell, at.url, head=head)
+    desk.regard(head(*_as_typed(loaded.path), steps=steps_of(loaded)))
     return at, loaded
 
 
@@ -167,16 +178,25 @@ def _chosen_anew(before: CliContext) -> "tuple[CliContext, LoadedRecipe]":
     desk = present_desk()
     assert desk is not None  # noqa: S101 - it is offered at a desk alone
 
-    def head(*typed: str) -> "Header":
-        return header_of(at, tr("Change needle"), *typed, anew=True)
+    def head(*typed: str, steps: int = _STEPS) -> "Header":
+        return header_of(at, tr("Change needle"), *typed, anew=True, steps=steps)
 
     at = before
     if before.cell is not None:
         name = choose_cell(desk, head, marked=before.cell.name).name
         at = before if name == before.cell.name else context_of_cell(name, anew=True)
     loaded = choose_recipe(desk, at.cell, at.url, head=head)
-    desk.regard(head("change", _as_short_as_it_goes(loaded.path)))
+    desk.regard(head("change", _as_short_as_it_goes(loaded.path), steps=steps_of(loaded)))
     return at, loaded
+
+
+def steps_of(loaded: "LoadedRecipe") -> int:
+    """Return how many steps of a change are numbered; the last one is the turn test.
+
+    Args:
+        loaded: The recipe.
+    """
+    return _STEPS if loaded.recipe.verifies else _STEPS - 1
 
 
 def _as_typed(path: Path) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ from robolink.messages import tr
 from robolink_cli.console.columns import columns, padded
 from robolink_cli.wizard.check_list import CheckPoint, CheckSubject, Mark
 from robolink_cli.wizard.screens.layout import Screen, broken
-from robolink_cli.wizard.screens.rows import status_row, title_row
+from robolink_cli.wizard.screens.rows import JobStep, status_row, title_row
 from robolink_cli.wizard.state import WizardState
 
 
@@ -14,7 +14,7 @@ def check_screen(state: WizardState, subject: CheckSubject, now_s: float) -> Scr
     rows = [row for point in subject.points for row in point_rows(point, state.checked)]
     start = tr("Start moving ({n} open)", n=left) if left else tr("Start moving")
     return Screen(
-        title_row(state, tr("Check")),
+        title_row(state, tr("Check"), JobStep.CHECK),
         (*rows, "", *broken(subject.plan), tr("Keep a hand near the emergency stop.")),
         (("5", start), ("0", tr("Leave"))),
         status=status_row(state, now_s),

@@ -6,7 +6,7 @@ from robolink.locale.languages import ENGLISH
 from robolink.messages import tr
 from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.screens.layout import BODY, Screen, broken
-from robolink_cli.wizard.screens.rows import status_row, title_row
+from robolink_cli.wizard.screens.rows import JobStep, status_row, title_row
 from robolink_cli.wizard.state import WizardState
 
 _LEAST_SHOWN: Final = 3
@@ -31,11 +31,11 @@ def choice_screen(state: WizardState, subject: ChoiceSubject, now_s: float) -> S
     keys = (
         ("5", subject.does or tr("Next")),
         (tr("arrows"), tr("choose")),
-        *((("F2", _named(subject.other)),) if subject.other else ()),
+        *((("F2", language_label(subject.other)),) if subject.other else ()),
         ("0", subject.leaves or tr("Leave")),
     )
     return Screen(
-        title_row(state, subject.step),
+        title_row(state, subject.step, JobStep.CHOOSE),
         (*above, "", state.question.text, *rows, *(["", *told] if told else ())),
         keys,
         status=status_row(state, now_s) if state.reading is not None else "",
@@ -43,8 +43,12 @@ def choice_screen(state: WizardState, subject: ChoiceSubject, now_s: float) -> S
     )
 
 
-def _named(language: str) -> str:
-    """Return the name of a language, as who reads it calls it where the screen can show that."""
+def language_label(language: str) -> str:
+    """Return what a language is called beside the key that changes to it.
+
+    Args:
+        language: One of :data:`robolink.locale.languages.LANGUAGES`.
+    """
     return tr("English") if language == ENGLISH else tr("Chinese")
 
 

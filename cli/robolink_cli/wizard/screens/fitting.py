@@ -8,7 +8,7 @@ from robolink.runner import FitRow, FitSubject
 from robolink_cli.console.columns import padded
 from robolink_cli.wizard.questions_flow import worst_first
 from robolink_cli.wizard.screens.layout import Screen
-from robolink_cli.wizard.screens.rows import mm, title_row
+from robolink_cli.wizard.screens.rows import JobStep, mm, title_row
 from robolink_cli.wizard.state import WizardState
 
 _BAR: Final = 20
@@ -26,7 +26,7 @@ def fit_screen(state: WizardState, fit: FitSubject) -> Screen:
     else:
         keys = (("5", show), *more, ("/" if more else "1", retake))
     return Screen(
-        title_row(state, tr("How well it fits")),
+        title_row(state, tr("How well it fits"), JobStep.FIT),
         ("", *fit_lines(fit)),
         (*keys, ("0", tr("STOP"))),
         message=state.message,

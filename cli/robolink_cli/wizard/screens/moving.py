@@ -10,7 +10,7 @@ from robolink_cli.console.columns import padded
 from robolink_cli.wizard.happenings import Reading
 from robolink_cli.wizard.screens.layout import Screen, broken
 from robolink_cli.wizard.screens.picture import COLUMNS, ROWS, picture
-from robolink_cli.wizard.screens.rows import status_row, title_row
+from robolink_cli.wizard.screens.rows import JobStep, status_row, title_row
 from robolink_cli.wizard.state import WizardState
 
 _TURNS_DEG: Final = 0.05
@@ -45,12 +45,17 @@ def moving_screen(state: WizardState, now_s: float) -> Screen:
     legend = tr("# base   O elbow   @ flange and its U direction   * where it goes")
     unknown = tr("Picture of the start: this controller tells no position while it moves.")
     return Screen(
-        title_row(state, tr("On the way")),
+        title_row(state, tr("On the way"), step_of_movement(state)),
         (" " + tr("From above"), *lines, "", " " + legend, *([] if follows else [" " + unknown])),
         (("0", tr("STOP")), ("Esc", tr("STOP"))),
         status=status_row(state, now_s),
         message=tr("The robot is moving."),
     )
+
+
+def step_of_movement(state: WizardState) -> JobStep:
+    """Return the step of a movement: once a write was agreed to, those of the turn test follow."""
+    return JobStep.TURN_TEST if state.accepted else JobStep.ON_THE_WAY
 
 
 def _told(subject: MoveSubject, here: Pose | None, *, low_power: bool, left: bool) -> list[str]:

@@ -1,18 +1,46 @@
 """The two rows that stand above every screen."""
 
 from collections.abc import Iterator
+from enum import IntEnum
 
 from robolink.messages import tr
+from robolink_cli.console.columns import columns
 from robolink_cli.console.machine_words import state_word
 from robolink_cli.wizard.happenings import Reading
+from robolink_cli.wizard.screens.layout import WIDTH
 from robolink_cli.wizard.state import WizardState
 
 
-def title_row(state: WizardState, step: str) -> tuple[str, str]:
-    """Return the first row: cell and job at the left, the step at the right."""
+class JobStep(IntEnum):
+    """The steps of a change, as they are numbered."""
+
+    CHOOSE = 1
+    CHECK = 2
+    ON_THE_WAY = 3
+    TOUCH = 4
+    FIT = 5
+    VALUES = 6
+    TURN_TEST = 7
+
+
+def title_row(state: WizardState, name: str, step: JobStep | None = None) -> tuple[str, str]:
+    """Return the first row: cell and job at the left, the step at the right.
+
+    Args:
+        state: The state.
+        name: What the screen is called.
+        step: Which step it belongs to, ``None`` for none; its number is left out where the job's
+            steps have none, and where it would cut off something else.
+    """
     header = state.header
-    simulated = "  " + tr("SIMULATED") if header.simulated else ""
-    return f"{header.cell}   {header.job}", f"{step}{simulated}"
+    left, simulated = f"{header.cell}   {header.job}", ""
+    if header.simulated:
+        simulated = "  " + tr("SIMULATED")
+    if step is not None and header.steps:
+        numbered = tr("{k} of {n}  {step}", k=min(step, header.steps), n=header.steps, step=name)
+        if columns(left) + 3 + columns(numbered + simulated) <= WIDTH:
+            name = numbered
+    return left, f"{name}{simulated}"
 
 
 def status_row(state: WizardState, now_s: float) -> str:

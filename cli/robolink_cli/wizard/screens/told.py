@@ -9,6 +9,7 @@ from robolink.runner import FitSubject, Question, TouchSubject
 from robolink_cli.wizard.check_list import CheckSubject
 from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.screens.checking import mark_of
+from robolink_cli.wizard.screens.choosing import language_label
 from robolink_cli.wizard.screens.fitting import fit_lines
 from robolink_cli.wizard.screens.rows import mm
 from robolink_cli.wizard.screens.touching import angle_word, instruction, touch_title
@@ -64,17 +65,15 @@ def told_question(state: WizardState) -> str:
 
 
 def _choice(question: str, subject: ChoiceSubject) -> str:
-    if subject.other == ENGLISH:
-        return tr(
-            "{question} [Type the number of a row. To read English: english. To leave: stop.]",
-            question=question,
-        )
-    if subject.other:
-        return tr(
-            "{question} [Type the number of a row. To read Chinese: chinese. To leave: stop.]",
-            question=question,
-        )
-    return tr("{question} [Type the number of a row. To leave: stop.]", question=question)
+    if not subject.other:
+        return tr("{question} [Type the number of a row. To leave: stop.]", question=question)
+    english = subject.other == ENGLISH
+    return tr(
+        "{question} [Type the number of a row, or {word} to read {language}. To leave: stop.]",
+        question=question,
+        word="english" if english else "chinese",
+        language=language_label(subject.other),
+    )
 
 
 def _further(subject: WriteSubject) -> list[str]:

@@ -7,7 +7,7 @@ from robolink.model import angle_difference_deg
 from robolink.runner import AngleShown, JogRange, Question, TouchSubject
 from robolink_cli.console.columns import padded
 from robolink_cli.wizard.screens.layout import Screen, row_of
-from robolink_cli.wizard.screens.rows import mm, signed, status_row, title_row
+from robolink_cli.wizard.screens.rows import JobStep, mm, signed, status_row, title_row
 from robolink_cli.wizard.state import STEP_SIZES, WizardState
 
 _HEAD = 14
@@ -29,7 +29,7 @@ def touch_screen(state: WizardState, now_s: float) -> Screen:
     ]
     lines += [*_range(state.free_jog), "", *_keypad(state), *_typing(state)]
     return Screen(
-        title_row(state, touch_title(touch)),
+        title_row(state, touch_title(touch), _step(touch)),
         tuple(lines),
         _actions(state),
         status=status_row(state, now_s),
@@ -46,6 +46,13 @@ def touch_title(touch: TouchSubject | None) -> str:
     if touch.total is None:
         return tr("Touch {k}", k=touch.number)
     return tr("Touch {k} of {n}", k=touch.number, n=touch.total)
+
+
+def _step(touch: TouchSubject | None) -> JobStep | None:
+    """Return the step of a place; one that is no touch has none."""
+    if touch is None or not touch.number:
+        return None
+    return JobStep.TURN_TEST if touch.proof else JobStep.TOUCH
 
 
 def instruction(state: WizardState) -> str:

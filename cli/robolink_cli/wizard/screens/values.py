@@ -8,7 +8,7 @@ from robolink.model import ToolOffset
 from robolink.nozzle_change import LimitVerdict, Proposal, WriteSubject
 from robolink_cli.console.columns import padded
 from robolink_cli.wizard.screens.layout import BODY, Screen, broken, row_of
-from robolink_cli.wizard.screens.rows import mm, signed, title_row
+from robolink_cli.wizard.screens.rows import JobStep, mm, signed, title_row
 from robolink_cli.wizard.state import WizardState
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ def values_screen(state: WizardState, subject: WriteSubject) -> Screen:
     shown, pages = _shown(state, subject)
     onward = ((".", tr("The rest")),) if pages > 1 else ()
     return Screen(
-        title_row(state, tr("New values")),
+        title_row(state, tr("New values"), JobStep.VALUES),
         (*shown, "", typed),
         (("*", tr("Write")), *_further(subject), *onward, ("Esc", tr("Do not write"))),
         message=state.message,

@@ -16,7 +16,7 @@ from robolink.messages import tr
 from robolink.model import Path, Pose
 from robolink.procedures.approach import offset_z
 from robolink.procedures.pin.touch_plan import TouchPlan, fresh_seed, plain_pose
-from robolink.procedures.pin.witnessed import WitnessedTouches
+from robolink.procedures.pin.witnessed import WitnessedTouches, you_touch
 from robolink.runner import Move, Procedure, TouchedAt, TouchSubject
 
 if TYPE_CHECKING:
@@ -112,9 +112,11 @@ class SurfaceTouches(WitnessedTouches):
         x_mm, y_mm, z_mm = (away_mm * along for along in normal)
         beside = replace(expected, x_mm=expected.x_mm + x_mm, y_mm=expected.y_mm + y_mm)
         above_mm = self._plan.lift_mm
-        yield Move(offset_z(beside, above_mm), Path.JOINT, tr("Moving over the surface."))
         down = tr("Lowering to just above the place.")
-        arrival: Pose = yield Move(offset_z(beside, z_mm), Path.STRAIGHT, down)
+        over = tr("Moving over the surface.")
+        yield Move(offset_z(beside, above_mm), Path.JOINT, over, then=down)
+        lower = Move(offset_z(beside, z_mm), Path.STRAIGHT, down, then=you_touch())
+        arrival: Pose = yield lower
         touch = yield from self.touched(
             expected,
             arrival,

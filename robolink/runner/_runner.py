@@ -1,7 +1,7 @@
 """Takes the steps of a procedure on one motion group."""
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import starmap
 from typing import Final, TypeVar
 
@@ -226,7 +226,7 @@ class Runner:
         if isinstance(step, Seek):
             return self._seek(step)
         going = MoveSubject(step.target, step.path, self._settings.speed_mm_s, step.purpose)
-        regard(self._operator, [going])
+        regard(self._operator, [replace(going, then=step.then)])
         return self.move(step.target, step.path)
 
     def _obstacle(self, move: Move, start: Pose | None) -> str:

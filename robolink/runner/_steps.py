@@ -24,12 +24,14 @@ class Move:
         path: How.
         purpose: What for, for a person.
         aside_mm: In a look ahead, how far beside the target it may go when it is taken.
+        then: What follows it, for a person; empty where the procedure does not know yet.
     """
 
     target: Pose
     path: Path
     purpose: str
     aside_mm: float = 0.0
+    then: str = ""
 
 
 class TeachPrompt(Enum):

@@ -127,12 +127,14 @@ class MoveSubject:
         path: How.
         speed_mm_s: Fastest that a straight one goes.
         purpose: What for.
+        then: What follows it; empty where nobody knows yet.
     """
 
     target: Pose
     path: Path
     speed_mm_s: float
     purpose: str
+    then: str = ""
 
 
 @dataclass(frozen=True, slots=True)

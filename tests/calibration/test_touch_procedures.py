@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import pytest
 
@@ -10,8 +11,23 @@ from robolink.errors import CalibrationError
 from robolink.methods import measure_two_pose
 from robolink.model import Path, Pose, ToolOffset, WorkBox, rotate_xy
 from robolink.nozzle_change import foresee
-from robolink.procedures import DriftProof, TouchPlan, contact_pose, verify_by_turning
-from robolink.runner import Ask, Consider, Move, Notify, RunSettings, TouchedAt, TouchSubject
+from robolink.procedures import (
+    DriftProof,
+    SurfaceTouches,
+    TouchPlan,
+    contact_pose,
+    verify_by_turning,
+)
+from robolink.runner import (
+    Ask,
+    Consider,
+    Move,
+    Notify,
+    RunSettings,
+    TouchedAt,
+    TouchSubject,
+    foreseen_steps,
+)
 
 PIN = (310.0, 95.0, -40.0)
 PLAN = TouchPlan(lift_mm=10, clearance_mm=2)
@@ -196,6 +212,25 @@ def test_each_touch_of_the_turn_test_is_asked_for_with_what_the_earlier_ones_hav
     assert [one.distance_mm for one in outcome.drifts] == pytest.approx([error_mm] * 2)
     _, measuring = measured(ToolOffset(12.3, -3.9, -20), ToolOffset(12, -4, -20))
     assert earlier_shown(measuring) == [[], []]
+
+
+def test_what_a_movement_says_will_follow_is_what_follows():
+    tip, stored = ToolOffset(12.3, -3.9, -20), ToolOffset(12, -4, -20)
+    logs = [measured(tip, stored)[1].log, measured(tip, None)[1].log, verified(tip, tip)[1].log]
+    touches = SurfaceTouches(replace(PLAN, nominal=True))
+    here = Pose(298, 99, 0, 0)
+    course = touches.again(Pose(298, 99, -20, 0), (0, 0, 1), key=0)
+    logs.append([one.step for one in foreseen_steps(course, here)])
+    for log in logs:
+        taken = [step for step in log if isinstance(step, (Ask, Move))]
+        pairs = [(one, after) for one, after in pairwise(taken) if isinstance(one, Move)]
+        told = [(one.then, after) for one, after in pairs if one.then]
+        assert any(isinstance(after, Ask) for _, after in told)
+        for then, after in told:
+            follows = "You jog the tip into contact." if isinstance(after, Ask) else after.purpose
+            assert then == follows
+        # Each way to a touch says so.
+        assert all(one.then for one, after in pairs if isinstance(after, Ask))
 
 
 def test_the_mean_of_touches_at_one_angle_is_surer_and_may_pass():

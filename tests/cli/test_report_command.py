@@ -6,9 +6,11 @@ import sqlite3
 
 import pytest
 from robolink_cli import main
+from robolink_cli.access.change_page import page_of_change
 from robolink_simulators.epson.memory.points import Point
 
 from robolink.calibration import Drift, VerifyResult
+from robolink.errors import ConfigError
 from robolink.journal import open_journal
 from robolink.model import EntryKind, NewEntry, Pose, Signature, ToolOffset
 from robolink.nozzle_change._records import verification_entry
@@ -116,6 +118,25 @@ def test_how_it_ended_stands_on_the_page(run, recorded, tmp_path, name):
     recorded(*entries)
     assert run("report", "1", "page.html")[0] == 0
     assert words in text_of(tmp_path / "page.html")
+
+
+def test_the_page_that_the_wizard_shows_is_that_of_the_command(run, recorded, tmp_path):
+    change = recorded(*ENDS["verified"][0])
+    recorded(*ENDS["declined"][0], change="decade00" * 4)
+    assert run("report", change[:8], "page.html")[0] == 0
+    (said,) = page_of_change(change)
+    page = tmp_path / f"change-{change[:8]}.html"
+    assert said == f"Report: {page}"
+    made = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d)?")
+    assert made.sub("", text_of(page)) == made.sub("", text_of(tmp_path / "page.html"))
+    # What stands there already is not written over, and a change that nobody made has no page.
+    page.write_text("mine")
+    with pytest.raises(ConfigError):
+        page_of_change(change)
+    assert page.read_text() == "mine"
+    with pytest.raises(ConfigError):
+        page_of_change("facade00" * 4)
+    assert [one.name for one in tmp_path.glob("change-*")] == [page.name]
 
 
 def test_the_page_says_who_when_with_what_and_what_came_of_it(run, recorded, simulator, tmp_path):

@@ -171,16 +171,20 @@ def looking_options(command: Callable[..., int | None]) -> Callable[..., int | N
     return shared_options(with_context)
 
 
-def context_of_cell(name: str) -> CliContext:
+def context_of_cell(name: str, *, anew: bool = False) -> CliContext:
     """Return what a command was told, for another cell than the one that ``-c`` names.
 
     Args:
         name: A cell of the cell files, or a URL.
+        anew: Whether the line was about another cell, so that of it only who works here, and where
+            the dialogue is recorded, holds for this one.
 
     Raises:
         ConfigError: There is no such cell, or a cell file is wrong.
     """
     given = click.get_current_context().meta.get(GIVEN, {})
+    if anew:
+        given = {key: given[key] for key in ("operator", "record") if key in given}
     return _context_from({**given, "url": name})
 
 

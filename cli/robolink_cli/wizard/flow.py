@@ -39,7 +39,13 @@ from robolink_cli.wizard.happenings import (
     WizardCommand,
 )
 from robolink_cli.wizard.keys import folded, meaning_of, number_in, pose_in, step_of
-from robolink_cli.wizard.questions_flow import answered_by_key, answered_by_line, into_field
+from robolink_cli.wizard.questions_flow import (
+    answered_by_key,
+    answered_by_line,
+    chosen_by_key,
+    chosen_by_line,
+    into_field,
+)
 from robolink_cli.wizard.state import (
     ARMED_AFTER_S,
     LEAST_WAY_MM,
@@ -224,20 +230,14 @@ def _too_early(state: WizardState, key: KeyPressed) -> bool:
     return early or key.at_s - state.early_s < ARMED_AFTER_S
 
 
-def _last_key(state: WizardState, ended: LastScreen, key: KeyPressed) -> Advanced:
-    """Leave the last screen, or begin again; ENTER does neither."""
-    if key.at_s - ended.at_s < ARMED_AFTER_S:
-        return state, []
-    if key.name in ("stop", "0", "q") or (ended.done and key.name in ("5", "main")):
-        return state, [WizardCommand.LEAVE]
-    if key.name in ("5", "main"):
-        return replace(state, begins_again=True), [WizardCommand.BEGIN_AGAIN]
-    return state, []
+def _last(state: WizardState, wanted: WizardCommand | None) -> Advanced:
+    """Leave the last screen, for good or for what was chosen there."""
+    return (state, []) if wanted is None else (replace(state, wants=wanted), [wanted])
 
 
 def _key(state: WizardState, key: KeyPressed) -> Advanced:
     if state.ended is not None:
-        return _last_key(state, state.ended, key)
+        return _last(state, chosen_by_key(state, state.ended, key))
     if key.name == "stop" or (key.name == "0" and not (state.has_field and key.text)):
         return _stop(state)
     if stops_at_once(state, key.name):
@@ -336,6 +336,10 @@ def _again(state: WizardState, number: int | None = None) -> Advanced:
 
 
 def _line(state: WizardState, line: LineTyped) -> Advanced:
+    if state.ended is not None:
+        chosen = chosen_by_line(state, line.text)
+        unknown = chosen is None and folded(line.text)
+        return _last(state.says(tr("Type one of these words.") if unknown else ""), chosen)
     meaning = meaning_of(line.text)
     question = state.question
     typed = question is not None and question.kind is Question.TEXT

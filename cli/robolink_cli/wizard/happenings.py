@@ -185,5 +185,11 @@ class WizardCommand(Enum):
     BEGIN_AGAIN = "begin again"
     """Begin the same job once more, from its first question."""
 
+    SHOW_REPORT = "show the report"
+    """Write the page about the change that was carried out, and come back to the last screen."""
+
+    NEXT_TOOL = "next tool"
+    """Choose another job, from the first list on."""
+
 
 Effect = SendAnswer | WizardCommand

@@ -1,12 +1,16 @@
 """Runs the work of a command in a thread of its own, while a face shows it in the main one."""
 
+import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TypeVar
 
+from robolink.errors import RobolinkError
 from robolink_cli.console.output import shown_by
 from robolink_cli.console.render import note
 from robolink_cli.prompts.present import sitting_at
 from robolink_cli.wizard.desk import Desk
+from robolink_cli.wizard.happenings import WizardCommand
 from robolink_cli.wizard.screens.ending import ended_of, kept_lines
 from robolink_cli.wizard.state import Header, WizardState
 from robolink_cli.wizard.work import Face, Work
@@ -14,26 +18,43 @@ from robolink_cli.wizard.work import Face, Work
 T = TypeVar("T")
 
 
-def guided(header: Header, do: Callable[[], T]) -> T:
+def guided(
+    header: Header,
+    do: Callable[[], T],
+    *,
+    report: Callable[[str], tuple[str, ...]] | None = None,
+    following: Callable[[], T] | None = None,
+) -> T:
     """Do the work of a command, guided by a face on this process's terminal.
 
     Args:
         header: What stands in the first row.
         do: The work; what it asks and shows goes to the face.
+        report: Writes the page about a change, by its id; returns where it is, in sentences.
+            ``None`` where none is offered.
+        following: The work that begins with a choice, for the next tool; ``None`` for none.
 
     Raises:
         BaseException: Whatever ended the work.
     """
     from robolink_cli.wizard.faces.choice import face_here
 
-    face = face_here()
+    face, offers = face_here(), set()
+    if report is not None:
+        offers.add(WizardCommand.SHOW_REPORT)
+    if following is not None:
+        offers.add(WizardCommand.NEXT_TOOL)
     while True:
         desk, work = Desk(), Work(do)
         with sitting_at(desk), shown_by(lambda text, _beside: desk.tell(text)):  # noqa: B023 - used inside the turn
             work.start()
-            state = _shown(face, desk, WizardState(header), work)
+            state = _shown(face, desk, WizardState(header, offers=frozenset(offers)), work)
+        while state.wants is WizardCommand.SHOW_REPORT and report is not None:
+            state = _shown(face, desk, _reported(state, report), work)
         _leave(state, work.error)
-        if not state.begins_again:
+        if state.wants is WizardCommand.NEXT_TOOL and following is not None:
+            do = following
+        elif state.wants is not WizardCommand.BEGIN_AGAIN:
             break
     if work.error is not None:
         raise work.error
@@ -55,6 +76,21 @@ def _shown(face: Face, desk: Desk, state: WizardState, work: "Work[T]") -> Wizar
     except BaseException:
         _ends_alone(desk, work)
         raise
+
+
+def _reported(state: WizardState, report: Callable[[str], tuple[str, ...]]) -> WizardState:
+    """Return the last screen with where the page is; or with why there is none, and the offer."""
+    ended = state.ended
+    assert ended is not None and state.report is not None  # noqa: S101, PT018 - it was offered there
+    again = replace(state, wants=None, message="")
+    try:
+        said = report(state.report.change)
+    except (RobolinkError, OSError) as error:
+        why = error.what if isinstance(error, RobolinkError) else str(error)
+        return replace(again, message=why, ended=replace(ended, at_s=time.monotonic()))
+    lines, kept = (*ended.lines, *said), (*ended.kept, *said)
+    shown = replace(ended, lines=lines, kept=kept, at_s=time.monotonic())
+    return replace(again, offers=state.offers - {WizardCommand.SHOW_REPORT}, ended=shown)
 
 
 def _ends_alone(desk: Desk, work: "Work[T]") -> None:

@@ -39,6 +39,9 @@ _WORDS: Final = {
     "help": "help ? h 帮助",
     "yes": "y yes j ja 是",
     "no": "n no nein 否",
+    "report": "report 报告",
+    "next": "next 下一个",
+    "finish": "finish 结束",
     "zh": "chinese zh 中文",
     "en": "english en 英文",
 }

@@ -11,13 +11,16 @@ from robolink.nozzle_change import WriteSubject
 from robolink.runner import BACK, MORE, FitSubject, Question
 from robolink_cli.wizard.check_list import SWITCH_ON, CheckSubject, Mark
 from robolink_cli.wizard.choices import CHANGE_LANGUAGE, ChoiceSubject
-from robolink_cli.wizard.happenings import KeyPressed
+from robolink_cli.wizard.happenings import KeyPressed, WizardCommand
 from robolink_cli.wizard.keys import folded, meaning_of
-from robolink_cli.wizard.state import WizardState
+from robolink_cli.wizard.state import ARMED_AFTER_S, LastScreen, WizardState
 
 Answered = WizardState | str
 
 _WRITES: Final = frozenset({"*", "main"})
+
+_OFFERED: Final = {"1": WizardCommand.SHOW_REPORT, "3": WizardCommand.NEXT_TOOL}
+_OFFERED_WORDS: Final = {"report": WizardCommand.SHOW_REPORT, "next": WizardCommand.NEXT_TOOL}
 
 _LIKELY_SHARE: Final = 3.0
 """The worst one is offered first where it is so many times as far off as each of the others .."""
@@ -87,6 +90,30 @@ def answered_by_line(state: WizardState, line: str) -> Answered:
     if meaning in ("yes", "no"):
         return meaning[0]
     return state.says(tr("Type y or n."))
+
+
+def chosen_by_key(state: WizardState, ended: LastScreen, key: KeyPressed) -> WizardCommand | None:
+    """Return what a key chooses on the last screen, ``None`` for nothing; ENTER is none.
+
+    A key that is still held down chooses nothing either.
+    """
+    if key.at_s - ended.at_s < ARMED_AFTER_S:
+        return None
+    if key.name in ("stop", "0", "q"):
+        return WizardCommand.LEAVE
+    if key.name in ("5", "main"):
+        return WizardCommand.LEAVE if ended.done else WizardCommand.BEGIN_AGAIN
+    offered = _OFFERED.get(key.name)
+    return offered if ended.done and offered in state.offers else None
+
+
+def chosen_by_line(state: WizardState, line: str) -> WizardCommand | None:
+    """Return what a line chooses at the end of a job; an empty one chooses nothing."""
+    meaning = meaning_of(line)
+    if meaning in ("stop", "finish"):
+        return WizardCommand.LEAVE
+    offered = _OFFERED_WORDS.get(meaning)
+    return offered if offered in state.offers else None
 
 
 def worst_first(fit: FitSubject) -> bool:

@@ -8,7 +8,7 @@ from robolink.model import Pose
 from robolink.nozzle_change import ChangeReport, WriteSubject
 from robolink.runner import FINEST_STEP, FitSubject, JogRange, Question, TouchSubject
 from robolink_cli.wizard.choices import ChoiceSubject
-from robolink_cli.wizard.happenings import Reading, WasAsked
+from robolink_cli.wizard.happenings import Reading, WasAsked, WizardCommand
 
 if TYPE_CHECKING:
     from robolink.calibration import Impact  # numpy, which a touch does without
@@ -125,7 +125,8 @@ class WizardState:
         impact: What the new value does at taught points, ``None`` where none were named.
         report: What was reached, ``None`` before the end.
         ended: The last screen, ``None`` before it.
-        begins_again: Whether the same job is to be begun once more.
+        offers: What the last screen offers beside leaving it, where the job was carried out.
+        wants: What the person chose there; ``None`` for leaving, and before.
     """
 
     header: Header
@@ -152,7 +153,8 @@ class WizardState:
     impact: "Impact | None" = None
     report: ChangeReport | None = None
     ended: LastScreen | None = None
-    begins_again: bool = False
+    offers: frozenset[WizardCommand] = frozenset()
+    wants: WizardCommand | None = None
 
     def says(self, message: str) -> "WizardState":
         """Return the same with another message."""

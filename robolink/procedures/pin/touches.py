@@ -15,7 +15,7 @@ from robolink.model import Path, Pose, ToolOffset, angle_difference_deg
 from robolink.procedures.approach import offset_z
 from robolink.procedures.pin.judging import heights_agree, require_touches
 from robolink.procedures.pin.touch_plan import TouchPlan, fresh_seed, plain_pose
-from robolink.procedures.pin.witnessed import WitnessedTouches
+from robolink.procedures.pin.witnessed import WitnessedTouches, you_touch
 from robolink.runner import Move, NotYet, Procedure, TouchedAt
 
 if TYPE_CHECKING:
@@ -105,7 +105,8 @@ class PinTouches(WitnessedTouches):
         x_mm, y_mm, z_mm = self._standoff(expected)
         beside = replace(expected, x_mm=expected.x_mm + x_mm, y_mm=expected.y_mm + y_mm)
         above_mm = self._plan.lift_mm if self._comes_down else z_mm
-        arrival: Pose = yield self._move(offset_z(beside, above_mm), Path.JOINT, turning)
+        over = self._move(offset_z(beside, above_mm), Path.JOINT, turning)
+        arrival: Pose = yield replace(over, then=lowering() if self._comes_down else you_touch())
         if self._comes_down:
             arrival = yield from self.come_down(offset_z(beside, z_mm))
         touch = yield from self.touched(
@@ -116,7 +117,8 @@ class PinTouches(WitnessedTouches):
 
     def come_down(self, target: Pose) -> Procedure[Pose]:
         """Go straight down to a standoff; returns the pose on arrival."""
-        arrival: Pose = yield self._move(target, Path.STRAIGHT, tr("Lowering beside the pin."))
+        down = self._move(target, Path.STRAIGHT, lowering())
+        arrival: Pose = yield replace(down, then=you_touch())
         return arrival
 
     def require_made(self) -> None:
@@ -218,6 +220,11 @@ class PinTouches(WitnessedTouches):
 
     def _how_to_make(self) -> str:
         return tr("The robot never stops on the pin: jog until the tip is on it, then answer.")
+
+
+def lowering() -> str:
+    """Return what the way down beside a pin is for."""
+    return tr("Lowering beside the pin.")
 
 
 def lift_off(plan: TouchPlan, touch: Pose) -> Move:

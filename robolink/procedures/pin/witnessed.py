@@ -30,6 +30,11 @@ MOST_ASKED: Final = 3
 """How often a person is asked for a touch before the refusal ends the measurement."""
 
 
+def you_touch() -> str:
+    """Return what follows where the robot stops beside what is touched."""
+    return tr("You jog the tip into contact.")
+
+
 class WitnessedTouches(ABC):
     """The touches of one thing in one measurement or one proof.
 

@@ -281,6 +281,10 @@ def test_a_reading_that_is_old_takes_no_touch():
         (True, "5", WizardCommand.LEAVE),
         (True, "0", WizardCommand.LEAVE),
         (True, "enter", None),
+        (True, "1", WizardCommand.SHOW_REPORT),
+        (True, "3", WizardCommand.NEXT_TOOL),
+        (False, "1", None),
+        (False, "3", None),
         (False, "5", WizardCommand.BEGIN_AGAIN),
         (False, "stop", WizardCommand.LEAVE),
         (False, "enter", None),
@@ -288,13 +292,37 @@ def test_a_reading_that_is_old_takes_no_touch():
     ],
 )
 def test_the_last_screen_is_left_by_its_keys_alone_and_not_by_one_that_is_held(done, key, effect):
+    offers = frozenset((WizardCommand.SHOW_REPORT, WizardCommand.NEXT_TOOL))
     hand = at_touch()
+    hand.state = replace(hand.state, offers=offers)
     hand.happens(HasEnded(LastScreen(done, ("line",), (), hand.now)))
     hand.now += 0.2
     assert hand.keys(key).sent == []
     hand.now += 0.2
     assert hand.keys(key).sent == ([effect] if effect else [])
-    assert hand.state.begins_again is (effect is WizardCommand.BEGIN_AGAIN)
+    assert hand.state.wants is effect
+
+
+def test_the_last_screen_takes_only_what_it_offers_typed_words_too():
+    for offers in ((), (WizardCommand.SHOW_REPORT,), (WizardCommand.NEXT_TOOL,)):
+        for key, word, chinese, wanted in (
+            ("1", "report", "报告", WizardCommand.SHOW_REPORT),
+            ("3", "Next", "下一个", WizardCommand.NEXT_TOOL),
+        ):
+            for act in (
+                lambda hand, key=key: hand.keys(key),
+                lambda hand, word=word: hand.line(word),
+                lambda hand, word=chinese: hand.line(word),
+            ):
+                hand = at_touch()
+                hand.state = replace(hand.state, offers=frozenset(offers))
+                hand.happens(HasEnded(LastScreen(True, ("line",), (), hand.now)))
+                hand.now += 1.0
+                assert act(hand).sent == ([wanted] if wanted in offers else [])
+    hand = at_touch().happens(HasEnded(LastScreen(True, ("line",), (), 0.0)))
+    for nothing in ("", "  ", "take", "y", "N-0418"):
+        assert hand.line(nothing).sent == [], nothing
+    assert hand.line("finish").sent == [WizardCommand.LEAVE]
 
 
 def test_a_pose_is_typed_into_a_field_that_enter_only_closes():

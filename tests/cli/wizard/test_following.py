@@ -18,10 +18,29 @@ from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 import robolink
 from robolink.model import MotionProfile, Path, Pose, WorkBox
-from robolink.runner import MoveSubject, Question
+from robolink.runner import Move, MoveSubject, Question, Runner, RunSettings
+from robolink.testing import MemoryController
 from tests.cli.wizard._people import ARRIVAL, HEADER, Sitting
 
 pytestmark = pytest.mark.simulator_only
+
+
+def test_what_follows_a_movement_reaches_the_screen():
+    desk, controller = Desk(), MemoryController()
+    target = Pose(300, 0, 90, 30, tool=0)
+
+    def course():
+        yield Move(target, Path.STRAIGHT, "Lowering.", then="You touch.")
+        yield Move(target, Path.STRAIGHT, "Lifting.")
+
+    settings = RunSettings(WorkBox(z_max_mm=200), speed_mm_s=12.0)
+    Runner(controller, controller.groups[0], desk, settings).run(course())
+    told = [one.subject for one in desk.happened() if isinstance(one, WasRegarded)]
+    moves = [one for one in told if isinstance(one, MoveSubject)]
+    assert [(one.purpose, one.then, one.speed_mm_s) for one in moves] == [
+        ("Lowering.", "You touch.", 12.0),
+        ("Lifting.", "", 12.0),
+    ]
 
 
 def followed(url):

@@ -7,6 +7,7 @@ import threading
 import time
 from dataclasses import replace
 from io import StringIO
+from pathlib import Path
 
 import click
 import pyte
@@ -19,7 +20,7 @@ from prompt_toolkit.output.vt100 import Vt100_Output
 from robolink_cli.wizard.desk import Desk
 from robolink_cli.wizard.faces.arrivals import TimedPress
 from robolink_cli.wizard.faces.full import FullFace
-from robolink_cli.wizard.happenings import Reading
+from robolink_cli.wizard.happenings import Reading, WizardCommand
 from robolink_cli.wizard.state import Header, WizardState
 from robolink_cli.wizard.work import Work
 from robolink_simulators.cell.clock import ScaledClock
@@ -205,7 +206,7 @@ def test_the_last_screen_stays_until_it_is_left_and_may_begin_again(keys, again)
         "Next: robolink -c line3 change a.toml",
     ):
         assert said in seen[-1], seen[-1]
-    assert face.state.begins_again is again
+    assert (face.state.wants is WizardCommand.BEGIN_AGAIN) is again
 
 
 @pytest.fixture
@@ -215,6 +216,7 @@ def simulator():
 
 @pytest.fixture
 def hand(simulator, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # a page is written where one is
     with serve_tcp(simulator, clock=ScaledClock(10.0)) as host:
         words = ["calibrate", "two-pose", "--tool", "1", "-c", host.url]
         hand = ScreenHand(words, simulator)
@@ -232,6 +234,7 @@ def check_terminal_is_restored(hand):
 @pytest.mark.soak
 @pytest.mark.timeout(240)
 def test_a_needle_on_the_full_screen(hand, simulator):
+    """To its end, and to the page about it."""
     before = simulator.machine.tools.get(1)
     hand.start()
     hand.see("Touch 1 of 2")
@@ -245,7 +248,15 @@ def test_a_needle_on_the_full_screen(hand, simulator):
         hand.see("Turn test")
         hand.touch()
         hand.see("moving|DONE")
+    hand.see(r"\[1\] Show the report")
+    hand.rest(0.4)
+    hand.press(["1"])
+    hand.see("Report: ")
+    assert "[1]" not in hand.text
+    (page,) = Path.cwd().glob("change-*.html")
+    assert "tool 1" in page.read_text(encoding="utf-8").lower()
     assert hand.end() == 0, hand.text
+    assert "Report: " in hand.text, "it stays on the terminal"
     assert "Tool 1 is measured, written and tested." in hand.text
     assert simulator.machine.tools.get(1) != before
     check_terminal_is_restored(hand)

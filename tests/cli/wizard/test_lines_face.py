@@ -65,6 +65,9 @@ def test_a_needle_by_hand_is_measured_written_by_its_number_and_tested(hand, sim
     hand.touch()
     hand.terminal.wait_for("Turn test")
     hand.touch()
+    hand.terminal.wait_for(r"report = show the report\. finish = leave\.")
+    time.sleep(0.35)
+    hand.type("finish")
     assert hand.terminal.end() == 0
     assert stored(simulator) != before
     assert simulator.machine.tools.selected == 1

@@ -14,6 +14,7 @@ from robolink_cli.wizard.happenings import (
     WasRead,
     WasRegarded,
     WasTold,
+    WizardCommand,
 )
 from robolink_cli.wizard.screens.drawing import screen_of
 from robolink_cli.wizard.screens.ending import ended_of
@@ -53,7 +54,11 @@ def moving():
     seen = Reading(10.0, "ready", pose=here, axes=SCARA, motors=True, low_power=True)
     hand = Sitting().happens(WasRead(seen))
     going = MoveSubject(
-        Pose(300.0, 400.0, -60.0, 90.0, tool=0), Way.JOINT, 20.0, tr("Turning in the air.")
+        Pose(300.0, 400.0, -60.0, 90.0, tool=0),
+        Way.JOINT,
+        20.0,
+        tr("Turning in the air."),
+        tr("Lowering beside the pin."),
     )
     return hand.happens(WasRegarded(going))
 
@@ -103,7 +108,9 @@ def done():
     proof = VerifyResult((Drift(90.0, 0.006, 0.004), Drift(0.0, 0.002, 0.001)), 0.1)
     tool = ToolReport(proposal, receipt, proof, verdicts)
     header = Header("line3", "Change needle", needle="N-0418")
-    return ended(header, report=ChangeReport("7f3a5c1200", (tool,)))
+    offers = frozenset((WizardCommand.SHOW_REPORT, WizardCommand.NEXT_TOOL))
+    report = ChangeReport("7f3a5c1200", (tool,))
+    return ended(header, report=report, offers=offers)
 
 
 def checking():
@@ -203,8 +210,8 @@ def test_a_job_that_was_refused_for_an_earlier_one_names_recover_last():
     assert last.lines[-1] == 'Next: robolink -c "line3" recover'
 
 
-def ended(header, error=None, report=None):
-    hand = Sitting().asked(touch_subject()).happens(WasRegarded(header))
+def ended(header, error=None, report=None, offers=frozenset()):
+    hand = Sitting(WizardState(header, offers=offers)).asked(touch_subject())
     if report is not None:
         hand.happens(WasRegarded(report))
     return hand.happens(HasEnded(ended_of(hand.state, error, hand.now)))
@@ -248,7 +255,25 @@ def jobs():
     return Sitting().asked(subject, Question.TEXT, tr("Which job?"))
 
 
+def coming_down(*, reads=True, **other):
+    """A straight way down of which a good third is left."""
+    start = Pose(300.0, 400.0, -20.0, 90.0, tool=0)
+    target = replace(start, z_mm=-80.0, **other)
+    going = MoveSubject(
+        target,
+        Way.STRAIGHT,
+        8.0,
+        tr("Lowering beside the pin."),
+        tr("You jog the tip into contact."),
+    )
+    seen = Reading(10.0, "ready", pose=replace(start, z_mm=-57.0), motors=True, low_power=True)
+    hand = Sitting().happens(WasRead(replace(seen, pose=start))).happens(WasRegarded(going))
+    return hand.happens(WasRead(seen if reads else replace(seen, pose=None)))
+
+
 SCREENS = {
+    "moving down": coming_down,
+    "moving unseen": lambda: coming_down(reads=False),
     "free jog": jogging,
     "choose": choosing,
     "choose job": jobs,
@@ -356,6 +381,24 @@ def test_lines_say_what_the_turn_test_has_shown_too():
     assert told_question(Sitting().asked(beyond).state).startswith(
         "At U 90.0 it was 0.200 mm off: over the limit."
     )
+
+
+def test_how_long_a_movement_takes_is_said_where_it_is_known():
+    def shown(hand, later_s=0.0):
+        return "\n".join(screen_of(hand.state, hand.now + later_s).rows())
+
+    assert "Still: 23.0 mm, about 3 s" in shown(coming_down())
+    # A controller that tells no position meanwhile: the whole way, from where it began.
+    assert "Way:   60.0 mm in all, about 8 s" in shown(coming_down(reads=False))
+    assert "Still" not in shown(coming_down(), later_s=1.5), "where it is now, nobody knows"
+    # A tool that turns on its way has a speed of its own.
+    for turns in ({"u_deg": 80.0}, {"v_deg": 1.0}, {"w_deg": 1.0}):
+        assert "about" not in shown(coming_down(**turns))
+    assert "about" not in shown(moving())
+    lifting = MoveSubject(ARRIVAL, Way.STRAIGHT, 8.0, "Lifting off the pin.")
+    assert "Then" not in shown(moving().happens(WasRegarded(lifting)))
+    assert "Then:  Lowering beside the pin." in shown(moving())
+    assert "Then:  You jog the tip into contact." in shown(coming_down())
 
 
 def test_the_picture_finds_the_elbow_by_angles_alone():

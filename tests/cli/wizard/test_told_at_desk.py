@@ -6,9 +6,11 @@ from pathlib import Path
 import click
 import pytest
 from robolink_cli.commands.measure.choosing import choose_recipe
-from robolink_cli.commands.measure.recalibrate import steps_of
+from robolink_cli.commands.measure.recalibrate import _chosen_anew, steps_of
+from robolink_cli.options.shared import GIVEN, TYPED
 from robolink_cli.prompts.present import sitting_at
 from robolink_cli.session.check_before_start import check_before_start
+from robolink_cli.session.context import context_of_cell
 from robolink_cli.wizard.check_list import CheckPoint, CheckSubject, Mark
 from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.desk import Desk
@@ -18,7 +20,7 @@ from robolink_cli.wizard.screens.checking import point_rows
 from robolink_cli.wizard.screens.drawing import screen_of
 from robolink_cli.wizard.screens.rows import JobStep, status_row, title_row
 from robolink_cli.wizard.screens.told import told_before
-from robolink_cli.wizard.state import WizardState
+from robolink_cli.wizard.state import Header, WizardState
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
@@ -252,6 +254,49 @@ def test_lines_say_of_each_job_what_it_does():
         "  2 The new one.",
         "    It tests.",
     ]
+
+
+class Chooser(Desk):
+    """Somebody who takes rows by their numbers."""
+
+    def __init__(self, *rows):
+        super().__init__()
+        self.rows, self.marked = list(rows), []
+        self.header = None
+
+    def regard(self, subject):
+        if isinstance(subject, ChoiceSubject):
+            self.marked.append((subject.options[subject.marked or 0].split()[0], subject.step))
+        if isinstance(subject, Header):
+            self.header = subject
+
+    def poll(self, wait_s):
+        return str(self.rows.pop(0))
+
+
+@pytest.mark.parametrize(("row", "keeps"), [(2, True), (1, False)])
+def test_the_next_tool_is_chosen_anew_and_takes_nothing_of_the_line_along(
+    tmp_path, monkeypatch, row, keeps
+):
+    monkeypatch.chdir(tmp_path)
+    recipe = RECIPES / "needle-one-touch.toml"
+    (tmp_path / "a.toml").write_text(recipe.read_text(encoding="utf-8"), encoding="utf-8")
+    cells = "".join(f'[cells.line{n}]\nurl = "epson+tcp://127.0.0.1:{n}"\n' for n in (3, 4))
+    (tmp_path / "robolink.toml").write_text(cells)
+    typed = ["-c", "line4", "change", "b.toml", "--nozzle", "N-0417", "--timeout", "9"]
+    given = {"url": "line4", "timeout_s": 9.0, "operator": "Lin"}
+    context, desk = click.Context(click.Command("x")), Chooser(row, 1)
+    context.meta.update({TYPED: typed, GIVEN: given})
+    with context, sitting_at(desk):
+        at, loaded = _chosen_anew(context_of_cell("line4"))
+    assert desk.marked[0][0] == "line4", "the cell of the job before is marked"
+    assert loaded.path.name == "a.toml"
+    assert at.cell is not None
+    assert at.cell.name == ("line4" if keeps else "line3")
+    # What the line says of one cell is not true of another; who works there is.
+    assert (at.timeout_s, at.operator, at.nozzle) == (9.0 if keeps else 3.0, "Lin", "")
+    assert desk.header is not None
+    assert desk.header.command == f"robolink -c {at.cell.name} change a.toml"
 
 
 def test_a_job_is_chosen_by_what_it_does_and_when_it_did_so_last(tmp_path, monkeypatch):

@@ -5,6 +5,7 @@ import tomllib
 
 import pytest
 from robolink_cli.console.columns import columns, within
+from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 
@@ -88,6 +89,53 @@ def test_the_id_is_asked_before_anything_moves_and_the_row_says_that_it_is_simul
             hand.rest(0.4)
             hand.press(["0"])
             assert hand.end() == 9
+        finally:
+            hand.close()
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(240)
+def test_after_a_tool_the_next_one_begins_with_the_choice_and_nothing_moves_before_its_list(
+    tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    simulator, recipe = EpsonSimulator(seed=7), tmp_path / "needle.toml"
+    recipe.write_text(TWO_TOUCHES)
+    with serve_tcp(simulator, clock=ScaledClock(10.0)) as host:
+        words = ["-c", host.url, "change", str(recipe), "--nozzle", "N-0417"]
+        hand = ScreenHand(words, simulator)
+        try:
+            hand.start()
+            for touch in ("Touch 1 of 2", "Touch 2 of 2"):
+                hand.see(touch)
+                hand.touch()
+            hand.see("exactly as long")
+            hand.rest(0.4)
+            hand.press(["1"])
+            hand.see("To write, type the tool number")
+            hand.rest(0.4)
+            hand.press(["1", "*"])
+            for _ in range(2):
+                hand.see("Turn test")
+                hand.touch()
+                hand.see("moving|DONE")
+            hand.see(r"\[3\] Next tool")
+            moved = simulator.machine.arm.moves_started
+            hand.rest(0.4)
+            hand.press(["\r", "3"])
+            hand.see(r"Which job\?")
+            hand.rest(0.4)
+            hand.press(["5"])
+            # Its needle is another one: it is asked for, and the list is gone through again.
+            hand.see("Id of the new needle")
+            hand.rest(0.4)
+            hand.press([*"N-0418", "\r"])
+            hand.see(r"Start moving \(2 open\)")
+            assert simulator.machine.arm.moves_started == moved
+            hand.rest(0.4)
+            hand.press(["0"])
+            assert hand.end() == 9
+            assert "Tool 1 is measured, written and tested." in hand.text + hand.raw.decode()
         finally:
             hand.close()
 

@@ -57,12 +57,13 @@ def context_at_desk(context: "CliContext", job: str, *, steps: int = 0) -> "CliC
     return at
 
 
-def choose_cell(desk: AskingDesk, head: "Callable[[], Header]") -> "Cell":
+def choose_cell(desk: AskingDesk, head: "Callable[[], Header]", *, marked: str = "") -> "Cell":
     """Have one of the cells of this computer chosen; the only one is taken.
 
     Args:
         desk: Where.
         head: Makes the first row, in the language that is spoken by then.
+        marked: Name of the one that is marked; empty for the first.
 
     Raises:
         ConfigError: There is none.
@@ -82,10 +83,12 @@ def choose_cell(desk: AskingDesk, head: "Callable[[], Header]") -> "Cell":
     if len(cells) == 1:
         return cells[0]
     rows = tuple(f"{cell.name}   {cell.settings.robot or cell.url}" for cell in cells)
+    names = [cell.name for cell in cells]
+    at = names.index(marked) if marked in names else 0
 
     def ask() -> tuple[str, ChoiceSubject]:
         desk.regard(head())
-        return tr("Which cell?"), ChoiceSubject(tr("Choose"), (), rows)
+        return tr("Which cell?"), ChoiceSubject(tr("Choose"), (), rows, marked=at)
 
     return cells[choose_in_either_language(desk, ask, _nothing)]
 

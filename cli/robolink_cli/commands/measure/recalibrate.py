@@ -96,9 +96,11 @@ def recalibrate(
         raise nobody_to_ask()
     require_no_dry_run(order, dry_run=dry_run)
     events = EventStream(click.get_current_context(), on=jsonl)
+    reached: list[CliContext] = []
 
     def change() -> None:
         at, loaded = _chosen(context, recipe)
+        reached.append(at)
         for sentence in loaded.notes:
             note(sentence)
         prepared = answers_from(
@@ -116,10 +118,30 @@ def recalibrate(
             order=order,
         ).run(dry_run=dry_run)
 
+    def another() -> None:
+        # What was typed is about the tool before: neither its needle nor a consent holds again.
+        at, loaded = _chosen_anew(reached[-1])
+        reached.append(at)
+        for sentence in loaded.notes:
+            note(sentence)
+        Recalibration(
+            at,
+            loaded,
+            answers_from(loaded.recipe, texts=(), z_mm=(), nozzle=None, lot=None, yes=False),
+            events=events,
+            assist_url=assist,
+            take_reference=False,
+            accepted_change_mm=None,
+            sensor=None,
+        ).run(dry_run=False)
+
     with events.closing():
         # An order comes from a program, also where that has a terminal.
         alone = recipe is None or (assist is None and not dry_run and order is None)
-        guided_if_alone(context, change, job=tr("Change needle"), alone=alone, steps=_STEPS)
+        job = tr("Change needle")
+        # A program that reads what comes of it waits for one result.
+        following = None if jsonl or context.json else another
+        guided_if_alone(context, change, job=job, alone=alone, following=following, steps=_STEPS)
 
 
 def _chosen(context: CliContext, recipe: Path | None) -> "tuple[CliContext, LoadedRecipe]":
@@ -146,6 +168,28 @@ def _chosen(context: CliContext, recipe: Path | None) -> "tuple[CliContext, Load
     return at, loaded
 
 
+def _chosen_anew(before: CliContext) -> "tuple[CliContext, LoadedRecipe]":
+    """Have cell and recipe chosen for the next tool, the cell of the one before marked."""
+    from robolink_cli.commands.measure.choosing import choose_cell, choose_recipe
+    from robolink_cli.prompts.present import present_desk
+    from robolink_cli.session.context import context_of_cell
+    from robolink_cli.session.guidance import header_of
+
+    desk = present_desk()
+    assert desk is not None  # noqa: S101 - it is offered at a desk alone
+
+    def head(*typed: str, steps: int = _STEPS) -> "Header":
+        return header_of(at, tr("Change needle"), *typed, anew=True, steps=steps)
+
+    at = before
+    if before.cell is not None:
+        name = choose_cell(desk, head, marked=before.cell.name).name
+        at = before if name == before.cell.name else context_of_cell(name, anew=True)
+    loaded = choose_recipe(desk, at.cell, at.url, head=head)
+    desk.regard(head("change", _as_short_as_it_goes(loaded.path), steps=steps_of(loaded)))
+    return at, loaded
+
+
 def steps_of(loaded: "LoadedRecipe") -> int:
     """Return how many steps of a change are numbered; the last one is the turn test.
 
@@ -158,6 +202,10 @@ def steps_of(loaded: "LoadedRecipe") -> int:
 def _as_typed(path: Path) -> tuple[str, ...]:
     """Return what is typed for a recipe that was chosen, as short as it goes."""
     typed = click.get_current_context().meta.get(TYPED, ())
+    shown = _as_short_as_it_goes(path)
+    return (shown,) if {"change", "recalibrate"} & set(typed) else ("change", shown)
+
+
+def _as_short_as_it_goes(path: Path) -> str:
     here = Path.cwd()
-    shown = path.relative_to(here) if path.is_relative_to(here) else path
-    return (str(shown),) if {"change", "recalibrate"} & set(typed) else ("change", str(shown))
+    return str(path.relative_to(here) if path.is_relative_to(here) else path)

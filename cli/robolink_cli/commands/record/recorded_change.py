@@ -4,13 +4,11 @@ from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from robolink import __version__
-from robolink.errors import ConfigError, JournalError
+from robolink.errors import ConfigError
 from robolink.journal import Journal
 from robolink.messages import tr
 from robolink.model import EntryKind, Recorded
-from robolink.report import Report, reports_of
-from robolink.timing import wall_time
+from robolink.report import Report
 from robolink.transaction import id_of_change
 from robolink_cli.commands.record.journal_lookup import controller_meant, entries_of_change
 from robolink_cli.options.impact import ImpactRequest, judge
@@ -50,27 +48,6 @@ def find_change(journal: Journal, name: str | None, *, controller: str | None) -
             )
         name = id_of_change(newest)
     return entries_of_change(journal, name, controller=meant)
-
-
-def reports_from(
-    journal: Journal, entries: Sequence[Recorded]
-) -> tuple[tuple[Report, ...], list[str]]:
-    """Return the report of each tool, and what is wrong with the journal.
-
-    The whole journal is checked: that an entry is as it was stored rests on all before it.
-
-    Raises:
-        ConfigError: The entries are not about a change, or cannot be understood.
-    """
-    check, problems = _checked(journal)
-    reports = reports_of(
-        entries,
-        made_at=wall_time().isoformat(timespec="seconds"),
-        robolink_version=__version__,
-        check=check,
-        problems=problems,
-    )
-    return reports, problems
 
 
 def with_points(
@@ -127,17 +104,3 @@ def _tool_payload(report: Report) -> dict[str, object]:
         "warnings": list(fit.warnings) if fit else [],
         "verification": verification_payload(proof) if proof else None,
     }
-
-
-def _checked(journal: Journal) -> tuple[str, list[str]]:
-    try:
-        found = journal.verify()
-    except JournalError as error:
-        return tr("The journal could not be checked: {error}", error=error), []
-    if found.problems:
-        return tr("The journal is NOT as it was stored."), list(found.problems)
-    return tr(
-        "All {count} entries of the journal were checked when this page was made: none was "
-        "changed and none is missing.",
-        count=found.checked,
-    ), []

@@ -4,21 +4,24 @@ import time
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
+from robolink.interrupts import ended_by
 from robolink.messages import tr
 from robolink.runner import Question
 from robolink_cli.console.output import draw, sentences
 from robolink_cli.prompts.lines import QUIET_S, Lines, open_lines
 from robolink_cli.wizard.desk import Desk
-from robolink_cli.wizard.faces.effects import carry_out
+from robolink_cli.wizard.faces.effects import carry_out, leaves
 from robolink_cli.wizard.flow import advance
 from robolink_cli.wizard.happenings import (
     Happening,
+    HasEnded,
     LineTyped,
     WaitsForAnswer,
     WasAsked,
     WasRegarded,
     WasTold,
 )
+from robolink_cli.wizard.screens.ending import ended_of, told_end
 from robolink_cli.wizard.screens.told import told_after_jog, told_before, told_question
 from robolink_cli.wizard.state import WizardState
 
@@ -37,7 +40,7 @@ class LineFace:
 
     def run(self, desk: Desk, state: WizardState, work: "Work[Any]") -> WizardState:
         """Show it until the work has ended; return the last state."""
-        if state.question is not None and state.waits:
+        if state.ended is None and state.question is not None and state.waits:
             # Taken over from a screen that has become too small.
             self._begin_question(state, state.question.kind)
             self._shown = state.question.number
@@ -49,7 +52,8 @@ class LineFace:
                 self._tell(happening, state)
                 carry_out(desk, effects)
             if ended:
-                return replace(state, fresh=())  # all of it stands above
+                # All of what was told stands above.
+                return self._at_the_end(replace(state, fresh=()), work)
             if state.question is None or not state.waits:
                 work.wait(_TURN_S)
                 continue
@@ -72,6 +76,32 @@ class LineFace:
                 _put(told_after_jog(state))
             elif state.message:
                 _put(state.message)
+        return state
+
+    def _at_the_end(self, state: WizardState, work: "Work[Any]") -> WizardState:
+        """Ask what comes after a job that was carried out; any other end is told by lines alone."""
+        ended = state.ended or ended_of(state, work.error, time.monotonic())
+        if ended is None or not ended.done or not state.offers or ended_by() is not None:
+            return state
+        for row in (*ended.kept, state.message):
+            _put(row)
+        # It is told now, and not once more when the dialogue is over.
+        state, _ = advance(state, HasEnded(replace(ended, kept=())))
+        self._begin_question(state, Question.TEXT)
+        _put(told_end(state))
+        assert self._lines is not None  # noqa: S101 - opened with the question
+        while ended_by() is None:
+            try:
+                line = self._lines.next(_TURN_S)
+            except EOFError:
+                break
+            if line is None:
+                continue
+            state, effects = advance(state, LineTyped(line, time.monotonic()))
+            if leaves(effects):
+                break
+            _put(state.message)
+            _put(told_end(state))
         return state
 
     def _tell(self, happening: Happening, state: WizardState) -> None:

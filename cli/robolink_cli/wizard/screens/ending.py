@@ -1,12 +1,15 @@
 """Screens (h) and (i): what stands at the end, shown as the last screen and kept as lines."""
 
+from collections.abc import Iterator
+
 from robolink.errors import DeclinedError, OutcomeUnknownError, RobolinkError
-from robolink.messages import tr
+from robolink.messages import joined, tr
 from robolink.model import describe_offset, describe_standing
 from robolink.nozzle_change import ChangeReport, ToolReport
 from robolink.standing import UNTOUCHED, standing_after
 from robolink_cli.wizard.check_list import CheckSubject
 from robolink_cli.wizard.choices import ChoiceSubject
+from robolink_cli.wizard.happenings import WizardCommand
 from robolink_cli.wizard.screens.layout import Screen
 from robolink_cli.wizard.screens.rows import mm, title_row
 from robolink_cli.wizard.screens.touching import touch_title
@@ -102,10 +105,28 @@ def kept_lines(state: WizardState, error: BaseException | None) -> list[str]:
 def ended_screen(state: WizardState, ended: LastScreen) -> Screen:
     """Return the last screen."""
     if ended.done:
-        keys: tuple[tuple[str, str], ...] = (("5", tr("Finish")),)
+        keys: tuple[tuple[str, str], ...] = (("5", tr("Finish")), *_offered(state))
     else:
         keys = (("5", tr("Start again")), ("0", tr("Leave")))
-    return Screen(title_row(state, tr("DONE") if ended.done else tr("STOPPED")), ended.lines, keys)
+    title = title_row(state, tr("DONE") if ended.done else tr("STOPPED"))
+    return Screen(title, ended.lines, keys, message=state.message)
+
+
+def _offered(state: WizardState) -> Iterator[tuple[str, str]]:
+    if WizardCommand.SHOW_REPORT in state.offers:
+        yield "1", tr("Show the report")
+    if WizardCommand.NEXT_TOOL in state.offers:
+        yield "3", tr("Next tool")
+
+
+def told_end(state: WizardState) -> str:
+    """Return what can be typed at the end of a job that was carried out."""
+    words = []
+    if WizardCommand.SHOW_REPORT in state.offers:
+        words.append(tr("report = show the report."))
+    if WizardCommand.NEXT_TOOL in state.offers:
+        words.append(tr("next = next tool."))
+    return joined(" ", (*words, tr("finish = leave.")))
 
 
 def _head(state: WizardState, ended: str) -> str:

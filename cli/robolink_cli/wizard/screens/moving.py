@@ -1,15 +1,24 @@
 """Screen (c): the robot goes by itself, or the work goes on without a question."""
 
 import math
+from typing import Final
 
 from robolink.messages import tr
 from robolink.model import Path, Pose, angle_difference_deg
 from robolink.runner import MoveSubject
 from robolink_cli.console.columns import padded
+from robolink_cli.wizard.happenings import Reading
 from robolink_cli.wizard.screens.layout import Screen, broken
 from robolink_cli.wizard.screens.picture import COLUMNS, ROWS, picture
 from robolink_cli.wizard.screens.rows import JobStep, status_row, title_row
 from robolink_cli.wizard.state import WizardState
+
+_TURNS_DEG: Final = 0.05
+"""Less is what a reading of U differs by."""
+
+
+_OLD_S: Final = 1.0
+"""A reading of longer ago says nothing about where the robot is now."""
 
 
 def moving_screen(state: WizardState, now_s: float) -> Screen:
@@ -27,13 +36,13 @@ def moving_screen(state: WizardState, now_s: float) -> Screen:
     if state.pose is not None and state.reading is not None:
         drawn = picture(state.pose, state.reading.axes, subject.target)
     low_power = state.reading is not None and state.reading.low_power is True
-    told = _told(subject, state.pose, low_power=low_power)
+    follows = state.reading is None or state.reading.follows
+    told = _told(subject, state.pose, low_power=low_power, left=_is_left(state.reading, now_s))
     lines = [
         padded(left, COLUMNS + 4) + right
         for left, right in zip(drawn, [*told, *[""] * (ROWS - len(told))], strict=True)
     ]
     legend = tr("# base   O elbow   @ flange and its U direction   * where it goes")
-    follows = state.reading is None or state.reading.follows
     unknown = tr("Picture of the start: this controller tells no position while it moves.")
     return Screen(
         title_row(state, tr("On the way"), step_of_movement(state)),
@@ -49,20 +58,48 @@ def step_of_movement(state: WizardState) -> JobStep:
     return JobStep.TURN_TEST if state.accepted else JobStep.ON_THE_WAY
 
 
-def _told(subject: MoveSubject, here: Pose | None, *, low_power: bool) -> list[str]:
+def _told(subject: MoveSubject, here: Pose | None, *, low_power: bool, left: bool) -> list[str]:
     """Return what the movement is, in short rows beside the picture."""
     target = subject.target
     lines = [tr("^ Y"), "|", tr("+---> X"), "", tr("Now:   {purpose}", purpose=subject.purpose)]
+    if subject.then:
+        lines.append(tr("Then:  {purpose}", purpose=subject.then))
     if here is not None and here.tool == target.tool:
         way = math.dist(here.coordinates()[:3], target.coordinates()[:3])
         turn = angle_difference_deg(target.u_deg, here.u_deg)
-        lines.append(tr("Way:   {mm} mm", mm=f"{way:.1f}"))
-        if abs(turn) >= 0.05:
+        lines.append(_way(subject, way, _turns_deg(here, target), left=left))
+        if abs(turn) >= _TURNS_DEG:
             lines.append(
                 tr("U:     {u} to {to} deg", u=f"{here.u_deg:.1f}", to=f"{target.u_deg:.1f}")
             )
     lines.append(_how_fast(subject, low_power=low_power))
     return lines
+
+
+def _turns_deg(here: Pose, target: Pose) -> float:
+    """Return by how much the largest of the three angles changes."""
+    angles = zip(here.coordinates()[3:], target.coordinates()[3:], strict=True)
+    return max(abs(angle_difference_deg(there, now)) for now, there in angles)
+
+
+def _is_left(reading: Reading | None, now_s: float) -> bool:
+    """Tell whether the way from a reading is what is left: it is of now, and not of the start."""
+    return reading is not None and reading.follows and now_s - reading.at_s <= _OLD_S
+
+
+def _way(subject: MoveSubject, way_mm: float, turn_deg: float, *, left: bool) -> str:
+    """Return how far it is; of a plain straight way, about how long that takes too.
+
+    A turn of the joints has a speed of its own, which nobody reads, and so has a turn of the tool.
+    """
+    values = {"mm": f"{way_mm:.1f}", "n": math.ceil(way_mm / subject.speed_mm_s)}
+    straight = subject.path is Path.STRAIGHT and turn_deg < _TURNS_DEG
+    if not left:
+        whole = tr("Way:   {mm} mm in all, about {n} s", **values)
+        return whole if straight else tr("Way:   {mm} mm in all", mm=values["mm"])
+    if straight:
+        return tr("Still: {mm} mm, about {n} s", **values)
+    return tr("Still: {mm} mm", mm=values["mm"])
 
 
 def _how_fast(subject: MoveSubject, *, low_power: bool) -> str:
@@ -80,7 +117,7 @@ def sentence_of(subject: MoveSubject, here: Pose | None) -> str:
     """Return a movement as one sentence, for a face that draws nothing."""
     if here is not None:
         turn = angle_difference_deg(subject.target.u_deg, here.u_deg)
-        if abs(turn) >= 0.05:
+        if abs(turn) >= _TURNS_DEG:
             side = tr("counter-clockwise") if turn > 0 else tr("clockwise")
             return tr(
                 "U turns from {u} to {to} degrees, {side} seen from above.",

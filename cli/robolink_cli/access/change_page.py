@@ -1,0 +1,76 @@
+"""The page about a change, made from the journal alone."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from robolink import __version__
+from robolink.errors import JournalError
+from robolink.files.named import require_free
+from robolink.journal import Journal, open_journal
+from robolink.messages import tr
+from robolink.model import Recorded
+from robolink.report import Report, reports_of, save
+from robolink.timing import wall_time
+
+
+def page_of_change(change: str) -> tuple[str, ...]:
+    """Write the page about a change into the working folder, as 'robolink journal report' does.
+
+    Args:
+        change: Its whole id.
+
+    Returns:
+        Where it is, and what is wrong with the journal; each a sentence.
+
+    Raises:
+        ConfigError: The change is not in the journal, or a file of that name is there already.
+        JournalError: The journal cannot be read.
+        OSError: The page cannot be written.
+    """
+    journal = open_journal(read_only=True)
+    entries = list(journal.entries(change=change, newest_first=False))
+    path = Path(page_name(change)).absolute()
+    require_free(path, replace=False)
+    reports, problems = reports_from(journal, entries)
+    save(reports[0], path, others=reports[1:], replace=False)
+    return (tr("Report: {path}", path=path), *problems)
+
+
+def page_name(change: str) -> str:
+    """Return how the file of a page is called where nobody names it."""
+    return f"change-{change[:8]}.html"
+
+
+def reports_from(
+    journal: Journal, entries: Sequence[Recorded]
+) -> tuple[tuple[Report, ...], list[str]]:
+    """Return the report of each tool, and what is wrong with the journal.
+
+    The whole journal is checked: that an entry is as it was stored rests on all before it.
+
+    Raises:
+        ConfigError: The entries are not about a change, or cannot be understood.
+    """
+    check, problems = _checked(journal)
+    reports = reports_of(
+        entries,
+        made_at=wall_time().isoformat(timespec="seconds"),
+        robolink_version=__version__,
+        check=check,
+        problems=problems,
+    )
+    return reports, problems
+
+
+def _checked(journal: Journal) -> tuple[str, list[str]]:
+    try:
+        found = journal.verify()
+    except JournalError as error:
+        return tr("The journal could not be checked: {error}", error=error), []
+    if found.problems:
+        return tr("The journal is NOT as it was stored."), list(found.problems)
+    return tr(
+        "All {count} entries of the journal were checked when this page was made: none was "
+        "changed and none is missing.",
+        count=found.checked,
+    ), []

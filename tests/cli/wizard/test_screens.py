@@ -91,7 +91,9 @@ def turning_on():
         earlier=earlier,
         arrival=replace(ARRIVAL, u_deg=180.0, tool=1),
     )
-    return Sitting(in_tool=1).asked(subject)
+    hand = Sitting(in_tool=1)
+    hand.here = subject.arrival
+    return hand.asked(subject)
 
 
 def choosing():
@@ -171,7 +173,8 @@ def recovering():
         tr("The new one. Make the turn test, then keep the new value."),
         tr("I cannot tell. Stay blocked; call an engineer."),
     )
-    found = tr("What we read: {sentence}", sentence="Tool 1 = X 12.324 Y -3.729 Z -20.512")
+    holds = tr("Tool {tool} holds the new value {now}.", tool=1, now="X 12.300 Y -3.750 Z -20.000")
+    found = tr("What we read: {sentence}", sentence=holds)
     subject = ChoiceSubject(
         tr("Recover"),
         (found, tr("Tool {t} is selected.", t=0)),

@@ -68,7 +68,7 @@ def moves(simulator):
 
 def moved(hand, simulator, count):
     """Wait until so many steps were begun and the last one has ended."""
-    hand.see(rf"\D{count} steps")
+    hand.see(rf"\D{count} steps?")
     hand.rest(0.1)
     assert moves(simulator) == count
 

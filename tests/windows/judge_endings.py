@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from tests.windows.judge_needle_change import BOTH, scan
+from tests.windows.judge_needle_change import BOTH, jogging, scan
 
 
 @pytest.fixture
@@ -55,12 +55,7 @@ SLOWLY = pytest.mark.parametrize("pace", [1.0])
 @pytest.fixture
 def under_way(opened, simulator):
     """Return a console in which a step of 5 mm to X+ has just begun."""
-    console = opened("sequences", "robot", "jog", "--keys")
-    console.see("everybody out of the cell")
-    console.rest(0.6)
-    console.press(["1"])
-    console.see("Step")
-    console.rest(0.6)
+    console = jogging(opened, "sequences")
     for size in ("0.50", "1.00", "5.00"):
         console.press(["+"])
         console.see(f"Step +{size} mm")

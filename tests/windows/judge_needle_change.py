@@ -15,6 +15,17 @@ def scan(console, code="N-7"):
     console.send(f"burst {'+'.join(code)}+enter")
 
 
+def jogging(opened, way):
+    """Return a console in which somebody may jog by keys."""
+    console = opened(way, "robot", "jog", "--keys")
+    console.see("everybody out of the cell")
+    console.rest(0.6)
+    console.press(["1"])
+    console.see("Step")
+    console.rest(0.6)
+    return console
+
+
 @BOTH
 def test_a_needle_is_changed_from_the_scan_to_done(opened, simulator, way):
     before = simulator.machine.tools.get(1)
@@ -38,10 +49,7 @@ def test_a_needle_is_changed_from_the_scan_to_done(opened, simulator, way):
     console.see("Type the number of the tool first")
     assert simulator.machine.tools.get(1) == before
     console.press(["1", "*"])
-    for _ in range(2):
-        console.see("Turn test")
-        console.touch()
-        console.see("moving|DONE")
+    console.prove()
     console.see("DONE")
     console.rest(0.6)
     console.press(["0"])
@@ -58,12 +66,7 @@ def test_a_needle_is_changed_from_the_scan_to_done(opened, simulator, way):
 def test_keys_without_numlock_jog_a_held_one_ends_with_its_release_and_escape_stops(
     opened, simulator, way
 ):
-    console = opened(way, "robot", "jog", "--keys")
-    console.see("everybody out of the cell")
-    console.rest(0.6)
-    console.press(["1"])
-    console.see("Step")
-    console.rest(0.6)
+    console = jogging(opened, way)
     arm = simulator.machine.arm
     for key in ("left", "up", "pageup", "home"):
         began = arm.moves_started
@@ -85,12 +88,7 @@ def test_keys_without_numlock_jog_a_held_one_ends_with_its_release_and_escape_st
 
 @BOTH
 def test_a_code_that_is_scanned_while_somebody_jogs_moves_nothing(opened, simulator, way):
-    console = opened(way, "robot", "jog", "--keys")
-    console.see("everybody out of the cell")
-    console.rest(0.6)
-    console.press(["1"])
-    console.see("Step")
-    console.rest(0.6)
+    console = jogging(opened, way)
     for how in ("scan 4468136931", "burst 4+6+9+enter", "scan 6842679", "burst 4+6+8+2") * 3:
         console.send(how)
         console.see("Too fast for a hand")

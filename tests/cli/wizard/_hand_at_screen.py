@@ -2,11 +2,12 @@
 
 import re
 import time
+from abc import ABC, abstractmethod
 
 import pyte
 
 
-class HandAtScreen:
+class HandAtScreen(ABC):
     """Reads a screen, presses keys and brings the tip of a simulated robot onto its pin.
 
     What derives from it says how to take what was drawn (``read``) and to press a key (``send``).
@@ -25,13 +26,13 @@ class HandAtScreen:
         self.stream = pyte.ByteStream(screen)
         self.keys, self.tool, self.eyes = 0, tool, eyes
 
+    @abstractmethod
     def read(self, seconds=0.05):
         """Take what was drawn; return whether the far end is still there."""
-        raise NotImplementedError
 
+    @abstractmethod
     def send(self, key):
         """Press one key."""
-        raise NotImplementedError
 
     @property
     def text(self):
@@ -112,3 +113,17 @@ class HandAtScreen:
         self.see("Jog the tip onto the pin")
         self.jog()
         self.press(["5"])
+
+    def prove(self):
+        """Make the two touches of the turn test."""
+        for _ in range(2):
+            self.see("Turn test")
+            self.touch()
+            self.see("moving|DONE")
+
+    def write_and_prove(self):
+        """Write what is proposed for the tool, and make the turn test."""
+        self.see("To write, type the tool number")
+        self.rest(0.4)
+        self.press([str(self.tool), "*"])
+        self.prove()

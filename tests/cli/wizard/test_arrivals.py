@@ -9,42 +9,34 @@ from prompt_toolkit.input import create_pipe_input
 from robolink_cli.wizard.faces.arrivals import ArrivalReader, TimedInput
 from robolink_cli.wizard.key_gate import KeyGate
 
+from tests.cli.wizard._keys_in_time import KeysInTime
 from tests.cli.wizard._people import until
 
 SCANNED = "4006381333931\r\n"
 
 
-class Terminal:
-    """A pipe on which keys come at times of a clock that is stepped."""
+class Terminal(KeysInTime):
+    """A pipe on which keys come."""
 
     def __init__(self, fd, write):
-        self.now_s, self.write = 0.0, write
+        self.write = write
         self.reader = ArrivalReader(fd, lambda: self.now_s)
 
-    def until(self, at_s, every_s=0.005):
-        """Let time pass, and the thread look so often; 0 for never."""
-        while every_s and self.now_s + every_s <= at_s:
-            self.now_s += every_s
-            self.reader.look()
-        self.now_s = at_s
+    def look(self):
+        self.reader.look()
 
-    def key(self, text, at_s, every_s=0.005):
-        self.until(at_s, every_s)
+    def send(self, text):
         os.write(self.write, text.encode())
 
-    def counted(self):
-        """Let the loop get to what came, late; return what counts, and whether a burst is told."""
-        gate = KeyGate()
-        found = [
-            one.key
+    def taken(self):
+        return [
+            (key, came.at_s, came.quiet_s)
             for came in self.reader.taken()
             for key in came.data.decode()
-            for one in gate.press(key, came.at_s, came.quiet_s)
         ]
-        quiet_s = self.reader.quiet()
-        assert quiet_s is not None
-        found += [one.key for one in gate.due(quiet_s)]
-        return found, gate.burst_ended(quiet_s)
+
+    def quiet(self):
+        return self.reader.quiet()
 
 
 @pytest.fixture

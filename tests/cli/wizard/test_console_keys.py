@@ -11,44 +11,34 @@ from robolink_cli.wizard.faces.arrivals import TimedPress
 from robolink_cli.wizard.faces.console_keys import TimedConsole, fine_clock
 from robolink_cli.wizard.key_gate import KeyGate
 
+from tests.cli.wizard._keys_in_time import KeysInTime
 
-class Console:
-    """A queue of keys, in the place of Windows' own, at times of a clock that is stepped."""
+
+class Console(KeysInTime):
+    """A queue of keys, in the place of Windows' own."""
 
     def __init__(self, source):
-        self.now_s, self.source = 0.0, source
+        self.source = source
         self.keys = TimedConsole(source, self.waits, lambda: self.now_s)
 
     def waits(self):
         return bool(select.select([self.source.fileno()], [], [], 0)[0])
 
-    def until(self, at_s, every_s=0.005):
-        """Let time pass, and the thread look so often; 0 for never."""
-        while every_s and self.now_s + every_s <= at_s:
-            self.now_s += every_s
-            self.keys.look()
-        self.now_s = at_s
+    def look(self):
+        self.keys.look()
 
-    def key(self, text, at_s, every_s=0.005):
-        self.until(at_s, every_s)
+    def send(self, text):
         self.source.send_text(text)
 
     def taken(self):
-        """Return each key that came, when, and when it surely had not."""
         taken = []
         for press in self.keys.read_keys():
             assert isinstance(press, TimedPress)
             taken.append((press.data, press.at_s, press.quiet_s))
         return taken
 
-    def counted(self):
-        """Let the loop get to what came, late; return what counts, and whether a burst is told."""
-        gate = KeyGate()
-        found = [one.key for press in self.taken() for one in gate.press(*press)]
-        quiet_s = self.keys.quiet()
-        assert quiet_s is not None
-        found += [one.key for one in gate.due(quiet_s)]
-        return found, gate.burst_ended(quiet_s)
+    def quiet(self):
+        return self.keys.quiet()
 
 
 @pytest.fixture

@@ -112,13 +112,7 @@ def test_after_a_tool_the_next_one_begins_with_the_choice_and_nothing_moves_befo
             hand.see("exactly as long")
             hand.rest(0.4)
             hand.press(["1"])
-            hand.see("To write, type the tool number")
-            hand.rest(0.4)
-            hand.press(["1", "*"])
-            for _ in range(2):
-                hand.see("Turn test")
-                hand.touch()
-                hand.see("moving|DONE")
+            hand.write_and_prove()
             hand.see(r"\[3\] Next tool")
             moved = simulator.machine.arm.moves_started
             hand.rest(0.4)

@@ -98,11 +98,14 @@ def recalibrate(
     events = EventStream(click.get_current_context(), on=jsonl)
     reached: list[CliContext] = []
 
-    def change() -> None:
-        at, loaded = _chosen(context, recipe)
+    def told(at: CliContext, loaded: "LoadedRecipe") -> "tuple[CliContext, LoadedRecipe]":
         reached.append(at)
         for sentence in loaded.notes:
             note(sentence)
+        return at, loaded
+
+    def change() -> None:
+        at, loaded = told(*_chosen(context, recipe))
         prepared = answers_from(
             loaded.recipe, texts=answers, z_mm=z_mm, nozzle=nozzle, lot=lot, yes=yes
         )
@@ -120,10 +123,7 @@ def recalibrate(
 
     def another() -> None:
         # What was typed is about the tool before: neither its needle nor a consent holds again.
-        at, loaded = _chosen_anew(reached[-1])
-        reached.append(at)
-        for sentence in loaded.notes:
-            note(sentence)
+        at, loaded = told(*_chosen_anew(reached[-1]))
         Recalibration(
             at,
             loaded,

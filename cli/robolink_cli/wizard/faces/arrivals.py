@@ -12,6 +12,7 @@ import os
 import select
 import threading
 import time
+from abc import abstractmethod
 from asyncio import get_running_loop
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
@@ -150,9 +151,9 @@ class TimedKeys(Input):
     def __init__(self, source: Input) -> None:
         self._source = source
 
+    @abstractmethod
     def quiet(self) -> float | None:
         """See :meth:`ArrivalReader.quiet`."""
-        raise NotImplementedError
 
     def detach(self) -> AbstractContextManager[None]:
         """Nothing is run in place of a screen."""

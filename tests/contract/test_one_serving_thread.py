@@ -1,5 +1,6 @@
 """All simulated controllers of a process are served by one thread, and do not feel each other."""
 
+import select
 import socket
 import threading
 
@@ -95,3 +96,47 @@ def test_a_host_may_be_closed_by_what_its_own_controller_does(asking):
     host.close()
     with pytest.raises(ConnectionRefusedError):
         asking(host.url)
+
+
+def test_those_who_asked_at_once_are_all_heard_before_one_is_answered(hosts, asking):
+    """A client that asks many is woken once for all of them, not once for each."""
+    holding, let_go = threading.Event(), threading.Event()
+    clients = [asking(host.url) for host in hosts[:6]]
+    for client in clients:
+        client.ask(b"$Login,")
+    answered_before = []
+
+    def hold(_number, _text):
+        holding.set()
+        let_go.wait(20)
+
+    def look(_number, _text):
+        sockets = [client.socket for client in clients[1:]]
+        answered_before.append(select.select(sockets, [], [], 0)[0])
+
+    hosts[0]._simulator.on_request = hold
+    for host in hosts[1:6]:
+        host._simulator.on_request = look
+    clients[0].socket.sendall(b"$GetStatus\r\n")
+    assert holding.wait(20)
+    for client in clients[1:]:
+        client.socket.sendall(b"$GetStatus\r\n")
+    let_go.set()
+    for client in clients:
+        assert client.socket.recv(4096).startswith(b"#GetStatus,")
+    assert answered_before == [[]] * 5
+
+
+def test_one_that_cannot_answer_is_served_no_more_and_the_others_are(hosts, asking, monkeypatch):
+    told = []
+    monkeypatch.setattr(threading, "excepthook", lambda args: told.append(args.exc_value))
+    broken, sound = asking(hosts[0].url), asking(hosts[1].url)
+    broken.ask(b"$Login,")
+
+    def fail():
+        raise RuntimeError("of a test")
+
+    monkeypatch.setattr(hosts[0], "flush", fail)
+    assert broken.ask(b"$GetStatus") == b""
+    assert sound.ask(b"$Login,") == b"#Login,0\r\n"
+    assert [str(error) for error in told] == ["of a test"]

@@ -196,14 +196,14 @@ def test_a_long_wire_is_counted_whole(epson_sim):
     write(epson_sim)
     record = epson_sim.simulator.log
     for _ in range(MOST_LINES):
-        record.append((0, ">", "$GetStatus"))
+        record.add(0, ">", "$GetStatus")
     epson_sim.wire.assert_sent("TLSet 2, XY", times=1)
     with pytest.raises(AssertionError, match="was sent 1 times"):
         epson_sim.wire.assert_not_sent("TLSet 2, XY")
     # One that has lost a line says nothing of how often something was sent.
     epson_sim.simulator.log = short = WireRecord(2)
     for text in ("$Reset", "$GetStatus", "$GetStatus"):
-        short.append((0, ">", text))
+        short.add(0, ">", text)
     for asked in (epson_sim.wire.assert_not_sent, epson_sim.wire.assert_sent):
         with pytest.raises(AssertionError, match="Only the last 2 lines"):
             asked("$Reset")

@@ -1,4 +1,4 @@
-"""A process that serves collects garbage so that full collections look at what is new only."""
+"""A process that serves collects garbage so that what has survived once is hardly ever seen."""
 
 import gc
 import json
@@ -30,21 +30,28 @@ with RareFullCollections(spare=0) as collections:
     at_first = gc.get_freeze_count()
     rings = [Ring() for _ in range(500)]
     seen = [ref(ring) for ring in rings]
+    gc.collect(0)
+    assert gc.get_freeze_count() == at_first, "one of the youngest alone sets nothing aside"
     gc.collect(1)
-    assert gc.get_freeze_count() == at_first, "one that is not full sets nothing aside"
-    gc.collect()
     assert gc.get_freeze_count() >= at_first + 500, "what survives is set aside"
     rings.clear()
     gc.collect()
     assert sum(ring() is not None for ring in seen) == 500, "and not looked at"
+    more = [[] for _ in range(2 * at_first)]
+    del more
+    gc.collect(1)
+    assert collections.thaws == 0, "what has gone by itself does not count"
     more = [[] for _ in range(at_first)]
+    gc.collect(1)
+    assert (collections.thaws, gc.get_freeze_count()) == (1, 0), "until it is twice what it was"
+    gc.collect(1)
+    assert gc.get_freeze_count() == 0, "then nothing is set aside"
     gc.collect()
-    assert collections.thaws == 0
-    gc.collect()
-    assert collections.thaws == 1, "until there is twice as much as was in use"
-    assert sum(ring() is not None for ring in seen) == 0, "then its garbage is found"
-    more += [[] for _ in range(at_first)]
-    gc.collect()
+    assert sum(ring() is not None for ring in seen) == 0, "before its garbage is found"
+    in_use = gc.get_freeze_count()
+    assert in_use >= 2 * at_first
+    more += [[] for _ in range(in_use // 2)]
+    gc.collect(1)
     gc.collect()
     assert collections.thaws == 1, "and what was found in use is what counts from then on"
 assert (gc.get_freeze_count(), gc.callbacks) == (0, before), "at the end all is as it was"

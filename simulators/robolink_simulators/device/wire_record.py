@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice
 from sys import intern
-from typing import Final
+from typing import Any, Final
 
 MOST_LINES: Final = 2000
 
@@ -27,8 +27,11 @@ class WireLine:
     text: str
 
 
-class WireRecord(deque[tuple[int, str, str]]):
+class WireRecord:
     """The last (now_ns, ">" or "<", text).
+
+    Each line is held as three values in a row: a tuple for each would be looked at by every
+    collection of garbage, and thousands of simulators hold thousands of lines each.
 
     Args:
         most: How many are held; ``None`` for all.
@@ -38,19 +41,25 @@ class WireRecord(deque[tuple[int, str, str]]):
     """
 
     def __init__(self, most: int | None = MOST_LINES) -> None:
-        super().__init__(maxlen=most)
+        self._held: deque[Any] = deque(maxlen=None if most is None else 3 * most)
         self.added = 0
 
-    def append(self, line: tuple[int, str, str]) -> None:
+    def __len__(self) -> int:
+        return len(self._held) // 3
+
+    def __iter__(self) -> Iterator[tuple[int, str, str]]:
+        values = iter(tuple(self._held))
+        return zip(values, values, values, strict=True)
+
+    def add(self, now_ns: int, direction: str, text: str) -> None:
         """Add what crossed the wire just now."""
         self.added += 1
-        now_ns, direction, text = line
         # Thousands of controllers are asked the same: each text is held once in a process.
-        super().append((now_ns, direction, intern(text)))
+        self._held.extend((now_ns, direction, intern(text)))
 
     def clear(self) -> None:
         """Forget all of it, and count from 1 again."""
-        super().clear()
+        self._held.clear()
         self.added = 0
 
     def lines(self, after: int = 0) -> Iterator[WireLine]:

@@ -82,7 +82,10 @@ class DepartingReplies:
         if self.stalled_until_ns > now_ns:
             return self.stalled_until_ns
         # What is due now may not have been taken yet; behind it something may leave later.
-        return next((at_ns for at_ns, _ in self._waiting if at_ns > now_ns), None)
+        for at_ns, _ in self._waiting:
+            if at_ns > now_ns:
+                return at_ns
+        return None
 
     def empty(self, now_ns: int) -> bool:
         """Tell whether nothing will leave any more."""

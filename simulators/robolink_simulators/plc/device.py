@@ -149,7 +149,7 @@ class PlcSimulator(HostedDevice):
         """
         if frames.shared and request.unit != self.unit:
             return []
-        self.log.append((self._now_ns, ">", request.words))
+        self.log.add(self._now_ns, ">", request.words)
         met = () if counted else self.faults.take(request.words)
         actions = {fault.action: fault for fault in met}
         if FaultAction.DISCONNECT_BEFORE in actions:
@@ -162,7 +162,7 @@ class PlcSimulator(HostedDevice):
         ignored = FaultAction.IGNORE_WRITE in actions
         reply = self._answer(request, frames, ignored=ignored)
         self.exchanges += 1
-        self.log.append((self._now_ns, "<", request.words))
+        self.log.add(self._now_ns, "<", request.words)
         leaving = self.faults.departures(reply, met)
         if (again := actions.get(FaultAction.DUPLICATE_REQUEST)) is not None:
             leaving.append((again.seconds, self._answer(request, frames, ignored=ignored)))

@@ -53,7 +53,7 @@ class RequestTaking(HostedDevice, ABC):
     def take(self, link: EpsonServerLink, event: Request | BadRequest) -> None:
         """Deal with a request of a client; while another is logged in, it is not heard."""
         self._settled_ns, shown = -1, shown_request(event)
-        self.log.append((self._now_ns, ">", shown))
+        self.log.add(self._now_ns, ">", shown)
         if not self._slot.hears(link, cuts=self.options.second_client == "closed"):
             return
         faults = self.faults.take(shown, LinkKind.EPSON_SERIAL if link.dialect else None)
@@ -109,7 +109,7 @@ class RequestTaking(HostedDevice, ABC):
         self.exchanges += 1
         # A login that was bent may come back in its refusal.
         echoed = bool(exchange.faults) and reply[:1] == b"!"
-        self.log.append((self._now_ns, "<", "***" if echoed else shown_reply(reply)))
+        self.log.add(self._now_ns, "<", "***" if echoed else shown_reply(reply))
         if not exchange.faults:
             self.faults.remember(reply)
             return ((0.0, reply),)

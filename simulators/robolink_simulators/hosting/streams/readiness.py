@@ -13,7 +13,7 @@ import socket
 from collections.abc import Iterable
 from typing import Any, Final, Protocol
 
-_MOST_AT_ONCE: Final = 32
+_MOST_AT_ONCE: Final = 16
 """So many are served before the queue is looked at again, which costs 1 us."""
 
 

@@ -3,7 +3,9 @@
 Theory of operation. A device is bytes in, bytes out, and an instant at which it does something
 by itself, so serving it blocks nowhere: one queue tells whose bytes have come (``readiness``), one
 heap whose instant. Other threads ask for something by a list and a byte that wakes it. The thread
-begins with the first host and ends with the last. Whatever a hook of a simulator does in it holds
+begins with the first host and ends with the last. A few are served before any of them is answered:
+to wake a client takes as long as half an exchange, and one that asks many is then awake already for
+all answers but the first. Whatever a hook of a simulator does in it holds
 up all that this process serves, so it must never wait for another one of them.
 """
 
@@ -44,8 +46,11 @@ class LoopHost(Protocol):
     def begin(self, loop: "ServingLoop") -> None:
         """Register what is watched with the loop that serves it."""
 
-    def step(self, served: Served | None, events: int) -> float | None:
-        """Serve what was ready, let time pass; return in how many seconds to look again."""
+    def serve(self, served: Served | None, events: int) -> None:
+        """Take what was ready, and let time pass."""
+
+    def answer(self) -> float | None:
+        """Let out what is ready; return in how many seconds to look again, ``None`` for never."""
 
     def end(self) -> None:
         """Close all that is open."""
@@ -68,6 +73,7 @@ class ServingLoop:
         self._asked: deque[Callable[[], None]] = deque()
         self._alarmed = self._ended = False
         self._hosts: set[LoopHost] = set()
+        self._unanswered: list[LoopHost] = []
         self._members = 0
         self._heap: list[tuple[float, int, LoopHost]] = []
         self._thread = threading.Thread(target=self._run, name="simulators", daemon=True)
@@ -86,7 +92,7 @@ class ServingLoop:
         """Have a host look at its device again; any thread may call it."""
         with self._gate:
             if not self._ended:
-                self._ask(partial(self._step, host, None, 0))
+                self._ask(partial(self._look_at, host))
 
     def leave(self, host: LoopHost) -> None:
         """Serve a host no more, and return once it is closed; in the loop itself, soon."""
@@ -117,7 +123,8 @@ class ServingLoop:
                 for entry, events in self.watched.ready(self._patience_s()):
                     if entry is not None:
                         host, served = entry
-                        self._step(host, served, events)
+                        self._serve(host, served, events)
+                self._answer()
                 self._do_asked()
                 self._look_at_overdue()
             self._do_asked()
@@ -153,18 +160,40 @@ class ServingLoop:
             if host.due_s is not None and host.due_s > now_s:
                 self._queue(host, host.due_s)
             elif host.due_s is not None:
-                self._step(host, None, 0)
+                self._look_at(host)
 
-    def _step(self, host: LoopHost, served: Served | None, events: int) -> None:
+    def _look_at(self, host: LoopHost) -> None:
+        """Have a host look at its device although nothing came, and answer."""
+        self._serve(host, None, 0)
+        self._answer()
+
+    def _serve(self, host: LoopHost, served: Served | None, events: int) -> None:
         """Let a host work; one that fails is served no more, and the others are."""
         if host.stopping or host not in self._hosts:
             return
         try:
-            patience_s = host.step(served, events)
+            host.serve(served, events)
         except BaseException as error:
             self._drop(host, None)
             self._tell(error)
-            return
+        else:
+            self._unanswered.append(host)
+
+    def _answer(self) -> None:
+        """Let out what those have to say that were served."""
+        answering, self._unanswered = self._unanswered, []
+        for host in answering:
+            if host in self._hosts:
+                try:
+                    patience_s = host.answer()
+                except BaseException as error:
+                    self._drop(host, None)
+                    self._tell(error)
+                else:
+                    self._look_again(host, patience_s)
+
+    def _look_again(self, host: LoopHost, patience_s: float | None) -> None:
+        """Look at a host when it wants to be looked at."""
         host.due_s = None if patience_s is None else monotonic() + patience_s
         if host.due_s is not None and (host.queued_s is None or host.due_s < host.queued_s):
             self._queue(host, host.due_s)
@@ -185,7 +214,7 @@ class ServingLoop:
             self._drop(host, None)
             self._tell(error)
         else:
-            self._step(host, None, 0)
+            self._look_at(host)
 
     def _drop(self, host: LoopHost, gone: threading.Event | None) -> None:
         try:

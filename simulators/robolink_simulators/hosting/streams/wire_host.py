@@ -78,8 +78,8 @@ class WireHost(ClosedAtExit):
     def shut(self, now_ns: int) -> None:
         """Close what the subclass has opened; the device is held."""
 
-    def step(self, served: Served | None, events: int) -> float | None:
-        """See ``LoopHost.step``."""
+    def serve(self, served: Served | None, events: int) -> None:
+        """See ``LoopHost.serve``."""
         if served is None:
             self._woken = False
         else:
@@ -89,6 +89,10 @@ class WireHost(ClosedAtExit):
             if served is not None:
                 served(events, now_ns)
             self._device.advance(now_ns)
+
+    def answer(self) -> float | None:
+        """See ``LoopHost.answer``."""
+        with self._lock:
             self.flush()
             change = self._device.next_change()
         return None if change is None else self._clock.real_seconds(change)

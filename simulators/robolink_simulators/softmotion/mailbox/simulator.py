@@ -287,7 +287,7 @@ class SoftMotionSimulator(HostedDevice):
         self.hear(now_ns)
         self._requests += 1
         number = self._requests
-        self.log.append((self._now_ns, ">", shown))
+        self.log.add(self._now_ns, ">", shown)
         faults = self.faults.take(shown, link)
         actions = {fault.action for fault in faults}
         if PlcFaultAction.DISCONNECT_BEFORE in actions:
@@ -302,7 +302,7 @@ class SoftMotionSimulator(HostedDevice):
             words = carry_out(faults)
             self._file.save_changes()
         self.exchanges += 1
-        self.log.append((self._now_ns, "<", shown))
+        self.log.add(self._now_ns, "<", shown)
         if self.on_reply is not None:
             self.on_reply(number, shown)
         return self.faults.leaving(shown, words, faults)

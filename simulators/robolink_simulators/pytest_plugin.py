@@ -70,7 +70,8 @@ def pytest_runtest_makereport(
     """Attach wire log, seed and state of the simulated cells to a test that failed.
 
     They are sections of what is printed, and properties of the test: those stand in the file
-    that ``--junitxml`` writes.
+    that ``--junitxml`` writes. With the teardown of a test its cells are let go, since pytest
+    holds the tests themselves to the end of the run; and one that is tried again begins anew.
     """
     report: pytest.TestReport = yield
     cells: list[SimulatedCell] | None = item.stash.get(_CELLS, None)
@@ -84,7 +85,9 @@ def pytest_runtest_makereport(
             item.user_properties += sections
             if report.when == "teardown":
                 report.user_properties += sections
-    if not report.passed:
+    if report.when == "teardown":
+        item.stash[_CELLS], item.stash[_NOT_PASSED] = [], False
+    elif not report.passed:
         item.stash[_NOT_PASSED] = True
     return report
 

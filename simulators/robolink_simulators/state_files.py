@@ -12,10 +12,13 @@ from robolink.messages import tr
 def save_state(path: Path, document: Mapping[str, object]) -> None:
     """Put a new state in the place of the old one; a crash leaves one of them whole.
 
+    Its folder is made where there is none.
+
     Raises:
         ConfigError: It cannot be written.
     """
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, json.dumps(document).encode())
         sync_folder(path.parent)
     except OSError as error:

@@ -9,7 +9,7 @@ from itertools import count
 from time import monotonic
 
 import pytest
-from robolink_cli.commands.simulate.serving import Termination
+from robolink_cli.commands.simulate.serving import ParentWatch, Termination
 from robolink_cli.options.simulation import ServedLife
 
 
@@ -35,6 +35,25 @@ def test_it_ends_when_nobody_has_asked_for_so_long():
     # Somebody asks between the first twelve looks, and nobody afterwards.
     assert waited(life, requests) >= 0.2 + 11 * 0.2 / 4
     assert looked.count(12) >= 4
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows does not tell that a parent has ended")
+@pytest.mark.parametrize("handles", [True, False])
+def test_a_parent_that_was_killed_has_ended_before_anybody_has_waited_for_it(handles, monkeypatch):
+    parent = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
+    if not handles:
+        monkeypatch.delattr(os, "pidfd_open", raising=False)
+    watch = ParentWatch(parent.pid)
+    assert not watch.ended()
+    parent.kill()
+    if not handles:
+        parent.wait()  # there it counts as ended only then
+    began = monotonic()
+    while not watch.ended():
+        assert monotonic() - began < 10
+    watch.close()
+    parent.communicate()
+    assert ParentWatch(parent.pid).ended()  # and whoever comes too late sees it at once
 
 
 SPAWNS = """

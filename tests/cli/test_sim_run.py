@@ -285,6 +285,7 @@ def test_a_port_that_is_taken_ends_it_all_by_the_name_of_the_cell(file, tmp_path
             done = started(path, *how, folder=tmp_path)
             assert (done.returncode, done.stdout) == (3, "")
             assert "b: The simulator cannot listen on 127.0.0.1" in done.stderr
+            assert [one.name for one in tmp_path.iterdir()] == [path.name]
 
 
 @pytest.mark.soak
@@ -306,6 +307,16 @@ def test_in_the_background_they_end_with_the_shell_that_started_them(file, tmp_p
     os.kill(pid, 0)
     shell.communicate("\n")
     assert ended(pid)
+
+
+def test_the_file_of_the_page_is_right_as_it_stands_there(file, tmp_path):
+    page = (Path(__file__).parents[2] / "docs/simulated-fleet.md").read_text(encoding="utf-8")
+    _, _, rest = page.partition("```toml\n")
+    (tmp_path / MAP.name).write_bytes(MAP.read_bytes())
+    cells = read_cells(file(rest.partition("```")[0]), sim.commands)
+    assert len(cells) == 202
+    made(cells)
+    assert (tmp_path / "state" / "glue.json").exists()
 
 
 def test_a_cell_of_a_file_is_made_when_it_is_first_used(file):

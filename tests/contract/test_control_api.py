@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 
 import pytest
 from robolink_cli import main
-from robolink_simulators.cell.clock import SteeredClock
+from robolink_simulators.cell.clock import ManualClock, SteeredClock
 from robolink_simulators.control import server as served_api
 from robolink_simulators.control.acts.registry import ACTS
 from robolink_simulators.control.cell import ControlledCell
@@ -151,6 +151,22 @@ def test_sim_ctl_does_an_act_from_a_shell(cells, at, capsys):
     assert control.do("clock")["simulated_s"] == pytest.approx(then + 2)
 
 
+def test_sim_ctl_takes_for_a_text_what_is_one(cells, at, capsys):
+    """A snapshot may be called 007, and a request be found by a number in it."""
+    control, _ = at("a")
+
+    def ctl(*words):
+        return main.run(["sim", "ctl", "--at", cells.url_of("a"), *words])
+
+    for name in ("007", "true", "inf"):
+        assert ctl("snapshot", f"name={name}") == 0
+        assert ctl("restore", f"name={name}") == 0
+    assert ctl("add_fault", "action=drop_reply", "match=2003", "times=2") == 0
+    assert {fault["match"] for fault in control.do("faults")["pending"]} == {"2003"}
+    assert ctl("step", "seconds=inf") == 2
+    assert "step needs seconds, a number from 0" in capsys.readouterr().err
+
+
 def test_time_is_paused_stepped_and_hastened(at):
     control, simulator = at("a")
     control.do("set_clock", factor=0)
@@ -170,7 +186,9 @@ def test_time_is_paused_stepped_and_hastened(at):
         ("a", "press_estop", {"hard": True}, "takes no 'hard'"),
         ("a", "raise_error", {}, "raise_error needs number"),
         ("a", "raise_error", {"number": "4002"}, "whole number from 0 to 9999"),
-        ("a", "set_input", {"number": 9000}, "no bit"),
+        ("a", "set_input", {"number": 9000}, "no input 9000. Inputs are 0 to 511"),
+        ("b", "set_input", {"number": 32}, "no input 32. Inputs are 0 to 31"),
+        ("a", "add_fault", {"action": "delay", "times": 0}, "whole number from 1 to 1000"),
         ("a", "set_input", {"number": 1, "on": 7}, "true or false"),
         ("a", "freeze", {}, "cannot do 'freeze'"),
         ("a", "restore", {"name": "nothing"}, "no snapshot"),
@@ -208,7 +226,6 @@ def test_a_client_in_any_language_is_told_what_went_wrong(cells):
     assert raw(cells, "POST", f"{post}/truth", b"{")[0] == 400
     assert raw(cells, "POST", f"{post}/truth", b'{"a":' * 5000)[0] == 400
     assert raw(cells, "POST", f"{post}/look", b'{"tool": 1e999}')[0] == 400
-    assert raw(cells, "POST", f"{post}/jog_onto_pin")[0] == 400  # not in Teach mode
     too_long = b" " * (LONGEST_REQUEST + 1)
     assert raw(cells, "POST", f"{post}/truth", too_long)[0] == 413
     assert raw(cells, "POST", f"{post}/truth", headers=[("Content-Length", "x")])[0] == 411
@@ -219,10 +236,36 @@ def test_a_client_in_any_language_is_told_what_went_wrong(cells):
         assert raw(cells, "GET", f"{base}/cells/a/log?{query}")[0] == 400
     for path in ("", "/openapi.json", "/cells/a"):
         assert raw(cells, "GET", f"{base}{path}?nothing=1")[0] == 400
+    status, told = raw(cells, "POST", f"{post}/step?seconds=5", b'{"seconds": 1}')
+    assert (status, "not behind the question mark" in told["error"]) == (400, True)
     assert raw(cells, "GET", f"{base}/cells/a/truth", b"{}")[0] == 400
     status, told = raw(cells, "POST", f"{post}/raise_error")
     assert (status, told["ok"], told["schema"]) == (400, False, "robolink/control/1")
     assert told["error"]
+    assert told["remedy"]
+
+
+@pytest.mark.parametrize(
+    ("name", "act", "given", "words"),
+    [
+        ("a", "jog_onto_pin", {}, "Teach mode only"),
+        ("a", "teach_point", {"number": 1, "u_deg": 0}, "Teach mode only"),
+        ("b", "move_axis", {"number": 0, "target": 1e6}, "Axis 0 does not move"),
+        ("d", "reset", {}, "keeps its state in a file"),
+        ("d", "set_clock", {"factor": 2}, "only while somebody waits"),
+    ],
+)
+def test_what_cannot_be_done_now_is_told_apart_from_what_was_asked_wrongly(
+    cells, tmp_path, name, act, given, words
+):
+    if name == "d":
+        kept = EpsonSimulator(state_path=tmp_path / "epson.json")
+        cells.cells["d"] = ControlledCell(kept, ManualClock())
+    address = f"{urlsplit(cells.url).path}/cells/{name}/{act}"
+    status, told = raw(cells, "POST", address, json.dumps(given).encode())
+    cells.cells.pop("d", None)
+    assert (status, told["ok"]) == (409, False)
+    assert words in told["error"]
     assert told["remedy"]
 
 

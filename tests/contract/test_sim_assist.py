@@ -98,7 +98,7 @@ def test_the_assist_port_counts_and_changes_the_nozzle(assisted):
         ("dance", {}, "These are known"),
         ("raise_error", {}, "whole number"),
         ("raise_error", {"number": "4002"}, "whole number"),
-        ("set_input", {"number": 9000}, "no bit"),
+        ("set_input", {"number": 9000}, "no input 9000"),
     ],
 )
 def test_what_the_assist_port_cannot_do_is_said(assisted, act, parameters, words):

@@ -115,7 +115,31 @@ def test_the_truth_has_the_same_shape_for_every_kind(served):
     assert {frozenset(offset) for offset in truth["stored"].values()} == {frozenset(components)}
     names = {"exchanges", "moves_started", "tool_writes", "starts", "touches"}
     assert set(served.simulator.counters()) == names
+    assert served.simulator.counters() == {**dict.fromkeys(names, 0), "starts": 1}
     assert list(served.simulator.motions()) == []
+
+
+def test_writes_and_starts_are_counted_alike(served):
+    write(served, -31.0)
+    if served.kind != "plc":
+        with robolink.connect(served.url) as controller:
+            controller.tools.clear(2, expected=robolink.ANY)  # a write too
+    served.simulator.restart()
+    counted = served.simulator.counters()
+    writes = 1 if served.kind == "plc" else 2
+    assert (counted["tool_writes"], counted["starts"]) == (writes, 2)
+    served.simulator.reset()
+    counted = served.simulator.counters()
+    assert (counted["exchanges"], counted["tool_writes"], counted["starts"]) == (0, 0, 1)
+
+
+@pytest.mark.parametrize("kind", [EpsonSimulator, SoftMotionSimulator])
+def test_a_state_that_cannot_be_kept_is_refused_before_anybody_is_served(kind, tmp_path):
+    kind(state_path=tmp_path / "not" / "yet" / "there" / "cell.json")
+    assert (tmp_path / "not/yet/there/cell.json").exists()
+    (tmp_path / "a-file").touch()
+    with pytest.raises(ConfigError, match="cannot save its state"):
+        kind(state_path=tmp_path / "a-file" / "cell.json")
 
 
 def test_what_keeps_its_state_in_a_file_is_not_made_anew(tmp_path):

@@ -134,7 +134,7 @@ def test_the_assist_port_pushes_buttons(assisted):
     assert client.now() == client.now()
     assist.do("thaw")
     counters = assist.do("counters")
-    assert (counters["moves_started"], counters["tool_writes"], counters["starts"]) == (0, 1, 1)
+    assert (counters["moves_started"], counters["tool_writes"], counters["starts"]) == (0, 0, 1)
     with pytest.raises(ConfigError, match="axis 9"):
         assist.do("fail_axis", number=9)
     with pytest.raises(ConfigError, match="in error"):

@@ -185,7 +185,6 @@ def state(tmp_path):
 
 def test_tools_and_the_selection_outlive_the_simulator(login, state):
     simulator = EpsonSimulator(state_path=state)
-    assert not state.exists()
     client = login(simulator)
     # Who was seen once is the same after a restart.
     assert EpsonSimulator(state_path=state).machine.serial == simulator.machine.serial

@@ -8,7 +8,7 @@ import json
 from collections.abc import Mapping
 from typing import Any, Final
 
-from robolink_simulators.control.acts.declared import LONGEST_TEXT, MOST, ControlAct, Taken
+from robolink_simulators.control.acts.declared import LONGEST_TEXT, ControlAct, Taken
 from robolink_simulators.control.acts.registry import ACTS
 
 _KINDS: Final = {
@@ -97,7 +97,8 @@ def _object(act: ControlAct) -> dict[str, Any]:
 def _schema(taken: Taken) -> Mapping[str, Any]:
     match taken.form:
         case "whole":
-            return {"type": "integer", "minimum": 0, "maximum": int(min(taken.most, MOST))}
+            lowest, highest = taken.whole_limits
+            return {"type": "integer", "minimum": lowest, "maximum": highest}
         case "number":
             return {"type": "number", "minimum": taken.least, "maximum": taken.most}
         case "flag":

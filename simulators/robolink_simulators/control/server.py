@@ -28,6 +28,7 @@ from robolink_simulators.control.cell import ControlledCell
 from robolink_simulators.control.tokens import drawn_token, is_token
 from robolink_simulators.epson.refusals import SpelRefusal
 from robolink_simulators.hosting.loopback import require_loopback
+from robolink_simulators.not_now import NotNowError
 from robolink_simulators.softmotion.smc_errors import BlockRefused
 
 VERSION: Final = "v1"
@@ -122,6 +123,8 @@ class ControlServer(ClosedAtExit):
             return self._found(method, path, _given(method, parts.query, body))
         except UnknownActError as error:
             return HTTPStatus.NOT_FOUND, _error(error.what, error.remedy)
+        except NotNowError as error:
+            return HTTPStatus.CONFLICT, _error(error.what, error.remedy)
         except RobolinkError as error:
             return HTTPStatus.BAD_REQUEST, _error(error.what, error.remedy)
         except (SpelRefusal, BlockRefused) as refused:
@@ -181,7 +184,7 @@ def _given(method: str, query: str, body: bytes) -> dict[str, Any]:
     """Return what an act is given: a JSON object, or numbers and texts behind the question mark.
 
     Raises:
-        ConfigError: It is neither.
+        ConfigError: It is neither, or stands where it would not be looked for.
     """
     if method == "GET":
         try:
@@ -192,6 +195,11 @@ def _given(method: str, query: str, body: bytes) -> dict[str, Any]:
                 remedy=tr("Give {most} values or fewer.", most=_MOST_ASKED),
             ) from error
         return _each_once([(name, _value(text)) for name, text in asked])
+    if query:
+        raise ConfigError(
+            tr("A POST has its values in its body, not behind the question mark."),
+            remedy=tr("Give them there as a JSON object."),
+        )
     try:
         given = json.loads(body, object_pairs_hook=_each_once) if body.strip() else {}
     except ConfigError:  # which is a ValueError too

@@ -12,6 +12,7 @@ from robolink.messages import tr
 from robolink_simulators.device.motion_log import StartedMotion
 from robolink_simulators.device.wire_record import WireRecord
 from robolink_simulators.device.wire_time import WireClock, WireTime
+from robolink_simulators.not_now import NotNowError
 
 RequestHook = Callable[[int, str], None]
 """Called with the running number of a request and a text, passwords hidden."""
@@ -192,12 +193,12 @@ class HostedDevice(ABC):
 
     def _require_renewable(self) -> None:
         if self.durable:
-            raise ConfigError(
+            raise NotNowError(
                 tr("A simulator that keeps its state in a file cannot be rebuilt."),
                 remedy=tr("Restart it, or start another one without a file."),
             )
         if self.executes_program:
-            raise ConfigError(
+            raise NotNowError(
                 tr("A simulator that executes a program cannot be rebuilt."),
                 remedy=tr("Restart it instead."),
             )

@@ -121,6 +121,7 @@ class EpsonSimulator(TimeStepping):
         self._serial = serial or drawn_serial()
         if state_path is not None or world is not None:
             self._begin()  # a file or a world that does not fit is refused now
+            self._flash.save_changes()  # and so is a file that cannot be written
 
     def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - whatever a controller has
         """Make the controller when something of it is first asked for.

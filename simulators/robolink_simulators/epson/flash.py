@@ -28,7 +28,7 @@ class Flash:
     def __init__(self, path: Path | None, machine: Machine) -> None:
         self._path = path
         self._machine = machine
-        # Nothing is written yet: a serial number that was drawn is kept at the first occasion.
+        # Nothing is written yet: a serial number that was drawn is kept with the first writing.
         self._written: list[object] | None = None
 
     def restore(self) -> None:

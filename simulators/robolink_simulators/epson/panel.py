@@ -3,9 +3,13 @@
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 
+from robolink.errors import ConfigError
+from robolink.messages import tr
 from robolink_simulators.epson.condition import Condition, Mode, Task
 from robolink_simulators.epson.machine import Machine
+from robolink_simulators.epson.memory.bits import IO_BITS
 from robolink_simulators.epson.options import EpsonOptions
+from robolink_simulators.epson.refusals import SpelRefusal
 from robolink_simulators.epson.remote.client_slot import ClientSlot
 from robolink_simulators.epson.remote.command_window import SpelWindow
 from robolink_simulators.epson.remote.queries import Alarms
@@ -99,10 +103,16 @@ class EpsonPanel:
         """Switch an input by hand; whatever waits for it goes on.
 
         Raises:
-            Refusal: There is no such input.
+            ConfigError: There is no such input.
         """
         with self._acting():
-            self._machine.inputs.set(number, on)
+            try:
+                self._machine.inputs.set(number, on)
+            except SpelRefusal as refused:
+                raise ConfigError(
+                    tr("There is no input {number}.", number=number),
+                    remedy=tr("Inputs are 0 to {last}.", last=IO_BITS - 1),
+                ) from refused
 
     def teach(self) -> None:
         """Turn the mode selector to TEACH."""

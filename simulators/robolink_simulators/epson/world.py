@@ -6,7 +6,6 @@ from contextlib import suppress
 from dataclasses import asdict, replace
 from typing import Any, Final
 
-from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
 from robolink_simulators.cell.frames import Z_AXIS, Frame, about, product, turned
@@ -33,6 +32,7 @@ from robolink_simulators.epson.memory.driven_robot import DrivenRobot
 from robolink_simulators.epson.memory.input_bits import InputBits
 from robolink_simulators.epson.memory.tip_input import Nozzle, TipInput
 from robolink_simulators.epson.refusals import OutOfReach
+from robolink_simulators.not_now import NotNowError
 
 STORED: Final = ToolOffset(12.0, -3.5, -20.0)
 """What the controller holds for tool 1 at first: the nozzle that was there before."""
@@ -225,7 +225,7 @@ class PendantOperator(SimulatedOperator):
 
     def _require_pendant(self) -> None:
         if not self._pendant_live():
-            raise ConfigError(
+            raise NotNowError(
                 tr("The pendant moves the arm in Teach mode only."),
                 remedy=tr("Turn the mode selector to Teach first."),
             )

@@ -5,7 +5,6 @@ from collections.abc import Hashable
 from contextlib import suppress
 from typing import Final
 
-from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import AxisKind, OrientationSpace, Pose, ToolOffset
 from robolink_simulators.cell.frames import (
@@ -31,6 +30,7 @@ from robolink_simulators.cell.workplace import (
     pin_beside,
 )
 from robolink_simulators.cell.world_parameters import WorldParameters
+from robolink_simulators.not_now import NotNowError
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
 from robolink_simulators.softmotion.group.condition import SmcGroupState
 from robolink_simulators.softmotion.kinematics.kinematics import AxisValues
@@ -157,7 +157,7 @@ class SoftMotionWorld(Workplace):
 
     def _require_rest(self) -> None:
         if self.group.state not in (SmcGroupState.DISABLED, SmcGroupState.STANDBY):
-            raise ConfigError(
+            raise NotNowError(
                 tr("The machine cannot be jogged by hand while it moves or is in error."),
                 remedy=tr("Wait for the end of the movement, or reset the error first."),
             )

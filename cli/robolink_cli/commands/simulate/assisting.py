@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from robolink_simulators.assist.port import AssistClient
+from robolink_simulators.control.acts.registry import texts_of
 from robolink_simulators.control.client import ControlClient
 
 from robolink.errors import ConfigError
@@ -36,8 +37,9 @@ def do_controlled(url: str, act: str, values: Sequence[str]) -> None:
         ConfigError: A value is not NAME=VALUE, or the simulator cannot do it and says why.
         ConnectError: No simulator is there.
     """
+    texts = texts_of(act)
     given = {
-        name: _typed(text)
+        name: text if name in texts else _typed(text)
         for name, text in named_values(values, "add_fault action=drop_reply").items()
     }
     with ControlClient(url) as client:

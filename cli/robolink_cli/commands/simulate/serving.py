@@ -2,6 +2,7 @@
 
 import json
 import os
+import select
 import signal
 import threading
 from collections.abc import Callable, Mapping, Sequence
@@ -22,6 +23,52 @@ if TYPE_CHECKING:
     from robolink_simulators.control.server import ControlServer
 
 
+class ParentWatch:
+    """Tells whether the process has ended that a simulator must not outlive.
+
+    Args:
+        number: Its process id; ``None`` for the process that started this one.
+    """
+
+    def __init__(self, number: int | None = None) -> None:
+        self._number = number
+        self._starter = os.getppid()
+        self._handle: int | None = None
+        self._gone = False
+        if number is not None:
+            # A handle tells of an end that nobody has waited for yet, and is not taken in by
+            # another process that has got the same number. Some systems have none.
+            try:
+                self._handle = os.pidfd_open(number)
+            except ProcessLookupError:
+                self._gone = True
+            except (AttributeError, OSError):
+                self._handle = None
+
+    def ended(self) -> bool:
+        """Whether it has."""
+        if self._number is None:
+            return os.getppid() != self._starter
+        if self._handle is not None:
+            looked_at = select.poll()  # which takes any handle of a process with thousands
+            looked_at.register(self._handle, select.POLLIN)
+            self._gone = bool(looked_at.poll(0))
+        elif not self._gone:
+            try:
+                os.kill(self._number, 0)
+            except ProcessLookupError:
+                self._gone = True
+            except PermissionError:
+                return False  # it lives, and is somebody else's
+        return self._gone
+
+    def close(self) -> None:
+        """Look no more."""
+        if self._handle is not None:
+            os.close(self._handle)
+            self._handle = None
+
+
 class Termination:
     """Makes SIGTERM an orderly end; Ctrl-C stays what it is.
 
@@ -38,12 +85,12 @@ class Termination:
 
     def __init__(self, life: ServedLife | None = None) -> None:
         self._life = life
-        self._parent = os.getppid()
         if life is not None and life.with_parent and os.name == "nt":
             raise ConfigError(
                 tr("On Windows a simulator does not see that its parent has ended."),
                 remedy=tr("Use --idle-exit there."),
             )
+        self._parent = ParentWatch(life.parent) if life and life.with_parent else None
         self._stopped = threading.Event()
         self._before: Any = None
         self._folder = TemporaryDirectory(prefix="robolink-sim-", ignore_cleanup_errors=True)
@@ -70,20 +117,9 @@ class Termination:
     def _is_over(self, idle_s: float) -> bool:
         if self._life is None:
             return False
-        if self._life.with_parent and self._parent_has_ended():
+        if self._parent is not None and self._parent.ended():
             return True
         return self._life.idle_exit_s is not None and idle_s >= self._life.idle_exit_s
-
-    def _parent_has_ended(self) -> bool:
-        if self._life is None or self._life.parent is None:
-            return os.getppid() != self._parent
-        try:
-            os.kill(self._life.parent, 0)
-        except ProcessLookupError:
-            return True
-        except PermissionError:
-            return False  # it lives, and is somebody else's
-        return False
 
     @property
     def came(self) -> bool:
@@ -96,6 +132,8 @@ class Termination:
 
     def __exit__(self, *_details: object) -> None:
         signal.signal(signal.SIGTERM, self._before)
+        if self._parent is not None:
+            self._parent.close()
         self._folder.cleanup()
 
 

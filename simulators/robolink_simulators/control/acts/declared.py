@@ -31,8 +31,8 @@ class Taken:
         form: A whole number, a number, true or false, a text, or any of these.
         needed: Whether it must be given.
         choices: The texts that there are, where not any will do.
-        most: The highest number; of ``whole`` the lowest is 0.
-        least: The lowest number.
+        most: The highest number.
+        least: The lowest number; of ``whole`` never below 0.
         default: What it is where it is not given; ``None`` for not given.
     """
 
@@ -44,6 +44,11 @@ class Taken:
     least: float = -_FAR
     default: object = None
 
+    @property
+    def whole_limits(self) -> tuple[int, int]:
+        """The lowest and the highest, if it is a whole number."""
+        return int(max(self.least, 0)), int(min(self.most, MOST))
+
     def checked(self, act: str, value: object) -> object:
         """Return the value, if it is one of these.
 
@@ -52,7 +57,8 @@ class Taken:
         """
         match self.form:
             case "whole":
-                fits = type(value) is int and 0 <= value <= min(self.most, MOST)
+                lowest, highest = self.whole_limits
+                fits = type(value) is int and lowest <= value <= highest
             case "number":
                 # An integer of JSON may have hundreds of digits: compared before it is a float.
                 number = isinstance(value, (int, float)) and not isinstance(value, bool)
@@ -73,11 +79,12 @@ class Taken:
     def _needs(self, act: str) -> str:
         match self.form:
             case "whole":
-                most = int(min(self.most, MOST))
+                least, most = self.whole_limits
                 return tr(
-                    "{act} needs {name}, a whole number from 0 to {most}.",
+                    "{act} needs {name}, a whole number from {least} to {most}.",
                     act=act,
                     name=self.name,
+                    least=least,
                     most=most,
                 )
             case "number":

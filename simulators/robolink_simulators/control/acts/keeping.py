@@ -7,6 +7,7 @@ from robolink.messages import tr
 from robolink_simulators.cell.clock import ManualClock, SteeredClock
 from robolink_simulators.control.acts.declared import Answer, ControlAct, Given, Taken
 from robolink_simulators.control.cell import ControlledCell
+from robolink_simulators.not_now import NotNowError
 
 _MOST_SNAPSHOTS: Final = 100
 _NAME: Final = Taken("name", "text")
@@ -37,7 +38,7 @@ def _reset(cell: ControlledCell, _given: Given) -> Answer:
 def _snapshot(cell: ControlledCell, given: Given) -> Answer:
     """Keep under a name what controller and world are now."""
     if given["name"] not in cell.moments and len(cell.moments) >= _MOST_SNAPSHOTS:
-        raise ConfigError(
+        raise NotNowError(
             tr("There are {count} snapshots already.", count=len(cell.moments)),
             remedy=tr("Take one under a name that there is."),
         )
@@ -66,7 +67,7 @@ def _clock(cell: ControlledCell, _given: Given) -> Answer:
 def _set_clock(cell: ControlledCell, given: Given) -> Answer:
     """Let simulated time run at a factor of real time from now on; 0 pauses it."""
     if not isinstance(cell.clock, SteeredClock):
-        raise ConfigError(
+        raise NotNowError(
             tr("The time of this simulator passes only while somebody waits for it."),
             remedy=tr("Serve it on a port, or let time pass with the act step."),
         )
@@ -81,7 +82,7 @@ def _step(cell: ControlledCell, given: Given) -> Answer:
         clock.advance(given["seconds"])
         cell.simulator.advance(clock.now_ns())
     else:
-        raise ConfigError(
+        raise NotNowError(
             tr("The time of this simulator cannot be stepped."),
             remedy=tr("Serve it by 'robolink sim'."),
         )

@@ -2,7 +2,6 @@
 
 from typing import Final, get_args
 
-from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_simulators.control.acts.declared import (
     NUMBER,
@@ -16,6 +15,7 @@ from robolink_simulators.control.acts.declared import (
 from robolink_simulators.control.cell import ControlledCell
 from robolink_simulators.faults.fieldbus import Order
 from robolink_simulators.faults.links import LinkKind
+from robolink_simulators.not_now import NotNowError
 from robolink_simulators.plc import PlcSimulator
 from robolink_simulators.plc.panel import MappedPlcPanel
 from robolink_simulators.softmotion.mailbox.panel import PlcPanel
@@ -27,7 +27,7 @@ _NO_CONNECTION: Final = frozenset({LinkKind.MODBUS_RTU, LinkKind.CAN, LinkKind.P
 def _cut_link(cell: ControlledCell, _given: Given) -> Answer:
     """Pull the cable of the client that is logged in."""
     if _NO_CONNECTION.issuperset(cell.links):
-        raise ConfigError(
+        raise NotNowError(
             tr("A serial line or a CAN bus has no connection that could be cut."),
             remedy=tr("Plan a fault of the wire there, for example drop_reply."),
         )

@@ -30,6 +30,12 @@ ACTS: Final[Mapping[str, Mapping[str, ControlAct]]] = {
 """Kind of controller, name of the act."""
 
 
+def texts_of(name: str) -> frozenset[str]:
+    """Return what of an act are texts, at any kind: a shell cannot tell "007" from a number."""
+    acts = [of_kind[name] for of_kind in ACTS.values() if name in of_kind]
+    return frozenset(taken.name for act in acts for taken in act.takes if taken.form == "text")
+
+
 def act_named(cell: ControlledCell, name: object) -> ControlAct:
     """Return an act of a cell.
 

@@ -47,7 +47,7 @@ def _add_fault(cell: ControlledCell, given: Given) -> Answer:
     """Plan a fault for requests that match, as docs/fault-plans.md explains; times in a row."""
     table: dict[str, Any] = dict(given)
     times, first = table.pop("times", 1), table.get("on_exchange", 0)
-    tables = [{**table, "on_exchange": first + further} for further in range(max(1, times))]
+    tables = [{**table, "on_exchange": first + further} for further in range(times)]
     planned: Any = cell.simulator.faults
     for fault in _possible(tables, cell.links):
         planned.add(fault)
@@ -81,7 +81,7 @@ WIRE_ACTS: Final = (
             Taken("action", "text", choices=_ACTIONS),
             Taken("match", "text", needed=False),
             Taken("on_exchange", "whole", needed=False),
-            Taken("times", "whole", needed=False, most=1000),
+            Taken("times", "whole", needed=False, least=1, most=1000),
             Taken("seconds", needed=False, least=0, most=86_400),
             Taken("position", "whole", needed=False),
             Taken("bit", "whole", needed=False, most=15),

@@ -7,8 +7,10 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.protocols.mailbox import WordOrder
 from robolink_simulators.faults.fieldbus import Order
+from robolink_simulators.not_now import NotNowError
 from robolink_simulators.softmotion.kinematics.coordinates import CoordRef
 from robolink_simulators.softmotion.mailbox.plc import Plc
+from robolink_simulators.softmotion.signals import SIGNALS
 from robolink_simulators.softmotion.smc_errors import BlockRefused
 
 _LAG_ERROR = 16
@@ -87,7 +89,7 @@ class PlcPanel:
             self._require_axis(number)
             error = self._plc.group.move_axis(number, target).outputs.error
             if error is not None:
-                raise ConfigError(
+                raise NotNowError(
                     tr("Axis {number} does not move: {cause}.", number=number, cause=error.text),
                     remedy=tr("Look at the state of the group and of the drive."),
                 )
@@ -101,7 +103,7 @@ class PlcPanel:
         with self._acting():
             error = self._plc.group.set_tool(tool).outputs.error
             if error is not None:
-                raise ConfigError(
+                raise NotNowError(
                     tr("The tool cannot be set: {cause}.", cause=error.text),
                     remedy=tr("Look at the state of the group and at its kinematics."),
                 )
@@ -118,7 +120,7 @@ class PlcPanel:
             except BlockRefused as refused:
                 raise ConfigError(
                     tr("There is no input {number}.", number=number),
-                    remedy=tr("Inputs are 0 to 31."),
+                    remedy=tr("Inputs are 0 to {last}.", last=SIGNALS - 1),
                 ) from refused
 
     def zero_inputs(self) -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from robolink.model import ToolOffset
-from robolink.protocols.mailbox import COMMAND, Opcode, Six, Words
+from robolink.protocols.mailbox import COMMAND, SLOTS, Opcode, Six, Words
 from robolink_simulators.cell.frames import zyx_angles
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.device.hosted import HostedDevice
@@ -101,6 +101,7 @@ class SoftMotionSimulator(HostedDevice):
         self.faults = WireFaults(faults, seed)
         self._kinematics, self._given = kinematics, dict(parameters or {})
         self._parameters, self._state_path, self._make_plc = world, state_path, make_plc
+        self._starts_before = 0
         self._make()
 
     def _make(self) -> None:
@@ -119,6 +120,7 @@ class SoftMotionSimulator(HostedDevice):
         self.plc.start(self._now_ns)
         if not switched_on:
             self._make_ready()
+        self._changes_before = self._slot_changes()
         self._file.save_changes()
 
     @property
@@ -136,10 +138,14 @@ class SoftMotionSimulator(HostedDevice):
         return {
             "exchanges": self.exchanges,
             "moves_started": self.plc.group.movements_started,
-            "tool_writes": sum(slot.counter for slot in self.plc.memory.defined().values()),
-            "starts": self.plc.starts,
+            "tool_writes": self._slot_changes() - self._changes_before,
+            "starts": self.plc.starts - self._starts_before,
             "touches": self.world.operator.touches,
         }
+
+    def _slot_changes(self) -> int:
+        """How often the slots were written or cleared, ever since the PLC was new."""
+        return sum(self.plc.memory.slot(number).counter for number in SLOTS)
 
     def motions(self, after: int = 0) -> Iterator[StartedMotion]:
         """See :meth:`HostedDevice.motions`."""
@@ -253,6 +259,7 @@ class SoftMotionSimulator(HostedDevice):
         starts, cuts = self.plc.starts, self.plc.cuts
         self._make()
         self.plc.starts += starts  # hosts cut their links when they see another number
+        self._starts_before = starts
         self.plc.cuts = cuts
 
     def _moment(self) -> dict[str, Any]:

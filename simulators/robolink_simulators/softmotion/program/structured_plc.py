@@ -24,6 +24,7 @@ from robolink.protocols.mailbox import (
     encode_command,
     next_number,
 )
+from robolink_simulators.not_now import NotNowError
 from robolink_simulators.softmotion.catalogue import MachineModel
 from robolink_simulators.softmotion.group.condition import SmcGroupState
 from robolink_simulators.softmotion.kinematics.coordinates import CoordRef
@@ -183,8 +184,8 @@ def sources_in(folder: Path) -> tuple[SourceText, ...]:
     return tuple(sources)
 
 
-def _not_in_a_program() -> ConfigError:
-    return ConfigError(
+def _not_in_a_program() -> NotNowError:
+    return NotNowError(
         tr("A program that is executed from its text cannot be changed like that."),
         remedy=tr("Change its text, or simulate without one."),
     )

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -62,6 +63,7 @@ def _first_line(process: "subprocess.Popen[bytes]", log: Path, errors: Path) -> 
         first, line_end, _ = log.read_text(encoding="utf-8").partition("\n")
         if ended is not None:
             _tell_end(log.read_text(encoding="utf-8"), errors.read_text(encoding="utf-8"))
+            shutil.rmtree(log.parent, ignore_errors=True)  # all that stood there was told
             return ended
         if line_end and first.startswith(_READY):
             hand_over(json.dumps({**json.loads(first), "log": str(log)}))

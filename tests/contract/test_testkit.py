@@ -230,6 +230,9 @@ def test_a_person_does_what_the_script_says_when_the_wire_gives_the_cue(epson_si
         epson_sim.operator.when("GetStatus", "dance")
     with pytest.raises(ConfigError, match="needs number"):
         epson_sim.operator.when("GetStatus", "raise_error")
+    for skip in (-1, 0.5, True):
+        with pytest.raises(ConfigError, match=r"skip .* cannot be"):
+            epson_sim.operator.when("GetStatus", "press_estop", skip=skip)
     epson_sim.operator.when("GetStatus", "restore", name="nothing")
     with robolink.connect(epson_sim.url) as controller:
         controller.status()
@@ -238,9 +241,25 @@ def test_a_person_does_what_the_script_says_when_the_wire_gives_the_cue(epson_si
     assert epson_sim.operator.unplayed() == []
 
 
+@pytest.mark.parametrize("softmotion_sim", ["sim", "can"], indirect=True)
+def test_no_command_is_run_on_a_cell_that_it_would_not_reach(epson_sim, softmotion_sim):
+    """A simulator of that name would be made in its own process, and be written to instead."""
+    for cell in (epson_sim, softmotion_sim):
+        with pytest.raises(ConfigError, match=r"lives in the process of the test.*epson_tcp"):
+            cell.run("status")
+
+
+def test_nobody_is_asked_where_there_is_no_person(epson_factory):
+    with pytest.raises(ConfigError, match=r"no person at this cell.*person=True"):
+        _ = epson_factory(medium="tcp").by_hand
+
+
 def test_what_crossed_the_wire_and_what_moved_is_asserted(epson_sim):
     write(epson_sim)
     epson_sim.wire.assert_not_sent("TLSet 3,")
+    epson_sim.wire.assert_sent("TLSet 3,", times=0)
+    with pytest.raises(AssertionError, match="was sent 1 times, not 0 times"):
+        epson_sim.wire.assert_sent("TLSet 2, XY", times=0)
     with pytest.raises(AssertionError, match="'TLSet 3,' was sent 0 times"):
         epson_sim.wire.assert_sent("TLSet 3,")
     with pytest.raises(AssertionError, match="1 times, not 2 times") as told:

@@ -55,7 +55,8 @@ class WireLook:
         """
         __tracebackhide__ = True
         found = self.sent(text)
-        if found == 0 or times not in (None, found):
+        as_wanted = found > 0 if times is None else found == times
+        if not as_wanted:
             wanted = "" if times is None else f", not {times} times"
             raise AssertionError(f"{text!r} was sent {found} times{wanted}.\n{self.shown()}")
 

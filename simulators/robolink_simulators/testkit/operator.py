@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass, field
 
+from robolink.errors import ConfigError
+from robolink.messages import tr
 from robolink_simulators.control.acts.registry import act_named, perform
 from robolink_simulators.control.cell import ControlledCell
 
@@ -54,6 +56,11 @@ class ScriptedOperator:
         Raises:
             ConfigError: There is no such act, or a value is missing, wrong or unknown.
         """
+        if type(skip) is not int or skip < 0:  # it would never be its turn
+            raise ConfigError(
+                tr("{name} of a simulated cell cannot be {value!r}.", name="skip", value=skip),
+                remedy=tr("Give it as {example}.", example="skip=1"),
+            )
         act_named(self.cell, act).checked(given)
         self._cues.append(_Cue(match, skip, act, dict(given)))
         self.cell.simulator.on_request = self._heard

@@ -9,12 +9,18 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
+from robolink.errors import ConfigError
+from robolink.messages import tr
 from robolink_simulators.control.cell import AnySimulator, ControlledCell
 from robolink_simulators.device.wire_record import WireRecord
 from robolink_simulators.testkit.looks import MotionLook, WireLook
 from robolink_simulators.testkit.operator import ScriptedOperator
 
 _COMMAND_S: Final = 120.0
+_IN_PROCESS: Final = ("+sim://", "interface=virtual")
+"""In the URL of what no other process reaches: a simulator, or a CAN bus, in the memory of this
+one. A command would make another simulator of the same name, and work on that."""
+
 _FIRST: Final = "as it was given to the test"
 
 MOST_LINES: Final = 200_000
@@ -99,7 +105,23 @@ class SimulatedCell:
         It is told where the person is where it takes ``--assist``: give ``*cell.by_hand`` then.
         Of the environment it finds what the test set, and nothing that robolink was told before
         pytest began: a password or a language of the tester's own is for another cell.
+
+        Args:
+            arguments: Of the command, behind ``robolink --json -c URL``.
+            timeout_s: Longest wait for its end.
+
+        Raises:
+            ConfigError: The cell lives in the process of the test, where no other one reaches it.
+            subprocess.TimeoutExpired: It did not end in time; it was killed.
         """
+        if any(mark in self.url for mark in _IN_PROCESS):
+            raise ConfigError(
+                tr("This cell lives in the process of the test; a command is another process."),
+                remedy=tr(
+                    "Ask for one on a port, for example by epson_tcp, epson_cell, "
+                    "softmotion_cell, or a factory with medium=."
+                ),
+            )
         done = subprocess.run(
             [sys.executable, "-m", "robolink_cli", "--json", "-c", self.url, *arguments],
             env=self._environment(),
@@ -119,7 +141,16 @@ class SimulatedCell:
 
     @property
     def by_hand(self) -> tuple[str, ...]:
-        """The options by which a command asks this person, and asks nobody else."""
+        """The options by which a command asks this person, and asks nobody else.
+
+        Raises:
+            ConfigError: There is none.
+        """
+        if self.assist is None:
+            raise ConfigError(
+                tr("There is no person at this cell."),
+                remedy=tr("Take epson_cell or softmotion_cell, or a factory with person=True."),
+            )
         return ("--assist", str(self.assist), "--yes")
 
 

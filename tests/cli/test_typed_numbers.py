@@ -2,8 +2,10 @@
 
 import re
 
+import click
 import pytest
-from robolink_cli.options.numbers import decimal
+from robolink_cli import main
+from robolink_cli.console.numbers import decimal
 
 STRANGE = [
     "\uff11\uff12.\uff15",
@@ -45,3 +47,38 @@ def test_f38_such_a_number_is_refused_as_an_offset_and_nothing_is_written(simula
     assert "is not a decimal number" in err
     assert simulator.machine.tools.get(1) == before
     assert simulator.exchanges == 0
+
+
+def options(command, path=()):
+    """Yield what a command and those below it take, each with its name."""
+    yield from ((" ".join((*path, option.opts[0])), option) for option in command.params)
+    if isinstance(command, click.Group):
+        context = click.Context(command)
+        besides = ["expert"] if command is main.cli else []
+        for name in command.list_commands(context) + besides:
+            inner = command.get_command(context, name)
+            assert inner is not None
+            yield from options(inner, (*path, name))
+
+
+@pytest.mark.fault("F38")
+def test_f38_no_option_takes_a_limit_that_nothing_exceeds():
+    """Nothing is greater than nan: as a limit it would let everything pass."""
+    limits = dict(options(main.cli))
+    taking = {
+        name: option
+        for name, option in limits.items()
+        if isinstance(option.type, click.types.FloatParamType)
+    }
+    assert {"calibrate two-pose --tolerance", "sim epson --idle-exit"} <= set(taking)
+    for name, option in taking.items():
+        for text in ("nan", "inf", "-nan", *STRANGE[:3]):
+            with pytest.raises(click.BadParameter):
+                option.type.convert(text, option, None)
+                pytest.fail(f"{name} takes {text!r}")
+
+
+def test_a_time_that_is_none_is_a_mistake_of_usage(run):
+    code, _, err = run("status", "--timeout", "nan")
+    assert code == 2
+    assert "must be a finite number" in err

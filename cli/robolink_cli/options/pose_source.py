@@ -12,7 +12,7 @@ import click
 from robolink.errors import ConfigError
 from robolink.messages import declared, tr
 from robolink.pose_tables import NOTHING_SAID, ReadingChoices
-from robolink_cli.options.numbers import decimal
+from robolink_cli.console.numbers import decimal
 from robolink_cli.options.pose_reading import reading_options
 
 if TYPE_CHECKING:

@@ -11,6 +11,7 @@ from robolink.locale.languages import ENGLISH, LANGUAGES, language_named
 from robolink.messages import declared, tr
 from robolink_cli.access.cell import complete_cell
 from robolink_cli.console.language import OPTION, VARIABLE
+from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import switch_json_on
 from robolink_cli.options.line import LINE
 
@@ -135,7 +136,7 @@ def _link_options(command: CommandT) -> CommandT:
             "--timeout",
             "timeout_s",
             metavar="S",
-            type=click.FloatRange(min=0, min_open=True),
+            type=NumberInside(min=0, min_open=True),
             expose_value=False,
             callback=_keep,
             help=declared("Longest wait for one answer, in seconds (3)."),
@@ -144,7 +145,7 @@ def _link_options(command: CommandT) -> CommandT:
             "--remote-timeout",
             "remote_timeout_s",
             metavar="S",
-            type=click.FloatRange(min=0),
+            type=NumberInside(min=0),
             expose_value=False,
             callback=_keep,
             help=declared(

@@ -12,6 +12,7 @@ from click.core import ParameterSource
 
 from robolink.messages import declared, tr
 from robolink_cli.console.help_sections import HelpSection
+from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import note
 
 Judged = Callable[[click.Context, click.Parameter, Any], Any]
@@ -123,7 +124,7 @@ def life_options(function: F) -> F:
         ),
         click.option(
             "--idle-exit",
-            type=click.FloatRange(min=0.1),
+            type=NumberInside(min=0.1),
             metavar="SECONDS",
             help="End when nobody has asked for anything for this long.",
         ),
@@ -234,14 +235,14 @@ def pace_options(function: F) -> F:
     """Add ``--speed`` and ``--exchange``."""
     function = click.option(
         "--exchange",
-        type=click.FloatRange(min=0, max=10),
+        type=NumberInside(min=0, max=10),
         metavar="SECONDS",
         help="How much simulated time each request takes besides; without it 0, and 0.05 at "
         "--speed 0.",
     )(function)
     return click.option(
         "--speed",
-        type=click.FloatRange(min=0, max=1000),
+        type=NumberInside(min=0, max=1000),
         default=1.0,
         show_default=True,
         metavar="FACTOR",

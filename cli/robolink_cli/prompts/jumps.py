@@ -11,6 +11,7 @@ import click
 
 from robolink.errors import DeclinedError
 from robolink.messages import declared, joined, tr
+from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import json_is_on
 from robolink_cli.prompts.questions import asked, on_terminal
 
@@ -52,7 +53,7 @@ def jump_limit_mm(cell: "Cell | None") -> float:
 
 def accept_jump_options(function: F) -> F:
     """Add ``--accept-jump`` and ``--accept-turn``."""
-    positive = click.FloatRange(min=0, min_open=True)
+    positive = NumberInside(min=0, min_open=True)
     options = (
         click.option(
             "--accept-jump",

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 from robolink.errors import ConfigError, RobolinkError
 from robolink.messages import tr
 from robolink.register_maps import COMPONENTS, Number, RegisterMap
+from robolink_cli.console.numbers import decimal
 from robolink_cli.console.render import note, table
-from robolink_cli.options.numbers import decimal
 
 if TYPE_CHECKING:
     from robolink.controllers.plc_map import PlcMapController

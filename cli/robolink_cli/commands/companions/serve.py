@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 import click
 
 from robolink.messages import declared, tr
+from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import note
 from robolink_cli.session.context import CliContext, optional_controller
 
@@ -52,7 +53,7 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--tolerance-mm",
-    type=float,
+    type=NumberInside(min=0, min_open=True),
     metavar="MM",
     default=0.1,
     show_default=True,
@@ -60,7 +61,7 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--max-change-mm",
-    type=float,
+    type=NumberInside(min=0, min_open=True),
     metavar="MM",
     default=2.0,
     show_default=True,
@@ -68,7 +69,7 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--sigma-mm",
-    type=float,
+    type=NumberInside(min=0, min_open=True),
     metavar="MM",
     help=declared("How far one touch scatters, where it is known."),
 )

@@ -8,6 +8,7 @@ import click
 
 from robolink.errors import ControllerFaultError
 from robolink.messages import tr
+from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import emit_json, json_is_on, note, say
 from robolink_cli.options.simulation import project_options
 from robolink_cli.session.context import json_option
@@ -89,7 +90,7 @@ def check(files: tuple[Path, ...], points: tuple[Path, ...]) -> None:
 @click.option(
     "--for",
     "most_s",
-    type=click.FloatRange(min=0.001, max=1e7),
+    type=NumberInside(min=0.001, max=1e7),
     default=LONGEST_RUN_S,
     show_default=True,
     metavar="SECONDS",

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 import click
 
 from robolink.messages import tr
+from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import emit_json, json_is_on, say
 from robolink_cli.session.context import json_option
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 @click.option(
     "--timeout",
     "timeout_s",
-    type=click.FloatRange(min=0.05, max=10),
+    type=NumberInside(min=0.05, max=10),
     default=0.5,
     show_default=True,
     metavar="S",

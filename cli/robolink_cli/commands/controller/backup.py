@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from robolink.messages import tr
+from robolink_cli.console.numbers import NumberInside
 from robolink_cli.options.consent import dry_run_option, published_option, yes_option
 from robolink_cli.prompts.questions import agree
 from robolink_cli.session.completing import complete_tool
@@ -36,7 +37,7 @@ def backup(context: CliContext, file: Path, force: bool) -> None:
 @click.option(
     "--tolerance",
     "length_mm",
-    type=click.FloatRange(min=0),
+    type=NumberInside(min=0),
     default=0.0005,
     metavar="MM",
     show_default=True,
@@ -45,7 +46,7 @@ def backup(context: CliContext, file: Path, force: bool) -> None:
 @click.option(
     "--tolerance-deg",
     "angle_deg",
-    type=click.FloatRange(min=0),
+    type=NumberInside(min=0),
     default=0.0005,
     metavar="DEG",
     show_default=True,

@@ -10,6 +10,7 @@ import click
 
 from robolink.errors import ConfigError, DeclinedError
 from robolink.messages import declared, joined, tr
+from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import note, say, table
 from robolink_cli.options.consent import yes_option
 from robolink_cli.options.shared import controller_argument
@@ -67,7 +68,7 @@ class _Asked:
 @click.option(
     "--step",
     "step_mm",
-    type=click.FloatRange(min=0.2, max=5),
+    type=NumberInside(min=0.2, max=5),
     default=1.0,
     show_default=True,
     metavar="MM",

@@ -7,6 +7,7 @@ import click
 from robolink.errors import ConfigError
 from robolink.messages import declared, tr
 from robolink_cli.access.cell import with_cell_limits
+from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.tolerance import may_be_guided
 from robolink_cli.options.consent import dry_run_option, plain_option, yes_option
 from robolink_cli.session.context import CliContext, controller_options
@@ -26,7 +27,7 @@ _CELL_KEYS: Final = {"speed_mm_s": "speed_mm_s", "box_mm": "jog_box_mm"}
 @click.option(
     "--speed",
     "speed_mm_s",
-    type=click.FloatRange(1, 100),
+    type=NumberInside(1, 100),
     default=20.0,
     metavar="MM_S",
     help="Speed of straight moves, in Power Low.",
@@ -34,7 +35,7 @@ _CELL_KEYS: Final = {"speed_mm_s": "speed_mm_s", "box_mm": "jog_box_mm"}
 @click.option(
     "--box",
     "box_mm",
-    type=click.FloatRange(min=0, min_open=True),
+    type=NumberInside(min=0, min_open=True),
     default=50.0,
     metavar="MM",
     help="How far from the start the tool may be jogged, in every direction.",

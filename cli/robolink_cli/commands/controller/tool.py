@@ -10,6 +10,7 @@ import click
 from robolink.errors import ConfigError
 from robolink.messages import declared, tr
 from robolink_cli.access.warnings import note_change
+from robolink_cli.console.numbers import DECIMAL
 from robolink_cli.console.render import note, say
 from robolink_cli.lazy_group import LazyGroup
 from robolink_cli.options.consent import (
@@ -18,7 +19,6 @@ from robolink_cli.options.consent import (
     then_select_option,
     yes_option,
 )
-from robolink_cli.options.numbers import DECIMAL
 from robolink_cli.prompts.jumps import Allowed, accept_jump, accept_jump_options, allowed_by
 from robolink_cli.prompts.questions import agree
 from robolink_cli.session.completing import complete_tool

@@ -7,9 +7,9 @@ import click
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink_cli.console.numbers import DECIMAL
 from robolink_cli.console.render import say
 from robolink_cli.options.impact import impact_payload, impact_request, show_impact
-from robolink_cli.options.numbers import DECIMAL
 from robolink_cli.options.report import report_options, report_request, reporting
 from robolink_cli.session.completing import complete_tool
 from robolink_cli.session.context import CliContext, controller_options

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from robolink.messages import declared, tr
+from robolink_cli.console.numbers import NumberInside
 from robolink_cli.options.consent import dry_run_option, plain_option, yes_option
 from robolink_cli.options.recipe_answers import answer_options
 from robolink_cli.options.sensor import sensor_option
@@ -40,7 +41,7 @@ _STEPS: Final = 7
     "--accept-jump",
     "accepted_change_mm",
     metavar="MM",
-    type=click.FloatRange(min=0, min_open=True),
+    type=NumberInside(min=0, min_open=True),
     help=declared("Accept a change up to MM this time, beyond the recipe's limit; for engineers."),
 )
 @click.option(

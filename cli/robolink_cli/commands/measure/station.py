@@ -3,6 +3,7 @@
 import click
 
 from robolink.messages import declared, tr
+from robolink_cli.console.numbers import NumberInside
 from robolink_cli.options.consent import dry_run_option, yes_option
 from robolink_cli.session.completing import complete_station, complete_tool
 from robolink_cli.session.context import CliContext, controller_options
@@ -58,14 +59,14 @@ def show(context: CliContext, name: str, robot: str | None) -> None:
 @click.option(
     "--sigma",
     "sigma_mm",
-    type=click.FloatRange(min=0, min_open=True),
+    type=NumberInside(min=0, min_open=True),
     metavar="MM",
     help=declared("Standard deviation of one coordinate of one touch, where it is known."),
 )
 @click.option(
     "--speed",
     "speed_mm_s",
-    type=click.FloatRange(1, 100),
+    type=NumberInside(1, 100),
     default=20.0,
     metavar="MM_S",
     help=declared("Speed of straight moves, in Power Low."),
@@ -73,7 +74,7 @@ def show(context: CliContext, name: str, robot: str | None) -> None:
 @click.option(
     "--box",
     "box_mm",
-    type=click.FloatRange(min=1),
+    type=NumberInside(min=1),
     metavar="MM",
     default=150.0,
     show_default=True,

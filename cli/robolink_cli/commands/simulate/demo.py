@@ -2,6 +2,7 @@
 
 import click
 
+from robolink_cli.console.numbers import NumberInside
 from robolink_cli.session.context import json_option
 
 
@@ -11,7 +12,7 @@ from robolink_cli.session.context import json_option
 )
 @click.option(
     "--speed",
-    type=click.FloatRange(1, 100),
+    type=NumberInside(1, 100),
     metavar="FACTOR",
     default=20.0,
     show_default=True,

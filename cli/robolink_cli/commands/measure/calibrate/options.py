@@ -9,6 +9,7 @@ import click
 from robolink.messages import declared
 from robolink_cli.access.cell import with_cell_limits
 from robolink_cli.commands.measure.calibrate.request import request_from
+from robolink_cli.console.numbers import NumberInside
 from robolink_cli.options.consent import dry_run_option, plain_option, yes_option
 from robolink_cli.options.impact import impact_options
 from robolink_cli.options.motion import motion_option
@@ -32,7 +33,7 @@ _CELL_KEYS: Final = {
 }
 """Option to key in the cell file."""
 
-_LENGTH: Final = click.FloatRange(min=0, min_open=True)
+_LENGTH: Final = NumberInside(min=0, min_open=True)
 
 
 def calibration_options(function: Callable[..., None]) -> Callable[..., int | None]:
@@ -108,7 +109,7 @@ def _own_options() -> tuple[Callable[[Callable[..., Any]], Callable[..., Any]], 
         motion_option(
             "--speed",
             "speed_mm_s",
-            type=click.FloatRange(1, 100),
+            type=NumberInside(1, 100),
             default=20.0,
             metavar="MM_S",
             help=declared("Speed of straight moves, in Power Low."),
@@ -116,7 +117,7 @@ def _own_options() -> tuple[Callable[[Callable[..., Any]], Callable[..., Any]], 
         motion_option(
             "--box",
             "box_mm",
-            type=click.FloatRange(min=1),
+            type=NumberInside(min=1),
             metavar="MM",
             default=150.0,
             show_default=True,

@@ -10,7 +10,7 @@ from annotated_types import Ge, Gt, Le
 from robolink.messages import tr
 from robolink.methods import ParameterField, fields_of
 from robolink.methods.declaration.fields import bare, refusals
-from robolink_cli.options.numbers import DECIMAL, decimal
+from robolink_cli.console.numbers import DECIMAL, decimal
 
 _NUMBERS = (float, int)
 

@@ -7,8 +7,8 @@ import click
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.pose_tables import NOTHING_SAID, ReadingChoices
+from robolink_cli.console.numbers import DECIMAL
 from robolink_cli.console.render import emit_json, json_is_on
-from robolink_cli.options.numbers import DECIMAL
 from robolink_cli.options.pose_reading import reading_options
 from robolink_cli.session.context import json_option
 

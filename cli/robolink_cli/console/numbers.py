@@ -4,6 +4,7 @@
 of these meant something else, or pasted it (docs/faults.md, "Numbers").
 """
 
+import math
 import re
 from typing import Any, Final
 
@@ -49,3 +50,24 @@ class DecimalNumber(click.ParamType[float]):
 
 
 DECIMAL: Final = DecimalNumber()
+
+
+class NumberInside(click.FloatRange):
+    """The type of an option that takes a decimal number within limits, or any finite one.
+
+    No comparison with ``nan`` holds: within limits it would pass each of them, and as a limit it
+    would let everything pass.
+    """
+
+    def convert(
+        self,
+        value: Any,  # noqa: ANN401 - click's form
+        param: click.Parameter | None,
+        ctx: click.Context | None,
+    ) -> float:
+        """Return the number."""
+        number = DECIMAL.convert(value, param, ctx)
+        if not math.isfinite(number):
+            self.fail(tr("must be a finite number"), param, ctx)
+        inside: float = super().convert(number, param, ctx)
+        return inside

@@ -2,6 +2,8 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
+from traceback import extract_tb
 
 from robolink.errors import RobolinkError
 from robolink.testing.motion_checks import MOVING_CHECKS
@@ -43,8 +45,16 @@ def outcomes(subject: Subject, checks: Iterable[Check] = READING_CHECKS) -> Iter
             broken = str(error)
         except RobolinkError as error:
             broken, kept_from = str(error), error
+        except Exception as error:
+            # Who uses a controller catches one family of errors; a driver lets no other out.
+            broken = f"{type(error).__name__} at {_place_of(error)} is no RobolinkError: {error}"
         promise = " ".join((check.__doc__ or "").split())
         yield CheckOutcome(check.__name__, promise, broken, kept_from)
+
+
+def _place_of(error: Exception) -> str:
+    raised = extract_tb(error.__traceback__)[-1]
+    return f"{Path(raised.filename).name}:{raised.lineno}"
 
 
 def check_controller(subject: Subject, *, writes: bool = True, moves: bool = True) -> None:

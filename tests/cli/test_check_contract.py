@@ -125,6 +125,9 @@ def test_told_to_it_writes_and_moves_and_puts_everything_back(
         (("--write", "--tool", "1", "--yes"), 2, "Tool 1 is selected"),
         (("--write", "--yes"), 2, "--write and --tool go together"),
         (("--tool", "2", "--yes"), 2, "--write and --tool go together"),
+        (("--write", "--tool", "2", "--yes", "--junit", "no/such/a.xml"), 2, "no folder no/such"),
+        (("--driver", "json:dumps"), 2, "gives no controller: TypeError"),
+        (("--driver", "os:getcwd"), 2, "gives no controller: str has no __enter__"),
         (("--driver", "nowhere"), 2, "is not the name of a driver"),
         (("--driver", "no_such_module:x"), 2, "cannot be loaded"),
     ],
@@ -146,6 +149,13 @@ machine = MemoryMachine()
 def good():
     return MemoryController(machine, identity="memory+object://good")
 
+class Crude(MemoryMachine):
+    def read(self, tool):
+        return {}[tool]
+
+def crude():
+    return MemoryController(Crude(), identity="memory+object://crude")
+
 class Deaf(MemoryMachine):
     def store(self, tool, offset):
         pass
@@ -163,6 +173,10 @@ def test_a_driver_in_the_present_folder_is_held_to_it(monkeypatch, tmp_path, cap
     assert json.loads(capsys.readouterr().out)["kept"] is True
     assert main.run([*line, "drv_of_mine:deaf", "--junit", "deaf.xml"]) == 5
     assert "a write is read back: Tool 3 was written" in capsys.readouterr().err
+    # An error that is none of robolink's is the driver's, and no defect of robolink.
+    assert main.run([*line[:3], "--driver", "drv_of_mine:crude"]) == 1
+    told = [one["broken"] for one in json.loads(capsys.readouterr().out)["checks"]]
+    assert any(one and "KeyError at drv_of_mine.py:12 is no RobolinkError" in one for one in told)
     suite = ElementTree.fromstring(Path("deaf.xml").read_bytes())
     assert (suite.get("errors"), suite[-1].get("name")) == ("1", "a_write_is_read_back")
     sys.path.remove(str(tmp_path))

@@ -109,6 +109,8 @@ def check_contract(
     if (writes and tool is None) or (tool is not None and not writes):
         raise click.UsageError(tr("--write and --tool go together: say which tool may change."))
     asked = _Asked(tool, step_mm if moves else None, yes)
+    if junit is not None and not junit.parent.is_dir():
+        raise click.UsageError(tr("There is no folder {path}.", path=junit.parent))
     if driver is not None:
         identity, found = _of_a_driver(driver, asked)
     else:
@@ -165,16 +167,17 @@ def _of_a_cell(context: CliContext, asked: _Asked) -> "tuple[str, list[CheckOutc
         return identity, _found(subject, asked)
 
 
-def _of_a_driver(name: str, asked: _Asked) -> "tuple[str, list[CheckOutcome]]":
+def _of_a_driver(driver: str, asked: _Asked) -> "tuple[str, list[CheckOutcome]]":
     """Check what somebody's own function gives; only the checks put back what they change."""
     from robolink.testing import Subject
-    from robolink_cli.commands.controller.contract_trials import driver_named
+    from robolink_cli.commands.controller.contract_trials import driver_named, told_of_the_driver
 
-    made = driver_named(name)
+    made = driver_named(driver)
     if asked.changes:
         with made() as controller:
             _agree(controller, asked)
-    identity, tool = _looked_at(made, asked)
+    with told_of_the_driver(driver):
+        identity, tool = _looked_at(made, asked)
     subject = Subject(made, tool=tool, step_mm=asked.step_mm or 1.0)
     return identity, _found(subject, asked)
 

@@ -8,7 +8,7 @@ from sys import path as module_path
 from typing import TYPE_CHECKING
 
 import robolink
-from robolink.errors import ConfigError, StoppedError
+from robolink.errors import ConfigError, RobolinkError, StoppedError
 from robolink.messages import tr
 from robolink.stopping import far_end_of, find_note
 from robolink_cli.session.context import CliContext
@@ -119,4 +119,35 @@ def driver_named(name: str) -> "Callable[[], Controller]":
             tr("{name!r} cannot be called.", name=name),
             remedy=tr("Name a class or a function that takes nothing and gives a controller."),
         )
-    return made  # type: ignore[no-any-return]
+
+    def connect() -> "Controller":
+        with told_of_the_driver(name):
+            controller: Controller = made()
+        missing = {"__enter__", "capabilities", "status", "tools"}.difference(dir(controller))
+        if missing:
+            raise _no_controller(name, f"{type(controller).__name__} has no {min(missing)}")
+        return controller
+
+    return connect
+
+
+@contextmanager
+def told_of_the_driver(name: str) -> Iterator[None]:
+    """Tell an error that is not one of robolink's as the driver's, before any check is made.
+
+    Raises:
+        ConfigError: There was one.
+    """
+    try:
+        yield
+    except RobolinkError:
+        raise
+    except Exception as error:
+        raise _no_controller(name, f"{type(error).__name__}: {error}") from error
+
+
+def _no_controller(name: str, cause: str) -> ConfigError:
+    return ConfigError(
+        tr("The driver {name!r} gives no controller: {cause}.", name=name, cause=cause),
+        remedy=tr("Name a class or a function that takes nothing and gives a controller."),
+    )

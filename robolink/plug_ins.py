@@ -35,3 +35,5 @@ def find_plug_in(group: str, name: str) -> object | None:
         return found[0].load()  # type: ignore[no-any-return]
     except (ImportError, AttributeError) as error:
         raise PlugInError(str(error)) from error
+    except Exception as error:  # its module runs when it is loaded, and may do anything
+        raise PlugInError(f"{type(error).__name__}: {error}") from error

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Final, Protocol, cast
 
-from robolink.errors import ConfigError
+from robolink.errors import ConfigError, RobolinkError
 from robolink.journal import GlancingLog, open_log, signature_here
 from robolink.messages import tr
 from robolink.model import Controller, OutcomeLog, Secret, Signature
@@ -123,11 +123,32 @@ def find_opener(url: LinkUrl) -> ControllerOpener:
                 remedy=tr("Reinstall the package that provides it."),
             ) from error.origin
         if found is not None:
-            return cast(ControllerOpener, found)
+            return _told_as_its_own(name, cast(ControllerOpener, found))
     raise ConfigError(
         tr("robolink does not know controllers of the kind {kind!r}.", kind=url.kind),
         remedy=tr("Write for example epson+tcp://192.168.0.1:5000."),
     )
+
+
+def _told_as_its_own(kind: str, opener: ControllerOpener) -> ControllerOpener:
+    """Return an opener of somebody else, whose errors are not told as robolink's."""
+
+    def opened(url: LinkUrl, terms: ConnectionTerms, /) -> Controller:
+        try:
+            return opener(url, terms)
+        except RobolinkError:
+            raise
+        except Exception as error:
+            raise ConfigError(
+                tr(
+                    "The part that connects to {kind!r} failed: {cause}.",
+                    kind=kind,
+                    cause=f"{type(error).__name__}: {error}",
+                ),
+                remedy=tr("Tell it to whoever made that part."),
+            ) from error
+
+    return opened
 
 
 def connect(

@@ -24,12 +24,15 @@ from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 import robolink
 from robolink import ToolOffset
-from robolink.model import TIP, Hand, Pose, Secret, Spot, SpotUnit, WorkBox, rotate_xy
+from robolink.controllers.registry import ConnectionTerms
+from robolink.journal import memory_journal
+from robolink.model import TIP, Hand, Pose, Secret, Signature, Spot, SpotUnit, WorkBox, rotate_xy
 from robolink.protocols.epson_text import VariableType
 from robolink.protocols.mailbox import program_texts
 from robolink.runner import RunSettings, ask_yes_no
 from robolink.sensing import open_sensor, seen_once
 from robolink.testing import MemoryMachine
+from robolink.transport import parse_url
 
 pytest_plugins = ["pytester"]
 
@@ -269,7 +272,15 @@ def an_acme_arm(stack: ExitStack) -> dict[str, Any]:
         left[0] = 0
         done.append("stop")
 
-    return {
+    def then() -> bool:
+        """Whether it was moved and stopped, its tool is back, and its opener takes the record."""
+        record = memory_journal("acme").log("acme")
+        terms = ConnectionTerms(Signature(), outcomes=record)
+        with given["open_acme"](parse_url("acme+usb://17"), terms) as controller:
+            kept = controller.outcomes is record
+        return kept and {"go", "stop"} == {*done} and inner.tools[1] == ToolOffset(12, -3.5, -20)
+
+    given: dict[str, Any] = {
         "acme": SimpleNamespace(
             tool=inner.read,
             set_tool=inner.store,
@@ -280,8 +291,9 @@ def an_acme_arm(stack: ExitStack) -> dict[str, Any]:
             busy=busy,
             stop=stop,
         ),
-        "then": lambda: {"go", "stop"} == {*done} and inner.tools[1] == ToolOffset(12, -3.5, -20),
+        "then": then,
     }
+    return given
 
 
 def nothing(stack: ExitStack) -> dict[str, Any]:

@@ -34,7 +34,13 @@ class Installed(EntryPoint):
     def load(self):
         if self.value == "gone:opener":
             raise ImportError("no module named 'gone'")
-        return open_bench
+        if self.value == "crude:module":
+            raise RuntimeError("no dongle")
+        return crude_opener if self.value == "crude:opener" else open_bench
+
+
+def crude_opener(url, terms):
+    raise KeyError("dongle")
 
 
 def install(monkeypatch, *entries):
@@ -99,6 +105,13 @@ def test_what_nobody_brings_or_cannot_be_loaded_is_said(server, monkeypatch):
         robolink.connect(server.url)
     install(monkeypatch, ("bench", "gone:opener"))
     with pytest.raises(ConfigError, match="no module named 'gone'"):
+        robolink.connect(server.url)
+    # Whatever it raises is told as its own, and not as a defect of robolink.
+    install(monkeypatch, ("bench", "crude:module"))
+    with pytest.raises(ConfigError, match="cannot be loaded: RuntimeError: no dongle"):
+        robolink.connect(server.url)
+    install(monkeypatch, ("bench", "crude:opener"))
+    with pytest.raises(ConfigError, match="connects to 'bench' failed: KeyError: 'dongle'"):
         robolink.connect(server.url)
 
 

@@ -1,9 +1,12 @@
 """The exit codes that are documented are those of the code, and 6 comes first."""
 
 import re
+from inspect import getsource, unwrap
 from pathlib import Path
 
+import click
 import pytest
+from robolink_cli import main
 from robolink_cli.console import exit_codes
 
 from robolink import errors
@@ -26,6 +29,29 @@ def test_the_page_has_the_table_of_the_code():
 
 def test_every_code_that_a_command_can_end_with_has_a_meaning():
     assert _NAMED | {code for _, code in exit_codes.EXIT_CODES} == set(exit_codes.MEANINGS)
+
+
+def commands(command, path=()):
+    """Yield every command below one, with its name."""
+    if not isinstance(command, click.Group):
+        yield " ".join(path), command
+        return
+    context = click.Context(command)
+    for name in [*command.list_commands(context), *(["expert"] if command is main.cli else [])]:
+        inner = command.get_command(context, name)
+        assert inner is not None
+        yield from commands(inner, (*path, name))
+
+
+def test_every_command_that_can_end_with_1_stands_in_its_row():
+    ending = {
+        name.removeprefix("expert ")
+        for name, command in commands(main.cli)
+        if "return DIFFERENT" in (source := getsource(unwrap(command.callback)))
+        or "else DIFFERENT" in source
+    }
+    assert "tool compare" in ending
+    assert {name for name in ending if f"`{name}`" not in exit_codes.MEANINGS[1]} == set()
 
 
 OLD, NEW = (12.0, -3.5, -20.0, 0.0, 0.0, 0.0), (12.5, -3.5, -20.0, 0.0, 0.0, 0.0)

@@ -36,9 +36,10 @@ _ENDINGS: Final = {
 MEANINGS: Final[dict[int, str]] = {
     DONE: "done",
     DIFFERENT: (
-        "`tool compare` found a difference; `journal verify` found a damaged record; "
-        "`journal drift` found something that stands out; `cell doctor`, `cell ports` or "
-        "`cell check` found something that needs attention"
+        "`tool compare` found a difference; `journal verify` or `journal report` "
+        "found a damaged record; `journal drift` found something that stands out; "
+        "`check-contract` found a broken promise; `cell doctor`, `cell ports` or `cell check` "
+        "found something that needs attention"
     ),
     USAGE: "the command, a file, a setting, the journal or an installed package is wrong",
     3: "the controller was not reached, or the link broke",

@@ -2,6 +2,7 @@
 
 import click
 
+from robolink_cli.console.exit_codes import DIFFERENT
 from robolink_cli.console.render import emit_json, json_is_on, say
 from robolink_cli.session.context import json_option
 
@@ -27,4 +28,4 @@ def doctor() -> int:
     else:
         for line in in_words(remarks):
             say(line)
-    return 0 if healthy else 1
+    return 0 if healthy else DIFFERENT

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 import click
 
 from robolink.messages import tr
+from robolink_cli.console.exit_codes import DIFFERENT
 from robolink_cli.console.render import emit_json, json_is_on, say
 from robolink_cli.session.context import json_option
 
@@ -36,7 +37,7 @@ def ports() -> int:
             say(problem)
         if found or not problems:
             _show(found, cells)
-    return 1 if problems else 0
+    return DIFFERENT if problems else 0
 
 
 def _cells_unknown(error: str) -> str:

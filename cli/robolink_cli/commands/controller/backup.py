@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from robolink.messages import tr
+from robolink_cli.console.exit_codes import DIFFERENT
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.options.consent import dry_run_option, published_option, yes_option
 from robolink_cli.prompts.questions import agree
@@ -91,7 +92,7 @@ def compare(
         **comparison_payload(comparison, tolerance),
     }
     context.emit("compare", payload, lambda: show_comparison(comparison, tolerance, identity))
-    return 0 if comparison.equal else 1
+    return 0 if comparison.equal else DIFFERENT
 
 
 @click.command()

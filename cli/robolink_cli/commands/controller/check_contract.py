@@ -10,6 +10,7 @@ import click
 
 from robolink.errors import ConfigError, DeclinedError
 from robolink.messages import declared, joined, tr
+from robolink_cli.console.exit_codes import DIFFERENT
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import note, say, table
 from robolink_cli.options.consent import yes_option
@@ -19,9 +20,6 @@ from robolink_cli.session.context import CliContext, controller_options, emit
 if TYPE_CHECKING:
     from robolink.model import Controller
     from robolink.testing import CheckOutcome, Subject
-
-_BROKEN: Final = 1
-"""As of a comparison that found a difference."""
 
 _SPEED_MM_S: Final = 10.0
 
@@ -139,7 +137,7 @@ def check_contract(
     ]
     payload: dict[str, object] = {"controller": identity, "kept": not broken, "checks": checks}
     emit("contract", payload, show)
-    return _BROKEN if broken else 0
+    return DIFFERENT if broken else 0
 
 
 def _of_a_cell(context: CliContext, asked: _Asked) -> "tuple[str, list[CheckOutcome]]":

@@ -18,6 +18,7 @@ from robolink_cli.commands.record.journal_lookup import (
     entries_of_change,
     journal_to_read,
 )
+from robolink_cli.console.exit_codes import DIFFERENT
 from robolink_cli.console.render import emit_json, json_is_on, say
 from robolink_cli.lazy_group import LazyGroup
 from robolink_cli.options.shared import json_option
@@ -257,7 +258,7 @@ def verify() -> int:
                     hash=found.last_hash,
                 )
             )
-    return 1 if found.problems else 0
+    return DIFFERENT if found.problems else 0
 
 
 @contextmanager

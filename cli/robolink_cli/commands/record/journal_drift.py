@@ -9,6 +9,7 @@ import click
 from robolink.messages import declared, tr
 from robolink_cli.access.cell import complete_cell
 from robolink_cli.commands.record.journal_lookup import controller_meant, journal_to_read
+from robolink_cli.console.exit_codes import DIFFERENT
 from robolink_cli.console.render import emit_json, json_is_on, say
 from robolink_cli.options.shared import json_option
 from robolink_cli.session.completing import complete_tool
@@ -92,7 +93,7 @@ def drift(
         show_drift(cells, all_plots=plots)
         if page is not None:
             say(tr("Page: {path}", path=page))
-    return 1 if any(cell.findings for cell in cells) else 0
+    return DIFFERENT if any(cell.findings for cell in cells) else 0
 
 
 def _cells(

@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from robolink.messages import declared, tr
+from robolink_cli.console.exit_codes import DIFFERENT
 from robolink_cli.console.render import note, say
 from robolink_cli.options.pose_source import point_numbers
 from robolink_cli.session.context import CliContext, optional_controller
@@ -66,4 +67,4 @@ def report(
         note(problem)
     payload = report_payload(reports, path)
     context.emit("report", payload, lambda: say(tr("Report: {path}", path=path)))
-    return 1 if problems else 0
+    return DIFFERENT if problems else 0

@@ -96,6 +96,7 @@ def test_a_person_is_told_in_words(capsys, plan):
     ("command", "link", "action", "told"),
     [
         (["epson"], "softmotion+can", "echo", "echo cannot happen on epson+tcp"),
+        (["epson"], "softmotion+can", "drop_reply", 'Write link = "epson+tcp" in the plan'),
         (["softmotion"], "softmotion+can", "echo", "echo cannot happen on softmotion+modbus-tcp"),
         (["softmotion"], "epson+tcp", "lose_login", "lose_login cannot happen on softmotion"),
         (

@@ -107,6 +107,13 @@ def links_of(action: AnyAction) -> frozenset[LinkKind]:
     return links - _LINES if action in _OF_CONNECTIONS else links
 
 
+def _namesake_on(served: Collection[LinkKind], action: AnyAction) -> LinkKind | None:
+    """Return a served link on which the other family has a fault of that name, if it has one."""
+    family = PlcFaultAction if isinstance(action, FaultAction) else FaultAction
+    namesake = family.__members__.get(action.name)
+    return min(links_of(namesake).intersection(served), default=None) if namesake else None
+
+
 def require_possible(action: AnyAction, served: Collection[LinkKind]) -> None:
     """Refuse a fault that cannot happen on any of the links that are served.
 
@@ -114,6 +121,16 @@ def require_possible(action: AnyAction, served: Collection[LinkKind]) -> None:
         FaultNotPossibleError: Names the fault, the links, and those where it could happen.
     """
     links = links_of(action)
+    if links.isdisjoint(served) and (there := _namesake_on(served, action)):
+        raise FaultNotPossibleError(
+            tr(
+                "The fault {action} is planned for another kind of link than {links}.",
+                action=action.name.lower(),
+                links=", ".join(sorted(served)),
+            ),
+            remedy=tr("Write {example} in the plan.", example=f'link = "{there}"'),
+            action=action,
+        )
     if links.isdisjoint(served):
         raise FaultNotPossibleError(
             tr(

@@ -74,9 +74,9 @@ class Connection:
             self._unsent = b""
             with contextlib.suppress(OSError):
                 self._client.shutdown(socket.SHUT_RDWR)
-        self._watch(selectors.EVENT_READ | (selectors.EVENT_WRITE if self._unsent else 0))
-
-    def _watch(self, events: int) -> None:
+        events = (
+            selectors.EVENT_READ | selectors.EVENT_WRITE if self._unsent else selectors.EVENT_READ
+        )
         if events != self._watched:
             self._watched = events
             self._host.watch_for(self._client, events, self.serve)

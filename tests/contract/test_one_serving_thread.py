@@ -1,12 +1,15 @@
 """All simulated controllers of a process are served by one thread, and do not feel each other."""
 
+import contextlib
 import select
 import socket
 import threading
 
 import pytest
 from robolink_simulators.epson import EpsonSimulator
+from robolink_simulators.hosting.streams import serving_loop
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.readiness import MOST_AT_ONCE, SelectedReadiness
 
 from robolink.transport import parse_url
 
@@ -98,33 +101,58 @@ def test_a_host_may_be_closed_by_what_its_own_controller_does(asking):
         asking(host.url)
 
 
-def test_those_who_asked_at_once_are_all_heard_before_one_is_answered(hosts, asking):
+@pytest.fixture
+def asked_at_once(asking):
+    """Ask some controllers while another holds all of them up; tell what each saw when served."""
+
+    def asked(hosts):
+        holding, let_go, all_looked = (threading.Event() for _ in range(3))
+        held, *others = [asking(host.url) for host in hosts]
+        answered_before = []
+
+        def hold(_number, _text):
+            holding.set()
+            let_go.wait(20)
+
+        def look(_number, _text):
+            sockets = [client.socket for client in others]
+            answered_before.append(len(select.select(sockets, [], [], 0)[0]))
+            if len(answered_before) == len(others):
+                all_looked.set()
+
+        for client in (held, *others):
+            client.ask(b"$Login,")
+        hosts[0]._simulator.on_request = hold
+        for host in hosts[1:]:
+            host._simulator.on_request = look
+        held.socket.sendall(b"$GetStatus\r\n")
+        assert holding.wait(20)
+        for client in others:
+            client.socket.sendall(b"$GetStatus\r\n")
+        let_go.set()
+        assert all_looked.wait(20)
+        for client in (held, *others):
+            assert client.socket.recv(4096).startswith(b"#GetStatus,")
+        return answered_before
+
+    return asked
+
+
+def test_those_who_asked_at_once_are_all_heard_before_one_is_answered(hosts, asked_at_once):
     """A client that asks many is woken once for all of them, not once for each."""
-    holding, let_go = threading.Event(), threading.Event()
-    clients = [asking(host.url) for host in hosts[:6]]
-    for client in clients:
-        client.ask(b"$Login,")
-    answered_before = []
+    assert asked_at_once(hosts[:6]) == [0] * 5
 
-    def hold(_number, _text):
-        holding.set()
-        let_go.wait(20)
 
-    def look(_number, _text):
-        sockets = [client.socket for client in clients[1:]]
-        answered_before.append(select.select(sockets, [], [], 0)[0])
-
-    hosts[0]._simulator.on_request = hold
-    for host in hosts[1:6]:
-        host._simulator.on_request = look
-    clients[0].socket.sendall(b"$GetStatus\r\n")
-    assert holding.wait(20)
-    for client in clients[1:]:
-        client.socket.sendall(b"$GetStatus\r\n")
-    let_go.set()
-    for client in clients:
-        assert client.socket.recv(4096).startswith(b"#GetStatus,")
-    assert answered_before == [[]] * 5
+def test_of_many_who_ask_at_once_a_few_are_answered_before_the_rest_is_heard(
+    monkeypatch, asked_at_once
+):
+    """Also where the system tells of all of them at once."""
+    monkeypatch.setattr(serving_loop, "make_readiness", SelectedReadiness)
+    with contextlib.ExitStack() as stack:
+        hosts = [stack.enter_context(serve_tcp(EpsonSimulator())) for _ in range(40)]
+        answered_before = asked_at_once(hosts)
+    assert answered_before[:MOST_AT_ONCE] == [0] * MOST_AT_ONCE
+    assert answered_before[-1] >= MOST_AT_ONCE
 
 
 def test_one_that_cannot_answer_is_served_no_more_and_the_others_are(hosts, asking, monkeypatch):

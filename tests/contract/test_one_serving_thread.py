@@ -4,12 +4,15 @@ import contextlib
 import select
 import socket
 import threading
+import time
 
 import pytest
 from robolink_simulators.epson import EpsonSimulator
+from robolink_simulators.epson.remote.link import EpsonServerLink
 from robolink_simulators.hosting.streams import serving_loop
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 from robolink_simulators.hosting.streams.readiness import MOST_AT_ONCE, SelectedReadiness
+from robolink_simulators.hosting.streams.tcp_host import TcpHost
 
 from robolink.transport import parse_url
 
@@ -168,3 +171,50 @@ def test_one_that_cannot_answer_is_served_no_more_and_the_others_are(hosts, aski
     assert broken.ask(b"$GetStatus") == b""
     assert sound.ask(b"$Login,") == b"#Login,0\r\n"
     assert [str(error) for error in told] == ["of a test"]
+
+
+def test_one_whose_end_fails_too_is_closed_all_the_same(hosts, asking, monkeypatch):
+    """What has failed mostly fails again when it is told that its client has gone."""
+    told = []
+    monkeypatch.setattr(threading, "excepthook", lambda args: told.append(str(args.exc_value)))
+    broken, sound = asking(hosts[0].url), asking(hosts[1].url)
+    broken.ask(b"$Login,")
+
+    def fail(_link, _data, _now_ns):
+        raise RuntimeError("of a test")
+
+    with monkeypatch.context() as failing:
+        failing.setattr(EpsonServerLink, "receive", fail)
+        assert broken.ask(b"$GetStatus") == b""
+        hosts[0].close()  # returns when the thread is done with it
+    assert told == ["of a test"] * 2
+    with pytest.raises(ConnectionRefusedError):
+        asking(hosts[0].url)
+    assert sound.ask(b"$Login,") == b"#Login,0\r\n"
+
+
+@pytest.mark.skipif(not hasattr(select, "epoll"), reason="limits of open files are of Unix")
+def test_who_calls_while_no_file_can_be_opened_waits_and_costs_nothing(monkeypatch):
+    import resource
+
+    looked, accept = [], TcpHost._accept
+
+    def count(host, events, now_ns):
+        looked.append(now_ns)
+        accept(host, events, now_ns)
+
+    monkeypatch.setattr(TcpHost, "_accept", count)
+    with serve_tcp(EpsonSimulator()) as host, socket.socket() as client:
+        link = parse_url(host.url)
+        soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+        client.settimeout(20)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (client.fileno() + 1, hard))
+        try:
+            client.connect((link.host, link.port))
+            client.sendall(b"$Login,\r\n")
+            time.sleep(0.2)
+            tried = len(looked)
+        finally:
+            resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+        assert client.recv(4096) == b"#Login,0\r\n"
+    assert 0 < tried < 40

@@ -59,8 +59,10 @@ class Connection:
     def drop(self, now_ns: int) -> None:
         """The host stops serving."""
         if not self.finished:
-            self._link.receive(b"", now_ns)
-            self._close()
+            try:
+                self._link.receive(b"", now_ns)
+            finally:
+                self._close()
 
     def _send(self, data: bytes) -> None:
         try:

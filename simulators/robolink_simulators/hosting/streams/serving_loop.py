@@ -224,7 +224,10 @@ class ServingLoop:
             if host in self._hosts:
                 self._hosts.discard(host)
                 host.queued_s = host.due_s = None
-                host.end()
+                try:
+                    host.end()
+                except BaseException as error:  # of the same device that has failed, mostly
+                    self._tell(error)
                 with self._gate:
                     self._members -= 1
                     self._ended = not self._members

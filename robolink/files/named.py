@@ -40,8 +40,13 @@ def read_named(path: Path, *, most_bytes: int = MOST_BYTES, secret: bool = False
             a person's language. The caller says which file, and what it is for.
     """
     descriptor = os.open(path, os.O_RDONLY | _AT_ONCE)
-    with os.fdopen(descriptor, "rb") as file:
+    try:
         mode = _mode_of_regular(descriptor)
+        file = os.fdopen(descriptor, "rb")
+    except BaseException:
+        os.close(descriptor)
+        raise
+    with file:
         if secret and os.name == "posix" and mode & 0o077:
             raise OthersMayReadError(errno.EPERM, tr("people other than its owner may read it"))
         data = file.read(most_bytes + 1)

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Protocol
 
 from robolink.calibration import VerifyResult
 from robolink.errors import CalibrationError, ConfigError
@@ -17,13 +16,6 @@ from robolink.recipe.file.recipe import Recipe
 from robolink.recipe.file.tables import Output, Prompt
 from robolink.runner import StepDone
 from robolink.stations import Station
-
-
-class Outputs(Protocol):
-    """Switches the outputs of a controller."""
-
-    def set_output(self, bit: int, on: bool) -> object:
-        """Switch one output and read it back."""
 
 
 class RecipeListener(Listener):

@@ -122,6 +122,15 @@ def test_a_recording_goes_on_where_it_ended(tmp_path):
     assert not holds(tmp_path, b"")
 
 
+@pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="this system lists no open files")
+def test_a_folder_in_place_of_a_file_is_refused_in_our_words_and_left_closed(tmp_path):
+    before = len(list(Path("/proc/self/fd").iterdir()))
+    for _ in range(20):
+        with pytest.raises(OSError, match="it is not a regular file"):
+            read_named(tmp_path)
+    assert len(list(Path("/proc/self/fd").iterdir())) < before + 20
+
+
 def test_a_file_that_is_too_long_is_refused_and_a_link_is_followed(tmp_path):
     path, link = tmp_path / "long", tmp_path / "link"
     path.write_bytes(b"x" * MOST_BYTES)

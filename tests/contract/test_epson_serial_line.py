@@ -159,6 +159,22 @@ def _relay(cable, url, find, put):
             os.close(descriptor)
 
 
+def test_a_cable_at_whose_far_end_nobody_reads_loses_it_and_can_be_unplugged():
+    cable = SerialCable()
+    near = os.open(cable.near, os.O_RDWR | os.O_NOCTTY)
+
+    def send_and_unplug():
+        for _ in range(16):
+            os.write(near, bytes(4096))
+        cable.close()
+
+    thread = threading.Thread(target=send_and_unplug, daemon=True)
+    thread.start()
+    thread.join(20)
+    assert not thread.is_alive()
+    os.close(near)
+
+
 def test_a_line_that_never_falls_silent_is_not_opened():
     cable = SerialCable()
     far = os.open(cable.far, os.O_RDWR | os.O_NOCTTY)

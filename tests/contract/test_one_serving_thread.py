@@ -1,12 +1,18 @@
 """All simulated controllers of a process are served by one thread, and do not feel each other."""
 
+import contextlib
 import select
 import socket
 import threading
+import time
 
 import pytest
 from robolink_simulators.epson import EpsonSimulator
+from robolink_simulators.epson.remote.link import EpsonServerLink
+from robolink_simulators.hosting.streams import serving_loop
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.readiness import MOST_AT_ONCE, SelectedReadiness
+from robolink_simulators.hosting.streams.tcp_host import TcpHost
 
 from robolink.transport import parse_url
 
@@ -98,33 +104,58 @@ def test_a_host_may_be_closed_by_what_its_own_controller_does(asking):
         asking(host.url)
 
 
-def test_those_who_asked_at_once_are_all_heard_before_one_is_answered(hosts, asking):
+@pytest.fixture
+def asked_at_once(asking):
+    """Ask some controllers while another holds all of them up; tell what each saw when served."""
+
+    def asked(hosts):
+        holding, let_go, all_looked = (threading.Event() for _ in range(3))
+        held, *others = [asking(host.url) for host in hosts]
+        answered_before = []
+
+        def hold(_number, _text):
+            holding.set()
+            let_go.wait(20)
+
+        def look(_number, _text):
+            sockets = [client.socket for client in others]
+            answered_before.append(len(select.select(sockets, [], [], 0)[0]))
+            if len(answered_before) == len(others):
+                all_looked.set()
+
+        for client in (held, *others):
+            client.ask(b"$Login,")
+        hosts[0]._simulator.on_request = hold
+        for host in hosts[1:]:
+            host._simulator.on_request = look
+        held.socket.sendall(b"$GetStatus\r\n")
+        assert holding.wait(20)
+        for client in others:
+            client.socket.sendall(b"$GetStatus\r\n")
+        let_go.set()
+        assert all_looked.wait(20)
+        for client in (held, *others):
+            assert client.socket.recv(4096).startswith(b"#GetStatus,")
+        return answered_before
+
+    return asked
+
+
+def test_those_who_asked_at_once_are_all_heard_before_one_is_answered(hosts, asked_at_once):
     """A client that asks many is woken once for all of them, not once for each."""
-    holding, let_go = threading.Event(), threading.Event()
-    clients = [asking(host.url) for host in hosts[:6]]
-    for client in clients:
-        client.ask(b"$Login,")
-    answered_before = []
+    assert asked_at_once(hosts[:6]) == [0] * 5
 
-    def hold(_number, _text):
-        holding.set()
-        let_go.wait(20)
 
-    def look(_number, _text):
-        sockets = [client.socket for client in clients[1:]]
-        answered_before.append(select.select(sockets, [], [], 0)[0])
-
-    hosts[0]._simulator.on_request = hold
-    for host in hosts[1:6]:
-        host._simulator.on_request = look
-    clients[0].socket.sendall(b"$GetStatus\r\n")
-    assert holding.wait(20)
-    for client in clients[1:]:
-        client.socket.sendall(b"$GetStatus\r\n")
-    let_go.set()
-    for client in clients:
-        assert client.socket.recv(4096).startswith(b"#GetStatus,")
-    assert answered_before == [[]] * 5
+def test_of_many_who_ask_at_once_a_few_are_answered_before_the_rest_is_heard(
+    monkeypatch, asked_at_once
+):
+    """Also where the system tells of all of them at once."""
+    monkeypatch.setattr(serving_loop, "make_readiness", SelectedReadiness)
+    with contextlib.ExitStack() as stack:
+        hosts = [stack.enter_context(serve_tcp(EpsonSimulator())) for _ in range(40)]
+        answered_before = asked_at_once(hosts)
+    assert answered_before[:MOST_AT_ONCE] == [0] * MOST_AT_ONCE
+    assert answered_before[-1] >= MOST_AT_ONCE
 
 
 def test_one_that_cannot_answer_is_served_no_more_and_the_others_are(hosts, asking, monkeypatch):
@@ -140,3 +171,50 @@ def test_one_that_cannot_answer_is_served_no_more_and_the_others_are(hosts, aski
     assert broken.ask(b"$GetStatus") == b""
     assert sound.ask(b"$Login,") == b"#Login,0\r\n"
     assert [str(error) for error in told] == ["of a test"]
+
+
+def test_one_whose_end_fails_too_is_closed_all_the_same(hosts, asking, monkeypatch):
+    """What has failed mostly fails again when it is told that its client has gone."""
+    told = []
+    monkeypatch.setattr(threading, "excepthook", lambda args: told.append(str(args.exc_value)))
+    broken, sound = asking(hosts[0].url), asking(hosts[1].url)
+    broken.ask(b"$Login,")
+
+    def fail(_link, _data, _now_ns):
+        raise RuntimeError("of a test")
+
+    with monkeypatch.context() as failing:
+        failing.setattr(EpsonServerLink, "receive", fail)
+        assert broken.ask(b"$GetStatus") == b""
+        hosts[0].close()  # returns when the thread is done with it
+    assert told == ["of a test"] * 2
+    with pytest.raises(ConnectionRefusedError):
+        asking(hosts[0].url)
+    assert sound.ask(b"$Login,") == b"#Login,0\r\n"
+
+
+@pytest.mark.skipif(not hasattr(select, "epoll"), reason="limits of open files are of Unix")
+def test_who_calls_while_no_file_can_be_opened_waits_and_costs_nothing(monkeypatch):
+    import resource
+
+    looked, accept = [], TcpHost._accept
+
+    def count(host, events, now_ns):
+        looked.append(now_ns)
+        accept(host, events, now_ns)
+
+    monkeypatch.setattr(TcpHost, "_accept", count)
+    with serve_tcp(EpsonSimulator()) as host, socket.socket() as client:
+        link = parse_url(host.url)
+        soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+        client.settimeout(20)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (client.fileno() + 1, hard))
+        try:
+            client.connect((link.host, link.port))
+            client.sendall(b"$Login,\r\n")
+            time.sleep(0.2)
+            tried = len(looked)
+        finally:
+            resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+        assert client.recv(4096) == b"#Login,0\r\n"
+    assert 0 < tried < 40

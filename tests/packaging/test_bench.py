@@ -4,6 +4,7 @@ import importlib
 import json
 import os
 import sys
+from collections import Counter
 from xml.etree import ElementTree
 
 import pytest
@@ -14,7 +15,7 @@ from benchmarks.cases import CASES
 from benchmarks.pictures import Growth, picture
 from benchmarks.quiet import SPREAD, Floors
 from benchmarks.table import Amount, Figure
-from benchmarks.work.asked_cells import WRITE_S, lived
+from benchmarks.work.asked_cells import WRITE_S, lived, lived_apart
 from robolink.journal import EntryKind, memory_journal
 
 SLOW = Figure("a stop", Amount(30.0, "ms"), "a floor", Amount(10.0, "ms"), 3.0, 2.5)
@@ -42,8 +43,14 @@ def test_each_case_is_there_and_has_its_title_on_the_page():
 def test_cells_in_virtual_time_are_asked_each_second_and_written_to_each_minute():
     (factor,) = lived(3, WRITE_S, 1)
     assert factor > 0
-    entries = list(memory_journal("bench-asked-3").entries(kinds=[EntryKind.DONE]))
-    assert len({entry.controller for entry in entries}) == len(entries) == 3
+    written = list(memory_journal("bench-asked-3").entries(kinds=[EntryKind.DONE]))
+    assert sorted(Counter(entry.controller for entry in written).values()) == [2, 2, 2]
+
+
+def test_a_fleet_is_divided_among_processes_and_is_as_fast_as_the_slowest():
+    factors = lived_apart(3, 2, 4, processes=2)
+    assert len(factors) == 4
+    assert all(factor > 0 for factor in factors)
 
 
 def test_a_ratio_over_its_goal_is_missed_and_without_a_goal_neither():

@@ -3,7 +3,7 @@
 import threading
 
 import pytest
-from robolink_simulators.cell.clock import ManualClock, ScaledClock
+from robolink_simulators.cell.clock import ManualClock, ScaledClock, SteeredClock
 
 from robolink.errors import ConfigError
 
@@ -56,8 +56,11 @@ def test_real_seconds_until_a_simulated_instant():
     base = ManualClock()
     clock = ScaledClock(10, base)
     assert clock.real_seconds(5_000_000_000) == 0.5
+    assert clock.real_seconds(5_000_000_000, 3_000_000_000) == 0.2
+    assert SteeredClock(10, base).real_seconds(5_000_000_000, 3_000_000_000) == 0.2
     base.advance(1)
     assert clock.real_seconds(5_000_000_000) == 0.0
+    assert clock.real_seconds(5_000_000_000, 3_000_000_000) == 0.2
 
 
 @pytest.mark.parametrize("factor", [0, -1, float("inf"), float("nan")])

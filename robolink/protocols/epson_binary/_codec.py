@@ -68,7 +68,8 @@ class EpsonBinaryCodec(EpsonCodec):
             LocalProtocolError: The protocol, the dialect or this end's role forbids it.
             RemoteProtocolError: The codec is dead.
         """
-        self._check_alive()
+        if self._failure is not None:
+            raise self._failed_again(self._failure)
         if self._role is Role.HOST and isinstance(event, Opening):
             return bytes([EOT])
         if self._role is Role.HOST and isinstance(event, Request):

@@ -89,7 +89,8 @@ class EpsonCodec(ABC):
             LocalProtocolError: Bytes after the end of the stream.
             RemoteProtocolError: The codec is dead.
         """
-        self._check_alive()
+        if self._failure is not None:
+            raise self._failed_again(self._failure)
         if not data:
             self._ended = True
         elif self._ended:
@@ -109,7 +110,8 @@ class EpsonCodec(ABC):
             RemoteProtocolError: The stream makes no sense, or ended inside a message; the
                 codec is dead from here on.
         """
-        self._check_alive()
+        if self._failure is not None:
+            raise self._failed_again(self._failure)
         if not self._arrived and not self._ended:
             return NEED_DATA  # asked twice in every exchange, and mostly true
         try:
@@ -159,9 +161,10 @@ class EpsonCodec(ABC):
             remedy=tr("A host sends requests; a device sends replies and refusals."),
         )
 
-    def _check_alive(self) -> None:
-        if (failure := self._failure) is not None:
-            raise RemoteProtocolError(failure.what, remedy=failure.remedy, raw=failure.raw)
+    @staticmethod
+    def _failed_again(failure: RemoteProtocolError) -> RemoteProtocolError:
+        """Return the error of a codec that is dead."""
+        return RemoteProtocolError(failure.what, remedy=failure.remedy, raw=failure.raw)
 
 
 class EpsonTextCodec(EpsonCodec):
@@ -236,7 +239,8 @@ class EpsonTextCodec(EpsonCodec):
             LocalProtocolError: The protocol, or this end's role, forbids it.
             RemoteProtocolError: The codec is dead.
         """
-        self._check_alive()
+        if self._failure is not None:
+            raise self._failed_again(self._failure)
         if self._role is Role.HOST and isinstance(event, Request):
             return write_request(event) + self._terminator
         if self._role is Role.DEVICE and isinstance(event, Reply):
@@ -254,7 +258,8 @@ class EpsonTextCodec(EpsonCodec):
             LocalProtocolError: The codec was made without ``unterminated``.
             RemoteProtocolError: The codec is dead.
         """
-        self._check_alive()
+        if self._failure is not None:
+            raise self._failed_again(self._failure)
         if not self._unterminated:
             raise LocalProtocolError(
                 tr("This codec takes no request without its line end."),

@@ -109,9 +109,10 @@ class MessageBuffer:
             if end < 0:
                 self._scanned = len(self._data)
                 return -1
-            self._opening = self._opening_quote(end)
+            if self._quoted_replies:
+                self._opening = self._opening_quote(end)
             if not self._opening:
-                return self._sooner(end)
+                return end if self._next_message is None else self._sooner(end, self._next_message)
             self._scanned = self._opening + 1
         closing = self._earliest(b'"\r', b'"\n')
         if closing < 0:
@@ -120,11 +121,9 @@ class MessageBuffer:
             return -1
         return closing + 1
 
-    def _sooner(self, end: int) -> int:
+    def _sooner(self, end: int, next_message: Callable[[bytearray, int], int]) -> int:
         """Return where a message that has no line end of its own ends before ``end``."""
-        if self._next_message is None:
-            return end
-        following = self._next_message(self._data, 1)
+        following = next_message(self._data, 1)
         return following if 0 < following < end else end
 
     def _earliest(self, first: bytes, second: bytes) -> int:
@@ -137,7 +136,7 @@ class MessageBuffer:
     def _opening_quote(self, end: int) -> int:
         """Return the index of the quote that opens the payload of the line, 0 for none."""
         data = self._data
-        if not self._quoted_replies or data[0] != _HASH:
+        if data[0] != _HASH:
             return 0
         opening = data.find(b",", 0, end) + 1
         return opening if opening and data[opening] == _QUOTE else 0

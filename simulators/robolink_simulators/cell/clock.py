@@ -101,9 +101,15 @@ class ScaledClock:
         """Block until ``seconds`` of simulated time have passed."""
         self._base.sleep(seconds / self._factor)
 
-    def real_seconds(self, until_ns: int) -> float:
-        """Return how long it really takes until the simulated instant, 0.0 when it passed."""
-        return max(0, until_ns - self.now_ns()) / NS_PER_S / self._factor
+    def real_seconds(self, until_ns: int, now_ns: int | None = None) -> float:
+        """Return how long it really takes until the simulated instant, 0.0 when it passed.
+
+        Args:
+            until_ns: The instant.
+            now_ns: The simulated time, where it was read a moment ago.
+        """
+        left_ns = until_ns - (self.now_ns() if now_ns is None else now_ns)
+        return left_ns / NS_PER_S / self._factor if left_ns > 0 else 0.0
 
     def really_takes_s(self, seconds: float) -> float:
         """Return how many seconds of the base clock so many simulated ones are."""
@@ -206,9 +212,9 @@ class SteeredClock(ScaledClock):
         while (left_s := self.real_seconds(until_ns)) > 0:
             self._base.sleep(min(left_s, _LOOK_S))
 
-    def real_seconds(self, until_ns: int) -> float:
+    def real_seconds(self, until_ns: int, now_ns: int | None = None) -> float:
         """Return how long it really takes until an instant, as things are; a day in a pause."""
-        left_s = max(0, until_ns - self.now_ns()) / NS_PER_S
+        left_s = max(0, until_ns - (self.now_ns() if now_ns is None else now_ns)) / NS_PER_S
         return left_s / self._factor if self._factor else left_s and _PAUSED_S
 
     def really_takes_s(self, seconds: float) -> float:

@@ -42,6 +42,7 @@ class HostedDevice(ABC):
     Attributes:
         lock: Held by whoever touches it while a host serves it.
         url: Where the first host serves it, empty when none does.
+        now_ns: The instant last given; for others to read.
         seed: See above.
         exchanges: Requests answered.
         log: What crossed the wire.
@@ -68,14 +69,9 @@ class HostedDevice(ABC):
         self.on_request: RequestHook | None = None
         self.on_reply: RequestHook | None = None
         self.durable = False
-        self._now_ns = 0
+        self.now_ns = 0
         self._stepping = False
         self._requests = 0
-
-    @property
-    def now_ns(self) -> int:
-        """The instant last given."""
-        return self._now_ns
 
     def keep_time(self, clock: WireClock) -> None:
         """Take the present time from a clock; whoever hosts it says so."""
@@ -89,7 +85,7 @@ class HostedDevice(ABC):
             if self.present_ns is not None and not self._stepping:
                 self.advance(self.present_ns())
             try:
-                yield self._now_ns
+                yield self.now_ns
             finally:
                 self._after_act()
         for watcher in tuple(self.watchers):

@@ -140,7 +140,7 @@ class EpsonSimulator(TimeStepping):
     def _begin(self) -> None:
         self._begun = True
         self._make(self._serial)
-        self.machine.advance(self._now_ns)
+        self.machine.advance(self.now_ns)
 
     def _make(self, serial: str) -> None:
         """Make the controller and its world, as they are at first."""
@@ -153,7 +153,7 @@ class EpsonSimulator(TimeStepping):
                 one,
                 self.seed,
                 pendant_live=lambda: self.condition.mode is Mode.TEACH,
-                now_ns=lambda: self._now_ns,
+                now_ns=lambda: self.now_ns,
                 parameters=self._parameters,
             )
             for one in self.machine.robots
@@ -233,9 +233,9 @@ class EpsonSimulator(TimeStepping):
             self.program = ProgramRunner(self._session, self.condition, project, Ports(ports))
             if "robolink_begin" in project.preserved():
                 self._companion = None  # the real one is part of the project
-            self._desk.starter = self.program.starter(lambda: self._now_ns)
+            self._desk.starter = self.program.starter(lambda: self.now_ns)
             self.panel.starter = self._desk.starter
-            self.program.begin_background(self._now_ns)
+            self.program.begin_background(self.now_ns)
             return self.program
 
     def status_flags(self) -> StatusFlags:
@@ -288,16 +288,16 @@ class EpsonSimulator(TimeStepping):
         with self.acting():
             self.starts += 1
             self._links.cut()
-            self._window.interrupt(self._now_ns)
+            self._window.interrupt(self.now_ns)
             if self.program is not None:
                 self.program.forget()
             self._slot.free()
             self._mishaps.forget()
             self.condition.restart()
-            self.machine.forget_volatile(self._now_ns)
+            self.machine.forget_volatile(self.now_ns)
             self._window.restart()
             if self.program is not None:
-                self.program.begin_background(self._now_ns)
+                self.program.begin_background(self.now_ns)
 
     def push(self, data: bytes) -> None:
         """Send every client bytes that nobody asked for (F10)."""
@@ -321,4 +321,4 @@ class EpsonSimulator(TimeStepping):
         return moment_of(self.machine, self.variables, self.worlds)
 
     def _restore(self, held: Mapping[str, Any]) -> None:
-        put_back(held, self.machine, self.variables, self.worlds, now_ns=self._now_ns)
+        put_back(held, self.machine, self.variables, self.worlds, now_ns=self.now_ns)

@@ -39,21 +39,26 @@ class TimeStepping(RequestTaking, ABC):
         """Let simulated time reach ``now_ns``, stopping wherever something changes."""
         if now_ns == self._settled_ns or self._passes(now_ns):
             return
-        while now_ns > self._now_ns < (change := self.next_change() or now_ns) < now_ns:
+        while now_ns > self.now_ns < (change := self.next_change() or now_ns) < now_ns:
             self._step(change)
-        self._step(max(now_ns, self._now_ns))
+        self._step(max(now_ns, self.now_ns))
 
     def next_change(self) -> int | None:
         """Return when :meth:`advance` will next do something by itself, if ever."""
         if not self._begun:
             return None
-        if self._settled_ns == -1 or self._settled_ns != self._known_ns or self._at_work:
-            return self._look_ahead()
-        return self._next_ns
+        return self._next_ns if self._knows_next else self._look_ahead()
 
     def _look_ahead(self) -> int | None:
-        self._next_ns, self._known_ns = self._found_next(), self._settled_ns
+        self._next_ns = self._found_next()
+        # While something goes on what comes next changes by itself.
+        self._known_ns = -1 if self._at_work else self._settled_ns
         return self._next_ns
+
+    @property
+    def _knows_next(self) -> bool:
+        """Whether nothing has happened since it was found that nothing goes on."""
+        return self._settled_ns == self._known_ns != -1
 
     def _found_next(self) -> int | None:
         first = self._links.next_change()
@@ -77,17 +82,20 @@ class TimeStepping(RequestTaking, ABC):
         What an idle controller does by itself :meth:`next_change` tells, all of it.
         """
         if not self._begun:
-            self._now_ns = max(now_ns, self._now_ns)
+            self.now_ns = max(now_ns, self.now_ns)
             return True
-        if now_ns < self._now_ns or self._at_work or not self._links.settled:
+        if now_ns < self.now_ns or not self._links.settled:
             return False
-        known = self._settled_ns != -1 and self._settled_ns == self._known_ns
-        change = self._next_ns if known else self._look_ahead()
+        if not self._knows_next:
+            if self._at_work:
+                return False
+            self._next_ns = self._found_next()
+        change = self._next_ns
         if change is not None and change <= now_ns:
             return False
-        if now_ns > self._now_ns:
+        if now_ns > self.now_ns:
             self.machine.advance(now_ns)
-        self._now_ns = self._settled_ns = self._known_ns = now_ns
+        self.now_ns = self._settled_ns = self._known_ns = now_ns
         return True
 
     @property
@@ -102,7 +110,7 @@ class TimeStepping(RequestTaking, ABC):
         )
 
     def _step(self, now_ns: int) -> None:
-        self._now_ns = now_ns
+        self.now_ns = now_ns
         self._stepping = True
         try:
             if self.program is not None:

@@ -110,8 +110,8 @@ class PlcSimulator(HostedDevice):
 
     def advance(self, now_ns: int) -> None:
         """Let simulated time reach ``now_ns``."""
-        self._now_ns = max(self._now_ns, now_ns)
-        self.program.advance(self._now_ns)
+        self.now_ns = max(self.now_ns, now_ns)
+        self.program.advance(self.now_ns)
         for link in self._links:
             link.catch_up()
 
@@ -149,7 +149,7 @@ class PlcSimulator(HostedDevice):
         """
         if frames.shared and request.unit != self.unit:
             return []
-        self.log.add(self._now_ns, ">", request.words)
+        self.log.add(self.now_ns, ">", request.words)
         met = () if counted else self.faults.take(request.words)
         actions = {fault.action: fault for fault in met}
         if FaultAction.DISCONNECT_BEFORE in actions:
@@ -162,7 +162,7 @@ class PlcSimulator(HostedDevice):
         ignored = FaultAction.IGNORE_WRITE in actions
         reply = self._answer(request, frames, ignored=ignored)
         self.exchanges += 1
-        self.log.add(self._now_ns, "<", request.words)
+        self.log.add(self.now_ns, "<", request.words)
         leaving = self.faults.departures(reply, met)
         if (again := actions.get(FaultAction.DUPLICATE_REQUEST)) is not None:
             leaving.append((again.seconds, self._answer(request, frames, ignored=ignored)))

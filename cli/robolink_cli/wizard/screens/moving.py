@@ -111,18 +111,3 @@ def _how_fast(subject: MoveSubject, *, low_power: bool) -> str:
     if low_power:
         return tr("Up to {v} mm/s, power LOW", v=speed)
     return tr("Up to {v} mm/s", v=speed)
-
-
-def sentence_of(subject: MoveSubject, here: Pose | None) -> str:
-    """Return a movement as one sentence, for a face that draws nothing."""
-    if here is not None:
-        turn = angle_difference_deg(subject.target.u_deg, here.u_deg)
-        if abs(turn) >= _TURNS_DEG:
-            side = tr("counter-clockwise") if turn > 0 else tr("clockwise")
-            return tr(
-                "U turns from {u} to {to} degrees, {side} seen from above.",
-                u=f"{here.u_deg:.0f}",
-                to=f"{subject.target.u_deg:.0f}",
-                side=side,
-            )
-    return subject.purpose

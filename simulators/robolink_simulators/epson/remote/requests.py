@@ -53,7 +53,7 @@ class RequestTaking(HostedDevice, ABC):
     def take(self, link: EpsonServerLink, event: Request | BadRequest) -> None:
         """Deal with a request of a client; while another is logged in, it is not heard."""
         self._settled_ns, shown = -1, shown_request(event)
-        self.log.add(self._now_ns, ">", shown)
+        self.log.add(self.now_ns, ">", shown)
         if not self._slot.hears(link, cuts=self.options.second_client == "closed"):
             return
         faults = self.faults.take(shown, LinkKind.EPSON_SERIAL if link.dialect else None)
@@ -73,14 +73,14 @@ class RequestTaking(HostedDevice, ABC):
         heard = arriving(link, event, faults, self.faults, unterminated=silence)
         if heard is None:
             return
-        self._mishaps.strike(faults, self._now_ns)
+        self._mishaps.strike(faults, self.now_ns)
         if link.over:  # a restart has cut it
             return
         self._carry_out(link, heard, shown, faults)
         for fault in faults:
             if fault.action is FaultAction.DUPLICATE_REQUEST:
                 again = partial(self._carry_out, link, heard, shown, ())
-                self._mishaps.plan(self._now_ns, fault.seconds, again)
+                self._mishaps.plan(self.now_ns, fault.seconds, again)
 
     def take_late(self, link: EpsonServerLink, event: Request | BadRequest) -> None:
         """Deal with a request that was under way while its link carried nothing."""
@@ -100,7 +100,7 @@ class RequestTaking(HostedDevice, ABC):
             if self.on_request is not None:
                 self.on_request(exchange.number, shown)
         finally:
-            self._service.carry_out(link, exchange, event, self._now_ns)
+            self._service.carry_out(link, exchange, event, self.now_ns)
             self._flash.save_changes()
 
     def leaving(self, exchange: PendingRequest, reply: bytes) -> Sequence[Departure]:
@@ -109,7 +109,7 @@ class RequestTaking(HostedDevice, ABC):
         self.exchanges += 1
         # A login that was bent may come back in its refusal.
         echoed = bool(exchange.faults) and reply[:1] == b"!"
-        self.log.add(self._now_ns, "<", "***" if echoed else shown_reply(reply))
+        self.log.add(self.now_ns, "<", "***" if echoed else shown_reply(reply))
         if not exchange.faults:
             self.faults.remember(reply)
             return ((0.0, reply),)
@@ -132,4 +132,4 @@ class RequestTaking(HostedDevice, ABC):
             own = self._service.unfinished and not self.condition.monitoring_only
             self._slot.lost(unfinished=own)
             if self.options.execute_on_disconnect == "stops":
-                self._window.interrupt(self._now_ns)
+                self._window.interrupt(self.now_ns)

@@ -59,8 +59,10 @@ class Connection:
     def drop(self, now_ns: int) -> None:
         """The host stops serving."""
         if not self.finished:
-            self._link.receive(b"", now_ns)
-            self._close()
+            try:
+                self._link.receive(b"", now_ns)
+            finally:
+                self._close()
 
     def _send(self, data: bytes) -> None:
         try:
@@ -74,9 +76,9 @@ class Connection:
             self._unsent = b""
             with contextlib.suppress(OSError):
                 self._client.shutdown(socket.SHUT_RDWR)
-        self._watch(selectors.EVENT_READ | (selectors.EVENT_WRITE if self._unsent else 0))
-
-    def _watch(self, events: int) -> None:
+        events = (
+            selectors.EVENT_READ | selectors.EVENT_WRITE if self._unsent else selectors.EVENT_READ
+        )
         if events != self._watched:
             self._watched = events
             self._host.watch_for(self._client, events, self.serve)

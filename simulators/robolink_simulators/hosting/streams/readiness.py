@@ -13,8 +13,8 @@ import socket
 from collections.abc import Iterable
 from typing import Any, Final, Protocol
 
-_MOST_AT_ONCE: Final = 16
-"""So many are served before the queue is looked at again, which costs 1 us."""
+MOST_AT_ONCE: Final = 16
+"""So many are served before they are answered, and before the queue is looked at again."""
 
 
 class Readiness(Protocol):
@@ -103,7 +103,7 @@ class QueuedReadiness:
         data = self._data
         return [
             (data[number], _READ if events == select.EPOLLIN else _seen(events))
-            for number, events in self._queue.poll(timeout_s, _MOST_AT_ONCE)
+            for number, events in self._queue.poll(timeout_s, MOST_AT_ONCE)
         ]
 
     def close(self) -> None:

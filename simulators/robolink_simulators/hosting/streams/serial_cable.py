@@ -1,5 +1,6 @@
 """Two pseudo terminals joined by a thread: a serial cable without hardware."""
 
+import contextlib
 import os
 import select
 import threading
@@ -37,6 +38,8 @@ class SerialCable:
         self.near, self.far = (os.ttyname(device) for device in self._devices)
         for device in self._devices:
             tty.setraw(device)
+        for end in self._ends:
+            os.set_blocking(end, False)
         self._character_s = _CHARACTER_BITS / baud if baud else 0.0
         self._stop, self._stopped = os.pipe()
         self._thread = threading.Thread(target=self._carry, name="serial cable", daemon=True)
@@ -58,7 +61,9 @@ class SerialCable:
             for end in ready:
                 data = os.read(end, _CHUNK_BYTES)
                 time.sleep(len(data) * self._character_s)
-                os.write(other if end == one else one, data)
+                # There is no flow control: what nobody takes is lost.
+                with contextlib.suppress(BlockingIOError):
+                    os.write(other if end == one else one, data)
 
 
 def no_pseudo_terminal(error: Exception) -> ConnectError:

@@ -3,10 +3,11 @@
 Theory of operation. A device is bytes in, bytes out, and an instant at which it does something
 by itself, so serving it blocks nowhere: one queue tells whose bytes have come (``readiness``), one
 heap whose instant. Other threads ask for something by a list and a byte that wakes it. The thread
-begins with the first host and ends with the last. A few are served before any of them is answered:
-to wake a client takes as long as half an exchange, and one that asks many is then awake already for
-all answers but the first. Whatever a hook of a simulator does in it holds
+begins with the first host and ends with the last. Whatever a hook of a simulator does in it holds
 up all that this process serves, so it must never wait for another one of them.
+
+A few are served before the first of them is answered. To wake a client that sleeps takes a quarter
+of an exchange; one that asks many of them is then awake already when the second answer comes.
 """
 
 import contextlib
@@ -20,7 +21,7 @@ from heapq import heapify, heappop, heappush
 from time import monotonic
 from typing import Final, Protocol
 
-from robolink_simulators.hosting.streams.readiness import make_readiness
+from robolink_simulators.hosting.streams.readiness import MOST_AT_ONCE, make_readiness
 
 Served = Callable[[int, int], None]
 """Deals with what was seen; is given the events and the simulated time."""
@@ -124,6 +125,8 @@ class ServingLoop:
                     if entry is not None:
                         host, served = entry
                         self._serve(host, served, events)
+                        if len(self._unanswered) == MOST_AT_ONCE:
+                            self._answer()
                 self._answer()
                 self._do_asked()
                 self._look_at_overdue()
@@ -221,7 +224,10 @@ class ServingLoop:
             if host in self._hosts:
                 self._hosts.discard(host)
                 host.queued_s = host.due_s = None
-                host.end()
+                try:
+                    host.end()
+                except BaseException as error:  # of the same device that has failed, mostly
+                    self._tell(error)
                 with self._gate:
                     self._members -= 1
                     self._ended = not self._members

@@ -1,8 +1,12 @@
 """Serves a device on a TCP port, loopback unless told otherwise."""
 
+import contextlib
+import errno
 import selectors
 import socket
+import time
 from contextlib import AbstractContextManager
+from typing import Final
 
 from robolink.errors import ConnectError
 from robolink.messages import tr
@@ -11,6 +15,10 @@ from robolink_simulators.hosting.loopback import require_loopback
 from robolink_simulators.hosting.seam import WireDevice
 from robolink_simulators.hosting.streams.connection import Connection
 from robolink_simulators.hosting.streams.wire_host import WireHost
+
+_NONE_FREE: Final = (errno.EMFILE, errno.ENFILE)
+_UNTIL_ONE_IS_FREE_S: Final = 0.02
+"""All that this process serves waits so long; to look again at once would take a whole CPU."""
 
 
 class TcpHost(WireHost):
@@ -73,17 +81,21 @@ class TcpHost(WireHost):
 
     def shut(self, now_ns: int) -> None:
         """See :meth:`WireHost.shut`."""
-        for connection in self._connections.values():
-            connection.drop(now_ns)
-        self._connections.clear()
-        self.watch_no_more(self._listener)
-        self._listener.close()
+        with contextlib.ExitStack() as all_of_it:  # also where a device fails at one of them
+            all_of_it.callback(self._listener.close)
+            all_of_it.callback(self.watch_no_more, self._listener)
+            for connection in self._connections.values():
+                all_of_it.callback(connection.drop, now_ns)
+            self._connections = {}
 
     def _accept(self, _events: int, now_ns: int) -> None:
         try:
             client, _ = self._listener.accept()
-        except OSError:
-            return  # it left before it was let in
+        except OSError as error:
+            # It left before it was let in; or no descriptor is free, and it goes on waiting.
+            if error.errno in _NONE_FREE:
+                time.sleep(_UNTIL_ONE_IS_FREE_S)
+            return
         connection = Connection(client, self._device.connect(now_ns), self)
         self._connections[client.fileno()] = connection
 

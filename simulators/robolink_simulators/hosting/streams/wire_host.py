@@ -42,6 +42,7 @@ class WireHost(ClosedAtExit):
         self._clock = clock
         self._lock = lock
         self._woken = False
+        self._now_ns = 0
         self.stopping = False
         self.due_s: float | None = None
         self.queued_s: float | None = None
@@ -85,7 +86,7 @@ class WireHost(ClosedAtExit):
         else:
             self._clock.exchanged()
         with self._lock:
-            now_ns = self._clock.now_ns()
+            self._now_ns = now_ns = self._clock.now_ns()
             if served is not None:
                 served(events, now_ns)
             self._device.advance(now_ns)
@@ -95,7 +96,7 @@ class WireHost(ClosedAtExit):
         with self._lock:
             self.flush()
             change = self._device.next_change()
-        return None if change is None else self._clock.real_seconds(change)
+        return None if change is None else self._clock.real_seconds(change, self._now_ns)
 
     def end(self) -> None:
         """See ``LoopHost.end``."""

@@ -117,7 +117,7 @@ class SoftMotionSimulator(HostedDevice):
         self._mishaps = PlcMishaps(self.panel)
         self._file = RetainedFile(self._state_path, self.plc.memory, self._kinematics)
         switched_on = self._file.restore()
-        self.plc.start(self._now_ns)
+        self.plc.start(self.now_ns)
         if not switched_on:
             self._make_ready()
         self._changes_before = self._slot_changes()
@@ -158,20 +158,20 @@ class SoftMotionSimulator(HostedDevice):
     def advance(self, now_ns: int) -> None:
         """Let simulated time reach ``now_ns``, stopping wherever something changes."""
         # Most calls come at the instant of the last one: then nothing lies in between.
-        while now_ns > self._now_ns < (change := self.next_change() or now_ns) < now_ns:
+        while now_ns > self.now_ns < (change := self.next_change() or now_ns) < now_ns:
             before_ns = self._presently_ns()
             self._step(change)
             self.plc.keep_pace(self._presently_ns() - before_ns)
-        self._step(max(now_ns, self._now_ns))
+        self._step(max(now_ns, self.now_ns))
 
     def _presently_ns(self) -> int:
         """The host's own time, which goes on while this computer works."""
-        return self._now_ns if self.present_ns is None else self.present_ns()
+        return self.now_ns if self.present_ns is None else self.present_ns()
 
     def next_change(self) -> int | None:
         """Return when :meth:`advance` will next do something by itself, if ever."""
         times = (
-            self.plc.next_change(self._now_ns),
+            self.plc.next_change(self.now_ns),
             self._mishaps.next_change(),
             self._watchdog.deadline_ns,
         )
@@ -196,7 +196,7 @@ class SoftMotionSimulator(HostedDevice):
             ('0x100', True)
         """
         shown = shown_read(first, count)
-        return self._serve(shown, now_ns, link, lambda _: self.plc.read(first, count, self._now_ns))
+        return self._serve(shown, now_ns, link, lambda _: self.plc.read(first, count, self.now_ns))
 
     def write(
         self,
@@ -224,7 +224,7 @@ class SoftMotionSimulator(HostedDevice):
     def snapshot(self, now_ns: int) -> ServedAccess:
         """Serve a client that has the response copied to where it reads it later, over CAN."""
         return self._serve(
-            "snapshot", now_ns, LinkKind.CAN, lambda _: self.plc.response(self._now_ns)
+            "snapshot", now_ns, LinkKind.CAN, lambda _: self.plc.response(self.now_ns)
         )
 
     def read_copy(self, words: Words, now_ns: int) -> ServedAccess:
@@ -234,7 +234,7 @@ class SoftMotionSimulator(HostedDevice):
     def hear(self, now_ns: int) -> None:
         """Note a valid request, for the fieldbus's watchdog."""
         self.advance(now_ns)
-        self._watchdog.hear(self._now_ns)
+        self._watchdog.hear(self.now_ns)
 
     def _truth(self) -> dict[str, Any]:
         stored = self.plc.memory.defined()
@@ -294,14 +294,14 @@ class SoftMotionSimulator(HostedDevice):
         self.hear(now_ns)
         self._requests += 1
         number = self._requests
-        self.log.add(self._now_ns, ">", shown)
+        self.log.add(self.now_ns, ">", shown)
         faults = self.faults.take(shown, link)
         actions = {fault.action for fault in faults}
         if PlcFaultAction.DISCONNECT_BEFORE in actions:
             return ServedAccess(answered=False, cut=True)
         if PlcFaultAction.DROP_REQUEST in actions:
             return ServedAccess(answered=False)
-        self._mishaps.strike(faults, self._now_ns)
+        self._mishaps.strike(faults, self.now_ns)
         try:
             if self.on_request is not None:
                 self.on_request(number, shown)
@@ -309,7 +309,7 @@ class SoftMotionSimulator(HostedDevice):
             words = carry_out(faults)
             self._file.save_changes()
         self.exchanges += 1
-        self.log.add(self._now_ns, "<", shown)
+        self.log.add(self.now_ns, "<", shown)
         if self.on_reply is not None:
             self.on_reply(number, shown)
         return self.faults.leaving(shown, words, faults)
@@ -324,11 +324,11 @@ class SoftMotionSimulator(HostedDevice):
             return ()
         stall = planned.get(PlcFaultAction.STALL)
         if stall is not None:
-            self._mishaps.plan(self._now_ns, stall.seconds, lambda: self._store(first, words))
+            self._mishaps.plan(self.now_ns, stall.seconds, lambda: self._store(first, words))
             return ()
         again = planned.get(PlcFaultAction.DUPLICATE_REQUEST)
         if again is not None:
-            self._mishaps.plan(self._now_ns, again.seconds, lambda: self._store(first, words))
+            self._mishaps.plan(self.now_ns, again.seconds, lambda: self._store(first, words))
         torn = planned.get(PlcFaultAction.TEAR_WRITE)
         if torn is not None:
             self._tear(first, words, torn)
@@ -341,16 +341,16 @@ class SoftMotionSimulator(HostedDevice):
         middle = len(words) // 2 if torn.position is None else torn.position % len(words)
         late = words[middle:]
         late_s = torn.seconds or _TORN_S
-        self._mishaps.plan(self._now_ns, late_s, lambda: self._store(first + middle, late))
+        self._mishaps.plan(self.now_ns, late_s, lambda: self._store(first + middle, late))
         self._store(first, words[:middle])
 
     def _store(self, first: int, words: Words) -> None:
         overtaken, self._overtaken = self._overtaken, []
         for start, piece in ((first, words), *overtaken):
-            self.plc.write(start, piece, self._now_ns)
+            self.plc.write(start, piece, self.now_ns)
 
     def _step(self, now_ns: int) -> None:
-        self._now_ns = now_ns
+        self.now_ns = now_ns
         self._stepping = True
         try:
             self.plc.advance(now_ns)

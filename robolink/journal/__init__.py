@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from robolink.journal._journal import Journal as Journal
     from robolink.journal._looking import LookingLog as LookingLog
     from robolink.journal._opening import close_files as close_files
+    from robolink.journal._opening import forget_memory as forget_memory
     from robolink.journal._opening import memory_journal as memory_journal
     from robolink.journal._opening import open_journal as open_journal
     from robolink.journal._opening import open_log as open_log
@@ -40,7 +41,7 @@ else:
             "_journal": "Journal",
             "_outcome_log": "JournalOutcomeLog",
             "_looking": "LookingLog",
-            "_opening": "close_files memory_journal open_journal open_log",
+            "_opening": "close_files forget_memory memory_journal open_journal open_log",
             "_places": "default_location may_exist",
             "_processes": "LeaseHolder signature_here this_process",
             "_records": "ChainVerification",

@@ -53,6 +53,21 @@ def memory_journal(identity: str) -> "Journal":
         return known
 
 
+def forget_memory(identity: str) -> None:
+    """Let go of :func:`memory_journal`; whoever still has it goes on with an empty one.
+
+    For whoever ends a simulator of this process before the process ends.
+
+    Args:
+        identity: Whose, without options: of a CAN bus all nodes. One that has none is fine.
+    """
+    with _lock:
+        gone = [name for name in _in_memory if name.partition("?")[0] == identity]
+        journals = [_in_memory.pop(name) for name in gone]
+    for journal in journals:
+        journal.close()
+
+
 def open_log(address: str, *, durable: bool, signature: Signature) -> OutcomeLog:
     """Return the record of a controller, which may be one that cannot be kept.
 

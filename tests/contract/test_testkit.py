@@ -3,12 +3,15 @@
 import os
 import subprocess
 import sys
+from contextlib import ExitStack
 from xml.etree import ElementTree
 
 import pytest
 from robolink_simulators import pytest_plugin
 from robolink_simulators.device.wire_record import MOST_LINES, WireRecord
 from robolink_simulators.testkit.asked import CellRequest
+from robolink_simulators.testkit.making import make_epson, make_softmotion
+from robolink_simulators.testkit.served import OwnFolder
 
 import robolink
 from robolink import ToolOffset
@@ -18,9 +21,10 @@ from robolink.errors import (
     RobolinkError,
     TransportBrokenError,
 )
-from robolink.journal import EntryKind
+from robolink.journal import EntryKind, forget_memory, memory_journal
 from robolink.protocols.mailbox import program_texts
 from robolink.transaction import Wanted, change_tools
+from robolink.transport import parse_url
 
 WANTED = ToolOffset(1.0, 2.0, -30.0)
 
@@ -461,3 +465,22 @@ def properties(path, test):
     """Return what a file for a pipeline holds of a test, by name."""
     found = ElementTree.parse(path).getroot().iterfind(f".//testcase[@name='{test}']//property")
     return {one.get("name"): one.get("value") for one in found}
+
+
+@pytest.mark.parametrize(
+    ("make", "medium"), [(make_epson, "sim"), (make_softmotion, "sim"), (make_softmotion, "can")]
+)
+def test_what_was_recorded_of_a_cell_in_the_process_goes_with_it(
+    make, medium, tmp_path, robolink_state
+):
+    """Ten thousand tests would hold ten thousand records."""
+    with ExitStack() as stack:
+        cell = make(OwnFolder(stack, tmp_path, 1, []), CellRequest(), medium, None)
+        with robolink.connect(cell.url) as controller:
+            identity = controller.identity
+            controller.tools.write(2, WANTED, expected=robolink.ANY)
+        record = memory_journal(identity)
+        assert any(record.entries())
+    assert memory_journal(identity) is not record
+    assert not any(memory_journal(identity).entries())
+    forget_memory(parse_url(cell.url).identity)

@@ -2,6 +2,7 @@
 
 import itertools
 import os
+import sys
 from pathlib import Path
 from typing import Any, Final
 
@@ -184,6 +185,7 @@ def _furnished(
     if request.tip is not None:
         simulator.world.tips[MOUNTED_TOOL] = request.tip
     (url,) = urls.values()
+    own.stack.callback(_forget_record, url)
     _plan(simulator, request, LinkKind(url.partition("://")[0]))
     if not person:
         return own.keep(simulator, clock, urls)
@@ -193,6 +195,15 @@ def _furnished(
 
         assist = own.stack.enter_context(serve_assist(simulator, clock=clock)).url
     return own.keep(simulator, clock, urls, assist=assist, recipe=written_recipe(own.folder))
+
+
+def _forget_record(url: str) -> None:
+    """Let go of what was recorded, in memory, of a cell that no other process reaches."""
+    if "robolink.journal" in sys.modules:
+        from robolink.journal import forget_memory
+        from robolink.transport import parse_url
+
+        forget_memory(parse_url(url).identity)
 
 
 def _plan(simulator: Any, request: CellRequest, link: LinkKind) -> None:  # noqa: ANN401 - of any kind

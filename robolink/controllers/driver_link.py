@@ -28,7 +28,7 @@ from robolink.errors import (
     RobolinkError,
     UnclearAnswerError,
 )
-from robolink.messages import tr
+from robolink.messages import joined, tr
 from robolink.model import EntryKind, Marker, MarkerKind, NewEntry, OutcomeLog
 from robolink.stop_latch import StopLatch
 from robolink.timing import Clock
@@ -194,7 +194,6 @@ class DriverLink:
 
 def advise_emergency_stop(error: RobolinkError) -> RobolinkError:
     """Put in front of an error of a stop what a person has to do first."""
-    error.remedy = " ".join(
-        (tr("The stop is not confirmed: press the emergency stop."), error.remedy)
-    ).rstrip()
+    first = tr("The stop is not confirmed: press the emergency stop.")
+    error.remedy = joined(" ", filter(None, (first, error.remedy)))
     return error

@@ -44,7 +44,7 @@ class MarkedCommand(ABC, Generic[T]):
         acknowledged: Whether the controller has said that it did it.
 
     Args:
-        request: See above.
+        request: What is sent, as a person may read it.
     """
 
     def __init__(self, request: str) -> None:
@@ -98,9 +98,9 @@ class DriverLink:
         lock: One procedure at a time.
 
     Args:
-        identity: See above.
-        clock: See above.
-        latch: See above.
+        identity: Which controller.
+        clock: The clock on which its time passes.
+        latch: What holds requests back while a stop is in force.
         outcomes: Where the markers are kept.
         gate: Holds Ctrl-C back inside.
 

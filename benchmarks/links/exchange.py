@@ -12,7 +12,6 @@ measured alone) costs twice that, and slows the simulator's answer down as well.
 import contextlib
 import json
 import os
-import signal
 import socket
 import subprocess
 import sys
@@ -22,6 +21,7 @@ from time import perf_counter_ns
 from urllib.parse import urlsplit
 
 import robolink
+from benchmarks.links.placing import a_cpu_each
 from benchmarks.table import Amount, Figure
 from robolink.journal import memory_journal
 
@@ -32,16 +32,13 @@ WARM_UP = 150
 
 def measure_exchange() -> Iterator[Figure]:
     """Yield the figures of a GetStatus exchange over TCP."""
-    cpus = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
-    if len(cpus) < 2:
-        yield from _compare("where the system put them", goal=1.35)
-        return
-    try:
-        os.sched_setaffinity(0, {cpus[0]})
-        yield from _compare("a CPU each", goal=1.35, simulator_cpu=cpus[1])
-        yield from _compare("sharing one CPU", goal=None, simulator_cpu=cpus[0])
-    finally:
-        os.sched_setaffinity(0, set(cpus))
+    with a_cpu_each() as simulator_cpu:
+        if simulator_cpu is None:
+            yield from _compare("where the system put them", goal=1.35)
+            return
+        yield from _compare("a CPU each", goal=1.35, simulator_cpu=simulator_cpu)
+        (ours,) = os.sched_getaffinity(0)
+        yield from _compare("sharing one CPU", goal=None, simulator_cpu=ours)
 
 
 def _compare(
@@ -73,8 +70,13 @@ def served_simulator(
         assert process.stdout is not None  # noqa: S101 - a pipe was asked for
         yield json.loads(process.stdout.readline())["url"]
     finally:
-        os.kill(process.pid, signal.SIGTERM)
-        process.communicate(timeout=10)
+        process.terminate()
+        try:
+            process.communicate(timeout=10)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.communicate()
+            raise
 
 
 def _raw_round(url: str) -> float:

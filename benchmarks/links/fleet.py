@@ -19,6 +19,7 @@ from time import perf_counter
 from typing import Any, Final
 from urllib.parse import urlsplit
 
+from benchmarks.links.placing import a_cpu_each
 from benchmarks.links.served_fleet import allow_descriptors
 from benchmarks.links.sim_run import measure_sim_run
 from benchmarks.table import Amount, Figure
@@ -129,30 +130,22 @@ def _clients(urls: Sequence[str]) -> Iterator[list[socket.socket]]:
 def _fleet(count: int) -> Iterator[tuple[dict[str, Any], Any]]:
     """Serve so many in a process of its own; gives what it said, and what asks it again."""
     command = [sys.executable, "-m", "benchmarks.links.served_fleet", str(count)]
-    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
-    with subprocess.Popen(command, text=True, **pipes) as process, _a_cpu_each(process.pid):  # type: ignore[call-overload]
+    pipe = subprocess.PIPE
+    with (
+        subprocess.Popen(command, text=True, stdin=pipe, stdout=pipe) as process,
+        a_cpu_each() as cpu,
+    ):
+        if cpu is not None:
+            os.sched_setaffinity(process.pid, {cpu})
+        asked, said = process.stdin, process.stdout
+        assert asked is not None and said is not None  # noqa: S101, PT018 - pipes were asked for
 
         def ask_again() -> dict[str, Any]:
-            process.stdin.write("\n")
-            process.stdin.flush()
-            return dict(json.loads(process.stdout.readline()))
+            asked.write("\n")
+            asked.flush()
+            return dict(json.loads(said.readline()))
 
         try:
-            yield dict(json.loads(process.stdout.readline())), ask_again
+            yield dict(json.loads(said.readline())), ask_again
         finally:
-            process.stdin.close()
-
-
-@contextlib.contextmanager
-def _a_cpu_each(pid: int) -> Iterator[None]:
-    """Put a process and this one on a CPU each, where there are two."""
-    cpus = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
-    if len(cpus) < 2:
-        yield
-        return
-    os.sched_setaffinity(pid, {cpus[1]})
-    os.sched_setaffinity(0, {cpus[0]})
-    try:
-        yield
-    finally:
-        os.sched_setaffinity(0, set(cpus))
+            asked.close()

@@ -14,7 +14,6 @@ the end of one the ratio is 1.05 in one run and 1.55 in the next. The median ove
 taken for each point by itself, and then the mean over the cycle.
 """
 
-import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import count
@@ -25,6 +24,7 @@ from typing import Final
 import robolink
 from benchmarks.links.bare_links import ACK, SLOT, Bare, bare_can, bare_modbus, free_port
 from benchmarks.links.exchange import served_simulator
+from benchmarks.links.placing import a_cpu_each
 from benchmarks.table import Amount, Figure
 from robolink.journal import memory_journal
 from robolink.model import ToolOffset
@@ -52,18 +52,11 @@ _GROUP: Final = "239.74.163.8"
 
 def measure_mailbox() -> Iterator[Figure]:
     """Yield the figures of a tool write over Modbus TCP and over CAN."""
-    cpus = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
-    simulator_cpu = cpus[1] if len(cpus) > 1 else None
     can = f"udp_multicast:{_GROUP}:{free_port()}"
-    try:
-        if simulator_cpu is not None:
-            os.sched_setaffinity(0, {cpus[0]})
+    with a_cpu_each() as simulator_cpu:
         serving = ("softmotion", "--tcp", "127.0.0.1:0")
         yield from _compare("Modbus TCP", "pymodbus", serving, bare_modbus, simulator_cpu)
         yield from _compare("CAN", "canopen", ("softmotion", "--can", can), bare_can, simulator_cpu)
-    finally:
-        if simulator_cpu is not None:
-            os.sched_setaffinity(0, set(cpus))
 
 
 def _compare(

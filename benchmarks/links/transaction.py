@@ -7,7 +7,6 @@ process, and where there are two a CPU, of its own.
 """
 
 import contextlib
-import os
 import socket
 import sqlite3
 from collections.abc import Callable, Iterator
@@ -19,6 +18,7 @@ from urllib.parse import urlsplit
 
 import robolink
 from benchmarks.links.exchange import served_simulator
+from benchmarks.links.placing import a_cpu_each
 from benchmarks.table import Amount, Figure
 from robolink.journal import open_journal
 from robolink.model import ToolOffset
@@ -33,15 +33,8 @@ _OFFSETS = (ToolOffset(12.0, -3.5, -20.0), ToolOffset(12.125, -3.25, -20.0))
 
 def measure_transaction() -> Iterator[Figure]:
     """Yield the figures of a tool write that is journalled and read back."""
-    cpus = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
-    if len(cpus) < 2:
-        yield from _compare(None)
-        return
-    try:
-        os.sched_setaffinity(0, {cpus[0]})
-        yield from _compare(cpus[1])
-    finally:
-        os.sched_setaffinity(0, set(cpus))
+    with a_cpu_each() as simulator_cpu:
+        yield from _compare(simulator_cpu)
 
 
 def _compare(simulator_cpu: int | None) -> Iterator[Figure]:

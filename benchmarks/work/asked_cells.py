@@ -133,6 +133,11 @@ class _Worker:
     def factors(self) -> list[float]:
         return list(json.loads(self._answer()))
 
+    def end(self) -> None:
+        asked = self._process.stdin
+        assert asked is not None  # noqa: S101 - as above
+        asked.close()
+
     def _answer(self) -> str:
         said = self._process.stdout
         assert said is not None  # noqa: S101 - as above
@@ -143,12 +148,13 @@ class _Worker:
 def _worker(cells: int, seconds: int, rounds: int) -> Iterator[_Worker]:
     command = [sys.executable, "-m", "benchmarks.work.asked_cells"]
     numbers = map(str, (cells, seconds, rounds))
-    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
-    with subprocess.Popen([*command, *numbers], text=True, **pipes) as process:  # type: ignore[call-overload]
+    pipe = subprocess.PIPE
+    with subprocess.Popen([*command, *numbers], text=True, stdin=pipe, stdout=pipe) as process:
+        worker = _Worker(process)
         try:
-            yield _Worker(process)
+            yield worker
         finally:
-            process.stdin.close()
+            worker.end()
 
 
 @contextmanager

@@ -17,7 +17,7 @@ def main() -> NoReturn:
 
 
 def run(arguments: Sequence[str], *, last: bool = False) -> int:
-    """Run one command line; return the exit code (the table is in ``_exit``).
+    """Run one command line; return the exit code (the table is in ``console.exit_codes``).
 
     Args:
         arguments: The command line without the program's name.

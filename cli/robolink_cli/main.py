@@ -66,7 +66,7 @@ def main() -> NoReturn:
 
 
 def run(arguments: Sequence[str], *, last: bool = False) -> int:
-    """Run one command line; return the exit code (the table is in ``_exit``).
+    """Run one command line; return the exit code (the table is in ``console.exit_codes``).
 
     Args:
         arguments: The command line without the program's name.
@@ -150,12 +150,14 @@ def _explained(error: BaseException) -> BaseException:
     if exit_code(error) != BUG:
         return error
     from robolink.errors import ConfigError
+    from robolink.messages import joined
     from robolink_cli.unfit_packages import cannot_run, unfit_packages
 
     unfit = unfit_packages()
     if not unfit:
         return error
-    told = ConfigError(cannot_run(unfit, error), remedy=" ".join(remark.remedy for remark in unfit))
+    remedy = joined(" ", (remark.remedy for remark in unfit))
+    told = ConfigError(cannot_run(unfit, error), remedy=remedy)
     told.__cause__ = error
     return told
 

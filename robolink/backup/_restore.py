@@ -13,7 +13,7 @@ from robolink.errors import (
     ToolIndexError,
     UndefinedToolError,
 )
-from robolink.messages import tr
+from robolink.messages import joined, tr
 from robolink.model import ControllerFacts, ToolOffset, ToolReceipt, ToolTable
 from robolink.ways import Way, way
 
@@ -180,7 +180,8 @@ def restore(
         for change in plan.clears:
             receipts.append(_set(tools, change, tell))
     except RobolinkError as error:
-        error.remedy = " ".join((error.remedy, _where_it_ended(plan, receipts))).strip()
+        sentences = (error.remedy, _where_it_ended(plan, receipts))
+        error.remedy = joined(" ", filter(None, sentences))
         raise
     return tuple(receipts)
 
@@ -209,12 +210,12 @@ def _check_index(tool: int) -> None:
     if tool == 0:
         raise ReservedToolError(
             tr("Tool 0 is the flange itself and is never written."),
-            remedy=tr("Choose a tool from 1 to 15."),
+            remedy=tr("Choose a tool from {lowest} to {highest}.", lowest=1, highest=TOOLS[-1]),
         )
     if tool not in TOOLS:
         raise ToolIndexError(
             tr("There is no tool {tool}.", tool=tool),
-            remedy=tr("EPSON controllers have tools {lowest} to 15.", lowest=1),
+            remedy=tr("There are tools {lowest} to {highest}.", lowest=1, highest=TOOLS[-1]),
         )
 
 

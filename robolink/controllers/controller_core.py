@@ -52,8 +52,8 @@ class ControllerCore(ABC):
 
     Args:
         link: The controller, connected.
-        capabilities: See above.
-        tools: See above.
+        capabilities: What can be asked for.
+        tools: The tool offsets.
 
     Example:
         >>> from robolink.controllers import ControllerCore

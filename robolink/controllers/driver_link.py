@@ -28,7 +28,7 @@ from robolink.errors import (
     RobolinkError,
     UnclearAnswerError,
 )
-from robolink.messages import tr
+from robolink.messages import joined, tr
 from robolink.model import EntryKind, Marker, MarkerKind, NewEntry, OutcomeLog
 from robolink.stop_latch import StopLatch
 from robolink.timing import Clock
@@ -44,7 +44,7 @@ class MarkedCommand(ABC, Generic[T]):
         acknowledged: Whether the controller has said that it did it.
 
     Args:
-        request: See above.
+        request: What is sent, as a person may read it.
     """
 
     def __init__(self, request: str) -> None:
@@ -98,9 +98,9 @@ class DriverLink:
         lock: One procedure at a time.
 
     Args:
-        identity: See above.
-        clock: See above.
-        latch: See above.
+        identity: Which controller.
+        clock: The clock on which its time passes.
+        latch: What holds requests back while a stop is in force.
         outcomes: Where the markers are kept.
         gate: Holds Ctrl-C back inside.
 
@@ -194,7 +194,6 @@ class DriverLink:
 
 def advise_emergency_stop(error: RobolinkError) -> RobolinkError:
     """Put in front of an error of a stop what a person has to do first."""
-    error.remedy = " ".join(
-        (tr("The stop is not confirmed: press the emergency stop."), error.remedy)
-    ).rstrip()
+    first = tr("The stop is not confirmed: press the emergency stop.")
+    error.remedy = joined(" ", filter(None, (first, error.remedy)))
     return error

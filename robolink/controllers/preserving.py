@@ -11,7 +11,7 @@ from contextlib import contextmanager
 
 from robolink.controllers.driver_link import DriverLink
 from robolink.errors import ConfigError, JournalError, RobolinkError
-from robolink.messages import tr
+from robolink.messages import joined, tr
 from robolink.model import (
     EntryKind,
     Finding,
@@ -131,7 +131,7 @@ class Preserver:
         except RobolinkError as second:
             if isinstance(error, RobolinkError):
                 left = _unrestored(second, tool_before(marker))
-                error.remedy = f"{error.remedy} {left}".strip()
+                error.remedy = joined(" ", filter(None, (error.remedy, left)))
 
 
 def tool_before(marker: Marker) -> int:

@@ -183,8 +183,8 @@ def connect(
             and what would change something raises it.
         signature: Who works here, and with what; by default the user of this computer.
         glance: Whether this is for a look, so that a journal in which nothing is unfinished is
-            not opened before something has to be recorded. Who the controller says it is is
-            not asked then.
+            not opened before something has to be recorded. The controller is not asked for its
+            identity then.
 
     Raises:
         ConfigError: The URL or an option is wrong.

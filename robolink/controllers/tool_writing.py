@@ -41,8 +41,8 @@ class ToolWrite(MarkedCommand[ToolOffset | None]):
 
     Args:
         link: The controller.
-        tool: See above.
-        requested: See above.
+        tool: Number of the tool.
+        requested: The new value as the controller can hold it; ``None`` clears the tool.
         request: What is sent, as a person may read it.
         same: Whether the controller stores two values alike.
 

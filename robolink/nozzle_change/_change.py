@@ -25,6 +25,7 @@ from robolink.nozzle_change._measuring import (
 )
 from robolink.nozzle_change._plan import (
     ChangePlan,
+    Proposals,
     ToolPlan,
     require_clearance,
     require_contacts,
@@ -40,15 +41,11 @@ from robolink.nozzle_change._proposal import (
     WriteSubject,
 )
 from robolink.nozzle_change._records import decision_entry, refusal_entry, verification_entry
-from robolink.nozzle_change._station_check import (
-    Proposals,
-    check_stations,
-    found_with,
-    stations_found,
-)
+from robolink.nozzle_change._station_check import check_stations, found_with, stations_found
 from robolink.nozzle_change.open_turn_test.marking import marked_turn_tests
 from robolink.procedures import TOUCH_CODES, MeasurementContext
 from robolink.runner import Operator, regard
+from robolink.timing import NS_PER_S
 from robolink.transaction import Order, ToolChange, Wanted, plain_result
 
 Earlier = Callable[[int], Sequence[float]]
@@ -311,7 +308,7 @@ class NozzleChange:
                 self._listener.wrote(receipt)
             for (plan, proposal), receipt in zip(proposals, receipts, strict=True):
                 drifts[receipt.tool] = self._verify(context, plan, proposal, receipt)
-            took_s = round((self._controller.clock.now_ns() - self._began_ns) / 1e9, 1)
+            took_s = round((self._controller.clock.now_ns() - self._began_ns) / NS_PER_S, 1)
             for details in known:
                 details["took_s"] = took_s
             change.keep(tr("verified") if verify else tr("not verified"))

@@ -17,15 +17,13 @@ from robolink.messages import tr
 from robolink.methods import find_last_touch
 from robolink.model import Controller, EntryKind, Pose, ToolOffset
 from robolink.nozzle_change._pin_record import tells_height, touch_details, touch_heights_mm
-from robolink.nozzle_change._plan import ToolPlan
+from robolink.nozzle_change._plan import Proposals, ToolPlan
 from robolink.nozzle_change._proposal import Proposal
 from robolink.nozzle_change._records import decision_entry
 from robolink.nozzle_change._seating import touch_sigma_z_mm, touched_by
 from robolink.procedures import MeasurementContext
 from robolink.stations import AGREEING_MM, Station, StationKind, find_stations
 from robolink.ways import Way, way
-
-Proposals = Sequence[tuple[ToolPlan, Proposal]]
 
 _UNKNOWN_SIGMA_MM: Final = 0.05
 """Scatter of one touch by a person, where neither residuals nor anybody tells it."""

@@ -1,6 +1,7 @@
 """What a nozzle change is to do, and within which limits."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 
 from robolink.calibration import CalibrationResult
@@ -124,6 +125,10 @@ class ToolPlan:
     def moving(self) -> MovingSource | None:
         """The source, where it moves the robot."""
         return self.source if isinstance(self.source, MovingSource) else None
+
+
+Proposals = Sequence[tuple[ToolPlan, Proposal]]
+"""What is proposed for each tool of a plan."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,14 +10,12 @@ from robolink.messages import tr
 from robolink.methods import KEPT
 from robolink.model import Controller, EntryKind, NewEntry
 from robolink.nozzle_change._pin_record import finds_pin, found_pin
-from robolink.nozzle_change._plan import ToolPlan
+from robolink.nozzle_change._plan import Proposals, ToolPlan
 from robolink.nozzle_change._proposal import Proposal
 from robolink.nozzle_change._seating import Seating, nozzle_in, seating_of
 from robolink.procedures import FindsStation
 from robolink.stations import Station, base_now, find_stations, station_entry
 from robolink.ways import Way, way
-
-Proposals = Sequence[tuple[ToolPlan, Proposal]]
 
 
 def check_stations(controller: Controller, proposals: Proposals) -> Proposals:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from robolink.errors import AmbiguousPosesError, CalibrationError, ConfigError
-from robolink.messages import tr
+from robolink.messages import joined, tr
 
 
 class UnusableText(Exception):
@@ -70,9 +70,9 @@ def refused(path: Path, cause: UnusableText) -> ConfigError | CalibrationError:
 
 def unclear(path: Path, questions: Sequence[OpenQuestion]) -> AmbiguousPosesError:
     """Return the error for a file that leaves something open."""
-    whats = "; ".join(question.what for question in questions)
+    whats = joined("; ", (question.what for question in questions))
     return AmbiguousPosesError(
         tr("{path} does not say everything: {what}.", path=path, what=whats),
         asks=tuple(question.about for question in questions),
-        remedy=" ".join(question.remedy for question in questions),
+        remedy=joined(" ", (question.remedy for question in questions)),
     )

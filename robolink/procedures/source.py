@@ -22,9 +22,9 @@ class MeasurementContext:
         stands: Where the frame then in force was after the last step; ``None`` before any.
 
     Args:
-        controller: See above.
-        operator: See above.
-        start: See above.
+        controller: The controller, connected.
+        operator: The person at the cell.
+        start: Flange pose at the start of the change; limits lie about it.
         settings: Limits and speeds for a tip at an offset from the flange.
         offers: Whether the person is asked about what a procedure offers.
         types: Whether the pose of a touch may be typed: a turn test by touches follows.

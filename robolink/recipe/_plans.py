@@ -57,7 +57,15 @@ def plan_of(
         tuple(
             ToolPlan(
                 tool.number,
-                _source(recipe, parameters, station, controller, tool, sensor, folder),
+                _source(
+                    recipe,
+                    parameters,
+                    station=station,
+                    controller=controller,
+                    tool=tool,
+                    sensor=sensor,
+                    folder=folder,
+                ),
                 criteria,
                 verify=recipe.verifies,
                 attempts=recipe.attempts,
@@ -91,6 +99,7 @@ def parameters_of(recipe: Recipe) -> MethodParameters:
 def _source(
     recipe: Recipe,
     parameters: MethodParameters,
+    *,
     station: Station,
     controller: Controller,
     tool: Tool,

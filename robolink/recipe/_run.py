@@ -7,7 +7,7 @@ from functools import partial
 
 from robolink.config import Cell
 from robolink.errors import ConfigError, NotAllowedError, RobolinkError
-from robolink.messages import tr
+from robolink.messages import joined, tr
 from robolink.model import Controller, EntryKind, PersonRole, TipSensor
 from robolink.nozzle_change import (
     ChangePlan,
@@ -221,7 +221,8 @@ class RecipeRun:
         try:
             return change.run(write=not (self.takes_reference or self._measure_only))
         except RobolinkError as error:
-            error.remedy = f"{error.remedy} {self._outputs_left(listener)}".strip()
+            sentences = (error.remedy, self._outputs_left(listener))
+            error.remedy = joined(" ", filter(None, sentences))
             raise
         except KeyboardInterrupt:
             if said := self._outputs_left(listener):

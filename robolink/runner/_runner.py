@@ -52,11 +52,11 @@ from robolink.ways import Way, way
 POLL_S = 1.0
 """Longest time between two status reads while a person is asked (design: at most 5 s)."""
 
-_MOST_REPEATS: Final = 2
-"""Steps of one procedure that may be repeated: a computer busier than that has to be looked at."""
-
 CONTACT_POLL_S: Final = 0.2
 """The same while an input is watched that shows contact."""
+
+_MOST_REPEATS: Final = 2
+"""Steps of one procedure that may be repeated: a computer busier than that has to be looked at."""
 
 T = TypeVar("T")
 

@@ -338,7 +338,7 @@ class ToolChange:
             return
         sentence = left_unverified(stand, marked=self._marker is not None)
         self._tell(sentence)
-        error.remedy = f"{error.remedy} {sentence}".strip()
+        error.remedy = joined(" ", filter(None, (error.remedy, sentence)))
 
     def _record(self, done: Sequence[PutBack]) -> None:
         entries = [result.entry for result in done]

@@ -8,7 +8,8 @@ import click
 import pytest
 from robolink_cli import lazy_group, main
 from robolink_cli.console import render
-from robolink_cli.session.context import controller_options, json_option
+from robolink_cli.options.shared import json_option
+from robolink_cli.session.context import controller_options
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.in_process.epson import register, unregister
 

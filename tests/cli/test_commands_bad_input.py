@@ -119,7 +119,7 @@ NUMBERS = {
     "tool 0, calibrated": (["calibrate", "two-pose", "--tool", "0"], "never written"),
     "NaN": (["tool", "set", "1", "--x", "nan"], "x_mm is not a number"),
     "infinity": (["tool", "set", "1", "--u", "inf"], "u_deg is not a number"),
-    "no component": (["tool", "set", "1"], "No component was given"),
+    "no component": (["tool", "set", "1"], "Give at least one of --x --y --z --u --v --w."),
     "no jog step": (["jog", "--yes", "x0.1"], "is not a step"),
     "jog with a decimal comma": (
         ["jog", "--yes", "x+0,1"],

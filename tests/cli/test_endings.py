@@ -111,6 +111,9 @@ def test_output_that_was_closed_from_the_start_goes_nowhere(monkeypatch):
     with watched_output():
         print("to nobody", file=sys.stderr)  # noqa: T201
     assert sys.stderr is None
+    with pytest.raises(OSError, match="the disk"), watched_output():
+        raise OSError("the disk")
+    assert sys.stderr is None
 
 
 @pytest.fixture

@@ -11,9 +11,10 @@ from pathlib import Path
 
 import pytest
 from robolink_cli import main
+from robolink_cli.commands.simulate.run.background import _tell_end
 from robolink_cli.commands.simulate.run.cells_file import KINDS, read_cells
 from robolink_cli.commands.simulate.run.declared_keys import DeclaredKeys
-from robolink_cli.commands.simulate.run.running import made
+from robolink_cli.commands.simulate.run.running import SCHEMA, made
 from robolink_cli.commands.simulate.sim import sim
 from robolink_simulators.control.client import ControlClient
 
@@ -271,6 +272,15 @@ def test_all_kinds_are_served_by_one_process_until_it_is_told_to_end(file, tmp_p
         os.kill(document["pid"], signal.SIGTERM)
     assert ended(document["pid"])
     assert not Path(document["state_dir"]).exists()
+
+
+@pytest.mark.parametrize(
+    "after", ["", '{"error": {"what": "The port is gone.", "remedy": "Wait."}}']
+)
+def test_an_end_after_the_first_line_is_told_only_where_there_is_an_error(after, capsys):
+    ready = json.dumps({"schema": SCHEMA, "cells": []})
+    _tell_end(f"{ready}\n{after}", "")
+    assert capsys.readouterr().err == ("robolink: The port is gone.\n  Wait.\n" if after else "")
 
 
 @pytest.mark.soak

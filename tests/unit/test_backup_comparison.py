@@ -136,8 +136,10 @@ def test_the_tool_in_force_is_never_cleared():
 
 @pytest.mark.parametrize(("tool", "error"), [(0, ReservedToolError), (16, ToolIndexError)])
 def test_a_tool_that_cannot_be_written_is_refused(tool, error):
-    with pytest.raises(error):
+    with pytest.raises(error) as caught:
         plan_restore(backup_of(state()), state(), tools=[tool])
+    assert caught.value.remedy.endswith(" from 1 to 15." if tool == 0 else " tools 1 to 15.")
+    assert "EPSON" not in caught.value.remedy  # a PLC has tools too
 
 
 OTHERS = {

@@ -3,14 +3,19 @@
 import os
 import pickle
 import time
+from pathlib import Path
 
 import pytest
 from robolink_cli.console.language import _of_user, chosen_language
 
 from robolink import messages
+from robolink.controllers import advise_emergency_stop
+from robolink.errors import ConnectError
 from robolink.journal.store.chain import canonical, storable
+from robolink.journal.store.failures import damaged_error, journal_error
 from robolink.locale import languages
 from robolink.messages import joined, plain, spoken, tr
+from robolink.pose_tables.refusals import OpenQuestion, unclear
 
 
 @pytest.fixture
@@ -111,6 +116,26 @@ def test_no_blank_stands_behind_a_chinese_full_stop():
     assert both == "\u79fb\u52a8\u3002\u5199\u5165\u3002"
     assert storable(both) == "Moved. Written."
     assert joined(" ", ("", "Moved.")) == " Moved."
+
+
+@pytest.mark.parametrize(
+    "joins",
+    [
+        lambda: advise_emergency_stop(ConnectError("No answer.", remedy=tr("Check it."))),
+        lambda: journal_error(PermissionError("it is read-only"), "a", tr("Nothing was sent.")),
+        lambda: damaged_error("a page is bent", "a", tr("Nothing was sent.")),
+        lambda: unclear(Path("a"), [OpenQuestion("deg", "turn", tr("Which?"))] * 2),
+    ],
+)
+def test_a_remedy_of_several_sentences_is_kept_in_english_and_has_no_blank_in_chinese(joins):
+    messages.install(lambda sentence: f"\u79fb{'{elsewhere}' * ('{e' in sentence)}\u3002")
+    try:
+        remedy = joins().remedy
+    finally:
+        messages.install(None)
+    assert remedy.endswith("\u79fb\u3002")
+    assert "\u3002 " not in remedy
+    assert storable(remedy) == joins().remedy
 
 
 def test_a_translation_with_a_wrong_placeholder_leaves_the_english_sentence():

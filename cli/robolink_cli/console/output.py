@@ -172,8 +172,10 @@ def _watched(name: str) -> Iterator[None]:
     if before is None:  # closed by whoever started us: Python has no stream then
         with open(os.devnull, "w", encoding="ascii", errors="backslashreplace") as nowhere:
             setattr(sys, name, nowhere)
-            yield
-            setattr(sys, name, None)
+            try:
+                yield
+            finally:
+                setattr(sys, name, None)
         return
     buffer = getattr(before, "buffer", None)
     raw = getattr(buffer, "raw", buffer)  # the same where Python was told not to buffer

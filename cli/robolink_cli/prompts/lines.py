@@ -9,6 +9,7 @@ import os
 import queue
 import sys
 import threading
+import time
 from importlib import import_module
 from types import ModuleType
 from typing import Any, Final, Protocol
@@ -77,8 +78,6 @@ class TerminalLines:
 
     def forget(self, quiet_s: float) -> list[str]:
         """Drop what was typed; see :class:`Lines`."""
-        import time
-
         dropped, self._held = self._held, b""
         end_s = time.monotonic() + BURST_S
         while (data := self._read(quiet_s)) and time.monotonic() < end_s:
@@ -124,8 +123,6 @@ class StreamLines:
 
     def forget(self, quiet_s: float) -> list[str]:
         """Drop what was written; see :class:`Lines`."""
-        import time
-
         self._start()
         dropped: list[str] = []
         end_s = time.monotonic() + BURST_S

@@ -15,8 +15,6 @@ from robolink_cli.access.only_cell import nothing_named, only_cell, which_cell
 from robolink_cli.console.render import emit_json, json_is_on, note, say
 from robolink_cli.console.tolerance import may_be_guided
 from robolink_cli.options.shared import GIVEN, shared_options
-from robolink_cli.options.shared import json_option as json_option
-from robolink_cli.options.shared import origin_of as origin_of
 from robolink_cli.stopping.request import StopRequest
 
 if TYPE_CHECKING:

@@ -12,15 +12,11 @@ from robolink.errors import ConfigError, ControllerError, RobolinkError
 from robolink.interrupts import EndedBy, ended_by
 from robolink.messages import joined, tr
 from robolink.standing import UNTOUCHED, Standing, note_standing, standing_after
-from robolink_cli.access.cell import (
-    require_expected_robot,
-)
+from robolink_cli.access.cell import require_expected_robot
 from robolink_cli.access.recording import recording
 from robolink_cli.access.warnings import note_at_work, note_unsettled
 from robolink_cli.console.exit_codes import is_cut_off
 from robolink_cli.console.render import json_is_on, note
-from robolink_cli.options.shared import json_option as json_option
-from robolink_cli.options.shared import origin_of as origin_of
 from robolink_cli.prompts.questions import WATCHED, asked, on_terminal
 from robolink_cli.session.context import CliContext
 from robolink_cli.session.desk_watch import watched_at_desk

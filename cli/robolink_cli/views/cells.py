@@ -17,7 +17,8 @@ from robolink.messages import tr
 from robolink_cli.access.cell import link_options
 from robolink_cli.console.columns import columns, padded
 from robolink_cli.console.render import say
-from robolink_cli.session.context import CliContext, origin_of
+from robolink_cli.options.shared import origin_of
+from robolink_cli.session.context import CliContext
 
 
 def files_payload() -> list[dict[str, object]]:

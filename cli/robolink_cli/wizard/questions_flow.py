@@ -23,10 +23,10 @@ _OFFERED: Final = {"1": WizardCommand.SHOW_REPORT, "3": WizardCommand.NEXT_TOOL}
 _OFFERED_WORDS: Final = {"report": WizardCommand.SHOW_REPORT, "next": WizardCommand.NEXT_TOOL}
 
 _LIKELY_SHARE: Final = 3.0
-"""The worst one is offered first where it is so many times as far off as each of the others .."""
+"""How many times as far off as each of the others the worst one is where it is offered first."""
 
 _LEAST_SHARE: Final = 1 / 3
-""".. and more than this share of the limit."""
+"""The share of the limit over which the worst one has to be off to be offered first."""
 
 
 def expected_number(subject: WriteSubject) -> str:

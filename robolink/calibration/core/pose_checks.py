@@ -45,13 +45,14 @@ def check_poses(
     tools = {pose.tool for pose in poses}
     one = of_one_tip and len(tools - {None}) == 1
     hands, locals_ = {pose.hand for pose in poses}, {pose.local for pose in poses}
-    return check_frames(hands, locals_, {None} if one else tools, allow_mixed_hand)
+    return check_frames(hands, locals_, {None} if one else tools, allow_mixed_hand=allow_mixed_hand)
 
 
 def check_frames(
     hands: Collection[Hand | None],
     locals_: Collection[int],
     tools: Collection[int | None],
+    *,
     allow_mixed_hand: bool,
 ) -> tuple[str, ...]:
     """Refuse poses of frames or arms that do not belong together; return lesser doubts.
@@ -191,7 +192,7 @@ def check_planar(
     """
     require_poses(len(poses), minimum)
     doubts = check_poses(poses, allow_mixed_hand=allow_mixed_hand)
-    on_its_head(poses)
+    require_upright(poses)
     spread_deg = angle_spread_deg([heading_deg(pose) for pose in poses])
     return (*doubts, *check_rotation(poses, spread_deg, min_rotation_deg))
 
@@ -218,10 +219,8 @@ def heading_deg(pose: Pose) -> float:
     return pose.u_deg if math.cos(math.radians(pose.v_deg)) >= 0.0 else pose.u_deg + 180.0
 
 
-def on_its_head(poses: Sequence[Pose]) -> bool:
-    """Tell whether the flange's Z points down (W or V is 180), in all poses alike.
-
-    X and Y of the tip can be told as well then; one sign differs (docs/reference/evidence.md 3).
+def require_upright(poses: Sequence[Pose]) -> None:
+    """Refuse a flange that leans, and one that stands on its head in some poses only.
 
     Raises:
         CalibrationError: ``tilted_pose`` when a pose leans by 0.01 degrees or more, or some stand
@@ -229,16 +228,27 @@ def on_its_head(poses: Sequence[Pose]) -> bool:
     """
     down = set()
     for number, pose in enumerate(poses, start=1):
-        if pose.v_deg == 0.0 and pose.w_deg == 0.0:
-            down.add(False)
-            continue
-        upward = math.cos(math.radians(pose.v_deg)) * math.cos(math.radians(pose.w_deg))
+        upward = _upward(pose)
         if lean_deg(upward) >= UPRIGHT_WITHIN_DEG:
             raise tilted(number, pose)
         down.add(upward < 0)
     if len(down) > 1:
         raise some_on_their_head()
-    return True in down
+
+
+def on_its_head(pose: Pose) -> bool:
+    """Tell whether the flange's Z points down (W or V is 180).
+
+    X and Y of the tip can be told as well then; one sign differs (docs/reference/evidence.md 3).
+    """
+    return _upward(pose) < 0
+
+
+def _upward(pose: Pose) -> float:
+    """Return the third component of the flange's Z, R33."""
+    if pose.v_deg == 0.0 and pose.w_deg == 0.0:
+        return 1.0
+    return math.cos(math.radians(pose.v_deg)) * math.cos(math.radians(pose.w_deg))
 
 
 def lean_deg(upward: float) -> float:

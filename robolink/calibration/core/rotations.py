@@ -81,7 +81,8 @@ def checked_table(
     refuse_metres(bool(near.all()))
     some = poses[:1] if alike else poses
     hands, tools = {pose.hand for pose in some}, {pose.tool for pose in some}
-    return table, check_frames(hands, {pose.local for pose in some}, tools, allow_mixed_hand)
+    locals_ = {pose.local for pose in some}
+    return table, check_frames(hands, locals_, tools, allow_mixed_hand=allow_mixed_hand)
 
 
 def _table_of_one_frame(poses: Sequence[Pose]) -> Floats | None:

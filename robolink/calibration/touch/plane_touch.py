@@ -124,7 +124,16 @@ def solve_plane_touch(
     )
     require_told_apart(fit, unknowns, remedy)
     misses = -fit.residuals[:, None] * state.normal
-    result = tip_result("plane-touch", poses, stored, state.tip, fit, misses, (), warnings)
+    result = tip_result(
+        "plane-touch",
+        poses,
+        stored=stored,
+        tip_mm=state.tip,
+        fit=fit,
+        misses=misses,
+        place_mm=(),
+        warnings=warnings,
+    )
     result = judged(
         result,
         fit.residuals[:, None],

@@ -107,7 +107,16 @@ def solve_sphere_touch(
     ways = places / np.linalg.norm(places, axis=1)[:, None]
     x, y, z = state.centre.tolist()
     misses = -fit.residuals[:, None] * ways
-    result = tip_result("sphere-touch", poses, stored, state.tip, fit, misses, (x, y, z), warnings)
+    result = tip_result(
+        "sphere-touch",
+        poses,
+        stored=stored,
+        tip_mm=state.tip,
+        fit=fit,
+        misses=misses,
+        place_mm=(x, y, z),
+        warnings=warnings,
+    )
     result = judged(
         result,
         fit.residuals[:, None],

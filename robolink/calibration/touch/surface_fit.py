@@ -124,6 +124,7 @@ def never_settled() -> CalibrationError:
 def tip_result(
     method: str,
     poses: Sequence[Pose],
+    *,
     stored: ToolOffset | None,
     tip_mm: Floats,
     fit: LinearFit,

@@ -158,7 +158,7 @@ class PlcMapController(ControllerCore):
         """
         slot = next(iter(self.register_map.slots.values()))
         self._plc.registers.read(slot.table, slot.span)
-        fault, busy = self.tools.handshake.fault(), self.tools.handshake.busy
+        fault, busy = self.tools.handshake.fault(), self.tools.handshake.is_busy()
         return ControllerStatus(
             remote=self._plc.permitted,
             ready=fault is None and not busy,

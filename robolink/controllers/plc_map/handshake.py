@@ -74,7 +74,7 @@ class Handshake:
             raise self._unknown(error.what, request) from error
         if code is not None:
             raise RejectedError(
-                tr("The PLC refused the new value: {error}.", error=self._error_text(code)),
+                tr("The PLC refused the new value: {error}.", error=self._error_in_words(code)),
                 code=code,
                 remedy=tr("The old value stays. Remove the cause, then try again."),
                 controller=registers.identity,
@@ -108,8 +108,7 @@ class Handshake:
         code = self._registers.word(commit.error_code)
         return code if code or commit.error is not None else None
 
-    @property
-    def busy(self) -> bool:
+    def is_busy(self) -> bool:
         """Whether the PLC says that it is busy."""
         return self._registers.is_on(self._commit.busy)
 
@@ -159,14 +158,14 @@ class Handshake:
         code = self.fault()
         if code is not None:
             return NotReadyError(
-                tr("The PLC is in error: {error}.", error=self._error_text(code)),
+                tr("The PLC is in error: {error}.", error=self._error_in_words(code)),
                 reason=NotReadyReason.FAULT,
                 code=code,
                 remedy=tr("Clear it at the HMI; nothing was written."),
                 controller=registers.identity,
                 request=request,
             )
-        if self.busy or registers.is_on(self._commit.answer):
+        if self.is_busy() or registers.is_on(self._commit.answer):
             return BusyError(
                 tr("The PLC is busy with another request."),
                 remedy=tr("Wait until it has finished, then try again; nothing was written."),
@@ -175,7 +174,7 @@ class Handshake:
             )
         return None
 
-    def _error_text(self, code: int) -> str:
+    def _error_in_words(self, code: int) -> str:
         if not code:
             return tr("error without a number")
         text = self.error_text(code)

@@ -18,7 +18,7 @@ class MappedPlc(DriverLink):
 
     Args:
         client: An open Modbus client.
-        register_map: See above.
+        register_map: Where everything stands.
         outcomes: Where doubtful outcomes of this PLC are kept.
     """
 

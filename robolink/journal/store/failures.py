@@ -5,7 +5,7 @@ from typing import Final
 from sqlalchemy.exc import DBAPIError
 
 from robolink.errors import JournalError
-from robolink.messages import tr
+from robolink.messages import joined, tr
 from robolink.ways import Way, way
 
 # Result codes of SQLite (https://www.sqlite.org/rescode.html), the low byte.
@@ -49,7 +49,7 @@ def journal_error(error: Exception, name: str, consequence: str) -> JournalError
     cause, remedy = _sentences(_reason(raw), " ".join(str(raw).split()))
     return JournalError(
         tr("The journal {name} cannot be used: {cause}.", name=name, cause=cause),
-        remedy=f"{remedy} {consequence}".rstrip(),
+        remedy=joined(" ", filter(None, (remedy, consequence))),
     )
 
 
@@ -64,7 +64,7 @@ def damaged_error(found: str, name: str, consequence: str) -> JournalError:
     cause = tr("it is damaged ({text})", text=found.rstrip("."))
     return JournalError(
         tr("The journal {name} cannot be used: {cause}.", name=name, cause=cause),
-        remedy=f"{_move_it_away()} {consequence}",
+        remedy=joined(" ", filter(None, (_move_it_away(), consequence))),
     )
 
 

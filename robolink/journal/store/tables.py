@@ -1,4 +1,4 @@
-"""The tables as statements see them; ``_migrations`` makes them."""
+"""The tables as statements see them; ``migrations`` makes them."""
 
 from dataclasses import fields
 from typing import Final

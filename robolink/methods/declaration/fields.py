@@ -53,6 +53,7 @@ class ParameterField:
         return not self.option.from_recipe
 
 
+# No functools.cache: to mypy a dataclass with a hash of its own is no Hashable as a type.
 _read: dict[type[Any], tuple[ParameterField, ...]] = {}
 
 

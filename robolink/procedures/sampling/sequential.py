@@ -40,7 +40,7 @@ def finalize_samples(
     *,
     retake: bool,
 ) -> Procedure[ResultT]:
-    """Return what was taken says, after the worst of it was taken again or not. Ends lifted.
+    """Return the result of all samples; the worst may have been taken again. Ends lifted.
 
     Args:
         method: How it is taken and solved.
@@ -219,7 +219,7 @@ def fit_subject(
     Args:
         method: How samples are named.
         fit: What they say; it has a degree of freedom.
-        taken: They.
+        taken: The samples, in the order of the fit.
         worst: Index of the one that is offered to be taken again.
     """
     rows = tuple(

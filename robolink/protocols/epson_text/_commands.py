@@ -30,7 +30,7 @@ class ParameterForm(Enum):
     ``NUMBERS`` unsigned decimal integers; ``VARIABLE`` a variable name, whose subscripts may
     hold commas, then plain text; ``PASSWORD`` plain text up to a comma; ``STATEMENT`` one text
     between the first and the last quote. What a device does with more of them than a command
-    takes is said in ``_parameters``.
+    takes is said in ``_messages``.
     """
 
     NUMBERS = auto()

@@ -51,7 +51,7 @@ class ControlServer(ClosedAtExit):
         token: What its URL holds; drawn when it is left out.
 
     Attributes:
-        cells: See above.
+        cells: The controllers, by name.
         requests: How many were answered.
 
     Raises:

@@ -43,7 +43,7 @@ class HostedDevice(ABC):
         lock: Held by whoever touches it while a host serves it.
         url: Where the first host serves it, empty when none does.
         now_ns: The instant last given; for others to read.
-        seed: See above.
+        seed: Decides the world and every scatter.
         exchanges: Requests answered.
         log: What crossed the wire.
         on_request: Called with a request before it is carried out; what it raises goes to the

@@ -72,6 +72,12 @@ class VirtualCell:
         folder: For its disk; empty.
     """
 
+    # What lives as long as :meth:`run`.
+    _computer: VirtualComputer
+    _books: Books
+    _plant: PlantMachine
+    _rules: Rulebook
+
     def __init__(self, history: History, folder: Path) -> None:
         self.story = Story(history)
         self._history = history
@@ -304,7 +310,7 @@ class VirtualCell:
                     stopped_ns = process.stopped_ns
         except Killed:
             self._plant.hang_up(process)
-        except (RobolinkError, KeyboardInterrupt, Exception) as raised:
+        except (Exception, KeyboardInterrupt) as raised:
             error = error or raised
         finally:
             me.owner = None

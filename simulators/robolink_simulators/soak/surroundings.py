@@ -23,7 +23,7 @@ class SeededSurroundings(Ambience):
     Attributes:
         wall_jump_s: By how much the computer's wall clock is wrong.
         booted_ns: When the computer was switched on, in virtual time.
-        rng: See above; replaced for each hour, so that what one hour draws is its own.
+        rng: From which everything is drawn; replaced for each hour, whose draws are its own.
     """
 
     def __init__(self, clock: ManualClock, turns: TurnTaking, rng: random.Random) -> None:

@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
+from robolink.timing import NS_PER_S
 from robolink_simulators.control.cell import AnySimulator
 from robolink_simulators.device.motion_log import StartedMotion
 from robolink_simulators.device.wire_record import WireLine
@@ -73,7 +74,10 @@ class WireLook:
     def shown(self, most: int = _SHOWN) -> str:
         """Return the last lines for a person."""
         return listed(
-            (f"{line.at_ns / 1e9:10.3f} s {line.direction} {line.text}" for line in self.lines),
+            (
+                f"{line.at_ns / NS_PER_S:10.3f} s {line.direction} {line.text}"
+                for line in self.lines
+            ),
             most,
         )
 
@@ -114,7 +118,7 @@ class MotionLook:
         """Return the last motions for a person."""
         return listed(
             (
-                f"{one.at_ns / 1e9:10.3f} s {one.kind} {one.number} {_place(one)}"
+                f"{one.at_ns / NS_PER_S:10.3f} s {one.kind} {one.number} {_place(one)}"
                 for one in self.started
             ),
             most,

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Iterable
 
+from robolink.timing import NS_PER_S
 from robolink_simulators.testkit.served import SimulatedCell
 
 _SHOWN_LINES = 200
@@ -16,7 +17,7 @@ def sections_of(cells: Iterable[SimulatedCell]) -> list[tuple[str, str]]:
         with simulator.lock:
             head = f"{simulator.machine_name}, seed {simulator.seed}, {cell.url}"
             state = {
-                "simulated_s": simulator.now_ns / 1e9,
+                "simulated_s": simulator.now_ns / NS_PER_S,
                 "counters": simulator.counters(),
                 "faults": cell.do("faults"),
                 "truth": simulator.truth(),

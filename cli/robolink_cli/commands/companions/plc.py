@@ -7,7 +7,7 @@ import click
 from robolink.messages import tr
 from robolink_cli.commands.companions.check_map import check_map
 from robolink_cli.console.render import emit_json, json_is_on, say
-from robolink_cli.session.context import json_option
+from robolink_cli.options.shared import json_option
 
 _LAST_BASE = 64880  # the response block, fifteen slots and the device block end at register 65535
 

@@ -8,10 +8,11 @@ import click
 
 from robolink.errors import ControllerFaultError
 from robolink.messages import tr
+from robolink.timing import NS_PER_S
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import emit_json, json_is_on, note, say
+from robolink_cli.options.shared import json_option
 from robolink_cli.options.simulation import project_options
-from robolink_cli.session.context import json_option
 
 if TYPE_CHECKING:
     from robolink_simulators.epson import EpsonSimulator
@@ -133,7 +134,7 @@ def run(
     if program is not None and program.failure is not None:
         raise _failed(program.failure)
     if json_is_on():
-        seconds = simulator.now_ns / 1e9
+        seconds = simulator.now_ns / NS_PER_S
         document = {"printed": "".join(printed), "ended": ended, "simulated_s": seconds}
         emit_json("robolink/spel-run/1", document)
     elif not ended:
@@ -163,7 +164,7 @@ def _run(
     runner.channels.window.ask = _typed_line
     if trace:
         runner.on_statement = lambda task, file, line, text: note(
-            f"{task.now_ns / 1e9:12.6f} {task.task_number:3} {file}:{line}: {text}"
+            f"{task.now_ns / NS_PER_S:12.6f} {task.task_number:3} {file}:{line}: {text}"
         )
     try:
         if function is not None:

@@ -5,7 +5,8 @@ from pathlib import Path
 import click
 
 from robolink_cli.console.render import emit_json, json_is_on
-from robolink_cli.session.context import CliContext, emit, json_option, optional_controller
+from robolink_cli.options.shared import json_option
+from robolink_cli.session.context import CliContext, emit, optional_controller
 
 
 @click.command()

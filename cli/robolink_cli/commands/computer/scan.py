@@ -7,7 +7,7 @@ import click
 from robolink.messages import tr
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import emit_json, json_is_on, say
-from robolink_cli.session.context import json_option
+from robolink_cli.options.shared import json_option
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

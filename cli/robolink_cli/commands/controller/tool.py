@@ -160,7 +160,8 @@ def set_tool(
     changes = {units[axis]: value for axis, value in given.items() if value is not None}
     if not changes:
         raise ConfigError(
-            tr("No component was given."), remedy=tr("Give at least one of --x --y --z --u.")
+            tr("No component was given."),
+            remedy=tr("Give at least one of --x --y --z --u --v --w."),
         )
     if order is not None:
         require_no_dry_run(order, dry_run=dry_run)

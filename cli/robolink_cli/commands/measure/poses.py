@@ -8,7 +8,7 @@ import click
 from robolink.messages import tr
 from robolink_cli.console.render import emit_json, json_is_on, say, table
 from robolink_cli.options.pose_reading import reading_options
-from robolink_cli.session.context import json_option
+from robolink_cli.options.shared import json_option
 
 if TYPE_CHECKING:
     from robolink.pose_tables import HowRead, PoseTable, ReadingChoices, TabledPose

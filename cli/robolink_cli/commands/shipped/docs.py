@@ -11,7 +11,7 @@ import click
 from robolink.messages import tr
 from robolink_cli.console.render import emit_json, json_is_on, say, say_listed
 from robolink_cli.console.tolerance import is_terminal
-from robolink_cli.session.context import json_option
+from robolink_cli.options.shared import json_option
 
 _COMMENT: Final = re.compile(r"<!--.*?-->\n*", re.DOTALL)
 """For whoever edits a page; a browser does not show it either."""

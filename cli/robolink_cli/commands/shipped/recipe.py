@@ -6,8 +6,8 @@ import click
 
 from robolink.messages import spoken, tr
 from robolink_cli.console.render import emit_json, json_is_on, say, say_listed
+from robolink_cli.options.shared import json_option
 from robolink_cli.session.completing import complete_recipe
-from robolink_cli.session.context import json_option
 
 
 @click.group()

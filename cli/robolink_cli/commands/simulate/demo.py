@@ -3,7 +3,7 @@
 import click
 
 from robolink_cli.console.numbers import NumberInside
-from robolink_cli.session.context import json_option
+from robolink_cli.options.shared import json_option
 
 
 @click.command()

@@ -10,6 +10,7 @@ from robolink_cli.commands.simulate.run.sim_run import sim_run
 from robolink_cli.commands.simulate.sim_plc import sim_plc
 from robolink_cli.commands.simulate.sim_softmotion import softmotion
 from robolink_cli.console.help_sections import SectionedCommand
+from robolink_cli.options.shared import json_option
 from robolink_cli.options.simulation import (
     SECTIONS,
     ServedLife,
@@ -20,7 +21,6 @@ from robolink_cli.options.simulation import (
     simulation_options,
     tcp_option,
 )
-from robolink_cli.session.context import json_option
 
 
 def _complete_robot(_: click.Context, __: click.Parameter, start: str) -> list[str]:

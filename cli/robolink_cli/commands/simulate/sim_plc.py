@@ -6,6 +6,7 @@ from typing import Any
 import click
 
 from robolink_cli.console.help_sections import SectionedCommand
+from robolink_cli.options.shared import json_option
 from robolink_cli.options.simulation import (
     SECTIONS,
     ServedLife,
@@ -16,7 +17,6 @@ from robolink_cli.options.simulation import (
     pace_options,
     seed_option,
 )
-from robolink_cli.session.context import json_option
 
 
 @click.command(

@@ -6,6 +6,7 @@ from typing import Any
 import click
 
 from robolink_cli.console.help_sections import SectionedCommand
+from robolink_cli.options.shared import json_option
 from robolink_cli.options.simulation import (
     SECTIONS,
     ServedLife,
@@ -13,7 +14,6 @@ from robolink_cli.options.simulation import (
     modbus_options,
     simulation_options,
 )
-from robolink_cli.session.context import json_option
 
 
 def _complete_kinematics(_: click.Context, __: click.Parameter, start: str) -> list[str]:

@@ -364,5 +364,5 @@ class EpsonSession:
 
 
 def _shown(request: Request) -> str:
-    """Return a request as a person may read it; a login, with its password, is never held back."""
+    """Return a request as a person may read it. Never the parameters of a login."""
     return request.parameters[0] if request.name == "Execute" else request.name

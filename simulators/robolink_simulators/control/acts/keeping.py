@@ -4,6 +4,7 @@ from typing import Final
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.timing import NS_PER_S
 from robolink_simulators.cell.clock import ManualClock, SteeredClock
 from robolink_simulators.control.acts.declared import Answer, ControlAct, Given, Taken
 from robolink_simulators.control.cell import ControlledCell
@@ -61,7 +62,7 @@ def _restore(cell: ControlledCell, given: Given) -> Answer:
 def _clock(cell: ControlledCell, _given: Given) -> Answer:
     """Tell the simulated time, and how many simulated seconds a real one has; 0 is a pause."""
     factor = cell.clock.factor if isinstance(cell.clock, SteeredClock) else None
-    return {"simulated_s": cell.simulator.now_ns / 1e9, "factor": factor}
+    return {"simulated_s": cell.simulator.now_ns / NS_PER_S, "factor": factor}
 
 
 def _set_clock(cell: ControlledCell, given: Given) -> Answer:

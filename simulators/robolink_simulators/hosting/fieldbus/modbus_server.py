@@ -21,6 +21,7 @@ from pymodbus.pdu import ModbusPDU
 from pymodbus.server import ModbusSerialServer, ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
+from robolink.timing import NS_PER_S
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.faults import PlcFault, PlcFaultAction
 from robolink_simulators.hosting.fieldbus.plc_registers import PlcRegisters
@@ -34,7 +35,6 @@ logging.getLogger("pymodbus").addHandler(logging.NullHandler())
 _READS: Final = {1: Bank.HOLDING, 2: Bank.INPUT, 3: Bank.HOLDING, 4: Bank.INPUT}
 _COIL_FUNCTIONS: Final = frozenset({1, 2, 5, 15})
 _WORD_BITS: Final = 16
-_NANOSECONDS: Final = 1_000_000_000
 _ALL_UNITS: Final = 0
 _SPLIT_S: Final = 0.01
 _SETTLING_S: Final = 0.02
@@ -200,7 +200,7 @@ class ModbusServerThread:
         raise NoSuchIdException
 
     def _real_seconds(self, simulated_s: float) -> float:
-        at_ns = self._clock.now_ns() + round(simulated_s * _NANOSECONDS)
+        at_ns = self._clock.now_ns() + round(simulated_s * NS_PER_S)
         return self._clock.real_seconds(at_ns)
 
     def _watch_connections(self, server: Server) -> None:

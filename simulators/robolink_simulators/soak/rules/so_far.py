@@ -89,9 +89,10 @@ class Grounds:
         books: The journal on the disk.
 
     Attributes:
-        plant, books: See above.
+        plant: The machine.
+        books: The journal on the disk.
         now: The hour that runs.
-        story: See above.
+        story: Where a broken rule is noted.
     """
 
     now: HourSoFar

@@ -1,20 +1,19 @@
 """Planned restarts, failures and the like, and what arrives later than it should."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from robolink.timing import NS_PER_S
+from robolink_simulators.device.planned_acts import Act, PlannedActs
 from robolink_simulators.faults import PlcFault, PlcFaultAction
 from robolink_simulators.softmotion.mailbox.panel import PlcPanel
 
-Act = Callable[[], None]
 
-
-class PlcMishaps:
+class PlcMishaps(PlannedActs):
     """Does to the panel what a fault plan says, each act at its own instant."""
 
     def __init__(self, panel: PlcPanel) -> None:
+        super().__init__()
         self._panel = panel
-        self._planned: list[tuple[int, Act]] = []
         self._acts: Mapping[PlcFaultAction, Act] = {
             PlcFaultAction.RESTART: panel.restart,
             PlcFaultAction.FREEZE: panel.freeze,
@@ -34,20 +33,7 @@ class PlcMishaps:
 
     def plan(self, now_ns: int, seconds: float, act: Act) -> None:
         """Have something done some time from now, not before the request is carried out."""
-        self._planned.append((now_ns + max(1, round(seconds * NS_PER_S)), act))
-
-    def next_change(self) -> int | None:
-        """Return when the next one is due."""
-        return min(at_ns for at_ns, _ in self._planned) if self._planned else None
-
-    def carry_out(self, now_ns: int) -> None:
-        """Do what is due by now."""
-        if not self._planned:
-            return
-        due = [act for at_ns, act in self._planned if at_ns <= now_ns]
-        self._planned = [plan for plan in self._planned if plan[0] > now_ns]
-        for act in due:
-            act()
+        self.plan_at(now_ns + max(1, round(seconds * NS_PER_S)), act)
 
     def _act_of(self, fault: PlcFault) -> Act | None:
         match fault.action:

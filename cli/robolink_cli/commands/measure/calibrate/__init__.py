@@ -1,8 +1,8 @@
 """calibrate METHOD: measure a tool offset, propose it, write it, prove it.
 
-Every method runs in one frame (``_frame``): plan and limits, consent, measurement, proposal with
+Every method runs in one frame (``measuring``): plan and limits, consent, measurement, proposal with
 interval and verdict, question, write, proof, report. A method only says how it measures, and its
-command is made from what it declares (``_command``).
+command is made from what it declares (``method_command``).
 """
 
 import click

@@ -10,7 +10,7 @@ from robolink.pose_tables import NOTHING_SAID, ReadingChoices
 from robolink_cli.console.numbers import DECIMAL
 from robolink_cli.console.render import emit_json, json_is_on
 from robolink_cli.options.pose_reading import reading_options
-from robolink_cli.session.context import json_option
+from robolink_cli.options.shared import json_option
 
 
 @click.command()

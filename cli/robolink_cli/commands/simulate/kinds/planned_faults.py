@@ -8,6 +8,7 @@ from typing import Any
 from robolink_simulators.faults import LinkKind, fault_as_keys, read_fault_file
 
 from robolink.messages import tr
+from robolink.timing import NS_PER_S
 from robolink_cli.console.output import hand_over, show
 from robolink_cli.console.render import json_is_on
 
@@ -41,7 +42,7 @@ def plan_faults(
         if as_json:
             named = {"cell": cell} if cell else {}
             document = {"schema": "robolink/fault/1", **named, "fault": keys, "request": request}
-            hand_over(json.dumps({**document, "simulated_s": simulator.now_ns / 1e9}))
+            hand_over(json.dumps({**document, "simulated_s": simulator.now_ns / NS_PER_S}))
         else:
             told = tr("FAULT {action}: {request}", action=keys["action"], request=request)
             show(f"{cell}: {told}" if cell else told)

@@ -53,6 +53,7 @@ def start_and_wait(arguments: Sequence[str]) -> int:
         return _first_line(process, log, errors)
     except BaseException:  # nobody is left behind whose first line nobody has read
         process.kill()
+        process.wait()  # killed, so at once; else it stays in the table of processes
         raise
 
 
@@ -82,8 +83,10 @@ def _tell_end(document: str, messages: str) -> None:
     if json_is_on() or not document.startswith("{"):
         hand_over(document.rstrip("\n"))
         return
-    error = json.loads(document).get("error", {})
-    show(f"robolink: {error.get('what')}\n  {error.get('remedy')}", beside=True)
+    *_, last = document.splitlines()  # the line of who listens may stand before it
+    error = json.loads(last).get("error")
+    if error is not None:  # without one it was told to end, or the system ended it
+        show(f"robolink: {error['what']}\n  {error['remedy']}", beside=True)
 
 
 def parent_of_starter() -> int | None:

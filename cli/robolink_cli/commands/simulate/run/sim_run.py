@@ -7,8 +7,8 @@ import click
 
 from robolink.messages import tr
 from robolink_cli.console.render import emit_json, json_is_on, say
+from robolink_cli.options.shared import json_option
 from robolink_cli.options.simulation import ServedLife, life_options
-from robolink_cli.session.context import json_option
 
 
 @click.command("run", short_help="Serve many simulated controllers, as a file says.")

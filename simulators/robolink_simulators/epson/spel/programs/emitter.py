@@ -195,6 +195,17 @@ class Emitter:
         subscripts = [self.run(argument) for argument in name.arguments]
         return lambda t: reference(t).element([run(t) for run in subscripts])
 
+    def variable_for(self, item: Expression) -> Reference:
+        """Return what gives the variable that a statement writes to, ``ByRef`` or not.
+
+        Raises:
+            ProgramFault: It is no variable, or there is no such one.
+        """
+        given = item.target if isinstance(item, ByReference) else item
+        if not isinstance(given, Name):
+            raise self.fault(tr("a variable is needed"))
+        return self.variable(given)
+
     def array(self, name: Name) -> Reference:
         """Return what gives an array itself.
 

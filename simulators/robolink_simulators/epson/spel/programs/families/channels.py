@@ -186,13 +186,6 @@ def _window_or(emitter: Emitter, node: ChannelStatement) -> Callable[[SpelTask],
     return channel_number(emitter, node)
 
 
-def _into(emitter: Emitter, item: Expression) -> Reference:
-    given = item.target if isinstance(item, ByReference) else item
-    if not isinstance(given, Name):
-        raise emitter.fault(tr("a variable is needed"))
-    return emitter.variable(given)
-
-
 def _store(variable: Variable, value: str | int) -> None:
     variable.values[0] = variable.kind.store(value)
 
@@ -203,7 +196,7 @@ def _input(emitter: Emitter, node: ChannelStatement) -> Operation:
     Without a port a person at the window is asked, as with the number of the window.
     """
     number = _window_or(emitter, node)
-    references = [_into(emitter, item) for item in node.items]
+    references = [emitter.variable_for(item) for item in node.items]
 
     def go(t: SpelTask) -> Blocking:
         variables = [reference(t) for reference in references]
@@ -229,7 +222,7 @@ def _line_input(emitter: Emitter, node: ChannelStatement) -> Operation:
     if len(node.items) != 1:
         raise emitter.fault(tr("Line Input takes one variable"))
     number = _window_or(emitter, node)
-    reference = _into(emitter, node.items[0])
+    reference = emitter.variable_for(node.items[0])
 
     def go(t: SpelTask) -> Blocking:
         variable = reference(t)
@@ -256,7 +249,7 @@ def _bytes(t: SpelTask, at: int, count: int, take: Callable[[bytes], None]) -> B
 def _read(emitter: Emitter, node: ChannelStatement) -> Operation:
     """Read #n, s$, count."""
     number, (item, amount) = channel_number(emitter, node), _two(emitter, node)
-    reference, count = _into(emitter, item), emitter.run(amount)
+    reference, count = emitter.variable_for(item), emitter.run(amount)
 
     def go(t: SpelTask) -> Blocking:
         variable, wanted = reference(t), as_integer(count(t))
@@ -275,7 +268,7 @@ def _holder(emitter: Emitter, item: Expression) -> Reference:
     given = item.target if isinstance(item, ByReference) else item
     if isinstance(given, Name) and emitter.scope.is_array(given.name) and not given.arguments:
         return emitter.array(given)
-    return _into(emitter, item)
+    return emitter.variable_for(item)
 
 
 def _read_binary(emitter: Emitter, node: ChannelStatement) -> Operation:

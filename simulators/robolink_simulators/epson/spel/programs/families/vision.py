@@ -7,12 +7,11 @@ from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.values import as_integer, as_text
 from robolink_simulators.epson.spel.line_tree import VisionAccess, VisionRun, VisionStatement
 from robolink_simulators.epson.spel.programs.emitter import Emitter
-from robolink_simulators.epson.spel.programs.scope import Reference
 from robolink_simulators.epson.spel.tasks.compiled import Operation
 from robolink_simulators.epson.spel.tasks.permissions import require_unbound
 from robolink_simulators.epson.spel.tasks.task import SpelTask
 from robolink_simulators.epson.spel.tasks.waits import Blocking
-from robolink_simulators.epson.spel.tree import ByReference, Expression, Name
+from robolink_simulators.epson.spel.tree import Expression, Name
 from robolink_simulators.epson.vision.picture_file import SUFFIX
 from robolink_simulators.epson.vision.system import RESULTS, VisionSystem
 
@@ -82,7 +81,7 @@ def compile_access(emitter: Emitter, node: VisionAccess) -> Operation:
     if len(node.items) != count:
         name = node.path[-1]
         raise emitter.fault(tr("{name} fills {count} variables", name=name, count=count))
-    targets = [_target(emitter, item) for item in node.items]
+    targets = [emitter.variable_for(item) for item in node.items]
 
     def go(t: SpelTask) -> None:
         path = tuple(part(t) for part in parts)
@@ -127,10 +126,3 @@ def _setting(
         vision_of(t).set(tuple(part(t) for part in parts), given)
 
     return go
-
-
-def _target(emitter: Emitter, item: Expression) -> Reference:
-    given = item.target if isinstance(item, ByReference) else item
-    if not isinstance(given, Name):
-        raise emitter.fault(tr("a variable is needed"))
-    return emitter.variable(given)

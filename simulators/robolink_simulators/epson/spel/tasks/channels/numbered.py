@@ -25,7 +25,7 @@ class NumberedChannels:
         keeps_ports: Whether the ports of a task that ends stay open.
 
     Attributes:
-        ports: See above.
+        ports: The ports of the controller.
         files: The files that are open.
         window: Where a person answers Input.
     """

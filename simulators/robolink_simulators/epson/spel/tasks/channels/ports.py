@@ -108,7 +108,7 @@ class Ports:
         addresses: Where ports lead whatever SetNet says: a test puts free ports here.
 
     Attributes:
-        addresses: See above.
+        addresses: Where ports lead whatever SetNet says: a test puts free ports here.
         devices: The serial line of each serial port that has one.
         dial: Connects a port that is a client; what stands in for a network is put here.
     """

@@ -98,7 +98,10 @@ class LazySource:
         """
         source = self._source
         if not isinstance(source, KeepsProof):
-            raise ConfigError(tr("This measurement has no turn test that can be made later."))
+            raise ConfigError(
+                tr("This measurement has no turn test that can be made later."),
+                remedy=tr("Measure again, and let the turn test follow at once."),
+            )
         return source.proof(context, tool, result, tip=tip, tolerance_mm=tolerance_mm)
 
     @property

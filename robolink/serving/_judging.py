@@ -40,7 +40,10 @@ class CallbackLimits:
         for name in ("tolerance_mm", "max_change_mm", "sigma_mm"):
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value > 0):
-                raise ConfigError(tr("{name} is {value}, not positive.", name=name, value=value))
+                raise ConfigError(
+                    tr("{name} is {value}, not positive.", name=name, value=value),
+                    remedy=tr("Give {name} above 0.", name=name),
+                )
 
 
 def require_believed(

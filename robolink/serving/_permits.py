@@ -56,7 +56,10 @@ class PermitPlan:
 
     def __post_init__(self) -> None:
         if self.method not in PERMIT_METHODS:
-            raise ConfigError(tr("There is no calibration method {name!r}.", name=self.method))
+            raise ConfigError(
+                tr("There is no calibration method {name!r}.", name=self.method),
+                remedy=tr("Choose one of {names}.", names=", ".join(PERMIT_METHODS)),
+            )
         if self.touches < LEAST_TOUCHES or self.proofs < LEAST_PROOFS:
             raise ConfigError(
                 tr(
@@ -66,7 +69,8 @@ class PermitPlan:
                     proofs=self.proofs,
                     least=LEAST_TOUCHES,
                     least_proofs=LEAST_PROOFS,
-                )
+                ),
+                remedy=tr("Let the PLC's program touch that often, and state the same numbers."),
             )
 
 
@@ -87,7 +91,10 @@ def free_machine(controller: Controller, *, patience_s: float = 12.0) -> None:
     from robolink.controllers.softmotion import SoftMotionController
 
     if not isinstance(controller, SoftMotionController):
-        raise ConfigError(tr("{controller} has no mailbox.", controller=controller.identity))
+        raise ConfigError(
+            tr("{controller} has no mailbox.", controller=controller.identity),
+            remedy=tr("Name a PLC whose URL begins with softmotion+."),
+        )
     deadline = Deadline.after(controller.clock, patience_s)
     while True:
         try:

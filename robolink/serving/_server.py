@@ -4,10 +4,11 @@ import ipaddress
 import socket
 import threading
 from collections.abc import Callable, Collection
-from contextlib import suppress
+from contextlib import closing, suppress
 from typing import TYPE_CHECKING, Final
 
-from robolink.errors import ConfigError, LocalProtocolError, RemoteProtocolError
+from robolink import ambient
+from robolink.errors import ConfigError, RobolinkError
 from robolink.messages import tr
 from robolink.protocols.spel_callback import NEED_DATA, CallbackCodec, encode_line
 
@@ -30,7 +31,7 @@ class CallbackServer:
         port: TCP port, 0 for any that is free.
         conversation: Makes the partner of one program, given from where it calls.
         allow: Addresses that may call; empty for this computer only.
-        tell: Told, in sentences, why a program was sent away or cut.
+        tell: Told, in sentences, why a program was sent away or cut, or why none can call.
 
     Attributes:
         address: Host and port where it listens.
@@ -80,8 +81,9 @@ class CallbackServer:
                     "robolink cannot listen at {host}:{port}: {cause}.",
                     host=host,
                     port=port,
-                    cause=error,
-                )
+                    cause=error.strerror or error,
+                ),
+                remedy=tr("Give an address of this computer and another port; 0 is any."),
             ) from error
         self._listener.settimeout(0.2)
         self.address: tuple[str, int] = self._listener.getsockname()[:2]
@@ -105,46 +107,75 @@ class CallbackServer:
         self._listener.close()
 
     def _listen(self) -> None:
+        trouble = ""
         while not self._closed:
             try:
                 link, peer = self._listener.accept()
             except TimeoutError:
                 continue
-            except OSError:
-                return
-            if not self._admits(str(peer[0])):
-                self._tell(tr("{peer} may not call and was cut off.", peer=peer[0]))
-                link.close()
+            except OSError as error:
+                # Too many open files, or a program that gave up meanwhile: the next one may call.
+                before, trouble = trouble, str(error.strerror or error)
+                if trouble != before:
+                    self._say(
+                        tr(
+                            "No program can call just now: {cause}. It is tried again each second.",
+                            cause=trouble,
+                        )
+                    )
+                ambient.sleep(BEAT_S)
                 continue
-            with self._lock:
-                self._links.add(link)
-            thread = threading.Thread(target=self._talk, args=(link, str(peer[0])), daemon=True)
-            self._threads = [one for one in self._threads if one.is_alive()]
-            self._threads.append(thread)
-            thread.start()
+            trouble = ""
+            self._receive(link, str(peer[0]))
 
-    def _admits(self, peer: str) -> bool:
+    def _receive(self, link: socket.socket, peer: str) -> None:
+        refusal = self._refusal(peer)
+        if refusal:
+            self._say(refusal)
+            link.close()
+            return
         with self._lock:
-            full = len(self._links) >= MOST_PROGRAMS
+            self._links.add(link)
+        thread = threading.Thread(target=self._talk, args=(link, peer), daemon=True)
+        self._threads = [one for one in self._threads if one.is_alive()]
+        self._threads.append(thread)
+        thread.start()
+
+    def _refusal(self, peer: str) -> str:
+        """Return why a program is cut off unheard; empty where it is admitted."""
         ip = _ip(peer)
         allowed = ip in self._allowed if self._allowed else ipaddress.ip_address(ip).is_loopback
-        return allowed and not full
+        if not allowed:
+            return tr("{peer} may not call and was cut off.", peer=peer)
+        with self._lock:
+            full = len(self._links) >= MOST_PROGRAMS
+        if not full:
+            return ""
+        return tr(
+            "{peer} was cut off: {most} programs call already, and no more may.",
+            peer=peer,
+            most=MOST_PROGRAMS,
+        )
+
+    def _say(self, sentence: str) -> None:
+        with suppress(Exception):  # a console that is gone ends nobody's conversation
+            self._tell(sentence)
 
     def _talk(self, link: socket.socket, peer: str) -> None:
-        conversation = self._conversation(peer)
         try:
-            link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            link.settimeout(BEAT_S)
-            self._answer_all(link, conversation)
-        except (RemoteProtocolError, LocalProtocolError) as error:
-            self._tell(tr("{peer} was cut off: {cause}", peer=peer, cause=error))
+            with closing(self._conversation(peer)) as conversation:
+                link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                link.settimeout(BEAT_S)
+                self._answer_all(link, conversation)
+        except RobolinkError as error:
+            self._say(tr("{peer} was cut off: {cause}", peer=peer, cause=error))
         except OSError:
             pass  # the program puts its own value back; what is open stays so in the journal
         finally:
-            conversation.close()
-            link.close()
+            # Whatever it was: a place that is not given back is one program less for good.
             with self._lock:
                 self._links.discard(link)
+            link.close()
 
     def _answer_all(self, link: socket.socket, conversation: "CallbackConversation") -> None:
         codec, silent_s = CallbackCodec(), 0.0

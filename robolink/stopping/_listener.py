@@ -12,7 +12,7 @@ The thread that listens is the only one that robolink starts on its own; it does
 
 import json
 import os
-import select
+import selectors
 import socket
 import threading
 import time
@@ -62,7 +62,8 @@ class StopListener(ClosedAtExit):
         who: Who holds it, and for what, as a person is told.
         name: Under which name the controller is on record (``controller.outcomes.identity``), so
             that a stop finds it by another address, too; empty where that is not known.
-        heard: Called with who stopped it, in the listener's thread, before the stop.
+        heard: Called with who asked for it, in the listener's thread, after the stop; what it
+            raises is lost.
 
     Raises:
         OSError: There is no place to listen.
@@ -135,15 +136,16 @@ class StopListener(ClosedAtExit):
             raise
 
     def _listen(self) -> None:
-        while True:
-            ready, _, _ = select.select([self._socket, self._awake], [], [])
-            if self._awake in ready:
-                return
-            with suppress(OSError):  # whoever knocked has left
-                caller, _ = self._socket.accept()
-                with caller:
-                    caller.settimeout(_HEARD_S)
-                    self._serve(caller)
+        # No plain select: it takes no descriptor above 1023, and whoever holds us may have more.
+        with selectors.DefaultSelector() as selector:
+            for one in (self._socket, self._awake):
+                selector.register(one, selectors.EVENT_READ)
+            while self._awake not in [key.fileobj for key, _ in selector.select()]:
+                with suppress(OSError):  # whoever knocked has left
+                    caller, _ = self._socket.accept()
+                    with caller:
+                        caller.settimeout(_HEARD_S)
+                        self._serve(caller)
 
     def _serve(self, caller: socket.socket) -> None:
         asked = _read_line(caller)
@@ -154,8 +156,6 @@ class StopListener(ClosedAtExit):
         if not compare_digest(shown, self._token.encode()):
             return
         _tell(caller, {"taken": True})
-        if self._heard:
-            self._heard(str(asked.get("who", "")))
         try:
             self._controller.stop()
             _tell(caller, {"state": str(self._controller.status().state)})
@@ -169,6 +169,11 @@ class StopListener(ClosedAtExit):
                 "A defect in robolink: {kind}: {error}", kind=type(error).__name__, error=error
             )
             _tell(caller, {"error": "OutcomeUnknownError", "what": what, "remedy": ""})
+        # Last: a console that is held up must not hold up a stop. And one that fails ends nothing:
+        # how the stop ended has been told, and the next one has to be heard.
+        with suppress(Exception):
+            if self._heard:
+                self._heard(str(asked.get("who", "")))
 
 
 def _listening(path: Path) -> tuple[socket.socket, str]:

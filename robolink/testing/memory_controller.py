@@ -4,12 +4,12 @@ It is no simulator: a movement has ended when it has begun, nothing fails, and t
 What it shares with a controller is what :mod:`robolink.controllers` promises of every kind.
 """
 
-import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Final
 
+from robolink import ambient
 from robolink.controllers import ControllerCore, DriverLink, PolledGroup, ToolTableCore, ToolWrite
 from robolink.errors import ToolError, TransportClosedError
 from robolink.interrupts import InterruptGate
@@ -132,7 +132,7 @@ class MemoryLink(DriverLink):
         gate.open()
         super().__init__(identity, clock, StopLatch(identity), outcomes, gate=gate)
         self._machine = machine
-        self._wire = threading.Lock()
+        self._wire = ambient.lock()
         self._closed = False
         self.exchanges = 0
 

@@ -9,11 +9,13 @@ from contextlib import ExitStack
 
 import pytest
 
-from robolink.errors import ConfigError
+from robolink import ambient
+from robolink.errors import ConfigError, JournalError
 from robolink.journal import memory_journal, open_journal
 from robolink.model import EntryKind, new_operation
 from robolink.protocols.spel_callback import CallbackLine, CallbackWord, encode_line
 from robolink.serving import CallbackConversation, CallbackLimits, CallbackServer
+from robolink.serving._server import MOST_PROGRAMS
 from tests.faults._callback_cell import Bend, CallbackCell
 
 SERVED = ("--spel", "127.0.0.1:0", "--sigma-mm", "0.01", "--json")
@@ -85,6 +87,123 @@ def test_who_is_not_on_the_list_is_cut_off_unheard():
     finally:
         server.close()
     assert told == ["127.0.0.1 may not call and was cut off."]
+
+
+@pytest.fixture
+def listening():
+    """Start a server; return it, and what it tells."""
+    servers = []
+
+    def started(conversation=conversation):
+        told: list[str] = []
+        server = CallbackServer("127.0.0.1", 0, conversation, tell=told.append)
+        servers.append(server)
+        return server, told
+
+    yield started
+    for server in servers:
+        server.close()
+
+
+HELLO = encode_line(CallbackLine(1, CallbackWord.HELLO, ("S", "1", "0", "-", "1", "1", *["0"] * 6)))
+
+
+def greeted(link):
+    """Tell whether the server answers a program."""
+    link.sendall(HELLO)
+    return b"WELCOME" in link.recv(200)
+
+
+def test_who_finds_no_room_is_told_so_and_not_that_it_may_not_call(listening):
+    server, told = listening()
+    server.start()
+    with ExitStack() as stack:
+        *_, last, ninth = (
+            stack.enter_context(socket.create_connection(server.address, timeout=10))
+            for _ in range(MOST_PROGRAMS + 1)
+        )
+        assert greeted(last)
+        assert ninth.recv(1) == b""
+        assert told == ["127.0.0.1 was cut off: 8 programs call already, and no more may."]
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+@pytest.mark.parametrize("error", [JournalError("no journal"), OSError(28, "full"), KeyError(1)])
+def test_programs_that_cannot_be_answered_take_no_place_away(listening, error):
+    refused: list[str] = []
+
+    def first_fail(peer):
+        if len(refused) < MOST_PROGRAMS:
+            refused.append(peer)
+            raise error
+        return conversation(peer)
+
+    server, told = listening(first_fail)
+    server.start()
+    for _ in range(MOST_PROGRAMS):
+        with socket.create_connection(server.address, timeout=10) as link:
+            assert link.recv(1) == b""
+    with socket.create_connection(server.address, timeout=10) as link:
+        assert greeted(link)
+    expected = "127.0.0.1 was cut off: no journal"
+    assert told == ([expected] * MOST_PROGRAMS if isinstance(error, JournalError) else [])
+
+
+class Failing:
+    """A listener that cannot accept at first."""
+
+    def __init__(self, listener, errors):
+        self._listener, self._errors = listener, errors
+
+    def accept(self):
+        if self._errors:
+            raise self._errors.pop()
+        return self._listener.accept()
+
+    def close(self):
+        self._listener.close()
+
+
+def test_an_error_of_the_system_does_not_end_the_listening(listening, monkeypatch):
+    waits: list[float] = []
+    monkeypatch.setattr(ambient, "sleep", waits.append)
+    server, told = listening()
+    errors = [OSError(103, "aborted"), OSError(24, "too many files"), OSError(24, "too many files")]
+    monkeypatch.setattr(server, "_listener", Failing(server._listener, errors))
+    server.start()
+    with socket.create_connection(server.address, timeout=10) as link:
+        assert greeted(link)
+    assert waits == [1.0, 1.0, 1.0]
+    # The same trouble is told once.
+    assert told == [
+        "No program can call just now: too many files. It is tried again each second.",
+        "No program can call just now: aborted. It is tried again each second.",
+    ]
+
+
+def test_a_console_that_fails_does_not_end_the_listening(monkeypatch):
+    monkeypatch.setattr(ambient, "sleep", lambda _seconds: None)
+
+    def tell(_sentence):
+        raise BrokenPipeError
+
+    server = CallbackServer("127.0.0.1", 0, conversation, tell=tell)
+    errors = [OSError(24, "too many files")]
+    monkeypatch.setattr(server, "_listener", Failing(server._listener, errors))
+    server.start()
+    try:
+        with socket.create_connection(server.address, timeout=10) as link:
+            assert greeted(link)
+    finally:
+        server.close()
+
+
+def test_an_address_that_is_taken_is_refused_with_what_to_do(listening):
+    server, _ = listening()
+    with pytest.raises(ConfigError, match="Address already in use") as caught:
+        CallbackServer("127.0.0.1", server.address[1], conversation)
+    assert "Errno" not in caught.value.what
+    assert caught.value.remedy == "Give an address of this computer and another port; 0 is any."
 
 
 @pytest.mark.parametrize(

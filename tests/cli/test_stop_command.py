@@ -26,10 +26,11 @@ import robolink
 from robolink import Secret
 from robolink.config import glance_at_cell
 from robolink.controllers.epson import EpsonController
+from robolink.errors import OutcomeUnknownError
 from robolink.journal import close_files, open_journal
 from robolink.model import MotionProfile, WorkBox
 from robolink.model import Path as MovePath
-from robolink.stopping import far_end_of, find_note
+from robolink.stopping import StopListener, far_end_of, find_note
 from robolink.transport import parse_url
 
 CREEPING = MotionProfile(MovePath.STRAIGHT, 5, 1.0)
@@ -212,6 +213,49 @@ def test_a_wrong_password_in_the_environment_gives_way_to_the_keyring(
         keyring.get_password = lambda service, user: None
         assert entry.run(["-c", host.url, "stop"]) == 5
     assert "refused the login" in capsys.readouterr().err
+
+
+def test_a_keyring_that_fails_in_a_way_of_its_own_does_not_keep_it_back(moving, stop, monkeypatch):
+    def fails(_service, _user):
+        raise RuntimeError("D-Bus is not there")
+
+    monkeypatch.setitem(sys.modules, "keyring", SimpleNamespace(get_password=fails))
+    monkeypatch.setitem(sys.modules, "keyring.errors", SimpleNamespace(KeyringError=OSError))
+    code, _, err = stop()
+    assert code == 0
+    assert "The system's keyring failed: RuntimeError: D-Bus is not there." in err
+    assert "The stop went out anyway." in err
+
+
+class Unclear:
+    """A controller in other hands whose stop is not answered."""
+
+    def stop(self):
+        raise OutcomeUnknownError("sent, not answered")
+
+    def status(self):
+        raise AssertionError
+
+
+@pytest.mark.parametrize("kind", ["softmotion+modbus-tcp", "epson+tcp"])
+def test_what_a_holder_sent_without_an_answer_leaves_a_note(
+    state_folder, kind, monkeypatch, capsys
+):
+    monkeypatch.setenv("ROBOLINK_PASSWORD", "canary-wrong")
+    with ExitStack() as stack:
+        if kind == "epson+tcp":  # it answers, and refuses
+            simulator = EpsonSimulator(seed=4, password=Secret("canary-right"))
+            url = stack.enter_context(serve_tcp(simulator)).url
+        else:  # nobody answers
+            taken = stack.enter_context(socket.socket())
+            taken.bind(("127.0.0.1", 0))
+            url = f"{kind}://127.0.0.1:{taken.getsockname()[1]}"
+        stack.enter_context(StopListener(Unclear(), url))
+        assert entry.run(["-c", url, "stop", "--timeout", "0.5"]) == 6
+    assert "sent, not answered" in capsys.readouterr().err
+    found = find_note(far_end_of(url))
+    assert found is not None
+    assert not found.confirmed
 
 
 def test_nobody_there_is_told_and_leaves_no_note(state_folder, capsys):

@@ -8,13 +8,16 @@ import pytest
 from robolink import ToolOffset
 from robolink.controllers.epson.link.session import EpsonSession
 from robolink.errors import (
+    BusyError,
     ControllerFaultError,
     LimitError,
+    LocalProtocolError,
     MotionTimeoutError,
     NotReadyError,
     StoppedError,
 )
 from robolink.model import MotionOutcome, MotionProfile, Path, WorkBox
+from robolink.protocols.spel import Statement
 
 pytestmark = pytest.mark.moves
 
@@ -43,6 +46,31 @@ def test_a_straight_move_arrives(controller):
     assert motion.wait(timeout_s=60) is MotionOutcome.ARRIVED
     assert group.pose().z_mm == pytest.approx(target.z_mm, abs=0.05)
     assert controller.outcomes.open_markers() == ()
+
+
+def test_a_statement_that_cannot_be_sent_leaves_nothing_to_wait_for(controller):
+    session = controller._link.session
+    with pytest.raises(LocalProtocolError):
+        session.start_execute(Statement("Wait 1\r\nWait 2"))
+    assert session.pending is None
+    group, target = start(controller)
+    motion = group.move_to(target, STRAIGHT, box=EVERYWHERE)
+    assert motion.wait(timeout_s=60) is MotionOutcome.ARRIVED
+
+
+def test_a_statement_that_may_have_left_is_known_to_a_stop(controller, monkeypatch):
+    session, transport = controller._link.session, controller._link.session._transport
+
+    def cut_short(*_arguments, **_options):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(type(transport), "send", cut_short)
+        with pytest.raises(KeyboardInterrupt):
+            session.start_execute(Statement("Wait 1"))
+    assert session.pending is not None
+    with pytest.raises(BusyError):
+        session.execute(Statement("Wait 1"))
 
 
 def test_a_joint_move_turns_the_tool(controller):

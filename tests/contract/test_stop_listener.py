@@ -40,9 +40,9 @@ def test_who_asks_is_named_and_the_latch_is_closed(controller):
         holder = holder_of(controller)
         assert holder.who == "line 3"
         assert holder.ask_to_stop("anna") == "ready"
-        assert heard == ["anna"]
         controller.latch.release()
         assert holder.ask_to_stop("bert") == "ready"  # it goes on listening
+    assert heard == ["anna", "bert"]
     group = controller.groups[0]
     with pytest.raises(StoppedError):
         group.move_to(group.pose(), MotionProfile(), box=WorkBox())
@@ -121,14 +121,60 @@ def test_a_stop_that_fails_is_told_as_it_is(error, told):
             holder.ask_to_stop("anna")
 
 
-def test_whoever_leaves_the_controller_waits_for_the_stop_under_way(controller):
-    begun, go_on, ends = threading.Event(), threading.Event(), []
+def test_a_console_that_is_held_up_does_not_hold_up_the_stop(controller):
+    told, go_on = threading.Event(), threading.Event()
 
     def heard(_who):
-        begun.set()
+        told.set()
         go_on.wait(10)
 
-    listener = StopListener(controller, url_of(controller), heard=heard)
+    with StopListener(controller, url_of(controller), heard=heard):
+        assert holder_of(controller).ask_to_stop("anna") == "ready"
+        with pytest.raises(StoppedError):
+            controller.latch.require_open("the check")
+        assert told.wait(10)
+        go_on.set()
+
+
+@pytest.mark.parametrize("error", [OSError("gone"), BrokenPipeError(), RuntimeError("no console")])
+def test_a_console_that_fails_ends_neither_the_stop_nor_the_listening(controller, error):
+    def heard(_who):
+        raise error
+
+    with StopListener(controller, url_of(controller), heard=heard):
+        holder = holder_of(controller)
+        assert holder.ask_to_stop("anna") == "ready"
+        assert holder.ask_to_stop("bert") == "ready"
+
+
+def test_a_process_with_many_files_open_listens_too(controller):
+    resource = pytest.importorskip("resource")
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    most = 1100 if hard == resource.RLIM_INFINITY else min(hard, 1100)
+    if most < 1100:
+        pytest.skip("this user may not open so many")
+    resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, most), hard))
+    held = [os.dup(0) for _ in range(1024)]
+    try:
+        with StopListener(controller, url_of(controller)):
+            assert holder_of(controller).ask_to_stop("anna") == "ready"
+    finally:
+        for one in held:
+            os.close(one)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+
+
+def test_whoever_leaves_the_controller_waits_for_the_stop_under_way(controller, monkeypatch):
+    begun, go_on, ends = threading.Event(), threading.Event(), []
+    stop = controller.stop
+
+    def held_up():
+        begun.set()
+        go_on.wait(10)
+        stop()
+
+    monkeypatch.setattr(controller, "stop", held_up)
+    listener = StopListener(controller, url_of(controller))
     holder = holder_of(controller)
     asking = threading.Thread(target=lambda: ends.append(holder.ask_to_stop("anna")))
     asking.start()

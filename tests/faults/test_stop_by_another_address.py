@@ -108,8 +108,8 @@ def test_whoever_has_a_plc_on_the_network_hears_of_a_stop_on_its_line(plc):
         ),
     ):
         assert entry.run(["-c", ways["line"], "--operator", "anna", "stop"]) == 0
-        assert [who.startswith("anna") for who in heard] == [True]
         assert controller.latch.closed
+    assert [who.startswith("anna") for who in heard] == [True]
 
 
 def test_a_command_that_moves_a_plc_is_stopped_on_its_line(plc, beside):

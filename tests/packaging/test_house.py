@@ -39,3 +39,16 @@ def test_a_public_class_shares_its_name_with_no_other():
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 homes[node.name].append(str(path.relative_to(ROOT)))
     assert {name: paths for name, paths in homes.items() if len(paths) > 1} == {}
+
+
+def test_whoever_gave_something_wrong_is_told_what_to_do_next():
+    bare = [
+        f"{path.relative_to(ROOT)}:{node.lineno}"
+        for path in modules()
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Name)
+        and node.func.id == "ConfigError"
+        and "remedy" not in [given.arg for given in node.keywords]
+    ]
+    assert bare == []

@@ -59,8 +59,7 @@ class StopOutcome:
     @property
     def may_stand(self) -> bool:
         """Whether a stop left this computer, so that the next one who moves must hear of it."""
-        kept_back = (ConfigError, ConnectError, LoginRefusedError)
-        return self.error is None or not isinstance(self.error, kept_back)
+        return self.error is None or _left(self.error)
 
 
 def stop_first(request: StopRequest) -> StopOutcome:
@@ -109,26 +108,42 @@ def _stop(request: StopRequest, outcome: StopOutcome) -> None:
         password_file = password_file or reach.password_file
         outcome.doubts += [reach.doubt] if reach.doubt else []
     outcome.keys = far_end_of(outcome.url)
-    if _SEVERAL_CLIENTS in outcome.url:
-        try:
-            _directly(request, outcome, password_file, password_env)
-        except RobolinkError:
-            if not _through_holder(request, outcome, also=_last_known(outcome.url)):
-                raise
-        else:
-            _through_holder(request, outcome)
-        return
+    several = _SEVERAL_CLIENTS in outcome.url
     refusals: list[RobolinkError] = []
-    if _through_holder(request, outcome, refusals):
+    if not several and _through_holder(request, outcome, refusals):
         return
     try:
         _directly(request, outcome, password_file, password_env)
-    except ConnectError as error:
-        if not _through_holder(request, outcome, also=_last_known(outcome.url)):
-            raise (refusals or [error])[0] from error
+    except RobolinkError as error:
+        again = several or isinstance(error, ConnectError)
+        if again and _through_holder(request, outcome, refusals, also=_last_known(outcome.url)):
+            return
+        told = _most_telling(error, refusals)
+        if told is error:
+            raise
+        raise told from error
     else:
         # Whoever has it by another address, a PLC over the network, hears of it now.
         _through_holder(request, outcome)
+
+
+def _left(error: BaseException) -> bool:
+    """Tell whether a stop may have left a computer, although it ended in ``error``."""
+    return not isinstance(error, (ConfigError, ConnectError, LoginRefusedError))
+
+
+def _most_telling(error: RobolinkError, refusals: list[RobolinkError]) -> RobolinkError:
+    """Return how a stop ended that nobody confirms: one that may have left goes before all.
+
+    Args:
+        error: What the attempt from here ended in.
+        refusals: What the stops of those who have the controller ended in.
+    """
+    for one in (error, *refusals):
+        if _left(one):
+            return one
+    # Who has it knows more than one who could not even reach it.
+    return refusals[0] if refusals and isinstance(error, ConnectError) else error
 
 
 def _last_known(url: str) -> str:
@@ -212,7 +227,13 @@ def _passwords(outcome: StopOutcome, file: str, variable: str) -> Iterator[str]:
         yield near.reveal()
     from robolink.transport import parse_url
 
-    stored = from_keyring(parse_url(outcome.url).identity)
+    try:
+        stored = from_keyring(parse_url(outcome.url).identity)
+    except Exception as error:
+        # What a backend raises by itself, of D-Bus for example, is no reason to send nothing.
+        cause = f"{type(error).__name__}: {error}"
+        outcome.doubts.append(tr("The system's keyring failed: {cause}.", cause=cause))
+        stored = None
     if stored is not None:
         yield stored.reveal()
     elif near is None:

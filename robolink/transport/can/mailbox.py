@@ -1,12 +1,12 @@
 """A PLC mailbox in the object dictionary of a CANopen node (docs/mailbox.md, "CANopen")."""
 
 import struct
-import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Final
 
+from robolink import ambient
 from robolink.errors import (
     ConnectError,
     RejectedError,
@@ -107,7 +107,7 @@ class CanopenMailboxLink:
         self._timeout_s = timeout_s
         self._clock = clock
         self._watch = NodeWatch(line, node, identity, clock)
-        self._lock = threading.Lock()
+        self._lock = ambient.lock()
 
     @property
     def identity(self) -> str:

@@ -2,9 +2,10 @@
 
 The first line shows the token of the URL, ``{"token": "..."}``; each further one has something
 done: ``{"do": "look"}``. Both are answered with ``{"ok": true, ...}``, what cannot be done with
-``{"ok": false, "error": sentence}``. A wrong token ends the connection after its answer; a line
-that is no JSON object, or is longer than :data:`LONGEST_LINE` bytes, at once, so that a web page
-which posts to the port gets nothing done. At most :data:`MOST_CLIENTS` are connected: a newcomer
+``{"ok": false, "error": sentence}`` and, often, a ``"remedy"``: what to do next. A wrong token
+ends the connection after its answer; a line that is no JSON object, or is longer than
+:data:`LONGEST_LINE` bytes, at once, so that a web page which posts to the port gets nothing
+done. At most :data:`MOST_CLIENTS` are connected: a newcomer
 takes the place of whoever has waited longest without showing the token, and where all have shown
 it, there is none for him. So nobody who connects and keeps silent keeps others out.
 """
@@ -153,7 +154,9 @@ class _AssistLink:
             return b""
         try:
             answer = self._performed(request) if self.let_in else self._entered(request)
-        except (RobolinkError, SpelRefusal, BlockRefused) as error:
+        except RobolinkError as error:
+            answer = {"ok": False, "error": error.what, "remedy": error.remedy}
+        except (SpelRefusal, BlockRefused) as error:
             answer = {"ok": False, "error": str(error)}
         return json.dumps(answer).encode() + b"\n"
 
@@ -213,7 +216,7 @@ class AssistClient(ClosedAtExit):
         """
         answer = self._asked({"do": act, **parameters})
         if not answer.pop("ok"):
-            raise ConfigError(str(answer["error"]))
+            raise ConfigError(str(answer["error"]), remedy=str(answer.get("remedy", "")))
         return answer
 
     def look(self, tool: int | None = None) -> PersonLook:

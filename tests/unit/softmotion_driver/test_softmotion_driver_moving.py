@@ -11,6 +11,7 @@ from dataclasses import replace
 import pytest
 
 from robolink.controllers.softmotion import Jog
+from robolink.controllers.softmotion.link.turns import Turns
 from robolink.errors import (
     BusyError,
     ConfigError,
@@ -54,6 +55,19 @@ def test_a_movement_arrives_and_its_marker_goes(cell, plc, group):
     assert command.opcode == Opcode.MOVE_LINEAR
     assert command.operands[2:] == (CoordinateSystem.MCS, BufferMode.BUFFERED)
     assert command.dynamics[0] == 20.0
+
+
+def test_ctrl_c_before_the_first_beat_keeps_nobody_out_afterwards(monkeypatch):
+    turns = Turns()
+
+    def interrupted(_predicate, _timeout):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(turns._changed, "wait_for", interrupted)
+        with pytest.raises(KeyboardInterrupt), turns.kept():
+            raise AssertionError
+    assert turns._waiters == 0
 
 
 def test_a_joint_move_carries_factors(plc, group):

@@ -149,8 +149,11 @@ class EpsonSession:
             pending = PendingExecute(statement)
             try:
                 self._expect_silence()
+                # What the codec refuses never leaves, and nothing would end the wait for it. From
+                # here on some of it may leave, however the sending ends.
+                data = self._codec.send(request)
                 self._pending = pending
-                self._send(request, secret=False)
+                self._transmit(data, secret=False)
             except RobolinkError as error:
                 self._end(error)
                 raise
@@ -218,7 +221,8 @@ class EpsonSession:
                 self._admit(request, what)
                 try:
                     self._expect_silence()
-                    return self._receive(request, self._send(request, secret=secret))
+                    deadline = self._transmit(self._codec.send(request), secret=secret)
+                    return self._receive(request, deadline)
                 except RobolinkError as error:
                     self._end(error)
                     raise
@@ -263,9 +267,9 @@ class EpsonSession:
                     request=request.name,
                 )
 
-    def _send(self, request: Request, *, secret: bool) -> Deadline:
+    def _transmit(self, data: bytes, *, secret: bool) -> Deadline:
         deadline = Deadline.after(self.clock, self.timeout_s)
-        self._transport.send(self._codec.send(request), deadline=deadline, secret=secret)
+        self._transport.send(data, deadline=deadline, secret=secret)
         self.exchanges += 1
         return deadline
 

@@ -39,16 +39,20 @@ class Turns:
     @contextmanager
     def kept(self) -> Iterator[None]:
         """Have the say over who comes in, for as long as this thread waits on a movement."""
-        with self._changed:
-            self._waiters += 1
-            self._sign_s = _now_s()
-            self._changed.wait_for(self._nobody_inside, _LONGEST_EXCHANGE_S)
+        counted = False
         try:
+            with self._changed:
+                self._waiters += 1
+                counted = True
+                self._sign_s = _now_s()
+                # Ctrl-C may end this wait.
+                self._changed.wait_for(self._nobody_inside, _LONGEST_EXCHANGE_S)
             yield
         finally:
-            with self._changed:
-                self._waiters -= 1
-                self._changed.notify_all()
+            if counted:
+                with self._changed:
+                    self._waiters -= 1
+                    self._changed.notify_all()
 
     def let_one_in(self) -> bool:
         """Let another thread have one exchange and wait for its end; False when none wants it."""

@@ -113,11 +113,18 @@ def _in_the_background(project: SpelProject, names: str) -> tuple[CompiledFuncti
     for name in filter(None, (part.strip() for part in names.split(","))):
         function = project.functions.get(name.lower())
         if function is None or function.parameters:
-            raise ConfigError(tr("There is no function {name} without arguments.", name=name))
+            raise ConfigError(
+                tr("There is no function {name} without arguments.", name=name),
+                remedy=tr(
+                    "Name functions of the programs in background_tasks, with commas between."
+                ),
+            )
         found.append(function)
     if len(found) > MOST_IN_BACKGROUND:
-        text = tr("A controller has {most} background tasks.", most=MOST_IN_BACKGROUND)
-        raise ConfigError(text)
+        raise ConfigError(
+            tr("A controller has {most} background tasks.", most=MOST_IN_BACKGROUND),
+            remedy=tr("Name no more functions than that in background_tasks."),
+        )
     return tuple(found)
 
 

@@ -23,7 +23,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any, Final
 
-from benchmarks.cases import CASES, measure
+from benchmarks.cases import CASES, measured_alone
 from benchmarks.growth import measured_growth
 from benchmarks.page import PAGE, ROOT, publish
 from benchmarks.quiet import SPREAD, Floors, load_average
@@ -43,7 +43,7 @@ def main() -> int:
     floors.look()
     for name in asked.cases or CASES:
         began = perf_counter()
-        cases[name] = list(measure(name))
+        cases[name] = measured_alone(name)
         seconds[name] = perf_counter() - began
         floors.look()
         print(f"\n{name}: {seconds[name]:.0f} s")

@@ -11,7 +11,7 @@ import pytest
 
 from benchmarks import __main__ as bench
 from benchmarks import page
-from benchmarks.cases import CASES
+from benchmarks.cases import CASES, measured_alone
 from benchmarks.pictures import Growth, picture
 from benchmarks.quiet import SPREAD, Floors
 from benchmarks.table import Amount, Figure
@@ -51,6 +51,14 @@ def test_a_fleet_is_divided_among_processes_and_is_as_fast_as_the_slowest():
     factors = lived_apart(3, 2, 4, processes=2)
     assert len(factors) == 4
     assert all(factor > 0 for factor in factors)
+
+
+def test_a_case_is_measured_in_a_process_of_its_own():
+    case = "benchmarks.work.kinematics"
+    before = case in sys.modules
+    (figure,) = measured_alone("kinematics")
+    assert figure.ours.value > 0
+    assert (case in sys.modules) == before
 
 
 def test_a_ratio_over_its_goal_is_missed_and_without_a_goal_neither():

@@ -2,6 +2,7 @@
 
 import http.client
 import json
+import os
 import socket
 import time
 from contextlib import ExitStack
@@ -314,6 +315,11 @@ def test_what_is_no_request_is_answered_in_json_too(cells, sent, status):
         assert (told["schema"], told["ok"]) == ("robolink/control/1", False)
 
 
+def test_half_an_address_is_answered_too(cells):
+    reply, told = exchanged(cells, b"GET http://[x/ HTTP/1.1\r\n\r\n")
+    assert (reply.status, told["ok"]) == (400, False)
+
+
 def test_an_old_client_is_answered_and_cut_off(cells):
     path = f"{urlsplit(cells.url).path}/cells/a/counters"
     reply, told = exchanged(cells, f"GET {path} HTTP/1.0\r\n\r\n".encode())
@@ -407,3 +413,15 @@ def test_the_page_names_every_act():
     page = (ROOT / "docs/control-api.md").read_text()
     acts = {name for kind in ACTS.values() for name in kind}
     assert {name for name in acts if f"`{name}`" not in page} == set()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="Windows holds no port for a connection that ended")
+def test_a_port_can_be_had_again_although_somebody_was_connected_at_the_end():
+    cell = ControlledCell(EpsonSimulator(seed=3), ManualClock())
+    with ControlServer({"a": cell}) as control:
+        parts = urlsplit(control.url)
+        client = ControlClient(control.url_of("a"))
+        client.do("clock")
+    client.close()
+    with ControlServer({"a": cell}, (parts.hostname or "", parts.port or 0)) as control:
+        assert urlsplit(control.url).port == parts.port

@@ -10,13 +10,14 @@ at most :data:`LONGEST_REQUEST` bytes, and a connection that is silent ends by i
 """
 
 import json
+import os
 import threading
 from collections.abc import Mapping
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib import metadata
 from importlib.resources import files
-from socket import AF_INET, AF_INET6, SHUT_RDWR, socket
+from socket import AF_INET, AF_INET6, SHUT_RDWR, SO_REUSEADDR, SOL_SOCKET, socket
 from typing import Any, Final
 from urllib.parse import parse_qsl, urlsplit
 
@@ -112,7 +113,10 @@ class ControlServer(ClosedAtExit):
     def answered(self, method: str, target: str, body: bytes) -> _Reply:
         """Return what a request is answered with."""
         self.requests += 1
-        parts = urlsplit(target)
+        try:
+            parts = urlsplit(target)
+        except ValueError:  # half an address of IPv6
+            return HTTPStatus.BAD_REQUEST, _no_request(HTTPStatus.BAD_REQUEST)
         token, *path = parts.path.strip("/").split("/")
         if not is_token(token, self._token):
             return HTTPStatus.FORBIDDEN, _error(
@@ -254,6 +258,12 @@ def _error(what: str, remedy: str = "") -> dict[str, Any]:
     return {"schema": SCHEMA, "ok": False, "error": what, "remedy": remedy}
 
 
+def _no_request(status: HTTPStatus) -> dict[str, Any]:
+    return _error(
+        tr("What came is no request that is answered here: {cause}.", cause=status.phrase)
+    )
+
+
 class _HttpServer(ThreadingHTTPServer):
     """Serves each connection in a thread of its own, a bounded number of them."""
 
@@ -270,6 +280,10 @@ class _HttpServer(ThreadingHTTPServer):
 
     def server_bind(self) -> None:
         """Bind without asking who this machine is, which may take seconds."""
+        if os.name == "posix":
+            # Else nobody can listen here for a minute after one who was connected at the end. On
+            # Windows it would let two programs share the port.
+            self.socket.setsockopt(SOL_SOCKET, SO_REUSEADDR, 1)
         self.socket.bind(self.server_address)
         self.server_address = self.socket.getsockname()
 
@@ -362,10 +376,7 @@ class _Handler(BaseHTTPRequestHandler):
             code = HTTPStatus.METHOD_NOT_ALLOWED
         self._refuse(
             HTTPStatus(code),
-            tr(
-                "What came is no request that is answered here: {cause}.",
-                cause=HTTPStatus(code).phrase,
-            ),
+            _no_request(HTTPStatus(code))["error"],
         )
 
     def log_message(self, *_: object) -> None:

@@ -116,7 +116,7 @@ class ControlServer(ClosedAtExit):
         try:
             parts = urlsplit(target)
         except ValueError:  # half an address of IPv6
-            return HTTPStatus.BAD_REQUEST, _no_request(HTTPStatus.BAD_REQUEST)
+            return HTTPStatus.BAD_REQUEST, _error(_no_request(HTTPStatus.BAD_REQUEST))
         token, *path = parts.path.strip("/").split("/")
         if not is_token(token, self._token):
             return HTTPStatus.FORBIDDEN, _error(
@@ -258,10 +258,8 @@ def _error(what: str, remedy: str = "") -> dict[str, Any]:
     return {"schema": SCHEMA, "ok": False, "error": what, "remedy": remedy}
 
 
-def _no_request(status: HTTPStatus) -> dict[str, Any]:
-    return _error(
-        tr("What came is no request that is answered here: {cause}.", cause=status.phrase)
-    )
+def _no_request(status: HTTPStatus) -> str:
+    return tr("What came is no request that is answered here: {cause}.", cause=status.phrase)
 
 
 class _HttpServer(ThreadingHTTPServer):
@@ -374,10 +372,7 @@ class _Handler(BaseHTTPRequestHandler):
         self.request_version = self.protocol_version  # or it would get no head
         if code == HTTPStatus.NOT_IMPLEMENTED:
             code = HTTPStatus.METHOD_NOT_ALLOWED
-        self._refuse(
-            HTTPStatus(code),
-            _no_request(HTTPStatus(code))["error"],
-        )
+        self._refuse(HTTPStatus(code), _no_request(HTTPStatus(code)))
 
     def log_message(self, *_: object) -> None:
         """Print nothing: the URL holds the token."""

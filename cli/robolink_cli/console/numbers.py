@@ -69,5 +69,11 @@ class NumberInside(click.FloatRange):
         number = DECIMAL.convert(value, param, ctx)
         if not math.isfinite(number):
             self.fail(tr("must be a finite number"), param, ctx)
+        return self.inside(number, param, ctx)
+
+    def inside(
+        self, number: float, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """Return a finite number, which is within the limits."""
         inside: float = super().convert(number, param, ctx)
         return inside

@@ -10,7 +10,7 @@ from annotated_types import Ge, Gt, Le
 from robolink.messages import tr
 from robolink.methods import ParameterField, fields_of
 from robolink.methods.declaration.fields import bare, refusals
-from robolink_cli.console.numbers import DECIMAL, decimal
+from robolink_cli.console.numbers import DECIMAL, NumberInside, decimal
 
 _NUMBERS = (float, int)
 
@@ -62,21 +62,15 @@ def _number(kind: type[Any], metadata: tuple[object, ...]) -> click.ParamType[An
     return made
 
 
-class _FloatInside(click.FloatRange):
+class _FloatInside(NumberInside):
     """A number that is refused in the words of a recipe."""
 
     metadata: tuple[object, ...] = ()
 
-    def convert(
-        self,
-        value: Any,  # noqa: ANN401 - click's form
-        param: click.Parameter | None,
-        ctx: click.Context | None,
+    def inside(
+        self, number: float, param: click.Parameter | None, ctx: click.Context | None
     ) -> float:
         """Return the number."""
-        number: float = DECIMAL.convert(value, param, ctx)
-        if not math.isfinite(number):
-            self.fail(tr("must be a finite number"), param, ctx)
         for why in refusals(number, float, self.metadata):
             self.fail(why, param, ctx)
         return number

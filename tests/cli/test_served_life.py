@@ -9,8 +9,13 @@ from itertools import count
 from time import monotonic
 
 import pytest
+from robolink_cli import main
 from robolink_cli.commands.simulate.serving import ParentWatch, Termination
 from robolink_cli.options.simulation import ServedLife
+from robolink_simulators.assist.port import AssistClient
+from robolink_simulators.control.client import ControlClient
+
+import robolink
 
 
 def waited(life, requests=int):
@@ -90,3 +95,63 @@ def test_it_ends_with_the_process_that_started_it():
         subprocess.run(["sleep", "0.2"], check=True)
     os.kill(simulator, signal.SIGTERM)
     pytest.fail("it lives on")
+
+
+FILE = """
+schema = "robolink/sim-cells/1"
+[cells.a]
+kind = "epson"
+tcp = "127.0.0.1:0"
+assist = true
+[cells.b]
+kind = "softmotion"
+tcp = "127.0.0.1:0"
+assist = true
+"""
+
+
+@pytest.mark.parametrize(
+    "what",
+    [
+        ("sim", "epson", "--tcp", "127.0.0.1:0"),
+        ("sim", "softmotion", "--modbus-tcp", "127.0.0.1:0"),
+        ("sim", "run"),
+    ],
+    ids=["epson", "softmotion", "a file"],
+)
+def test_whatever_is_asked_at_any_of_its_ports_keeps_it_alive(what, tmp_path, monkeypatch, capsys):
+    """Each port is used once, and the count that ``--idle-exit`` looks at goes up."""
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path))
+    if what == ("sim", "run"):
+        path = tmp_path / "cells.toml"
+        path.write_text(FILE)
+        what = (*what, str(path))
+    used = []
+
+    def wait(_, requests):
+        document = json.loads(capsys.readouterr().out)
+        for cell in document.get("cells", {"": document}).values():
+            for use, url in ((look, cell["assist"]), (ask, cell["control"]), (read, cell["url"])):
+                before = requests()
+                use(url)
+                assert requests() > before, url
+                used.append(use)
+
+    monkeypatch.setattr(Termination, "wait", wait)
+    assert main.run([*what, "--idle-exit", "60", "--json"]) == 0, capsys.readouterr().err
+    assert len(used) == 3 * (2 if what[1] == "run" else 1)
+
+
+def look(url):
+    with AssistClient(url) as client:
+        client.look()
+
+
+def ask(url):
+    with ControlClient(url) as client:
+        client.about()
+
+
+def read(url):
+    with robolink.connect(url, timeout_s=10) as controller:
+        controller.tools.read(1)

@@ -183,6 +183,11 @@ tcp = "127.0.0.1:6012"
             "line 6, cells.a.state: a-1 has it already",
         ),
         (
+            '[cells.a]\nkind = "epson"\nstate = "s.json"\n'
+            '[cells.b]\nkind = "epson"\ntcp = "127.0.0.1:0"\nstate = "b/../s.json"',
+            "line 8, cells.b.state: a has it already",
+        ),
+        (
             '[cells.a]\nkind = "epson"\ncount = 3\ntcp = "127.0.0.1:65534"',
             "line 5, cells.a.tcp: there are not so many ports",
         ),

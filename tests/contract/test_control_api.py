@@ -13,12 +13,13 @@ from urllib.parse import urlsplit
 import pytest
 from robolink_cli import main
 from robolink_simulators.cell.clock import ManualClock, SteeredClock
-from robolink_simulators.control import server as served_api
+from robolink_simulators.control import http_port
 from robolink_simulators.control.acts.registry import ACTS
 from robolink_simulators.control.cell import ControlledCell
 from robolink_simulators.control.client import ControlClient
+from robolink_simulators.control.http_port import LONGEST_REQUEST, MOST_CLIENTS
 from robolink_simulators.control.openapi import openapi
-from robolink_simulators.control.server import LONGEST_REQUEST, MOST_CLIENTS, ControlServer
+from robolink_simulators.control.server import ControlServer
 from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
@@ -73,7 +74,9 @@ def raw(cells, method, path, body=b"", headers=()):
     try:
         connection.request(method, path, body, dict(headers))
         reply = connection.getresponse()
-        return reply.status, json.loads(reply.read())
+        told = json.loads(reply.read())
+        assert told.get("ok", "openapi" in told) or (told["error"] and told["remedy"])
+        return reply.status, told
     finally:
         connection.close()
 
@@ -164,8 +167,9 @@ def test_sim_ctl_takes_for_a_text_what_is_one(cells, at, capsys):
         assert ctl("restore", f"name={name}") == 0
     assert ctl("add_fault", "action=drop_reply", "match=2003", "times=2") == 0
     assert {fault["match"] for fault in control.do("faults")["pending"]} == {"2003"}
-    assert ctl("step", "seconds=inf") == 2
-    assert "step needs seconds, a number from 0" in capsys.readouterr().err
+    for no_number in ("inf", "1_0"):
+        assert ctl("step", f"seconds={no_number}") == 2
+        assert "step needs seconds, a number from 0" in capsys.readouterr().err
 
 
 def test_time_is_paused_stepped_and_hastened(at):
@@ -313,6 +317,8 @@ def test_what_is_no_request_is_answered_in_json_too(cells, sent, status):
     assert reply.headers["Connection"] == "close"
     if b"HEAD" not in sent:
         assert (told["schema"], told["ok"]) == ("robolink/control/1", False)
+        assert told["error"]
+        assert told["remedy"]
 
 
 def test_half_an_address_is_answered_too(cells):
@@ -354,12 +360,13 @@ def counters_of(url):
     try:
         with ControlClient(url) as client:
             return client.do("counters")
-    except TransportBrokenError:
+    except ConnectError:
         return None
 
 
 def test_silent_clients_are_bounded_and_keep_nobody_out_for_good(cells, monkeypatch):
-    monkeypatch.setattr(served_api, "MOST_CLIENTS", 4)
+    monkeypatch.setattr(http_port, "MOST_CLIENTS", 4)
+    monkeypatch.setattr(http_port, "MOST_TURNED_AWAY", 2)
     parts = urlsplit(cells.url)
     silent = [socket.create_connection((parts.hostname, parts.port), 5) for _ in range(3)]
     with ExitStack() as stack:
@@ -367,8 +374,17 @@ def test_silent_clients_are_bounded_and_keep_nobody_out_for_good(cells, monkeypa
             stack.callback(connection.close)
         with ControlClient(cells.url_of("a")) as client:
             assert client.do("counters")
-            with socket.create_connection((parts.hostname, parts.port), 5) as one_too_many:
-                assert one_too_many.recv(1) == b""
+            with (
+                ControlClient(cells.url_of("a")) as one_too_many,
+                pytest.raises(ConnectError, match="4 clients are connected") as told,
+            ):
+                one_too_many.do("counters")
+            assert told.value.remedy
+            too_silent = [socket.create_connection((parts.hostname, parts.port), 5) for _ in "ab"]
+            with socket.create_connection((parts.hostname, parts.port), 5) as far_too_many:
+                assert far_too_many.recv(1) == b""
+            for connection in too_silent:
+                connection.close()
     # The server sees that they have left a moment later.
     ends = time.monotonic() + 20.0
     while counters_of(cells.url_of("a")) is None:

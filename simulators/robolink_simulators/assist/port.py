@@ -2,7 +2,7 @@
 
 The first line shows the token of the URL, ``{"token": "..."}``; each further one has something
 done: ``{"do": "look"}``. Both are answered with ``{"ok": true, ...}``, what cannot be done with
-``{"ok": false, "error": sentence}`` and, often, a ``"remedy"``: what to do next. A wrong token
+``{"ok": false, "error": sentence, "remedy": what to do next}``. A wrong token
 ends the connection after its answer; a line that is no JSON object, or is longer than
 :data:`LONGEST_LINE` bytes, at once, so that a web page which posts to the port gets nothing
 done. At most :data:`MOST_CLIENTS` are connected: a newcomer
@@ -18,7 +18,7 @@ from typing import Any, Final
 from urllib.parse import urlsplit
 
 from robolink.closing import ClosedAtExit
-from robolink.errors import ConfigError, ConnectError, RobolinkError, TransportBrokenError
+from robolink.errors import ConfigError, RobolinkError
 from robolink.messages import tr
 from robolink_simulators.assist.acts import perform
 from robolink_simulators.assist.entrance import SCHEME, assist_address
@@ -26,15 +26,20 @@ from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.cell.habits import PersonManner
 from robolink_simulators.cell.person import PersonLook
 from robolink_simulators.cell.places import Axis, XyzMm
+from robolink_simulators.client_errors import (
+    ended_unanswered,
+    is_no_simulator,
+    is_silent,
+    nobody_listens,
+)
+from robolink_simulators.control.acts.registry import MACHINE_REFUSALS, machine_refusal
 from robolink_simulators.control.cell import ControlledCell
 from robolink_simulators.control.tokens import drawn_token, is_token
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.epson.refusals import SpelRefusal
 from robolink_simulators.hosting.in_process import epson as in_process
 from robolink_simulators.hosting.in_process import softmotion as plc_in_process
 from robolink_simulators.hosting.streams.tcp_host import TcpHost
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
-from robolink_simulators.softmotion.smc_errors import BlockRefused
 
 LEAST_THINKING_S: Final = 0.35
 """However fast simulated time passes, a person who thinks at all really answers no sooner: a driver
@@ -60,13 +65,19 @@ class AssistHost(TcpHost):
 
     def __init__(self, simulator: Assisted, port: int, clock: ScaledClock, token: str) -> None:
         self._token = token
+        self._assisting = _AssistDevice(simulator, clock, token)
         super().__init__(
-            _AssistDevice(simulator, clock, token),
+            self._assisting,
             SCHEME,
             ("127.0.0.1", port),
             clock=clock,
             lock=simulator.lock,
         )
+
+    @property
+    def requests(self) -> int:
+        """How many lines came, of whomever."""
+        return self._assisting.requests
 
     @property
     def url(self) -> str:
@@ -95,14 +106,14 @@ class _AssistDevice:
     """Implements :class:`~robolink_simulators.hosting.seam.WireDevice`."""
 
     def __init__(self, simulator: Assisted, clock: ScaledClock, token: str) -> None:
-        self._simulator = simulator
-        self._cell = ControlledCell(simulator, clock)
-        self._clock = clock
-        self._token = token
+        self.cell = ControlledCell(simulator, clock)
+        self.clock = clock
+        self.token = token
+        self.requests = 0
         self._links: list[_AssistLink] = []
 
     def connect(self, now_ns: int) -> "_AssistLink":  # noqa: ARG002 - time plays no part
-        link = _AssistLink(self._cell, self._clock, self._token)
+        link = _AssistLink(self)
         self._links = [other for other in self._links if not other.closed]
         if len(self._links) >= MOST_CLIENTS:
             waiting = (other for other in self._links if not other.let_in)
@@ -120,10 +131,8 @@ class _AssistDevice:
 class _AssistLink:
     """Implements :class:`~robolink_simulators.hosting.seam.DeviceLink`."""
 
-    def __init__(self, cell: ControlledCell, clock: ScaledClock, token: str) -> None:
-        self._cell = cell
-        self._clock = clock
-        self._token = token
+    def __init__(self, device: _AssistDevice) -> None:
+        self._device = device
         self._held = b""
         self._out = b""
         self.let_in = False
@@ -135,7 +144,8 @@ class _AssistLink:
         *lines, self._held = (self._held + data).split(b"\n")
         for line in lines:
             if not self.closed:
-                self._cell.simulator.advance(now_ns)
+                self._device.requests += 1
+                self._device.cell.simulator.advance(now_ns)
                 self._out += self._answered(line)
         if len(self._held) > LONGEST_LINE:
             self.closed = True
@@ -156,26 +166,27 @@ class _AssistLink:
             answer = self._performed(request) if self.let_in else self._entered(request)
         except RobolinkError as error:
             answer = {"ok": False, "error": error.what, "remedy": error.remedy}
-        except (SpelRefusal, BlockRefused) as error:
-            answer = {"ok": False, "error": str(error)}
+        except MACHINE_REFUSALS as refused:
+            what, remedy = machine_refusal(refused)
+            answer = {"ok": False, "error": what, "remedy": remedy}
         return json.dumps(answer).encode() + b"\n"
 
     def _entered(self, request: dict[str, Any]) -> dict[str, Any]:
-        self.let_in = is_token(request.get("token"), self._token)
+        self.let_in = is_token(request.get("token"), self._device.token)
         if self.let_in:
             return {"ok": True}
         self.closed = True
         return {"ok": False, "error": tr("That is not the token of this simulator.")}
 
     def _performed(self, request: dict[str, Any]) -> dict[str, Any]:
-        answer: dict[str, Any] = {"ok": True, **perform(self._cell, request)}
+        answer: dict[str, Any] = {"ok": True, **perform(self._device.cell, request)}
         if "thinks_s" in answer:
             answer["thinks_s"] = self._real_thinking_s(answer["thinks_s"])
         return answer
 
     def _real_thinking_s(self, thinks_s: float) -> float:
         """Return how long they think by the clock that really passes, which whoever asks has."""
-        return max(self._clock.really_takes_s(thinks_s), min(thinks_s, LEAST_THINKING_S))
+        return max(self._device.clock.really_takes_s(thinks_s), min(thinks_s, LEAST_THINKING_S))
 
 
 class AssistClient(ClosedAtExit):
@@ -188,18 +199,17 @@ class AssistClient(ClosedAtExit):
     Raises:
         ConfigError: It is not an assist URL, or its token is not that of the simulator.
         ConnectError: Nobody listens there.
+        TransportError, RemoteProtocolError: What listens gives no answer, or that of no simulator.
     """
 
     def __init__(self, url: str, *, timeout_s: float = 5.0) -> None:
         address = assist_address(url)
         self._url = address.shown
+        self._timeout_s = timeout_s
         try:
             self._socket = socket.create_connection((address.host, address.port), timeout_s)
         except OSError as error:
-            raise ConnectError(
-                tr("No simulator listens on {url}.", url=self._url),
-                remedy=tr("Start one with 'robolink sim epson' or 'robolink sim softmotion'."),
-            ) from error
+            raise nobody_listens(self._url) from error
         self._lines = self._socket.makefile("rb")
         try:
             self._enter(address.token)
@@ -213,6 +223,8 @@ class AssistClient(ClosedAtExit):
         Raises:
             ConfigError: The simulator cannot do it, and says why.
             TransportBrokenError: The simulator is gone.
+            TransportTimeoutError: No answer came in time; whether it was done is not known.
+            RemoteProtocolError: What answers is no simulator.
         """
         answer = self._asked({"do": act, **parameters})
         if not answer.pop("ok"):
@@ -267,21 +279,19 @@ class AssistClient(ClosedAtExit):
         try:
             self._socket.sendall(json.dumps(request).encode() + b"\n")
             line = self._lines.readline(_LONGEST_ANSWER)
+        except TimeoutError as error:
+            raise is_silent(self._url, self._timeout_s) from error
         except OSError as error:
-            raise self._broken() from error
+            raise ended_unanswered(self._url) from error
+        if not line:
+            raise ended_unanswered(self._url)
         try:
             answer = json.loads(line)
         except (ValueError, RecursionError) as error:
-            raise self._broken() from error
+            raise is_no_simulator(self._url) from error
         if not isinstance(answer, dict) or "ok" not in answer:
-            raise self._broken()
+            raise is_no_simulator(self._url)
         return answer
-
-    def _broken(self) -> TransportBrokenError:
-        return TransportBrokenError(
-            tr("The simulator at {url} is gone.", url=self._url),
-            remedy=tr("Start it again."),
-        )
 
 
 class InProcessEyes:

@@ -1,16 +1,33 @@
 """The control API from Python, as ``robolink sim ctl`` and tests of one's own use it."""
 
 import json
-from http.client import HTTPConnection, HTTPException
+from collections.abc import Mapping
+from http import HTTPStatus
+from http.client import HTTPConnection, HTTPException, IncompleteRead
+from socket import MSG_PEEK, socket
 from typing import Any, Final
 from urllib.parse import urlsplit
 
 from robolink.closing import ClosedAtExit
-from robolink.errors import ConfigError, ConnectError, TransportBrokenError
+from robolink.errors import ConfigError, ConnectError, RemoteProtocolError, RobolinkError
 from robolink.messages import tr
+from robolink_simulators.client_errors import (
+    ended_unanswered,
+    is_gone,
+    is_no_simulator,
+    is_silent,
+    nobody_listens,
+)
+from robolink_simulators.control.http_port import SCHEMA
 
 _LONGEST_ANSWER: Final = 1 << 23
-_OK: Final = 200
+"""Bytes of an answer that does not say its length: some proxy's."""
+
+_REFUSED_BY: Final[Mapping[int, type[RobolinkError]]] = {
+    HTTPStatus.INTERNAL_SERVER_ERROR: RemoteProtocolError,
+    HTTPStatus.SERVICE_UNAVAILABLE: ConnectError,
+}
+"""What is not the fault of whoever asks."""
 
 
 class ControlClient(ClosedAtExit):
@@ -38,6 +55,7 @@ class ControlClient(ClosedAtExit):
             )
         self._path = f"/{'/'.join(steps)}"
         self._shown = f"http://{host}:{port}"
+        self._timeout_s = timeout_s
         self._connection = HTTPConnection(host, port, timeout=timeout_s)
 
     def do(self, act: str, **given: object) -> dict[str, Any]:
@@ -45,8 +63,10 @@ class ControlClient(ClosedAtExit):
 
         Raises:
             ConfigError: The simulator cannot do it, and says why.
-            ConnectError: Nobody listens there.
+            ConnectError: Nobody listens there, or too many clients are connected.
             TransportBrokenError: The simulator is gone.
+            TransportTimeoutError: No answer came in time; whether it was done is not known.
+            RemoteProtocolError: What answers is no simulator, or has a defect.
         """
         return self._asked("POST", f"/{act}", given)
 
@@ -59,29 +79,66 @@ class ControlClient(ClosedAtExit):
         self._connection.close()
 
     def _asked(self, method: str, path: str, given: dict[str, object]) -> dict[str, Any]:
-        if self._connection.sock is None:
-            self._connect()
+        self._be_connected()
+        body = json.dumps(given) if method == "POST" else None
         try:
-            body = json.dumps(given) if method == "POST" else None
             self._connection.request(method, self._path + path, body)
-            reply = self._connection.getresponse()
-            answer = json.loads(reply.read(_LONGEST_ANSWER))
-        except (OSError, HTTPException, ValueError, RecursionError) as error:
+            with self._connection.getresponse() as reply:
+                read = reply.read(None if reply.length else _LONGEST_ANSWER)
+        except TimeoutError as error:
             self.close()
-            raise TransportBrokenError(
-                tr("The simulator at {url} is gone.", url=self._shown),
-                remedy=tr("Start it again."),
-            ) from error
-        if reply.status != _OK or not isinstance(answer, dict):
-            told = answer if isinstance(answer, dict) else {}
-            raise ConfigError(str(told.get("error", "")), remedy=str(told.get("remedy", "")))
+            raise is_silent(self._shown, self._timeout_s) from error
+        except (OSError, IncompleteRead) as error:
+            self.close()
+            raise ended_unanswered(self._shown) from error
+        except HTTPException as error:
+            self.close()
+            raise is_no_simulator(self._shown) from error
+        if not read:
+            self.close()
+            raise ended_unanswered(self._shown)
+        return self._told(reply.status, read)
+
+    def _told(self, status: int, read: bytes) -> dict[str, Any]:
+        """Return what was answered, or raise what was refused."""
+        try:
+            answer = json.loads(read)
+        except (ValueError, RecursionError):
+            answer = None
+        if not isinstance(answer, dict) or answer.get("schema") != SCHEMA:
+            self.close()
+            raise is_no_simulator(self._shown)
+        if status != HTTPStatus.OK:
+            kind = _REFUSED_BY.get(status, ConfigError)
+            raise kind(str(answer.get("error")), remedy=str(answer.get("remedy")))
         return {name: value for name, value in answer.items() if name not in ("ok", "schema")}
 
-    def _connect(self) -> None:
+    def _be_connected(self) -> None:
+        """Connect, where that has not been done or the simulator has ended a silent connection."""
+        held = self._connection.sock
+        if held is not None and not _has_ended(held):
+            return
+        self.close()
         try:
             self._connection.connect()
         except OSError as error:
-            raise ConnectError(
-                tr("No simulator listens on {url}.", url=self._shown),
-                remedy=tr("Start one with 'robolink sim epson' or 'robolink sim softmotion'."),
-            ) from error
+            raise (nobody_listens if held is None else is_gone)(self._shown) from error
+
+
+def _has_ended(connection: socket) -> bool:
+    """Tell whether the far side ended a connection, or sent what nobody asked for.
+
+    Looked at before each request: one that was sent into an ended connection may, for all that
+    its sender knows, have been carried out.
+    """
+    waits_s = connection.gettimeout()
+    connection.setblocking(False)
+    try:
+        connection.recv(1, MSG_PEEK)
+    except BlockingIOError:
+        return False
+    except OSError:
+        return True
+    finally:
+        connection.settimeout(waits_s)
+    return True

@@ -125,6 +125,7 @@ def _responses() -> dict[str, Any]:
         "403": told("The token is another one.", "Refusal"),
         "404": told("There is no such cell or act.", "Refusal"),
         "409": told("The simulated robot cannot do it.", "Refusal"),
+        "503": told("Too many clients are connected.", "Refusal"),
         "default": told("Refused for another reason: the method, the length.", "Refusal"),
     }
 

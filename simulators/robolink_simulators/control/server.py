@@ -5,41 +5,44 @@ simulated controller, ``cells/NAME``: what it is and which acts it has; ``cells/
 by POST, with what it takes as a JSON object. What changes nothing may be asked by GET, too.
 
 Who does not show the token learns nothing, not even which paths there are, and a web page in a
-browser does not know it. At most :data:`MOST_CLIENTS` are connected at a time, each request is
-at most :data:`LONGEST_REQUEST` bytes, and a connection that is silent ends by itself.
+browser does not know it. How many may be connected, and how long a request may be, stands in
+:mod:`robolink_simulators.control.http_port`.
 """
 
 import json
-import os
 import threading
 from collections.abc import Mapping
 from http import HTTPStatus
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib import metadata
 from importlib.resources import files
-from socket import AF_INET, AF_INET6, SHUT_RDWR, SO_REUSEADDR, SOL_SOCKET, socket
 from typing import Any, Final
 from urllib.parse import parse_qsl, urlsplit
 
 from robolink.closing import ClosedAtExit
 from robolink.errors import ConfigError, ConnectError, RobolinkError
 from robolink.messages import tr
-from robolink_simulators.control.acts.registry import ACTS, UnknownActError, act_named, perform
+from robolink_simulators.control.acts.registry import (
+    ACTS,
+    MACHINE_REFUSALS,
+    UnknownActError,
+    act_named,
+    machine_refusal,
+    perform,
+)
 from robolink_simulators.control.cell import ControlledCell
+from robolink_simulators.control.http_port import (
+    SCHEMA,
+    HttpPort,
+    Reply,
+    error_document,
+    no_request,
+)
 from robolink_simulators.control.tokens import drawn_token, is_token
-from robolink_simulators.epson.refusals import SpelRefusal
 from robolink_simulators.hosting.loopback import require_loopback
 from robolink_simulators.not_now import NotNowError
-from robolink_simulators.softmotion.smc_errors import BlockRefused
 
 VERSION: Final = "v1"
-SCHEMA: Final = "robolink/control/1"
-MOST_CLIENTS: Final = 64
-LONGEST_REQUEST: Final = 65_536
-_SILENCE_S: Final = 60.0
 _MOST_ASKED: Final = 50
-
-_Reply = tuple[HTTPStatus, dict[str, Any]]
 
 
 class ControlServer(ClosedAtExit):
@@ -74,7 +77,7 @@ class ControlServer(ClosedAtExit):
         self._token = drawn_token() if token is None else token
         self._host = address[0]
         try:
-            self._http = _HttpServer(address, self)
+            self._http = HttpPort(address, self.answered)
         except (OSError, OverflowError) as error:
             raise ConnectError(
                 tr(
@@ -110,36 +113,37 @@ class ControlServer(ClosedAtExit):
             self._http.server_close()
             self._thread.join()
 
-    def answered(self, method: str, target: str, body: bytes) -> _Reply:
+    def answered(self, method: str, target: str, body: bytes) -> Reply:
         """Return what a request is answered with."""
         self.requests += 1
         try:
             parts = urlsplit(target)
         except ValueError:  # half an address of IPv6
-            return HTTPStatus.BAD_REQUEST, _error(_no_request(HTTPStatus.BAD_REQUEST))
+            return HTTPStatus.BAD_REQUEST, error_document(*no_request(HTTPStatus.BAD_REQUEST))
         token, *path = parts.path.strip("/").split("/")
         if not is_token(token, self._token):
-            return HTTPStatus.FORBIDDEN, _error(
+            return HTTPStatus.FORBIDDEN, error_document(
                 tr("That is not the token of this simulator."),
                 tr("Take the whole URL that 'robolink sim' prints; each start has its own."),
             )
         try:
             return self._found(method, path, _given(method, parts.query, body))
         except UnknownActError as error:
-            return HTTPStatus.NOT_FOUND, _error(error.what, error.remedy)
+            return HTTPStatus.NOT_FOUND, error_document(error.what, error.remedy)
         except NotNowError as error:
-            return HTTPStatus.CONFLICT, _error(error.what, error.remedy)
+            return HTTPStatus.CONFLICT, error_document(error.what, error.remedy)
         except RobolinkError as error:
-            return HTTPStatus.BAD_REQUEST, _error(error.what, error.remedy)
-        except (SpelRefusal, BlockRefused) as refused:
-            return HTTPStatus.CONFLICT, _error(str(refused))
+            return HTTPStatus.BAD_REQUEST, error_document(error.what, error.remedy)
+        except MACHINE_REFUSALS as refused:
+            return HTTPStatus.CONFLICT, error_document(*machine_refusal(refused))
         except Exception as error:
             # Whoever asked is told, else its client waits for an answer that never comes.
-            return HTTPStatus.INTERNAL_SERVER_ERROR, _error(
-                tr("The simulator failed: {cause}.", cause=f"{type(error).__name__}: {error}")
+            return HTTPStatus.INTERNAL_SERVER_ERROR, error_document(
+                tr("The simulator failed: {cause}.", cause=f"{type(error).__name__}: {error}"),
+                tr("That is a defect of the simulator: please report it."),
             )
 
-    def _found(self, method: str, path: list[str], given: dict[str, Any]) -> _Reply:
+    def _found(self, method: str, path: list[str], given: dict[str, Any]) -> Reply:
         match path:
             case [version, "openapi.json"] if version == VERSION:
                 _require_nothing(given)
@@ -155,17 +159,17 @@ class ControlServer(ClosedAtExit):
             case [version, "cells", name, act] if version == VERSION and name in self.cells:
                 return self._acted(method, self.cells[name], act, given)
             case _:
-                return HTTPStatus.NOT_FOUND, _error(
+                return HTTPStatus.NOT_FOUND, error_document(
                     tr("There is no such address."),
                     tr(
                         "These are known: {known}.", known=", ".join(map(self._path_of, self.cells))
                     ),
                 )
 
-    def _acted(self, method: str, cell: ControlledCell, act: str, given: dict[str, Any]) -> _Reply:
+    def _acted(self, method: str, cell: ControlledCell, act: str, given: dict[str, Any]) -> Reply:
         if method == "GET" and not act_named(cell, act).reads:
-            return HTTPStatus.METHOD_NOT_ALLOWED, _error(
-                tr("{act} changes something: send it by POST.", act=act)
+            return HTTPStatus.METHOD_NOT_ALLOWED, error_document(
+                tr("{act} changes something.", act=act), tr("Send it by POST.")
             )
         return HTTPStatus.OK, _ok(perform(cell, act, given))
 
@@ -252,148 +256,3 @@ def _value(text: str) -> object:
 
 def _ok(answer: Mapping[str, Any]) -> dict[str, Any]:
     return {**answer, "schema": SCHEMA, "ok": True}
-
-
-def _error(what: str, remedy: str = "") -> dict[str, Any]:
-    return {"schema": SCHEMA, "ok": False, "error": what, "remedy": remedy}
-
-
-def _no_request(status: HTTPStatus) -> str:
-    return tr("What came is no request that is answered here: {cause}.", cause=status.phrase)
-
-
-class _HttpServer(ThreadingHTTPServer):
-    """Serves each connection in a thread of its own, a bounded number of them."""
-
-    daemon_threads = True
-    block_on_close = False
-    request_queue_size = 64
-
-    def __init__(self, address: tuple[str, int], control: ControlServer) -> None:
-        self.address_family = AF_INET6 if ":" in address[0] else AF_INET
-        self.control = control
-        self._open: set[socket] = set()
-        self._counting = threading.Lock()
-        super().__init__(address, _Handler)
-
-    def server_bind(self) -> None:
-        """Bind without asking who this machine is, which may take seconds."""
-        if os.name == "posix":
-            # Else nobody can listen here for a minute after one who was connected at the end. On
-            # Windows it would let two programs share the port.
-            self.socket.setsockopt(SOL_SOCKET, SO_REUSEADDR, 1)
-        self.socket.bind(self.server_address)
-        self.server_address = self.socket.getsockname()
-
-    def process_request(self, request: Any, client_address: Any) -> None:  # noqa: ANN401 - as there
-        """Serve a connection, unless there are too many."""
-        with self._counting:
-            room = len(self._open) < MOST_CLIENTS
-            if room:
-                self._open.add(request)
-        if room:
-            super().process_request(request, client_address)
-        else:
-            super().shutdown_request(request)
-
-    def shutdown_request(self, request: Any) -> None:  # noqa: ANN401 - as there
-        """End a connection."""
-        with self._counting:
-            self._open.discard(request)
-        super().shutdown_request(request)
-
-    def end_connections(self) -> None:
-        """End those that are open; their threads see it."""
-        with self._counting:
-            still_open = tuple(self._open)
-        for connection in still_open:
-            try:
-                connection.shutdown(SHUT_RDWR)
-            except OSError:
-                continue  # it has ended by itself
-
-    def handle_error(self, request: Any, client_address: Any) -> None:  # noqa: ANN401 - as there
-        """A client that is gone in the middle is nobody's business."""
-
-
-class _Handler(BaseHTTPRequestHandler):
-    """Reads one request after the other of a connection, and answers it."""
-
-    server: _HttpServer
-    protocol_version = "HTTP/1.1"
-    server_version = "robolink"
-    sys_version = ""
-    timeout = _SILENCE_S
-    disable_nagle_algorithm = True
-
-    def do_GET(self) -> None:
-        """Look."""
-        body = self._body()
-        if body:
-            self._refuse(
-                HTTPStatus.BAD_REQUEST,
-                tr("A GET has its values behind the question mark, not in a body."),
-            )
-        elif body is not None:
-            self._answer("GET", b"")
-
-    def do_POST(self) -> None:
-        """Act."""
-        body = self._body()
-        if body is not None:
-            self._answer("POST", body)
-
-    def _body(self) -> bytes | None:
-        """Return what came with the request; ``None`` where it was refused for that."""
-        lengths = self.headers.get_all("Content-Length", ["0"])
-        length = lengths[0]
-        if (
-            len(lengths) > 1
-            or not (length.isascii() and length.isdigit())
-            or "Transfer-Encoding" in self.headers
-        ):
-            self._refuse(HTTPStatus.LENGTH_REQUIRED, tr("The request says no Content-Length."))
-        elif len(length) > 9 or int(length) > LONGEST_REQUEST:
-            self._refuse(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, tr("The request is too long."))
-        elif len(body := self.rfile.read(int(length))) < int(length):
-            # Its sender is gone in the middle: what it wanted done, nobody knows.
-            self._refuse(HTTPStatus.BAD_REQUEST, tr("The request ended early."))
-        else:
-            return body
-        return None
-
-    def send_error(
-        self,
-        code: int,
-        message: str | None = None,  # noqa: ARG002 - part of the signature
-        explain: str | None = None,  # noqa: ARG002 - part of the signature
-    ) -> None:
-        """Answer what is no request, or one of another method, in JSON as everything else."""
-        self.request_version = self.protocol_version  # or it would get no head
-        if code == HTTPStatus.NOT_IMPLEMENTED:
-            code = HTTPStatus.METHOD_NOT_ALLOWED
-        self._refuse(HTTPStatus(code), _no_request(HTTPStatus(code)))
-
-    def log_message(self, *_: object) -> None:
-        """Print nothing: the URL holds the token."""
-
-    def _refuse(self, status: HTTPStatus, what: str) -> None:
-        self.close_connection = True  # what follows is not read
-        self._send(status, _error(what))
-
-    def _answer(self, method: str, body: bytes) -> None:
-        self._send(*self.server.control.answered(method, self.path, body))
-
-    def _send(self, status: HTTPStatus, document: dict[str, Any]) -> None:
-        data = json.dumps(document).encode()
-        self.send_response(status)
-        self.send_header("Content-Type", "application/json")
-        self.send_header("Content-Length", str(len(data)))
-        self.send_header("Cache-Control", "no-store")
-        if status == HTTPStatus.METHOD_NOT_ALLOWED:
-            self.send_header("Allow", "GET, POST")
-        if self.close_connection:
-            self.send_header("Connection", "close")
-        self.end_headers()
-        if self.command != "HEAD":
-            self.wfile.write(data)

@@ -9,6 +9,7 @@ from robolink_simulators.control.client import ControlClient
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli.commands.simulate.serving import named_values
+from robolink_cli.console.numbers import decimal
 from robolink_cli.console.render import emit_json, json_is_on, say
 
 
@@ -57,7 +58,7 @@ def _typed(text: str) -> bool | int | float | str:
     if text in ("true", "false"):
         return text == "true"
     try:
-        number = float(text)
+        number = decimal(text)
     except ValueError:
         return text
     return int(number) if number.is_integer() and "." not in text else number
@@ -78,7 +79,7 @@ def _shown(value: object) -> str:
 def _parsed(text: str) -> tuple[str, float | int]:
     name, equals, value = text.partition("=")
     try:
-        number = float(value)
+        number = decimal(value)
     except ValueError:
         equals = ""
     if not (name and equals):

@@ -12,10 +12,21 @@ from robolink_simulators.control.acts.plc import MAPPED_ACTS, PLC_ACTS
 from robolink_simulators.control.acts.wire import WIRE_ACTS
 from robolink_simulators.control.acts.world import WORLD_ACTS
 from robolink_simulators.control.cell import ControlledCell
+from robolink_simulators.epson.refusals import SpelRefusal
+from robolink_simulators.softmotion.smc_errors import BlockRefused
 
 
 class UnknownActError(ConfigError):
     """There is no act of that name at this kind of controller."""
+
+
+MACHINE_REFUSALS: Final = (SpelRefusal, BlockRefused)
+"""What an act ends in that the simulated robot cannot do."""
+
+
+def machine_refusal(refused: Exception) -> tuple[str, str]:
+    """Return what one of these says, and what to do next."""
+    return str(refused), tr("Nothing was changed. Ask for what this machine can do.")
 
 
 def _by_name(*families: tuple[ControlAct, ...]) -> dict[str, ControlAct]:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from robolink_simulators.cell.clock import EXCHANGE_S, SteeredClock
 from robolink_simulators.control.cell import AnySimulator, ControlledCell
@@ -13,6 +13,9 @@ from robolink_simulators.plc import PlcSimulator
 from robolink.messages import tr
 from robolink_cli.commands.simulate.serving import Termination, announce, controlled
 from robolink_cli.options.simulation import ServedLife
+
+if TYPE_CHECKING:
+    from robolink_simulators.assist.port import AssistHost
 
 Options = Mapping[str, Any]
 """The values of a command's options, by the names of its parameters."""
@@ -29,13 +32,19 @@ class ServedCell:
     """
 
     controlled: ControlledCell
-    assist: str | None
+    assist: "AssistHost | None"
     about: Mapping[str, object]
+
+    @property
+    def requests(self) -> int:
+        """How much has come to its ports, and left from there, since it was made or reset."""
+        asked = 0 if self.assist is None else self.assist.requests
+        return self.controlled.simulator.log.added + asked
 
     def document(self, control: str) -> dict[str, object]:
         """Return what a script is told of it: URLs, kind, machine and seed."""
         simulator, urls = self.controlled.simulator, dict(self.controlled.urls)
-        person = {} if self.assist is None else {"assist": self.assist}
+        person = {} if self.assist is None else {"assist": self.assist.url}
         where = {"url": next(iter(urls.values())), "urls": urls, **person, "control": control}
         return {**where, "kind": simulator.kind, **self.about, "seed": simulator.seed}
 
@@ -82,7 +91,7 @@ class SimulatedKind:
         if person and not isinstance(simulator, PlcSimulator):
             from robolink_simulators.assist.port import serve_assist
 
-            assist = stack.enter_context(serve_assist(simulator, clock=clock)).url
+            assist = stack.enter_context(serve_assist(simulator, clock=clock))
         return ServedCell(ControlledCell(simulator, clock, urls), assist, self.about(simulator))
 
 
@@ -107,13 +116,13 @@ def serve_alone(kind: SimulatedKind, life: ServedLife, given: Options) -> None:
         control = stack.enter_context(controlled(cells, life, allow_remote=given["allow_remote"]))
         document = served.document(control.url_of("cell"))
         announce(document, [kind.title(simulator), *_told(served, document)], stopped.state_dir)
-        stopped.wait(lambda: simulator.log.added + control.requests)
+        stopped.wait(lambda: served.requests + control.requests)
 
 
 def _told(served: ServedCell, document: Mapping[str, object]) -> list[str]:
     lines = [f"  {link.ljust(10)}  {url}" for link, url in served.controlled.urls.items()]
     if served.assist is not None:
-        lines.append(tr("  assist      {url}", url=served.assist))
+        lines.append(tr("  assist      {url}", url=served.assist.url))
     lines.append(tr("  control     {url}", url=document["control"]))
     if served.controlled.simulator.kind == "plc":
         lines.append(tr('Try: robolink -c "{url}" expert plc check-map', url=document["url"]))

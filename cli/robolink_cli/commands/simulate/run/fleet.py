@@ -137,6 +137,6 @@ def _claims(table: CellTable, cell: PlannedCell) -> Iterator[tuple[str, object]]
         if address is not None and (place := host_and_port(address, ""))[1]:
             yield key, place
     if cell.given.get("state") is not None:
-        yield "state", cell.given["state"].absolute()
+        yield "state", cell.given["state"].resolve()
     if cell.given.get("can") is not None:
         yield "can", (cell.given["can"], cell.given["node"])

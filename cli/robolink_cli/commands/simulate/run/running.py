@@ -67,8 +67,8 @@ def run_cells(path: Path, cells: Sequence[PlannedCell], life: ServedLife) -> Non
         document: dict[str, object] = {"control": control.url, "cells": about}
         lines = _told(path, about, control.url)
         announce(document, lines, stopped.state_dir, schema=SCHEMA)
-        all_of_them = tuple(simulators.values())
-        stopped.wait(lambda: sum(it.log.added for it in all_of_them) + control.requests)
+        all_of_them = tuple(served.values())
+        stopped.wait(lambda: sum(it.requests for it in all_of_them) + control.requests)
 
 
 def _served(stack: ExitStack, cell: PlannedCell, simulator: AnySimulator) -> ServedCell:

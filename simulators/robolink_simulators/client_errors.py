@@ -1,0 +1,61 @@
+"""What the clients of a simulator say when no answer of a simulator comes."""
+
+from robolink.errors import (
+    ConnectError,
+    RemoteProtocolError,
+    TransportBrokenError,
+    TransportTimeoutError,
+)
+from robolink.messages import tr
+
+
+def nobody_listens(url: str) -> ConnectError:
+    """Return the error of a port that takes no connection.
+
+    Args:
+        url: Where, without its token; so in all of these.
+    """
+    return ConnectError(
+        tr("No simulator listens on {url}.", url=url),
+        remedy=tr("Start one with 'robolink sim epson' or 'robolink sim softmotion'."),
+    )
+
+
+def is_gone(url: str) -> TransportBrokenError:
+    """Return the error of one that has answered before and takes no connection any more."""
+    return TransportBrokenError(
+        tr("The simulator at {url} is gone.", url=url),
+        remedy=tr("Start it again."),
+    )
+
+
+def ended_unanswered(url: str) -> TransportBrokenError:
+    """Return the error of a connection that ended before the answer was whole."""
+    return TransportBrokenError(
+        tr("The connection to {url} ended without an answer.", url=url),
+        remedy=tr(
+            "If the simulator still runs, look whether it was done before you repeat it; "
+            "otherwise start it again."
+        ),
+    )
+
+
+def is_silent(url: str, timeout_s: float) -> TransportTimeoutError:
+    """Return the error of an answer that did not come in time."""
+    return TransportTimeoutError(
+        tr("No answer came from {url} within {seconds:g} s.", url=url, seconds=timeout_s),
+        remedy=tr(
+            "If a simulator listens there, look whether it was done before you repeat it; "
+            "otherwise take the URL that 'robolink sim' prints."
+        ),
+    )
+
+
+def is_no_simulator(url: str) -> RemoteProtocolError:
+    """Return the error of an answer that no simulator gives."""
+    return RemoteProtocolError(
+        tr("Something answers on {url}, but it is no simulator of robolink.", url=url),
+        remedy=tr(
+            "Take the URL that 'robolink sim' prints; another program may have this port now."
+        ),
+    )

@@ -1,0 +1,225 @@
+"""The HTTP of the control API: connections, requests, and what is no request.
+
+At most :data:`MOST_CLIENTS` are connected at a time, each request is at most
+:data:`LONGEST_REQUEST` bytes, and a connection that is silent ends by itself.
+"""
+
+import json
+import os
+import threading
+from collections.abc import Callable
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from socket import AF_INET, AF_INET6, SHUT_RDWR, SO_REUSEADDR, SOL_SOCKET, socket
+from typing import Any, Final
+
+from robolink.messages import tr
+
+SCHEMA: Final = "robolink/control/1"
+"""Of each answer, but for the API's own description."""
+
+MOST_CLIENTS: Final = 64
+MOST_TURNED_AWAY: Final = 16
+"""So many more are told that there is no room for them."""
+
+LONGEST_REQUEST: Final = 65_536
+_SILENCE_S: Final = 60.0
+_TURNED_AWAY_S: Final = 5.0
+
+Reply = tuple[HTTPStatus, dict[str, Any]]
+
+
+def error_document(what: str, remedy: str = "") -> dict[str, Any]:
+    """Return what a request is answered with that is not carried out."""
+    return {"schema": SCHEMA, "ok": False, "error": what, "remedy": remedy}
+
+
+def no_request(status: HTTPStatus) -> tuple[str, str]:
+    """Return what happened and what to do next."""
+    return (
+        tr("What came is no request that is answered here: {cause}.", cause=status.phrase),
+        tr("Send GET or POST, as docs/control-api.md explains."),
+    )
+
+
+class HttpPort(ThreadingHTTPServer):
+    """Serves each connection in a thread of its own, a bounded number of them.
+
+    Args:
+        address: Host and port to bind to.
+        answered: Returns what a request is answered with, given its method, target and body.
+
+    Raises:
+        OSError: The port is taken, or the address is not this machine's.
+        OverflowError: There is no such port.
+    """
+
+    daemon_threads = True
+    block_on_close = False
+    request_queue_size = 64
+
+    def __init__(
+        self, address: tuple[str, int], answered: Callable[[str, str, bytes], Reply]
+    ) -> None:
+        self.address_family = AF_INET6 if ":" in address[0] else AF_INET
+        self.answered = answered
+        self._served = set[socket]()
+        self._turned_away = set[socket]()
+        self._counting = threading.Lock()
+        super().__init__(address, _Served)
+
+    def server_bind(self) -> None:
+        """Bind without asking who this machine is, which may take seconds."""
+        if os.name == "posix":
+            # Else nobody can listen here for a minute after one who was connected at the end. On
+            # Windows it would let two programs share the port.
+            self.socket.setsockopt(SOL_SOCKET, SO_REUSEADDR, 1)
+        self.socket.bind(self.server_address)
+        self.server_address = self.socket.getsockname()
+
+    def process_request(self, request: Any, client_address: Any) -> None:  # noqa: ANN401 - as there
+        """Serve a connection, or tell it that there are too many, unless those are too many too."""
+        with self._counting:
+            if len(self._served) < MOST_CLIENTS:
+                self._served.add(request)
+            elif len(self._turned_away) < MOST_TURNED_AWAY:
+                self._turned_away.add(request)
+            else:
+                super().shutdown_request(request)
+                return
+        super().process_request(request, client_address)
+
+    def finish_request(self, request: Any, client_address: Any) -> None:  # noqa: ANN401 - as there
+        """Serve a connection, in its own thread."""
+        handler = _TurnedAway if request in self._turned_away else _Served
+        handler(request, client_address, self)
+
+    def shutdown_request(self, request: Any) -> None:  # noqa: ANN401 - as there
+        """End a connection."""
+        with self._counting:
+            self._served.discard(request)
+            self._turned_away.discard(request)
+        super().shutdown_request(request)
+
+    def end_connections(self) -> None:
+        """End those that are open; their threads see it."""
+        with self._counting:
+            still_open = (*self._served, *self._turned_away)
+        for connection in still_open:
+            try:
+                connection.shutdown(SHUT_RDWR)
+            except OSError:
+                continue  # it has ended by itself
+
+    def handle_error(self, request: Any, client_address: Any) -> None:  # noqa: ANN401 - as there
+        """A client that is gone in the middle is nobody's business."""
+
+
+class _Served(BaseHTTPRequestHandler):
+    """Reads one request after the other of a connection, and answers it."""
+
+    server: HttpPort
+    protocol_version = "HTTP/1.1"
+    server_version = "robolink"
+    sys_version = ""
+    timeout = _SILENCE_S
+    disable_nagle_algorithm = True
+
+    def do_GET(self) -> None:
+        """Look."""
+        body = self._body()
+        if body:
+            self._refuse(
+                HTTPStatus.BAD_REQUEST,
+                tr("A GET has its values behind the question mark, not in a body."),
+                tr("Give them there, or send it by POST."),
+            )
+        elif body is not None:
+            self._answer("GET", b"")
+
+    def do_POST(self) -> None:
+        """Act."""
+        body = self._body()
+        if body is not None:
+            self._answer("POST", body)
+
+    def _body(self) -> bytes | None:
+        """Return what came with the request; ``None`` where it was refused for that."""
+        lengths = self.headers.get_all("Content-Length", ["0"])
+        length = lengths[0]
+        if (
+            len(lengths) > 1
+            or not (length.isascii() and length.isdigit())
+            or "Transfer-Encoding" in self.headers
+        ):
+            self._refuse(
+                HTTPStatus.LENGTH_REQUIRED,
+                tr("The request says no Content-Length."),
+                tr("Give one, a number of bytes, and no Transfer-Encoding."),
+            )
+        elif len(length) > 9 or int(length) > LONGEST_REQUEST:
+            self._refuse(
+                HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
+                tr("The request is too long."),
+                tr("Send {most} bytes or fewer.", most=LONGEST_REQUEST),
+            )
+        elif len(body := self.rfile.read(int(length))) < int(length):
+            # Its sender is gone in the middle: what it wanted done, nobody knows.
+            self._refuse(
+                HTTPStatus.BAD_REQUEST, tr("The request ended early."), tr("Send it whole.")
+            )
+        else:
+            return body
+        return None
+
+    def send_error(
+        self,
+        code: int,
+        message: str | None = None,  # noqa: ARG002 - part of the signature
+        explain: str | None = None,  # noqa: ARG002 - part of the signature
+    ) -> None:
+        """Answer what is no request, or one of another method, in JSON as everything else."""
+        self.request_version = self.protocol_version  # or it would get no head
+        if code == HTTPStatus.NOT_IMPLEMENTED:
+            code = HTTPStatus.METHOD_NOT_ALLOWED
+        self._refuse(HTTPStatus(code), *no_request(HTTPStatus(code)))
+
+    def log_message(self, *_: object) -> None:
+        """Print nothing: the URL holds the token."""
+
+    def _refuse(self, status: HTTPStatus, what: str, remedy: str) -> None:
+        self.close_connection = True  # what follows is not read
+        self._send(status, error_document(what, remedy))
+
+    def _answer(self, method: str, body: bytes) -> None:
+        self._send(*self.server.answered(method, self.path, body))
+
+    def _send(self, status: HTTPStatus, document: dict[str, Any]) -> None:
+        data = json.dumps(document).encode()
+        self.send_response(status)
+        self.send_header("Content-Type", "application/json")
+        self.send_header("Content-Length", str(len(data)))
+        self.send_header("Cache-Control", "no-store")
+        if status == HTTPStatus.METHOD_NOT_ALLOWED:
+            self.send_header("Allow", "GET, POST")
+        if self.close_connection:
+            self.send_header("Connection", "close")
+        self.end_headers()
+        if self.command != "HEAD":
+            self.wfile.write(data)
+
+
+class _TurnedAway(_Served):
+    """Answers a first request, whatever it is, with that there is no room.
+
+    A client reads no answer before it has asked; it would see its connection end, and not why.
+    """
+
+    timeout = _TURNED_AWAY_S
+
+    def _answer(self, method: str, body: bytes) -> None:  # noqa: ARG002 - of those who are served
+        self._refuse(
+            HTTPStatus.SERVICE_UNAVAILABLE,
+            tr("{most} clients are connected to this simulator already.", most=MOST_CLIENTS),
+            tr("Let those end that are done, and try again."),
+        )

@@ -105,3 +105,16 @@ def test_the_keyring_goes_first_when_it_has_an_entry(monkeypatch, ring, identity
     found = _password.find_password(identity)
     assert found is not None
     assert found.reveal() == expected
+
+
+def test_a_keyring_that_fails_in_a_way_of_its_own_is_told_where_nothing_else_has_one(monkeypatch):
+    ring = Ring(RuntimeError("D-Bus is not there"))
+    monkeypatch.setitem(sys.modules, "keyring", ring)
+    monkeypatch.setitem(sys.modules, "keyring.errors", ring)
+    with pytest.raises(errors.ConfigError, match="RuntimeError: D-Bus is not there") as told:
+        _password.find_password(URL)
+    assert "PYTHON_KEYRING_BACKEND" in told.value.remedy
+    monkeypatch.setenv("ROBOLINK_PASSWORD", "from environment")
+    found = _password.find_password(URL)
+    assert found is not None
+    assert found.reveal() == "from environment"

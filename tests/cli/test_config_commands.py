@@ -53,6 +53,13 @@ def test_path_shows_each_place_and_whether_it_is_there(cells, capsys, monkeypatc
     assert f"{cells / 'robolink.toml'}\n    the working folder's: exists" in capsys.readouterr().out
 
 
+def test_nothing_to_check_is_not_right(capsys):
+    code, document = run(capsys, "cell", "validate")
+    assert (code, document["ok"], document["files"]) == (2, False, [])
+    assert main.run(["cell", "validate"]) == 2
+    assert "There is no cell file to check" in capsys.readouterr().out
+
+
 def test_check_finds_all_right(cells, capsys):
     code, document = run(capsys, "config", "check")
     assert code == 0
@@ -97,11 +104,6 @@ def test_check_takes_one_file_that_is_in_use_nowhere(tmp_path, capsys):
     path.unlink()
     assert main.run(["config", "check", str(path)]) == 2
     assert "cannot be read: No such file" in capsys.readouterr().out
-
-
-def test_check_without_files_says_so(capsys):
-    assert main.run(["config", "check"]) == 0
-    assert "There is no cell file" in capsys.readouterr().out
 
 
 def test_show_lists_the_cells(cells, capsys):

@@ -33,13 +33,16 @@ def find_password(
 
     Raises:
         ConfigError: The file cannot be read, is no regular file or is too long, or others than
-            its owner may read it.
+            its owner may read it; or the keyring failed, and nothing else has one.
     """
-    stored = from_keyring(identity)
-    if stored is not None:
-        return stored
     path = password_file or os.environ.get("ROBOLINK_PASSWORD_FILE") or cell_file
-    return from_places(path, cell_variable)
+    try:
+        stored = from_keyring(identity)
+    except ConfigError:
+        if (elsewhere := from_places(path, cell_variable)) is None:
+            raise
+        return elsewhere
+    return from_places(path, cell_variable) if stored is None else stored
 
 
 def from_places(path: str | None, variable: str | None) -> Secret | None:
@@ -60,7 +63,11 @@ def from_places(path: str | None, variable: str | None) -> Secret | None:
 
 
 def from_keyring(identity: str) -> Secret | None:
-    """Return the password that the system's keyring has, None where it has none."""
+    """Return the password that the system's keyring has, None where it has none.
+
+    Raises:
+        ConfigError: The keyring failed in a way of its own, of D-Bus for example.
+    """
     try:
         import keyring
         from keyring.errors import KeyringError
@@ -72,6 +79,15 @@ def from_keyring(identity: str) -> Secret | None:
         # No keyring service, or a locked one, as on most cell computers: the other sources
         # are asked, and without any the controller itself says that it wants a password.
         return None
+    except Exception as error:
+        cause = f"{type(error).__name__}: {error}"
+        raise ConfigError(
+            tr("The system's keyring failed: {cause}.", cause=cause),
+            remedy=tr(
+                "Mend it, or give the password in a file, or set PYTHON_KEYRING_BACKEND to "
+                "keyring.backends.null.Keyring, so that none is asked."
+            ),
+        ) from error
     return None if value is None else Secret(value)
 
 

@@ -229,10 +229,8 @@ def _passwords(outcome: StopOutcome, file: str, variable: str) -> Iterator[str]:
 
     try:
         stored = from_keyring(parse_url(outcome.url).identity)
-    except Exception as error:
-        # What a backend raises by itself, of D-Bus for example, is no reason to send nothing.
-        cause = f"{type(error).__name__}: {error}"
-        outcome.doubts.append(tr("The system's keyring failed: {cause}.", cause=cause))
+    except ConfigError as error:
+        outcome.doubts.append(error.what)
         stored = None
     if stored is not None:
         yield stored.reveal()

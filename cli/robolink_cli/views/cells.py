@@ -43,7 +43,11 @@ def show_files(files: Sequence[Mapping[str, object]]) -> None:
 
 
 def check_payload(file: Path | None) -> dict[str, Any]:
-    """Return what is wrong in one file, or in all that are in use and in how they agree."""
+    """Return what is wrong in one file, or in all that are in use and in how they agree.
+
+    Where there is none, nothing was checked, and that is wrong too: a pipeline in another folder
+    than it should be would go on.
+    """
     paths = [file] if file else [found.path for found in config_files() if found.present]
     files = [_checked(path) for path in paths]
     disagreement = None
@@ -52,7 +56,7 @@ def check_payload(file: Path | None) -> dict[str, Any]:
             _add_refusals(files, file)
         except ConfigError as error:
             disagreement = error.what
-    ok = disagreement is None and all(not entry["problems"] for entry in files)
+    ok = bool(files) and disagreement is None and all(not entry["problems"] for entry in files)
     return {"ok": ok, "files": files, "disagreement": disagreement}
 
 
@@ -66,7 +70,7 @@ def show_check(payload: Mapping[str, Any]) -> None:
     if payload["disagreement"]:
         say(payload["disagreement"])
     if not payload["files"]:
-        say(tr("There is no cell file; 'robolink cell files' shows where one may be."))
+        say(tr("There is no cell file to check; 'robolink cell files' shows where one may be."))
 
 
 def cells_payload(cells: Iterable[Cell]) -> dict[str, Any]:

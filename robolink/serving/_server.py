@@ -76,12 +76,14 @@ class CallbackServer:
             family = socket.AF_INET6 if ":" in host else socket.AF_INET
             self._listener = socket.create_server((host, port), family=family)
         except OSError as error:
+            # Python tells the address once more; before that stands what the system said.
+            said = error.__context__ if isinstance(error.__context__, OSError) else error
             raise ConfigError(
                 tr(
                     "robolink cannot listen at {host}:{port}: {cause}.",
                     host=host,
                     port=port,
-                    cause=error.strerror or error,
+                    cause=said.strerror or said,
                 ),
                 remedy=tr("Give an address of this computer and another port; 0 is any."),
             ) from error
@@ -137,9 +139,13 @@ class CallbackServer:
         with self._lock:
             self._links.add(link)
         thread = threading.Thread(target=self._talk, args=(link, peer), daemon=True)
-        self._threads = [one for one in self._threads if one.is_alive()]
-        self._threads.append(thread)
-        thread.start()
+        try:
+            thread.start()
+        except RuntimeError as error:  # the system gives no further thread just now
+            self._say(tr("{peer} was cut off: {cause}", peer=peer, cause=error))
+            self._end(link)
+            return
+        self._threads = [one for one in self._threads if one.is_alive()] + [thread]
 
     def _refusal(self, peer: str) -> str:
         """Return why a program is cut off unheard; empty where it is admitted."""
@@ -173,9 +179,12 @@ class CallbackServer:
             pass  # the program puts its own value back; what is open stays so in the journal
         finally:
             # Whatever it was: a place that is not given back is one program less for good.
-            with self._lock:
-                self._links.discard(link)
-            link.close()
+            self._end(link)
+
+    def _end(self, link: socket.socket) -> None:
+        with self._lock:
+            self._links.discard(link)
+        link.close()
 
     def _answer_all(self, link: socket.socket, conversation: "CallbackConversation") -> None:
         codec, silent_s = CallbackCodec(), 0.0

@@ -5,6 +5,7 @@ import os
 import socket
 import subprocess
 import sys
+import threading
 from contextlib import ExitStack
 
 import pytest
@@ -179,6 +180,35 @@ def test_an_error_of_the_system_does_not_end_the_listening(listening, monkeypatc
         "No program can call just now: too many files. It is tried again each second.",
         "No program can call just now: aborted. It is tried again each second.",
     ]
+
+
+def test_a_system_without_a_further_thread_does_not_end_the_listening(listening, monkeypatch):
+    server, told = listening()
+    server.start()
+    begin, refused = threading.Thread.start, iter([True] * (MOST_PROGRAMS + 1))
+
+    def start(thread):
+        if next(refused, False):
+            raise RuntimeError("can't start new thread")
+        begin(thread)
+
+    monkeypatch.setattr(threading.Thread, "start", start)
+    # As often as there are places: each of them is given back.
+    for _ in range(MOST_PROGRAMS + 1):
+        with socket.create_connection(server.address, timeout=10) as link:
+            assert link.recv(1) == b""
+    with socket.create_connection(server.address, timeout=10) as link:
+        assert greeted(link)
+    assert told == ["127.0.0.1 was cut off: can't start new thread"] * (MOST_PROGRAMS + 1)
+
+
+def test_an_address_that_is_taken_is_told_once():
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        with pytest.raises(ConfigError) as told:
+            CallbackServer("127.0.0.1", port, conversation)
+    assert "(" not in told.value.what
+    assert told.value.what.count("127.0.0.1") == 1
 
 
 def test_a_console_that_fails_does_not_end_the_listening(monkeypatch):

@@ -19,7 +19,7 @@ from typing import Any, Final
 from urllib.parse import parse_qsl, urlsplit
 
 from robolink.closing import ClosedAtExit
-from robolink.errors import ConfigError, ConnectError, RobolinkError
+from robolink.errors import ConfigError, RobolinkError
 from robolink.messages import tr
 from robolink_simulators.control.acts.registry import (
     ACTS,
@@ -38,7 +38,7 @@ from robolink_simulators.control.http_port import (
     no_request,
 )
 from robolink_simulators.control.tokens import drawn_token, is_token
-from robolink_simulators.hosting.loopback import require_loopback
+from robolink_simulators.hosting.addresses import cannot_listen, require_loopback
 from robolink_simulators.not_now import NotNowError
 
 VERSION: Final = "v1"
@@ -79,15 +79,7 @@ class ControlServer(ClosedAtExit):
         try:
             self._http = HttpPort(address, self.answered)
         except (OSError, OverflowError) as error:
-            raise ConnectError(
-                tr(
-                    "The simulator cannot listen on {host} port {port}: {cause}.",
-                    host=address[0],
-                    port=address[1],
-                    cause=getattr(error, "strerror", None) or error,
-                ),
-                remedy=tr("Use another port; 0 takes a free one."),
-            ) from error
+            raise cannot_listen(*address, error) from error
         self._closed = False
         self._thread = threading.Thread(
             target=self._http.serve_forever, args=(0.2,), name="control", daemon=True

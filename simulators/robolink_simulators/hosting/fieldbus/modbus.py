@@ -4,13 +4,11 @@ from typing import Final
 from urllib.parse import urlencode
 
 from robolink.closing import ClosedAtExit
-from robolink.errors import ConnectError
-from robolink.messages import tr
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.faults import LinkKind
+from robolink_simulators.hosting.addresses import cannot_listen, require_loopback
 from robolink_simulators.hosting.fieldbus.modbus_server import ModbusServerThread, SerialLine
 from robolink_simulators.hosting.fieldbus.plc_registers import PlcRegisters
-from robolink_simulators.hosting.loopback import require_loopback
 from robolink_simulators.hosting.streams.serial_cable import (
     PTY_LINE,
     SerialCable,
@@ -94,10 +92,7 @@ def serve_modbus_tcp(
     try:
         server = ModbusServerThread(PlcRegisters(simulator, clock), clock, (host, port))
     except (OSError, OverflowError) as error:
-        raise ConnectError(
-            tr("The simulator cannot listen on {host} port {port}.", host=host, port=port),
-            remedy=tr("Use another port; 0 takes a free one."),
-        ) from error
+        raise cannot_listen(host, port, error) from error
     shown = f"[{host}]" if ":" in host else host
     options = _client_options(simulator.options.mailbox)
     url = f"softmotion+modbus-tcp://{shown}:{server.port}{_query(options)}"

@@ -56,6 +56,18 @@ class SerialLine:
     unit: int
 
 
+def _reason(place: tuple[str, int] | SerialLine, told: RuntimeError) -> OSError | OverflowError:
+    """Return why nothing can listen there: the server knew, and keeps it to itself."""
+    try:
+        if not isinstance(place, SerialLine):
+            family = socket.AF_INET6 if ":" in place[0] else socket.AF_INET
+            with socket.socket(family) as another:
+                another.bind(place)
+    except (OSError, OverflowError) as reason:
+        return reason
+    return OSError(str(told).rstrip("."))
+
+
 class ModbusServerThread:
     """Serves registers until it is closed.
 
@@ -65,7 +77,7 @@ class ModbusServerThread:
         place: Host and port to listen on, or a serial port.
 
     Raises:
-        OSError: It cannot listen there.
+        OSError, OverflowError: It cannot listen there.
     """
 
     def __init__(
@@ -127,8 +139,8 @@ class ModbusServerThread:
         self._watch_connections(server)
         try:
             await server.serve_forever(background=True)
-        except RuntimeError as error:  # it keeps the reason to itself
-            raise OSError(str(error)) from error
+        except RuntimeError as error:
+            raise _reason(place, error) from None
         return server
 
     async def _stopped(self) -> None:

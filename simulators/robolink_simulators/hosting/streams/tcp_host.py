@@ -8,10 +8,8 @@ import time
 from contextlib import AbstractContextManager
 from typing import Final
 
-from robolink.errors import ConnectError
-from robolink.messages import tr
 from robolink_simulators.cell.clock import ScaledClock
-from robolink_simulators.hosting.loopback import require_loopback
+from robolink_simulators.hosting.addresses import cannot_listen, require_loopback
 from robolink_simulators.hosting.seam import WireDevice
 from robolink_simulators.hosting.streams.connection import Connection
 from robolink_simulators.hosting.streams.wire_host import WireHost
@@ -116,13 +114,5 @@ def _listening(address: tuple[str, int], *, allow_remote: bool) -> socket.socket
         listener.setblocking(False)
     except (OSError, OverflowError) as error:
         listener.close()
-        raise ConnectError(
-            tr(
-                "The simulator cannot listen on {host} port {port}: {cause}.",
-                host=host,
-                port=port,
-                cause=getattr(error, "strerror", None) or error,
-            ),
-            remedy=tr("Use another port; 0 takes a free one."),
-        ) from error
+        raise cannot_listen(host, port, error) from error
     return listener

@@ -274,6 +274,26 @@ def test_what_cannot_be_done_now_is_told_apart_from_what_was_asked_wrongly(
     assert told["remedy"]
 
 
+def test_what_a_controller_cannot_keep_is_refused_and_noted(tmp_path):
+    """Whoever serves it ends it then; until that such an act says why."""
+    kept = tmp_path / "kept/plc.json"
+    simulator = SoftMotionSimulator(state_path=kept)
+    cell = ControlledCell(simulator, ManualClock())
+    with ControlServer({"a": cell}) as server, ControlClient(server.url_of("a")) as control:
+        control.do("restart")
+        assert simulator.failure is None
+        kept.unlink()
+        kept.parent.rmdir()
+        kept.parent.write_text("in its place")
+        for _ in "ab":
+            with pytest.raises(ConfigError, match="cannot save its state") as told:
+                control.do("restart")
+            assert "a folder that can be written" in told.value.remedy
+            assert str(simulator.failure) == str(told.value)
+        path = f"{urlsplit(server.url).path}/cells/a/restart"
+        assert raw(server, "POST", path)[0] == 409
+
+
 def exchanged(cells, sent, *, then_closes=False):
     """Send bytes as they are, and return the head and the document of the answer."""
     parts = urlsplit(cells.url)

@@ -13,6 +13,7 @@ from robolink_simulators.device.motion_log import StartedMotion
 from robolink_simulators.device.wire_record import WireRecord
 from robolink_simulators.device.wire_time import WireClock, WireTime
 from robolink_simulators.not_now import NotNowError
+from robolink_simulators.state_files import StateNotKeptError
 
 RequestHook = Callable[[int, str], None]
 """Called with the running number of a request and a text, passwords hidden."""
@@ -146,6 +147,11 @@ class HostedDevice(ABC):
     def executes_program(self) -> bool:
         """Whether it executes a program that was loaded, whose variables no snapshot holds."""
         return False
+
+    @property
+    def failure(self) -> StateNotKeptError | None:
+        """Why it can keep its state no longer; whoever serves it ends it then."""
+        return None
 
     @property
     @abstractmethod

@@ -42,6 +42,7 @@ from robolink_simulators.epson.world import World
 from robolink_simulators.faults import Fault, FaultPlan
 from robolink_simulators.faults.links import EPSON_LINKS
 from robolink_simulators.serial_numbers import drawn_serial
+from robolink_simulators.state_files import StateNotKeptError
 
 
 class EpsonSimulator(TimeStepping):
@@ -306,6 +307,11 @@ class EpsonSimulator(TimeStepping):
 
     def _truth(self) -> dict[str, Any]:
         return self.world.truth()
+
+    @property
+    def failure(self) -> StateNotKeptError | None:
+        """See :attr:`~robolink_simulators.device.hosted.HostedDevice.failure`."""
+        return self._flash.failure if self.durable else None
 
     @property
     def executes_program(self) -> bool:

@@ -34,6 +34,7 @@ from robolink_simulators.softmotion.mailbox.words.exchange import (
 )
 from robolink_simulators.softmotion.mailbox.words.fieldbus_watchdog import FieldbusWatchdog
 from robolink_simulators.softmotion.world import SoftMotionWorld
+from robolink_simulators.state_files import StateNotKeptError
 
 DEFAULT_KINEMATICS: Final = "Kin_Scara3_Z"
 
@@ -122,6 +123,11 @@ class SoftMotionSimulator(HostedDevice):
             self._make_ready()
         self._changes_before = self._slot_changes()
         self._file.save_changes()
+
+    @property
+    def failure(self) -> StateNotKeptError | None:
+        """See :attr:`HostedDevice.failure`."""
+        return self._file.failure
 
     @property
     def executes_program(self) -> bool:

@@ -412,6 +412,72 @@ def test_silent_clients_are_bounded_and_keep_nobody_out_for_good(cells, monkeypa
     assert MOST_CLIENTS >= 16
 
 
+def connected(cells):
+    parts = urlsplit(cells.url)
+    return socket.create_connection((parts.hostname, parts.port), 10)
+
+
+def test_where_all_places_are_taken_who_has_asked_nothing_makes_way(cells, monkeypatch):
+    monkeypatch.setattr(http_port, "MOST_CLIENTS", 4)
+    monkeypatch.setattr(http_port, "_BEFORE_ASKING_S", 0.0)
+    with ExitStack() as stack:
+        asked = stack.enter_context(ControlClient(cells.url_of("a")))
+        assert asked.do("counters")
+        kept = asked._connection.sock
+        slow = [stack.enter_context(connected(cells)) for _ in range(8)]
+        for connection in slow[-3:]:
+            connection.sendall(b"GET /the-token/v1")
+        for name in "abc":
+            assert stack.enter_context(ControlClient(cells.url_of(name))).do("counters")
+        for connection in slow:
+            assert connection.recv(1) == b""
+        assert asked.do("counters")
+        assert asked._connection.sock is kept
+        with (
+            ControlClient(cells.url_of("a")) as one_too_many,
+            pytest.raises(ConnectError, match="4 clients are connected"),
+        ):
+            one_too_many.do("counters")
+
+
+def test_who_sends_a_byte_now_and_then_is_cut_off_like_who_sends_none(cells, monkeypatch):
+    monkeypatch.setattr(http_port._Served, "timeout", 0.3)
+    with connected(cells) as slow:
+        slow.settimeout(0.05)
+        for _ in range(400):
+            try:
+                slow.sendall(b"G")
+                assert slow.recv(1) == b""
+            except TimeoutError:
+                continue  # not yet
+            except OSError:
+                pass  # cut off with a byte under way
+            break
+        else:
+            pytest.fail("it has a place for good")
+
+
+def test_who_takes_no_answer_is_cut_off(cells, monkeypatch):
+    monkeypatch.setattr(http_port._Served, "timeout", 0.3)
+    simulator = cells.cells["a"].simulator
+    for number in range(2000):
+        simulator.log.add(number, ">", "x" * 500)
+    with connected(cells) as deaf:
+        path = f"{urlsplit(cells.url).path}/cells/a/log"
+        deaf.sendall(f"GET {path} HTTP/1.1\r\n\r\n".encode() * 20)
+        assert counters_of(cells.url_of("a"))
+        ends = time.monotonic() + 30.0
+        while cells._http._served:
+            assert time.monotonic() < ends
+            time.sleep(0.01)
+    simulator.reset()
+
+
+def test_who_shows_another_token_keeps_no_place(cells):
+    reply, told = exchanged(cells, b"GET /another/v1 HTTP/1.1\r\n\r\n")
+    assert (reply.status, reply.headers["Connection"], told["ok"]) == (403, "close", False)
+
+
 def test_it_listens_where_only_this_machine_reaches_it():
     cell = {"a": ControlledCell(EpsonSimulator())}
     with pytest.raises(ConfigError, match="other machines"):

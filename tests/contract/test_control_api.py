@@ -14,6 +14,7 @@ import pytest
 from robolink_cli import main
 from robolink_simulators.cell.clock import ManualClock, SteeredClock
 from robolink_simulators.control import http_port
+from robolink_simulators.control.acts import wire
 from robolink_simulators.control.acts.registry import ACTS
 from robolink_simulators.control.cell import ControlledCell
 from robolink_simulators.control.client import ControlClient
@@ -21,6 +22,7 @@ from robolink_simulators.control.http_port import LONGEST_REQUEST, MOST_CLIENTS
 from robolink_simulators.control.openapi import openapi
 from robolink_simulators.control.server import ControlServer
 from robolink_simulators.epson import EpsonSimulator
+from robolink_simulators.faults import counted
 from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 from robolink_simulators.plc import PlcSimulator
@@ -170,6 +172,25 @@ def test_sim_ctl_takes_for_a_text_what_is_one(cells, at, capsys):
     for no_number in ("inf", "1_0"):
         assert ctl("step", f"seconds={no_number}") == 2
         assert "step needs seconds, a number from 0" in capsys.readouterr().err
+
+
+def test_what_happened_and_what_waits_is_bounded(at, monkeypatch):
+    monkeypatch.setattr(wire, "_MOST_PENDING", 12)
+    monkeypatch.setattr(wire, "MOST_FIRED", 3)
+    monkeypatch.setattr(counted, "MOST_FIRED", 3)
+    control, simulator = at("a")
+    assert len(control.do("add_fault", action="drop_reply", times=10)["pending"]) == 10
+    with pytest.raises(ConfigError, match="10 faults wait already") as told:
+        control.do("add_fault", action="delay", times=3)
+    assert "clear_faults" in told.value.remedy
+    for _ in range(10):
+        assert simulator.faults.take("$GetStatus")
+    told = control.do("faults")
+    assert [fault["on_exchange"] for fault in told["fired"]] == [7, 8, 9]
+    assert (told["times_fired"], told["pending"]) == (10, [])
+    assert len(simulator.faults.fired) <= 6
+    control.do("reset")
+    assert control.do("faults") == {"fired": [], "times_fired": 0, "pending": []}
 
 
 def test_time_is_paused_stepped_and_hastened(at):

@@ -133,6 +133,58 @@ def test_writes_and_starts_are_counted_alike(served):
     assert (counted["exchanges"], counted["tool_writes"], counted["starts"]) == (0, 0, 1)
 
 
+def test_what_is_counted_goes_on_when_it_goes_back(served):
+    """Whoever looks at two counts sees what there was between them, whatever else was done."""
+    write(served, -31.0)
+    moment = served.simulator.kept_moment()
+    write(served, -32.0)
+    served.simulator.restart()
+    counted, lines = served.simulator.counters(), served.simulator.log.added
+    served.simulator.go_back(moment)
+    assert served.simulator.counters() == counted
+    assert served.simulator.log.added == lines
+    write(served, -33.0)
+    served.simulator.restart()
+    later = served.simulator.counters()
+    assert later["exchanges"] > counted["exchanges"]
+    del later["exchanges"]
+    starts, writes = counted["starts"] + 1, counted["tool_writes"] + 1
+    assert later == {"moves_started": 0, "tool_writes": writes, "starts": starts, "touches": 0}
+
+
+@pytest.mark.parametrize("kind", ["epson", "softmotion"])
+def test_motions_are_numbered_on_when_it_goes_back(kind):
+    simulator = EpsonSimulator(seed=4) if kind == "epson" else SoftMotionSimulator(seed=4)
+
+    def move():
+        simulator._motion_log().add(simulator.now_ns)
+        return simulator.counters()["moves_started"], [it.number for it in simulator.motions()]
+
+    moment = simulator.kept_moment()
+    assert [move(), move()] == [(1, [1]), (2, [1, 2])]
+    simulator.go_back(moment)
+    assert list(simulator.motions()) == []
+    assert [move(), move()] == [(3, [3]), (4, [3, 4])]
+    assert [it.number for it in simulator.motions(3)] == [4]
+    simulator.reset()
+    assert move() == (1, [1])
+
+
+@pytest.mark.parametrize("kind", [EpsonSimulator, SoftMotionSimulator])
+def test_what_a_file_tells_of_earlier_is_not_counted(kind, tmp_path):
+    for _ in "ab":
+        simulator = kind(state_path=tmp_path / "cell.json")
+        names = ("exchanges", "moves_started", "tool_writes", "touches")
+        assert simulator.counters() == {**dict.fromkeys(names, 0), "starts": 1}
+        with simulator.acting():
+            if isinstance(simulator, EpsonSimulator):
+                simulator.machine.tools.set(3, ToolOffset(1, 2, 3))
+                simulator._flash.save_changes()
+            else:
+                simulator.plc.memory.define(3, (1.0, 2.0, 3.0, 0.0, 0.0, 0.0), "T")
+        assert simulator.counters()["tool_writes"] == 1
+
+
 @pytest.mark.parametrize("kind", [EpsonSimulator, SoftMotionSimulator])
 def test_a_state_that_cannot_be_kept_is_refused_before_anybody_is_served(kind, tmp_path):
     kind(state_path=tmp_path / "not" / "yet" / "there" / "cell.json")

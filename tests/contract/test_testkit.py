@@ -273,7 +273,7 @@ def test_what_crossed_the_wire_and_what_moved_is_asserted(epson_sim):
         epson_sim.wire.assert_not_sent("TLSet 2, XY")
     epson_sim.motions.assert_none()
     simulator = epson_sim.simulator
-    simulator.machine.arm.motions.add(0, lambda: (1.0, 2.0, 3.0))
+    simulator.machine.motions.add(0, lambda: (1.0, 2.0, 3.0))
     with pytest.raises(AssertionError, match=r"(?s)1 motions began.*to 1\.000 2\.000 3\.000"):
         epson_sim.motions.assert_none()
 

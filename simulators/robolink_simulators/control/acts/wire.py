@@ -3,6 +3,7 @@
 from dataclasses import asdict
 from typing import Any, Final
 
+from robolink.messages import tr
 from robolink_simulators.control.acts.declared import Answer, ControlAct, Given, Taken
 from robolink_simulators.control.cell import ControlledCell
 from robolink_simulators.faults import (
@@ -12,8 +13,11 @@ from robolink_simulators.faults import (
     fault_as_keys,
     faults_of_table,
 )
+from robolink_simulators.faults.counted import MOST_FIRED
 from robolink_simulators.faults.links import LinkKind
+from robolink_simulators.not_now import NotNowError
 
+_MOST_PENDING: Final = 10_000
 _AFTER: Final = Taken("after", needed=False, least=0, most=1e15)
 _ACTIONS: Final = tuple(sorted({action.name.lower() for action in (*FaultAction, *PlcFaultAction)}))
 
@@ -38,7 +42,8 @@ def _faults(cell: ControlledCell, _given: Given) -> Answer:
     """Tell the planned faults that have happened, and those that wait."""
     faults = cell.simulator.faults
     return {
-        "fired": [fault_as_keys(fault) for fault in faults.fired],
+        "fired": [fault_as_keys(fault) for fault in faults.fired[-MOST_FIRED:]],
+        "times_fired": faults.times_fired,
         "pending": [fault_as_keys(fault) for fault in faults.pending],
     }
 
@@ -49,6 +54,12 @@ def _add_fault(cell: ControlledCell, given: Given) -> Answer:
     times, first = table.pop("times", 1), table.get("on_exchange", 0)
     tables = [{**table, "on_exchange": first + further} for further in range(times)]
     planned: Any = cell.simulator.faults
+    wait = len(planned.pending)
+    if wait + times > _MOST_PENDING:
+        raise NotNowError(
+            tr("{count} faults wait already.", count=wait),
+            remedy=tr("Let them happen, or forget them with clear_faults."),
+        )
     for fault in _possible(tables, cell.links):
         planned.add(fault)
     return _faults(cell, {})

@@ -1,7 +1,8 @@
 """The simulated PLC: a program behind a Modbus server."""
 
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import fields
+from math import isfinite
 from typing import Any, Final
 
 from robolink.model import ToolOffset
@@ -189,9 +190,7 @@ class PlcSimulator(HostedDevice):
     def _truth(self) -> dict[str, Any]:
         selected = self.register_map.selected
         return {
-            "stored": {
-                str(tool): asdict(_offset(held)) for tool, held in self.program.in_force.items()
-            },
+            "stored": {str(tool): _offset(held) for tool, held in self.program.in_force.items()},
             "selected_tool": selected
             and self.program.memory.read(
                 selected.table, range(selected.address, selected.address + 1)
@@ -210,6 +209,7 @@ class PlcSimulator(HostedDevice):
         self.program.put_back(held["program"])
 
 
-def _offset(components: Mapping[str, float]) -> ToolOffset:
-    angles = (components.get(name, 0.0) for name in ("u", "v", "w"))
-    return ToolOffset(*(components.get(name, 0.0) for name in ("x", "y", "z")), *angles)
+def _offset(components: Mapping[str, float]) -> dict[str, float | None]:
+    """Return a tool as it is told; a client may have written what is no number."""
+    named = ((it.name, components.get(it.name[0], 0.0)) for it in fields(ToolOffset))
+    return {name: value if isfinite(value) else None for name, value in named}

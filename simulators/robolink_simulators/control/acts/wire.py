@@ -4,6 +4,7 @@ from dataclasses import asdict
 from typing import Any, Final
 
 from robolink.messages import tr
+from robolink_simulators.control.acts.answers import FaultsTold, LinesTold, MotionsTold
 from robolink_simulators.control.acts.declared import Answer, ControlAct, Given, Taken
 from robolink_simulators.control.cell import ControlledCell
 from robolink_simulators.faults import (
@@ -82,9 +83,9 @@ def _clear_faults(cell: ControlledCell, _given: Given) -> Answer:
 
 
 WIRE_ACTS: Final = (
-    ControlAct("log", _log, (_AFTER,), reads=True),
-    ControlAct("motions", _motions, (_AFTER,), reads=True),
-    ControlAct("faults", _faults, reads=True),
+    ControlAct("log", _log, (_AFTER,), reads=True, gives=LinesTold),
+    ControlAct("motions", _motions, (_AFTER,), reads=True, gives=MotionsTold),
+    ControlAct("faults", _faults, reads=True, gives=FaultsTold),
     ControlAct(
         "add_fault",
         _add_fault,
@@ -99,7 +100,8 @@ WIRE_ACTS: Final = (
             Taken("code", "whole", needed=False),
             Taken("order", "text", needed=False),
         ),
+        gives=FaultsTold,
     ),
-    ControlAct("clear_faults", _clear_faults),
+    ControlAct("clear_faults", _clear_faults, gives=FaultsTold),
 )
 """Acts upon the wire."""

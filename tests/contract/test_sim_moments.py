@@ -1,7 +1,9 @@
 """Every simulated controller is made anew, and goes back to a moment, while it is served."""
 
 import json
-from contextlib import ExitStack
+import socket
+import time
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
@@ -77,6 +79,23 @@ def test_it_is_made_anew_as_another_controller(served):
     assert not served.simulator.faults.pending
     assert served.simulator.truth() == at_first
     assert write(served, -32.0) != who
+
+
+def test_who_asked_before_it_was_made_anew_is_not_answered_by_the_new_one(served):
+    """A request is under way while the controller is replaced: its connection has ended."""
+    host, _, port = served.url.partition("://")[2].partition("?")[0].rpartition(":")
+    asked = b"$Login,\r\n" if served.kind == "epson" else bytes.fromhex("000100000006010400140002")
+    with socket.create_connection((host, int(port)), 10) as client:
+        client.sendall(asked)
+        assert client.recv(100)
+        with served.simulator.lock:
+            client.sendall(asked)
+            time.sleep(0.05)  # it waits for the controller by then, else it is cut off all the same
+            served.simulator.reset()
+        with suppress(ConnectionResetError):
+            assert client.recv(100) == b""
+    assert served.simulator.counters()["exchanges"] == 0
+    write(served, -31.0)
 
 
 def test_it_goes_back_to_a_moment_as_the_same_controller(served):

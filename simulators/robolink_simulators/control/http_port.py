@@ -66,7 +66,7 @@ class HttpPort(ThreadingHTTPServer):
 
     daemon_threads = True
     block_on_close = False
-    request_queue_size = 64
+    request_queue_size = 512  # whoever finds no room tries again only a second later
 
     def __init__(
         self, address: tuple[str, int], answered: Callable[[str, str, bytes], Reply]

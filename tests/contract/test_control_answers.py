@@ -172,6 +172,7 @@ def test_the_check_of_a_schema_sees_what_is_wrong():
         "fired": [{"action": "delay"}],
         "times_fired": 1,
         "pending": [],
+        "waiting": 0,
         "schema": "robolink/control/1",
         "ok": True,
     }

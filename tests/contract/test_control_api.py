@@ -190,7 +190,11 @@ def test_what_happened_and_what_waits_is_bounded(at, monkeypatch):
     assert (told["times_fired"], told["pending"]) == (10, [])
     assert len(simulator.faults.fired) <= 6
     control.do("reset")
-    assert control.do("faults") == {"fired": [], "times_fired": 0, "pending": []}
+    nothing = {"fired": [], "times_fired": 0, "pending": [], "waiting": 0}
+    assert control.do("faults") == nothing
+    monkeypatch.setattr(wire, "_MOST_TOLD", 2)
+    told = control.do("add_fault", action="drop_reply", times=3)
+    assert (len(told["pending"]), told["waiting"]) == (2, 3)
 
 
 def test_time_is_paused_stepped_and_hastened(at):

@@ -215,12 +215,14 @@ class FaultsTold:
     Attributes:
         fired: The last that have happened, oldest first.
         times_fired: How many have happened.
-        pending: Those that wait, in the order in which they were planned.
+        pending: The first of those that wait, in the order in which they were planned.
+        waiting: How many wait.
     """
 
     fired: tuple[FaultKeys, ...]
     times_fired: int
     pending: tuple[FaultKeys, ...]
+    waiting: int
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,6 +19,7 @@ from robolink_simulators.faults.links import LinkKind
 from robolink_simulators.not_now import NotNowError
 
 _MOST_PENDING: Final = 10_000
+_MOST_TOLD: Final = 2000
 _AFTER: Final = Taken("after", needed=False, least=0, most=1e15)
 _ACTIONS: Final = tuple(sorted({action.name.lower() for action in (*FaultAction, *PlcFaultAction)}))
 
@@ -42,10 +43,12 @@ def _number(given: Given) -> int:
 def _faults(cell: ControlledCell, _given: Given) -> Answer:
     """Tell the planned faults that have happened, and those that wait."""
     faults = cell.simulator.faults
+    pending = faults.pending
     return {
         "fired": [fault_as_keys(fault) for fault in faults.fired[-MOST_FIRED:]],
         "times_fired": faults.times_fired,
-        "pending": [fault_as_keys(fault) for fault in faults.pending],
+        "pending": [fault_as_keys(fault) for fault in pending[:_MOST_TOLD]],
+        "waiting": len(pending),
     }
 
 

@@ -285,7 +285,11 @@ def test_a_cell_is_put_back_between_two_looks(epson_sim, softmotion_sim, fault_p
         cell.snapshot("written")
         cell.do("change_nozzle")
         fault_plan(cell, "drop_reply")
+        cell.simulator._motion_log().add(0)
+        assert cell.motions.count == 1
         cell.put_back()
+        assert {**cell.do("counters"), "starts": 0} == dict.fromkeys(cell.do("counters"), 0)
+        cell.motions.assert_none()
         assert cell.truth() == at_first
         assert not cell.wire.lines
         assert fault_plan(cell)["pending"] == []

@@ -122,7 +122,13 @@ class HostedDevice(ABC):
         self._require_renewable()
         with self.acting():
             self._renew()
-            self.exchanges = self._requests = 0
+            self._requests = 0
+            self.forget_past()
+
+    def forget_past(self) -> None:
+        """Count from the beginning again, with an empty log; nothing else is changed."""
+        with self.lock:
+            self.exchanges = 0
             self._count_on()
             self.log.clear()
 

@@ -4,29 +4,54 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 
-from robolink.errors import ConfigError
 from robolink.files.durable import sync_folder, write_whole
 from robolink.messages import tr
+from robolink_simulators.not_now import NotNowError
 
 
-def save_state(path: Path, document: Mapping[str, object]) -> None:
-    """Put a new state in the place of the old one; a crash leaves one of them whole.
+class StateNotKeptError(NotNowError):
+    """A file of a state cannot be written, so what was changed would not outlive a restart."""
 
-    Its folder is made where there is none.
 
-    Raises:
-        ConfigError: It cannot be written.
+class StateFile:
+    """The file that stands for flash or retained memory.
+
+    A controller whose memory is broken and goes on as if nothing were would make a test green
+    that is not: whoever serves it looks at :attr:`failure`, and ends it.
+
+    Args:
+        path: Where; ``None`` keeps nothing.
+
+    Attributes:
+        path: Where.
+        failure: Why something could not be kept; ``None`` as long as all was.
     """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(path, json.dumps(document).encode())
-        sync_folder(path.parent)
-    except OSError as error:
-        raise ConfigError(
-            tr(
-                "The simulator cannot save its state in {path}: {cause}.",
-                path=path,
-                cause=error.strerror or error,
-            ),
-            remedy=tr("Name a file in a folder that can be written."),
-        ) from error
+
+    def __init__(self, path: Path | None) -> None:
+        self.path = path
+        self.failure: StateNotKeptError | None = None
+
+    def save(self, document: Mapping[str, object]) -> None:
+        """Put a new state in the place of the old one; a crash leaves one of them whole.
+
+        Its folder is made where there is none.
+
+        Raises:
+            StateNotKeptError: It cannot be written.
+        """
+        if self.path is None:
+            return
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            write_whole(self.path, json.dumps(document).encode())
+            sync_folder(self.path.parent)
+        except OSError as error:
+            self.failure = StateNotKeptError(
+                tr(
+                    "The simulator cannot save its state in {path}: {cause}.",
+                    path=self.path,
+                    cause=error.strerror or error,
+                ),
+                remedy=tr("Name a file in a folder that can be written."),
+            )
+            raise self.failure from error

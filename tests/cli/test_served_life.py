@@ -16,6 +16,7 @@ from robolink_simulators.assist.port import AssistClient
 from robolink_simulators.control.client import ControlClient
 
 import robolink
+from robolink.errors import RobolinkError
 
 
 def waited(life, requests=int):
@@ -128,7 +129,7 @@ def test_whatever_is_asked_at_any_of_its_ports_keeps_it_alive(what, tmp_path, mo
         what = (*what, str(path))
     used = []
 
-    def wait(_, requests):
+    def wait(_, requests, _failure):
         document = json.loads(capsys.readouterr().out)
         for cell in document.get("cells", {"": document}).values():
             for use, url in ((look, cell["assist"]), (ask, cell["control"]), (read, cell["url"])):
@@ -140,6 +141,48 @@ def test_whatever_is_asked_at_any_of_its_ports_keeps_it_alive(what, tmp_path, mo
     monkeypatch.setattr(Termination, "wait", wait)
     assert main.run([*what, "--idle-exit", "60", "--json"]) == 0, capsys.readouterr().err
     assert len(used) == 3 * (2 if what[1] == "run" else 1)
+
+
+@pytest.mark.parametrize(
+    "what",
+    [(*of, kind) for of in (("sim",), ("sim", "run")) for kind in ("epson", "softmotion")],
+    ids=" ".join,
+)
+def test_one_that_can_keep_its_state_no_longer_says_so_and_ends(
+    what, tmp_path, monkeypatch, capsys
+):
+    """A disk that is full, or a folder that is gone: no traceback, and no test that goes on."""
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "records"))
+    kept = tmp_path / "kept/state.json"
+    arguments = [*what, "--tcp", "127.0.0.1:0", "--state", str(kept)]
+    if what[1] == "run":
+        path = tmp_path / "cells.toml"
+        path.write_text(
+            'schema = "robolink/sim-cells/1"\n'
+            f'[cells.a]\nkind = "{what[2]}"\ntcp = "127.0.0.1:0"\nstate = "kept/state.json"\n'
+        )
+        arguments = ["sim", "run", str(path)]
+    waited_before = Termination.wait
+
+    def wait(self, requests, failure):
+        document = json.loads(capsys.readouterr().out)
+        (cell,) = document.get("cells", {"": document}).values()
+        kept.unlink()
+        kept.parent.rmdir()
+        kept.parent.write_text("in its place")
+        with pytest.raises(RobolinkError), robolink.connect(cell["url"]) as controller:
+            controller.tools.write(2, robolink.ToolOffset(1, 2, 3), expected=None)
+        waited_before(self, requests, failure)
+
+    monkeypatch.setattr(Termination, "wait", wait)
+    assert main.run([*arguments, "--json"]) == 2
+    told = capsys.readouterr()
+    error = json.loads(told.out)["error"]
+    assert "cannot save its state" in error["what"]
+    assert str(kept) in error["what"]
+    assert error["what"].startswith("a: ") == (what[1] == "run")
+    assert error["remedy"]
+    assert "Traceback" not in told.err
 
 
 def look(url):

@@ -14,6 +14,7 @@ import pytest
 from robolink_cli import main
 from robolink_simulators.cell.clock import ManualClock, SteeredClock
 from robolink_simulators.control import http_port
+from robolink_simulators.control.acts import wire
 from robolink_simulators.control.acts.registry import ACTS
 from robolink_simulators.control.cell import ControlledCell
 from robolink_simulators.control.client import ControlClient
@@ -21,6 +22,7 @@ from robolink_simulators.control.http_port import LONGEST_REQUEST, MOST_CLIENTS
 from robolink_simulators.control.openapi import openapi
 from robolink_simulators.control.server import ControlServer
 from robolink_simulators.epson import EpsonSimulator
+from robolink_simulators.faults import counted
 from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 from robolink_simulators.plc import PlcSimulator
@@ -172,6 +174,29 @@ def test_sim_ctl_takes_for_a_text_what_is_one(cells, at, capsys):
         assert "step needs seconds, a number from 0" in capsys.readouterr().err
 
 
+def test_what_happened_and_what_waits_is_bounded(at, monkeypatch):
+    monkeypatch.setattr(wire, "_MOST_PENDING", 12)
+    monkeypatch.setattr(wire, "MOST_FIRED", 3)
+    monkeypatch.setattr(counted, "MOST_FIRED", 3)
+    control, simulator = at("a")
+    assert len(control.do("add_fault", action="drop_reply", times=10)["pending"]) == 10
+    with pytest.raises(ConfigError, match="10 faults wait already") as told:
+        control.do("add_fault", action="delay", times=3)
+    assert "clear_faults" in told.value.remedy
+    for _ in range(10):
+        assert simulator.faults.take("$GetStatus")
+    told = control.do("faults")
+    assert [fault["on_exchange"] for fault in told["fired"]] == [7, 8, 9]
+    assert (told["times_fired"], told["pending"]) == (10, [])
+    assert len(simulator.faults.fired) <= 6
+    control.do("reset")
+    nothing = {"fired": [], "times_fired": 0, "pending": [], "waiting": 0}
+    assert control.do("faults") == nothing
+    monkeypatch.setattr(wire, "_MOST_TOLD", 2)
+    told = control.do("add_fault", action="drop_reply", times=3)
+    assert (len(told["pending"]), told["waiting"]) == (2, 3)
+
+
 def test_time_is_paused_stepped_and_hastened(at):
     control, simulator = at("a")
     control.do("set_clock", factor=0)
@@ -272,6 +297,26 @@ def test_what_cannot_be_done_now_is_told_apart_from_what_was_asked_wrongly(
     assert (status, told["ok"]) == (409, False)
     assert words in told["error"]
     assert told["remedy"]
+
+
+def test_what_a_controller_cannot_keep_is_refused_and_noted(tmp_path):
+    """Whoever serves it ends it then; until that such an act says why."""
+    kept = tmp_path / "kept/plc.json"
+    simulator = SoftMotionSimulator(state_path=kept)
+    cell = ControlledCell(simulator, ManualClock())
+    with ControlServer({"a": cell}) as server, ControlClient(server.url_of("a")) as control:
+        control.do("restart")
+        assert simulator.failure is None
+        kept.unlink()
+        kept.parent.rmdir()
+        kept.parent.write_text("in its place")
+        for _ in "ab":
+            with pytest.raises(ConfigError, match="cannot save its state") as told:
+                control.do("restart")
+            assert "a folder that can be written" in told.value.remedy
+            assert str(simulator.failure) == str(told.value)
+        path = f"{urlsplit(server.url).path}/cells/a/restart"
+        assert raw(server, "POST", path)[0] == 409
 
 
 def exchanged(cells, sent, *, then_closes=False):
@@ -390,6 +435,72 @@ def test_silent_clients_are_bounded_and_keep_nobody_out_for_good(cells, monkeypa
     while counters_of(cells.url_of("a")) is None:
         assert time.monotonic() < ends
     assert MOST_CLIENTS >= 16
+
+
+def connected(cells):
+    parts = urlsplit(cells.url)
+    return socket.create_connection((parts.hostname, parts.port), 10)
+
+
+def test_where_all_places_are_taken_who_has_asked_nothing_makes_way(cells, monkeypatch):
+    monkeypatch.setattr(http_port, "MOST_CLIENTS", 4)
+    monkeypatch.setattr(http_port, "_BEFORE_ASKING_S", 0.0)
+    with ExitStack() as stack:
+        asked = stack.enter_context(ControlClient(cells.url_of("a")))
+        assert asked.do("counters")
+        kept = asked._connection.sock
+        slow = [stack.enter_context(connected(cells)) for _ in range(8)]
+        for connection in slow[-3:]:
+            connection.sendall(b"GET /the-token/v1")
+        for name in "abc":
+            assert stack.enter_context(ControlClient(cells.url_of(name))).do("counters")
+        for connection in slow:
+            assert connection.recv(1) == b""
+        assert asked.do("counters")
+        assert asked._connection.sock is kept
+        with (
+            ControlClient(cells.url_of("a")) as one_too_many,
+            pytest.raises(ConnectError, match="4 clients are connected"),
+        ):
+            one_too_many.do("counters")
+
+
+def test_who_sends_a_byte_now_and_then_is_cut_off_like_who_sends_none(cells, monkeypatch):
+    monkeypatch.setattr(http_port._Served, "timeout", 0.3)
+    with connected(cells) as slow:
+        slow.settimeout(0.05)
+        for _ in range(400):
+            try:
+                slow.sendall(b"G")
+                assert slow.recv(1) == b""
+            except TimeoutError:
+                continue  # not yet
+            except OSError:
+                pass  # cut off with a byte under way
+            break
+        else:
+            pytest.fail("it has a place for good")
+
+
+def test_who_takes_no_answer_is_cut_off(cells, monkeypatch):
+    monkeypatch.setattr(http_port._Served, "timeout", 0.3)
+    simulator = cells.cells["a"].simulator
+    for number in range(2000):
+        simulator.log.add(number, ">", "x" * 500)
+    with connected(cells) as deaf:
+        path = f"{urlsplit(cells.url).path}/cells/a/log"
+        deaf.sendall(f"GET {path} HTTP/1.1\r\n\r\n".encode() * 20)
+        assert counters_of(cells.url_of("a"))
+        ends = time.monotonic() + 30.0
+        while cells._http._served:
+            assert time.monotonic() < ends
+            time.sleep(0.01)
+    simulator.reset()
+
+
+def test_who_shows_another_token_keeps_no_place(cells):
+    reply, told = exchanged(cells, b"GET /another/v1 HTTP/1.1\r\n\r\n")
+    assert (reply.status, reply.headers["Connection"], told["ok"]) == (403, "close", False)
 
 
 def test_it_listens_where_only_this_machine_reaches_it():

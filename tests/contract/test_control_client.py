@@ -168,6 +168,14 @@ def test_one_that_listens_no_more_is_gone():
             client.do("counters")
 
 
+def test_the_longest_answer_there_is_reaches_a_client_of_the_assist_port():
+    simulator = EpsonSimulator(seed=3)
+    for number in range(2000):
+        simulator.log.add(number, ">", f"{number} {'x' * 1500}")
+    with serve_assist(simulator, clock=ScaledClock()) as port, AssistClient(port.url) as client:
+        assert len(client.do("log")["lines"]) == 2000
+
+
 def test_the_assist_port_counts_what_it_was_asked():
     with serve_assist(EpsonSimulator(seed=3), clock=ScaledClock()) as port:
         assert port.requests == 0

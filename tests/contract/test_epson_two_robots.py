@@ -65,6 +65,25 @@ def test_what_belongs_to_a_robot_is_that_of_the_robot_in_force(cell):
     assert scara.tools.get(4).components()[3:] == (10.0, 0.0, 0.0)
 
 
+def test_the_motions_of_all_robots_are_told_in_order(cell):
+    def up(number):
+        cell.machine.choose(number)
+        with robolink.connect(cell.url) as controller:
+            here = controller.groups[0].pose()
+            profile = MotionProfile(Path.STRAIGHT, speed_mm_s=250.0)
+            above = replace(here, z_mm=here.z_mm + 3)
+            controller.groups[0].move_to(above, profile, box=WorkBox()).wait(timeout_s=60)
+
+    for number in (1, 2, 1):
+        up(number)
+    told = list(cell.motions())
+    assert [(it.number, it.robot) for it in told] == [(1, 1), (2, 2), (3, 1)]
+    first_mm, _, last_mm = (it.flange_mm[2] for it in told)
+    assert last_mm - first_mm == pytest.approx(3, abs=0.01)
+    assert [it.number for it in cell.motions(2)] == [3]
+    assert cell.counters()["moves_started"] == 3
+
+
 def test_each_robot_is_undone_by_its_own_record(cell):
     """Tool 4 of robot 1 and tool 4 of robot 2 are two tools."""
     robots = cell.machine.robots

@@ -74,7 +74,7 @@ def test_nothing_moves_where_a_tool_holds_another_value_by_then(later):
     machine = later.cell.simulator.machine
     with later.connected() as controller:
         operation = settled(controller)
-    before = machine.arm.motions.added
+    before = machine.motions.added
     for value in (old, FOREIGN):
         machine.tools.set(1, value)
         with later.connected() as controller:
@@ -82,7 +82,7 @@ def test_nothing_moves_where_a_tool_holds_another_value_by_then(later):
             with pytest.raises(OutcomeUnknownError):
                 finish_by_turn_test(controller, operation, later.person())
             assert len(controller.outcomes.open_markers()) == 1
-    assert machine.arm.motions.added == before
+    assert machine.motions.added == before
     assert later.asked == []
 
 
@@ -91,12 +91,12 @@ def test_under_a_stop_nothing_is_begun_and_nothing_put_back(later):
     machine = later.cell.simulator.machine
     with later.connected() as controller:
         operation = settled(controller)
-        before = machine.arm.motions.added, machine.flash_writes
+        before = machine.motions.added, machine.flash_writes
         controller.stop()
         with pytest.raises(StoppedError):
             finish_by_turn_test(controller, operation, later.person())
         assert len(controller.outcomes.open_markers()) == 1
-    assert (machine.arm.motions.added, machine.flash_writes) == before
+    assert (machine.motions.added, machine.flash_writes) == before
     assert later.asked == []
 
 

@@ -1,7 +1,9 @@
 """Every simulated controller is made anew, and goes back to a moment, while it is served."""
 
 import json
-from contextlib import ExitStack
+import socket
+import time
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
@@ -79,6 +81,23 @@ def test_it_is_made_anew_as_another_controller(served):
     assert write(served, -32.0) != who
 
 
+def test_who_asked_before_it_was_made_anew_is_not_answered_by_the_new_one(served):
+    """A request is under way while the controller is replaced: its connection has ended."""
+    host, _, port = served.url.partition("://")[2].partition("?")[0].rpartition(":")
+    asked = b"$Login,\r\n" if served.kind == "epson" else bytes.fromhex("000100000006010400140002")
+    with socket.create_connection((host, int(port)), 10) as client:
+        client.sendall(asked)
+        assert client.recv(100)
+        with served.simulator.lock:
+            client.sendall(asked)
+            time.sleep(0.05)  # it waits for the controller by then, else it is cut off all the same
+            served.simulator.reset()
+        with suppress(ConnectionResetError):
+            assert client.recv(100) == b""
+    assert served.simulator.counters()["exchanges"] == 0
+    write(served, -31.0)
+
+
 def test_it_goes_back_to_a_moment_as_the_same_controller(served):
     who = write(served, -31.0)
     if served.kind != "plc":
@@ -131,6 +150,58 @@ def test_writes_and_starts_are_counted_alike(served):
     served.simulator.reset()
     counted = served.simulator.counters()
     assert (counted["exchanges"], counted["tool_writes"], counted["starts"]) == (0, 0, 1)
+
+
+def test_what_is_counted_goes_on_when_it_goes_back(served):
+    """Whoever looks at two counts sees what there was between them, whatever else was done."""
+    write(served, -31.0)
+    moment = served.simulator.kept_moment()
+    write(served, -32.0)
+    served.simulator.restart()
+    counted, lines = served.simulator.counters(), served.simulator.log.added
+    served.simulator.go_back(moment)
+    assert served.simulator.counters() == counted
+    assert served.simulator.log.added == lines
+    write(served, -33.0)
+    served.simulator.restart()
+    later = served.simulator.counters()
+    assert later["exchanges"] > counted["exchanges"]
+    del later["exchanges"]
+    starts, writes = counted["starts"] + 1, counted["tool_writes"] + 1
+    assert later == {"moves_started": 0, "tool_writes": writes, "starts": starts, "touches": 0}
+
+
+@pytest.mark.parametrize("kind", ["epson", "softmotion"])
+def test_motions_are_numbered_on_when_it_goes_back(kind):
+    simulator = EpsonSimulator(seed=4) if kind == "epson" else SoftMotionSimulator(seed=4)
+
+    def move():
+        simulator._motion_log().add(simulator.now_ns)
+        return simulator.counters()["moves_started"], [it.number for it in simulator.motions()]
+
+    moment = simulator.kept_moment()
+    assert [move(), move()] == [(1, [1]), (2, [1, 2])]
+    simulator.go_back(moment)
+    assert list(simulator.motions()) == []
+    assert [move(), move()] == [(3, [3]), (4, [3, 4])]
+    assert [it.number for it in simulator.motions(3)] == [4]
+    simulator.reset()
+    assert move() == (1, [1])
+
+
+@pytest.mark.parametrize("kind", [EpsonSimulator, SoftMotionSimulator])
+def test_what_a_file_tells_of_earlier_is_not_counted(kind, tmp_path):
+    for _ in "ab":
+        simulator = kind(state_path=tmp_path / "cell.json")
+        names = ("exchanges", "moves_started", "tool_writes", "touches")
+        assert simulator.counters() == {**dict.fromkeys(names, 0), "starts": 1}
+        with simulator.acting():
+            if isinstance(simulator, EpsonSimulator):
+                simulator.machine.tools.set(3, ToolOffset(1, 2, 3))
+                simulator._flash.save_changes()
+            else:
+                simulator.plc.memory.define(3, (1.0, 2.0, 3.0, 0.0, 0.0, 0.0), "T")
+        assert simulator.counters()["tool_writes"] == 1
 
 
 @pytest.mark.parametrize("kind", [EpsonSimulator, SoftMotionSimulator])

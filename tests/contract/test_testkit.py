@@ -273,7 +273,7 @@ def test_what_crossed_the_wire_and_what_moved_is_asserted(epson_sim):
         epson_sim.wire.assert_not_sent("TLSet 2, XY")
     epson_sim.motions.assert_none()
     simulator = epson_sim.simulator
-    simulator.machine.arm.motions.add(0, lambda: (1.0, 2.0, 3.0))
+    simulator.machine.motions.add(0, lambda: (1.0, 2.0, 3.0))
     with pytest.raises(AssertionError, match=r"(?s)1 motions began.*to 1\.000 2\.000 3\.000"):
         epson_sim.motions.assert_none()
 
@@ -285,7 +285,11 @@ def test_a_cell_is_put_back_between_two_looks(epson_sim, softmotion_sim, fault_p
         cell.snapshot("written")
         cell.do("change_nozzle")
         fault_plan(cell, "drop_reply")
+        cell.simulator._motion_log().add(0)
+        assert cell.motions.count == 1
         cell.put_back()
+        assert {**cell.do("counters"), "starts": 0} == dict.fromkeys(cell.do("counters"), 0)
+        cell.motions.assert_none()
         assert cell.truth() == at_first
         assert not cell.wire.lines
         assert fault_plan(cell)["pending"] == []

@@ -12,7 +12,7 @@ from pymodbus.pdu.register_message import (
     WriteMultipleRegistersRequest,
     WriteSingleRegisterRequest,
 )
-from robolink_simulators.plc import PlcSimulator
+from robolink_simulators.plc import PlcSimulator, device
 from robolink_simulators.plc.frames import LineFrames
 
 from robolink.register_maps import load_map
@@ -43,6 +43,35 @@ def test_what_is_written_reads_back(plc):
     assert found.registers == [1, 2, 3, 4]
     assert ask(link, ReadCoilsRequest(address=2000, count=1)).bits[0] is True
     assert plc.writes == ["fc16 100", "fc6 103", "fc5 2000"]
+
+
+@pytest.mark.parametrize("encoded", ["int16", "uint16", "int32", "uint32"])
+def test_a_tool_that_whole_numbers_cannot_hold_is_the_nearest_that_they_can(encoded, tmp_path):
+    path, after = tmp_path / "map.toml", 101 if encoded.endswith("16") else 102
+    path.write_text(
+        'schema = "robolink/plc-map/1"\nname = "narrow"\n'
+        f'[numbers]\ntype = "{encoded}"\nword_order = "low_first"\nscale = 1e-6\n'
+        f"[[tools]]\nnumber = 1\nx = {{ address = 100 }}\ny = {{ address = {after} }}\n"
+        '[commit]\nkind = "none"\nsettle_s = 0.2\n'
+    )
+    plc = PlcSimulator(load_map(path))
+    bits = int(encoded[-2:])
+    lowest = 0 if encoded.startswith("u") else -(1 << bits - 1)
+    plc.program.set_tool(1, {"x": 1e6, "y": -1e6})
+    for _ in "ab":
+        stored = plc.truth()["stored"]["1"]
+        assert stored["x_mm"] == pytest.approx((lowest + (1 << bits) - 1) * 1e-6)
+        assert stored["y_mm"] == pytest.approx(lowest * 1e-6)
+        plc.restart()
+
+
+def test_the_writes_that_are_remembered_are_bounded(plc, monkeypatch):
+    monkeypatch.setattr(device, "MOST_WRITES", 3)
+    link = plc.connect(0)
+    for number in range(20):
+        ask(link, WriteSingleRegisterRequest(address=100 + number % 2, registers=[number]))
+    assert plc.writes[-3:] == ["fc6 101", "fc6 100", "fc6 101"]
+    assert len(plc.writes) <= 6
 
 
 def test_the_probe_is_there_in_the_order_of_the_map(plc):

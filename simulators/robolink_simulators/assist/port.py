@@ -53,7 +53,9 @@ MOST_CLIENTS: Final = 16
 Assisted = EpsonSimulator | SoftMotionSimulator
 """A simulator with a person beside it."""
 
-_LONGEST_ANSWER: Final = 1 << 20
+_LONGEST_ANSWER: Final = 1 << 23
+"""Bytes; what is held of the past, and of what waits, is bounded."""
+
 _IN_PROCESS: Final[Mapping[str, Callable[[str], Assisted]]] = {
     "epson+sim": in_process.simulator_named,
     "softmotion+sim": plc_in_process.simulator_named,

@@ -1,16 +1,23 @@
 """The HTTP of the control API: connections, requests, and what is no request.
 
-At most :data:`MOST_CLIENTS` are connected at a time, each request is at most
-:data:`LONGEST_REQUEST` bytes, and a connection that is silent ends by itself.
+At most :data:`MOST_CLIENTS` are connected at a time, and each request is at most
+:data:`LONGEST_REQUEST` bytes. A connection ends by itself on which no whole request came for a
+minute, or whose client takes no answer for so long. Where all places are taken, who has asked
+nothing yet makes way for a newcomer: so nobody who is silent, or sends a byte now and then, keeps
+others out.
 """
 
+import io
 import json
 import os
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from math import inf
 from socket import AF_INET, AF_INET6, SHUT_RDWR, SO_REUSEADDR, SOL_SOCKET, socket
+from time import monotonic
 from typing import Any, Final
 
 from robolink.messages import tr
@@ -25,6 +32,9 @@ MOST_TURNED_AWAY: Final = 16
 LONGEST_REQUEST: Final = 65_536
 _SILENCE_S: Final = 60.0
 _TURNED_AWAY_S: Final = 5.0
+
+_BEFORE_ASKING_S: Final = 5.0
+"""Who has asked nothing for so long has no claim to a place where there is none left."""
 
 Reply = tuple[HTTPStatus, dict[str, Any]]
 
@@ -56,14 +66,14 @@ class HttpPort(ThreadingHTTPServer):
 
     daemon_threads = True
     block_on_close = False
-    request_queue_size = 64
+    request_queue_size = 512  # whoever finds no room tries again only a second later
 
     def __init__(
         self, address: tuple[str, int], answered: Callable[[str, str, bytes], Reply]
     ) -> None:
         self.address_family = AF_INET6 if ":" in address[0] else AF_INET
         self.answered = answered
-        self._served = set[socket]()
+        self._served = dict[socket, float]()  # since when each has asked nothing
         self._turned_away = set[socket]()
         self._counting = threading.Lock()
         super().__init__(address, _Served)
@@ -80,8 +90,10 @@ class HttpPort(ThreadingHTTPServer):
     def process_request(self, request: Any, client_address: Any) -> None:  # noqa: ANN401 - as there
         """Serve a connection, or tell it that there are too many, unless those are too many too."""
         with self._counting:
+            if len(self._served) >= MOST_CLIENTS:
+                self._make_room()
             if len(self._served) < MOST_CLIENTS:
-                self._served.add(request)
+                self._served[request] = monotonic()
             elif len(self._turned_away) < MOST_TURNED_AWAY:
                 self._turned_away.add(request)
             else:
@@ -97,22 +109,72 @@ class HttpPort(ThreadingHTTPServer):
     def shutdown_request(self, request: Any) -> None:  # noqa: ANN401 - as there
         """End a connection."""
         with self._counting:
-            self._served.discard(request)
+            self._served.pop(request, None)
             self._turned_away.discard(request)
         super().shutdown_request(request)
+
+    def has_asked(self, connection: socket) -> None:
+        """Leave a client its place, whoever comes."""
+        with self._counting:
+            if connection in self._served:
+                self._served[connection] = inf
 
     def end_connections(self) -> None:
         """End those that are open; their threads see it."""
         with self._counting:
             still_open = (*self._served, *self._turned_away)
         for connection in still_open:
-            try:
-                connection.shutdown(SHUT_RDWR)
-            except OSError:
-                continue  # it has ended by itself
+            _end(connection)
+
+    def _make_room(self) -> None:
+        """End the connection that has been open the longest without asking anything, if any."""
+        oldest = min(self._served, key=self._served.__getitem__)
+        if monotonic() - self._served[oldest] >= _BEFORE_ASKING_S:
+            del self._served[oldest]
+            _end(oldest)
 
     def handle_error(self, request: Any, client_address: Any) -> None:  # noqa: ANN401 - as there
         """A client that is gone in the middle is nobody's business."""
+
+
+def _end(connection: socket) -> None:
+    """End a connection; its thread sees it."""
+    with suppress(OSError):  # it has ended by itself
+        connection.shutdown(SHUT_RDWR)
+
+
+class _RequestBytes(io.RawIOBase):
+    """What comes on a connection, as long as there is patience.
+
+    Args:
+        connection: Where it comes.
+        patience_s: How long one whole request may take, and the silence before it.
+    """
+
+    def __init__(self, connection: socket, patience_s: float) -> None:
+        self._connection = connection
+        self._patience_s = patience_s
+        self.await_another()
+
+    def await_another(self) -> None:
+        """Have patience anew."""
+        self._until_s = monotonic() + self._patience_s
+
+    def readable(self) -> bool:
+        """Whether it can be read."""
+        return True
+
+    def readinto(self, buffer: Any) -> int:  # noqa: ANN401 - as there
+        """Read what has come.
+
+        Raises:
+            TimeoutError: The patience has ended.
+        """
+        left_s = self._until_s - monotonic()
+        if left_s <= 0:
+            raise TimeoutError
+        self._connection.settimeout(left_s)
+        return self._connection.recv_into(buffer)
 
 
 class _Served(BaseHTTPRequestHandler):
@@ -124,6 +186,18 @@ class _Served(BaseHTTPRequestHandler):
     sys_version = ""
     timeout = _SILENCE_S
     disable_nagle_algorithm = True
+
+    def setup(self) -> None:
+        """Read by the patience that there is with a whole request, not with each byte of it."""
+        super().setup()
+        self.rfile.close()
+        self._coming = _RequestBytes(self.connection, self.timeout)
+        self.rfile = io.BufferedReader(self._coming)
+
+    def handle_one_request(self) -> None:
+        """Read a request and answer it."""
+        self._coming.await_another()
+        super().handle_one_request()
 
     def do_GET(self) -> None:
         """Look."""
@@ -192,10 +266,15 @@ class _Served(BaseHTTPRequestHandler):
         self._send(status, error_document(what, remedy))
 
     def _answer(self, method: str, body: bytes) -> None:
-        self._send(*self.server.answered(method, self.path, body))
+        self.server.has_asked(self.connection)
+        status, document = self.server.answered(method, self.path, body)
+        if status == HTTPStatus.FORBIDDEN:
+            self.close_connection = True  # who does not show the token keeps no place
+        self._send(status, document)
 
     def _send(self, status: HTTPStatus, document: dict[str, Any]) -> None:
         data = json.dumps(document).encode()
+        self.connection.settimeout(self.timeout)  # of all of it
         self.send_response(status)
         self.send_header("Content-Type", "application/json")
         self.send_header("Content-Length", str(len(data)))

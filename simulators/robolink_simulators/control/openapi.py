@@ -8,8 +8,10 @@ import json
 from collections.abc import Mapping
 from typing import Any, Final
 
+from robolink_simulators.control.acts.answers import CellAbout, CellsAbout
 from robolink_simulators.control.acts.declared import LONGEST_TEXT, ControlAct, Taken
 from robolink_simulators.control.acts.registry import ACTS
+from robolink_simulators.control.answer_schemas import AnswerSchemas
 
 _KINDS: Final = {
     "epson": "an EPSON controller",
@@ -21,6 +23,7 @@ _CELL: Final = {"name": "cell", "in": "path", "required": True, "schema": {"type
 
 def openapi() -> dict[str, Any]:
     """Return the document; the server's URL is filled in by whoever reads it."""
+    answers = AnswerSchemas()
     acts: dict[str, ControlAct] = {}
     kinds: dict[str, list[str]] = {}
     for kind, of_kind in ACTS.items():
@@ -28,11 +31,13 @@ def openapi() -> dict[str, Any]:
             acts.setdefault(name, act)
             kinds.setdefault(name, []).append(kind)
     paths: dict[str, Any] = {
-        "/": _looked_at("What is simulated here", with_cell=False),
-        "/cells/{cell}": _looked_at("What a simulated controller is, and its acts"),
+        "/": _looked_at("What is simulated here", answers.of(CellsAbout), with_cell=False),
+        "/cells/{cell}": _looked_at(
+            "What a simulated controller is, and its acts", answers.of(CellAbout)
+        ),
     }
     for name in sorted(acts):
-        paths[f"/cells/{{cell}}/{name}"] = _path(acts[name], kinds[name])
+        paths[f"/cells/{{cell}}/{name}"] = _path(acts[name], kinds[name], answers)
     return {
         "openapi": "3.1.0",
         "info": {
@@ -52,18 +57,18 @@ def openapi() -> dict[str, Any]:
             }
         ],
         "paths": paths,
-        "components": {"schemas": _schemas()},
+        "components": {"schemas": {**_schemas(), **answers.named}},
     }
 
 
-def _path(act: ControlAct, kinds: list[str]) -> dict[str, Any]:
+def _path(act: ControlAct, kinds: list[str], answers: AnswerSchemas) -> dict[str, Any]:
     of = "every kind" if len(kinds) == len(ACTS) else " or ".join(_KINDS[it] for it in kinds)
     operation = {
         "operationId": act.name,
         "summary": act.says,
         "description": f"At {of}.",
         "requestBody": {"content": {"application/json": {"schema": _object(act)}}},
-        "responses": _responses(),
+        "responses": _responses(None if act.gives is None else answers.of(act.gives)),
     }
     path: dict[str, Any] = {"parameters": [_CELL], "post": operation}
     if act.reads:
@@ -77,8 +82,8 @@ def _path(act: ControlAct, kinds: list[str]) -> dict[str, Any]:
     return path
 
 
-def _looked_at(summary: str, *, with_cell: bool = True) -> dict[str, Any]:
-    path: dict[str, Any] = {"get": {"summary": summary, "responses": _responses()}}
+def _looked_at(summary: str, gives: Mapping[str, Any], *, with_cell: bool = True) -> dict[str, Any]:
+    path: dict[str, Any] = {"get": {"summary": summary, "responses": _responses(gives)}}
     return {"parameters": [_CELL], **path} if with_cell else path
 
 
@@ -111,30 +116,39 @@ def _schema(taken: Taken) -> Mapping[str, Any]:
             return {"type": ["string", "number", "boolean"]}
 
 
-def _responses() -> dict[str, Any]:
-    def told(description: str, schema: str) -> dict[str, Any]:
-        reference = {"$ref": f"#/components/schemas/{schema}"}
+def _responses(gives: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Return what may be answered; ``gives`` is what stands beside ``ok``, if anything."""
+
+    def told(description: str, schema: Mapping[str, Any]) -> dict[str, Any]:
         return {
             "description": description,
-            "content": {"application/json": {"schema": reference}},
+            "content": {"application/json": {"schema": schema}},
         }
 
+    refusal = {"$ref": "#/components/schemas/Refusal"}
+    answer: Mapping[str, Any] = {"$ref": "#/components/schemas/Answer"}
     return {
-        "200": told("Done; what it gives stands beside ok.", "Answer"),
-        "400": told("A value is missing, wrong or unknown.", "Refusal"),
-        "403": told("The token is another one.", "Refusal"),
-        "404": told("There is no such cell or act.", "Refusal"),
-        "409": told("The simulated robot cannot do it.", "Refusal"),
-        "503": told("Too many clients are connected.", "Refusal"),
-        "default": told("Refused for another reason: the method, the length.", "Refusal"),
+        "200": told("Done.", answer if gives is None else {"allOf": [answer, gives]}),
+        "400": told("A value is missing, wrong or unknown.", refusal),
+        "403": told("The token is another one.", refusal),
+        "404": told("There is no such cell or act.", refusal),
+        "409": told("The simulated robot cannot do it.", refusal),
+        "503": told("Too many clients are connected.", refusal),
+        "default": told("Refused for another reason: the method, the length.", refusal),
     }
 
 
 def _schemas() -> dict[str, Any]:
-    common = {"schema": {"const": "robolink/control/1"}, "ok": {"type": "boolean"}}
-    refusal = {**common, "error": {"type": "string"}, "remedy": {"type": "string"}}
+    schema = {"schema": {"const": "robolink/control/1"}}
+    answer = {**schema, "ok": {"const": True}}
+    refusal = {
+        **schema,
+        "ok": {"const": False},
+        "error": {"type": "string", "description": "What happened."},
+        "remedy": {"type": "string", "description": "What to do next."},
+    }
     return {
-        "Answer": {"type": "object", "properties": common, "required": ["schema", "ok"]},
+        "Answer": {"type": "object", "properties": answer, "required": [*answer]},
         "Refusal": {"type": "object", "properties": refusal, "required": [*refusal]},
     }
 

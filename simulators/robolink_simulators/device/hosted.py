@@ -4,20 +4,27 @@ import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import Any, ClassVar, Final
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink_simulators.device.motion_log import StartedMotion
+from robolink_simulators.device.motion_log import MotionLog, StartedMotion
 from robolink_simulators.device.wire_record import WireRecord
 from robolink_simulators.device.wire_time import WireClock, WireTime
 from robolink_simulators.not_now import NotNowError
+from robolink_simulators.state_files import StateNotKeptError
 
 RequestHook = Callable[[int, str], None]
 """Called with the running number of a request and a text, passwords hidden."""
 
 SCHEMA: Final = "robolink/sim-truth/1"
+
+NEW: Final[Mapping[str, int]] = MappingProxyType(
+    {"moves_started": 0, "tool_writes": 0, "starts": 1, "touches": 0}
+)
+"""The counts of a controller that was just made."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +79,7 @@ class HostedDevice(ABC):
         self.now_ns = 0
         self._stepping = False
         self._requests = 0
+        self._counted_before: dict[str, int] = {}
 
     def keep_time(self, clock: WireClock) -> None:
         """Take the present time from a clock; whoever hosts it says so."""
@@ -114,7 +122,14 @@ class HostedDevice(ABC):
         self._require_renewable()
         with self.acting():
             self._renew()
-            self.exchanges = self._requests = 0
+            self._requests = 0
+            self.forget_past()
+
+    def forget_past(self) -> None:
+        """Count from the beginning again, with an empty log; nothing else is changed."""
+        with self.lock:
+            self.exchanges = 0
+            self._count_on()
             self.log.clear()
 
     def kept_moment(self) -> KeptMoment:
@@ -124,6 +139,8 @@ class HostedDevice(ABC):
 
     def go_back(self, moment: KeptMoment) -> None:
         """Be again what it was then, at rest, with nobody connected; faults are forgotten.
+
+        What is counted goes on, and the log too: both tell what there was since :meth:`reset`.
 
         Raises:
             ConfigError: That was another kind of machine; or as for :meth:`reset`.
@@ -139,13 +156,40 @@ class HostedDevice(ABC):
             )
         self._require_renewable()
         with self.acting():
+            counted = self.counters()
             self._renew()
             self._restore(moment.held)
+            self._count_on(counted)
+
+    def counters(self) -> dict[str, int]:
+        """Return what was counted since it was made or reset.
+
+        These are exchanges, moves_started, tool_writes, starts and touches.
+        """
+        with self.lock:
+            counted = self._counted()
+            before = self._counted_before
+            since = {name: count + before.get(name, 0) for name, count in counted.items()}
+            return {"exchanges": self.exchanges, **since}
+
+    def motions(self, after: int = 0) -> Iterator[StartedMotion]:
+        """Yield the motions that began, but for the first ``after`` ones.
+
+        Those before it went back to an earlier moment are counted, and held no longer.
+        """
+        before = self._counted_before.get("moves_started", 0)
+        for motion in self._motion_log().motions(after - before):
+            yield replace(motion, number=motion.number + before) if before else motion
 
     @property
     def executes_program(self) -> bool:
         """Whether it executes a program that was loaded, whose variables no snapshot holds."""
         return False
+
+    @property
+    def failure(self) -> StateNotKeptError | None:
+        """Why it can keep its state no longer; whoever serves it ends it then."""
+        return None
 
     @property
     @abstractmethod
@@ -161,12 +205,12 @@ class HostedDevice(ABC):
         """Switch off and on; what is kept over that stays."""
 
     @abstractmethod
-    def counters(self) -> dict[str, int]:
-        """Return what was counted: exchanges, moves_started, tool_writes, starts, touches."""
+    def _counted(self) -> dict[str, int]:
+        """Return what its parts have counted: moves_started, tool_writes, starts, touches."""
 
     @abstractmethod
-    def motions(self, after: int = 0) -> Iterator[StartedMotion]:
-        """Yield the motions that began, but for the first ``after`` ones."""
+    def _motion_log(self) -> MotionLog:
+        """Return where each motion of its robots is noted."""
 
     @abstractmethod
     def _truth(self) -> dict[str, Any]:
@@ -183,6 +227,12 @@ class HostedDevice(ABC):
     @abstractmethod
     def _restore(self, held: Mapping[str, Any]) -> None:
         """Put back what :meth:`_moment` gave."""
+
+    def _count_on(self, counted: Mapping[str, int] = NEW) -> None:
+        """Go on from these counts, whatever its parts have counted."""
+        self._counted_before = {
+            name: counted[name] - count for name, count in self._counted().items()
+        }
 
     def _after_act(self) -> None:  # noqa: B027 - most have nothing to do
         """Do what is due after an act past the wire."""

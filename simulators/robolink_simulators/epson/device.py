@@ -6,7 +6,7 @@ thread and no clock; whoever hosts it holds :attr:`EpsonSimulator.lock`, hands i
 the time, and asks when to call again.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ from robolink.protocols.epson_binary import Dialect
 from robolink.protocols.epson_text import StatusFlags
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.device.late_random import late_random
-from robolink_simulators.device.motion_log import StartedMotion
+from robolink_simulators.device.motion_log import MotionLog
 from robolink_simulators.epson.arm.robots import find_robot
 from robolink_simulators.epson.card import ControllerCard
 from robolink_simulators.epson.companion import Companion
@@ -42,6 +42,7 @@ from robolink_simulators.epson.world import World
 from robolink_simulators.faults import Fault, FaultPlan
 from robolink_simulators.faults.links import EPSON_LINKS
 from robolink_simulators.serial_numbers import drawn_serial
+from robolink_simulators.state_files import StateNotKeptError
 
 
 class EpsonSimulator(TimeStepping):
@@ -140,6 +141,7 @@ class EpsonSimulator(TimeStepping):
     def _begin(self) -> None:
         self._begun = True
         self._make(self._serial)
+        self._count_on()  # what a file says was written before
         self.machine.advance(self.now_ns)
 
     def _make(self, serial: str) -> None:
@@ -269,19 +271,16 @@ class EpsonSimulator(TimeStepping):
         """Name of the model of robot 1; to ask for it makes nothing."""
         return self._models[0].name
 
-    def counters(self) -> dict[str, int]:
-        """See :meth:`~robolink_simulators.device.hosted.HostedDevice.counters`."""
+    def _counted(self) -> dict[str, int]:
         return {
-            "exchanges": self.exchanges,
-            "moves_started": sum(robot.arm.moves_started for robot in self.machine.robots),
+            "moves_started": self.machine.motions.added,
             "tool_writes": self.machine.flash_writes,
             "starts": self.starts,
-            "touches": self.world.operator.touches,
+            "touches": sum(world.operator.touches for world in self.worlds),
         }
 
-    def motions(self, after: int = 0) -> Iterator[StartedMotion]:
-        """See ``HostedDevice.motions``; those of the robot in force."""
-        return self.machine.arm.motions.motions(after)
+    def _motion_log(self) -> MotionLog:
+        return self.machine.motions
 
     def restart(self) -> None:
         """Switch off and on: links are cut, all but the flash and the variables is forgotten."""
@@ -306,6 +305,11 @@ class EpsonSimulator(TimeStepping):
 
     def _truth(self) -> dict[str, Any]:
         return self.world.truth()
+
+    @property
+    def failure(self) -> StateNotKeptError | None:
+        """See :attr:`~robolink_simulators.device.hosted.HostedDevice.failure`."""
+        return self._flash.failure if self.durable else None
 
     @property
     def executes_program(self) -> bool:

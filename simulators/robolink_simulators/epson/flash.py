@@ -12,7 +12,7 @@ from robolink.messages import tr
 from robolink_simulators.cell.workplace import Workplace
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.variables import Variables
-from robolink_simulators.state_files import save_state
+from robolink_simulators.state_files import StateFile, StateNotKeptError
 
 SCHEMA: Final = "robolink/sim-state/1"
 
@@ -26,10 +26,15 @@ class Flash:
     """
 
     def __init__(self, path: Path | None, machine: Machine) -> None:
-        self._path = path
+        self._file = StateFile(path)
         self._machine = machine
         # Nothing is written yet: a serial number that was drawn is kept with the first writing.
         self._written: list[object] | None = None
+
+    @property
+    def failure(self) -> StateNotKeptError | None:
+        """Why something could not be kept; ``None`` as long as all was."""
+        return self._file.failure
 
     def restore(self) -> None:
         """Give the machine what the file holds, if there is one.
@@ -39,12 +44,13 @@ class Flash:
         Raises:
             ConfigError: The file cannot be read or is not of this robot.
         """
-        if self._path is None or not self._path.exists():
+        path = self._file.path
+        if path is None or not path.exists():
             return
         first, *others = self._machine.robots
         robot = first.model.name
         try:
-            state = json.loads(read_named(self._path))
+            state = json.loads(read_named(path))
             if state["schema"] != SCHEMA or state["robot"] != robot:
                 raise ValueError(state["robot"])
             first.tools.restore(state["tools"])
@@ -58,7 +64,7 @@ class Flash:
             raise ConfigError(
                 tr(
                     "{path} is not a saved state of a simulated {robot}.",
-                    path=self._path,
+                    path=path,
                     robot=robot,
                 ),
                 remedy=tr("Name another file, or delete this one to start afresh."),
@@ -71,14 +77,13 @@ class Flash:
         """Write the file if something of that changed since it was written last.
 
         Raises:
-            ConfigError: It cannot be written.
+            StateNotKeptError: It cannot be written.
         """
-        if self._path is None:
+        if self._file.path is None:
             return
         mark = self._mark()
         if mark == self._written:
             return
-        self._written = mark
         first, *others = self._machine.robots
         document: dict[str, object] = {
             "schema": SCHEMA,
@@ -89,7 +94,8 @@ class Flash:
         }
         if others:
             document["other_tools"] = [other.tools.to_state() for other in others]
-        save_state(self._path, document)
+        self._file.save(document)
+        self._written = mark
 
     def _mark(self) -> list[object]:
         robots = self._machine.robots

@@ -2,9 +2,11 @@
 
 import random
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, Generic, TypeVar, overload
 
 from robolink.model import Pose, ToolOffset
+from robolink_simulators.device.motion_log import MotionLog
 from robolink_simulators.epson.arm.arm import Arm
 from robolink_simulators.epson.arm.joints import Joints
 from robolink_simulators.epson.arm.motion_parameters import MotionParameters
@@ -60,6 +62,7 @@ class Machine:
 
     Attributes:
         robots: All of them.
+        motions: Those that any of them began, in order.
         robot_number: The one in force.
         inputs: Input bits; the world sets them, or connects them to what the tip meets.
         outputs: Output bits.
@@ -102,6 +105,9 @@ class Machine:
             for number, other in enumerate(others, start=2)
         ]
         self.robots = (first, *more)
+        self.motions = MotionLog()
+        for number, robot in enumerate(self.robots, start=1):
+            robot.arm.on_started = partial(self.motions.add, robot=number)
         self.robot_number = 1
         self.inputs = InputBits(IO_BITS)
         for robot in self.robots:

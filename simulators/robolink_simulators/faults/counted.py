@@ -24,6 +24,9 @@ class Planned(Protocol):
         """Text that a request must contain to be counted; empty counts all."""
 
 
+MOST_FIRED: Final = 2000
+"""So many of those that happened are told, the last ones."""
+
 AnyFault = TypeVar("AnyFault", bound=Planned)
 
 
@@ -45,7 +48,8 @@ class CountedFaults(Generic[AnyFault]):
             those on which it can happen.
 
     Attributes:
-        fired: What has been handed out.
+        fired: What has been handed out; at least the last :data:`MOST_FIRED`.
+        times_fired: How often something was.
         on_fired: Told of each fault that is handed out, and of the request that it meets,
             passwords hidden. What it raises goes to the host.
 
@@ -68,6 +72,7 @@ class CountedFaults(Generic[AnyFault]):
         self._groups: dict[tuple[str, frozenset[LinkKind]], _Waiting[AnyFault]] = {}
         self._added = 0
         self.fired: list[AnyFault] = []
+        self.times_fired = 0
         self.on_fired: Callable[[AnyFault, str], None] | None = None
         for fault in faults:
             self.add(fault)
@@ -121,6 +126,7 @@ class CountedFaults(Generic[AnyFault]):
         """Plan nothing, and tell of nothing that fired."""
         self.clear()
         self.fired.clear()
+        self.times_fired = 0
 
     def require_possible(self, served: Collection[LinkKind]) -> None:
         """Refuse what waits and can happen on none of the links that are served.
@@ -158,6 +164,9 @@ class CountedFaults(Generic[AnyFault]):
                 del self._groups[key]
         faults = tuple(fault for _, fault in sorted(due, key=lambda item: item[0]))
         self.fired += faults
+        self.times_fired += len(faults)
+        if len(self.fired) > 2 * MOST_FIRED:
+            del self.fired[:-MOST_FIRED]
         if self.on_fired is not None:
             for fault in faults:
                 self.on_fired(fault, request)

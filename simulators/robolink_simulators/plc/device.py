@@ -1,13 +1,14 @@
 """The simulated PLC: a program behind a Modbus server."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import asdict
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import fields
+from math import isfinite
+from typing import Any, Final
 
 from robolink.model import ToolOffset
 from robolink.register_maps import RegisterMap
 from robolink_simulators.device.hosted import HostedDevice
-from robolink_simulators.device.motion_log import StartedMotion
+from robolink_simulators.device.motion_log import MotionLog
 from robolink_simulators.faults import Departure, FaultAction, FaultPlan
 from robolink_simulators.faults.links import PLC_LINKS
 from robolink_simulators.plc.frames import (
@@ -23,6 +24,8 @@ from robolink_simulators.plc.memory import OutsideError
 from robolink_simulators.plc.panel import MappedPlcPanel
 from robolink_simulators.plc.program import PlcProgram
 
+MOST_WRITES: Final = 2000
+
 
 class PlcSimulator(HostedDevice):
     """Serves the tables of a map, and runs the program behind them.
@@ -32,7 +35,8 @@ class PlcSimulator(HostedDevice):
         unit: The unit that answers.
         program: Tools, handshake and signals.
         faults: What is to go wrong. Requests read ``fc16 100``: function and address.
-        writes: The writing requests that were carried out, in the same words.
+        writes: The writing requests that were carried out, in the same words; at least the last
+            :data:`MOST_WRITES`.
         panel: What a person, or the machine's own program, can do.
         starts: How often it was switched on.
 
@@ -75,19 +79,16 @@ class PlcSimulator(HostedDevice):
         """See :attr:`HostedDevice.machine_name`."""
         return f"{self.kind} {self.register_map.name}"
 
-    def counters(self) -> dict[str, int]:
-        """See :meth:`HostedDevice.counters`; it moves nothing."""
+    def _counted(self) -> dict[str, int]:
         return {
-            "exchanges": self.exchanges,
-            "moves_started": 0,
+            "moves_started": 0,  # it moves nothing
             "tool_writes": self.program.taken,
             "starts": self.starts,
             "touches": 0,
         }
 
-    def motions(self, after: int = 0) -> Iterator[StartedMotion]:  # noqa: ARG002 - it moves nothing
-        """See :meth:`HostedDevice.motions`."""
-        return iter(())
+    def _motion_log(self) -> MotionLog:
+        return MotionLog()
 
     def restart(self) -> None:
         """Switch off and on: links are cut, what the PLC retains stays."""
@@ -181,15 +182,15 @@ class PlcSimulator(HostedDevice):
         if request.values is not None and not ignored:
             self.program.memory.write(request.table, request.address, request.values)
             self.writes.append(request.words)
+            if len(self.writes) > 2 * MOST_WRITES:
+                del self.writes[:-MOST_WRITES]
             self.program.written(self.now_ns)
         return frames.answer(request, found)
 
     def _truth(self) -> dict[str, Any]:
         selected = self.register_map.selected
         return {
-            "stored": {
-                str(tool): asdict(_offset(held)) for tool, held in self.program.in_force.items()
-            },
+            "stored": {str(tool): _offset(held) for tool, held in self.program.in_force.items()},
             "selected_tool": selected
             and self.program.memory.read(
                 selected.table, range(selected.address, selected.address + 1)
@@ -208,6 +209,7 @@ class PlcSimulator(HostedDevice):
         self.program.put_back(held["program"])
 
 
-def _offset(components: Mapping[str, float]) -> ToolOffset:
-    angles = (components.get(name, 0.0) for name in ("u", "v", "w"))
-    return ToolOffset(*(components.get(name, 0.0) for name in ("x", "y", "z")), *angles)
+def _offset(components: Mapping[str, float]) -> dict[str, float | None]:
+    """Return a tool as it is told; a client may have written what is no number."""
+    named = ((it.name, components.get(it.name[0], 0.0)) for it in fields(ToolOffset))
+    return {name: value if isfinite(value) else None for name, value in named}

@@ -195,8 +195,16 @@ class LineFrames(Frames):
 
 
 def encode(number: Number, value: float) -> list[int]:
-    """Return the registers of a value in mm, degrees, or the probe's own unit."""
+    """Return the registers of a value in mm, degrees, or the probe's own unit.
+
+    A whole number that they cannot hold is the nearest one that they can.
+    """
     raw = value / number.factor + 0.0
+    if number.type.whole:
+        bits = 16 * number.type.words
+        signed = number.type in (NumberType.INT16, NumberType.INT32)
+        lowest = -(1 << bits - 1) if signed else 0
+        raw = min(max(raw, lowest), lowest + (1 << bits) - 1)
     words = ModbusClientMixin.convert_to_registers(
         round(raw) if number.type.whole else raw,
         _TYPES[number.type],

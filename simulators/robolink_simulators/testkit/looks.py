@@ -94,13 +94,13 @@ class MotionLook:
 
     @property
     def started(self) -> tuple[StartedMotion, ...]:
-        """Each with its instant and where the flange was to end; the last 2,000."""
+        """Each with its instant, robot, and where the flange was to end; the last 2,000."""
         with self.simulator.lock:
             return tuple(self.simulator.motions())
 
     @property
     def count(self) -> int:
-        """How many began since the simulator was made."""
+        """How many began since the simulator was made or reset."""
         with self.simulator.lock:
             return self.simulator.counters()["moves_started"]
 
@@ -118,11 +118,15 @@ class MotionLook:
         """Return the last motions for a person."""
         return listed(
             (
-                f"{one.at_ns / NS_PER_S:10.3f} s {one.kind} {one.number} {_place(one)}"
+                f"{one.at_ns / NS_PER_S:10.3f} s {one.kind} {one.number}{_robot(one)} {_place(one)}"
                 for one in self.started
             ),
             most,
         )
+
+
+def _robot(motion: StartedMotion) -> str:
+    return f" robot {motion.robot}" if motion.robot > 1 else ""
 
 
 def _place(motion: StartedMotion) -> str:

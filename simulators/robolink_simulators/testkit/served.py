@@ -93,11 +93,10 @@ class SimulatedCell:
         self.do("restore", name=name)
 
     def put_back(self) -> None:
-        """Be as at first, the same controller, with no faults, script or log: between tests."""
+        """Be as at first, the same controller: no faults, script, log or counts. Between tests."""
         self.operator.forget()
         self.restore(_FIRST)
-        with self.simulator.lock:
-            self.simulator.log.clear()
+        self.simulator.forget_past()
 
     def run(self, *arguments: str, timeout_s: float = _COMMAND_S) -> "EndedCommand":
         """Run robolink on this cell, in a process of its own: ``run("change", str(recipe))``.

@@ -34,7 +34,7 @@ def place(made, joints):
 
 def ends_after(made, number):
     """Return where the motions end that came after so many."""
-    return [motion.flange_mm for motion in made.simulator.machine.arm.motions.motions(number)]
+    return [motion.flange_mm for motion in made.simulator.motions(number)]
 
 
 SEEN = "  Print CtrlInfo(1) And &H6000, RobotInfo(1)\n"

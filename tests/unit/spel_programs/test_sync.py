@@ -57,8 +57,8 @@ class Pair:
     @property
     def began(self):
         """When each robot began to move."""
-        logs = {n: list(robot.arm.motions.motions()) for n, robot in enumerate(self.robots, 1)}
-        return {number: log[0].at_ns for number, log in logs.items() if log}
+        motions = [*self.simulator.motions()][::-1]  # so that the first of each robot stays
+        return {motion.robot: motion.at_ns for motion in motions}
 
     @property
     def robots(self):

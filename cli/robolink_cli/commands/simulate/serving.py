@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from robolink_simulators.control.cell import ControlledCell
     from robolink_simulators.control.server import ControlServer
 
+    from robolink.errors import RobolinkError
+
 
 class ParentWatch:
     """Tells whether the process has ended that a simulator must not outlive.
@@ -72,6 +74,9 @@ class ParentWatch:
 class Termination:
     """Makes SIGTERM an orderly end; Ctrl-C stays what it is.
 
+    What a simulator fails of that can keep its state no longer is told once, by whoever waits: the
+    thread that served it tells nothing.
+
     Args:
         life: When it ends by itself; never where that is left out. Whose end it waits for is the
             process that started this one, or the one that ``life`` names.
@@ -93,18 +98,29 @@ class Termination:
         self._parent = ParentWatch(life.parent) if life and life.with_parent else None
         self._stopped = threading.Event()
         self._before: Any = None
+        self._tell_before = threading.excepthook
         self._folder = TemporaryDirectory(prefix="robolink-sim-", ignore_cleanup_errors=True)
         self.state_dir = self._folder.name
 
-    def wait(self, requests: Callable[[], int] = int) -> None:
+    def wait(
+        self,
+        requests: Callable[[], int] = int,
+        failure: "Callable[[], RobolinkError | None]" = lambda: None,
+    ) -> None:
         """Block until SIGTERM, or until life ends otherwise.
 
         Args:
             requests: Tells how many requests there were so far.
+            failure: Tells why what is served can go on no longer.
+
+        Raises:
+            RobolinkError: That is so.
         """
         seen, since_s = -1, monotonic()
         # In slices, because Windows delivers Ctrl-C only between waits.
         while not self._stopped.wait(self._slice_s()):
+            if (failed := failure()) is not None:
+                raise failed
             if (now := requests()) != seen:
                 seen, since_s = now, monotonic()
             if self._is_over(monotonic() - since_s):
@@ -128,13 +144,22 @@ class Termination:
 
     def __enter__(self) -> "Termination":
         self._before = signal.signal(signal.SIGTERM, lambda _number, _frame: self._stopped.set())
+        self._tell_before, threading.excepthook = threading.excepthook, self._tell
         return self
 
     def __exit__(self, *_details: object) -> None:
+        threading.excepthook = self._tell_before
         signal.signal(signal.SIGTERM, self._before)
         if self._parent is not None:
             self._parent.close()
         self._folder.cleanup()
+
+    def _tell(self, failed: threading.ExceptHookArgs) -> None:
+        """Tell what a thread has ended of, unless the one that waits tells it."""
+        from robolink_simulators.state_files import StateNotKeptError
+
+        if not isinstance(failed.exc_value, StateNotKeptError):
+            self._tell_before(failed)
 
 
 def announce(

@@ -7,6 +7,7 @@ from typing import Any, Final, Literal
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Pose
+from robolink_simulators.control.acts.answers import Described
 from robolink_simulators.control.cell import ControlledCell
 
 Answer = dict[str, object]
@@ -116,12 +117,14 @@ class ControlAct:
         carry_out: Does it; the first line of its docstring says what it does.
         takes: What it takes.
         reads: Whether it changes nothing.
+        gives: What describes its answer; ``None`` where that is no more than that it was done.
     """
 
     name: str
     carry_out: Callable[[ControlledCell, Given], Answer]
     takes: tuple[Taken, ...] = ()
     reads: bool = False
+    gives: Described = None
 
     @property
     def says(self) -> str:

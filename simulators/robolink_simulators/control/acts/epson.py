@@ -4,6 +4,7 @@ from typing import Final
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink_simulators.control.acts.answers import FlangeTold
 from robolink_simulators.control.acts.declared import (
     NUMBER,
     ON,
@@ -43,7 +44,12 @@ def _epson(cell: ControlledCell) -> EpsonSimulator:
 
 
 EPSON_ACTS: Final = (
-    ControlAct("teach_point", _teach_point, (NUMBER, Taken("u_deg", least=-360, most=360))),
+    ControlAct(
+        "teach_point",
+        _teach_point,
+        (NUMBER, Taken("u_deg", least=-360, most=360)),
+        gives=FlangeTold,
+    ),
     ControlAct("push", _push, (Taken("text", "text"),)),
     panel_act(EpsonPanel, "set_input", NUMBER, ON, method="switch_input"),
     panel_act(EpsonPanel, "teach"),

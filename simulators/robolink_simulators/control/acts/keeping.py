@@ -6,6 +6,13 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.timing import NS_PER_S
 from robolink_simulators.cell.clock import ManualClock, SteeredClock
+from robolink_simulators.control.acts.answers import (
+    CellTruth,
+    ClockShown,
+    Counters,
+    MapTruth,
+    SnapshotNames,
+)
 from robolink_simulators.control.acts.declared import Answer, ControlAct, Given, Taken
 from robolink_simulators.control.cell import ControlledCell
 from robolink_simulators.not_now import NotNowError
@@ -91,14 +98,14 @@ def _step(cell: ControlledCell, given: Given) -> Answer:
 
 
 KEEPING_ACTS: Final = (
-    ControlAct("truth", _truth, reads=True),
-    ControlAct("counters", _counters, reads=True),
+    ControlAct("truth", _truth, reads=True, gives=CellTruth | MapTruth),
+    ControlAct("counters", _counters, reads=True, gives=Counters),
     ControlAct("restart", _restart),
     ControlAct("reset", _reset),
-    ControlAct("snapshot", _snapshot, (_NAME,)),
+    ControlAct("snapshot", _snapshot, (_NAME,), gives=SnapshotNames),
     ControlAct("restore", _restore, (_NAME,)),
-    ControlAct("clock", _clock, reads=True),
-    ControlAct("set_clock", _set_clock, (Taken("factor", least=0, most=1000),)),
-    ControlAct("step", _step, (Taken("seconds", least=0, most=86_400),)),
+    ControlAct("clock", _clock, reads=True, gives=ClockShown),
+    ControlAct("set_clock", _set_clock, (Taken("factor", least=0, most=1000),), gives=ClockShown),
+    ControlAct("step", _step, (Taken("seconds", least=0, most=86_400),), gives=ClockShown),
 )
 """Acts upon time and memory."""

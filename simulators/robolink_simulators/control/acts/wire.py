@@ -3,6 +3,8 @@
 from dataclasses import asdict
 from typing import Any, Final
 
+from robolink.messages import tr
+from robolink_simulators.control.acts.answers import FaultsTold, LinesTold, MotionsTold
 from robolink_simulators.control.acts.declared import Answer, ControlAct, Given, Taken
 from robolink_simulators.control.cell import ControlledCell
 from robolink_simulators.faults import (
@@ -12,8 +14,12 @@ from robolink_simulators.faults import (
     fault_as_keys,
     faults_of_table,
 )
+from robolink_simulators.faults.counted import MOST_FIRED
 from robolink_simulators.faults.links import LinkKind
+from robolink_simulators.not_now import NotNowError
 
+_MOST_PENDING: Final = 10_000
+_MOST_TOLD: Final = 2000
 _AFTER: Final = Taken("after", needed=False, least=0, most=1e15)
 _ACTIONS: Final = tuple(sorted({action.name.lower() for action in (*FaultAction, *PlcFaultAction)}))
 
@@ -37,9 +43,12 @@ def _number(given: Given) -> int:
 def _faults(cell: ControlledCell, _given: Given) -> Answer:
     """Tell the planned faults that have happened, and those that wait."""
     faults = cell.simulator.faults
+    pending = faults.pending
     return {
-        "fired": [fault_as_keys(fault) for fault in faults.fired],
-        "pending": [fault_as_keys(fault) for fault in faults.pending],
+        "fired": [fault_as_keys(fault) for fault in faults.fired[-MOST_FIRED:]],
+        "times_fired": faults.times_fired,
+        "pending": [fault_as_keys(fault) for fault in pending[:_MOST_TOLD]],
+        "waiting": len(pending),
     }
 
 
@@ -49,6 +58,12 @@ def _add_fault(cell: ControlledCell, given: Given) -> Answer:
     times, first = table.pop("times", 1), table.get("on_exchange", 0)
     tables = [{**table, "on_exchange": first + further} for further in range(times)]
     planned: Any = cell.simulator.faults
+    wait = len(planned.pending)
+    if wait + times > _MOST_PENDING:
+        raise NotNowError(
+            tr("{count} faults wait already.", count=wait),
+            remedy=tr("Let them happen, or forget them with clear_faults."),
+        )
     for fault in _possible(tables, cell.links):
         planned.add(fault)
     return _faults(cell, {})
@@ -71,9 +86,9 @@ def _clear_faults(cell: ControlledCell, _given: Given) -> Answer:
 
 
 WIRE_ACTS: Final = (
-    ControlAct("log", _log, (_AFTER,), reads=True),
-    ControlAct("motions", _motions, (_AFTER,), reads=True),
-    ControlAct("faults", _faults, reads=True),
+    ControlAct("log", _log, (_AFTER,), reads=True, gives=LinesTold),
+    ControlAct("motions", _motions, (_AFTER,), reads=True, gives=MotionsTold),
+    ControlAct("faults", _faults, reads=True, gives=FaultsTold),
     ControlAct(
         "add_fault",
         _add_fault,
@@ -88,7 +103,8 @@ WIRE_ACTS: Final = (
             Taken("code", "whole", needed=False),
             Taken("order", "text", needed=False),
         ),
+        gives=FaultsTold,
     ),
-    ControlAct("clear_faults", _clear_faults),
+    ControlAct("clear_faults", _clear_faults, gives=FaultsTold),
 )
 """Acts upon the wire."""

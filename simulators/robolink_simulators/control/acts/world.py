@@ -5,8 +5,17 @@ from typing import Final
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink_simulators.cell.habits import PersonManner
+from robolink_simulators.cell.person import PersonLook
 from robolink_simulators.cell.tip_switches import LightBeam, TouchPlate
 from robolink_simulators.cell.world_parameters import parameter_names, parameters_from_text
+from robolink_simulators.control.acts.answers import (
+    FlangeTold,
+    MarksSeen,
+    TipTold,
+    WaySeen,
+    WorldTold,
+)
 from robolink_simulators.control.acts.declared import (
     NUMBER,
     WHOLE_TOOL,
@@ -127,21 +136,28 @@ _SHAPE: Final = tuple(
 )
 
 WORLD_ACTS: Final = (
-    ControlAct("look", _look, (WHOLE_TOOL,), reads=True),
-    ControlAct("see", _see, (Taken("mark", "whole", needed=False),), reads=True),
-    ControlAct("be_asked", _be_asked, (Taken("touch", "flag", needed=False), WHOLE_TOOL)),
+    ControlAct("look", _look, (WHOLE_TOOL,), reads=True, gives=PersonLook),
+    ControlAct("see", _see, (Taken("mark", "whole", needed=False),), reads=True, gives=MarksSeen),
+    ControlAct(
+        "be_asked",
+        _be_asked,
+        (Taken("touch", "flag", needed=False), WHOLE_TOOL),
+        gives=PersonManner,
+    ),
     ControlAct(
         "way_along",
         _way_along,
         (Taken("axis", "text", choices=("x", "z")), Taken("length_mm"), WHOLE_TOOL),
         reads=True,
+        gives=WaySeen,
     ),
-    ControlAct("jog_onto_pin", _jog_onto_pin, (WHOLE_TOOL,)),
-    ControlAct("change_nozzle", _change_nozzle, (WHOLE_TOOL,)),
+    ControlAct("jog_onto_pin", _jog_onto_pin, (WHOLE_TOOL,), gives=FlangeTold),
+    ControlAct("change_nozzle", _change_nozzle, (WHOLE_TOOL,), gives=TipTold),
     _AnyOfTheWorld(
         "set_world",
         _set_world,
         tuple(Taken(name, "any", needed=False) for name in parameter_names()),
+        gives=WorldTold,
     ),
     ControlAct(
         "mount_beam", _mount_beam, (NUMBER, *_PLACE, Taken("heading_deg"), *_SHAPE, _SCATTER)

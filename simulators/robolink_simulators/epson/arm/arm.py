@@ -12,7 +12,7 @@ from itertools import accumulate
 from typing import Final
 
 from robolink.model import Hand, Pose, Posture, ToolOffset
-from robolink_simulators.device.motion_log import MotionLog, Place
+from robolink_simulators.device.motion_log import Place
 from robolink_simulators.epson.arm.joints import Joints, check_ranges
 from robolink_simulators.epson.arm.kinematics import forward, hand_of, posture_of, tip_of
 from robolink_simulators.epson.arm.robots import Mechanism, RobotModel
@@ -132,7 +132,8 @@ class Arm:
             commanded one by half of it, against the way it last turned (assumed model).
 
     Attributes:
-        motions: Those begun since the arm was made.
+        moves_started: Motions begun since the arm was made; a repeated command shows here.
+        on_started: Told when each motion begins, and of what tells where its flange is to end.
         backlash_mm: Play of a SCARA's joint 3, likewise; none at first.
         travelled_until_ns: Until when the motion under way has gone, or the last one went.
         followed: Told of each part of a motion, from when to when, before its end is forgotten.
@@ -148,7 +149,8 @@ class Arm:
         joints = rest_of(model) if joints is None else joints
         check_ranges(model, joints)
         self.model = model
-        self.motions = MotionLog()
+        self.moves_started = 0
+        self.on_started: Callable[[int, Callable[[], Place]], None] = _unnoted
         self.backlash_deg = backlash_deg
         self.backlash_mm = 0.0
         self.followed: Callable[[int, int], None] | None = None
@@ -172,11 +174,6 @@ class Arm:
     def now_ns(self) -> int:
         """The instant last given."""
         return self._now_ns
-
-    @property
-    def moves_started(self) -> int:
-        """Motions begun since the arm was made; a repeated command shows here."""
-        return self.motions.added
 
     @property
     def moving(self) -> bool:
@@ -261,7 +258,8 @@ class Arm:
         self.halt(now_ns)
         legs = self.guard(legs)
         last = legs[-1]
-        self.motions.add(self._now_ns, lambda: _place(last.flange_at(last.duration_ns)))
+        self.moves_started += 1
+        self.on_started(self._now_ns, lambda: _place(last.flange_at(last.duration_ns)))
         self._travel = _Travel(self._now_ns, tuple(legs))
         return self._travel.end_ns
 
@@ -347,6 +345,10 @@ class Arm:
 
 def _heedless(travelled: Travelled) -> None:
     """Do nothing: nobody measures the drives."""
+
+
+def _unnoted(at_ns: int, flange_mm: Callable[[], Place]) -> None:
+    """Do nothing: nobody notes the motions."""
 
 
 def _whole(legs: Sequence[Leg]) -> Sequence[Leg]:

@@ -40,7 +40,7 @@ class ModbusHost(ClosedAtExit):
         self._simulator = simulator
         self._server = server
         self._cable = cable
-        self._seen = self._ends
+        self._seen = server.ends
         self.url = url
         simulator.watchers.append(self._look)
 
@@ -56,14 +56,9 @@ class ModbusHost(ClosedAtExit):
 
     def _look(self) -> None:
         """Cut connections when the PLC was started anew or its cable pulled; a line has none."""
-        if self._cable is None and self._seen != self._ends:
+        if self._cable is None and self._seen != self._server.ends:
             self._server.cut()
-        self._seen = self._ends
-
-    @property
-    def _ends(self) -> tuple[int, int]:
-        """What counts the ends of all connections."""
-        return self._simulator.plc.starts, self._simulator.plc.cuts
+        self._seen = self._server.ends
 
 
 def serve_modbus_tcp(

@@ -88,6 +88,8 @@ class ModbusServerThread:
         # A device on a serial line answers one request after the other. The server here would
         # answer the next one while a late answer waits, and the late one to whoever asks then.
         self._turn = asyncio.Lock() if isinstance(place, SerialLine) else nullcontext()
+        self._has_connections = not isinstance(place, SerialLine)
+        self._cut_at = registers.ends
         self._met: tuple[PlcFault, ...] = ()
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._run, name="modbus host", daemon=True)
@@ -104,6 +106,11 @@ class ModbusServerThread:
         transport: Any = self._server.transport
         number: int = transport.sockets[0].getsockname()[1]
         return number
+
+    @property
+    def ends(self) -> tuple[int, int]:
+        """What counts the ends of all connections."""
+        return self._registers.ends
 
     def cut(self) -> None:
         """Close every connection; any thread may call it."""
@@ -184,18 +191,30 @@ class ModbusServerThread:
             # A read-back, or the read half of a combined function.
             words = self._registers.peek(Bank.HOLDING, first, count)
         elif values is None:
-            served = self._registers.read(_READS[function], first, count)
+            served = self._in_time(self._registers.read, _READS[function], first, count)
             words = list(served.words)
             await self._let_go(served)
         else:
             if coils:
-                served = self._registers.switch(address, [bool(bit) for bit in values])
+                bits = [bool(bit) for bit in values]
+                served = self._in_time(self._registers.switch, address, bits)
             else:
-                served = self._registers.write(address, [int(word) for word in values])
+                asked = [int(word) for word in values]
+                served = self._in_time(self._registers.write, address, asked)
             await self._let_go(served)
             return None
         registers[first - start : first - start + count] = words
         return None
+
+    def _in_time(self, serve: Callable[..., ServedAccess], *asked: object) -> ServedAccess:
+        """Carry a request out, unless its connection has ended and is about to be closed.
+
+        The controller that it was meant for is gone; another one in its place must not answer.
+        """
+        with self._registers.lock:
+            if self._has_connections and self._cut_at != self._registers.ends:
+                return ServedAccess(answered=False, cut=True)
+            return serve(*asked)
 
     async def _let_go(self, served: ServedAccess) -> None:
         if served.cut:
@@ -245,6 +264,7 @@ class ModbusServerThread:
         return data
 
     def _cut(self) -> None:
+        self._cut_at = self._registers.ends
         for connection in tuple(self._server.active_connections.values()):
             connection.close()
 

@@ -1,6 +1,7 @@
 """The registers and coils of a simulated PLC, with its mailbox among them."""
 
 from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import Final
 
@@ -41,6 +42,16 @@ class PlcRegisters:
         self._clock = clock
         self._places = places_of(simulator.options.mailbox)
         self._plain = {bank: [0] * REGISTERS for bank in Bank}
+
+    @property
+    def lock(self) -> AbstractContextManager[object]:
+        """Held while the PLC is touched."""
+        return self._simulator.lock
+
+    @property
+    def ends(self) -> tuple[int, int]:
+        """What counts the ends of all connections: starts, and cables that were pulled."""
+        return self._simulator.plc.starts, self._simulator.plc.cuts
 
     def read(self, bank: Bank, address: int, count: int) -> ServedAccess:
         """Serve a client that reads registers."""

@@ -11,7 +11,7 @@ from robolink_simulators.hosting.seam import DeviceLink, ResettableLink
 from robolink_simulators.hosting.streams.wire_host import WireHost
 
 _CHUNK_BYTES: Final = 65536
-_MOST_UNSENT: Final = 1 << 20
+_MOST_UNSENT: Final = 1 << 22
 NO_TIME: Final = struct.pack("HH" if sys.platform == "win32" else "ii", 1, 0)
 """For SO_LINGER: a socket that lingers for no time is reset when it is closed."""
 

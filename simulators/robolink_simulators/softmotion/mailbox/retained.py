@@ -18,7 +18,7 @@ from robolink.protocols.mailbox import (
     encode_slot,
     next_number,
 )
-from robolink_simulators.state_files import save_state
+from robolink_simulators.state_files import StateFile, StateNotKeptError
 
 SCHEMA: Final = "robolink/plc-state/1"
 
@@ -115,10 +115,15 @@ class RetainedFile:
     """
 
     def __init__(self, path: Path | None, memory: RetainedMemory, machine: str) -> None:
-        self._path = path
+        self._file = StateFile(path)
         self._memory = memory
         self._machine = machine
         self._written: dict[str, object] | None = None
+
+    @property
+    def failure(self) -> StateNotKeptError | None:
+        """Why something could not be kept; ``None`` as long as all was."""
+        return self._file.failure
 
     def restore(self) -> bool:
         """Fill the memory from the file; False when there is none.
@@ -126,10 +131,11 @@ class RetainedFile:
         Raises:
             ConfigError: The file cannot be read or is not of this machine.
         """
-        if self._path is None or not self._path.exists():
+        path = self._file.path
+        if path is None or not path.exists():
             return False
         try:
-            document = json.loads(read_named(self._path))
+            document = json.loads(read_named(path))
             if document["schema"] != SCHEMA or document["machine"] != self._machine:
                 raise ValueError(document["machine"])
             self._memory.restore(document["memory"])
@@ -137,7 +143,7 @@ class RetainedFile:
             raise ConfigError(
                 tr(
                     "{path} is not a saved state of a simulated PLC with {machine}.",
-                    path=self._path,
+                    path=path,
                     machine=self._machine,
                 ),
                 remedy=tr("Name another file, or delete this one to start afresh."),
@@ -148,13 +154,13 @@ class RetainedFile:
         """Write the file if something changed since it was written last.
 
         Raises:
-            ConfigError: It cannot be written.
+            StateNotKeptError: It cannot be written.
         """
-        if self._path is None:
+        if self._file.path is None:
             return
         state = self._memory.to_state()
         if state == self._written:
             return
-        self._written = state
         document = {"schema": SCHEMA, "machine": self._machine, "memory": state}
-        save_state(self._path, document)
+        self._file.save(document)
+        self._written = state

@@ -6,7 +6,7 @@ what clients read and write, and the time. Several hosts may serve one PLC; they
 words that clients write.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import asdict
 from pathlib import Path
@@ -17,7 +17,7 @@ from robolink.protocols.mailbox import COMMAND, SLOTS, Opcode, Six, Words
 from robolink_simulators.cell.frames import zyx_angles
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.device.hosted import HostedDevice
-from robolink_simulators.device.motion_log import StartedMotion
+from robolink_simulators.device.motion_log import MotionLog
 from robolink_simulators.faults import LinkKind, PlcFault, PlcFaultAction
 from robolink_simulators.softmotion.catalogue import MachineModel, machine_named
 from robolink_simulators.softmotion.kinematics.coordinates import CoordRef
@@ -34,6 +34,7 @@ from robolink_simulators.softmotion.mailbox.words.exchange import (
 )
 from robolink_simulators.softmotion.mailbox.words.fieldbus_watchdog import FieldbusWatchdog
 from robolink_simulators.softmotion.world import SoftMotionWorld
+from robolink_simulators.state_files import StateNotKeptError
 
 DEFAULT_KINEMATICS: Final = "Kin_Scara3_Z"
 
@@ -101,8 +102,8 @@ class SoftMotionSimulator(HostedDevice):
         self.faults = WireFaults(faults, seed)
         self._kinematics, self._given = kinematics, dict(parameters or {})
         self._parameters, self._state_path, self._make_plc = world, state_path, make_plc
-        self._starts_before = 0
         self._make()
+        self._count_on()
 
     def _make(self) -> None:
         """Make the controller and its world, as they are at first."""
@@ -120,8 +121,12 @@ class SoftMotionSimulator(HostedDevice):
         self.plc.start(self.now_ns)
         if not switched_on:
             self._make_ready()
-        self._changes_before = self._slot_changes()
         self._file.save_changes()
+
+    @property
+    def failure(self) -> StateNotKeptError | None:
+        """See :attr:`HostedDevice.failure`."""
+        return self._file.failure
 
     @property
     def executes_program(self) -> bool:
@@ -133,13 +138,11 @@ class SoftMotionSimulator(HostedDevice):
         """See :attr:`HostedDevice.machine_name`."""
         return f"{self.kind} {self._kinematics}"
 
-    def counters(self) -> dict[str, int]:
-        """See :meth:`HostedDevice.counters`."""
+    def _counted(self) -> dict[str, int]:
         return {
-            "exchanges": self.exchanges,
             "moves_started": self.plc.group.movements_started,
-            "tool_writes": self._slot_changes() - self._changes_before,
-            "starts": self.plc.starts - self._starts_before,
+            "tool_writes": self._slot_changes(),
+            "starts": self.plc.starts,
             "touches": self.world.operator.touches,
         }
 
@@ -147,9 +150,8 @@ class SoftMotionSimulator(HostedDevice):
         """How often the slots were written or cleared, ever since the PLC was new."""
         return sum(self.plc.memory.slot(number).counter for number in SLOTS)
 
-    def motions(self, after: int = 0) -> Iterator[StartedMotion]:
-        """See :meth:`HostedDevice.motions`."""
-        return self.plc.group.motions.motions(after)
+    def _motion_log(self) -> MotionLog:
+        return self.plc.group.motions
 
     def restart(self) -> None:
         """Start the PLC anew; what is retained stays."""
@@ -259,7 +261,6 @@ class SoftMotionSimulator(HostedDevice):
         starts, cuts = self.plc.starts, self.plc.cuts
         self._make()
         self.plc.starts += starts  # hosts cut their links when they see another number
-        self._starts_before = starts
         self.plc.cuts = cuts
 
     def _moment(self) -> dict[str, Any]:

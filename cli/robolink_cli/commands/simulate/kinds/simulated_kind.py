@@ -116,7 +116,7 @@ def serve_alone(kind: SimulatedKind, life: ServedLife, given: Options) -> None:
         control = stack.enter_context(controlled(cells, life, allow_remote=given["allow_remote"]))
         document = served.document(control.url_of("cell"))
         announce(document, [kind.title(simulator), *_told(served, document)], stopped.state_dir)
-        stopped.wait(lambda: served.requests + control.requests)
+        stopped.wait(lambda: served.requests + control.requests, lambda: simulator.failure)
 
 
 def _told(served: ServedCell, document: Mapping[str, object]) -> list[str]:

@@ -45,7 +45,7 @@ def run_cells(path: Path, cells: Sequence[PlannedCell], life: ServedLife) -> Non
         life: Where they are controlled, and when they end by themselves.
 
     Raises:
-        ConfigError: One cannot be made or served.
+        ConfigError: One cannot be made or served, or can keep its state no longer.
         ConnectError: A port is taken.
     """
     _raise_most_files()
@@ -68,7 +68,10 @@ def run_cells(path: Path, cells: Sequence[PlannedCell], life: ServedLife) -> Non
         lines = _told(path, about, control.url)
         announce(document, lines, stopped.state_dir, schema=SCHEMA)
         all_of_them = tuple(served.values())
-        stopped.wait(lambda: sum(it.requests for it in all_of_them) + control.requests)
+        stopped.wait(
+            lambda: sum(it.requests for it in all_of_them) + control.requests,
+            lambda: _failure(cells, simulators),
+        )
 
 
 def _served(stack: ExitStack, cell: PlannedCell, simulator: AnySimulator) -> ServedCell:
@@ -76,6 +79,16 @@ def _served(stack: ExitStack, cell: PlannedCell, simulator: AnySimulator) -> Ser
         return cell.kind.serve(stack, simulator, cell.given, person=cell.assist)
     except (ConfigError, ConnectError) as error:
         raise type(error)(_of_cell(cell, error), remedy=error.remedy) from error
+
+
+def _failure(
+    cells: Sequence[PlannedCell], simulators: Mapping[str, AnySimulator]
+) -> ConfigError | None:
+    """Return why a cell can go on no longer, ``None`` as long as all can."""
+    for cell in cells:
+        if (failed := simulators[cell.name].failure) is not None:
+            return ConfigError(_of_cell(cell, failed), remedy=failed.remedy)
+    return None
 
 
 def _of_cell(cell: PlannedCell, error: RobolinkError) -> str:

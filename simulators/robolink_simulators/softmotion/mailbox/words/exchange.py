@@ -137,6 +137,7 @@ class WireFaults(CountedFaults[PlcFault]):
             case PlcFaultAction.STALE_REPLY:
                 # There is nothing stale yet: it did not happen, and waits for the next one.
                 self.fired.remove(fault)
+                self.times_fired -= 1
                 self.add(replace(fault, on_exchange=0, match=fault.match or shown))
         return words
 

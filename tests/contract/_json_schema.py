@@ -1,0 +1,99 @@
+"""A small check of a document against a JSON schema, of the keywords that ours has.
+
+A key that no schema names is wrong here, although a client has to bear it: so nothing is
+answered that is not described.
+"""
+
+from typing import Any, Final
+
+_TYPES: Final[dict[str, tuple[type, ...]]] = {
+    "object": (dict,),
+    "array": (list,),
+    "string": (str,),
+    "integer": (int,),
+    "number": (int, float),
+    "boolean": (bool,),
+    "null": (type(None),),
+}
+_KNOWN: Final = frozenset(
+    {"description", "type", "enum", "const", "properties", "required", "additionalProperties"}
+    | {"items", "minItems", "maxItems", "oneOf", "allOf", "$ref"}
+)
+
+
+class Schemas:
+    """The schemas of a document of OpenAPI.
+
+    Args:
+        document: The document.
+    """
+
+    def __init__(self, document: dict[str, Any]) -> None:
+        self._document = document
+
+    def answer_to(self, path: str, method: str, status: int) -> dict[str, Any]:
+        """Return what describes the answer of an operation."""
+        responses = self._document["paths"][path][method]["responses"]
+        told = responses.get(str(status), responses["default"])
+        schema: dict[str, Any] = told["content"]["application/json"]["schema"]
+        return schema
+
+    def wrong(self, schema: dict[str, Any], value: object, at: str = "") -> list[str]:
+        """Return what is wrong with a value, each with its place."""
+        found = self._differs(schema, value, at)
+        if isinstance(value, dict) and "additionalProperties" not in schema:
+            unnamed = value.keys() - self._names(schema)
+            found += [f"{at}/{name} is not described" for name in sorted(unnamed)]
+        return found
+
+    def _differs(self, schema: dict[str, Any], value: Any, at: str) -> list[str]:
+        assert schema.keys() <= _KNOWN, schema
+        if "$ref" in schema:
+            return self._differs(self._referred(schema), value, at)
+        found = [it for part in schema.get("allOf", ()) for it in self._differs(part, value, at)]
+        if "oneOf" in schema:
+            tried = [self._differs(part, value, at) for part in schema["oneOf"]]
+            if tried.count([]) != 1:
+                found.append(f"{at} fits {tried.count([])} of {len(tried)}: {tried}")
+        if "const" in schema and value != schema["const"]:
+            found.append(f"{at} is {value!r}")
+        if "enum" in schema and value not in schema["enum"]:
+            found.append(f"{at} is {value!r}")
+        if "type" in schema:
+            found += self._of_type(schema, value, at)
+        return found
+
+    def _of_type(self, schema: dict[str, Any], value: Any, at: str) -> list[str]:
+        names = schema["type"] if isinstance(schema["type"], list) else [schema["type"]]
+        kinds = tuple(kind for name in names for kind in _TYPES[name])
+        if not isinstance(value, kinds) or (isinstance(value, bool) and "boolean" not in names):
+            return [f"{at} is {value!r}, no {names}"]
+        if isinstance(value, list):
+            least, most = schema.get("minItems", 0), schema.get("maxItems", len(value))
+            found = [] if least <= len(value) <= most else [f"{at} has {len(value)} items"]
+            each = enumerate(value)
+            return found + [
+                w for n, it in each for w in self.wrong(schema["items"], it, f"{at}/{n}")
+            ]
+        if not isinstance(value, dict):
+            return []
+        found = [
+            f"{at}/{name} is missing" for name in schema.get("required", ()) if name not in value
+        ]
+        for name, held in value.items():
+            inner = schema.get("properties", {}).get(name) or schema.get("additionalProperties")
+            if inner:
+                found += self.wrong(inner, held, f"{at}/{name}")
+        return found
+
+    def _names(self, schema: dict[str, Any]) -> set[str]:
+        """Return the keys that a schema names, whichever of several it is."""
+        if "$ref" in schema:
+            return self._names(self._referred(schema))
+        parts = (*schema.get("allOf", ()), *schema.get("oneOf", ()))
+        return {*schema.get("properties", ())}.union(*map(self._names, parts))
+
+    def _referred(self, schema: dict[str, Any]) -> dict[str, Any]:
+        name = schema["$ref"].removeprefix("#/components/schemas/")
+        found: dict[str, Any] = self._document["components"]["schemas"][name]
+        return found

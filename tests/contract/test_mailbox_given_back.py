@@ -15,7 +15,7 @@ NEW = robolink.ToolOffset(1.5, 2.5, 3.5)
 @pytest.mark.parametrize("command", [TAKEN, GIVEN_BACK])
 @pytest.mark.parametrize("late", range(4))
 def test_ctrl_c_while_it_is_taken_or_given_back(softmotion_sim, robolink_state, command, late):
-    passed = []
+    passed: list[str] = []
 
     def end_it(_point, what):
         if what == command or passed:

@@ -7,16 +7,19 @@ and 6); after the last one both are settled by reading, and put back where that 
 ends the process in between, ``robolink recover`` finds the two and does the same.
 """
 
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, ExitStack, contextmanager
+from dataclasses import dataclass, replace
+from functools import reduce
+from typing import Final, Protocol
 
 from robolink.errors import ConfigError, OutcomeUnknownError, RobolinkError
+from robolink.interrupts import InterruptGate
 from robolink.messages import joined, tr
 from robolink.model import (
     Controller,
     EntryKind,
+    Ledger,
     Marker,
     MarkerKind,
     NewEntry,
@@ -24,7 +27,14 @@ from robolink.model import (
     new_operation,
     plain_offset,
 )
+from robolink.standing import Standing, note_standing
 from robolink.testing.tool_checks import another_offset
+from robolink.timing import Deadline
+
+_REST_S: Final = 10.0
+"""A step of 5 mm at 10 mm/s ends well before."""
+
+_LOOK_S: Final = 0.05
 
 
 class Connect(Protocol):
@@ -53,9 +63,17 @@ class _Kept:
 
 @contextmanager
 def kept_on_site(
-    connect: Connect, reason: str, *, tool: int | None, agree: Callable[[Controller], None]
+    connect: Connect,
+    reason: str,
+    *,
+    tool: int | None,
+    agree: Callable[[Controller], None],
+    trials: Sequence[Ledger] = (),
 ) -> Iterator[None]:
     """Surround checks by a record of what was there, and put that back at their end.
+
+    From the moment at which it stands on record until it is back, Ctrl-C ends the block alone.
+    Whatever leaves the block says what stands then, and not what a check had just done.
 
     Args:
         connect: Connects to the controller, with its own record; once before the block and once
@@ -63,6 +81,7 @@ def kept_on_site(
         reason: What is done, as a person may read it in the record.
         tool: The tool that the checks write; ``None`` where they write none.
         agree: Asks the person, while the controller is connected and nothing is begun.
+        trials: The ledgers of the connections of the block in their order, which grow with them.
 
     Raises:
         ConfigError: The tool is the selected one, or is not there.
@@ -81,16 +100,47 @@ def kept_on_site(
         ...     print(controller.tools.read(2))
         None
     """
-    with connect(leaves=True) as controller:
-        controller.require_settled(reason)
-        if tool is not None:
-            _require_spare(controller, tool)
-        agree(controller)
-        kept = _put_on_record(controller, reason, tool)
+    kept: _Kept | None = None
+    back = False
+    ledgers: list[Ledger] = []
+    gate = InterruptGate()
+    gate.open()
     try:
-        yield
+        try:
+            with ExitStack() as held, connect(leaves=True) as controller:
+                controller.require_settled(reason)
+                if tool is not None:
+                    _require_spare(controller, tool)
+                agree(controller)
+                held.enter_context(gate)  # once it is begun, it is put back
+                kept = _put_on_record(controller, reason, tool)
+            yield
+        finally:
+            if kept is not None:
+                with gate:
+                    ledgers.extend(trials)
+                    _put_back(connect, kept, tool, ledgers)
+                    back = True
+    except BaseException as error:
+        if kept is None:
+            raise
+        told = _without_doubt(error) if back else error
+        stands = reduce(Standing.followed_by, (ledger.standing() for ledger in ledgers), Standing())
+        if kept.selected is not None:
+            stands = replace(stands, selected_before=kept.selected)
+        stands = replace(stands, settled=False, left_open=True)
+        note_standing(told, stands.put_back() if back else stands)
+        if told is error:
+            raise
+        raise told from None
     finally:
-        _put_back(connect, kept, tool)
+        gate.close()
+
+
+def _without_doubt(error: BaseException) -> BaseException:
+    """Return what an outcome was unknown for, once it has been read and nothing is left of it."""
+    caused = error.__cause__ if isinstance(error, OutcomeUnknownError) else None
+    return caused if isinstance(caused, RobolinkError) else error
 
 
 def _require_spare(controller: Controller, tool: int) -> None:
@@ -129,10 +179,19 @@ def _put_on_record(controller: Controller, reason: str, tool: int | None) -> _Ke
     return _Kept(change, selection, before, selected)
 
 
-def _put_back(connect: Connect, kept: _Kept, tool: int | None) -> None:
+def _put_back(connect: Connect, kept: _Kept, tool: int | None, ledgers: list[Ledger]) -> None:
+    """Put back what is on record; the ledger of that joins those of the checks.
+
+    Raises:
+        OutcomeUnknownError: It could not be, and stays open for ``recover``.
+    """
+    moving = any(ledger.standing().moving for ledger in ledgers)
     try:
         with connect(leaves=False) as controller, controller.uninterrupted():
+            ledgers.append(controller.ledger)
             controller.release_stop()
+            if moving:
+                _await_rest(controller)
             if kept.change is not None and tool is not None:
                 _restore_tool(controller, kept, tool)
             if kept.selection is not None:
@@ -143,6 +202,23 @@ def _put_back(connect: Connect, kept: _Kept, tool: int | None) -> None:
             remedy=tr("Do not start the cell. Next: 'robolink recover'."),
             controller=error.controller,
         ) from error
+
+
+def _await_rest(controller: Controller) -> None:
+    """Wait for the end of a movement whose connection was lost: nobody else has waited for it.
+
+    Raises:
+        OutcomeUnknownError: It did not come.
+    """
+    deadline = Deadline.after(controller.clock, _REST_S)
+    while controller.status().running:
+        if deadline.expired:
+            raise OutcomeUnknownError(
+                tr("The robot still moves."),
+                remedy=tr("Press the emergency stop if the robot still moves."),
+                controller=controller.identity,
+            )
+        controller.clock.sleep(_LOOK_S)
 
 
 def _restore_tool(controller: Controller, kept: _Kept, tool: int) -> None:

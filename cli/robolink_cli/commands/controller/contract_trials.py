@@ -15,7 +15,7 @@ from robolink_cli.session.context import CliContext
 from robolink_cli.session.opening import password_of
 
 if TYPE_CHECKING:
-    from robolink.model import Controller
+    from robolink.model import Controller, Ledger
 
 
 class TrialConnections:
@@ -26,16 +26,20 @@ class TrialConnections:
 
     Args:
         context: What the command was told.
+
+    Attributes:
+        ledgers: What each connection did so far, in their order.
     """
 
     def __init__(self, context: CliContext) -> None:
         from robolink.journal import memory_journal
         from robolink.model import Signature
 
+        self.ledgers: list[Ledger] = []
         self._context = context
         self._url, self._password = context.require_url(), password_of(context)
-        identity = f"contract-check:{self._url}"
-        self._record = memory_journal(identity).log(identity, signature=Signature())
+        self._identity = f"contract-check:{self._url.partition('?')[0]}"
+        self._record = memory_journal(self._identity).log(self._identity, signature=Signature())
         self._listening = ExitStack()
         self._stopped_by: str | None = None
 
@@ -64,12 +68,16 @@ class TrialConnections:
             remote_timeout_s=self._context.remote_timeout_s,
             outcomes=self._record,
         )
+        self.ledgers.append(controller.ledger)
         self._listening.enter_context(self._heard_while(controller))
         return controller
 
     def close(self) -> None:
-        """Listen no longer. Idempotent."""
+        """Listen no longer, and forget what an interrupted check left begun. Idempotent."""
+        from robolink.journal import forget_memory
+
         self._listening.close()
+        forget_memory(self._identity)
 
     @contextmanager
     def _heard_while(self, controller: "Controller") -> Iterator[None]:
@@ -109,9 +117,11 @@ def driver_named(name: str) -> "Callable[[], Controller]":
         module_path.append(str(Path.cwd()))
     try:
         made = getattr(import_module(module), attribute)
-    except (ImportError, AttributeError) as error:
+    except (Exception, SystemExit) as error:  # it is somebody else's code that runs here
+        ours = isinstance(error, (ImportError, AttributeError))
+        cause = str(error) if ours else f"{type(error).__name__}: {error}"
         raise ConfigError(
-            tr("The driver {name!r} cannot be loaded: {cause}.", name=name, cause=error),
+            tr("The driver {name!r} cannot be loaded: {cause}.", name=name, cause=cause),
             remedy=tr("It is looked for in the present folder and among installed packages."),
         ) from error
     if not callable(made):
@@ -142,7 +152,7 @@ def told_of_the_driver(name: str) -> Iterator[None]:
         yield
     except RobolinkError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise _no_controller(name, f"{type(error).__name__}: {error}") from error
 
 

@@ -197,7 +197,8 @@ def test_what_stands_is_said_in_whole_sentences(ledger, story, sentence):
 def test_what_two_connections_left_is_told_as_one():
     first, second = Ledger(), Ledger()
     done(first, write(), NEW)
-    done(first, move(), None)
+    first.begin(move())
+    first.ended(move())
     second.begin(write(before=NEW, requested=OLD))
     whole = first.standing().followed_by(second.standing())
     assert whole.moved

@@ -13,7 +13,12 @@ from dataclasses import dataclass, replace
 from functools import reduce
 from typing import Final, Protocol
 
-from robolink.errors import ConfigError, OutcomeUnknownError, RobolinkError
+from robolink.errors import (
+    ConfigError,
+    LoginUnansweredError,
+    OutcomeUnknownError,
+    RobolinkError,
+)
 from robolink.interrupts import InterruptGate
 from robolink.messages import joined, tr
 from robolink.model import (
@@ -29,12 +34,16 @@ from robolink.model import (
 )
 from robolink.standing import Standing, note_standing
 from robolink.testing.tool_checks import another_offset
-from robolink.timing import Deadline
+from robolink.timing import Deadline, SystemClock
 
 _REST_S: Final = 10.0
 """A step of 5 mm at 10 mm/s ends well before."""
 
 _LOOK_S: Final = 0.05
+
+_LOGINS: Final = 4
+_AGAIN_S: Final = 1.0
+"""A stop, which logs in, stops and logs out, takes a second or two."""
 
 
 class Connect(Protocol):
@@ -187,7 +196,7 @@ def _put_back(connect: Connect, kept: _Kept, tool: int | None, ledgers: list[Led
     """
     moving = any(ledger.standing().moving for ledger in ledgers)
     try:
-        with connect(leaves=False) as controller, controller.uninterrupted():
+        with _reached_again(connect) as controller, controller.uninterrupted():
             ledgers.append(controller.ledger)
             controller.release_stop()
             if moving:
@@ -202,6 +211,21 @@ def _put_back(connect: Connect, kept: _Kept, tool: int | None, ledgers: list[Led
             remedy=tr("Do not start the cell. Next: 'robolink recover'."),
             controller=error.controller,
         ) from error
+
+
+@contextmanager
+def _reached_again(connect: Connect) -> Iterator[Controller]:
+    """Connect, though whoever stopped the checks may have the controller's only login yet."""
+    with ExitStack() as stack:
+        for left in reversed(range(_LOGINS)):
+            try:
+                controller = stack.enter_context(connect(leaves=False))
+                break
+            except LoginUnansweredError:
+                if not left:
+                    raise
+                SystemClock().sleep(_AGAIN_S)
+        yield controller
 
 
 def _await_rest(controller: Controller) -> None:

@@ -3,15 +3,23 @@
 import json
 import signal
 import sys
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, cast
 from xml.etree import ElementTree
 
 import pytest
 from robolink_cli import main
+from robolink_cli.commands.controller.contract_trials import TrialConnections
 from robolink_simulators.faults import Fault, FaultAction
 
 import robolink
 from robolink.checkpoints import observed
-from robolink.model import ToolOffset
+from robolink.errors import LoginUnansweredError, StoppedError
+from robolink.model import Controller, ToolOffset
+from robolink.testing import kept_on_site, on_site
+
+if TYPE_CHECKING:
+    from robolink_cli.session.context import CliContext
 
 OLD = ToolOffset(1.0, 2.0, 3.0)
 ALL = ("--write", "--tool", "2", "--move", "--yes")
@@ -190,6 +198,57 @@ def test_the_file_for_pipelines_is_refused_before_anything_is_asked(epson, tmp_p
     code, _, err = epson.run()
     assert (code, "folder" in err) == (2, True)
     assert epson.fixture.simulator.counters()["exchanges"] == before
+
+
+@pytest.fixture
+def trials(epson):
+    context = SimpleNamespace(
+        require_url=lambda: epson.fixture.url,
+        timeout_s=3.0,
+        remote_timeout_s=60.0,
+        password_file=None,
+        cell=None,
+        reach=None,
+    )
+    trials = TrialConnections(cast("CliContext", context))
+    yield trials
+    trials.close()
+
+
+def test_a_stop_between_two_checks_stops_the_controller_and_ends_them(epson, trials):
+    with trials.connect():
+        pass
+    epson.fixture.wire.assert_not_sent("$Abort")
+    trials.stop()
+    epson.fixture.wire.assert_sent("$Abort")
+    assert trials.status().ready
+    with pytest.raises(StoppedError, match="stopped from another terminal"):
+        trials.connect()
+
+
+def test_a_stop_during_a_check_goes_over_its_connection(epson, trials):
+    with trials.connect() as controller:
+        trials.stop()
+        assert controller.latch.closed
+    with pytest.raises(StoppedError):
+        trials.connect()
+
+
+def test_whoever_stopped_the_checks_may_have_the_login_when_it_is_put_back(epson, monkeypatch):
+    monkeypatch.setattr(on_site, "_AGAIN_S", 0.0)
+    refusals = [LoginUnansweredError("Somebody has it."), LoginUnansweredError("Still.")]
+    begun: list[Controller] = []
+
+    def reach(*, leaves):
+        if not leaves and refusals:
+            raise refusals.pop()
+        return robolink.connect(epson.fixture.url)
+
+    with kept_on_site(reach, "a trial", tool=2, agree=begun.append):
+        with robolink.connect(epson.fixture.url) as controller:
+            controller.tools.write(2, ToolOffset(7.0), expected=OLD)
+    assert (len(begun), refusals) == (1, [])
+    assert (epson.kept(), epson.open_markers()) == (epson.before, ())
 
 
 DRIVER = """

@@ -8,8 +8,10 @@ from sys import path as module_path
 from typing import TYPE_CHECKING
 
 import robolink
-from robolink.errors import ConfigError, RobolinkError, StoppedError
+from robolink import ambient
+from robolink.errors import ConfigError, RobolinkError, StoppedError, TransportClosedError
 from robolink.messages import tr
+from robolink.model import ControllerStatus
 from robolink.stopping import far_end_of, find_note
 from robolink_cli.session.context import CliContext
 from robolink_cli.session.opening import password_of
@@ -22,7 +24,8 @@ class TrialConnections:
     """Connects for each check anew, and lets a second terminal stop what that does.
 
     The checks open and settle markers on purpose; those go to a record in memory. A stop that
-    somebody else gives ends them all: a check releases its own stops only.
+    somebody else gives ends them all, and is heard between two checks too: a check releases its
+    own stops only.
 
     Args:
         context: What the command was told.
@@ -41,7 +44,11 @@ class TrialConnections:
         self._identity = f"contract-check:{self._url.partition('?')[0]}"
         self._record = memory_journal(self._identity).log(self._identity, signature=Signature())
         self._listening = ExitStack()
-        self._stopped_by: str | None = None
+        self._lock = ambient.lock()
+        self._latest: Controller | None = None
+        self._stopped = False
+        self._stopped_by = ""
+        self._state = ControllerStatus()
 
     def connect(self) -> "Controller":
         """Connect for one check.
@@ -50,26 +57,12 @@ class TrialConnections:
             StoppedError: Somebody gave a stop; no further check begins.
             RobolinkError: The controller is not reached.
         """
-        self._listening.close()
-        if (note := find_note(far_end_of(self._url), "")) is not None:
-            # It came while no check had the controller, and went there by itself.
-            raise StoppedError(
-                note.sentence, remedy=tr("Find out why, then start the checks again.")
-            )
-        if self._stopped_by is not None:
-            raise StoppedError(
-                tr("{who} stopped the checks.", who=self._stopped_by),
-                remedy=tr("Find out why, then start the checks again."),
-            )
-        controller = robolink.connect(
-            self._url,
-            password=self._password,
-            timeout_s=self._context.timeout_s,
-            remote_timeout_s=self._context.remote_timeout_s,
-            outcomes=self._record,
-        )
-        self.ledgers.append(controller.ledger)
-        self._listening.enter_context(self._heard_while(controller))
+        with self._lock:
+            self._require_no_stop()
+            self._latest = controller = self._connected()
+            self.ledgers.append(controller.ledger)
+            if len(self.ledgers) == 1:
+                self._listen()
         return controller
 
     def close(self) -> None:
@@ -79,23 +72,55 @@ class TrialConnections:
         self._listening.close()
         forget_memory(self._identity)
 
-    @contextmanager
-    def _heard_while(self, controller: "Controller") -> Iterator[None]:
+    def stop(self) -> None:
+        """Bring the controller to rest, whether a check has it now or none does; any thread."""
+        self._stopped = True
+        with self._lock:  # a connection that is being made is the one that stops
+            controller = self._latest
+        if controller is not None:
+            with suppress(TransportClosedError):  # that check has ended
+                controller.stop()
+                self._state = controller.status()
+                return
+        with self._lock, self._connected() as own:
+            own.stop()
+            self._state = own.status()
+
+    def status(self) -> ControllerStatus:
+        """Return the state that the stop has shown."""
+        return self._state
+
+    def _require_no_stop(self) -> None:
+        note = find_note(far_end_of(self._url), "")
+        if note is not None:
+            # It came while no check had the controller, and went there by itself.
+            what = note.sentence
+        elif self._stopped_by:
+            what = tr("{who} stopped the checks.", who=self._stopped_by)
+        elif self._stopped:
+            what = tr("The checks were stopped from another terminal.")
+        else:
+            return
+        raise StoppedError(what, remedy=tr("Find out why, then start the checks again."))
+
+    def _connected(self) -> "Controller":
+        return robolink.connect(
+            self._url,
+            password=self._password,
+            timeout_s=self._context.timeout_s,
+            remote_timeout_s=self._context.remote_timeout_s,
+            outcomes=self._record,
+        )
+
+    def _listen(self) -> None:
         from robolink.stopping import StopListener
 
-        with ExitStack() as stack:
-            if "+sim://" not in self._url:
-                # Where there is no place to listen, Ctrl-C is left, as the command's page says.
-                with suppress(OSError):
-                    stack.enter_context(
-                        StopListener(
-                            controller,
-                            self._url,
-                            who=tr("the checks of the contract"),
-                            heard=self._hear,
-                        )
-                    )
-            yield
+        if "+sim://" in self._url:
+            return
+        who = tr("the checks of the contract")
+        # Where there is no place to listen, Ctrl-C is left, as the command's page says.
+        with suppress(OSError):
+            self._listening.enter_context(StopListener(self, self._url, who=who, heard=self._hear))
 
     def _hear(self, who: str) -> None:
         self._stopped_by = who

@@ -15,6 +15,7 @@ from typing import Final, Protocol
 
 from robolink.errors import (
     ConfigError,
+    LeaseHeldError,
     LoginUnansweredError,
     OutcomeUnknownError,
     RobolinkError,
@@ -41,9 +42,13 @@ _REST_S: Final = 10.0
 
 _LOOK_S: Final = 0.05
 
-_LOGINS: Final = 4
-_AGAIN_S: Final = 1.0
-"""A stop, which logs in, stops and logs out, takes a second or two."""
+_AGAIN_S: Final = 0.5
+
+_STOP_S: Final = 4.0
+"""A stop logs in, stops and logs out within a second or two."""
+
+_SILENT_S: Final = 12.0
+"""After 10 s without a sign a PLC lets its owner go (docs/mailbox.md, "Owners")."""
 
 
 class Connect(Protocol):
@@ -204,7 +209,8 @@ def _put_back(connect: Connect, kept: _Kept, tool: int | None, ledgers: list[Led
             if kept.change is not None and tool is not None:
                 _restore_tool(controller, kept, tool)
             if kept.selection is not None:
-                controller.resolver.settle(controller.resolver.examine(kept.selection))
+                finding = controller.resolver.examine(kept.selection)
+                _once_free(controller, lambda: controller.resolver.settle(finding))
     except RobolinkError as error:
         raise OutcomeUnknownError(
             joined(" ", (tr("What the checks found was not put back:"), error.what)),
@@ -216,16 +222,34 @@ def _put_back(connect: Connect, kept: _Kept, tool: int | None, ledgers: list[Led
 @contextmanager
 def _reached_again(connect: Connect) -> Iterator[Controller]:
     """Connect, though whoever stopped the checks may have the controller's only login yet."""
+    deadline = Deadline.after(SystemClock(), _STOP_S)
     with ExitStack() as stack:
-        for left in reversed(range(_LOGINS)):
+        while True:
             try:
                 controller = stack.enter_context(connect(leaves=False))
                 break
             except LoginUnansweredError:
-                if not left:
+                if deadline.expired:
                     raise
                 SystemClock().sleep(_AGAIN_S)
         yield controller
+
+
+def _once_free(controller: Controller, act: Callable[[], object]) -> None:
+    """Do what a PLC refuses while it still takes a check, whose link was lost, for its owner.
+
+    Raises:
+        LeaseHeldError: Somebody else owns it.
+    """
+    deadline = Deadline.after(controller.clock, _SILENT_S)
+    while True:
+        try:
+            act()
+            return
+        except LeaseHeldError:
+            if deadline.expired:
+                raise
+            controller.clock.sleep(_AGAIN_S)
 
 
 def _await_rest(controller: Controller) -> None:
@@ -253,10 +277,12 @@ def _restore_tool(controller: Controller, kept: _Kept, tool: int) -> None:
     mine = controller.begin(marker.kind, marker.request, marker.details, operation=marker.operation)
     now = tools.read(tool)
     written = not tools.same(now, kept.before)
-    if written and kept.before is None:
-        tools.clear(tool, expected=now, then_select=kept.selected or 0)
-    elif written and kept.before is not None:
-        tools.write(tool, kept.before, expected=now)
+    before = kept.before
+    if written and before is None:
+        selected = kept.selected or 0
+        _once_free(controller, lambda: tools.clear(tool, expected=now, then_select=selected))
+    elif written and before is not None:
+        _once_free(controller, lambda: tools.write(tool, before, expected=now))
     controller.finish(
         mine,
         NewEntry(

@@ -167,6 +167,18 @@ def test_a_movement_whose_link_is_cut_ends_before_anything_is_put_back(epson):
     assert err.splitlines()[-1].startswith("Every movement has ended. Tool 2 holds")
 
 
+def test_a_plc_that_takes_a_lost_check_for_its_owner_is_waited_for(
+    softmotion_sim, robolink_state, tmp_path, capsys
+):
+    cell = Cell(softmotion_sim, tmp_path, capsys)
+    # Its first write of the tool is carried out, and the link is gone before that is seen.
+    softmotion_sim.do("add_fault", action="disconnect", match="write_command WRITE_TOOL")
+    code, _, err = cell.run(*ALL)
+    assert (code, cell.open_markers()) == (3, ()), err
+    assert cell.kept() == cell.before
+    assert err.splitlines()[-1].endswith("as before. Tool 1 is selected.")
+
+
 @pytest.mark.parametrize("document", [True, False])
 def test_what_could_not_be_put_back_is_named_and_recover_knows_of_it(epson, document):
     faults = epson.fixture.simulator.faults

@@ -218,6 +218,7 @@ def trials(epson):
         require_url=lambda: epson.fixture.url,
         timeout_s=3.0,
         remote_timeout_s=60.0,
+        record=None,
         password_file=None,
         cell=None,
         reach=None,

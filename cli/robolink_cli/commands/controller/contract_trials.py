@@ -13,11 +13,13 @@ from robolink.errors import ConfigError, RobolinkError, StoppedError, TransportC
 from robolink.messages import tr
 from robolink.model import ControllerStatus
 from robolink.stopping import far_end_of, find_note
+from robolink_cli.access.recording import recording
 from robolink_cli.session.context import CliContext
 from robolink_cli.session.opening import password_of
 
 if TYPE_CHECKING:
     from robolink.model import Controller, Ledger
+    from robolink.transport import TraceSink
 
 
 class TrialConnections:
@@ -44,6 +46,7 @@ class TrialConnections:
         self._identity = f"contract-check:{self._url.partition('?')[0]}"
         self._record = memory_journal(self._identity).log(self._identity, signature=Signature())
         self._listening = ExitStack()
+        self._trace: TraceSink | None = None
         self._lock = ambient.lock()
         self._latest: Controller | None = None
         self._stopped = False
@@ -59,6 +62,10 @@ class TrialConnections:
         """
         with self._lock:
             self._require_no_stop()
+            if not self.ledgers:
+                far_end = self._url.partition("?")[0]
+                kept = recording(self._context.record, far_end)
+                self._trace = self._listening.enter_context(kept)
             self._latest = controller = self._connected()
             self.ledgers.append(controller.ledger)
             if len(self.ledgers) == 1:
@@ -109,6 +116,7 @@ class TrialConnections:
             password=self._password,
             timeout_s=self._context.timeout_s,
             remote_timeout_s=self._context.remote_timeout_s,
+            trace=self._trace,
             outcomes=self._record,
         )
 

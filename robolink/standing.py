@@ -8,7 +8,7 @@ are not part of it.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 Components = tuple[float, ...] | None
@@ -102,6 +102,47 @@ class Standing:
     def selected_another(self) -> bool:
         """Whether another tool is selected than before."""
         return self.selected_before not in (None, self.selected)
+
+    def followed_by(self, later: "Standing") -> "Standing":
+        """Return what stands after the work of two connections, one after the other.
+
+        Args:
+            later: What the second one left. What it did not look at is as the first left it.
+        """
+        tools = dict(self.tools)
+        for number, tool in later.tools.items():
+            before = tools[number].before if number in tools else tool.before
+            differs = tool.known and tool.holds != before
+            tools[number] = replace(tool, before=before, differs=differs)
+        looked = later.selected is not None or later.selected_before is not None
+        chosen = self.selected_before is None
+        return Standing(
+            tools=tools,
+            selected=later.selected if looked else self.selected,
+            selected_before=later.selected_before if chosen else self.selected_before,
+            selection_known=later.selection_known if looked else self.selection_known,
+            carried_out=(*self.carried_out, *later.carried_out),
+            doubtful=(*self.doubtful, *later.doubtful),
+            moved=self.moved or later.moved,
+            moving=(*self.moving, *later.moving),
+            settled=self.settled and later.settled,
+            left_open=self.left_open or later.left_open,
+        )
+
+    def put_back(self) -> "Standing":
+        """Return what stands once tools and selection were read and are as before, at rest."""
+        return replace(
+            self,
+            tools={
+                number: replace(tool, holds=tool.before, known=True, differs=False)
+                for number, tool in self.tools.items()
+            },
+            selected=self.selected if self.selected_before is None else self.selected_before,
+            selection_known=True,
+            moving=(),
+            settled=True,
+            left_open=False,
+        )
 
 
 UNTOUCHED = Standing()

@@ -77,14 +77,15 @@ def a_stop_ends_a_movement(subject: Subject) -> None:
         start = group.pose()
         box = _around(start, subject)
         motion = group.move_to(_raised(start, subject.step_mm), _PROFILE, box=box)
-        controller.stop()
-        with refused(StoppedError, "who waits on a movement that is stopped gets StoppedError"):
-            motion.wait(timeout_s=_TIMEOUT_S)
-        with refused(StoppedError, "after a stop nothing moves"):
-            group.move_to(start, _PROFILE, box=box)
-        rest = group.pose()
-        controller.clock.sleep(_LOOKED_S)
-        _is_at(controller, rest, "what was stopped stands still")
+        with subject.releasing_stop(controller):
+            controller.stop()
+            with refused(StoppedError, "who waits on a movement that is stopped gets StoppedError"):
+                motion.wait(timeout_s=_TIMEOUT_S)
+            with refused(StoppedError, "after a stop nothing moves"):
+                group.move_to(start, _PROFILE, box=box)
+            rest = group.pose()
+            controller.clock.sleep(_LOOKED_S)
+            _is_at(controller, rest, "what was stopped stands still")
 
 
 def _raised(pose: Pose, by_mm: float) -> Pose:

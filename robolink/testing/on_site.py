@@ -7,16 +7,25 @@ and 6); after the last one both are settled by reading, and put back where that 
 ends the process in between, ``robolink recover`` finds the two and does the same.
 """
 
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, ExitStack, contextmanager
+from dataclasses import dataclass, replace
+from functools import reduce
+from typing import Final, Protocol
 
-from robolink.errors import ConfigError, OutcomeUnknownError, RobolinkError
+from robolink.errors import (
+    ConfigError,
+    LeaseHeldError,
+    LoginUnansweredError,
+    OutcomeUnknownError,
+    RobolinkError,
+)
+from robolink.interrupts import InterruptGate
 from robolink.messages import joined, tr
 from robolink.model import (
     Controller,
     EntryKind,
+    Ledger,
     Marker,
     MarkerKind,
     NewEntry,
@@ -24,7 +33,22 @@ from robolink.model import (
     new_operation,
     plain_offset,
 )
+from robolink.standing import Standing, note_standing
 from robolink.testing.tool_checks import another_offset
+from robolink.timing import Deadline, SystemClock
+
+_REST_S: Final = 10.0
+"""A step of 5 mm at 10 mm/s ends well before."""
+
+_LOOK_S: Final = 0.05
+
+_AGAIN_S: Final = 0.5
+
+_STOP_S: Final = 4.0
+"""A stop logs in, stops and logs out within a second or two."""
+
+_SILENT_S: Final = 12.0
+"""After 10 s without a sign a PLC lets its owner go (docs/mailbox.md, "Owners")."""
 
 
 class Connect(Protocol):
@@ -53,9 +77,17 @@ class _Kept:
 
 @contextmanager
 def kept_on_site(
-    connect: Connect, reason: str, *, tool: int | None, agree: Callable[[Controller], None]
+    connect: Connect,
+    reason: str,
+    *,
+    tool: int | None,
+    agree: Callable[[Controller], None],
+    trials: Sequence[Ledger] = (),
 ) -> Iterator[None]:
     """Surround checks by a record of what was there, and put that back at their end.
+
+    From the moment at which it stands on record until it is back, Ctrl-C ends the block alone.
+    Whatever leaves the block says what stands then, and not what a check had just done.
 
     Args:
         connect: Connects to the controller, with its own record; once before the block and once
@@ -63,6 +95,7 @@ def kept_on_site(
         reason: What is done, as a person may read it in the record.
         tool: The tool that the checks write; ``None`` where they write none.
         agree: Asks the person, while the controller is connected and nothing is begun.
+        trials: The ledgers of the connections of the block in their order, which grow with them.
 
     Raises:
         ConfigError: The tool is the selected one, or is not there.
@@ -81,16 +114,47 @@ def kept_on_site(
         ...     print(controller.tools.read(2))
         None
     """
-    with connect(leaves=True) as controller:
-        controller.require_settled(reason)
-        if tool is not None:
-            _require_spare(controller, tool)
-        agree(controller)
-        kept = _put_on_record(controller, reason, tool)
+    kept: _Kept | None = None
+    back = False
+    ledgers: list[Ledger] = []
+    gate = InterruptGate()
+    gate.open()
     try:
-        yield
+        try:
+            with ExitStack() as held, connect(leaves=True) as controller:
+                controller.require_settled(reason)
+                if tool is not None:
+                    _require_spare(controller, tool)
+                agree(controller)
+                held.enter_context(gate)  # once it is begun, it is put back
+                kept = _put_on_record(controller, reason, tool)
+            yield
+        finally:
+            if kept is not None:
+                with gate:
+                    ledgers.extend(trials)
+                    _put_back(connect, kept, tool, ledgers)
+                    back = True
+    except BaseException as error:
+        if kept is None:
+            raise
+        told = _without_doubt(error) if back else error
+        stands = reduce(Standing.followed_by, (ledger.standing() for ledger in ledgers), Standing())
+        if kept.selected is not None:
+            stands = replace(stands, selected_before=kept.selected)
+        stands = replace(stands, settled=False, left_open=True)
+        note_standing(told, stands.put_back() if back else stands)
+        if told is error:
+            raise
+        raise told from None
     finally:
-        _put_back(connect, kept, tool)
+        gate.close()
+
+
+def _without_doubt(error: BaseException) -> BaseException:
+    """Return what an outcome was unknown for, once it has been read and nothing is left of it."""
+    caused = error.__cause__ if isinstance(error, OutcomeUnknownError) else None
+    return caused if isinstance(caused, RobolinkError) else error
 
 
 def _require_spare(controller: Controller, tool: int) -> None:
@@ -129,20 +193,80 @@ def _put_on_record(controller: Controller, reason: str, tool: int | None) -> _Ke
     return _Kept(change, selection, before, selected)
 
 
-def _put_back(connect: Connect, kept: _Kept, tool: int | None) -> None:
+def _put_back(connect: Connect, kept: _Kept, tool: int | None, ledgers: list[Ledger]) -> None:
+    """Put back what is on record; the ledger of that joins those of the checks.
+
+    Raises:
+        OutcomeUnknownError: It could not be, and stays open for ``recover``.
+    """
+    moving = any(ledger.standing().moving for ledger in ledgers)
     try:
-        with connect(leaves=False) as controller, controller.uninterrupted():
+        with _reached_again(connect) as controller, controller.uninterrupted():
+            ledgers.append(controller.ledger)
             controller.release_stop()
+            if moving:
+                _await_rest(controller)
             if kept.change is not None and tool is not None:
                 _restore_tool(controller, kept, tool)
             if kept.selection is not None:
-                controller.resolver.settle(controller.resolver.examine(kept.selection))
+                finding = controller.resolver.examine(kept.selection)
+                _once_free(controller, lambda: controller.resolver.settle(finding))
     except RobolinkError as error:
         raise OutcomeUnknownError(
             joined(" ", (tr("What the checks found was not put back:"), error.what)),
             remedy=tr("Do not start the cell. Next: 'robolink recover'."),
             controller=error.controller,
         ) from error
+
+
+@contextmanager
+def _reached_again(connect: Connect) -> Iterator[Controller]:
+    """Connect, though whoever stopped the checks may have the controller's only login yet."""
+    deadline = Deadline.after(SystemClock(), _STOP_S)
+    with ExitStack() as stack:
+        while True:
+            try:
+                controller = stack.enter_context(connect(leaves=False))
+                break
+            except LoginUnansweredError:
+                if deadline.expired:
+                    raise
+                SystemClock().sleep(_AGAIN_S)
+        yield controller
+
+
+def _once_free(controller: Controller, act: Callable[[], object]) -> None:
+    """Do what a PLC refuses while it still takes a check, whose link was lost, for its owner.
+
+    Raises:
+        LeaseHeldError: Somebody else owns it.
+    """
+    deadline = Deadline.after(controller.clock, _SILENT_S)
+    while True:
+        try:
+            act()
+            return
+        except LeaseHeldError:
+            if deadline.expired:
+                raise
+            controller.clock.sleep(_AGAIN_S)
+
+
+def _await_rest(controller: Controller) -> None:
+    """Wait for the end of a movement whose connection was lost: nobody else has waited for it.
+
+    Raises:
+        OutcomeUnknownError: It did not come.
+    """
+    deadline = Deadline.after(controller.clock, _REST_S)
+    while controller.status().running:
+        if deadline.expired:
+            raise OutcomeUnknownError(
+                tr("The robot still moves."),
+                remedy=tr("Press the emergency stop if the robot still moves."),
+                controller=controller.identity,
+            )
+        controller.clock.sleep(_LOOK_S)
 
 
 def _restore_tool(controller: Controller, kept: _Kept, tool: int) -> None:
@@ -153,10 +277,12 @@ def _restore_tool(controller: Controller, kept: _Kept, tool: int) -> None:
     mine = controller.begin(marker.kind, marker.request, marker.details, operation=marker.operation)
     now = tools.read(tool)
     written = not tools.same(now, kept.before)
-    if written and kept.before is None:
-        tools.clear(tool, expected=now, then_select=kept.selected or 0)
-    elif written and kept.before is not None:
-        tools.write(tool, kept.before, expected=now)
+    before = kept.before
+    if written and before is None:
+        selected = kept.selected or 0
+        _once_free(controller, lambda: tools.clear(tool, expected=now, then_select=selected))
+    elif written and before is not None:
+        _once_free(controller, lambda: tools.write(tool, before, expected=now))
     controller.finish(
         mine,
         NewEntry(

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 
-from robolink.errors import RobolinkError
+from robolink.errors import OutcomeUnknownError, ProtocolError, RobolinkError, TransportError
 from robolink.model import Controller, ToolOffset
 
 
@@ -30,12 +30,23 @@ class Subject:
 
     @contextmanager
     def kept(self) -> Iterator[Controller]:
-        """Connect for a block, and put back the tool and what is selected at its end."""
+        """Connect for a block, and put back the tool and what is selected at its end.
+
+        Ctrl-C, or an error of robolink, that ended the block is told in place of what it then
+        keeps from being put back.
+        """
         with self.connect() as controller:
             before, selected = controller.tools.read(self.tool), controller.tools.selected()
             try:
                 yield controller
-            finally:
+            except (RobolinkError, KeyboardInterrupt):
+                with suppress(RobolinkError):
+                    self.put_back(controller, before, selected)
+                raise
+            except BaseException:
+                self.put_back(controller, before, selected)
+                raise
+            else:
                 self.put_back(controller, before, selected)
 
     def put_back(
@@ -74,14 +85,25 @@ class Subject:
         """Connect for a block in which the robot may be moved."""
         with self.connect() as controller:
             self.prepare(controller)
-            try:
-                yield controller
-            finally:
-                if controller.latch.closed:
-                    controller.release_stop()
-                    # A held stop, or motors that went off, must not meet the next check.
-                    with suppress(RobolinkError):
-                        controller.reset_fault()
+            yield controller
+
+    @contextmanager
+    def releasing_stop(self, controller: Controller) -> Iterator[None]:
+        """Surround a stop that a check gives: whatever ends the block, it is in force no longer.
+
+        That of somebody else, who stops the checks, stays.
+
+        Args:
+            controller: What is stopped.
+        """
+        try:
+            yield
+        finally:
+            controller.release_stop()
+            # A held stop, or motors that went off, must not meet the next check; there may be
+            # nothing to reset.
+            with suppress(RobolinkError), controller.uninterrupted():
+                controller.reset_fault()
 
 
 Check = Callable[[Subject], None]
@@ -104,11 +126,14 @@ def refused(kind: type[RobolinkError], promise: str) -> Iterator[None]:
 
     Raises:
         ContractBrokenError: It was not, or by another error.
+        RobolinkError: The link is gone, or nobody knows what was done: that refuses nothing.
     """
     try:
         yield
     except kind:
         return
+    except (TransportError, ProtocolError, OutcomeUnknownError):
+        raise
     except RobolinkError as error:
         raise ContractBrokenError(f"{promise}: {type(error).__name__} instead: {error}") from error
     raise ContractBrokenError(f"{promise}: {kind.__name__} was not raised")

@@ -45,16 +45,36 @@ def outcomes(subject: Subject, checks: Iterable[Check] = READING_CHECKS) -> Iter
             broken = str(error)
         except RobolinkError as error:
             broken, kept_from = str(error), error
-        except Exception as error:
-            # Who uses a controller catches one family of errors; a driver lets no other out.
-            broken = f"{type(error).__name__} at {_place_of(error)} is no RobolinkError: {error}"
+            if found := _found_before(error):
+                broken = f"{found}; {broken}"
+        except (Exception, SystemExit) as error:
+            # Who uses a controller catches one family of errors; a driver lets no other out,
+            # and ends no process.
+            broken = f"{type(error).__name__} at {_place_of(error)} is no RobolinkError"
+            broken += f": {_said_by(error)}"
         promise = " ".join((check.__doc__ or "").split())
         yield CheckOutcome(check.__name__, promise, broken, kept_from)
 
 
-def _place_of(error: Exception) -> str:
+def _found_before(error: BaseException) -> str:
+    """Return what was found broken before the check could not even put back what was there."""
+    context = error.__context__
+    while context is not None and not isinstance(context, ContractBrokenError):
+        context = context.__context__
+    return "" if context is None else str(context)
+
+
+def _place_of(error: BaseException) -> str:
     raised = extract_tb(error.__traceback__)[-1]
     return f"{Path(raised.filename).name}:{raised.lineno}"
+
+
+def _said_by(error: BaseException) -> str:
+    """Return the text of an error, which may be one that cannot even say that."""
+    try:
+        return str(error)
+    except Exception:
+        return "(it has no text)"
 
 
 def check_controller(subject: Subject, *, writes: bool = True, moves: bool = True) -> None:

@@ -18,7 +18,7 @@ from robolink.errors import (
     ToolError,
     UndefinedToolError,
 )
-from robolink.model import ANY, Controller, Jump, MarkerKind, ToolOffset
+from robolink.model import ANY, Controller, Jump, Marker, MarkerKind, ToolOffset
 from robolink.testing.subject import Check, Subject, refused, require
 
 _COMPONENTS: Final = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
@@ -29,6 +29,9 @@ _TOLD_APART: Final = 0.1
 """Values that differ by this, in mm or degrees, are two: a tip would be seen to be elsewhere."""
 
 _TIP_SLACK_MM: Final = 0.1
+
+_AT_ONCE_S: Final = 5.0
+"""Longer than any refusal takes, on a slow line too."""
 
 
 def a_write_is_read_back(subject: Subject) -> None:
@@ -59,14 +62,17 @@ def a_write_lasts(subject: Subject) -> None:
     """The next connection, which may be tomorrow's, finds what this one wrote."""
     with subject.connect() as controller:
         before, selected = controller.tools.read(subject.tool), controller.tools.selected()
-        wanted = another_offset(before)
-        controller.tools.write(subject.tool, wanted, expected=before)
-    with subject.connect() as controller:
-        try:
+    wanted = another_offset(before)
+    try:
+        with subject.connect() as controller:
+            controller.tools.write(subject.tool, wanted, expected=before)
+    finally:
+        # Whatever came in between, Ctrl-C included: nothing but this puts the old value back.
+        with subject.connect() as controller:
             found = controller.tools.read(subject.tool)
-            require(controller.tools.same(found, wanted), "a new connection finds the new value")
-        finally:
+            same = controller.tools.same(found, wanted)
             subject.put_back(controller, before, selected)
+    require(same, "a new connection finds the new value")
 
 
 def the_other_tools_are_left_alone(subject: Subject) -> None:
@@ -204,26 +210,34 @@ def one_procedure_at_a_time(subject: Subject) -> None:
     with subject.kept() as controller:
         ends: list[BaseException | None] = []
         before = controller.tools.read(subject.tool)
-        other = threading.Thread(target=_write, args=(controller, subject.tool, before, ends))
+        arguments = (controller, subject.tool, before, ends)
+        # One that waits for the first to end would wait for ever, and with it the process.
+        other = threading.Thread(target=_write, args=arguments, daemon=True)
         with controller.preserved("a check"):
             other.start()
-            other.join()
-        require(isinstance(ends[0], BusyError), "a second procedure is refused with BusyError")
+            other.join(_AT_ONCE_S)
+            told = list(ends)
+        other.join(_AT_ONCE_S)  # what waited for the end has it now
+        require(told, "a second procedure is told at once, and does not wait")
+        require(isinstance(told[0], BusyError), "a second procedure is refused with BusyError")
 
 
 def what_is_unsettled_blocks(subject: Subject) -> None:
     """A killed process raised no exception: its marker stops the next one."""
-    with subject.connect() as first:
-        marker = first.begin(MarkerKind.CHANGE, "a check", {"tools": {}, "change": "a check"})
-    with subject.connect() as second:
-        found = {one.operation for one in second.outcomes.open_markers()}
-        if marker.operation in found:  # else the record is kept with the connection only
-            try:
+    marker: Marker | None = None
+    try:
+        with subject.connect() as first:
+            marker = first.begin(MarkerKind.CHANGE, "a check", {"tools": {}, "change": "a check"})
+        with subject.connect() as second:
+            if _is_open(second, marker):  # else the record is kept with the connection only
                 with refused(OutcomeUnknownError, "what is unsettled blocks"):
                     second.require_settled("the next command")
-            finally:
-                second.finish(marker)
-            second.require_settled("the next command")
+    finally:
+        # Ctrl-C in between must not leave it to block whatever comes next.
+        with subject.connect() as third:
+            if marker is not None and _is_open(third, marker):
+                third.finish(marker)
+                third.require_settled("the next command")
 
 
 def a_stop_holds_writes_back(subject: Subject) -> None:
@@ -231,15 +245,13 @@ def a_stop_holds_writes_back(subject: Subject) -> None:
     with subject.kept() as controller:
         tools, before = controller.tools, controller.tools.read(subject.tool)
         wanted = another_offset(before)
-        with suppress(RobolinkError):  # a machine that cannot be stopped from here says so
-            controller.stop()
-        require(controller.latch.closed, "stop() closes the latch, whatever becomes of it")
-        with refused(StoppedError, "after a stop nothing is written"):
-            tools.write(subject.tool, wanted, expected=before)
-        require(tools.same(tools.read(subject.tool), before), "the old value is still there")
-        controller.release_stop()
-        with suppress(RobolinkError):  # there may be nothing to reset
-            controller.reset_fault()
+        with subject.releasing_stop(controller):
+            with suppress(RobolinkError):  # a machine that cannot be stopped from here says so
+                controller.stop()
+            require(controller.latch.closed, "stop() closes the latch, whatever becomes of it")
+            with refused(StoppedError, "after a stop nothing is written"):
+                tools.write(subject.tool, wanted, expected=before)
+            require(tools.same(tools.read(subject.tool), before), "the old value is still there")
         tools.write(subject.tool, wanted, expected=before)
 
 
@@ -268,6 +280,10 @@ def _written_whole(controller: Controller, tool: int) -> tuple[ToolOffset, tuple
     raise AssertionError(held)
 
 
+def _is_open(controller: Controller, marker: Marker) -> bool:
+    return marker.operation in {one.operation for one in controller.outcomes.open_markers()}
+
+
 def _same_but_one(
     controller: Controller, before: Mapping[int, ToolOffset | None], tool: int, act: str
 ) -> None:
@@ -285,8 +301,8 @@ def _write(
 ) -> None:
     try:
         controller.tools.write(tool, another_offset(before), expected=before)
-    except RobolinkError as error:
-        ends.append(error)
+    except Exception as error:
+        ends.append(error)  # of whatever kind: it is looked at where the check is made
     else:
         ends.append(None)
 

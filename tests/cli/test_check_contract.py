@@ -36,6 +36,17 @@ def test_a_controller_that_keeps_its_promises_is_only_looked_at(run, simulator):
     assert "All 8 promises" in out
 
 
+def test_what_the_checks_ask_is_recorded(run, simulator, tmp_path):
+    told = ("--record", str(tmp_path / "dialogue.jsonl"))
+    assert run("check-contract", *told)[0] == 0
+    reading = (tmp_path / "dialogue.jsonl").read_text(encoding="ascii")
+    assert reading.count("$GetStatus") > 2
+    assert run("check-contract", "--write", "--tool", "2", "--yes", *told)[0] == 0
+    whole = (tmp_path / "dialogue.jsonl").read_text(encoding="ascii")
+    assert whole.startswith(reading)
+    assert whole.count("TLSet 2, XY") >= simulator.counters()["tool_writes"] // 2
+
+
 def test_the_controller_may_stand_behind_the_command_and_is_named_once(simulator, capsys):
     named = ["check-contract", simulator.url]
     for line in (named, ["-c", simulator.url, *named]):
@@ -178,7 +189,9 @@ def test_a_driver_in_the_present_folder_is_held_to_it(monkeypatch, tmp_path, cap
     told = [one["broken"] for one in json.loads(capsys.readouterr().out)["checks"]]
     assert any(one and "KeyError at drv_of_mine.py:12 is no RobolinkError" in one for one in told)
     suite = ElementTree.fromstring(Path("deaf.xml").read_bytes())
-    assert (suite.get("errors"), suite[-1].get("name")) == ("1", "a_write_is_read_back")
+    (case,) = (case for case in suite if case.find("error") is not None)
+    assert (suite.get("errors"), case.get("name")) == ("1", "a_write_is_read_back")
+    assert suite.get("skipped") == "14"
     sys.path.remove(str(tmp_path))
     sys.modules.pop("drv_of_mine", None)
 

@@ -405,7 +405,7 @@ def counters_of(url):
     try:
         with ControlClient(url) as client:
             return client.do("counters")
-    except ConnectError:
+    except (ConnectError, TransportBrokenError):  # told that there is no room, or cut off at once
         return None
 
 

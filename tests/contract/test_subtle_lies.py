@@ -2,11 +2,20 @@
 
 import re
 import time
+from contextlib import contextmanager
 from dataclasses import replace
 
 import pytest
 
 from robolink import ToolOffset
+from robolink.controllers.markers import ProcedureLock
+from robolink.errors import (
+    NotReadyError,
+    OutcomeUnknownError,
+    RemoteProtocolError,
+    TransportBrokenError,
+    TransportTimeoutError,
+)
 from robolink.testing import (
     MOVING_CHECKS,
     READING_CHECKS,
@@ -15,7 +24,9 @@ from robolink.testing import (
     MemoryMachine,
     Subject,
     outcomes,
+    tool_checks,
 )
+from robolink.testing.subject import refused, require
 
 SPARE = 3
 FIRST = {1: ToolOffset(12.0, -3.5, -20.0), 4: ToolOffset(5.0, 5.0, 5.0)}
@@ -143,6 +154,54 @@ def test_a_driver_that_takes_all_values_for_the_same_is_found():
 
     (broken,) = found(connect, "every_component_is_kept").values()
     assert broken == "values 0.1 apart in u_deg differ"
+
+
+class Patient(ProcedureLock):
+    """Lets a second procedure wait for the first in place of telling it."""
+
+    @contextmanager
+    def held(self, _request, *, calming=False):
+        with self._lock:
+            yield
+
+
+def test_a_driver_in_which_a_second_procedure_waits_is_found_and_waited_for_no_longer(monkeypatch):
+    monkeypatch.setattr(tool_checks, "_AT_ONCE_S", 0.05)
+    machine = MemoryMachine(tools=dict(FIRST), selected=1)
+
+    def connect():
+        controller = MemoryController(machine, identity="memory+object://patient")
+        controller._driver.lock = Patient("patient", controller.latch)
+        return controller
+
+    (broken,) = found(connect, "one_procedure_at_a_time").values()
+    assert broken == "a second procedure is told at once, and does not wait"
+    assert machine.tools == FIRST
+
+
+@pytest.mark.parametrize(
+    "error", [TransportBrokenError, TransportTimeoutError, RemoteProtocolError, OutcomeUnknownError]
+)
+def test_a_link_that_is_gone_refuses_nothing(error):
+    with pytest.raises(error), refused(NotReadyError, "it is refused"):
+        raise error("The cable is out.")
+
+
+def test_what_was_found_is_told_though_the_link_goes_when_it_is_put_back():
+    def check(subject):
+        with subject.kept() as controller:
+            controller.tools.write(SPARE, ToolOffset(1.0), expected=None)
+            controller.tools.clear = lost
+            require(False, "it is kept")
+
+    def lost(*_given, **_named):
+        raise TransportBrokenError("The cable is out.")
+
+    machine = MemoryMachine(tools=dict(FIRST), selected=1)
+    subject = Subject(lambda: MemoryController(machine), tool=SPARE)
+    (one,) = outcomes(subject, [check])
+    assert one.broken == "it is kept; The cable is out."
+    assert isinstance(one.error, TransportBrokenError)
 
 
 def test_a_machine_that_keeps_its_promises_is_not_blamed():

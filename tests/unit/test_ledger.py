@@ -192,3 +192,29 @@ def output(ledger):
 def test_what_stands_is_said_in_whole_sentences(ledger, story, sentence):
     story(ledger)
     assert describe_standing(ledger.standing()) == sentence
+
+
+def test_what_two_connections_left_is_told_as_one():
+    first, second = Ledger(), Ledger()
+    done(first, write(), NEW)
+    first.begin(move())
+    first.ended(move())
+    second.begin(write(before=NEW, requested=OLD))
+    whole = first.standing().followed_by(second.standing())
+    assert whole.moved
+    assert (whole.tools[1].before, whole.tools[1].known) == (OLD.components(), False)
+    assert whole.effect is Effect.UNKNOWN
+    done(second, write(before=NEW, requested=OLD), OLD)
+    whole = first.standing().followed_by(second.standing())
+    assert (whole.tools[1].differs, whole.effect) == (False, Effect.UNCHANGED)
+
+
+def test_what_one_connection_did_not_look_at_is_as_the_one_before_left_it():
+    first, second = Ledger(), Ledger()
+    done(first, select(0, 1), 0)
+    done(second, write(), NEW)
+    whole = first.standing().followed_by(second.standing())
+    assert (whole.selected, whole.selected_before, whole.effect) == (0, 1, Effect.CHANGED)
+    back = whole.put_back()
+    assert (back.selected, back.effect, back.left_open) == (1, Effect.UNCHANGED, False)
+    assert describe_standing(back).endswith("as before. Tool 1 is selected.")

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import click
 
@@ -19,7 +19,8 @@ from robolink_cli.session.context import CliContext, controller_options, emit
 
 if TYPE_CHECKING:
     from robolink.model import Controller
-    from robolink.testing import CheckOutcome, Subject
+    from robolink.testing import Check
+    from robolink_cli.commands.controller.contract_report import ContractReport
 
 _SPEED_MM_S: Final = 10.0
 
@@ -109,23 +110,28 @@ def check_contract(
     asked = _Asked(tool, step_mm if moves else None, yes)
     if junit is not None and not junit.parent.is_dir():
         raise click.UsageError(tr("There is no folder {path}.", path=junit.parent))
-    if driver is not None:
-        identity, found = _of_a_driver(driver, asked)
-    else:
-        identity, found = _of_a_cell(context, asked)
-    if junit is not None:
-        _write_junit(junit, identity, found)
-    for one in found:
-        if one.error is not None:
-            raise one.error
-    broken = [one for one in found if one.broken]
+    from robolink_cli.commands.controller.contract_report import ContractReport
+
+    report = ContractReport(_checks(asked), junit)
+    with report.told(on_the_way=asked.changes):
+        if driver is not None:
+            _of_a_driver(driver, asked, report)
+        else:
+            _of_a_cell(context, asked, report)
+    _show(report)
+    return DIFFERENT if report.broken else 0
+
+
+def _show(report: "ContractReport") -> None:
+    """Give the result of checks that were all made."""
+    found, broken = report.found, report.broken
 
     def show() -> None:
         rows = [
             (one.name.replace("_", " "), one.broken or tr("kept"))
             for one in sorted(found, key=lambda one: not one.broken)
         ]
-        table(tr("what {who} promises", who=identity), (tr("promise"), tr("found")), rows)
+        table(tr("what {who} promises", who=report.identity), (tr("promise"), tr("found")), rows)
         say(
             tr("{count} of {all} promises are broken.", count=len(broken), all=len(found))
             if broken
@@ -135,14 +141,12 @@ def check_contract(
     checks = [
         {"name": one.name, "promise": one.promise, "broken": one.broken or None} for one in found
     ]
-    payload: dict[str, object] = {"controller": identity, "kept": not broken, "checks": checks}
-    emit("contract", payload, show)
-    return DIFFERENT if broken else 0
+    emit("contract", {"controller": report.identity, "kept": not broken, "checks": checks}, show)
 
 
-def _of_a_cell(context: CliContext, asked: _Asked) -> "tuple[str, list[CheckOutcome]]":
+def _of_a_cell(context: CliContext, asked: _Asked, report: "ContractReport") -> None:
     """Check a controller of a cell; what was there stands on its record meanwhile."""
-    from robolink.testing import Subject, kept_on_site
+    from robolink.testing import kept_on_site
     from robolink_cli.commands.controller.contract_trials import TrialConnections
     from robolink_cli.session.opening import open_controller
 
@@ -157,31 +161,28 @@ def _of_a_cell(context: CliContext, asked: _Asked) -> "tuple[str, list[CheckOutc
                     tr("checks of the contract"),
                     tool=asked.tool,
                     agree=lambda controller: _agree(controller, asked),
+                    trials=trials.ledgers,
                 )
             )
         stack.callback(trials.close)
-        identity, tool = _looked_at(trials.connect, asked)
-        subject = Subject(trials.connect, tool=tool, step_mm=asked.step_mm or 1.0)
-        return identity, _found(subject, asked)
+        _examine(trials.connect, asked, report, _looked_at(trials.connect, asked, report))
 
 
-def _of_a_driver(driver: str, asked: _Asked) -> "tuple[str, list[CheckOutcome]]":
+def _of_a_driver(driver: str, asked: _Asked, report: "ContractReport") -> None:
     """Check what somebody's own function gives; only the checks put back what they change."""
-    from robolink.testing import Subject
     from robolink_cli.commands.controller.contract_trials import driver_named, told_of_the_driver
 
     made = driver_named(driver)
-    if asked.changes:
-        with made() as controller:
-            _agree(controller, asked)
     with told_of_the_driver(driver):
-        identity, tool = _looked_at(made, asked)
-    subject = Subject(made, tool=tool, step_mm=asked.step_mm or 1.0)
-    return identity, _found(subject, asked)
+        if asked.changes:
+            with made() as controller:
+                _agree(controller, asked)
+        tool = _looked_at(made, asked, report)
+    _examine(made, asked, report, tool)
 
 
-def _looked_at(connect: "Callable[[], Controller]", asked: _Asked) -> tuple[str, int]:
-    """Return who it is, and which tool is looked at.
+def _looked_at(connect: "Callable[[], Controller]", asked: _Asked, report: "ContractReport") -> int:
+    """Note who it is; return which tool is looked at.
 
     Raises:
         ConfigError: It cannot do what was asked for.
@@ -194,26 +195,40 @@ def _looked_at(connect: "Callable[[], Controller]", asked: _Asked) -> tuple[str,
                     tr("This controller cannot be held to that: it is not able to do it."),
                     remedy=tr("Leave --write or --move out."),
                 )
-        return controller.outcomes.identity, tool
+        report.identity = str(controller.outcomes.identity)
+        return tool
 
 
-def _found(subject: "Subject", asked: _Asked) -> "list[CheckOutcome]":
-    """Make the checks that were asked for, and tell of each on the way."""
-    from robolink.testing import MOVING_CHECKS, READING_CHECKS, WRITING_CHECKS, outcomes
+def _checks(asked: _Asked) -> "Sequence[Check]":
+    """Return the checks that were asked for."""
+    from robolink.testing import MOVING_CHECKS, READING_CHECKS, WRITING_CHECKS
 
-    checks: Sequence[Any] = READING_CHECKS
+    checks = READING_CHECKS
     if asked.tool is not None:
         checks = (*checks, *WRITING_CHECKS)
     if asked.step_mm is not None:
         checks = (*checks, *MOVING_CHECKS)
-    found = []
-    for one in outcomes(subject, checks):
-        found.append(one)
+    return checks
+
+
+def _examine(
+    connect: "Callable[[], Controller]", asked: _Asked, report: "ContractReport", tool: int
+) -> None:
+    """Make the checks that were asked for, and tell of each on the way.
+
+    Raises:
+        RobolinkError: A stop, a link that is gone, a state that refuses: nothing more is begun.
+    """
+    from robolink.testing import Subject, outcomes
+
+    subject = Subject(connect, tool=tool, step_mm=asked.step_mm or 1.0)
+    for one in outcomes(subject, _checks(asked)):
+        report.found.append(one)
         if asked.changes:
-            note(f"{one.name.replace('_', ' ')}: {one.broken or tr('kept')}")
+            said = one.broken if one.error is None else one.error.what
+            note(f"{one.name.replace('_', ' ')}: {said or tr('kept')}")
         if one.error is not None:
-            break  # a stop, a link that is gone, a state that refuses: nothing more is begun
-    return found
+            raise one.error
 
 
 def _agree(controller: "Controller", asked: _Asked) -> None:
@@ -253,26 +268,3 @@ def _agree(controller: "Controller", asked: _Asked) -> None:
                 remedy=tr("Add --yes when nobody uses the controller, or run it on a terminal."),
             )
         questions.require_yes(joined(" ", said))
-
-
-def _write_junit(path: Path, identity: str, found: "Sequence[CheckOutcome]") -> None:
-    """Write the findings as pipelines read them: one case a promise."""
-    from xml.etree import ElementTree as Xml
-
-    errors = sum(one.error is not None for one in found)
-    broken = sum(bool(one.broken) for one in found) - errors
-    counts = {"tests": str(len(found)), "failures": str(broken), "errors": str(errors)}
-    suite = Xml.Element("testsuite", {"name": f"contract of {identity}", **counts})
-    for one in found:
-        case = Xml.SubElement(suite, "testcase", classname="robolink.contract", name=one.name)
-        if one.broken:
-            kind = "failure" if one.error is None else "error"
-            Xml.SubElement(case, kind, message=one.broken).text = one.promise
-    Xml.indent(suite)
-    try:
-        path.write_bytes(Xml.tostring(suite, encoding="utf-8", xml_declaration=True))
-    except OSError as error:
-        raise ConfigError(
-            tr("{path} cannot be written: {cause}.", path=path, cause=error.strerror or error),
-            remedy=tr("Name another file."),
-        ) from error

@@ -8,36 +8,50 @@ from sys import path as module_path
 from typing import TYPE_CHECKING
 
 import robolink
-from robolink.errors import ConfigError, RobolinkError, StoppedError
+from robolink import ambient
+from robolink.errors import ConfigError, RobolinkError, StoppedError, TransportClosedError
 from robolink.messages import tr
+from robolink.model import ControllerStatus
 from robolink.stopping import far_end_of, find_note
+from robolink_cli.access.recording import recording
 from robolink_cli.session.context import CliContext
 from robolink_cli.session.opening import password_of
 
 if TYPE_CHECKING:
-    from robolink.model import Controller
+    from robolink.model import Controller, Ledger
+    from robolink.transport import TraceSink
 
 
 class TrialConnections:
     """Connects for each check anew, and lets a second terminal stop what that does.
 
     The checks open and settle markers on purpose; those go to a record in memory. A stop that
-    somebody else gives ends them all: a check releases its own stops only.
+    somebody else gives ends them all, and is heard between two checks too: a check releases its
+    own stops only.
 
     Args:
         context: What the command was told.
+
+    Attributes:
+        ledgers: What each connection did so far, in their order.
     """
 
     def __init__(self, context: CliContext) -> None:
         from robolink.journal import memory_journal
         from robolink.model import Signature
 
+        self.ledgers: list[Ledger] = []
         self._context = context
         self._url, self._password = context.require_url(), password_of(context)
-        identity = f"contract-check:{self._url}"
-        self._record = memory_journal(identity).log(identity, signature=Signature())
+        self._identity = f"contract-check:{self._url.partition('?')[0]}"
+        self._record = memory_journal(self._identity).log(self._identity, signature=Signature())
         self._listening = ExitStack()
-        self._stopped_by: str | None = None
+        self._trace: TraceSink | None = None
+        self._lock = ambient.lock()
+        self._latest: Controller | None = None
+        self._stopped = False
+        self._stopped_by = ""
+        self._state = ControllerStatus()
 
     def connect(self) -> "Controller":
         """Connect for one check.
@@ -46,48 +60,75 @@ class TrialConnections:
             StoppedError: Somebody gave a stop; no further check begins.
             RobolinkError: The controller is not reached.
         """
+        with self._lock:
+            self._require_no_stop()
+            if not self.ledgers:
+                far_end = self._url.partition("?")[0]
+                kept = recording(self._context.record, far_end)
+                self._trace = self._listening.enter_context(kept)
+            self._latest = controller = self._connected()
+            self.ledgers.append(controller.ledger)
+            if len(self.ledgers) == 1:
+                self._listen()
+        return controller
+
+    def close(self) -> None:
+        """Listen no longer, and forget what an interrupted check left begun. Idempotent."""
+        from robolink.journal import forget_memory
+
         self._listening.close()
-        if (note := find_note(far_end_of(self._url), "")) is not None:
+        forget_memory(self._identity)
+
+    def stop(self) -> None:
+        """Bring the controller to rest, whether a check has it now or none does; any thread."""
+        self._stopped = True
+        with self._lock:  # a connection that is being made is the one that stops
+            controller = self._latest
+        if controller is not None:
+            with suppress(TransportClosedError):  # that check has ended
+                controller.stop()
+                self._state = controller.status()
+                return
+        with self._lock, self._connected() as own:
+            own.stop()
+            self._state = own.status()
+
+    def status(self) -> ControllerStatus:
+        """Return the state that the stop has shown."""
+        return self._state
+
+    def _require_no_stop(self) -> None:
+        note = find_note(far_end_of(self._url), "")
+        if note is not None:
             # It came while no check had the controller, and went there by itself.
-            raise StoppedError(
-                note.sentence, remedy=tr("Find out why, then start the checks again.")
-            )
-        if self._stopped_by is not None:
-            raise StoppedError(
-                tr("{who} stopped the checks.", who=self._stopped_by),
-                remedy=tr("Find out why, then start the checks again."),
-            )
-        controller = robolink.connect(
+            what = note.sentence
+        elif self._stopped_by:
+            what = tr("{who} stopped the checks.", who=self._stopped_by)
+        elif self._stopped:
+            what = tr("The checks were stopped from another terminal.")
+        else:
+            return
+        raise StoppedError(what, remedy=tr("Find out why, then start the checks again."))
+
+    def _connected(self) -> "Controller":
+        return robolink.connect(
             self._url,
             password=self._password,
             timeout_s=self._context.timeout_s,
             remote_timeout_s=self._context.remote_timeout_s,
+            trace=self._trace,
             outcomes=self._record,
         )
-        self._listening.enter_context(self._heard_while(controller))
-        return controller
 
-    def close(self) -> None:
-        """Listen no longer. Idempotent."""
-        self._listening.close()
-
-    @contextmanager
-    def _heard_while(self, controller: "Controller") -> Iterator[None]:
+    def _listen(self) -> None:
         from robolink.stopping import StopListener
 
-        with ExitStack() as stack:
-            if "+sim://" not in self._url:
-                # Where there is no place to listen, Ctrl-C is left, as the command's page says.
-                with suppress(OSError):
-                    stack.enter_context(
-                        StopListener(
-                            controller,
-                            self._url,
-                            who=tr("the checks of the contract"),
-                            heard=self._hear,
-                        )
-                    )
-            yield
+        if "+sim://" in self._url:
+            return
+        who = tr("the checks of the contract")
+        # Where there is no place to listen, Ctrl-C is left, as the command's page says.
+        with suppress(OSError):
+            self._listening.enter_context(StopListener(self, self._url, who=who, heard=self._hear))
 
     def _hear(self, who: str) -> None:
         self._stopped_by = who
@@ -109,9 +150,11 @@ def driver_named(name: str) -> "Callable[[], Controller]":
         module_path.append(str(Path.cwd()))
     try:
         made = getattr(import_module(module), attribute)
-    except (ImportError, AttributeError) as error:
+    except (Exception, SystemExit) as error:  # it is somebody else's code that runs here
+        ours = isinstance(error, (ImportError, AttributeError))
+        cause = str(error) if ours else f"{type(error).__name__}: {error}"
         raise ConfigError(
-            tr("The driver {name!r} cannot be loaded: {cause}.", name=name, cause=error),
+            tr("The driver {name!r} cannot be loaded: {cause}.", name=name, cause=cause),
             remedy=tr("It is looked for in the present folder and among installed packages."),
         ) from error
     if not callable(made):
@@ -142,7 +185,7 @@ def told_of_the_driver(name: str) -> Iterator[None]:
         yield
     except RobolinkError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise _no_controller(name, f"{type(error).__name__}: {error}") from error
 
 

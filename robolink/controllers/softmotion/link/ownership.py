@@ -69,26 +69,14 @@ class Ownership:
         Raises:
             LeaseHeldError: Another client owns it; the error names its token.
         """
-        end = self._send(take_command(insist=insist))
-        answer = end.now.answer
-        if end.state != CommandState.DONE or answer.holder != self._wire.owner:
-            error = LeaseHeldError(
-                tr(
-                    "Another program (client {holder:08X}) commands the PLC {identity}.",
-                    holder=answer.holder,
-                    identity=self._wire.identity,
-                ),
-                remedy=tr(
-                    "Close the other program; 10 s after its last sign the mailbox is "
-                    "free. A person at the cell can take it over: 'robolink robot "
-                    "take-ownership'."
-                ),
-                controller=self._wire.identity,
-            )
-            error.holder = f"{answer.holder:08X}"
-            raise error
-        self._wire.epoch = answer.epoch
-        self._lost = False
+        # A Ctrl-C before the answer is read would leave it taken by nobody who knows of it.
+        with self._wire.uninterrupted():
+            end = self._send(take_command(insist=insist))
+            answer = end.now.answer
+            if end.state != CommandState.DONE or answer.holder != self._wire.owner:
+                raise self._held_by(answer.holder)
+            self._wire.epoch = answer.epoch
+            self._lost = False
 
     def lose(self) -> None:
         """Note that the PLC says it is not ours any more."""
@@ -96,12 +84,33 @@ class Ownership:
         self._lost = True
 
     def release(self) -> None:
-        """Give the mailbox back, if it is ours; what is unfinished is halted first."""
-        if self._wire.epoch:
-            if self._wire.motions.unfinished:
-                self._send(Command(0, Opcode.HALT))
-            self._give_back()
-            self._wire.epoch = 0
+        """Give the mailbox back, if it is ours; what is unfinished is halted first.
+
+        Ctrl-C waits for that: else the next program would be refused for ten seconds.
+        """
+        with self._wire.uninterrupted():
+            if self._wire.epoch:
+                if self._wire.motions.unfinished:
+                    self._send(Command(0, Opcode.HALT))
+                self._give_back()
+                self._wire.epoch = 0
+
+    def _held_by(self, holder: int) -> LeaseHeldError:
+        error = LeaseHeldError(
+            tr(
+                "Another program (client {holder:08X}) commands the PLC {identity}.",
+                holder=holder,
+                identity=self._wire.identity,
+            ),
+            remedy=tr(
+                "Close the other program; 10 s after its last sign the mailbox is "
+                "free. A person at the cell can take it over: 'robolink robot "
+                "take-ownership'."
+            ),
+            controller=self._wire.identity,
+        )
+        error.holder = f"{holder:08X}"
+        return error
 
     def _give_back(self) -> None:
         """Release the ownership, after the stop of another client that may be in work yet."""

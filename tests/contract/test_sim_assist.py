@@ -192,6 +192,16 @@ def test_a_wrong_or_missing_token_is_refused_in_plain_words(assisted):
         assert "'robolink sim' prints" in refused.value.remedy
 
 
+def test_an_act_that_fails_as_none_should_ends_no_port(assisted, monkeypatch):
+    _, assist, simulator = assisted
+    with monkeypatch.context() as broken:
+        broken.setattr(simulator, "counters", lambda: 1 / 0)
+        with pytest.raises(ConfigError, match="The simulator failed: ZeroDivisionError") as told:
+            assist.do("counters")
+        assert "report" in told.value.remedy
+    assert assist.do("counters")["exchanges"] == 0
+
+
 def test_each_assist_port_draws_its_own_token():
     simulator, clock = EpsonSimulator(seed=3), ScaledClock()
     with serve_assist(simulator, clock=clock) as one, serve_assist(simulator, clock=clock) as two:

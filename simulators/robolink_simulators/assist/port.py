@@ -32,7 +32,7 @@ from robolink_simulators.client_errors import (
     is_silent,
     nobody_listens,
 )
-from robolink_simulators.control.acts.registry import MACHINE_REFUSALS, machine_refusal
+from robolink_simulators.control.acts.registry import MACHINE_REFUSALS, defect, machine_refusal
 from robolink_simulators.control.cell import ControlledCell
 from robolink_simulators.control.tokens import drawn_token, is_token
 from robolink_simulators.epson.device import EpsonSimulator
@@ -170,6 +170,10 @@ class _AssistLink:
             answer = {"ok": False, "error": error.what, "remedy": error.remedy}
         except MACHINE_REFUSALS as refused:
             what, remedy = machine_refusal(refused)
+            answer = {"ok": False, "error": what, "remedy": remedy}
+        except Exception as error:
+            # Whoever asked is told, and the port goes on, as that of the control API does.
+            what, remedy = defect(error)
             answer = {"ok": False, "error": what, "remedy": remedy}
         return json.dumps(answer).encode() + b"\n"
 

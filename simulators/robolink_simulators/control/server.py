@@ -26,6 +26,7 @@ from robolink_simulators.control.acts.registry import (
     MACHINE_REFUSALS,
     UnknownActError,
     act_named,
+    defect,
     machine_refusal,
     perform,
 )
@@ -130,10 +131,7 @@ class ControlServer(ClosedAtExit):
             return HTTPStatus.CONFLICT, error_document(*machine_refusal(refused))
         except Exception as error:
             # Whoever asked is told, else its client waits for an answer that never comes.
-            return HTTPStatus.INTERNAL_SERVER_ERROR, error_document(
-                tr("The simulator failed: {cause}.", cause=f"{type(error).__name__}: {error}"),
-                tr("That is a defect of the simulator: please report it."),
-            )
+            return HTTPStatus.INTERNAL_SERVER_ERROR, error_document(*defect(error))
 
     def _found(self, method: str, path: list[str], given: dict[str, Any]) -> Reply:
         match path:

@@ -29,6 +29,14 @@ def machine_refusal(refused: Exception) -> tuple[str, str]:
     return str(refused), tr("Nothing was changed. Ask for what this machine can do.")
 
 
+def defect(error: Exception) -> tuple[str, str]:
+    """Return what is said of an act that fails as none should, and what to do next."""
+    return (
+        tr("The simulator failed: {cause}.", cause=f"{type(error).__name__}: {error}"),
+        tr("That is a defect of the simulator: please report it."),
+    )
+
+
 def _by_name(*families: tuple[ControlAct, ...]) -> dict[str, ControlAct]:
     return {act.name: act for family in families for act in family}
 

@@ -34,6 +34,13 @@ if TYPE_CHECKING:
     from robolink.calibration.camera.runout_table import solve_runout_table as solve_runout_table
     from robolink.calibration.camera.up_camera import Sighting as Sighting
     from robolink.calibration.camera.up_camera import solve_up_camera as solve_up_camera
+    from robolink.calibration.core.accuracy import ACCURACY_ROWS as ACCURACY_ROWS
+    from robolink.calibration.core.accuracy import Accuracy as Accuracy
+    from robolink.calibration.core.accuracy import AccuracyFacts as AccuracyFacts
+    from robolink.calibration.core.accuracy import AccuracyRow as AccuracyRow
+    from robolink.calibration.core.accuracy import AssessedRow as AssessedRow
+    from robolink.calibration.core.accuracy import ErrorSource as ErrorSource
+    from robolink.calibration.core.accuracy import RowFact as RowFact
     from robolink.calibration.core.budget import DIVISORS as DIVISORS
     from robolink.calibration.core.budget import BudgetRow as BudgetRow
     from robolink.calibration.core.budget import UncertaintyBudget as UncertaintyBudget
@@ -86,6 +93,14 @@ if TYPE_CHECKING:
     from robolink.calibration.core.statistics import (
         studentized_range_0999 as studentized_range_0999,
     )
+    from robolink.calibration.core.turn_claim import CONTRADICTS_ACCURACY as CONTRADICTS_ACCURACY
+    from robolink.calibration.core.turn_claim import (
+        CONTRADICTS_REPEATABILITY as CONTRADICTS_REPEATABILITY,
+    )
+    from robolink.calibration.core.turn_claim import SMALL_ANGLE as SMALL_ANGLE
+    from robolink.calibration.core.turn_claim import DriftLimits as DriftLimits
+    from robolink.calibration.core.turn_claim import TurnClaim as TurnClaim
+    from robolink.calibration.core.turn_claim import TurnJudgement as TurnJudgement
     from robolink.calibration.crossed_beams import BeamsResult as BeamsResult
     from robolink.calibration.crossed_beams import crossing_sigma_gain as crossing_sigma_gain
     from robolink.calibration.crossed_beams import solve_crossed_beams as solve_crossed_beams
@@ -133,6 +148,8 @@ if TYPE_CHECKING:
     from robolink.calibration.pin.six_point import solve_tool_axis as solve_tool_axis
     from robolink.calibration.pin.two_pose import solve_two_pose as solve_two_pose
     from robolink.calibration.pin.two_pose import two_of as two_of
+    from robolink.calibration.quality.accuracy import assessed as assessed
+    from robolink.calibration.quality.accuracy import usual_look_sigma_mm as usual_look_sigma_mm
     from robolink.calibration.quality.control_chart import LEAST_BASELINE as LEAST_BASELINE
     from robolink.calibration.quality.control_chart import USUAL_LAMBDA as USUAL_LAMBDA
     from robolink.calibration.quality.control_chart import USUAL_WIDTH as USUAL_WIDTH
@@ -159,6 +176,9 @@ if TYPE_CHECKING:
     from robolink.calibration.quality.tool_fits import ToolFit as ToolFit
     from robolink.calibration.quality.tool_fits import better_fit as better_fit
     from robolink.calibration.quality.tool_fits import tool_fits as tool_fits
+    from robolink.calibration.quality.turn_test import LEAST_TURN_DEG as LEAST_TURN_DEG
+    from robolink.calibration.quality.turn_test import held_to_claim as held_to_claim
+    from robolink.calibration.quality.turn_test import turn_claim as turn_claim
     from robolink.calibration.quality.update_guard import NEEDLE_LIMIT_MM as NEEDLE_LIMIT_MM
     from robolink.calibration.quality.update_guard import Correction as Correction
     from robolink.calibration.quality.update_guard import require_shrinking as require_shrinking
@@ -223,6 +243,8 @@ __getattr__ = lazy_exports(
         "camera.runout": "RunoutReport runout_report",
         "camera.runout_table": "RunoutRow RunoutTable RunoutTableResult solve_runout_table",
         "camera.up_camera": "Sighting solve_up_camera",
+        "core.accuracy": "ACCURACY_ROWS Accuracy AccuracyFacts AccuracyRow AssessedRow "
+        "ErrorSource RowFact",
         "core.budget": "BudgetRow DIVISORS UncertaintyBudget",
         "core.dispersion": "require_positive",
         "core.evidence": "FitEvidence RunOrder",
@@ -236,6 +258,8 @@ __getattr__ = lazy_exports(
         "core.least_squares": "linear_fit",
         "core.robust": "Floats Robust",
         "core.rotations": "pose_arrays quaternion_rotations rotation_of rotations uvw_deg zyz_deg",
+        "core.turn_claim": "CONTRADICTS_ACCURACY CONTRADICTS_REPEATABILITY DriftLimits "
+        "SMALL_ANGLE TurnClaim TurnJudgement",
         "core.statistics": "NORMAL_95 chi_square_quantile f_quantile normal_quantile student_t "
         "studentized_range_0999",
         "crossed_beams": "BeamsResult crossing_sigma_gain solve_crossed_beams where_they_cross",
@@ -250,6 +274,7 @@ __getattr__ = lazy_exports(
         "pin.pivot_fit": "PivotDesign PivotFit fit_pivot fit_pivot_robust pivot_design",
         "pin.six_point": "FAR_DEG SixPointResult ToolAxis solve_six_point solve_tool_axis",
         "pin.two_pose": "solve_two_pose two_of",
+        "quality.accuracy": "assessed usual_look_sigma_mm",
         "quality.control_chart": (
             "LEAST_BASELINE USUAL_LAMBDA USUAL_WIDTH ControlChart control_chart"
         ),
@@ -262,6 +287,7 @@ __getattr__ = lazy_exports(
         "quality.tool_fits": "ToolFit better_fit tool_fits",
         "evidence.approach_bias": "with_approach_bias",
         "evidence.units": "RobotReach require_near require_stored_scale require_within_reach",
+        "quality.turn_test": "LEAST_TURN_DEG held_to_claim turn_claim",
         "quality.update_guard": "Correction NEEDLE_LIMIT_MM require_shrinking update_guard "
         "writes_refused_unattended",
         "quality.verify_drift": "PLACING_TOLERANCE_MM verify_drift",

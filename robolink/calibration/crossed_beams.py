@@ -12,6 +12,7 @@ import numpy as np
 
 from robolink.calibration.beam_lines import Beam, Crossing, check_crossings, require_crossed
 from robolink.calibration.beam_uncertainty import beams_part
+from robolink.calibration.core.accuracy import ErrorSource
 from robolink.calibration.core.least_squares import LinearFit, linear_fit
 from robolink.calibration.core.pose_checks import (
     MIN_ROTATION_DEG,
@@ -51,6 +52,11 @@ class BeamsResult(CalibrationResult):
 
     lag_mm: tuple[float | None, float | None]
     u_without_beams_mm: tuple[float, ...] = ()
+
+    @property
+    def inputs_per_look(self) -> int:
+        """Both beams, both ways."""
+        return 4
 
 
 def solve_crossed_beams(
@@ -123,6 +129,9 @@ def solve_crossed_beams(
         condition_number=fit.condition_number,
         rank=fit.rank,
         unobservable=_KEPT,
+        sources=()
+        if beams_may_have_moved
+        else (ErrorSource.of_lengths("place_mm", 2, turning="in_base"),),
         lag_mm=(
             lags.pop(0) if two_ways[0] else None,
             lags.pop(0) if two_ways[1] else None,

@@ -12,6 +12,7 @@ which is believed when an F test says that it is there (docs/reference/evidence.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from robolink.calibration.core.accuracy import ErrorSource
 from robolink.calibration.core.budget import DIVISORS, BudgetRow, UncertaintyBudget
 from robolink.calibration.core.pose_checks import keep_unmeasured, require_finite, require_poses
 from robolink.calibration.core.result import CalibrationResult
@@ -148,6 +149,7 @@ def _result(found: TouchFit, count: int, z_mm: float) -> ZTouchResult:
         condition_number=found.fit.condition_number,
         rank=found.fit.rank,
         unobservable=_KEPT,
+        sources=(ErrorSource.of_lengths("plate_mm", 1),),
         latency_s=found.latency_s,
         flange_z_mm=found.flange_z_mm,
         overshoot_s2_per_mm=found.overshoot_s2_per_mm,

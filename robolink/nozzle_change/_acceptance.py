@@ -179,7 +179,7 @@ def _sureness(result: CalibrationResult) -> tuple[str, float | None]:
     """Return what a limit of the process is compared with, and its name."""
     region = result.region95_radius_mm is not None
     name = tr("Sure to, all axes together (95 %)") if region else tr("Sure to (95 %)")
-    return name, result.known_within_mm
+    return name, result.repeatable_to_mm
 
 
 def _out_of_order(result: CalibrationResult) -> str:

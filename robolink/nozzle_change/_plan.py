@@ -1,10 +1,10 @@
 """What a nozzle change is to do, and within which limits."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 
-from robolink.calibration import CalibrationResult
+from robolink.calibration import CalibrationResult, RowFact
 from robolink.errors import ConfigError, RejectedError
 from robolink.messages import tr
 from robolink.methods import LengthRule, TwoPoseSource, find_method
@@ -76,6 +76,8 @@ class ToolPlan:
         method: Name of the calibration method, for the record; empty for what the result says.
         station: Name of the station on whose record the measurement rests; empty where it rests on
             none, because it finds the station itself or is told where it is.
+        rows: What is stated of the rows of the budget, by their keys
+            (:data:`~robolink.calibration.ACCURACY_ROWS`).
     """
 
     tool: int
@@ -91,6 +93,7 @@ class ToolPlan:
     length: LengthRule = "ask"
     method: str = ""
     station: str = ""
+    rows: Mapping[str, RowFact] = field(default_factory=dict)
 
     def named(self, result: CalibrationResult) -> CalibrationResult:
         """Return a result under the name of the method, whichever solver it borrows.

@@ -135,6 +135,9 @@ def _result(result: CalibrationResult) -> dict[str, object]:
         "region95_radius_mm": result.region95_radius_mm,
         "budget": result.budget.as_json() if result.budget else None,
         "evidence": result.evidence.as_json() if result.evidence else None,
+        "repeatable_to_mm": result.repeatable_to_mm,
+        "accurate_to_mm": result.accurate_to_mm,
+        "accuracy": result.accuracy.as_json(result.measured) if result.accuracy else None,
         **result.details(),
     }
 

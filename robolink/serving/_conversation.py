@@ -286,7 +286,7 @@ class CallbackConversation:
         run.change.note(
             EntryKind.CALIBRATION,
             result.method,
-            known_within_mm=result.known_within_mm,
+            known_within_mm=result.repeatable_to_mm,
             warnings=list(result.warnings),
             peer=self._peer,
             **run.measure.on_record(),

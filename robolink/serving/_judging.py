@@ -59,7 +59,7 @@ def require_believed(
     doubt = writes_refused_unattended(result)
     if doubt:
         raise CalibrationError(doubt, tr("What was measured contradicts itself."))
-    within_mm = result.known_within_mm
+    within_mm = result.repeatable_to_mm
     if within_mm is None or within_mm > limits.tolerance_mm:
         raise CalibrationError(
             "uncertain",

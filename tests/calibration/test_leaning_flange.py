@@ -318,6 +318,6 @@ def test_the_region_holds_what_the_height_is_unsure_of_as_each_axis_does():
     assert max(unsure.half_width95) > 20 * max(sure.half_width95)
     assert unsure.region95_radius_mm is not None
     assert unsure.region95_radius_mm > max(unsure.half_width95)
-    assert unsure.known_within_mm == unsure.region95_radius_mm
+    assert unsure.repeatable_to_mm == unsure.region95_radius_mm
     lean = math.tan(math.acos(math.cos(math.radians(6)) * math.cos(math.radians(5))))
     assert unsure.region95_radius_mm == pytest.approx(2.448 * lean, rel=0.02)

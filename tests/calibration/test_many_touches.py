@@ -107,7 +107,7 @@ def test_an_early_end_is_judged_as_the_result_will_be():
     assert until_mm < 0.95 * three.region95_radius_mm
     result = course(Person(), until_mm=until_mm, sigma_mm=0.01)
     assert 3 < len(result.inputs) < 8
-    assert result.known_within_mm == result.region95_radius_mm <= until_mm
+    assert result.repeatable_to_mm == result.region95_radius_mm <= until_mm
 
 
 def test_an_interval_that_is_never_reached_takes_all_touches():

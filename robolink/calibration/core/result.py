@@ -7,9 +7,11 @@ from enum import Enum
 from struct import iter_unpack
 from typing import Final, overload
 
+from robolink.calibration.core.accuracy import Accuracy, ErrorSource
 from robolink.calibration.core.budget import UncertaintyBudget
 from robolink.calibration.core.evidence import FitEvidence
 from robolink.calibration.core.statistics import NORMAL_95
+from robolink.calibration.core.turn_claim import TurnJudgement
 from robolink.model import (
     Pose,
     ToolOffset,
@@ -113,6 +115,10 @@ class CalibrationResult:
             all its lengths together: the largest half axis of the ellipse.
         budget: Where the uncertainty of the worst length comes from.
         evidence: Figures behind notes and doubts.
+        sources: Errors that its scatter cannot show, and how each enters; ``None`` where the method
+            does not say it.
+        accuracy: What it is accurate to, once it was held to what the cell knows
+            (:func:`~robolink.calibration.assessed`).
     """
 
     method: str
@@ -140,6 +146,8 @@ class CalibrationResult:
     region95_radius_mm: float | None = None
     budget: UncertaintyBudget | None = None
     evidence: FitEvidence | None = None
+    sources: tuple[ErrorSource, ...] | None = None
+    accuracy: Accuracy | None = None
 
     def details(self) -> dict[str, object]:
         """Return what the method tells besides, plain JSON; nothing for most."""
@@ -162,14 +170,29 @@ class CalibrationResult:
         return max((half for name, half in widths if name.endswith("_mm")), default=None)
 
     @property
-    def known_within_mm(self) -> float | None:
-        """How near the tip is to the truth in 95 %: the region where it is known, else each length.
+    def repeatable_to_mm(self) -> float | None:
+        """Within which the tip would be found again in 95 %: the region, else the worst length.
 
-        A nozzle misses in the plane, not along an axis: two intervals of 95 % hold both
-        coordinates in 90 to 92 % only (docs/reference/evidence.md 7). ``None`` without either.
+        That is what scatter and grid say, no more: :attr:`accurate_to_mm` says how far off the
+        truth it may be. A nozzle misses in the plane, not along an axis: two intervals of 95 %
+        hold both coordinates in 90 to 92 % only (docs/reference/evidence.md 7). ``None`` where
+        nothing tells it.
         """
         region_mm, half_mm = self.region95_radius_mm, self.half95_mm
         return half_mm if region_mm is None or half_mm is None else max(region_mm, half_mm)
+
+    @property
+    def accurate_to_mm(self) -> float | None:
+        """Within which of the truth the tip lies in 95 %, every row of the budget counted.
+
+        ``None`` where nothing tells it, or it was not held to a cell yet.
+        """
+        return None if self.accuracy is None else self.accuracy.within_mm
+
+    @property
+    def inputs_per_look(self) -> int:
+        """How many inputs together tell both coordinates once."""
+        return 1
 
     @property
     def residual_distances_mm(self) -> tuple[float, ...]:
@@ -189,6 +212,7 @@ class DriftVerdict(Enum):
 
     PASSED = ""
     UNDECIDED = "drift_undecided"
+    CONTRADICTED = "proof_contradicts_accuracy"
     FAILED = "large_drift"
 
 
@@ -221,7 +245,7 @@ def judge_drift(drift_mm: float, u_mm: float, tolerance_mm: float) -> DriftVerdi
 def worst_of(verdicts: Iterable[DriftVerdict]) -> DriftVerdict:
     """Return what drifts at several angles say together."""
     found = set(verdicts)
-    for verdict in (DriftVerdict.FAILED, DriftVerdict.UNDECIDED):
+    for verdict in (DriftVerdict.FAILED, DriftVerdict.CONTRADICTED, DriftVerdict.UNDECIDED):
         if verdict in found:
             return verdict
     return DriftVerdict.PASSED
@@ -232,7 +256,7 @@ class Drift:
     """How far the tip left the reference point when the tool stood at ``u_deg``.
 
     ``dz_mm`` stays 0 where only the plane is judged. ``u_mm`` is the standard uncertainty of a
-    drift that a person showed by touching, 0 where none is counted.
+    drift that a person showed by touching, 0 where none is counted. It is the mean of ``looks``.
     """
 
     u_deg: float
@@ -240,6 +264,7 @@ class Drift:
     dy_mm: float
     dz_mm: float = 0.0
     u_mm: float = 0.0
+    looks: int = 1
 
     @property
     def distance_mm(self) -> float:
@@ -253,7 +278,9 @@ class VerifyResult:
 
     ``warnings`` are named doubts about the test itself; ``heights_only`` tells that a surface was
     touched, which shows Z and nothing else. ``codes`` name why its touches do not count;
-    ``inputs`` are their poses, where a person made them.
+    ``inputs`` are their poses, where a person made them. ``judgement`` is what the drifts say about
+    the statement of the measurement, once they were held to it
+    (:func:`~robolink.calibration.held_to_claim`).
     """
 
     drifts: tuple[Drift, ...]
@@ -262,6 +289,7 @@ class VerifyResult:
     heights_only: bool = False
     codes: tuple[str, ...] = ()
     inputs: tuple[Pose, ...] = ()
+    judgement: TurnJudgement | None = None
 
     @property
     def max_drift_mm(self) -> float:
@@ -271,13 +299,20 @@ class VerifyResult:
     @property
     def verdict(self) -> DriftVerdict:
         """What the drifts say, each with its guard band."""
+        contradicted = self.judgement is not None and self.judgement.contradicts_accuracy
         return worst_of(
-            judge_drift(drift.distance_mm, drift.u_mm, self.tolerance_mm) for drift in self.drifts
+            [
+                *(judge_drift(one.distance_mm, one.u_mm, self.tolerance_mm) for one in self.drifts),
+                *([DriftVerdict.CONTRADICTED] if contradicted else []),
+            ]
         )
 
     @property
     def passed(self) -> bool:
-        """Whether every drift is inside the tolerance, and its touches count."""
+        """Whether every drift is inside the tolerance and contradicts no statement of accuracy.
+
+        Its touches have to count, too.
+        """
         return not self.codes and self.verdict is DriftVerdict.PASSED
 
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from robolink.calibration.core.accuracy import ErrorSource
 from robolink.calibration.core.pose_checks import (
     MIN_ROTATION_DEG,
     UPRIGHT_WITHIN_DEG,
@@ -162,6 +163,7 @@ def _result(
         condition_number=fit.condition_number,
         rank=UNKNOWNS,
         unobservable=_KEPT,
+        sources=(ErrorSource.of_lengths("touch_mm", 2),),
     )
 
 

@@ -16,6 +16,7 @@ from robolink.calibration.core.rotations import rotation_of
 from robolink.calibration.flange_checks import require_flange_in_base
 from robolink.calibration.flange_plane import FlangePlane
 from robolink.calibration.pin.needle_chain import NeedleChain, NeedleLimits
+from robolink.calibration.pin.one_touch import one_touch_sources
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
@@ -127,6 +128,7 @@ def solve_needle_change(
         rank=len(found),
         dof=0,
         unobservable=others,
+        sources=one_touch_sources(len(found)),
         shift_mm=shift,
         chain=now,
         full_calibration_due=due,

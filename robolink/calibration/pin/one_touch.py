@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from robolink.calibration.core.accuracy import ErrorSource
 from robolink.calibration.core.dispersion import Dispersion
 from robolink.calibration.core.pose_checks import check_poses, keep_unmeasured, require_finite
 from robolink.calibration.core.result import CalibrationResult
@@ -68,6 +69,18 @@ def pin_touched(flange: Pose, offset: ToolOffset, *, sigma_mm: float = 0.0) -> P
     """
     x, y, z = (rotation_of(flange) @ offset.components()[:3]).tolist()
     return Pin(flange.x_mm + x, flange.y_mm + y, flange.z_mm + z, sigma_mm)
+
+
+def one_touch_sources(count: int) -> tuple[ErrorSource, ...]:
+    """Return the errors of one touch of a pin whose place is relied on.
+
+    Args:
+        count: How many lengths are measured.
+    """
+    return (
+        ErrorSource.of_lengths("touch_mm", count),
+        ErrorSource.of_lengths("place_mm", count, turning="in_base"),
+    )
 
 
 def solve_one_touch(
@@ -129,5 +142,6 @@ def solve_one_touch(
         rank=3,
         dof=0,
         unobservable=("u_deg", "v_deg", "w_deg"),
+        sources=one_touch_sources(3),
     )
     return with_station(result, pin.part(flange))

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from robolink.calibration.core.accuracy import ErrorSource
 from robolink.calibration.core.pose_checks import (
     angle_spread_deg,
     keep_unmeasured,
@@ -172,6 +173,7 @@ def _result(
         condition_number=design.condition_number,
         rank=design.rank,
         unobservable=_KEPT,
+        sources=(ErrorSource.of_lengths("touch_mm", 3),),
     )
 
 

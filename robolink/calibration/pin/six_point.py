@@ -156,6 +156,7 @@ def solve_six_point(
         residuals_mm=pivot.residuals_mm,
         condition_number=pivot.condition_number,
         rank=pivot.rank,
+        sources=pivot.sources,
         off_square_deg=off,
     )
     result = judged(

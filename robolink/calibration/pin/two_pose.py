@@ -18,6 +18,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+from robolink.calibration.core.accuracy import ErrorSource
 from robolink.calibration.core.dispersion import Dispersion
 from robolink.calibration.core.pose_checks import (
     MIN_ROTATION_DEG,
@@ -98,6 +99,7 @@ def solve_two_pose(
         rank=4,
         dof=0,
         unobservable=("z_mm", "u_deg", "v_deg", "w_deg"),
+        sources=(ErrorSource.of_lengths("touch_mm", 2),),
     )
     result = replace(result, sigma_stated=sigma_mm is not None)
     return _with_interval(result, Dispersion.of(0.0, 0, sigma_mm, grid_mm))

@@ -72,7 +72,7 @@ def with_station(result: ResultT, *parts: StationPart) -> ResultT:
         return result
     count = len(added[0].covariance)
     lengths = [i for i in range(count) if result.measured[i].endswith("_mm")]
-    touches = _touches(result)
+    touches = scatter_covariance(result)
     places = [np.asarray(part.covariance) for part in added]
     total = touches.copy()
     for place in places:
@@ -107,8 +107,8 @@ def _by_normal(result: CalibrationResult) -> bool:
     )
 
 
-def _touches(result: CalibrationResult) -> "Floats":
-    """Return the covariance behind the interval of the touches.
+def scatter_covariance(result: CalibrationResult) -> "Floats":
+    """Return the covariance behind the interval of the touches, mm^2 between lengths.
 
     The interval may rest on more than the scatter: on a stated sigma, or on the grid of the jogs.
     """

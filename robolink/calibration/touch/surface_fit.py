@@ -11,6 +11,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from robolink.calibration.core.accuracy import ErrorSource
 from robolink.calibration.core.least_squares import LinearFit, linear_fit
 from robolink.calibration.core.pose_checks import check_poses, keep_unmeasured
 from robolink.calibration.core.result import CalibrationResult
@@ -161,4 +162,5 @@ def tip_result(
         condition_number=fit.condition_number,
         rank=fit.rank,
         unobservable=KEPT,
+        sources=(ErrorSource.of_lengths("touch_mm", 3),),
     )

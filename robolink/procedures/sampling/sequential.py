@@ -243,7 +243,7 @@ class SamplingPolicy:
 
     Attributes:
         until_mm: End early when the tip is known within this, in 95 %, as a limit of the process
-            judges it: :attr:`~robolink.calibration.CalibrationResult.known_within_mm`. ``None``
+            judges it: :attr:`~robolink.calibration.CalibrationResult.repeatable_to_mm`. ``None``
             for taking all.
         retake: Offer to take the one again that fits worst.
     """
@@ -341,7 +341,7 @@ def may_end_early(count: int, *, unknowns: int, sigma_stated: bool) -> bool:
 
 
 def _enough(fit: CalibrationResult, until_mm: float | None) -> bool:
-    within_mm, dof = fit.known_within_mm, fit.dof or 0
+    within_mm, dof = fit.repeatable_to_mm, fit.dof or 0
     if until_mm is None or within_mm is None:
         return False
     return (fit.sigma_stated or dof >= LEAST_DOF_TO_STOP) and within_mm <= until_mm

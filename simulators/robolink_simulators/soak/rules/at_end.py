@@ -131,7 +131,7 @@ class EndRules:
             "a tip was proved that nobody brought onto the pin",
         )
         if habit.careful or habit.declines:
-            within_mm = done.proposal.result.known_within_mm or 0.1
+            within_mm = done.proposal.result.repeatable_to_mm or 0.1
             self._on.story.certified.append(error_mm <= within_mm)
             self._on.hold(
                 "TipIsWhereItSays",

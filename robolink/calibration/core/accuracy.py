@@ -1,0 +1,269 @@
+"""What a result is accurate to: its scatter, and what its scatter cannot show.
+
+A fit that agrees with itself to a hundredth says nothing about a station that was moved, a camera
+that was turned, or a person who always sees contact on the same side. Each of these is a row of
+the budget with a half width: stated for the cell, learnt from its record, or the default of
+:data:`ACCURACY_ROWS` (docs/reference/evidence.md 19).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final, Literal, Self
+
+from robolink.calibration.core.budget import UncertaintyBudget
+from robolink.messages import declared
+
+Basis = Literal["stated", "record", "default"]
+"""What tells how large a row is: the cell, its record, or nobody."""
+
+Turning = Literal["with_tool", "in_base", "as_offset"]
+"""What becomes of an error when the tool turns about the tip that was found.
+
+``with_tool``: it turns along, so a turn test never shows it. ``in_base``: it stays where the
+station is, so the tip and the station part. ``as_offset``: the offset alone is wrong.
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class AccuracyRow:
+    """A kind of error that no scatter shows.
+
+    Attributes:
+        key: Its name in recipes, cell files and JSON.
+        unit: Unit of its half width.
+        default: The half width where a cell neither states nor has learnt one.
+        title: What it is, for a person.
+        month: By how much the half width grows in a month since the station was learnt.
+        most: What the default grows to at most.
+    """
+
+    key: str
+    unit: Literal["mm", "deg", "percent", "px"]
+    default: float
+    title: str
+    month: float = 0.0
+    most: float = 0.0
+
+
+ACCURACY_ROWS: Final[Mapping[str, AccuracyRow]] = {
+    row.key: row
+    for row in (
+        AccuracyRow("touch_mm", "mm", 0.05, declared("how a person sees contact")),
+        AccuracyRow("place_mm", "mm", 0.02, declared("place of the station"), month=0.01, most=0.1),
+        AccuracyRow("camera_turn_deg", "deg", 0.5, declared("turn of the camera")),
+        AccuracyRow("camera_scale_percent", "percent", 0.5, declared("scale of the camera")),
+        AccuracyRow("plate_mm", "mm", 0.1, declared("height of the surface")),
+        AccuracyRow("tip_image_px", "px", 0.5, declared("what the camera sees of the tip")),
+        AccuracyRow("bend_deg", "deg", 2.0, declared("bend of the needle")),
+        AccuracyRow("print_mm", "mm", 0.01, declared("print of the fiducials")),
+    )
+}
+"""The rows that a budget can have, by key (docs/reference/evidence.md 19)."""
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorSource:
+    """How one row enters what a method measured.
+
+    Attributes:
+        row: Key of the row.
+        gain: By how much each measured component changes, mm or degrees, for one unit of the row:
+            one line a component, one column for each direction in which the error can lie.
+            It may end before angles that it has no part in.
+        turning: What becomes of it when the tool turns about the tip.
+    """
+
+    row: str
+    gain: tuple[tuple[float, ...], ...]
+    turning: Turning = "with_tool"
+
+    @classmethod
+    def of_lengths(
+        cls, row: str, count: int, *, gain: float = 1.0, turning: Turning = "with_tool"
+    ) -> Self:
+        """Return a source that is alike in every direction.
+
+        Args:
+            row: Key of the row.
+            count: How many lengths are measured; they come first.
+            gain: By how much each changes for one unit of the row.
+            turning: What becomes of it when the tool turns.
+
+        Example:
+            >>> from robolink.calibration import ErrorSource
+            >>> ErrorSource.of_lengths("place_mm", 2, turning="in_base").gain
+            ((1.0, 0.0), (0.0, 1.0))
+        """
+        lines = tuple(
+            tuple(gain if line == column else 0.0 for column in range(count))
+            for line in range(count)
+        )
+        return cls(row, lines, turning)
+
+
+@dataclass(frozen=True, slots=True)
+class RowFact:
+    """How large one row is in a cell.
+
+    Attributes:
+        half_width: Half its width, in the unit of the row.
+        basis: What tells it.
+        growth: What has to be added for the age of a station.
+        told: Where it is told, in words; empty for a default.
+    """
+
+    half_width: float
+    basis: Basis
+    growth: float = 0.0
+    told: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class AccuracyFacts:
+    """What a cell knows about the rows of its budgets; what it does not know is the default.
+
+    Attributes:
+        rows: What is stated or learnt, by the key of the row.
+        months: How long ago the station was learnt, in months; ``None`` where nothing says it.
+        by_contact: Whether an input showed each touch, so that nobody had to see it.
+        look_sigma_mm: Standard deviation of one coordinate of one look, pooled over the record of
+            the station; ``None`` where too little is on record.
+        look_nu: Its degrees of freedom.
+    """
+
+    rows: Mapping[str, RowFact] = field(default_factory=dict)
+    months: float | None = None
+    by_contact: bool = False
+    look_sigma_mm: float | None = None
+    look_nu: float = 0.0
+
+    def of(self, key: str) -> RowFact:
+        """Return how large a row is.
+
+        A default grows with the time since the station was learnt, and so does what was learnt
+        from how well learning repeats; what the cell states is taken as it stands.
+
+        Raises:
+            KeyError: There is no such row.
+
+        Example:
+            >>> from robolink.calibration import AccuracyFacts
+            >>> fresh, old = AccuracyFacts(months=0), AccuracyFacts(months=3)
+            >>> fresh.of("place_mm").growth, round(old.of("place_mm").growth, 3)
+            (0.0, 0.03)
+        """
+        row = ACCURACY_ROWS[key]
+        fact = self.rows.get(key) or RowFact(row.default, "default")
+        if not row.month or fact.basis == "stated":
+            return fact
+        grown = row.month * max(self.months or 0.0, 0.0)
+        growth = max(min(fact.half_width + grown, row.most) - fact.half_width, 0.0)
+        return RowFact(fact.half_width, fact.basis, growth, fact.told)
+
+
+@dataclass(frozen=True, slots=True)
+class AssessedRow:
+    """One row of a budget, as it went into a result.
+
+    Attributes:
+        key: Its key; ``scatter`` for what the measurement shows by itself.
+        title: What it is, for a person, in the language of the day.
+        half_width: Half its width, in ``unit``, growth included; ``None`` for the scatter.
+        unit: Unit of the half width; empty for the scatter.
+        basis: What tells it; empty for the scatter.
+        told: Where it is told, in words.
+        u_mm: What it brings to the length that is known worst, as a standard uncertainty.
+    """
+
+    key: str
+    title: str
+    half_width: float | None
+    unit: str
+    basis: str
+    told: str
+    u_mm: float
+
+    def as_json(self) -> dict[str, object]:
+        """Return it as plain values."""
+        return {
+            "row": self.key,
+            "title": self.title,
+            "half_width": self.half_width,
+            "unit": self.unit,
+            "basis": self.basis,
+            "told": self.told,
+            "u_mm": self.u_mm,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Accuracy:
+    """What a result is accurate to.
+
+    Attributes:
+        within_mm: The tip lies within this of the truth in 95 %, all measured lengths together.
+        half_width95: Half the 95 % interval of each measured component alone, in their order.
+        rows: What it is made of, the largest first.
+        budget: The same rows for the length that is known worst.
+        without_defaults_mm: What ``within_mm`` would be if no row had to be a default.
+    """
+
+    within_mm: float
+    half_width95: tuple[float, ...]
+    rows: tuple[AssessedRow, ...]
+    budget: UncertaintyBudget
+    without_defaults_mm: float
+
+    @property
+    def largest(self) -> AssessedRow:
+        """The row that brings most."""
+        return self.rows[0]
+
+    @property
+    def largest_default(self) -> AssessedRow | None:
+        """The row that brings most of those that nobody stated and nothing on record tells."""
+        return next((row for row in self.rows if row.basis == "default"), None)
+
+    def as_json(self, measured: Sequence[str] = ()) -> dict[str, object]:
+        """Return it as plain values.
+
+        Args:
+            measured: Names of the measured components, in their order.
+        """
+        halves = dict(zip(measured, self.half_width95, strict=False))
+        return {
+            "within_mm": self.within_mm,
+            "half_width95": halves if measured else list(self.half_width95),
+            "largest_row": self.largest.key,
+            "without_defaults_mm": self.without_defaults_mm,
+            "rows": [row.as_json() for row in self.rows],
+            "budget": self.budget.as_json(),
+        }
+
+    @classmethod
+    def from_json(cls, document: Mapping[str, Any]) -> Self:
+        """Return what :meth:`as_json` wrote.
+
+        Raises:
+            KeyError, TypeError, ValueError: It is none.
+        """
+        halves = document["half_width95"]
+        values = halves.values() if isinstance(halves, Mapping) else halves
+        return cls(
+            float(document["within_mm"]),
+            tuple(map(float, values)),
+            tuple(
+                AssessedRow(
+                    row["row"],
+                    row["title"],
+                    None if row["half_width"] is None else float(row["half_width"]),
+                    row["unit"],
+                    row["basis"],
+                    row["told"],
+                    float(row["u_mm"]),
+                )
+                for row in document["rows"]
+            ),
+            UncertaintyBudget.from_json(document["budget"]),
+            float(document["without_defaults_mm"]),
+        )

@@ -1,0 +1,112 @@
+"""What a turn test is held to, and what it says about it: plain values that a marker can keep."""
+
+from dataclasses import dataclass
+from typing import Final
+
+CONTRADICTS_REPEATABILITY: Final = "proof_contradicts_repeatability"
+CONTRADICTS_ACCURACY: Final = "proof_contradicts_accuracy"
+SMALL_ANGLE: Final = "tested_at_small_angle"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TurnClaim:
+    """What a measurement lets a turn test expect (docs/reference/evidence.md 20).
+
+    Attributes:
+        look_sigma_mm: Standard deviation of one coordinate of one look.
+        look_nu: Its degrees of freedom, ``None`` where it is taken as known.
+        offset_sigma_mm: What scatter leaves of the offset, the worst length.
+        headings_deg: U of the tool at each look of the measurement, in their order.
+        inputs_per_look: How many of these together tell both coordinates once.
+        finds_place: Whether the measurement found the place that it turns about.
+        place_u_mm: Standard uncertainty of the place where it did not, without its growth by age.
+        offset_u_mm: Standard uncertainty of the offset by rows that a turn shows.
+        repeatable_mm: What the measurement says it is repeatable to, ``None`` for nothing.
+        accurate_mm: What it says it is accurate to, ``None`` for nothing.
+        by_camera: Whether the drift itself is seen through a camera whose scale, turn or mirror
+            may be what is wrong.
+    """
+
+    look_sigma_mm: float
+    look_nu: float | None = None
+    offset_sigma_mm: float
+    headings_deg: tuple[float, ...]
+    inputs_per_look: int = 1
+    finds_place: bool
+    place_u_mm: float = 0.0
+    offset_u_mm: float = 0.0
+    repeatable_mm: float | None = None
+    accurate_mm: float | None = None
+    by_camera: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class DriftLimits:
+    """What one drift may be.
+
+    Attributes:
+        repeatable_mm: By scatter alone.
+        accurate_mm: By scatter and all rows that turn into drift.
+        turn_deg: How far the tool was turned from where it was measured.
+    """
+
+    repeatable_mm: float
+    accurate_mm: float
+    turn_deg: float
+
+
+@dataclass(frozen=True, slots=True)
+class TurnJudgement:
+    """What the drifts of a turn test say about the statements of a measurement.
+
+    Attributes:
+        code: ``proof_contradicts_accuracy``, ``proof_contradicts_repeatability`` or empty.
+        limits: What each drift may be, in their order.
+        worst: Index of the drift that is furthest over its limit, or nearest to it.
+        small_angle: Whether the tool was turned too little to call it tested.
+        wider_mm: What the tip is within in any case, by these drifts; ``None`` where they were seen
+            through what may be wrong itself.
+    """
+
+    code: str
+    limits: tuple[DriftLimits, ...]
+    worst: int = 0
+    small_angle: bool = False
+    wider_mm: float | None = None
+
+    @property
+    def contradicts_accuracy(self) -> bool:
+        """Whether what the result says it is accurate to is contradicted."""
+        return self.code == CONTRADICTS_ACCURACY
+
+    @property
+    def contradicts_repeatability(self) -> bool:
+        """Whether only what it says it is repeatable to is contradicted."""
+        return self.code == CONTRADICTS_REPEATABILITY
+
+    @property
+    def good(self) -> bool:
+        """Whether nothing is contradicted, and the turn was large enough to show it."""
+        return not self.code and not self.small_angle
+
+    @property
+    def codes(self) -> tuple[str, ...]:
+        """Names of what is contradicted or doubtful."""
+        return (*filter(None, (self.code,)), *((SMALL_ANGLE,) if self.small_angle else ()))
+
+    def as_json(self) -> dict[str, object]:
+        """Return it as plain values."""
+        return {
+            "code": self.code or None,
+            "limits": [
+                {
+                    "repeatable_mm": one.repeatable_mm,
+                    "accurate_mm": one.accurate_mm,
+                    "turn_deg": one.turn_deg,
+                }
+                for one in self.limits
+            ],
+            "worst": self.worst,
+            "small_angle": self.small_angle,
+            "wider_mm": self.wider_mm,
+        }

@@ -6,6 +6,8 @@ from robolink.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from robolink.nozzle_change._acceptance import AcceptanceCriteria as AcceptanceCriteria
+    from robolink.nozzle_change._accuracy import accuracy_facts as accuracy_facts
+    from robolink.nozzle_change._accuracy import assessed_in_cell as assessed_in_cell
     from robolink.nozzle_change._change import DescribeReport as DescribeReport
     from robolink.nozzle_change._change import Earlier as Earlier
     from robolink.nozzle_change._change import NozzleChange as NozzleChange
@@ -33,6 +35,8 @@ if TYPE_CHECKING:
     from robolink.nozzle_change._seating import height_is_known as height_is_known
     from robolink.nozzle_change._seating import tip_sigma_mm as tip_sigma_mm
     from robolink.nozzle_change._seating import touching_as_recorded as touching_as_recorded
+    from robolink.nozzle_change._turn_verdict import conclude_turn_test as conclude_turn_test
+    from robolink.nozzle_change._turn_verdict import told_of_contradiction as told_of_contradiction
     from robolink.nozzle_change.open_turn_test.finishing import (
         finish_by_turn_test as finish_by_turn_test,
     )
@@ -46,6 +50,7 @@ __getattr__ = lazy_exports(
     __name__,
     {
         "_acceptance": "AcceptanceCriteria",
+        "_accuracy": "accuracy_facts assessed_in_cell",
         "_change": "DescribeReport Earlier NozzleChange",
         "_length": "known_height",
         "open_turn_test.finishing": "finish_by_turn_test",
@@ -57,5 +62,6 @@ __getattr__ = lazy_exports(
         "_proposal": "ChangeReport LimitVerdict Listener Moment Proposal ToolReport WriteSubject",
         "_records": "touches_made",
         "_seating": "height_is_known tip_sigma_mm touching_as_recorded",
+        "_turn_verdict": "conclude_turn_test told_of_contradiction",
     },
 )

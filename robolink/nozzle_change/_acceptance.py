@@ -25,9 +25,11 @@ class AcceptanceCriteria:
         rms_mm: Largest root mean square of the residuals.
         max_residual_mm: Largest residual.
         interval_mm: Largest distance from the truth within which the tip lies in 95 %, all measured
-            lengths together; where only each axis is known, half of its 95 % interval.
+            lengths together and every row of the budget counted.
         drift_tolerance_mm: Largest drift that passes the verification.
         accepted_change_mm: A larger change that an engineer accepts this time.
+        stated: Names of the limits that were stated for this measurement, not for all of a cell; of
+            a limit that cannot be judged these are refused. That of the interval always is.
         accepted_with: The option that sets it, for whoever is refused; empty where there is none.
         unattended: Nobody is asked before the write, so that a doubt which a person could weigh is
             a refusal.
@@ -41,6 +43,7 @@ class AcceptanceCriteria:
     accepted_change_mm: float | None = None
     accepted_with: str = ""
     unattended: bool = False
+    stated: frozenset[str] = frozenset()
 
     @property
     def limit_mm(self) -> float:
@@ -51,9 +54,9 @@ class AcceptanceCriteria:
         """Refuse a measurement that does not agree with itself.
 
         Raises:
-            CalibrationError: ``large_rms``, ``large_residual`` or ``large_interval``; where
-                nobody is asked, ``step_in_run_order``, ``drift_in_run_order`` or
-                ``sigma_contradicted``.
+            CalibrationError: ``large_rms``, ``large_residual``, ``large_interval``, or
+                ``not_judged`` where nothing tells what a limit is for; where nobody is asked,
+                ``step_in_run_order``, ``drift_in_run_order`` or ``sigma_contradicted``.
         """
         doubt = writes_refused_unattended(result) if self.unattended else ""
         if doubt:
@@ -65,7 +68,11 @@ class AcceptanceCriteria:
                     "again, or have a person look at it."
                 ),
             )
+        self._require_judged(result)
+        by_defaults = self.over_by_defaults(result) is not None
         for verdict in self._of_fit(result):
+            if by_defaults and verdict.code == "large_interval":
+                continue  # a person may weigh it; whoever writes asks
             if not verdict.passed:
                 raise CalibrationError(
                     verdict.code,
@@ -79,6 +86,80 @@ class AcceptanceCriteria:
                         "Clean pin and tip, check that the nozzle is tight, then measure again."
                     ),
                 )
+
+    def _require_judged(self, result: CalibrationResult) -> None:
+        """Refuse a limit of which the measurement does not tell whether it is kept.
+
+        Raises:
+            CalibrationError: ``not_judged``.
+        """
+        for name, limit_mm, found_mm, what in (
+            ("rms_mm", self.rms_mm, result.rms_mm, tr("how well the touches agree")),
+            (
+                "max_residual_mm",
+                self.max_residual_mm,
+                result.max_residual_mm,
+                tr("which touch fits worst"),
+            ),
+            ("interval_mm", self.interval_mm, result.accurate_to_mm, tr("what it is accurate to")),
+        ):
+            asked = name == "interval_mm" or name in self.stated
+            if limit_mm is not None and found_mm is None and asked:
+                raise CalibrationError(
+                    "not_judged",
+                    tr(
+                        "The limit of {limit:g} mm cannot be judged: {method} does not tell "
+                        "{what}.",
+                        limit=limit_mm,
+                        method=result.method,
+                        what=what,
+                    ),
+                    remedy=tr(
+                        "Nothing was written. Leave the limit out, or use a method that tells it."
+                    ),
+                )
+
+    def over_by_defaults(self, result: CalibrationResult) -> CalibrationError | None:
+        """Return why a statement is over the limit that only default rows carry there.
+
+        The error names the largest of them and what measures it. ``None`` where the statement is
+        within the limit, or over it without them.
+
+        Args:
+            result: The measurement, with what it is accurate to.
+        """
+        accuracy, limit_mm = result.accuracy, self.interval_mm
+        if accuracy is None or limit_mm is None or accuracy.within_mm <= limit_mm:
+            return None
+        row = accuracy.largest_default
+        if row is None or accuracy.without_defaults_mm > limit_mm:
+            return None
+        if row.half_width is None:
+            found = tr(
+                "Accurate to +-{found:.3f} mm (95 %), limit {limit:.3f} mm. Largest row: {row}, a "
+                "default.",
+                found=accuracy.within_mm,
+                limit=limit_mm,
+                row=row.title,
+            )
+        else:
+            found = tr(
+                "Accurate to +-{found:.3f} mm (95 %), limit {limit:.3f} mm. Largest row: {row}, "
+                "+-{half:g} {unit}, a default.",
+                found=accuracy.within_mm,
+                limit=limit_mm,
+                row=row.title,
+                half=row.half_width,
+                unit=row.unit,
+            )
+        return CalibrationError(
+            "large_interval",
+            found,
+            remedy=tr(
+                "Nothing was written. 'robolink cell accuracy' shows which rows are defaults and "
+                "how each is measured."
+            ),
+        )
 
     def judge_change(
         self, proposal: Proposal, *, earlier_mm: Sequence[float] = (), remedy: str = ""
@@ -158,7 +239,7 @@ class AcceptanceCriteria:
         if self.max_residual_mm is not None:
             yield tr("residual up to {limit:g} mm", limit=self.max_residual_mm)
         if self.interval_mm is not None:
-            yield tr("95 % interval up to +-{limit:g} mm", limit=self.interval_mm)
+            yield tr("accurate to +-{limit:g} mm or better (95 %)", limit=self.interval_mm)
 
     def _of_fit(self, result: CalibrationResult) -> Iterator[LimitVerdict]:
         for code, name, found_mm, limit_mm in (
@@ -169,17 +250,15 @@ class AcceptanceCriteria:
                 result.max_residual_mm,
                 self.max_residual_mm,
             ),
-            ("large_interval", *_sureness(result), self.interval_mm),
+            (
+                "large_interval",
+                tr("Accurate to (95 %)"),
+                result.accurate_to_mm,
+                self.interval_mm,
+            ),
         ):
             if found_mm is not None and limit_mm is not None:
                 yield LimitVerdict(code, name, found_mm, limit_mm)
-
-
-def _sureness(result: CalibrationResult) -> tuple[str, float | None]:
-    """Return what a limit of the process is compared with, and its name."""
-    region = result.region95_radius_mm is not None
-    name = tr("Sure to, all axes together (95 %)") if region else tr("Sure to (95 %)")
-    return name, result.repeatable_to_mm
 
 
 def _out_of_order(result: CalibrationResult) -> str:

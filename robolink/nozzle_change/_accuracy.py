@@ -8,7 +8,7 @@ from dataclasses import replace
 from datetime import datetime
 from typing import Final
 
-from robolink.calibration import AccuracyFacts, CalibrationResult, ErrorSource
+from robolink.calibration import AccuracyFacts, CalibrationResult, ErrorSource, assessed
 from robolink.methods import find_method
 from robolink.model import Controller, EntryKind
 from robolink.nozzle_change._plan import ToolPlan
@@ -35,6 +35,21 @@ def accuracy_facts(
         months=_months(controller, plan.station or plan.pin),
         by_contact=bool(touches) and all(touch.contact for touch in touches),
     )
+
+
+def assessed_in_cell(
+    controller: Controller, plan: ToolPlan, result: CalibrationResult
+) -> tuple[CalibrationResult, AccuracyFacts]:
+    """Return a result with what it is accurate to in this cell, and what that rests on.
+
+    Args:
+        controller: Whose record is looked at.
+        plan: How it was measured, and what is stated.
+        result: What was measured.
+    """
+    result = with_sources(plan, result)
+    facts = accuracy_facts(controller, plan, result)
+    return assessed(result, facts), facts
 
 
 def with_sources(plan: ToolPlan, result: CalibrationResult) -> CalibrationResult:

@@ -14,7 +14,7 @@ from robolink.calibration import VerifyResult
 from robolink.errors import CalibrationError, DeclinedError, StoppedError, VerifyError
 from robolink.messages import tr
 from robolink.model import Controller, ToolReceipt, new_operation, require_engineer
-from robolink.nozzle_change._acceptance import AcceptanceCriteria, require_proved
+from robolink.nozzle_change._acceptance import AcceptanceCriteria
 from robolink.nozzle_change._length import settle_lengths
 from robolink.nozzle_change._measuring import (
     MOST_FURTHER,
@@ -40,8 +40,9 @@ from robolink.nozzle_change._proposal import (
     ToolReport,
     WriteSubject,
 )
-from robolink.nozzle_change._records import decision_entry, refusal_entry, verification_entry
+from robolink.nozzle_change._records import decision_entry, refusal_entry
 from robolink.nozzle_change._station_check import check_stations, found_with, stations_found
+from robolink.nozzle_change._turn_verdict import conclude_turn_test, judged_proof
 from robolink.nozzle_change.open_turn_test.marking import marked_turn_tests
 from robolink.procedures import TOUCH_CODES, MeasurementContext
 from robolink.runner import Operator, regard
@@ -179,6 +180,8 @@ class NozzleChange:
             self._judge(proposals)
             if not write:
                 break
+            for plan, proposal in proposals:
+                self._require_accurate(context, plan, proposal)
             if left == MOST_FURTHER:
                 self._listener.moment(Moment.BEFORE_WRITE, context)
             further = self._ask(context, proposals, offer_of(measured) if left else None)
@@ -235,6 +238,37 @@ class NozzleChange:
                         change=proposal.change_mm,
                     ),
                 )
+
+    def _require_accurate(
+        self, context: MeasurementContext, plan: ToolPlan, proposal: Proposal
+    ) -> None:
+        """Have a person decide on a statement that only defaults carry over the limit.
+
+        Raises:
+            CalibrationError: ``large_interval``: nobody may be asked.
+            DeclinedError: The person said no.
+        """
+        criteria, outcomes = plan.criteria, self._controller.outcomes
+        refusal = criteria.over_by_defaults(proposal.result)
+        if refusal is None:
+            return
+        if not self._plan.asks:
+            outcomes.append(refusal_entry(plan.tool, criteria, refusal))
+            raise refusal
+        question = tr("{found} Go on all the same?", found=refusal.what)
+        accepted = context.runner().confirm(question)
+        entry = decision_entry(
+            tr("accepted") if accepted else tr("declined"),
+            accepted=accepted,
+            question=question,
+            code=refusal.code,
+            accurate_to_mm=proposal.result.accurate_to_mm,
+        )
+        outcomes.append(replace(entry, tool=plan.tool))
+        if not accepted:
+            raise DeclinedError(
+                tr("You did not accept the statement."), remedy=tr("Nothing was written.")
+            )
 
     def _ask(
         self, context: MeasurementContext, proposals: Proposals, offer: FurtherOffer | None
@@ -306,8 +340,12 @@ class NozzleChange:
             receipts = change.write()
             for receipt in receipts:
                 self._listener.wrote(receipt)
-            for (plan, proposal), receipt in zip(proposals, receipts, strict=True):
-                drifts[receipt.tool] = self._verify(context, plan, proposal, receipt)
+            for (plan, proposal), receipt, details in zip(proposals, receipts, known, strict=True):
+                proof = self._verify(context, plan, proposal, receipt)
+                drifts[receipt.tool] = proof
+                details["accurate_to_mm"] = (
+                    proposal.result.accurate_to_mm if proof is None else proof.accurate_to_mm
+                )
             took_s = round((self._controller.clock.now_ns() - self._began_ns) / NS_PER_S, 1)
             for details in known:
                 details["took_s"] = took_s
@@ -333,10 +371,17 @@ class NozzleChange:
                 tip=proposal.tip,
                 tolerance_mm=criteria.drift_tolerance_mm,
             )
-        self._controller.outcomes.append(verification_entry(tool, result))
-        self._listener.verified(tool, result)
-        require_proved(result, self._controller.identity)
-        return result
+        shown = judged_proof(proposal.claim, result)
+        accurate_mm = conclude_turn_test(
+            self._controller,
+            tool,
+            result,
+            claim=proposal.claim,
+            interval_mm=criteria.interval_mm,
+            confirm=context.runner().confirm if self._plan.asks else None,
+            tell=lambda proof: self._listener.verified(tool, proof),
+        )
+        return replace(shown, accurate_to_mm=accurate_mm)
 
     @contextmanager
     def _touches_counting(self, tool: int, criteria: AcceptanceCriteria) -> Iterator[None]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Literal
 
-from robolink.calibration import CalibrationResult, LengthChange, VerifyResult
+from robolink.calibration import CalibrationResult, LengthChange, TurnClaim, VerifyResult
 from robolink.errors import CalibrationError
 from robolink.model import ToolOffset, ToolReceipt
 from robolink.procedures import MeasurementContext
@@ -52,6 +52,7 @@ class Proposal:
         length: What the heights of the touches tell about the length; ``None`` for nothing.
         pin_z_mm: Height of the pin that Z goes back to, base; ``None`` for that of these touches.
         pin_touches: How many touches that height rests on.
+        claim: What a turn test of it is held to; ``None`` where nothing tells it.
     """
 
     tool: int
@@ -65,6 +66,7 @@ class Proposal:
     length: LengthChange | None = None
     pin_z_mm: float | None = None
     pin_touches: int = 0
+    claim: TurnClaim | None = None
 
     @property
     def offset(self) -> ToolOffset:

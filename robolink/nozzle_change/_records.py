@@ -93,6 +93,7 @@ def verification_entry(tool: int, result: VerifyResult) -> NewEntry:
         "drifts": [asdict(drift) for drift in result.drifts],
         "warnings": list(result.warnings),
         "verdict": result.codes[0] if result.codes else result.verdict.value,
+        "judgement": result.judgement.as_json() if result.judgement else None,
         **touches_made(result.inputs),
     }
     return NewEntry(

@@ -51,6 +51,7 @@ def plan_of(
         accepted_change_mm=accepted_change_mm,
         accepted_with=way(Way.ACCEPT_JUMP),
         unattended=not ask_before_write,
+        stated=frozenset(("rms_mm", "max_residual_mm", "interval_mm")),
     )
     safe, needs = recipe.poses.safe, recipe.source.of_method.needs
     return ChangePlan(

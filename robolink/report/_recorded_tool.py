@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from robolink.calibration import Drift, VerifyResult, doubt_sentence
+from robolink.calibration import Drift, TurnJudgement, VerifyResult, doubt_sentence
 from robolink.messages import tr
 from robolink.model import (
     ControllerFacts,
@@ -189,6 +189,7 @@ def _verification(entry: Recorded | None) -> VerifyResult | None:
         details["tolerance_mm"],
         tuple(details["warnings"]),
         codes=tuple(details.get("codes", ())),
+        judgement=TurnJudgement.from_json(said) if (said := details.get("judgement")) else None,
     )
 
 

@@ -252,7 +252,7 @@ class PermitCall:
         return {
             CALLED_BACK: True,
             "method": result.method,
-            "known_within_mm": result.known_within_mm,
+            "known_within_mm": result.repeatable_to_mm,
             "warnings": list(result.warnings),
             "proposed": plain_offset(result.offset),
             **self._touches.on_record(),

@@ -280,7 +280,8 @@ class VerifyResult:
     touched, which shows Z and nothing else. ``codes`` name why its touches do not count;
     ``inputs`` are their poses, where a person made them. ``judgement`` is what the drifts say about
     the statement of the measurement, once they were held to it
-    (:func:`~robolink.calibration.held_to_claim`).
+    (:func:`~robolink.calibration.held_to_claim`); ``accurate_to_mm`` is what the tip is accurate to
+    after it, by the measurement or by a wider statement that a person took.
     """
 
     drifts: tuple[Drift, ...]
@@ -290,6 +291,7 @@ class VerifyResult:
     codes: tuple[str, ...] = ()
     inputs: tuple[Pose, ...] = ()
     judgement: TurnJudgement | None = None
+    accurate_to_mm: float | None = None
 
     @property
     def max_drift_mm(self) -> float:

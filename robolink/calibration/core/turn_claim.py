@@ -1,7 +1,8 @@
 """What a turn test is held to, and what it says about it: plain values that a marker can keep."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final, Self
 
 CONTRADICTS_REPEATABILITY: Final = "proof_contradicts_repeatability"
 CONTRADICTS_ACCURACY: Final = "proof_contradicts_accuracy"
@@ -64,7 +65,9 @@ class TurnJudgement:
         limits: What each drift may be, in their order.
         worst: Index of the drift that is furthest over its limit, or nearest to it.
         small_angle: Whether the tool was turned too little to call it tested.
-        wider_mm: What the tip is within in any case, by these drifts; ``None`` where they were seen
+        wider_mm: Within what of the truth the tip is by these drifts, never below what was said;
+            ``None`` where no turn was large enough to tell.
+        offers_wider: Whether that may be taken as a statement: not while the drifts were seen
             through what may be wrong itself.
     """
 
@@ -73,6 +76,7 @@ class TurnJudgement:
     worst: int = 0
     small_angle: bool = False
     wider_mm: float | None = None
+    offers_wider: bool = True
 
     @property
     def contradicts_accuracy(self) -> bool:
@@ -94,6 +98,27 @@ class TurnJudgement:
         """Names of what is contradicted or doubtful."""
         return (*filter(None, (self.code,)), *((SMALL_ANGLE,) if self.small_angle else ()))
 
+    @classmethod
+    def from_json(cls, document: Mapping[str, Any]) -> Self:
+        """Return what :meth:`as_json` wrote.
+
+        Raises:
+            KeyError, TypeError, ValueError: It is none.
+        """
+        limits = tuple(
+            DriftLimits(float(a["repeatable_mm"]), float(a["accurate_mm"]), float(a["turn_deg"]))
+            for a in document["limits"]
+        )
+        wider_mm = document["wider_mm"]
+        return cls(
+            document["code"] or "",
+            limits,
+            int(document["worst"]),
+            bool(document["small_angle"]),
+            None if wider_mm is None else float(wider_mm),
+            bool(document["offers_wider"]),
+        )
+
     def as_json(self) -> dict[str, object]:
         """Return it as plain values."""
         return {
@@ -109,4 +134,5 @@ class TurnJudgement:
             "worst": self.worst,
             "small_angle": self.small_angle,
             "wider_mm": self.wider_mm,
+            "offers_wider": self.offers_wider,
         }

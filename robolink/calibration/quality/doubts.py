@@ -129,6 +129,18 @@ _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
     "touches_not_witnessed": lambda: tr(
         "Nobody saw these touches being made: the poses were taught, typed or read from a file."
     ),
+    "proof_contradicts_repeatability": lambda: tr(
+        "The turn test differs from the measurement by more than it repeats: was the station "
+        "moved, is the nozzle loose, was a touch off?"
+    ),
+    "proof_contradicts_accuracy": lambda: tr(
+        "The turn test contradicts what the measurement is accurate to: was the station moved, is "
+        "the nozzle loose, was the camera turned?"
+    ),
+    "tested_at_small_angle": lambda: tr(
+        "The turn test turned the tool by less than 90 degrees from where it was measured, so it "
+        "shows little."
+    ),
     "length_changed": lambda: tr("The length of the tool has changed."),
     "length_not_observable": lambda: tr(
         "Whether the length of the tool has changed cannot be told from these touches."

@@ -158,7 +158,8 @@ def held_to_claim(claim: TurnClaim, proof: VerifyResult) -> TurnJudgement:
         limits,
         worst,
         small_angle=not proof.heights_only and turned < LEAST_TURN_DEG - 0.5,
-        wider_mm=None if claim.by_camera else _wider_mm(claim, pairs),
+        wider_mm=_wider_mm(claim, pairs),
+        offers_wider=not claim.by_camera,
     )
 
 

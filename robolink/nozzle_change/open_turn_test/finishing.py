@@ -21,8 +21,7 @@ from robolink.errors import (
 )
 from robolink.messages import joined, tr
 from robolink.model import Controller, Finding, Marker, MarkerKind, Verdict
-from robolink.nozzle_change._acceptance import require_proved
-from robolink.nozzle_change._records import verification_entry
+from robolink.nozzle_change._turn_verdict import conclude_turn_test
 from robolink.nozzle_change.open_turn_test.marking import OpenTurnTest, tests_of
 from robolink.procedures import TOUCH_CODES, MeasurementContext
 from robolink.runner import Operator
@@ -161,9 +160,9 @@ def _prove(
             code=error.code,
             controller=controller.identity,
         ) from error
-    controller.outcomes.append(verification_entry(tool, result))
-    tell(tool, result)
-    require_proved(result, controller.identity)
+    conclude_turn_test(
+        controller, tool, result, claim=one.test.claim, tell=lambda proof: tell(tool, proof)
+    )
 
 
 @contextmanager

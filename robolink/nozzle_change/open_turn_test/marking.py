@@ -6,7 +6,7 @@ Whoever finds the marker open later takes the change up again
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 from functools import cache
 from typing import TYPE_CHECKING, Any, Final, TypeVar, cast
 
@@ -81,6 +81,7 @@ def _kept(
         tip=proposal.tip,
         tolerance_mm=plan.criteria.drift_tolerance_mm,
     )
+    test = replace(test, claim=proposal.claim)
     settings = limits.settings(start, proposal.result.offset)
     if not all(map(math.isfinite, astuple(settings.box))):
         return "no_box"

@@ -250,7 +250,7 @@ class DriftProof:
         for angle_deg, apart in self._apart.items():
             dx_mm, dy_mm, dz_mm = (sum(axis) / len(apart) for axis in zip(*apart, strict=True))
             u_mm = self.u_mm / math.sqrt(len(apart))
-            drifts.append(Drift(angle_deg, dx_mm, dy_mm, dz_mm, u_mm))
+            drifts.append(Drift(angle_deg, dx_mm, dy_mm, dz_mm, u_mm, len(apart)))
         return tuple(drifts)
 
 

@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar, Protocol, runtime_checkable
 
-from robolink.calibration import CalibrationResult, VerifyResult
+from robolink.calibration import CalibrationResult, TurnClaim, VerifyResult
 from robolink.model import Pose, ToolOffset
 from robolink.procedures.source import MeasurementContext
 from robolink.runner import Move, Procedure, Seek, foreseen_steps
@@ -24,6 +24,7 @@ class KeptProof(ABC):
         written: The offset that was written.
         tip: Where the tip was found; it differs where a difference was written.
         tolerance_mm: Largest drift that passes.
+        claim: What the measurement lets its drifts be; ``None`` where nothing tells it.
     """
 
     method: ClassVar[str]
@@ -33,6 +34,7 @@ class KeptProof(ABC):
     written: ToolOffset
     tip: ToolOffset
     tolerance_mm: float
+    claim: TurnClaim | None = None
 
     @abstractmethod
     def moves(self, here: Pose) -> int:

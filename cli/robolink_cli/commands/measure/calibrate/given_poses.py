@@ -18,6 +18,7 @@ from robolink.nozzle_change import (
     NozzleChange,
     Proposal,
     ToolReport,
+    assessed_in_cell,
 )
 from robolink.procedures import MeasurementContext, PoseMethod
 from robolink.transaction import Order, earlier_corrections
@@ -199,11 +200,14 @@ def _dry_run(
     """Propose and judge; return the document with what would be sent."""
     before = controller.tools.read(frame.tool)
     given.found = given.find(controller, frame.tool, before)
-    result = frame.tool_plan(given, verify=False).named(given.found.result)
+    plan = frame.tool_plan(given, verify=False)
+    result, _ = assessed_in_cell(controller, plan, plan.named(given.found.result))
     proposal = Proposal(frame.tool, before, result)
     if not frame.context.json:
         listener.proposed([proposal])
     frame.criteria.judge_fit(proposal.result)
+    if refusal := frame.criteria.over_by_defaults(proposal.result):
+        raise refusal
     frame.criteria.judge_change(proposal, remedy=given.remedy)
     requests = list(controller.tools.preview_write(frame.tool, proposal.offset))
     judged = judged_payload(proposal, frame.criteria.verdicts(proposal))

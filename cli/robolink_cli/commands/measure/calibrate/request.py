@@ -4,6 +4,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import click
+from click.core import ParameterSource
+
 from robolink.errors import ConfigError, ReservedToolError, ToolIndexError
 from robolink.messages import tr
 from robolink_cli.options.impact import ImpactRequest, impact_request
@@ -157,6 +160,7 @@ def request_from(
         interval_mm=interval_mm,
         drift_tolerance_mm=tolerance_mm,
         unattended=yes,
+        stated=_stated_limits(),
     )
     return CalibrationRequest(
         context.with_nozzle(nozzle, lot),
@@ -170,6 +174,16 @@ def request_from(
         dry_run=dry_run,
         yes=yes,
         order=order,
+    )
+
+
+def _stated_limits() -> frozenset[str]:
+    """Return which limits of the fit were typed; the others are those of the cell."""
+    context = click.get_current_context()
+    names = {"rms_mm": "rms_mm", "residual_mm": "max_residual_mm", "interval_mm": "interval_mm"}
+    typed = ParameterSource.COMMANDLINE
+    return frozenset(
+        limit for name, limit in names.items() if context.get_parameter_source(name) is typed
     )
 
 

@@ -2,6 +2,7 @@
 
 import importlib
 import sys
+from dataclasses import replace
 
 import pytest
 from click.testing import CliRunner
@@ -10,9 +11,11 @@ from robolink_cli.commands.measure.calibrate import calibrate
 from robolink.methods import find_method, method_names, register
 from robolink.model import EntryKind
 from robolink.recipe import json_schema, load_recipe
+from robolink.stations import touch_station
 from tests.contract._method_cell import method_cell, on
 from tests.contract.plate_touch import METHOD
 from tests.contract.plate_touch.parameters import PlateTouchParameters
+from tests.contract.plate_touch.source import PlateTouchSource
 
 RECIPE = """\
 schema = "robolink/recipe/1"
@@ -93,3 +96,25 @@ def test_a_package_brings_it_by_an_entry_point(tmp_path, monkeypatch):
 def test_two_methods_of_one_name_are_refused():
     with register(METHOD), pytest.raises(ValueError, match="already"), register(METHOD):
         pass
+
+
+def test_a_limit_of_which_it_tells_nothing_is_refused(cell):
+    class Silent(PlateTouchSource):
+        """Measures, and says neither how it scatters nor what its errors can be."""
+
+        def procedure(self, stored, here):
+            told = yield from super().procedure(stored, here)
+            return replace(told, half_width95=(), region95_radius_mm=None, sources=None)
+
+    def source(parameters, site):
+        return Silent(touch_station(site.station), parameters, site.sigma_mm)
+
+    silent = replace(METHOD, name="silent-touch", source=source)
+    with register(silent):
+        limited = ("--station", "PLATE", "--sigma", "0.01", "--max-interval", "0.05")
+        refused = cell.calibrate("silent-touch", *limited)
+        assert refused.code == 7, refused.err
+        assert refused.document["error"]["code"] == "not_judged"
+        assert "silent-touch does not tell" in refused.document["error"]["what"]
+        assert not cell.recorded(EntryKind.DONE)
+        assert cell.calibrate("silent-touch", "--station", "PLATE").code == 0

@@ -1,0 +1,170 @@
+"""What a result is accurate to: its rows, where they come from, and which is the largest."""
+
+import math
+
+import pytest
+
+from robolink.calibration import (
+    ACCURACY_ROWS,
+    Accuracy,
+    AccuracyFacts,
+    Beam,
+    CalibrationResult,
+    Crossing,
+    ErrorSource,
+    Pin,
+    RowFact,
+    assessed,
+    solve_crossed_beams,
+    solve_n_angle,
+    solve_one_touch,
+    solve_two_pose,
+)
+from robolink.model import Pose, ToolOffset
+
+TOUCHES = Pose(298, 99, -60, 0), Pose(322, 91, -60, 180)
+BEAMS = Beam(300, 80, 0), Beam(300, 80, 90)
+CROSSINGS = [
+    Crossing(0, Pose(288, 83.0, -60, 0), Pose(288, 84.0, -60, 0)),
+    Crossing(0, Pose(288, 84.0, -60, 0), Pose(288, 83.0, -60, 0)),
+    Crossing(1, Pose(287.5, 83.5, -60, 0), Pose(288.5, 83.5, -60, 0)),
+    Crossing(1, Pose(288.5, 83.5, -60, 0), Pose(287.5, 83.5, -60, 0)),
+] * 2
+
+
+def two_pose(sigma_mm: float | None = 0.02) -> CalibrationResult:
+    return solve_two_pose(*TOUCHES, sigma_mm=sigma_mm)
+
+
+def test_a_touch_by_eye_is_accurate_to_what_a_person_sees():
+    found = assessed(two_pose(sigma_mm=0.0001), AccuracyFacts())
+
+    assert found.repeatable_to_mm < 0.001
+    assert found.accurate_to_mm == pytest.approx(0.071, abs=0.0005)  # evidence 19
+    assert found.accuracy.largest.key == "touch_mm"
+    assert found.accuracy.largest.basis == "default"
+
+
+def test_the_scatter_is_one_row_beside_the_others():
+    found = assessed(two_pose(), AccuracyFacts())
+
+    assert found.repeatable_to_mm == pytest.approx(0.0346, abs=0.0005)
+    assert found.accurate_to_mm == pytest.approx(0.079, abs=0.0005)
+    assert found.accuracy.without_defaults_mm == pytest.approx(found.repeatable_to_mm)
+    assert {row.key for row in found.accuracy.rows} == {"scatter", "touch_mm"}
+
+
+def test_what_the_cell_states_takes_the_place_of_the_default():
+    rows = {"touch_mm": RowFact(0.025, "stated", told="recipe")}
+
+    found = assessed(two_pose(), AccuracyFacts(rows=rows))
+
+    assert found.accurate_to_mm < 0.05
+    assert found.accuracy.largest_default is None
+
+
+def test_an_input_that_showed_each_touch_needs_no_eye():
+    found = assessed(two_pose(), AccuracyFacts(by_contact=True))
+
+    assert found.accurate_to_mm == pytest.approx(found.repeatable_to_mm)
+
+
+def test_without_a_scatter_of_its_own_a_usual_one_counts_as_a_default():
+    found = assessed(two_pose(sigma_mm=None), AccuracyFacts())
+
+    assert found.repeatable_to_mm is None
+    assert found.accurate_to_mm == pytest.approx(
+        math.sqrt(5.991 * ((0.03 / math.sqrt(2)) ** 2 + 0.05**2 / 3)), abs=0.001
+    )
+    scatter = next(row for row in found.accuracy.rows if row.key == "scatter")
+    assert scatter.basis == "default"
+
+
+def test_a_method_that_says_nothing_of_its_errors_and_scatter_is_accurate_to_nothing():
+    bare = CalibrationResult(
+        "own", ToolOffset(1, 2, 3), ("x_mm", "y_mm"), ("z_mm",), (), 1.0, (), TOUCHES
+    )
+
+    assert assessed(bare, AccuracyFacts()).accuracy is None
+
+
+@pytest.mark.parametrize(
+    ("months", "within_mm"), [(0, 0.028), (1, 0.042), (2, 0.057), (8, 0.141), (30, 0.141)]
+)
+def test_the_place_of_beams_is_known_worse_the_longer_ago_it_was_learnt(months, within_mm):
+    solved = solve_crossed_beams(CROSSINGS, BEAMS, sigma_mm=0.0005)
+
+    found = assessed(solved, AccuracyFacts(months=months))
+
+    assert found.accurate_to_mm == pytest.approx(within_mm, abs=0.001)
+
+
+def test_a_stated_place_does_not_grow():
+    rows = {"place_mm": RowFact(0.01, "stated")}
+
+    found = assessed(
+        solve_crossed_beams(CROSSINGS, BEAMS, sigma_mm=0.0005), AccuracyFacts(rows, months=30)
+    )
+
+    assert found.accurate_to_mm == pytest.approx(0.0142, abs=0.0005)
+
+
+def test_beams_whose_places_are_solved_for_rely_on_none():
+    turned = [
+        *CROSSINGS[:4],
+        *(
+            Crossing(
+                one.beam,
+                Pose(624 - one.entry.x_mm, 153 - one.entry.y_mm, -60, 180),
+                Pose(624 - one.exit.x_mm, 153 - one.exit.y_mm, -60, 180),
+            )
+            for one in CROSSINGS[:4]
+        ),
+    ]
+
+    found = solve_crossed_beams(turned, BEAMS, sigma_mm=0.002, beams_may_have_moved=True)
+
+    assert [source.row for source in found.sources] == []
+
+
+def test_one_touch_relies_on_the_place_of_the_pin_and_on_the_eye():
+    found = solve_one_touch(Pose(300, 100, -60, 0), Pin(312, 96.5, -80), sigma_mm=0.02)
+
+    assert {source.row: source.turning for source in found.sources} == {
+        "touch_mm": "with_tool",
+        "place_mm": "in_base",
+    }
+
+
+def test_a_row_in_one_direction_widens_that_direction():
+    found = two_pose(sigma_mm=0.001)
+    askew = ErrorSource("camera_turn_deg", ((0.2,), (0.0,)), "as_offset")
+    turned = assessed(
+        CalibrationResult(
+            **{
+                **{name: getattr(found, name) for name in CalibrationResult.__dataclass_fields__},
+                "sources": (askew,),
+            }
+        ),
+        AccuracyFacts(),
+    )
+
+    x, y = turned.accuracy.half_width95
+    assert x == pytest.approx(1.96 * 0.1 / math.sqrt(3), rel=0.01)
+    assert y == pytest.approx(1.96 * 0.001 * found.sigma_gain, rel=0.01)
+
+
+def test_json_goes_back_and_forth():
+    poses = [Pose(298, 99, -60, 0), Pose(322, 91, -60, 180), Pose(306.001, 83, -60, 90)]
+    accuracy = assessed(solve_n_angle(poses), AccuracyFacts()).accuracy
+
+    again = Accuracy.from_json(accuracy.as_json(("x_mm", "y_mm")))
+
+    assert again == accuracy
+
+
+def test_every_row_has_a_unit_in_its_name_and_a_positive_default():
+    for key, row in ACCURACY_ROWS.items():
+        assert key == row.key
+        assert key.endswith("_" + {"percent": "percent"}.get(row.unit, row.unit))
+        assert row.default > 0

@@ -166,6 +166,17 @@ if TYPE_CHECKING:
     from robolink.calibration.quality.moved_station import StationShift as StationShift
     from robolink.calibration.quality.moved_station import TipShift as TipShift
     from robolink.calibration.quality.moved_station import judge_shifts as judge_shifts
+    from robolink.calibration.quality.statements import RowInWords as RowInWords
+    from robolink.calibration.quality.statements import accurate_sentence as accurate_sentence
+    from robolink.calibration.quality.statements import basis_words as basis_words
+    from robolink.calibration.quality.statements import largest_row_sentence as largest_row_sentence
+    from robolink.calibration.quality.statements import measured_axes as measured_axes
+    from robolink.calibration.quality.statements import repeatable_sentence as repeatable_sentence
+    from robolink.calibration.quality.statements import rows_in_words as rows_in_words
+    from robolink.calibration.quality.statements import seating_sentence as seating_sentence
+    from robolink.calibration.quality.statements import stated_mm as stated_mm
+    from robolink.calibration.quality.statements import statement_line as statement_line
+    from robolink.calibration.quality.statements import statement_sentences as statement_sentences
     from robolink.calibration.quality.station_part import SharedStation as SharedStation
     from robolink.calibration.quality.station_part import StationPart as StationPart
     from robolink.calibration.quality.station_part import shared_station as shared_station
@@ -179,6 +190,12 @@ if TYPE_CHECKING:
     from robolink.calibration.quality.turn_test import LEAST_TURN_DEG as LEAST_TURN_DEG
     from robolink.calibration.quality.turn_test import held_to_claim as held_to_claim
     from robolink.calibration.quality.turn_test import turn_claim as turn_claim
+    from robolink.calibration.quality.turn_test_words import (
+        turn_test_headline as turn_test_headline,
+    )
+    from robolink.calibration.quality.turn_test_words import (
+        turn_test_sentences as turn_test_sentences,
+    )
     from robolink.calibration.quality.update_guard import NEEDLE_LIMIT_MM as NEEDLE_LIMIT_MM
     from robolink.calibration.quality.update_guard import Correction as Correction
     from robolink.calibration.quality.update_guard import require_shrinking as require_shrinking
@@ -282,12 +299,16 @@ __getattr__ = lazy_exports(
         "quality.doubts": "doubt_sentence known_doubts order_in_words",
         "quality.impact": "Impact PointImpact impact_on",
         "quality.moved_station": "StationShift TipShift judge_shifts",
+        "quality.statements": "RowInWords accurate_sentence basis_words largest_row_sentence "
+        "measured_axes repeatable_sentence rows_in_words seating_sentence stated_mm "
+        "statement_line statement_sentences",
         "quality.station_part": "SharedStation StationPart shared_station with_station",
         "quality.tolerances": "PLANAR_TOLERANCE TOUCH_TOLERANCE Tolerance",
         "quality.tool_fits": "ToolFit better_fit tool_fits",
         "evidence.approach_bias": "with_approach_bias",
         "evidence.units": "RobotReach require_near require_stored_scale require_within_reach",
         "quality.turn_test": "LEAST_TURN_DEG held_to_claim turn_claim",
+        "quality.turn_test_words": "turn_test_headline turn_test_sentences",
         "quality.update_guard": "Correction NEEDLE_LIMIT_MM require_shrinking update_guard "
         "writes_refused_unattended",
         "quality.verify_drift": "PLACING_TOLERANCE_MM verify_drift",

@@ -32,7 +32,9 @@ if TYPE_CHECKING:
     from robolink.nozzle_change._proposal import ToolReport as ToolReport
     from robolink.nozzle_change._proposal import WriteSubject as WriteSubject
     from robolink.nozzle_change._records import touches_made as touches_made
+    from robolink.nozzle_change._seating import Seating as Seating
     from robolink.nozzle_change._seating import height_is_known as height_is_known
+    from robolink.nozzle_change._seating import seating_of as seating_of
     from robolink.nozzle_change._seating import tip_sigma_mm as tip_sigma_mm
     from robolink.nozzle_change._seating import touching_as_recorded as touching_as_recorded
     from robolink.nozzle_change._turn_verdict import conclude_turn_test as conclude_turn_test
@@ -61,7 +63,7 @@ __getattr__ = lazy_exports(
         "_preview": "PlannedStep flange_now foresee preview require_inside",
         "_proposal": "ChangeReport LimitVerdict Listener Moment Proposal ToolReport WriteSubject",
         "_records": "touches_made",
-        "_seating": "height_is_known tip_sigma_mm touching_as_recorded",
+        "_seating": "Seating height_is_known seating_of tip_sigma_mm touching_as_recorded",
         "_turn_verdict": "conclude_turn_test told_of_contradiction",
     },
 )

@@ -6,6 +6,7 @@ of it at the next touch can look at the needle before the rest is touched.
 
 import math
 
+from robolink.calibration import stated_mm
 from robolink.messages import tr
 from robolink.methods import find_method
 from robolink.model import Controller, Pose, ToolOffset
@@ -46,7 +47,7 @@ def told_by_first_touch(
     told = change_against(controller, plan.pin, known, [place[2]], before, [touch])
     values = {
         "mm": f"{abs(told.longer_mm):.2f}",
-        "half": f"{told.half95_mm:.2f}",
+        "half": stated_mm(told.half95_mm, 2),
         "limit": f"{told.limit_mm:.2f}",
     }
     if not told.changed:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from robolink.calibration import LengthChange, TipShift, chain_of, judge_shifts
+from robolink.calibration import LengthChange, TipShift, chain_of, judge_shifts, stated_mm
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.methods import find_last_touch
@@ -316,17 +316,17 @@ def in_words(tool: int, told: LengthChange) -> str:
         "tool": tool,
         "apart": abs(told.longer_mm),
         "up": told.height_change_mm,
-        "half": told.half95_mm,
+        "half": stated_mm(told.half95_mm, 2),
     }
     if told.longer_mm > 0:
         return tr(
             "The tip of tool {tool} is {apart:.2f} mm longer (flange {up:+.2f} mm on the same pin, "
-            "+-{half:.2f}).",
+            "+-{half}).",
             **values,
         )
     return tr(
         "The tip of tool {tool} is {apart:.2f} mm shorter (flange {up:+.2f} mm on the same pin, "
-        "+-{half:.2f}).",
+        "+-{half}).",
         **values,
     )
 

@@ -15,6 +15,7 @@ from robolink.nozzle_change._first_touch import told_by_first_touch
 from robolink.nozzle_change._plan import ToolPlan
 from robolink.nozzle_change._proposal import Listener, Moment, Proposal
 from robolink.nozzle_change._records import calibration_entry, decision_entry, refusal_entry
+from robolink.nozzle_change._seating import seating_of
 from robolink.procedures import MeasurementContext, TouchesFurther, approach_path, touches_of
 from robolink.runner import AGAIN, BACK, MORE, Ask, Confirm, Look, Seek, StepDone
 from robolink.stations import find_stations
@@ -111,7 +112,13 @@ class Measuring:
             plan.criteria.judge_fit(result)
             rests_on = self._station_record(plan.station)
             fresh = Proposal(
-                tool, before, result, notes=notes, record=rests_on, kept_record=rests_on
+                tool,
+                before,
+                result,
+                notes=notes,
+                record=rests_on,
+                kept_record=rests_on,
+                seating=seating_of(context.controller),
             )
             adjusted = self._listener.adjusted(fresh, context)
             proposal = replace(adjusted, claim=turn_claim(result, facts))

@@ -9,6 +9,7 @@ from typing import Literal
 from robolink.calibration import CalibrationResult, LengthChange, TurnClaim, VerifyResult
 from robolink.errors import CalibrationError
 from robolink.model import ToolOffset, ToolReceipt
+from robolink.nozzle_change._seating import Seating
 from robolink.procedures import MeasurementContext
 from robolink.runner import StepDone
 
@@ -53,6 +54,7 @@ class Proposal:
         pin_z_mm: Height of the pin that Z goes back to, base; ``None`` for that of these touches.
         pin_touches: How many touches that height rests on.
         claim: What a turn test of it is held to; ``None`` where nothing tells it.
+        seating: How differently nozzles sit in this cell; ``None`` where nobody looked.
     """
 
     tool: int
@@ -67,6 +69,7 @@ class Proposal:
     pin_z_mm: float | None = None
     pin_touches: int = 0
     claim: TurnClaim | None = None
+    seating: Seating | None = None
 
     @property
     def offset(self) -> ToolOffset:

@@ -44,6 +44,7 @@ def calibration_entry(
         **({} if facts is None else {"facts": asdict(facts)}),
         "gauges": [] if gauge is None else [asdict(gauge)],
         **_result(result),
+        "seating": proposal.seating.as_json() if proposal.seating else None,
         **proposal.record,
     }
     verdict = tr("measured: {offset}", offset=describe_offset(result.offset))

@@ -5,7 +5,12 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final, Literal
 
-from robolink.calibration import PERSON_SIGMA_Z_MM, PROBE_SIGMA_Z_MM
+from robolink.calibration import (
+    PERSON_SIGMA_Z_MM,
+    PROBE_SIGMA_Z_MM,
+    f_quantile,
+    seating_sentence,
+)
 from robolink.model import Controller, EntryKind, Pose, Recorded, ToolOffset, read_offset
 from robolink.procedures import TouchPlan
 from robolink.runner import TouchedAt
@@ -37,6 +42,26 @@ class Seating:
 
     sigma_mm: tuple[float, float, float] = USUAL_SEAT_MM
     changes: int | None = None
+
+    @property
+    def within_mm(self) -> float | None:
+        """In which distance, in the plane, the tip lies after the next mounting, in 95 %.
+
+        ``None`` while too few changes are on record. Two coordinates that were pooled from n
+        changes have 2 n degrees of freedom.
+        """
+        if self.changes is None:
+            return None
+        return math.sqrt(2 * f_quantile(0.95, 2, 2 * self.changes)) * self.sigma_mm[0]
+
+    @property
+    def sentence(self) -> str:
+        """How far off the tip may be after the next mounting."""
+        return seating_sentence(self.within_mm, self.changes)
+
+    def as_json(self) -> dict[str, object]:
+        """Return it as plain values; nothing but ``None`` where the record does not tell it."""
+        return {"within_mm": self.within_mm, "changes": self.changes}
 
 
 def seating_of(controller: Controller) -> Seating:

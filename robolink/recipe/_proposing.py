@@ -70,6 +70,7 @@ def proposed(
         record=_record(recipe, reference)
         | (reference_details(station, tip, stored, height) if taking_reference else {}),
         kept_record=_record(recipe, reference) | reference_details(station, tip, offset, height),
+        seating=measured.seating,
     )
 
 

@@ -5,6 +5,7 @@ from robolink.report._drift_page import save_drift as save_drift
 from robolink.report._file import save as save
 from robolink.report._page import render as render
 from robolink.report._recorded import reports_of as reports_of
+from robolink.report._recorded_fit import recorded_fit as recorded_fit
 from robolink.report._values import Attempt as Attempt
 from robolink.report._values import GaugeOnRecord as GaugeOnRecord
 from robolink.report._values import Judgement as Judgement

@@ -8,6 +8,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from robolink.calibration import rows_in_words, stated_mm
 from robolink.messages import tr
 from robolink.report._markup import drawing, plain, rounded
 from robolink.report._values import Report
@@ -66,6 +67,8 @@ def templates() -> Environment:
     environment.globals |= {
         "tr": tr,
         "figure": figure,
+        "half": half,
+        "rows_in_words": rows_in_words,
         "drawn": drawn,
         "drawings": drawings,
         "order": lambda report: list(order_drawings(report.fit, report.evidence)),
@@ -82,6 +85,11 @@ def templates() -> Environment:
 def figure(value: float, digits: int = 3) -> Markup:
     """Return a number: rounded to the eye, whole for a program that reads the page."""
     return Markup('<data value="{}">{}</data>').format(repr(float(value)), rounded(value, digits))
+
+
+def half(value: float, digits: int = 4) -> Markup:
+    """Return half of an interval: never 0 to the eye, whole for a program that reads the page."""
+    return Markup('<data value="{}">{}</data>').format(repr(float(value)), stated_mm(value, digits))
 
 
 def drawn(one: Drawing) -> Markup:

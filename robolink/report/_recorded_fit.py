@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from robolink.calibration import CalibrationResult, UncertaintyBudget
+from robolink.calibration import Accuracy, CalibrationResult, UncertaintyBudget
 from robolink.model import (
     Elbow,
     Hand,
@@ -47,6 +47,7 @@ def recorded_fit(details: Mapping[str, Any]) -> CalibrationResult:
         interval_from=details.get("interval_from", ""),
         region95_radius_mm=details.get("region95_radius_mm"),
         budget=UncertaintyBudget.from_json(budget) if (budget := details.get("budget")) else None,
+        accuracy=Accuracy.from_json(accuracy) if (accuracy := details.get("accuracy")) else None,
     )
 
 

@@ -79,6 +79,7 @@ def report_of_tool(
         gauges=tuple(GaugeOnRecord(**gauge) for gauge in calibration.get("gauges", ())),
         touches=tuple(_touch(said) for said in calibration.get("touches", ()) if said),
         evidence=calibration.get("evidence") or {},
+        seating=calibration.get("seating"),
     )
 
 

@@ -143,6 +143,8 @@ class Report:
         gauges: The gauges that were measured against.
         touches: How the touches were made by which it was measured.
         evidence: Figures of the checks that the measurement went through, plain JSON.
+        seating: How differently nozzles sit in this cell, plain JSON; ``None`` where that is not on
+            record.
     """
 
     made_at: str
@@ -170,3 +172,4 @@ class Report:
     gauges: tuple[GaugeOnRecord, ...] = ()
     touches: tuple[TouchOnRecord, ...] = ()
     evidence: Mapping[str, Any] = field(default_factory=dict)
+    seating: Mapping[str, Any] | None = None

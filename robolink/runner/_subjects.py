@@ -102,7 +102,8 @@ class FitSubject:
     Attributes:
         rows: Each sample.
         rms_mm: Root mean square of how far they are off, ``None`` without a degree of freedom.
-        half95_mm: Half of the 95 % interval of a measured length, ``None`` where nobody knows.
+        repeatable_mm: What they are repeatable to in 95 %, all measured lengths together; ``None``
+            where nobody knows.
         next_mm: What that becomes with one more.
         worst: Index of the one that fits worst, where it is offered to be taken again.
         limit_mm: The largest that is believed.
@@ -111,7 +112,7 @@ class FitSubject:
 
     rows: tuple[FitRow, ...]
     rms_mm: float | None
-    half95_mm: float | None = None
+    repeatable_mm: float | None = None
     next_mm: float | None = None
     worst: int | None = None
     limit_mm: float = 0.15

@@ -2,7 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 
-from robolink.calibration import VerifyResult, known_doubts
+from robolink.calibration import (
+    known_doubts,
+    statement_sentences,
+    turn_test_headline,
+    turn_test_sentences,
+)
 from robolink.messages import tr
 from robolink.model import ToolOffset, ToolReceipt, describe_offset
 from robolink.nozzle_change import LimitVerdict, PlannedStep, Proposal, ToolReport
@@ -15,12 +20,12 @@ from robolink_cli.views.documents import (
     receipt_payload,
     verification_payload,
 )
-from robolink_cli.views.fit import remarks, show_residuals
+from robolink_cli.views.fit import remarks, show_accuracy_rows, show_residuals
 from robolink_cli.views.tables import show_change
 
 
 def show_proposal(proposal: Proposal) -> None:
-    """Show what was measured next to what is stored, how sure it is, and what is in doubt."""
+    """Show what was measured next to what is stored, how accurate it is, and what is in doubt."""
     show_change(
         proposal.tool,
         offset_payload(proposal.before),
@@ -31,8 +36,12 @@ def show_proposal(proposal: Proposal) -> None:
     result = proposal.result
     for remark in (*proposal.notes, *remarks(result)):
         say(f"  {remark}")
+    if proposal.seating is not None:
+        say(f"  {proposal.seating.sentence}")
     if result.residuals_mm:
         show_residuals(result)
+    if result.accuracy is not None:
+        show_accuracy_rows(result.accuracy)
     for sentence in known_doubts(result.warnings):
         say(f"  ! {sentence}")
 
@@ -83,18 +92,11 @@ def show_report(report: ToolReport) -> None:
                 distance=drift.distance_mm,
             )
         )
-    say(_proof(report.verification))
-
-
-def _proof(verification: VerifyResult) -> str:
-    """Return how the verification ended, in one sentence."""
-    found = {"drift": verification.max_drift_mm, "limit": verification.tolerance_mm}
-    if verification.heights_only:
-        return tr("Touched again: {drift:.3f} mm off at most, limit {limit:.3f} mm.", **found)
-    return tr(
-        "Turn test passed: {drift:.3f} mm off at most, limit {limit:.3f} mm.",
-        **found,
-    )
+    say(turn_test_headline(report.verification))
+    for sentence in turn_test_sentences(report.verification.judgement, report.proposal.result):
+        say(f"  {sentence}")
+    for sentence in statement_sentences(report.proposal.result):
+        say(sentence)
 
 
 def judged_payload(proposal: Proposal, verdicts: Sequence[LimitVerdict]) -> dict[str, object]:

@@ -58,6 +58,7 @@ def proposal_payload(proposal: "Proposal") -> dict[str, object]:
         **_touches_payload(result.inputs),
         "fit": fit_payload(result),
         "length": length_payload(proposal),
+        "seating": proposal.seating.as_json() if proposal.seating else None,
         **result.details(),
     }
 
@@ -86,11 +87,19 @@ def length_payload(proposal: "Proposal") -> dict[str, object] | None:
 
 
 def fit_payload(result: "CalibrationResult") -> dict[str, object]:
-    """Return how sure a measurement is; what nothing tells is ``None`` or empty."""
+    """Return what a measurement is repeatable to and accurate to; what nothing tells is ``None``.
+
+    ``half_width95``, ``interval_from``, ``region95_radius_mm`` and ``budget`` are what it is
+    repeatable to, as before there was a statement of accuracy.
+    """
     from robolink.calibration import chain_of  # here, because a status needs no numpy
 
     chain = chain_of(result)
+    accuracy = result.accuracy
     return {
+        "repeatable_to_mm": result.repeatable_to_mm,
+        "accurate_to_mm": result.accurate_to_mm,
+        "accuracy": accuracy.as_json(result.measured) if accuracy else None,
         "half_width95": dict(zip(result.measured, result.half_width95, strict=False)),
         "sigma_mm": result.sigma_mm,
         "sigma_stated": result.sigma_stated,
@@ -118,6 +127,7 @@ def verification_payload(result: "VerifyResult | None") -> dict[str, object] | N
         "max_drift_mm": result.max_drift_mm,
         "tolerance_mm": result.tolerance_mm,
         "passed": result.passed,
+        "judgement": result.judgement.as_json() if result.judgement else None,
         "drifts": [
             {
                 "u_deg": drift.u_deg,

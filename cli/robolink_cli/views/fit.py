@@ -1,9 +1,20 @@
-"""How sure a measurement is, in words and as a table."""
+"""What a measurement is repeatable to and accurate to, in words and as tables."""
 
 from collections.abc import Iterator
 from typing import Final
 
-from robolink.calibration import CalibrationResult, chain_of, known_doubts, order_in_words
+from robolink.calibration import (
+    Accuracy,
+    CalibrationResult,
+    RowInWords,
+    chain_of,
+    known_doubts,
+    measured_axes,
+    order_in_words,
+    rows_in_words,
+    stated_mm,
+    statement_sentences,
+)
 from robolink.messages import tr
 from robolink_cli.console.render import table
 from robolink_cli.views.documents import number
@@ -11,10 +22,11 @@ from robolink_cli.views.documents import number
 
 def remarks(result: CalibrationResult) -> Iterator[str]:
     """Yield what there is to say about a measurement beside its numbers, a sentence each."""
-    for said in (_fit, _order, _interval, _region, _parts, _ways, _camera, _runout, _chain):
-        sentence = said(result)
-        if sentence:
-            yield sentence
+    for said in (_fit, _order):
+        yield from filter(None, (said(result),))
+    yield from statement_sentences(result)
+    for said in (_each_axis, _ways, _camera, _runout, _chain):
+        yield from filter(None, (said(result),))
     yield from known_doubts(note for note in result.notes if note not in _SAID_OTHERWISE)
 
 
@@ -23,8 +35,10 @@ _SAID_OTHERWISE: Final = ("length_not_observable",)
 
 
 def _fit(result: CalibrationResult) -> str:
-    """Return how well the poses agree, in one sentence; empty where a sensor measured once."""
+    """Return how well the poses agree, in one sentence; empty where a statement says why not."""
     if result.rms_mm is None:
+        if result.repeatable_to_mm is None and measured_axes(result):
+            return ""
         if result.method == "one-touch":
             return tr("One touch cannot be checked.")
         if result.method == "two-pose":
@@ -44,12 +58,12 @@ def _order(result: CalibrationResult) -> str:
     return order_in_words(order) if order is not None else ""
 
 
-def _interval(result: CalibrationResult) -> str:
-    """Return the 95 % interval of each measured component; empty when nothing tells it."""
+def _each_axis(result: CalibrationResult) -> str:
+    """Return the 95 % interval of each measured component alone; empty when nothing tells it."""
     if not result.half_width95:
         return ""
     parts = (
-        f"{name[0].upper()} +-{half:.3f}"
+        f"{name[0].upper()} +-{stated_mm(half)}"
         for name, half in zip(result.measured, result.half_width95, strict=True)
     )
     if result.interval_from == "resolution":
@@ -59,38 +73,8 @@ def _interval(result: CalibrationResult) -> str:
     else:
         basis = tr("from how well they agree")
     return tr(
-        "sure to (95 %, each axis alone): {parts}, {basis}", parts="  ".join(parts), basis=basis
+        "each axis alone repeatable to: {parts}, {basis}", parts="  ".join(parts), basis=basis
     )
-
-
-def _region(result: CalibrationResult) -> str:
-    """Return in which distance the tip lies, its lengths together; empty when nothing tells it."""
-    names = [name[0].upper() for name in result.measured if name.endswith("_mm")]
-    if result.region95_radius_mm is None or len(names) < 2:
-        return ""
-    return tr(
-        "sure to (95 %, {names} together): {radius:.3f} mm",
-        radius=result.region95_radius_mm,
-        names=", ".join(names),
-    )
-
-
-def _parts(result: CalibrationResult) -> str:
-    """Return type A, type B and both together; empty without a budget."""
-    budget = result.budget
-    if budget is None:
-        return ""
-    told = tr(
-        "sure to (about 68 %): from these touches {a:.3f} mm, from what else is known {b:.3f} "
-        "mm, together {c:.3f} mm",
-        a=budget.type_a_mm,
-        b=budget.type_b_mm,
-        c=budget.u_c_mm,
-    )
-    if not budget.not_assessed:
-        return told
-    left_out = tr("; not assessed: {names}", names=", ".join(budget.not_assessed))
-    return told + left_out
 
 
 def _ways(result: CalibrationResult) -> str:
@@ -177,3 +161,17 @@ def show_residuals(result: CalibrationResult) -> None:
     angles = (f"{name[0].upper()} deg" for name in names)
     columns = (tr("pose"), *angles, "dX mm", "dY mm", "dZ mm", tr("distance mm"), "")
     table(tr("How well it fits"), columns, rows)
+
+
+def show_accuracy_rows(accuracy: Accuracy) -> None:
+    """Show what makes up the statement of accuracy, a row each, the largest first."""
+    columns = (tr("part"), tr("half width"), tr("told by"), tr("share %"))
+    rows = [
+        [row.title, f"+-{row.half_width}" if row.half_width else "", row.basis, _share(row)]
+        for row in rows_in_words(accuracy)
+    ]
+    table(tr("What it is accurate to, part by part"), columns, rows)
+
+
+def _share(row: RowInWords) -> str:
+    return f"{row.share_percent:.0f}"

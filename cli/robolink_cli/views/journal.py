@@ -1,6 +1,7 @@
 """What the journal's commands show: payloads, and the tables made from them."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict
 from typing import Final
 
@@ -32,6 +33,10 @@ _PLAIN: Final = (
     *("tolerance", "verdict"),
 )
 _LISTS: Final = ("poses", "drifts", "tools")
+_IN_STATEMENTS: Final = (
+    *("repeatable_to_mm", "accurate_to_mm", "accuracy", "budget", "seating", "judgement"),
+)
+"""What sentences and a table say already."""
 
 _UNITS: Final = {
     "_mm_s": "mm/s",
@@ -127,14 +132,54 @@ def show_entry(entry: Recorded) -> None:
     for name, value in shown.items():
         if value != "":
             say(f"  {name}: {value}")
+    said_first = _statements(entry)
+    for sentence in said_first:
+        say(f"  {sentence}")
+    told = _IN_STATEMENTS if said_first else ()
     for name, value in with_method_name_now(entry.details).items():
-        if name not in (*_VALUES, *_LISTS):
+        if name not in (*_VALUES, *_LISTS, *told):
             for row, said in detail_rows(name, value):
                 say(f"  {row}: {said}")
     _show_values(entry)
+    _show_accuracy(entry.details.get("accuracy"))
     _show_poses(entry.details.get("poses"))
     _show_drifts(entry.details.get("drifts"))
     say()
+
+
+def _statements(entry: Recorded) -> list[str]:
+    """Return what a measurement is repeatable and accurate to; nothing of another entry."""
+    if entry.kind not in (EntryKind.CALIBRATION, EntryKind.VERIFY):
+        return []
+    from robolink.calibration import (
+        TurnJudgement,
+        seating_sentence,
+        statement_sentences,
+        turn_test_sentences,
+    )
+    from robolink.report import recorded_fit
+
+    details = with_method_name_now(entry.details)
+    try:
+        if entry.kind is EntryKind.VERIFY:
+            judged = details.get("judgement")
+            return list(turn_test_sentences(TurnJudgement.from_json(judged) if judged else None))
+        said = list(statement_sentences(recorded_fit(details)))
+        seating = details.get("seating")
+        if said and seating:
+            said.append(seating_sentence(seating["within_mm"], seating["changes"]))
+    except (ConfigError, LookupError, TypeError, ValueError):
+        return []  # a damaged entry is shown as it is
+    return said
+
+
+def _show_accuracy(found: object) -> None:
+    from robolink.calibration import Accuracy
+    from robolink_cli.views.fit import show_accuracy_rows
+
+    with suppress(LookupError, TypeError, ValueError):
+        if isinstance(found, Mapping):
+            show_accuracy_rows(Accuracy.from_json(found))
 
 
 def detail_rows(name: str, value: object) -> Iterator[tuple[str, str]]:

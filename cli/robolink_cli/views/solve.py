@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from robolink.calibration import CalibrationResult
+from robolink.calibration import Accuracy, CalibrationResult, rows_in_words, stated_mm
 from robolink.messages import declared, spoken, tr
 from robolink_cli.console.render import say
 
@@ -67,13 +67,8 @@ def show_case(document: Mapping[str, object]) -> None:
 
 
 def _show_quality(document: Mapping[str, object]) -> None:
-    intervals = document.get("interval95")
-    if isinstance(intervals, dict) and intervals:
-        for name, (low, high) in intervals.items():
-            say(tr("  95 %, alone: {name} {low:.4f} to {high:.4f}", name=name, low=low, high=high))
-        _show_parts(document)
-    elif "interval95" in document:
-        say(tr("  no interval: nothing tells how large the errors are; state sigma_mm"))
+    if "interval95" in document:
+        _show_statements(document)
     if document.get("rms_residual") is not None:
         say(
             tr(
@@ -91,23 +86,42 @@ def _show_quality(document: Mapping[str, object]) -> None:
         say(tr("  not measured: {names}", names=_words(document["unobservable"])))
 
 
-def _show_parts(document: Mapping[str, object]) -> None:
-    """Print what the interval rests on, the region of all lengths, and the parts of the budget."""
-    if document.get("region95_radius_mm") is not None:
-        say(
-            tr(
-                "  95 %, all lengths together: within {radius:.4f} mm",
-                radius=document["region95_radius_mm"],
+def _show_statements(document: Mapping[str, object]) -> None:
+    """Print what the case is repeatable to and accurate to, together and each component alone."""
+    repeatable, accurate = document.get("repeatable_to_mm"), document.get("accurate_to_mm")
+    if isinstance(repeatable, float):
+        say(tr("  repeatable to +-{mm} mm (95 %)", mm=stated_mm(repeatable, 4)))
+    else:
+        say(tr("  repeatable: not known; nothing tells how large the errors are, state sigma_mm"))
+    if isinstance(accurate, float):
+        say(tr("  accurate to +-{mm} mm (95 %)", mm=stated_mm(accurate, 4)))
+    intervals = document["interval95"]
+    if isinstance(intervals, dict):
+        for name, (low, high) in intervals.items():
+            say(
+                tr(
+                    "  repeatable alone, 95 %: {name} {middle:.4f} +-{half}",
+                    name=name,
+                    middle=(low + high) / 2,
+                    half=stated_mm((high - low) / 2, 4),
+                )
             )
-        )
-    budget = document.get("budget")
-    if isinstance(budget, dict):
+    _show_rows(document.get("accuracy"))
+
+
+def _show_rows(accuracy: object) -> None:
+    """Print what makes up the statement of accuracy; nothing where there is none."""
+    if not isinstance(accuracy, dict):
+        return
+    for row in rows_in_words(Accuracy.from_json(accuracy)):
+        half = f" +-{row.half_width}" if row.half_width else ""
         say(
             tr(
-                "  standard uncertainty: type A {a:.4f} mm, type B {b:.4f} mm, combined {c:.4f} mm",
-                a=budget["type_a_mm"],
-                b=budget["type_b_mm"],
-                c=budget["u_c_mm"],
+                "  part {title}{half}: {basis}, {share:.0f} %",
+                title=row.title,
+                half=half,
+                basis=row.basis,
+                share=row.share_percent,
             )
         )
 
@@ -149,7 +163,7 @@ _SHOWN = (
     ("nu_eff", declared("effective degrees of freedom")),
     ("coverage_factor", declared("coverage factor")),
     ("expanded_mm", declared("expanded uncertainty mm")),
-    ("not_assessed", declared("not assessed")),
+    ("not_assessed", declared("not stated")),
     ("plain_ls_offset", declared("offset without rejecting, mm")),
     ("mm_per_px_matrix", declared("mm per pixel")),
     ("camera_origin", declared("camera origin mm")),

@@ -22,6 +22,7 @@ from robolink.calibration.core.accuracy import (
 from robolink.calibration.core.budget import BudgetRow, UncertaintyBudget
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.statistics import NORMAL_95, chi_square_quantile
+from robolink.calibration.quality.statements import SCATTER, basis_words
 from robolink.calibration.quality.station_part import StationPart, scatter_covariance, with_station
 from robolink.messages import spoken, tr
 
@@ -29,9 +30,6 @@ if TYPE_CHECKING:
     from robolink.calibration.core.robust import Floats
 
 ResultT = TypeVar("ResultT", bound=CalibrationResult)
-
-SCATTER: Final = "scatter"
-"""Key of the row that the measurement shows by itself."""
 
 _PERSON_MM: Final = 0.03
 _PROBE_MM: Final = 0.005
@@ -172,7 +170,7 @@ def _parts(sources: Sequence[ErrorSource], facts: AccuracyFacts) -> Iterator[_Pa
         half_width = fact.half_width + fact.growth
         covariance = row_covariance(source, half_width)
         name = spoken(ACCURACY_ROWS[source.row].title)
-        part = StationPart(name, covariance.tolist(), origin=fact.told or _in_words(fact.basis))
+        part = StationPart(name, covariance.tolist(), origin=fact.told or basis_words(fact.basis))
         yield _Part(part, source, half_width, fact.basis, fact.told)
 
 
@@ -188,14 +186,6 @@ def row_covariance(source: ErrorSource, half_width: float) -> "Floats":
     gain = np.array(source.gain)
     covariance: Floats = gain @ gain.T * (half_width * half_width / 3)
     return covariance
-
-
-def _in_words(basis: str) -> str:
-    return {
-        "stated": tr("stated for this cell"),
-        "record": tr("record of the cell"),
-        "default": tr("default, not measured in this cell"),
-    }[basis]
 
 
 def _scattering(result: ResultT, sigma_mm: float, lengths: int) -> ResultT:

@@ -67,7 +67,7 @@ _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
     ),
     "ways_askew": lambda: tr(
         "The two moves are further from a right angle than the touches explain: the "
-        "orientation is less sure than its +- says."
+        "orientation is less accurate than its +- says."
     ),
     "full_calibration_due": lambda: tr(
         "A full calibration is due: the errors of the needle changes since the last "
@@ -109,6 +109,9 @@ _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
     "drift_undecided": lambda: tr(
         "The turn test is too near to its limit to call it passed or failed; take more touches."
     ),
+    "not_judged": lambda: tr(
+        "A limit is set, but nothing tells how large the errors are, so it cannot be judged."
+    ),
     "gauge_marginal": lambda: tr(
         "The measurement repeats only just well enough for the tolerance."
     ),
@@ -120,7 +123,7 @@ _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
         "from the smallest step it shows."
     ),
     "height_not_assessed": lambda: tr(
-        "The flange leans, so an error of the tool's Z reaches X and Y. How sure Z is "
+        "The flange leans, so an error of the tool's Z reaches X and Y. How accurate Z is "
         "was not given, so the +- leaves it out."
     ),
     "order_not_testable": lambda: tr(

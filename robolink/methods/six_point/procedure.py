@@ -18,6 +18,7 @@ from robolink.calibration import (
     require_unturned,
     rotation_of,
     solve_six_point,
+    stated_mm,
 )
 from robolink.errors import CalibrationError
 from robolink.messages import joined, tr
@@ -297,5 +298,5 @@ def _uncertainty(result: SixPointResult) -> str:
     if "ways_askew" in result.warnings:
         doubted = tr("The touches explain less than that: a move was not quite along its axis.")
         return joined(" ", (said, doubted))
-    known = tr("U, V and W are sure to +-{half:.3f} degrees.", half=half_deg)
+    known = tr("U, V and W: repeatable to +-{half} degrees (95 %).", half=stated_mm(half_deg))
     return joined(" ", (said, known))

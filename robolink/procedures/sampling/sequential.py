@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from robolink.calibration import MOST_RESIDUAL_MM, CalibrationResult
+from robolink.calibration import MOST_RESIDUAL_MM, CalibrationResult, stated_mm
 from robolink.errors import CalibrationError
 from robolink.messages import joined, tr
 from robolink.procedures.sampling.sampler import (
@@ -165,7 +165,9 @@ def worst_of(result: CalibrationResult, times: Mapping[int, int]) -> int:
 def agreement(
     method: Sampler[PlaceT, TakenT, ResultT], fit: CalibrationResult, *, last: int
 ) -> str:
-    """Return how well those agree that were taken so far, and how sure the tip is, as a sentence.
+    """Return how well those agree that were taken so far, and what the tip is repeatable to.
+
+    What it is accurate to is judged once, when it was measured.
 
     Args:
         method: How they are named.
@@ -192,19 +194,15 @@ def agreement(
         rms=fit.rms_mm,
         last=fit.residual_distances_mm[last],
     )
-    half_mm, region_mm = fit.half95_mm, fit.region95_radius_mm
-    if half_mm is None:
+    within_mm = fit.repeatable_to_mm
+    if within_mm is None:
         return agree
-    if region_mm is None or region_mm <= half_mm:
-        sure = tr("{known}: sure to +-{half:.3f} mm (95 %).", known=method.known, half=half_mm)
-    else:
-        sure = tr(
-            "{known}: each sure to +-{half:.3f} mm (95 %), together within {region:.3f} mm.",
-            known=method.known,
-            half=half_mm,
-            region=region_mm,
-        )
-    return joined(" ", (agree, sure))
+    repeatable = tr(
+        "{known}: repeatable to +-{within} mm (95 %).",
+        known=method.known,
+        within=stated_mm(within_mm),
+    )
+    return joined(" ", (agree, repeatable))
 
 
 def fit_subject(
@@ -227,7 +225,11 @@ def fit_subject(
         for number, (one, off) in enumerate(zip(taken, fit.residuals_mm, strict=True), start=1)
     )
     return FitSubject(
-        rows, fit.rms_mm, half95_mm=fit.half95_mm, worst=worst, limit_mm=MOST_RESIDUAL_MM
+        rows,
+        fit.rms_mm,
+        repeatable_mm=fit.repeatable_to_mm,
+        worst=worst,
+        limit_mm=MOST_RESIDUAL_MM,
     )
 
 
@@ -242,9 +244,9 @@ class SamplingPolicy:
     """How a measurement with many touches or crossings goes on.
 
     Attributes:
-        until_mm: End early when the tip is known within this, in 95 %, as a limit of the process
-            judges it: :attr:`~robolink.calibration.CalibrationResult.repeatable_to_mm`. ``None``
-            for taking all.
+        until_mm: End early when the tip is repeatable to this, in 95 %
+            (:attr:`~robolink.calibration.CalibrationResult.repeatable_to_mm`): further touches
+            make nothing else smaller. ``None`` for taking all.
         retake: Offer to take the one again that fits worst.
     """
 
@@ -263,8 +265,8 @@ def sample_sequentially(
 ) -> Procedure[ResultT]:
     """Take all after the first, and return what they say. Ends lifted.
 
-    As soon as they check each other it tells after each how well they agree, how sure the tip is,
-    and how sure one more would make it.
+    As soon as they check each other it tells after each how well they agree, what the tip is
+    repeatable to, and what one more would make of that.
 
     Args:
         method: What is done at each place.
@@ -323,7 +325,7 @@ def sample_sequentially(
 
 
 def may_end_early(count: int, *, unknowns: int, sigma_stated: bool) -> bool:
-    """Tell whether a measurement of ``count`` coordinates can be sure enough before the last one.
+    """Tell whether a measurement of ``count`` coordinates can be good enough before the last one.
 
     Args:
         count: How many coordinates are measured.
@@ -356,14 +358,15 @@ def _progress(
     """Return what those so far say."""
     told = agreement(method, fit, last=len(taken) - 1)
     shown = fit_subject(method, fit, taken)
-    if following is None or fit.half95_mm is None:
+    within_mm = fit.repeatable_to_mm
+    if following is None or within_mm is None:
         return Notify(told, fit=shown)
     better = method.gain([*taken, following]) / method.gain(taken)
-    next_mm = fit.half95_mm * better
+    next_mm = within_mm * better
     gain = tr(
-        "One more at {where} would make it about +-{next:.3f} mm.",
+        "One more at {where} would make it about +-{next} mm.",
         where=method.named(following),
-        next=next_mm,
+        next=stated_mm(next_mm),
     )
     told = joined(" ", (told, gain))
     return Notify(told, fit=replace(shown, next_mm=next_mm))

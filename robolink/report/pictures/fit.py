@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from typing import Final
 from xml.etree.ElementTree import Element
 
-from robolink.calibration import CalibrationResult
+from robolink.calibration import CalibrationResult, stated_mm
 from robolink.messages import tr
 from robolink.report._markup import element
 from robolink.report.pictures.panel import Drawing, PlotPanel, dot_names
@@ -72,8 +72,8 @@ def _residuals(result: CalibrationResult) -> Drawing:
 def _interval(result: CalibrationResult, axes: Axes) -> Drawing:
     """Draw the intervals about the measured tip, in the axes of the flange."""
     halves = [result.half_width95[result.measured.index(name)] for name in ("x_mm", "y_mm")]
-    radius_mm = result.region95_radius_mm
-    panel = PlotPanel(max(*halves, radius_mm or 0.0, _LOWEST_MM) * 1.25)
+    radius_mm, within_mm = result.region95_radius_mm, result.accurate_to_mm
+    panel = PlotPanel(max(*halves, radius_mm or 0.0, within_mm or 0.0, _LOWEST_MM) * 1.25)
     middle = panel.at(0, 0)
     long_mm, short_mm, turn_deg = axes
     shape: list[Element] = [
@@ -82,16 +82,19 @@ def _interval(result: CalibrationResult, axes: Axes) -> Drawing:
         )
     ]
     said = tr(
-        "Tip on the flange: X \u00b1 {x:.4f} mm, Y \u00b1 {y:.4f} mm, "
-        "each 95 % for its axis alone.",
-        x=halves[0],
-        y=halves[1],
+        "Repeatable: X \u00b1 {x} mm, Y \u00b1 {y} mm, each 95 % for its axis alone (ellipse).",
+        x=stated_mm(halves[0], 4),
+        y=stated_mm(halves[1], 4),
     )
     if radius_mm is not None:
         shape.append(circle(middle, round(radius_mm * panel.per_mm, 2), class_="rms"))
         said += " " + tr(
-            "The outer circle, radius {radius:.4f} mm, holds the whole tip, 95 %.",
-            radius=radius_mm,
+            "Both axes together, 95 %: circle, radius {radius} mm.", radius=stated_mm(radius_mm, 4)
+        )
+    if within_mm is not None:
+        shape.append(circle(middle, round(within_mm * panel.per_mm, 2), class_="accurate"))
+        said += " " + tr(
+            "Accurate, 95 %: dashed circle, radius {radius} mm.", radius=stated_mm(within_mm, 4)
         )
     dot = element("g", circle(middle, 2.4), class_="point")
-    return panel.drawn(tr("95 % interval of the tip on the flange"), said, *shape, dot)
+    return panel.drawn(tr("Tip on the flange: repeatable and accurate"), said, *shape, dot)

@@ -1,47 +1,64 @@
-"""How uncertain the result is: the interval, what it rests on, and the budget."""
+"""What the result is repeatable to and accurate to, what that rests on, and the budget."""
 
 import math
+from typing import Final
 
-from robolink.calibration import CalibrationResult, doubt_sentence
+from robolink.calibration import (
+    CalibrationResult,
+    doubt_sentence,
+    seating_sentence,
+    statement_sentences,
+)
 from robolink.messages import tr
 from robolink.model import Pose
+from robolink.report._values import Report
+
+SIGN: Final = "\u00b1 "
+
+
+def statements(report: Report) -> tuple[str, ...]:
+    """Return what the result is repeatable and accurate to, what brings most, and the seating."""
+    fit, seating = report.fit, report.seating
+    if fit is None:
+        return ()
+    said = tuple(statement_sentences(fit, SIGN))
+    if seating is None or not said:
+        return said
+    return (*said, seating_sentence(seating["within_mm"], seating["changes"], SIGN))
 
 
 def interval_sentences(fit: CalibrationResult) -> tuple[str, ...]:
-    """Return which interval it is, what it rests on, or why there is none."""
+    """Return what the statement of repeatability rests on; notes alone where there is none."""
+    notes = tuple(map(doubt_sentence, fit.notes))
     if not fit.half_width95:
-        return (tr("How sure it is cannot be said: too few touches."),)
+        return notes
     said = [_what_it_rests_on(fit)]
-    lengths = [name[0].upper() for name in fit.measured if name.endswith("_mm")]
-    if len(lengths) > 1:
-        said.append(tr("Each interval holds for its axis alone."))
-    if fit.region95_radius_mm is not None:
+    if sum(name.endswith("_mm") for name in fit.measured) > 1:
         said.append(
             tr(
-                "All together: the tip lies within {radius:.3f} mm of ({axes}), 95 %.",
-                radius=fit.region95_radius_mm,
-                axes=", ".join(lengths),
+                "Each interval of the table holds for its axis alone, the statements for all axes "
+                "together."
             )
         )
-    return (*said, *map(doubt_sentence, fit.notes))
+    return (*said, *notes)
 
 
 def _what_it_rests_on(fit: CalibrationResult) -> str:
     if fit.interval_from == "resolution" and fit.sigma_mm is not None:
         return tr(
-            "The interval rests on the step of the jogs, {step:g} mm.",
+            "Repeatability rests on the step of the jogs, {step:g} mm.",
             step=fit.sigma_mm * math.sqrt(12),
         )
     from_residuals = fit.interval_from == "residuals"
     if fit.sigma_stated and fit.sigma_mm is not None and not from_residuals:
         return tr(
-            "The interval rests on a stated standard deviation of {sigma:g} mm of one placement.",
+            "Repeatability rests on a stated standard deviation of {sigma:g} mm of one placement.",
             sigma=fit.sigma_mm,
         )
     if fit.dof is None:
-        return tr("The interval comes from how well the poses agree.")
+        return tr("Repeatability comes from how well the poses agree.")
     return tr(
-        "The interval comes from how well the poses agree (Student's t, degrees of freedom: "
+        "Repeatability comes from how well the poses agree (Student's t, degrees of freedom: "
         "{dof}).",
         dof=fit.dof,
     )

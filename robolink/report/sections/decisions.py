@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from robolink.calibration import GUARD_FACTOR, DriftVerdict, VerifyResult
+from robolink.calibration import GUARD_FACTOR, DriftVerdict, VerifyResult, turn_test_sentences
 from robolink.messages import tr
 from robolink.report._values import Outcome, Report
 
@@ -18,6 +18,7 @@ class Proof:
         rule: By which rule it was decided, one sentence.
         guarded: Whether a guard band was taken off the tolerance.
         heights: Whether the drift has a height.
+        said: What it says about both statements of the measurement, in sentences.
     """
 
     result: VerifyResult
@@ -25,6 +26,7 @@ class Proof:
     rule: str
     guarded: bool
     heights: bool
+    said: tuple[str, ...] = ()
 
 
 def proof(report: Report) -> Proof | None:
@@ -39,6 +41,7 @@ def proof(report: Report) -> Proof | None:
         rule=_rule(guarded=guarded),
         guarded=guarded,
         heights=any(drift.dz_mm for drift in result.drifts),
+        said=tuple(turn_test_sentences(result.judgement, report.fit)),
     )
 
 
@@ -61,6 +64,12 @@ def was_not_proved(report: Report) -> bool:
     return report.verification is None and report.outcome in (Outcome.WRITTEN, Outcome.SKIPPED)
 
 
+def turn_test_doubted(report: Report) -> bool:
+    """Tell whether a value was kept although its turn test does not fit what was measured."""
+    judgement = None if report.verification is None else report.verification.judgement
+    return report.outcome is Outcome.VERIFIED and judgement is not None and not judgement.good
+
+
 def limits_rule(report: Report) -> str:
     """Return by which rule the limits were judged, empty where nothing was."""
     if not report.judgements:
@@ -74,7 +83,9 @@ def limits_rule(report: Report) -> str:
 def conformity(report: Report) -> Iterator[str]:
     """Yield what may be stated of the tool now, in sentences."""
     result = report.verification
-    if report.outcome is Outcome.VERIFIED and result is not None:
+    if turn_test_doubted(report):
+        yield tr("Conformity is not stated: the turn test leaves a doubt.")
+    elif report.outcome is Outcome.VERIFIED and result is not None:
         yield tr(
             "The tool conforms: when it turned, its tip stayed within {limit:g} mm by the decision "
             "rule below.",

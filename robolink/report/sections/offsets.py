@@ -21,7 +21,8 @@ class OffsetComponent:
         before: What is or was stored.
         after: What is proposed or written.
         change: By how much they differ.
-        half95: Half its 95 % interval.
+        half95: What it is repeatable to alone, half its 95 % interval.
+        accurate95: What it is accurate to alone, likewise.
     """
 
     axis: str
@@ -29,6 +30,7 @@ class OffsetComponent:
     after: float | None
     change: float | None
     half95: float | None
+    accurate95: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,8 +51,13 @@ class OffsetTables:
 
     @property
     def intervals(self) -> bool:
-        """Whether any of them has one."""
+        """Whether any of them is known to be repeatable to something."""
         return any(one.half95 is not None for one in self.own)
+
+    @property
+    def accurate(self) -> bool:
+        """Whether any of them is known to be accurate to something."""
+        return any(one.accurate95 is not None for one in self.own)
 
 
 def offsets(report: Report) -> OffsetTables | None:
@@ -75,8 +82,14 @@ def _components(report: Report) -> Iterator[OffsetComponent]:
     after = [None] * 6 if report.after is None else report.after.components()
     fit = report.fit
     halves = {} if fit is None else dict(zip(fit.measured, fit.half_width95, strict=False))
+    accuracy = None if fit is None else fit.accuracy
+    wider = (
+        {}
+        if fit is None or accuracy is None
+        else dict(zip(fit.measured, accuracy.half_width95, strict=False))
+    )
     for name, axis, old, new in zip(NAMES, AXES, before, after, strict=True):
         change = None
         if old is not None and new is not None:
             change = angle_difference_deg(new, old) if name.endswith("deg") else new - old
-        yield OffsetComponent(axis, old, new, change, halves.get(name))
+        yield OffsetComponent(axis, old, new, change, halves.get(name), wider.get(name))

@@ -8,6 +8,7 @@ from typing import Final
 from robolink.messages import tr
 from robolink.model import ControllerFacts
 from robolink.report._values import Outcome, Record, Report
+from robolink.report.sections.decisions import turn_test_doubted
 
 _TONES: Final = {
     Outcome.SKIPPED: "still",
@@ -55,7 +56,10 @@ def heading(reports: Sequence[Report]) -> Heading:
     endings = dict.fromkeys(report.ending for report in reports if report.ending)
     record = worst.record
     suspicion = record.check if record is not None and record.problems else ""
-    return Heading(title, _verdict(worst.outcome), _TONES[worst.outcome], tuple(endings), suspicion)
+    verdict, tone = _verdict(worst.outcome), _TONES[worst.outcome]
+    if tone == "good" and any(map(turn_test_doubted, reports)):
+        verdict, tone = tr("Written and read back; the turn test leaves a doubt"), "still"
+    return Heading(title, verdict, tone, tuple(endings), suspicion)
 
 
 def facts(reports: Sequence[Report]) -> list[tuple[str, str]]:

@@ -259,11 +259,8 @@ class TurnTests:
 
 
 def _tell(tool: int, result: "VerifyResult") -> None:
-    note(
-        tr(
-            "Turn test of tool {tool}: {drift:.3f} mm off, limit {limit:.3f} mm.",
-            tool=tool,
-            drift=result.max_drift_mm,
-            limit=result.tolerance_mm,
-        )
-    )
+    from robolink.calibration import turn_test_headline, turn_test_sentences  # numpy, late
+
+    note(tr("Tool {tool}: {said}", tool=tool, said=turn_test_headline(result)))
+    for sentence in turn_test_sentences(result.judgement):
+        note(sentence)

@@ -2,6 +2,12 @@
 
 from collections.abc import Iterator
 
+from robolink.calibration import (
+    largest_row_sentence,
+    statement_line,
+    turn_test_headline,
+    turn_test_sentences,
+)
 from robolink.errors import DeclinedError, OutcomeUnknownError, RobolinkError
 from robolink.messages import joined, tr
 from robolink.model import describe_offset, describe_standing
@@ -11,7 +17,7 @@ from robolink_cli.wizard.check_list import CheckSubject
 from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.happenings import WizardCommand
 from robolink_cli.wizard.screens.layout import Screen
-from robolink_cli.wizard.screens.rows import mm, title_row
+from robolink_cli.wizard.screens.rows import title_row
 from robolink_cli.wizard.screens.touching import touch_title
 from robolink_cli.wizard.state import LastScreen, WizardState
 
@@ -42,23 +48,27 @@ def _tool_lines(report: ToolReport, needle: str) -> list[str]:
     if report.receipt is None:
         return [tr("Tool {t} is measured. Nothing was written.", t=proposal.tool)]
     value = describe_offset(proposal.offset)
-    if proof is not None and needle:
+    tested = proof is not None and (proof.judgement is None or proof.judgement.good)
+    if proof is None:
+        said = tr("Tool {t} is measured and written, not tested.", t=proposal.tool)
+    elif not tested:
+        said = tr(
+            "Tool {t} is measured and written; its turn test leaves a doubt.", t=proposal.tool
+        )
+    elif needle:
         said = tr(
             "Needle {id} on tool {t} is measured, written and tested.", id=needle, t=proposal.tool
         )
-    elif proof is None:
-        said = tr("Tool {t} is measured and written, not tested.", t=proposal.tool)
     else:
         said = tr("Tool {t} is measured, written and tested.", t=proposal.tool)
     lines = [said, tr("On the controller: tool {t} = {value}", t=proposal.tool, value=value)]
+    line, accuracy = statement_line(proposal.result), proposal.result.accuracy
+    lines += [line] if line else []
+    if line and accuracy is not None:
+        lines.append(largest_row_sentence(accuracy))
     if proof is not None:
-        lines.append(
-            tr(
-                "Turn test: {mm} mm off at most (limit {limit} mm)",
-                mm=mm(proof.max_drift_mm),
-                limit=mm(proof.tolerance_mm),
-            )
-        )
+        lines.append(turn_test_headline(proof))
+        lines += turn_test_sentences(proof.judgement, proposal.result)
     return lines
 
 

@@ -3,6 +3,7 @@
 import math
 from typing import Final
 
+from robolink.calibration import stated_mm
 from robolink.messages import tr
 from robolink.runner import FitRow, FitSubject
 from robolink_cli.console.columns import padded
@@ -51,10 +52,10 @@ def fit_lines(fit: FitSubject) -> list[str]:
     lines.append("")
     if fit.rms_mm is not None:
         lines.append(tr("The {n} touches agree within {r} mm.", n=len(away), r=mm(fit.rms_mm)))
-    if fit.half95_mm is not None:
-        lines.append(tr("X and Y are sure to +-{h} mm (95 %).", h=mm(fit.half95_mm)))
+    if fit.repeatable_mm is not None:
+        lines.append(tr("Repeatable to +-{h} mm (95 %).", h=stated_mm(fit.repeatable_mm)))
     if fit.next_mm is not None:
-        lines.append(tr("One more touch would make it about +-{h} mm.", h=mm(fit.next_mm)))
+        lines.append(tr("One more touch would make it about +-{h} mm.", h=stated_mm(fit.next_mm)))
     if worst_first(fit) and fit.worst is not None:
         lines.append(
             tr(

@@ -154,19 +154,26 @@ def _table(proposal: Proposal, *, short: bool) -> list[str]:
         ]
         shown = [tr("stays") if float(one) == 0.0 else one for one in changes]
         lines.append(padded(" " + tr("change"), _HEAD) + row_of(shown))
-    intervals = proposal.result.interval95
-    if intervals and not short:
-        halves = [_half(intervals.get(name)) for name in ("x_mm", "y_mm", "z_mm")]
-        lines.append(padded(" " + tr("sure to (95 %)"), _HEAD) + row_of(halves))
     if proposal.change_mm is not None and not short:
         tip = math.dist((old or new).components()[:3], new.components()[:3])
         lines += ["", tr("The tip moves {d} mm.", d=mm(tip))]
+    if not short:
+        lines += stated_lines(proposal)
+    return lines
+
+
+def stated_lines(proposal: Proposal) -> list[str]:
+    """Return what the new values are repeatable and accurate to, and what brings most."""
+    from robolink.calibration import largest_row_sentence, statement_line
+
+    line, accuracy = statement_line(proposal.result), proposal.result.accuracy
+    lines = [line] if line else []
+    if line and accuracy is not None:
+        lines.append(largest_row_sentence(accuracy))
+    if line and proposal.seating is not None:
+        lines.append(proposal.seating.sentence)
     return lines
 
 
 def _four(offset: ToolOffset) -> tuple[str, ...]:
     return tuple(mm(value) for value in offset.components()[:4])
-
-
-def _half(interval: tuple[float, float] | None) -> str:
-    return "" if interval is None else mm((interval[1] - interval[0]) / 2)

@@ -37,10 +37,10 @@ def length_change(node: Node) -> Payload:
     if undecided:
         payload |= {
             "what": tr(
-                "The tip is {longer:+.3f} mm longer (+-{half:.3f}), and nobody decided what is "
+                "The tip is {longer:+.3f} mm longer (+-{half}), and nobody decided what is "
                 "written.",
                 longer=found.longer_mm,
-                half=found.half95_mm,
+                half=cal.stated_mm(found.half95_mm),
             ),
             "remedy": tr("Decide: difference, keep, or measure."),
         }

@@ -1,0 +1,263 @@
+"""The two statements of a result, in words: what it is repeatable to, and what it is accurate to.
+
+Every face says them in these sentences. The word for what scatter and grid tell alone is
+"repeatable"; "accurate" is said only where every row of the budget is counted
+(docs/reference/evidence.md 19).
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+from robolink.calibration.core.accuracy import ACCURACY_ROWS, Accuracy, AssessedRow
+from robolink.messages import joined, spoken, tr
+
+if TYPE_CHECKING:
+    from robolink.calibration.core.result import CalibrationResult
+
+SCATTER: Final = "scatter"
+"""Key of the row that the measurement shows by itself."""
+
+_DIGITS: Final = 3
+
+
+def stated_mm(half_width: float, digits: int = _DIGITS) -> str:
+    """Return a half width as every face shows it: never as 0, because nothing is known that well.
+
+    What is less than half of the last digit is shown as one of it.
+
+    Args:
+        half_width: Half of an interval, mm or degrees.
+        digits: Decimals.
+
+    Example:
+        >>> from robolink.calibration import stated_mm
+        >>> stated_mm(0.0236), stated_mm(0.0002), stated_mm(0.0)
+        ('0.024', '0.001', '0.001')
+    """
+    return f"{max(abs(half_width), 10.0**-digits):.{digits}f}"
+
+
+def measured_axes(result: "CalibrationResult") -> str:
+    """Return the names of the measured lengths: ``X, Y``; empty where no length was measured."""
+    return ", ".join(name[0].upper() for name in result.measured if name.endswith("_mm"))
+
+
+def repeatable_sentence(result: "CalibrationResult", sign: str = "+-") -> str:
+    """Return what a result is repeatable to, or why that is not known; empty without a length.
+
+    Args:
+        result: What was measured.
+        sign: What stands before a half width; a page has ``±``.
+
+    Example:
+        >>> from robolink import Pose
+        >>> from robolink.calibration import repeatable_sentence, solve_two_pose
+        >>> touches = Pose(298, 99, -60, 0), Pose(322, 91, -60, 180)
+        >>> repeatable_sentence(solve_two_pose(*touches, sigma_mm=0.02))
+        'X, Y: repeatable to +-0.035 mm (95 %).'
+        >>> repeatable_sentence(solve_two_pose(*touches))
+        'Repeatable: not known (two touches cannot check each other).'
+    """
+    axes, within_mm = measured_axes(result), result.repeatable_to_mm
+    if not axes:
+        return ""
+    if within_mm is not None:
+        return tr(
+            "{axes}: repeatable to {sign}{mm} mm (95 %).",
+            axes=axes,
+            sign=sign,
+            mm=stated_mm(within_mm),
+        )
+    if result.method == "one-touch":
+        return tr("Repeatable: not known (one touch cannot be checked).")
+    if result.method == "two-pose":
+        return tr("Repeatable: not known (two touches cannot check each other).")
+    return tr("Repeatable: not known (nothing is left over that could check it).")
+
+
+def accurate_sentence(result: "CalibrationResult", sign: str = "+-") -> str:
+    """Return what a result is accurate to; empty without a length.
+
+    Args:
+        result: What was measured; :func:`~robolink.calibration.assessed` has judged it.
+        sign: What stands before a half width; a page has ``±``.
+
+    Example:
+        >>> from robolink import Pose
+        >>> from robolink.calibration import AccuracyFacts, accurate_sentence, assessed
+        >>> from robolink.calibration import solve_two_pose
+        >>> touches = Pose(298, 99, -60, 0), Pose(322, 91, -60, 180)
+        >>> found = assessed(solve_two_pose(*touches, sigma_mm=0.02), AccuracyFacts())
+        >>> accurate_sentence(found)
+        'X, Y: accurate to +-0.079 mm (95 %).'
+    """
+    axes = measured_axes(result)
+    if not axes:
+        return ""
+    if result.accuracy is None:
+        return tr("Accurate: not known (its possible errors are not on record).")
+    return tr(
+        "{axes}: accurate to {sign}{mm} mm (95 %).",
+        axes=axes,
+        sign=sign,
+        mm=stated_mm(result.accuracy.within_mm),
+    )
+
+
+def largest_row_sentence(accuracy: Accuracy, sign: str = "+-") -> str:
+    """Return which row brings most, how large it is, and what tells that.
+
+    Args:
+        accuracy: What a result is accurate to.
+        sign: What stands before a half width; a page has ``±``.
+
+    Example:
+        >>> from robolink import Pose
+        >>> from robolink.calibration import AccuracyFacts, assessed, largest_row_sentence
+        >>> from robolink.calibration import solve_two_pose
+        >>> touches = Pose(298, 99, -60, 0), Pose(322, 91, -60, 180)
+        >>> found = assessed(solve_two_pose(*touches, sigma_mm=0.02), AccuracyFacts())
+        >>> largest_row_sentence(found.accuracy)
+        'Largest part: how a person sees contact, +-0.05 mm (default, not measured in this cell).'
+    """
+    row = accuracy.largest
+    facts = {"row": row_title(row), "sign": sign, "basis": basis_in_words(row)}
+    if row.half_width is None:
+        if not row.basis:
+            return tr("Largest part: {row}.", row=facts["row"])
+        return tr("Largest part: {row} ({basis}).", **facts)
+    return tr("Largest part: {row}, {sign}{half} ({basis}).", half=half_width_of(row), **facts)
+
+
+def statement_sentences(result: "CalibrationResult", sign: str = "+-") -> Iterator[str]:
+    """Yield both statements and the largest row, a sentence each; nothing without a length.
+
+    Args:
+        result: What was measured.
+        sign: What stands before a half width; a page has ``±``.
+
+    Example:
+        >>> from robolink import Pose
+        >>> from robolink.calibration import AccuracyFacts, assessed, solve_two_pose
+        >>> from robolink.calibration import statement_sentences
+        >>> touches = Pose(298, 99, -60, 0), Pose(322, 91, -60, 180)
+        >>> found = assessed(solve_two_pose(*touches), AccuracyFacts())
+        >>> for sentence in statement_sentences(found):
+        ...     print(sentence)
+        Repeatable: not known (two touches cannot check each other).
+        X, Y: accurate to +-0.088 mm (95 %).
+        Largest part: how a person sees contact, +-0.05 mm (default, not measured in this cell).
+    """
+    for sentence in (repeatable_sentence(result, sign), accurate_sentence(result, sign)):
+        if sentence:
+            yield sentence
+    if measured_axes(result) and result.accuracy is not None:
+        yield largest_row_sentence(result.accuracy, sign)
+
+
+def statement_line(result: "CalibrationResult") -> str:
+    """Return both statements in one line, for a screen that has little room; empty without one."""
+    within_mm, accuracy = result.repeatable_to_mm, result.accuracy
+    if not measured_axes(result):
+        return ""
+    if within_mm is None or accuracy is None:
+        return joined(" ", filter(None, (repeatable_sentence(result), accurate_sentence(result))))
+    return tr(
+        "{axes}: repeatable to +-{r} mm, accurate to +-{u} mm (95 %).",
+        axes=measured_axes(result),
+        r=stated_mm(within_mm),
+        u=stated_mm(accuracy.within_mm),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class RowInWords:
+    """One row of what a result is accurate to, as a table shows it.
+
+    Attributes:
+        title: What it is.
+        half_width: Half its width with its unit; empty for the scatter.
+        basis: What tells how large it is.
+        u_mm: What it brings to the length that is known worst, as a standard uncertainty.
+        share_percent: Its share of the variance of that length.
+    """
+
+    title: str
+    half_width: str
+    basis: str
+    u_mm: float
+    share_percent: float
+
+
+def rows_in_words(accuracy: Accuracy) -> tuple[RowInWords, ...]:
+    """Return the rows of a result's accuracy, the largest first."""
+    whole = sum(row.u_mm**2 for row in accuracy.rows)
+    return tuple(
+        RowInWords(
+            row_title(row),
+            half_width_of(row),
+            basis_in_words(row),
+            row.u_mm,
+            100 * row.u_mm**2 / whole if whole > 0 else 0.0,
+        )
+        for row in accuracy.rows
+    )
+
+
+def row_title(row: AssessedRow) -> str:
+    """Return what a row is, in the language of the day; as it was recorded where it is unknown."""
+    if row.key == SCATTER:
+        return tr("how well it repeats")
+    known = ACCURACY_ROWS.get(row.key)
+    return row.title if known is None else spoken(known.title)
+
+
+def half_width_of(row: AssessedRow) -> str:
+    """Return half the width of a row with its unit, empty for the scatter."""
+    if row.half_width is None:
+        return ""
+    unit = {"deg": tr("degrees"), "percent": "%"}.get(row.unit, row.unit)
+    return f"{row.half_width:.3g} {unit}"
+
+
+def basis_in_words(row: AssessedRow) -> str:
+    """Return what tells how large a row is, and where it does."""
+    if row.key == SCATTER and not row.basis:
+        return tr("this measurement")
+    words = basis_words(row.basis)
+    return f"{words}: {row.told}" if row.told else words
+
+
+def basis_words(basis: str) -> str:
+    """Return what ``stated``, ``record`` or ``default`` means, in words."""
+    return {
+        "stated": tr("stated for this cell"),
+        "record": tr("record of the cell"),
+        "default": tr("default, not measured in this cell"),
+    }.get(basis, basis)
+
+
+def seating_sentence(within_mm: float | None, changes: int | None, sign: str = "+-") -> str:
+    """Return how far off the tip may be after the next mounting; no part of the accuracy.
+
+    Args:
+        within_mm: In which distance it lies then, in 95 %; ``None`` where the record is too short.
+        changes: How many changes tell it.
+        sign: What stands before a half width; a page has ``±``.
+
+    Example:
+        >>> from robolink.calibration import seating_sentence
+        >>> seating_sentence(0.13, 12)
+        'Seating: mounted anew, the tip lies within +-0.130 mm of here (95 %, 12 changes).'
+        >>> seating_sentence(None, None)
+        'Seating: not known (too few nozzle changes on record).'
+    """
+    if within_mm is None:
+        return tr("Seating: not known (too few nozzle changes on record).")
+    return tr(
+        "Seating: mounted anew, the tip lies within {sign}{mm} mm of here (95 %, {count} changes).",
+        sign=sign,
+        mm=stated_mm(within_mm),
+        count=changes,
+    )

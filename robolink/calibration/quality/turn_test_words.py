@@ -1,0 +1,122 @@
+"""What a turn test says about both statements of a measurement, in sentences.
+
+A drift beyond what the measurement lets expect has a few usual causes, which depend on what was
+measured with: a touch, beams, a camera. The rows of the budget tell that
+(docs/reference/evidence.md 20).
+"""
+
+from collections.abc import Iterator
+
+from robolink.calibration.core.accuracy import Accuracy
+from robolink.calibration.core.result import CalibrationResult, DriftVerdict, VerifyResult
+from robolink.calibration.core.turn_claim import TurnJudgement
+from robolink.calibration.quality.statements import stated_mm
+from robolink.messages import tr
+
+
+def turn_test_headline(result: VerifyResult) -> str:
+    """Return how a turn test ended, in one sentence with its figure and its limit.
+
+    A test that contradicts what a result says, or that turned too little, is never called passed.
+    """
+    found = {"drift": result.max_drift_mm, "limit": result.tolerance_mm}
+    judgement = result.judgement
+    if result.verdict is DriftVerdict.UNDECIDED:
+        return tr("Turn test not decided: {drift:.3f} mm off, limit {limit:.3f} mm.", **found)
+    if result.codes or result.verdict is DriftVerdict.FAILED:
+        return tr("Turn test failed: {drift:.3f} mm off, limit {limit:.3f} mm.", **found)
+    if judgement is not None and judgement.contradicts_accuracy:
+        return tr(
+            "Turn test contradicts the measurement: {drift:.3f} mm off at most, limit "
+            "{limit:.3f} mm.",
+            **found,
+        )
+    if result.heights_only:
+        return tr("Touched again: {drift:.3f} mm off at most, limit {limit:.3f} mm.", **found)
+    if judgement is not None and judgement.contradicts_repeatability:
+        return tr(
+            "Turn test within its limit, with a doubt: {drift:.3f} mm off at most, limit "
+            "{limit:.3f} mm.",
+            **found,
+        )
+    if judgement is not None and judgement.small_angle:
+        return tr(
+            "Tested at a small angle: {drift:.3f} mm off at most, limit {limit:.3f} mm.", **found
+        )
+    return tr("Turn test passed: {drift:.3f} mm off at most, limit {limit:.3f} mm.", **found)
+
+
+def turn_test_sentences(
+    judgement: TurnJudgement | None, measured: CalibrationResult | None = None
+) -> Iterator[str]:
+    """Yield what the drifts say about both statements, what may be the cause, and what would tell.
+
+    Args:
+        judgement: What the drifts were held to; ``None`` where they were held to the limit of the
+            process alone, of which nothing is said here.
+        measured: The measurement; its rows tell with what it was made. Without it the causes are
+            named for all of them.
+
+    Example:
+        >>> from robolink.calibration import DriftLimits, TurnJudgement, turn_test_sentences
+        >>> limits = DriftLimits(repeatable_mm=0.016, accurate_mm=0.09, turn_deg=180.0)
+        >>> for sentence in turn_test_sentences(TurnJudgement("", (limits,))):
+        ...     print(sentence)
+        Both statements stand: up to 0.016 mm is explained by scatter alone.
+        >>> doubtful = TurnJudgement("proof_contradicts_repeatability", (limits,))
+        >>> for sentence in turn_test_sentences(doubtful):
+        ...     print(sentence)
+        Scatter alone explains 0.016 mm, no more: it does not repeat as stated.
+        Possible causes: the nozzle is loose, or what it was measured at has moved.
+        To find out: check the mount, then measure again.
+    """
+    if judgement is None:
+        return
+    limit = judgement.limits[judgement.worst]
+    if judgement.contradicts_accuracy:
+        yield tr(
+            "All that is stated explains {mm} mm, no more: the tip is not where it was measured.",
+            mm=stated_mm(limit.accurate_mm),
+        )
+    elif judgement.contradicts_repeatability:
+        yield tr(
+            "Scatter alone explains {mm} mm, no more: it does not repeat as stated.",
+            mm=stated_mm(limit.repeatable_mm),
+        )
+    elif not judgement.small_angle:
+        yield tr(
+            "Both statements stand: up to {mm} mm is explained by scatter alone.",
+            mm=stated_mm(limit.repeatable_mm),
+        )
+    if judgement.code:
+        yield from _causes(None if measured is None else measured.accuracy)
+    if judgement.small_angle:
+        yield tr(
+            "The tool was turned by {turn:.0f} degrees; less than 90 is not called tested.",
+            turn=max(one.turn_deg for one in judgement.limits),
+        )
+
+
+def _causes(accuracy: Accuracy | None) -> Iterator[str]:
+    """Yield what may have happened, by what was measured with, and the step that would tell."""
+    rows = set() if accuracy is None else {row.key for row in accuracy.rows}
+    if "tip_image_px" in rows or "camera_turn_deg" in rows:
+        yield tr("Possible causes: the camera was turned or moved, or the nozzle is loose.")
+        yield tr("To find out: check the mount, then measure the camera again.")
+    elif "plate_mm" in rows:
+        yield tr("Possible causes: the surface was moved, or the nozzle is loose.")
+        yield tr("To find out: check the mount, then touch once more.")
+    elif "touch_mm" in rows and "place_mm" not in rows:
+        yield tr("Possible causes: the pin was bumped in between, or the nozzle is loose.")
+        yield tr("To find out: check mount and pin, then touch once more.")
+    elif "touch_mm" in rows:
+        yield tr("Possible causes: the pin was moved since it was learnt, or the nozzle is loose.")
+        yield tr("To find out: check the mount, then learn the station again.")
+    elif "place_mm" in rows:
+        yield tr(
+            "Possible causes: the sensor was moved since it was learnt, or the nozzle is loose."
+        )
+        yield tr("To find out: check the mount, then learn the station again.")
+    else:
+        yield tr("Possible causes: the nozzle is loose, or what it was measured at has moved.")
+        yield tr("To find out: check the mount, then measure again.")

@@ -210,14 +210,14 @@ PLANS = [
 The four of the shaft, made before the tool turns, have no number."""
 
 
-def test_each_crossing_that_others_check_tells_how_it_fits_and_how_sure_the_tip_is():
+def test_each_crossing_that_others_check_tells_how_it_fits_and_what_it_repeats_to():
     cell = IdealCell(TIP, noise_mm=0.003)
     cell.run(measure_beams(STATION, BeamsParameters(), here=HERE, stored=STORED))
     assert [text.partition(" agree")[0] for text in cell.told] == [
         f"{count} crossings" for count in (5, 6, 7, 8)
     ]
     assert all("the last is 0.00" in text for text in cell.told)
-    assert all("X and Y: each sure to +-0.0" in text for text in cell.told)
+    assert all("X and Y: repeatable to +-0.0" in text for text in cell.told)
     assert "One more at beam 2 would make it about +-0.0" in cell.told[0]
     assert "One more" not in cell.told[-1]
     assert cell.offers == []
@@ -227,7 +227,7 @@ def test_where_the_beams_are_is_not_relied_on_before_the_tool_has_turned():
     cell = IdealCell(TIP, noise_mm=0.003)
     cell.run(measure_beams(STATION, BeamsParameters(turn_deg=180.0), here=HERE, stored=STORED))
     assert [int(text.split()[0]) for text in cell.told] == [5, 6, 7, 8, *range(11, 17)]
-    assert ["sure to" in text for text in cell.told] == [False] * 4 + [True] * 6
+    assert ["repeatable to" in text for text in cell.told] == [False] * 4 + [True] * 6
     assert "One more at beam 2 and U -60.0" in cell.told[4]
 
 
@@ -360,7 +360,7 @@ def test_each_touch_tells_how_it_fits_and_the_worst_alone_is_made_again():
     assert [text.partition(" agree")[0] for text in cell.told] == [
         f"{count} touches" for count in (3, 4, 5, 6, 6)
     ]
-    assert " Z: each sure to +-" in cell.told[0]
+    assert " Z: repeatable to +-" in cell.told[0]
     half, following = map(float, re.findall(r"\+-(\d\.\d+)", cell.told[0]))
     assert "One more at 1 mm/s would make it about" in cell.told[0]
     assert following == pytest.approx(0.745 * half, rel=0.01)

@@ -120,7 +120,7 @@ def test_a_way_that_cannot_be_used_is_said_at_once_and_shown_again(shows, what, 
     (told,) = [text for text in guide.told if what in text and remedy in text]
     assert told
     assert result.offset.components() == pytest.approx(TOOL.components(), abs=1e-6)
-    assert any("U, V and W are sure to" in text for text in guide.told)
+    assert any("U, V and W: repeatable to" in text for text in guide.told)
 
 
 @pytest.mark.parametrize(

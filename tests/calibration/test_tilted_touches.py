@@ -62,11 +62,11 @@ def test_it_tilts_in_the_air_only_in_small_steps_and_never_far_from_above_the_pi
     assert tip_mm(there)[2] == pytest.approx(PIN[2] + PLAN.lift_mm, abs=0.1)
 
 
-def test_it_tells_how_sure_all_three_lengths_are_and_ends_when_that_is_enough():
+def test_it_tells_what_three_lengths_are_repeatable_to_and_ends_when_that_is_enough():
     person = Person()
     result = course(person, count=12, until_mm=0.1)
     assert person.told[0].startswith("3 touches agree within")
-    assert "X, Y and Z: each sure to" in person.told[0]
+    assert "X, Y and Z: repeatable to" in person.told[0]
     assert "One more at U" in person.told[0]
     assert "touches were taken" in person.told[-1]
     assert 4 <= len(result.inputs) < 12

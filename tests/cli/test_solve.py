@@ -97,7 +97,7 @@ def test_a_person_reads_lines(tmp_path, capsys):
     shown = capsys.readouterr().out
     assert "two_pose: ok" in shown
     assert "offset mm: 12.500  -3.250" in shown
-    assert "95 %, alone: x_mm 12.4723 to 12.5277" in shown
+    assert "repeatable alone, 95 %: x_mm 12.5000 +-0.0277" in shown
     assert "type B 0.0141 mm" in shown
     assert "not measured: z_mm" in shown
 

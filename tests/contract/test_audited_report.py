@@ -41,6 +41,8 @@ def test_machine_gauge_people_times_budget_touches_and_rule_stand_on_the_page(ce
     assert datetime.fromisoformat(tool["local_time"]).utcoffset() is not None
     assert tool["budget"]["u_c_mm"] > 0
     assert tool["region95_radius_mm"] > max(tool["half_width95"].values())
+    assert tool["repeatable_to_mm"] == tool["region95_radius_mm"] < tool["accurate_to_mm"]
+    assert tool["accuracy"]["largest_row"] == "touch_mm"
     assert tool["verification"]["passed"]
     assert any(tool["machine"].values())
     text = text_of(page)
@@ -49,13 +51,15 @@ def test_machine_gauge_people_times_budget_touches_and_rule_stand_on_the_page(ce
         "time (UTC)",
         "local time",
         "done by",
-        "Measured before after change 95 % interval X mm",
+        "Measured before after change repeatable to, 95 % accurate to, 95 % X mm",
         "Kept, not measured",
-        "Each interval holds for its axis alone.",
-        "All together: the tip lies within",
+        "Each interval of the table holds for its axis alone",
+        "X, Y: repeatable to ± 0.0",
+        "X, Y: accurate to ± 0.0",
+        "Largest part: how a person sees contact, ± 0.05 mm (default, not measured)",
+        "Seating: not known",
         "degrees of freedom",
         "combined",
-        "not assessed",
         "Test for a step: F",
         "How the touches were made",
         "1 brought by the person",
@@ -63,4 +67,5 @@ def test_machine_gauge_people_times_budget_touches_and_rule_stand_on_the_page(ce
         "The tool conforms",
     ):
         assert words in text
+    assert "not assessed" not in text
     assert text.count("undecided") == 1  # in the rule alone

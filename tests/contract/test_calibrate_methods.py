@@ -131,7 +131,7 @@ def test_a_sensor_measures_at_its_station_and_nobody_is_asked(cell, method, stat
     assert "Nobody touches anything" in done.err
     what, known = ("crossings", "X and Y") if method == "beams" else ("touches", "Z")
     assert f" {what} agree within 0.0" in done.err
-    assert f" {known}: sure to +-0.0" in done.err or f" {known}: each sure to +-0.0" in done.err
+    assert f" {known}: repeatable to +-0.0" in done.err
     assert "One more at " in done.err
     proof = "Touched again:" if method == "z-touch" else "Turn test passed:"
     assert proof in done.err

@@ -81,7 +81,6 @@ PLACES = {
     12: ("Touch", "off by"),
     14: ("now", "new", "change", "to the right", "to the left", "up", "down"),
     13: ("Flange now", "Tip now", "Since arrival", "Since start", "Lowest", "Highest", "Contact"),
-    17: ("sure to (95 %)",),
     6: ("OK", "TO DO", "YOU"),
     4: ("LOOK",),
     10: ("stays", "motors on", "motors OFF", "power LOW", "power HIGH"),

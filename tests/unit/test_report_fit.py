@@ -69,7 +69,7 @@ def test_two_touches_have_no_ellipse_and_the_page_says_why():
     result = solve_two_pose(*touches(0, 180))
     assert interval_ellipse(result) is None
     assert drawn(fit_drawings(result)) == ""
-    assert "How sure it is cannot be said" in render(report(result))
+    assert "Repeatable: not known (two touches cannot check each other)." in render(report(result))
 
 
 def test_a_stated_sigma_gives_two_touches_an_ellipse():
@@ -106,4 +106,4 @@ def test_heights_have_no_picture_from_above_and_need_none():
     result = solve_z_touch(touches, -86.0, stored=TIP)
     assert result.residuals_mm
     assert drawn(fit_drawings(result)) == drawn(pose_drawings(result)) == ""
-    assert "95 % interval" in render(report(result))
+    assert "repeatable to, 95 %" in render(report(result))

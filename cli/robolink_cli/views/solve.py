@@ -88,8 +88,8 @@ def _show_quality(document: Mapping[str, object]) -> None:
 
 def _show_statements(document: Mapping[str, object]) -> None:
     """Print what the case is repeatable to and accurate to, together and each component alone."""
-    repeatable, accurate = document.get("repeatable_to_mm"), document.get("accurate_to_mm")
-    if isinstance(repeatable, float):
+    repeatable, accurate = _repeatable_to_mm(document), document.get("accurate_to_mm")
+    if repeatable is not None:
         say(tr("  repeatable to +-{mm} mm (95 %)", mm=stated_mm(repeatable, 4)))
     else:
         say(tr("  repeatable: not known; nothing tells how large the errors are, state sigma_mm"))
@@ -107,6 +107,26 @@ def _show_statements(document: Mapping[str, object]) -> None:
                 )
             )
     _show_rows(document.get("accuracy"))
+    budget = document.get("budget")
+    if isinstance(budget, dict):
+        say(
+            tr(
+                "  standard uncertainty: type A {a:.4f} mm, type B {b:.4f} mm, combined {c:.4f} mm",
+                a=budget["type_a_mm"],
+                b=budget["type_b_mm"],
+                c=budget["u_c_mm"],
+            )
+        )
+
+
+def _repeatable_to_mm(document: Mapping[str, object]) -> float | None:
+    """Return what a case is repeatable to: the region of its lengths, else the worst of them."""
+    told = document.get("repeatable_to_mm", document.get("region95_radius_mm"))
+    intervals = document["interval95"]
+    if isinstance(told, float) or not isinstance(intervals, dict):
+        return told if isinstance(told, float) else None
+    halves = [(high - low) / 2 for name, (low, high) in intervals.items() if name.endswith("_mm")]
+    return max(halves, default=None)
 
 
 def _show_rows(accuracy: object) -> None:

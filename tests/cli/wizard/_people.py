@@ -18,10 +18,10 @@ from robolink_cli.wizard.happenings import (
 )
 from robolink_cli.wizard.state import Header, WizardState
 
-from robolink.calibration import solve_two_pose
+from robolink.calibration import AccuracyFacts, assessed, solve_two_pose
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
-from robolink.nozzle_change import LimitVerdict, Proposal, WriteSubject
+from robolink.nozzle_change import LimitVerdict, Proposal, Seating, WriteSubject
 from robolink.runner import FitRow, FitSubject, JogSubject, Question, TouchSubject
 
 ARRIVAL = Pose(249.992, 200.004, -81.563, 90.0, tool=0)
@@ -45,14 +45,14 @@ def fit_subject(*off_mm, worst=None):
         )
         for number, off in enumerate(off_mm, start=1)
     )
-    return FitSubject(rows, 0.066, half95_mm=0.074, next_mm=0.063, worst=worst, limit_mm=0.15)
+    return FitSubject(rows, 0.066, repeatable_mm=0.074, next_mm=0.063, worst=worst, limit_mm=0.15)
 
 
 def write_subject(*tools):
     first, second = Pose(250.0, 200.0, -83.0, 0.0), Pose(274.6, 192.5, -83.0, 180.0)
     old = ToolOffset(11.998, -3.502, -20.0)
-    result = solve_two_pose(first, second, stored=old)
-    proposals = tuple(Proposal(tool, old, result) for tool in tools)
+    result = assessed(solve_two_pose(first, second, stored=old, sigma_mm=0.02), AccuracyFacts())
+    proposals = tuple(Proposal(tool, old, result, seating=Seating()) for tool in tools)
     verdict = LimitVerdict("implausible_change", tr("Change of the tip"), 0.391, 2.0)
     return WriteSubject(proposals, ((verdict,),) * len(tools))
 

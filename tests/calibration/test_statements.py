@@ -1,0 +1,198 @@
+"""The two statements in words, and what a turn test says about them."""
+
+import math
+import re
+from dataclasses import replace
+
+import pytest
+
+from robolink.calibration import (
+    Accuracy,
+    AccuracyFacts,
+    Drift,
+    DriftLimits,
+    RowFact,
+    TurnJudgement,
+    VerifyResult,
+    assessed,
+    basis_words,
+    doubt_sentence,
+    held_to_claim,
+    rows_in_words,
+    seating_sentence,
+    solve_n_angle,
+    solve_one_touch,
+    solve_two_pose,
+    stated_mm,
+    statement_line,
+    statement_sentences,
+    turn_claim,
+    turn_test_headline,
+    turn_test_sentences,
+)
+from robolink.model import Pose, ToolOffset
+
+TOUCHES = Pose(298, 99, -60, 0), Pose(322, 91, -60, 180)
+STATED = AccuracyFacts(rows={"touch_mm": RowFact(0.01, "stated", told="cell file")})
+LIMITS = DriftLimits(repeatable_mm=0.016, accurate_mm=0.087, turn_deg=180.0)
+
+
+def two(facts=None, **more):
+    return assessed(solve_two_pose(*TOUCHES, **more), facts or AccuracyFacts())
+
+
+@pytest.mark.parametrize("value", [0.0, 1e-9, 0.0004, 0.00049999, -0.0])
+@pytest.mark.parametrize("digits", [2, 3, 4])
+def test_nothing_is_ever_known_to_zero(value, digits):
+    shown = stated_mm(value, digits)
+    assert float(shown) > 0
+    assert len(shown.partition(".")[2]) == digits
+
+
+def test_exact_touches_state_no_interval_of_zero():
+    tip = ToolOffset(12.0, -3.5, -20.0)
+    poses = []
+    for angle in (0, 90, 180, 270):
+        a = math.radians(angle)
+        x = 200 - math.cos(a) * tip.x_mm + math.sin(a) * tip.y_mm
+        y = 300 - math.sin(a) * tip.x_mm - math.cos(a) * tip.y_mm
+        poses.append(Pose(x, y, -80.0, angle))
+    found = assessed(solve_n_angle(poses), STATED)
+    said = " ".join((*statement_sentences(found), statement_line(found)))
+    assert "repeatable to +-0.0" in said
+    assert not re.search(r"\+-0\.0+ ", said)
+
+
+def test_what_cannot_be_checked_is_said_with_its_reason_and_has_a_default_for_scatter():
+    repeatable, accurate, largest = statement_sentences(two())
+    assert repeatable == "Repeatable: not known (two touches cannot check each other)."
+    assert accurate == "X, Y: accurate to +-0.088 mm (95 %)."
+    assert "how a person sees contact, +-0.05 mm (default, not measured)" in largest
+    scatter = next(row for row in rows_in_words(two().accuracy) if not row.half_width)
+    assert scatter.basis == basis_words("default")
+    alone = solve_one_touch(TOUCHES[0], (310, 95), stored=ToolOffset(12, -4, -20))
+    assert "one touch cannot be checked" in next(iter(statement_sentences(alone)))
+
+
+def test_what_nobody_held_to_a_cell_has_no_statement_of_accuracy():
+    said = list(statement_sentences(solve_two_pose(*TOUCHES, sigma_mm=0.02)))
+    assert said[0] == "X, Y: repeatable to +-0.035 mm (95 %)."
+    assert said[1] == "Accurate: not known (its possible errors are not on record)."
+    assert len(said) == 2
+
+
+def test_the_largest_row_says_what_tells_it():
+    stated = list(statement_sentences(two(STATED)))[-1]
+    assert "how a person sees contact, +-0.01 mm (stated for this cell: cell file)" in stated
+    own = list(statement_sentences(two(STATED, sigma_mm=0.02)))[-1]
+    assert own == "Largest part: how well it repeats (this measurement)."
+
+
+def test_the_rows_share_the_whole_and_outlive_a_record():
+    found = two(sigma_mm=0.02)
+    again = Accuracy.from_json(found.accuracy.as_json(found.measured))
+    assert again == found.accuracy
+    rows = rows_in_words(again)
+    assert sum(row.share_percent for row in rows) == pytest.approx(100)
+    assert [row.u_mm for row in rows] == sorted((row.u_mm for row in rows), reverse=True)
+
+
+def test_a_row_of_another_version_keeps_the_title_it_was_recorded_with():
+    found = two(sigma_mm=0.02).accuracy
+    rows = tuple(replace(row, key="later_mm", title="a later row") for row in found.rows[:1])
+    assert rows_in_words(replace(found, rows=rows))[0].title == "a later row"
+
+
+def judged(code="", *, small=False):
+    return TurnJudgement(code, (LIMITS,), small_angle=small)
+
+
+@pytest.mark.parametrize(
+    ("judgement", "headline", "said"),
+    [
+        (None, "Turn test passed: 0.012", None),
+        (judged(), "Turn test passed: 0.012", "Both statements stand"),
+        (
+            judged("proof_contradicts_repeatability"),
+            "Turn test within its limit, with a doubt: 0.012",
+            "Scatter alone explains 0.016 mm, no more",
+        ),
+        (
+            judged("proof_contradicts_accuracy"),
+            "Turn test contradicts the measurement: 0.012",
+            "All that is stated explains 0.087 mm, no more",
+        ),
+        (judged(small=True), "Tested at a small angle: 0.012", "less than 90"),
+    ],
+)
+def test_a_turn_test_is_called_passed_only_where_both_statements_stand(judgement, headline, said):
+    proof = VerifyResult((Drift(180.0, 0.012, 0.0),), 0.2, judgement=judgement)
+    assert turn_test_headline(proof).startswith(headline)
+    sentences = list(turn_test_sentences(judgement))
+    assert sentences == [] if said is None else said in sentences[0]
+    if judgement is not None:
+        assert TurnJudgement.from_json(judgement.as_json()) == judgement
+
+
+def test_a_failed_or_undecided_test_is_called_so_whatever_the_statements_say():
+    failed = VerifyResult((Drift(180.0, 0.3, 0.0),), 0.2, judgement=judged())
+    assert turn_test_headline(failed).startswith("Turn test failed")
+    near = VerifyResult((Drift(180.0, 0.19, 0.0, u_mm=0.02),), 0.2, judgement=judged())
+    assert turn_test_headline(near).startswith("Turn test not decided")
+
+
+def test_the_cause_that_is_named_depends_on_what_was_measured_with():
+    beams, camera, pin, known_pin = (
+        _with_rows(rows)
+        for rows in (
+            ["place_mm"],
+            ["place_mm", "tip_image_px"],
+            ["touch_mm"],
+            ["touch_mm", "place_mm"],
+        )
+    )
+    code = judged("proof_contradicts_accuracy")
+    told = [list(turn_test_sentences(code, one)) for one in (beams, camera, pin, known_pin)]
+    for sentences, cause, step in zip(
+        told,
+        ("sensor was moved", "camera was turned", "pin was bumped", "pin was moved since"),
+        ("learn the station again", "measure the camera", "touch once more", "learn the station"),
+        strict=True,
+    ):
+        assert cause in sentences[1], sentences
+        assert "nozzle is loose" in sentences[1]
+        assert step in sentences[2]
+
+
+def _with_rows(keys):
+    found = two(sigma_mm=0.02)
+    row = found.accuracy.rows[0]
+    accuracy = replace(found.accuracy, rows=tuple(replace(row, key=key) for key in keys))
+    return replace(found, accuracy=accuracy)
+
+
+def test_the_words_follow_the_judgement_of_a_real_claim():
+    found = two(STATED, sigma_mm=0.005)
+    claim = turn_claim(found, STATED)
+    proof = VerifyResult((Drift(180.0, 0.128, 0.0),), 0.2)
+    held = replace(proof, judgement=held_to_claim(claim, proof))
+    assert "passed" not in turn_test_headline(held)
+    assert any("pin was bumped" in one for one in turn_test_sentences(held.judgement, found))
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "proof_contradicts_repeatability",
+        "proof_contradicts_accuracy",
+        "tested_at_small_angle",
+        "not_judged",
+    ],
+)
+def test_each_code_has_a_sentence(code):
+    assert doubt_sentence(code) != code.replace("_", " ")
+
+
+def test_seating_is_a_line_of_its_own():
+    assert "not known" in seating_sentence(None, None)
+    assert "+-0.130 mm" in seating_sentence(0.13, 12)

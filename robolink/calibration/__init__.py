@@ -190,6 +190,7 @@ if TYPE_CHECKING:
     from robolink.calibration.quality.turn_test import LEAST_TURN_DEG as LEAST_TURN_DEG
     from robolink.calibration.quality.turn_test import held_to_claim as held_to_claim
     from robolink.calibration.quality.turn_test import turn_claim as turn_claim
+    from robolink.calibration.quality.turn_test_words import proved_statements as proved_statements
     from robolink.calibration.quality.turn_test_words import (
         turn_test_headline as turn_test_headline,
     )
@@ -308,7 +309,7 @@ __getattr__ = lazy_exports(
         "evidence.approach_bias": "with_approach_bias",
         "evidence.units": "RobotReach require_near require_stored_scale require_within_reach",
         "quality.turn_test": "LEAST_TURN_DEG held_to_claim turn_claim",
-        "quality.turn_test_words": "turn_test_headline turn_test_sentences",
+        "quality.turn_test_words": "proved_statements turn_test_headline turn_test_sentences",
         "quality.update_guard": "Correction NEEDLE_LIMIT_MM require_shrinking update_guard "
         "writes_refused_unattended",
         "quality.verify_drift": "PLACING_TOLERANCE_MM verify_drift",

@@ -72,7 +72,9 @@ def report_of_tool(
         poses=tuple(map(recorded_pose, calibration.get("poses", ()))),
         fit=None if measured is None else recorded_fit(calibration),
         attempts=tuple(_attempts(entries)),
-        verification=_verification(_last(entries, EntryKind.VERIFY)),
+        verification=_verification(
+            _last(entries, EntryKind.VERIFY), _last(entries, EntryKind.DONE)
+        ),
         judgements=judgements,
         record=record,
         local_time=str(calibration.get("local_time", "")),
@@ -180,7 +182,7 @@ def _attempts(entries: Sequence[Recorded]) -> list[Attempt]:
     ]
 
 
-def _verification(entry: Recorded | None) -> VerifyResult | None:
+def _verification(entry: Recorded | None, done: Recorded | None) -> VerifyResult | None:
     if entry is None:
         return None
     details: Mapping[str, Any] = entry.details
@@ -191,6 +193,7 @@ def _verification(entry: Recorded | None) -> VerifyResult | None:
         tuple(details["warnings"]),
         codes=tuple(details.get("codes", ())),
         judgement=TurnJudgement.from_json(said) if (said := details.get("judgement")) else None,
+        accurate_to_mm=None if done is None else done.details.get("accurate_to_mm"),
     )
 
 

@@ -18,6 +18,8 @@ from robolink.calibration import (
     basis_words,
     doubt_sentence,
     held_to_claim,
+    pin_touched,
+    proved_statements,
     rows_in_words,
     seating_sentence,
     solve_n_angle,
@@ -70,7 +72,8 @@ def test_what_cannot_be_checked_is_said_with_its_reason_and_has_a_default_for_sc
     assert "how a person sees contact, +-0.05 mm (default, not measured)" in largest
     scatter = next(row for row in rows_in_words(two().accuracy) if not row.half_width)
     assert scatter.basis == basis_words("default")
-    alone = solve_one_touch(TOUCHES[0], (310, 95), stored=ToolOffset(12, -4, -20))
+    tip = ToolOffset(12, -4, -20)
+    alone = solve_one_touch(TOUCHES[0], pin_touched(TOUCHES[1], tip), stored=tip)
     assert "one touch cannot be checked" in next(iter(statement_sentences(alone)))
 
 
@@ -82,8 +85,10 @@ def test_what_nobody_held_to_a_cell_has_no_statement_of_accuracy():
 
 
 def test_the_largest_row_says_what_tells_it():
-    stated = list(statement_sentences(two(STATED)))[-1]
+    stated = list(statement_sentences(two(STATED, sigma_mm=0.002)))[-1]
     assert "how a person sees contact, +-0.01 mm (stated for this cell: cell file)" in stated
+    default = list(statement_sentences(two(STATED)))[-1]
+    assert default == "Largest part: how well it repeats (default, not measured)."
     own = list(statement_sentences(two(STATED, sigma_mm=0.02)))[-1]
     assert own == "Largest part: how well it repeats (this measurement)."
 
@@ -111,7 +116,7 @@ def judged(code="", *, small=False):
     ("judgement", "headline", "said"),
     [
         (None, "Turn test passed: 0.012", None),
-        (judged(), "Turn test passed: 0.012", "Both statements stand"),
+        (judged(), "Turn test passed: 0.012", "It contradicts nothing that is stated"),
         (
             judged("proof_contradicts_repeatability"),
             "Turn test within its limit, with a doubt: 0.012",
@@ -162,6 +167,15 @@ def test_the_cause_that_is_named_depends_on_what_was_measured_with():
         assert cause in sentences[1], sentences
         assert "nozzle is loose" in sentences[1]
         assert step in sentences[2]
+
+
+def test_a_wider_statement_that_a_person_took_is_said_and_none_that_is_not_wider():
+    found, proof = two(sigma_mm=0.02), VerifyResult((Drift(180.0, 0.1, 0.0),), 0.2)
+    own = list(statement_sentences(found))
+    for none in (None, proof, replace(proof, accurate_to_mm=found.accurate_to_mm)):
+        assert list(proved_statements(found, none)) == own
+    _, accurate = proved_statements(found, replace(proof, accurate_to_mm=0.15))
+    assert accurate == "X, Y: accurate to +-0.150 mm (95 %), widened after the turn test."
 
 
 def _with_rows(keys):

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from robolink.calibration import (
     known_doubts,
-    statement_sentences,
+    proved_statements,
     turn_test_headline,
     turn_test_sentences,
 )
@@ -95,7 +95,7 @@ def show_report(report: ToolReport) -> None:
     say(turn_test_headline(report.verification))
     for sentence in turn_test_sentences(report.verification.judgement, report.proposal.result):
         say(f"  {sentence}")
-    for sentence in statement_sentences(report.proposal.result):
+    for sentence in proved_statements(report.proposal.result, report.verification):
         say(sentence)
 
 

@@ -128,6 +128,7 @@ def verification_payload(result: "VerifyResult | None") -> dict[str, object] | N
         "tolerance_mm": result.tolerance_mm,
         "passed": result.passed,
         "judgement": result.judgement.as_json() if result.judgement else None,
+        "accurate_to_mm": result.accurate_to_mm,
         "drifts": [
             {
                 "u_deg": drift.u_deg,

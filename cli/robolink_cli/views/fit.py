@@ -60,7 +60,7 @@ def _order(result: CalibrationResult) -> str:
 
 def _each_axis(result: CalibrationResult) -> str:
     """Return the 95 % interval of each measured component alone; empty when nothing tells it."""
-    if not result.half_width95:
+    if len(result.half_width95) < 2:
         return ""
     parts = (
         f"{name[0].upper()} +-{stated_mm(half)}"
@@ -73,7 +73,9 @@ def _each_axis(result: CalibrationResult) -> str:
     else:
         basis = tr("from how well they agree")
     return tr(
-        "each axis alone repeatable to: {parts}, {basis}", parts="  ".join(parts), basis=basis
+        "Each axis alone is repeatable to: {parts}, {basis}.",
+        parts="  ".join(parts),
+        basis=basis,
     )
 
 

@@ -124,8 +124,6 @@ def largest_row_sentence(accuracy: Accuracy, sign: str = "+-") -> str:
     row = accuracy.largest
     facts = {"row": row_title(row), "sign": sign, "basis": basis_in_words(row)}
     if row.half_width is None:
-        if not row.basis:
-            return tr("Largest part: {row}.", row=facts["row"])
         return tr("Largest part: {row} ({basis}).", **facts)
     return tr("Largest part: {row}, {sign}{half} ({basis}).", half=half_width_of(row), **facts)
 

@@ -10,7 +10,12 @@ from collections.abc import Iterator
 from robolink.calibration.core.accuracy import Accuracy
 from robolink.calibration.core.result import CalibrationResult, DriftVerdict, VerifyResult
 from robolink.calibration.core.turn_claim import TurnJudgement
-from robolink.calibration.quality.statements import stated_mm
+from robolink.calibration.quality.statements import (
+    measured_axes,
+    repeatable_sentence,
+    stated_mm,
+    statement_sentences,
+)
 from robolink.messages import tr
 
 
@@ -62,7 +67,7 @@ def turn_test_sentences(
         >>> limits = DriftLimits(repeatable_mm=0.016, accurate_mm=0.09, turn_deg=180.0)
         >>> for sentence in turn_test_sentences(TurnJudgement("", (limits,))):
         ...     print(sentence)
-        Both statements stand: up to 0.016 mm is explained by scatter alone.
+        It contradicts nothing that is stated: scatter alone explains 0.016 mm.
         >>> doubtful = TurnJudgement("proof_contradicts_repeatability", (limits,))
         >>> for sentence in turn_test_sentences(doubtful):
         ...     print(sentence)
@@ -85,7 +90,7 @@ def turn_test_sentences(
         )
     elif not judgement.small_angle:
         yield tr(
-            "Both statements stand: up to {mm} mm is explained by scatter alone.",
+            "It contradicts nothing that is stated: scatter alone explains {mm} mm.",
             mm=stated_mm(limit.repeatable_mm),
         )
     if judgement.code:
@@ -95,6 +100,43 @@ def turn_test_sentences(
             "The tool was turned by {turn:.0f} degrees; less than 90 is not called tested.",
             turn=max(one.turn_deg for one in judgement.limits),
         )
+
+
+def proved_statements(
+    measured: CalibrationResult, result: VerifyResult | None, sign: str = "+-"
+) -> Iterator[str]:
+    """Yield what a tip is repeatable and accurate to after its turn test, a sentence each.
+
+    Where a person took a wider statement, it stands in place of the one that was contradicted.
+
+    Args:
+        measured: The measurement with its own statements.
+        result: The turn test; ``None`` for none.
+        sign: What stands before a half width; a page has ``\u00b1``.
+
+    Example:
+        >>> from robolink import Pose
+        >>> from robolink.calibration import AccuracyFacts, Drift, VerifyResult, assessed
+        >>> from robolink.calibration import proved_statements, solve_two_pose
+        >>> touches = Pose(298, 99, -60, 0), Pose(322, 91, -60, 180)
+        >>> found = assessed(solve_two_pose(*touches, sigma_mm=0.02), AccuracyFacts())
+        >>> widened = VerifyResult((Drift(90, 0.15, 0),), 0.2, accurate_to_mm=0.22)
+        >>> for sentence in proved_statements(found, widened):
+        ...     print(sentence)
+        X, Y: repeatable to +-0.035 mm (95 %).
+        X, Y: accurate to +-0.220 mm (95 %), widened after the turn test.
+    """
+    own_mm, now_mm = measured.accurate_to_mm, None if result is None else result.accurate_to_mm
+    if now_mm is None or (own_mm is not None and now_mm <= own_mm):
+        yield from statement_sentences(measured, sign)
+        return
+    yield repeatable_sentence(measured, sign)
+    yield tr(
+        "{axes}: accurate to {sign}{mm} mm (95 %), widened after the turn test.",
+        axes=measured_axes(measured),
+        sign=sign,
+        mm=stated_mm(now_mm),
+    )
 
 
 def _causes(accuracy: Accuracy | None) -> Iterator[str]:

@@ -6,8 +6,8 @@ from typing import Final
 from robolink.calibration import (
     CalibrationResult,
     doubt_sentence,
+    proved_statements,
     seating_sentence,
-    statement_sentences,
 )
 from robolink.messages import tr
 from robolink.model import Pose
@@ -21,7 +21,7 @@ def statements(report: Report) -> tuple[str, ...]:
     fit, seating = report.fit, report.seating
     if fit is None:
         return ()
-    said = tuple(statement_sentences(fit, SIGN))
+    said = tuple(proved_statements(fit, report.verification, SIGN))
     if seating is None or not said:
         return said
     return (*said, seating_sentence(seating["within_mm"], seating["changes"], SIGN))

@@ -3,7 +3,12 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from robolink.calibration import GUARD_FACTOR, DriftVerdict, VerifyResult, turn_test_sentences
+from robolink.calibration import (
+    GUARD_FACTOR,
+    DriftVerdict,
+    VerifyResult,
+    turn_test_sentences,
+)
 from robolink.messages import tr
 from robolink.report._values import Outcome, Report
 

@@ -24,7 +24,7 @@ from robolink_cli.wizard.state import Header, WizardState
 from wcwidth import wcswidth
 
 from robolink import messages
-from robolink.calibration import Drift, VerifyResult, impact_on
+from robolink.calibration import Drift, DriftLimits, TurnJudgement, VerifyResult, impact_on
 from robolink.errors import DeclinedError, OutcomeUnknownError
 from robolink.locale.languages import CHINESE, ENGLISH, translator
 from robolink.messages import spoken, tr
@@ -104,10 +104,21 @@ def choosing():
 
 def done():
     """A needle that was written and proved."""
+    return proved(VerifyResult((Drift(90.0, 0.006, 0.004), Drift(0.0, 0.002, 0.001)), 0.1))
+
+
+def done_doubtful():
+    """A needle whose turn test contradicts its measurement; a person took a wider statement."""
+    limits = DriftLimits(repeatable_mm=0.082, accurate_mm=0.082, turn_deg=90.0)
+    judgement = TurnJudgement("proof_contradicts_accuracy", (limits,), wider_mm=0.145)
+    shown = VerifyResult((Drift(90.0, 0.088, 0.004),), 0.1, judgement=judgement)
+    return proved(replace(shown, accurate_to_mm=0.145))
+
+
+def proved(proof):
     subject = write_subject(1)
     (proposal,), (verdicts,) = subject.proposals, subject.verdicts
     receipt = ToolReceipt(1, proposal.before, proposal.offset, proposal.offset)
-    proof = VerifyResult((Drift(90.0, 0.006, 0.004), Drift(0.0, 0.002, 0.001)), 0.1)
     tool = ToolReport(proposal, receipt, proof, verdicts)
     header = Header("line3", "Change needle", needle="N-0418")
     offers = frozenset((WizardCommand.SHOW_REPORT, WizardCommand.NEXT_TOOL))
@@ -316,6 +327,7 @@ SCREENS = {
     "text": lambda: Sitting().asked(None, Question.TEXT, "Id of the new needle?").keys(*"N-0418"),
     "working": Sitting,
     "done": done,
+    "done doubtful": done_doubtful,
     "stopped": stopped,
 }
 

@@ -3,8 +3,7 @@
 from collections.abc import Iterator
 
 from robolink.calibration import (
-    largest_row_sentence,
-    statement_line,
+    proved_statements,
     turn_test_headline,
     turn_test_sentences,
 )
@@ -62,10 +61,7 @@ def _tool_lines(report: ToolReport, needle: str) -> list[str]:
     else:
         said = tr("Tool {t} is measured, written and tested.", t=proposal.tool)
     lines = [said, tr("On the controller: tool {t} = {value}", t=proposal.tool, value=value)]
-    line, accuracy = statement_line(proposal.result), proposal.result.accuracy
-    lines += [line] if line else []
-    if line and accuracy is not None:
-        lines.append(largest_row_sentence(accuracy))
+    lines += proved_statements(proposal.result, proof)
     if proof is not None:
         lines.append(turn_test_headline(proof))
         lines += turn_test_sentences(proof.judgement, proposal.result)

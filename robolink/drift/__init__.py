@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from robolink.drift.history import KINDS as KINDS
     from robolink.drift.history import MeasuredChange as MeasuredChange
     from robolink.drift.history import measured_changes as measured_changes
+    from robolink.drift.statements import last_statements as last_statements
 else:
     __getattr__ = lazy_exports(
         __name__,
@@ -27,5 +28,6 @@ else:
             "charts": "Chart ChartPoint charts_of",
             "findings": "DriftCode DriftFinding findings_in",
             "history": "KINDS MeasuredChange measured_changes",
+            "statements": "last_statements",
         },
     )

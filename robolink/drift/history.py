@@ -27,6 +27,10 @@ class MeasuredChange:
         pin_mm: Where the pin was found with it, base, mm, by axis ``x`` and ``y``; ``None`` where
             the method does not find its pin.
         turn_test_mm: Largest distance of the proof about the new tip, ``None`` without one.
+        repeatable_to_mm: Within which the tip would be found again in 95 %; ``None`` where that is
+            not on record.
+        accurate_to_mm: Within which of the truth it lies in 95 %, by the statement that stood when
+            it was kept; ``None`` likewise.
     """
 
     number: int
@@ -38,6 +42,8 @@ class MeasuredChange:
     tip_mm: Mapping[str, float]
     pin_mm: Mapping[str, float] | None
     turn_test_mm: float | None
+    repeatable_to_mm: float | None = None
+    accurate_to_mm: float | None = None
 
 
 def measured_changes(
@@ -94,7 +100,14 @@ def _change(
         tip_mm=_tip(said, done.details),
         pin_mm=_pin(said) if finds_pin(str(said.get("method", ""))) else None,
         turn_test_mm=turn_test_mm,
+        repeatable_to_mm=_number(said, "repeatable_to_mm"),
+        accurate_to_mm=_number(done.details, "accurate_to_mm") or _number(said, "accurate_to_mm"),
     )
+
+
+def _number(said: Mapping[str, object], name: str) -> float | None:
+    value = said.get(name)
+    return float(value) if isinstance(value, (int, float)) else None
 
 
 def _tip(said: Mapping[str, object], end: Mapping[str, object]) -> dict[str, float]:

@@ -9,6 +9,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from robolink.calibration import rows_in_words, stated_mm
+from robolink.drift import last_statements
 from robolink.messages import tr
 from robolink.report._markup import drawing, plain, rounded
 from robolink.report._values import Report
@@ -68,6 +69,7 @@ def templates() -> Environment:
         "tr": tr,
         "figure": figure,
         "half": half,
+        "last_statements": last_statements,
         "rows_in_words": rows_in_words,
         "drawn": drawn,
         "drawings": drawings,
@@ -104,7 +106,7 @@ def drawings(report: Report) -> list[Drawing]:
 
 def _squares(report: Report) -> Iterator[Drawing]:
     yield from tip_drawings(report)
-    yield from fit_drawings(report.fit)
+    yield from fit_drawings(report.fit, widened_mm=report.widened_mm)
     yield from pose_drawings(report.fit)
 
 

@@ -173,3 +173,10 @@ class Report:
     touches: tuple[TouchOnRecord, ...] = ()
     evidence: Mapping[str, Any] = field(default_factory=dict)
     seating: Mapping[str, Any] | None = None
+
+    @property
+    def widened_mm(self) -> float | None:
+        """What the tip is accurate to by a wider statement that a person took, else ``None``."""
+        own_mm = None if self.fit is None else self.fit.accurate_to_mm
+        now_mm = None if self.verification is None else self.verification.accurate_to_mm
+        return None if now_mm is None or (own_mm is not None and now_mm <= own_mm) else now_mm

@@ -25,7 +25,7 @@ def run(state_folder, capsys):
     return ran
 
 
-def entries(change, *, end=EntryKind.DONE, z_from="kept", method="n_angle"):
+def entries(change, *, end=EntryKind.DONE, z_from="kept", method="n_angle", stated=None):
     """Return what a nozzle change puts on record."""
     tip = [change.tip_mm["x"], change.tip_mm["y"], change.tip_mm["z"], 0.0, 0.0, 0.0]
     place = [change.pin_mm["x"], change.pin_mm["y"]]
@@ -36,9 +36,11 @@ def entries(change, *, end=EntryKind.DONE, z_from="kept", method="n_angle"):
             "proposed": tip,
             "tip": tip,
             "reference_point_mm": place,
+            **({} if stated is None else {"repeatable_to_mm": stated[0]}),
         },
         EntryKind.VERIFY: {"max_drift_mm": change.turn_test_mm, "passed": True},
-        end: {"value": tip, "z_from": z_from},
+        end: {"value": tip, "z_from": z_from}
+        | ({} if stated is None else {"accurate_to_mm": stated[1]}),
     }
     return [
         NewEntry(kind, change=change.change, operation="o", tool=change.tool, details=details)
@@ -109,6 +111,25 @@ def test_a_slipping_mount_is_said_drawn_and_ends_with_1(run):
     (finding,) = cell["findings"]
     assert finding["code"] == "mount_shifted"
     assert finding["subject"] == [1]
+
+
+def test_the_last_change_says_what_it_is_repeatable_and_accurate_to(run, tmp_path):
+    record(course(1, 6), stated=(0.0001, 0.0644))
+    code, out, _ = run()
+    said = "Tool 1, last change: repeatable to +-0.001 mm, accurate to +-0.064 mm (95 %)."
+    assert (code, said in " ".join(out.split())) == (0, True)
+    _, out, _ = run("--json")
+    point = json.loads(out)["controllers"][0]["charts"][0]["points"][-1]
+    assert (point["repeatable_to_mm"], point["accurate_to_mm"]) == (0.0001, 0.0644)
+    page = tmp_path / "drift.html"
+    run("--page", str(page))
+    assert "accurate to ± 0.064 mm (95 %)" in page.read_text(encoding="utf-8")
+
+
+def test_a_record_without_statements_says_none(run):
+    record(course(1, 6))
+    _, out, _ = run()
+    assert "accurate" not in out
 
 
 def test_several_cells_stand_beside_each_other(run):

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from typing import Final, TypeAlias
 
+from robolink.calibration import stated_mm
 from robolink.messages import tr
 from robolink.model import Recorded, ToolOffset, angle_difference_deg, with_method_name_now
 from robolink.transaction import id_of_change
@@ -60,6 +61,10 @@ class _Side:
         said = {"kind": str(entry.kind), "tolerance": entry.tolerance, "verdict": entry.verdict}
         method = with_method_name_now(entry.details).get("method")
         said |= {"method": str(method)} if method else {}
+        for name in ("repeatable_to_mm", "accurate_to_mm"):
+            value = entry.details.get(name)
+            if isinstance(value, (int, float)):
+                said[name] = stated_mm(value)
         self.facts |= {name: value for name, value in said.items() if value}
         self.facts |= {name: value for name, value in asdict(entry.signature).items() if value}
 

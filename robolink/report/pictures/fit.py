@@ -18,15 +18,22 @@ Axes = tuple[float, float, float]
 """Half of the long and of the short axis, mm, and the angle of the long one from X, degrees."""
 
 
-def fit_drawings(result: CalibrationResult | None) -> Iterator[Drawing]:
-    """Yield the drawings of a measurement that leaves a residual or has an interval."""
+def fit_drawings(
+    result: CalibrationResult | None, *, widened_mm: float | None = None
+) -> Iterator[Drawing]:
+    """Yield the drawings of a measurement that leaves a residual or has an interval.
+
+    Args:
+        result: What was measured; ``None`` for nothing.
+        widened_mm: What it is accurate to by a wider statement that a person took later.
+    """
     if result is None:
         return
     if any(any(residual[:2]) for residual in _in_the_plane(result)):
         yield _residuals(result)
     axes = interval_ellipse(result)
     if axes is not None:
-        yield _interval(result, axes)
+        yield _interval(result, axes, widened_mm or result.accurate_to_mm)
 
 
 def interval_ellipse(result: CalibrationResult) -> Axes | None:
@@ -69,10 +76,10 @@ def _residuals(result: CalibrationResult) -> Drawing:
     return panel.drawn(tr("Residual of each pose"), said, rms, *dots, *names)
 
 
-def _interval(result: CalibrationResult, axes: Axes) -> Drawing:
-    """Draw the intervals about the measured tip, in the axes of the flange."""
+def _interval(result: CalibrationResult, axes: Axes, within_mm: float | None) -> Drawing:
+    """Draw both statements about the measured tip, in the axes of the flange."""
     halves = [result.half_width95[result.measured.index(name)] for name in ("x_mm", "y_mm")]
-    radius_mm, within_mm = result.region95_radius_mm, result.accurate_to_mm
+    radius_mm = result.region95_radius_mm
     panel = PlotPanel(max(*halves, radius_mm or 0.0, within_mm or 0.0, _LOWEST_MM) * 1.25)
     middle = panel.at(0, 0)
     long_mm, short_mm, turn_deg = axes

@@ -9,7 +9,7 @@ from robolink.calibration import (
     VerifyResult,
     turn_test_sentences,
 )
-from robolink.messages import tr
+from robolink.messages import joined, tr
 from robolink.report._values import Outcome, Report
 
 
@@ -43,10 +43,19 @@ def proof(report: Report) -> Proof | None:
     return Proof(
         result,
         undecided=result.verdict is DriftVerdict.UNDECIDED,
-        rule=_rule(guarded=guarded),
+        rule=joined(" ", filter(None, (_rule(guarded=guarded), _held_to_statements(result)))),
         guarded=guarded,
         heights=any(drift.dz_mm for drift in result.drifts),
         said=tuple(turn_test_sentences(result.judgement, report.fit)),
+    )
+
+
+def _held_to_statements(result: VerifyResult) -> str:
+    if result.judgement is None:
+        return ""
+    return tr(
+        "Each drift is also compared with what scatter alone and all parts together explain: "
+        "beyond the first it leaves a doubt, beyond the second it contradicts the measurement."
     )
 
 

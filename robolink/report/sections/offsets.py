@@ -85,7 +85,7 @@ def _components(report: Report) -> Iterator[OffsetComponent]:
     accuracy = None if fit is None else fit.accuracy
     wider = (
         {}
-        if fit is None or accuracy is None
+        if fit is None or accuracy is None or report.widened_mm is not None
         else dict(zip(fit.measured, accuracy.half_width95, strict=False))
     )
     for name, axis, old, new in zip(NAMES, AXES, before, after, strict=True):

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from robolink.drift import CellDrift, Chart, ChartPoint
+from robolink.drift import CellDrift, Chart, ChartPoint, last_statements
 from robolink.messages import tr
 from robolink.report import chart_title
 from robolink_cli.console.render import say, table
@@ -34,6 +34,8 @@ def _show_cell(cell: CellDrift, *, all_plots: bool) -> None:
     )
     columns = (tr("what"), tr("values"), tr("mean mm"), tr("last mm"), tr("limits mm"), "")
     table(title, columns, [_row(chart) for chart in cell.charts])
+    for sentence in last_statements(cell.changes):
+        say(sentence)
     for chart in cell.charts:
         if chart.limits_mm is None:
             say(
@@ -167,6 +169,8 @@ def _chart(chart: Chart) -> dict[str, object]:
                 "outside": point.outside,
                 "mean_mm": point.mean_mm,
                 "mean_outside": point.mean_outside,
+                "repeatable_to_mm": point.change.repeatable_to_mm,
+                "accurate_to_mm": point.change.accurate_to_mm,
             }
             for point in chart.points
         ],

@@ -98,7 +98,7 @@ def _tool_payload(report: Report) -> dict[str, object]:
         "after": offset_payload(report.after),
         "measured": list(report.determined),
         "repeatable_to_mm": fit.repeatable_to_mm if fit else None,
-        "accurate_to_mm": fit.accurate_to_mm if fit else None,
+        "accurate_to_mm": _accurate_to_mm(report),
         "accuracy": fit.accuracy.as_json(fit.measured) if fit and fit.accuracy else None,
         "seating": dict(report.seating) if report.seating else None,
         "half_width95": dict(zip(fit.measured, fit.half_width95, strict=False)) if fit else {},
@@ -108,3 +108,10 @@ def _tool_payload(report: Report) -> dict[str, object]:
         "warnings": list(fit.warnings) if fit else [],
         "verification": verification_payload(proof) if proof else None,
     }
+
+
+def _accurate_to_mm(report: Report) -> float | None:
+    """Return what the tip is accurate to by the statement that stands, a wider one included."""
+    fit, proof = report.fit, report.verification
+    told = (None if fit is None else fit.accurate_to_mm, proof and proof.accurate_to_mm)
+    return max((mm for mm in told if mm is not None), default=None)

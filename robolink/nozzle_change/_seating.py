@@ -1,4 +1,4 @@
-"""How nozzles sit, how well touches repeat, how sure a tool is: from what a cell has on record."""
+"""How nozzles sit, how well touches repeat and a tool is known: from what a cell has on record."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence

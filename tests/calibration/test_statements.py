@@ -88,9 +88,9 @@ def test_the_largest_row_says_what_tells_it():
     stated = list(statement_sentences(two(STATED, sigma_mm=0.002)))[-1]
     assert "how a person sees contact, +-0.01 mm (stated for this cell: cell file)" in stated
     default = list(statement_sentences(two(STATED)))[-1]
-    assert default == "Largest part: how well it repeats (default, not measured)."
+    assert default == "Largest row: how well it repeats (default, not measured)."
     own = list(statement_sentences(two(STATED, sigma_mm=0.02)))[-1]
-    assert own == "Largest part: how well it repeats (this measurement)."
+    assert own == "Largest row: how well it repeats (this measurement)."
 
 
 def test_the_rows_share_the_whole_and_outlive_a_record():

@@ -80,7 +80,7 @@ def test_an_entry_says_both_statements_its_rows_and_the_seating(shown):
     for said in (
         "Repeatable: not known (two touches cannot check each other).",
         "X, Y: accurate to +-0.088 mm (95 %).",
-        "Largest part: how a person sees contact, +-0.05 mm (default, not measured).",
+        "Largest row: how a person sees contact, +-0.05 mm (default, not measured).",
         "Seating: mounted anew, the tip lies within +-0.130 mm of here (95 %, 12 changes).",
         "how a person sees contact +-0.05 mm default, not measured",
     ):

@@ -55,7 +55,7 @@ _CELL: Final = {
     "people": (f"{COMPUTER}.config:people", declared("Who works at a cell, and in which role.")),
     "station": (
         f"{MEASURE}.station:station",
-        declared("Pins, beams, surfaces and cameras of a cell: where they are, and how sure."),
+        declared("Pins, beams, surfaces and cameras of a cell: where, and how well known."),
     ),
 }
 

@@ -167,12 +167,12 @@ def show_residuals(result: CalibrationResult) -> None:
 
 def show_accuracy_rows(accuracy: Accuracy) -> None:
     """Show what makes up the statement of accuracy, a row each, the largest first."""
-    columns = (tr("part"), tr("half width"), tr("told by"), tr("share %"))
+    columns = (tr("row"), tr("half width"), tr("known from"), tr("share %"))
     rows = [
         [row.title, f"+-{row.half_width}" if row.half_width else "", row.basis, _share(row)]
         for row in rows_in_words(accuracy)
     ]
-    table(tr("What it is accurate to, part by part"), columns, rows)
+    table(tr("What it is accurate to, row by row"), columns, rows)
 
 
 def _share(row: RowInWords) -> str:

@@ -137,7 +137,7 @@ def _show_rows(accuracy: object) -> None:
         half = f" +-{row.half_width}" if row.half_width else ""
         say(
             tr(
-                "  part {title}{half}: {basis}, {share:.0f} %",
+                "  row {title}{half}: {basis}, {share:.0f} %",
                 title=row.title,
                 half=half,
                 basis=row.basis,

@@ -119,13 +119,13 @@ def largest_row_sentence(accuracy: Accuracy, sign: str = "+-") -> str:
         >>> touches = Pose(298, 99, -60, 0), Pose(322, 91, -60, 180)
         >>> found = assessed(solve_two_pose(*touches, sigma_mm=0.02), AccuracyFacts())
         >>> largest_row_sentence(found.accuracy)
-        'Largest part: how a person sees contact, +-0.05 mm (default, not measured).'
+        'Largest row: how a person sees contact, +-0.05 mm (default, not measured).'
     """
     row = accuracy.largest
     facts = {"row": row_title(row), "sign": sign, "basis": basis_in_words(row)}
     if row.half_width is None:
-        return tr("Largest part: {row} ({basis}).", **facts)
-    return tr("Largest part: {row}, {sign}{half} ({basis}).", half=half_width_of(row), **facts)
+        return tr("Largest row: {row} ({basis}).", **facts)
+    return tr("Largest row: {row}, {sign}{half} ({basis}).", half=half_width_of(row), **facts)
 
 
 def statement_sentences(result: "CalibrationResult", sign: str = "+-") -> Iterator[str]:
@@ -145,7 +145,7 @@ def statement_sentences(result: "CalibrationResult", sign: str = "+-") -> Iterat
         ...     print(sentence)
         Repeatable: not known (two touches cannot check each other).
         X, Y: accurate to +-0.088 mm (95 %).
-        Largest part: how a person sees contact, +-0.05 mm (default, not measured).
+        Largest row: how a person sees contact, +-0.05 mm (default, not measured).
     """
     for sentence in (repeatable_sentence(result, sign), accurate_sentence(result, sign)):
         if sentence:

@@ -38,8 +38,9 @@ METHOD = Method(
     summary=declared("Drive the tip through two crossed light beams: X and Y."),
     description=declared(
         "Drive the tip through two crossed light beams: X and Y; nobody touches anything.\n\n"
-        "As soon as the crossings check each other it says after each how well they agree and how "
-        "sure the tip is. At the end the one that fits worst is named and may be made again.\n\n"
+        "As soon as the crossings check each other it says after each how well they agree and what "
+        "X and Y are repeatable to. At the end the one that fits worst is named and may be made "
+        "again.\n\n"
         "The station is declared in the cell file, or was learnt with 'station learn'. Afterwards "
         "the tip turns half a turn about itself and crosses the beams again."
     ),

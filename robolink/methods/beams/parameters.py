@@ -143,7 +143,7 @@ class BeamsParameters(MethodParameters):
     until_mm: Annotated[
         Length | None,
         Option(metavar="MM"),
-        Help(declared("End early when X and Y together are known within this, in 95 %.")),
+        Help(declared("End early when X and Y are repeatable to this in 95 %.")),
     ] = None
     retake: Annotated[
         bool,

@@ -34,8 +34,8 @@ METHOD = Method(
     summary=declared("Touch one pin at several angles of U; the touches check each other."),
     description=declared(
         "Touch one pin at several angles of U; the touches check each other.\n\n"
-        "After each touch from the third on it says how well they agree and how sure "
-        "the tip is. At the end the touch that fits worst is named and may be made "
+        "After each touch from the third on it says how well they agree and what X "
+        "and Y are repeatable to. At the end the touch that fits worst is named and may be made "
         "again.\n\n"
         "With poses that exist already nothing moves."
     ),

@@ -41,7 +41,7 @@ class NAngleParameters(UprightPinParameters):
     until_mm: Annotated[
         Length | None,
         Option(metavar="MM"),
-        Help(declared("End early when X and Y together are known within this, in 95 %.")),
+        Help(declared("End early when X and Y are repeatable to this in 95 %.")),
     ] = None
     retake: Retake = False
 

@@ -43,7 +43,7 @@ class PivotParameters(PinParameters):
     until_mm: Annotated[
         Length | None,
         Option(metavar="MM"),
-        Help(declared("End early when X, Y and Z together are known within this, in 95 %.")),
+        Help(declared("End early when X, Y and Z are repeatable to this in 95 %.")),
     ] = None
     retake: Retake = False
 

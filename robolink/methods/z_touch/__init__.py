@@ -35,8 +35,8 @@ METHOD = Method(
     description=declared(
         "Touch a surface that switches an input: Z; nobody touches anything.\n\n"
         "X and Y are kept. The tip stops at the touch and retreats; two speeds tell the latency. "
-        "After each touch from the third on it says how well they agree and how sure Z is; at the "
-        "end the one that fits worst is named and may be made again."
+        "After each touch from the third on it says how well they agree and what Z is repeatable "
+        "to; at the end the one that fits worst is named and may be made again."
     ),
     parameters=ZTouchParameters,
     measures=("z_mm",),

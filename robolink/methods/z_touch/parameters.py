@@ -97,7 +97,7 @@ class ZTouchParameters(MethodParameters):
     until_mm: Annotated[
         Length | None,
         Option(metavar="MM"),
-        Help(declared("End early when half the 95 % interval of Z is at most this.")),
+        Help(declared("End early when Z is repeatable to this in 95 %.")),
     ] = None
     retake: Annotated[
         bool,

@@ -78,7 +78,7 @@ class StationTable(Table):
     always."""
     sigma_mm: Length | None = None
     """Standard deviation of each of them, mm, where it is known; one touch with basis "absolute"
-    needs it to say how sure it is."""
+    needs it to say what it is repeatable to."""
     note: Note = ""
     """For people."""
 

@@ -54,7 +54,7 @@ def _held_to_statements(result: VerifyResult) -> str:
     if result.judgement is None:
         return ""
     return tr(
-        "Each drift is also compared with what scatter alone and all parts together explain: "
+        "Each drift is also compared with what scatter alone and all rows together explain: "
         "beyond the first it leaves a doubt, beyond the second it contradicts the measurement."
     )
 

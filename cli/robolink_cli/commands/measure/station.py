@@ -11,7 +11,7 @@ from robolink_cli.session.context import CliContext, controller_options
 
 @click.group()
 def station() -> None:
-    """Pins, beams, surfaces and cameras of a cell: where they are, and how sure."""
+    """Pins, beams, surfaces and cameras of a cell: where, and how well known."""
 
 
 _robot_option = click.option(

@@ -154,7 +154,7 @@ def _own_options() -> tuple[Callable[[Callable[..., Any]], Callable[..., Any]], 
             "interval_mm",
             type=_LENGTH,
             metavar="MM",
-            help=declared("Largest half of a 95 % interval that is accepted."),
+            help=declared("Accurate to this or better (95 %), or it is refused."),
         ),
         motion_option(
             "--tolerance",

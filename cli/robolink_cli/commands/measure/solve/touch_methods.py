@@ -98,7 +98,7 @@ _GROUNDS: Final = {
     "touch_not_proven": declared("The standoffs before the touches were not undone."),
     "large_residual": declared("One touch does not fit the others."),
     "large_drift": declared("The tip is too far off when the tool turns."),
-    "drift_undecided": declared("It is not sure whether the drift is inside the tolerance."),
+    "drift_undecided": declared("The drift is too near to the tolerance to decide."),
 }
 
 

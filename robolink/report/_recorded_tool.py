@@ -193,8 +193,12 @@ def _verification(entry: Recorded | None, done: Recorded | None) -> VerifyResult
         tuple(details["warnings"]),
         codes=tuple(details.get("codes", ())),
         judgement=TurnJudgement.from_json(said) if (said := details.get("judgement")) else None,
-        accurate_to_mm=None if done is None else done.details.get("accurate_to_mm"),
+        accurate_to_mm=None if done is None else _length(done.details.get("accurate_to_mm")),
     )
+
+
+def _length(value: object) -> float | None:
+    return float(value) if isinstance(value, (int, float)) else None
 
 
 def _list(value: object) -> list[Any]:

@@ -188,6 +188,7 @@ def _with_rows(keys):
 def test_the_words_follow_the_judgement_of_a_real_claim():
     found = two(STATED, sigma_mm=0.005)
     claim = turn_claim(found, STATED)
+    assert claim is not None
     proof = VerifyResult((Drift(180.0, 0.128, 0.0),), 0.2)
     held = replace(proof, judgement=held_to_claim(claim, proof))
     assert "passed" not in turn_test_headline(held)

@@ -1,6 +1,7 @@
 """What a measurement stated is read back from its record: journal show, diff, and the report."""
 
 import json
+from dataclasses import replace
 
 import pytest
 from robolink_cli import main
@@ -39,7 +40,8 @@ def record(*, sigma_mm=None, drift_mm=0.06, wider_mm=None, damaged=False):
     proof = VerifyResult(shown.drifts, 0.2, judgement=held_to_claim(CLAIM, shown))
     measured = calibration_entry(proposal, AcceptanceCriteria(), source="touched")
     if damaged:
-        measured.details["accuracy"] = {"rows": "torn"}
+        details = {**measured.details, "accuracy": {"rows": "torn"}}
+        measured = replace(measured, details=details)
     value = plain_offset(found.offset)
     entries = (
         measured,
@@ -60,8 +62,6 @@ def record(*, sigma_mm=None, drift_mm=0.06, wider_mm=None, damaged=False):
 
 
 def _of_one_change(entry, before):
-    from dataclasses import replace
-
     return replace(entry, change=f"c0ffee{before:04d}", operation="o")
 
 

@@ -112,6 +112,6 @@ def _tool_payload(report: Report) -> dict[str, object]:
 
 def _accurate_to_mm(report: Report) -> float | None:
     """Return what the tip is accurate to by the statement that stands, a wider one included."""
-    fit, proof = report.fit, report.verification
-    told = (None if fit is None else fit.accurate_to_mm, proof and proof.accurate_to_mm)
-    return max((mm for mm in told if mm is not None), default=None)
+    if report.widened_mm is not None:
+        return report.widened_mm
+    return None if report.fit is None else report.fit.accurate_to_mm

@@ -130,6 +130,7 @@ class ReportDraft:
             "impact": impact,
             "touches": tuple(_touches(result.inputs)),
             "evidence": result.evidence.as_json() if result.evidence else {},
+            "seating": proposal.seating.as_json() if proposal.seating else None,
         }
 
     def note_result(self, result: "ToolReceipt | VerifyResult") -> None:

@@ -2,7 +2,7 @@
 
 from robolink.calibration import Impact, VerifyResult
 from robolink.model import Controller, Pose, ToolReceipt
-from robolink.nozzle_change import AcceptanceCriteria, Listener, Proposal
+from robolink.nozzle_change import AcceptanceCriteria, ChangeReport, Listener, Proposal
 from robolink_cli.options.impact import ImpactRequest, judge
 from robolink_cli.options.report import ReportDraft
 from robolink_cli.prompts.present import present_desk
@@ -38,6 +38,12 @@ class CalibrationListener(Listener):
     def verified(self, tool: int, result: VerifyResult) -> None:  # noqa: ARG002 - one tool only
         """Note it for the report."""
         self._draft.note_result(result)
+
+    def note_proved(self, done: ChangeReport) -> None:
+        """Note the statement that stands after the turn test, a wider one included."""
+        for report in done.tools:
+            if report.verification is not None:
+                self._draft.note_result(report.verification)
 
     def propose(self, proposal: Proposal, *, source: str, warnings: tuple[str, ...]) -> None:
         """Show the proposal, the verdict, and what it means for taught points."""

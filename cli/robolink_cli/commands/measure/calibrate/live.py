@@ -126,6 +126,7 @@ class LiveCalibration:
                 describe=self._document,
             )
             whole = change.run()
+            self._listener.note_proved(whole)
             (self._report,) = whole.tools
         desk = present_desk()
         if desk is not None:

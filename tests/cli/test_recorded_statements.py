@@ -1,5 +1,6 @@
 """What a measurement stated is read back from its record: journal show, diff, and the report."""
 
+import csv
 import json
 from dataclasses import replace
 
@@ -142,3 +143,13 @@ def test_a_report_of_a_good_change_conforms(shown, tmp_path):
     assert "X, Y: accurate to ± 0.079 mm (95 %)." in text
     assert "accurate to, 95 %" in text
     assert "not on record</td>" not in text
+
+
+def test_a_table_for_a_spreadsheet_has_both_figures(shown, tmp_path):
+    record(sigma_mm=0.02, wider_mm=0.15)
+    shown("journal", "export", str(tmp_path / "all.csv"))
+    with (tmp_path / "all.csv").open(encoding="utf-8-sig", newline="") as file:
+        measured, *_, kept = csv.DictReader(file)
+    assert float(measured["repeatable_to_mm"]) == pytest.approx(0.0346, abs=1e-4)
+    assert float(measured["accurate_to_mm"]) == pytest.approx(0.0786, abs=1e-4)
+    assert float(kept["accurate_to_mm"]) == 0.15

@@ -15,7 +15,9 @@ from robolink.model import Recorded, Signature
 from robolink_cli.views.journal import COMPONENTS, entry_payload
 
 _OFFSETS: Final = ("before", "after")
-_FIGURES: Final = ("rms_mm", "max_residual_mm", "max_drift_mm")
+_FIGURES: Final = (
+    *("rms_mm", "max_residual_mm", "max_drift_mm", "repeatable_to_mm", "accurate_to_mm"),
+)
 
 COLUMNS: Final = (
     *("number", "at", "controller", "kind", "change", "operation", "tool"),

@@ -148,8 +148,6 @@ if TYPE_CHECKING:
     from robolink.calibration.pin.six_point import solve_tool_axis as solve_tool_axis
     from robolink.calibration.pin.two_pose import solve_two_pose as solve_two_pose
     from robolink.calibration.pin.two_pose import two_of as two_of
-    from robolink.calibration.quality.accuracy import assessed as assessed
-    from robolink.calibration.quality.accuracy import usual_look_sigma_mm as usual_look_sigma_mm
     from robolink.calibration.quality.control_chart import LEAST_BASELINE as LEAST_BASELINE
     from robolink.calibration.quality.control_chart import USUAL_LAMBDA as USUAL_LAMBDA
     from robolink.calibration.quality.control_chart import USUAL_WIDTH as USUAL_WIDTH
@@ -166,17 +164,6 @@ if TYPE_CHECKING:
     from robolink.calibration.quality.moved_station import StationShift as StationShift
     from robolink.calibration.quality.moved_station import TipShift as TipShift
     from robolink.calibration.quality.moved_station import judge_shifts as judge_shifts
-    from robolink.calibration.quality.statements import RowInWords as RowInWords
-    from robolink.calibration.quality.statements import accurate_sentence as accurate_sentence
-    from robolink.calibration.quality.statements import basis_words as basis_words
-    from robolink.calibration.quality.statements import largest_row_sentence as largest_row_sentence
-    from robolink.calibration.quality.statements import measured_axes as measured_axes
-    from robolink.calibration.quality.statements import repeatable_sentence as repeatable_sentence
-    from robolink.calibration.quality.statements import rows_in_words as rows_in_words
-    from robolink.calibration.quality.statements import seating_sentence as seating_sentence
-    from robolink.calibration.quality.statements import stated_mm as stated_mm
-    from robolink.calibration.quality.statements import statement_line as statement_line
-    from robolink.calibration.quality.statements import statement_sentences as statement_sentences
     from robolink.calibration.quality.station_part import SharedStation as SharedStation
     from robolink.calibration.quality.station_part import StationPart as StationPart
     from robolink.calibration.quality.station_part import shared_station as shared_station
@@ -187,16 +174,6 @@ if TYPE_CHECKING:
     from robolink.calibration.quality.tool_fits import ToolFit as ToolFit
     from robolink.calibration.quality.tool_fits import better_fit as better_fit
     from robolink.calibration.quality.tool_fits import tool_fits as tool_fits
-    from robolink.calibration.quality.turn_test import LEAST_TURN_DEG as LEAST_TURN_DEG
-    from robolink.calibration.quality.turn_test import held_to_claim as held_to_claim
-    from robolink.calibration.quality.turn_test import turn_claim as turn_claim
-    from robolink.calibration.quality.turn_test_words import proved_statements as proved_statements
-    from robolink.calibration.quality.turn_test_words import (
-        turn_test_headline as turn_test_headline,
-    )
-    from robolink.calibration.quality.turn_test_words import (
-        turn_test_sentences as turn_test_sentences,
-    )
     from robolink.calibration.quality.update_guard import NEEDLE_LIMIT_MM as NEEDLE_LIMIT_MM
     from robolink.calibration.quality.update_guard import Correction as Correction
     from robolink.calibration.quality.update_guard import require_shrinking as require_shrinking
@@ -208,6 +185,33 @@ if TYPE_CHECKING:
         PLACING_TOLERANCE_MM as PLACING_TOLERANCE_MM,
     )
     from robolink.calibration.quality.verify_drift import verify_drift as verify_drift
+    from robolink.calibration.statement.accuracy import assessed as assessed
+    from robolink.calibration.statement.accuracy import usual_look_sigma_mm as usual_look_sigma_mm
+    from robolink.calibration.statement.sentences import RowInWords as RowInWords
+    from robolink.calibration.statement.sentences import accurate_sentence as accurate_sentence
+    from robolink.calibration.statement.sentences import basis_words as basis_words
+    from robolink.calibration.statement.sentences import (
+        largest_row_sentence as largest_row_sentence,
+    )
+    from robolink.calibration.statement.sentences import measured_axes as measured_axes
+    from robolink.calibration.statement.sentences import repeatable_sentence as repeatable_sentence
+    from robolink.calibration.statement.sentences import rows_in_words as rows_in_words
+    from robolink.calibration.statement.sentences import seating_sentence as seating_sentence
+    from robolink.calibration.statement.sentences import stated_mm as stated_mm
+    from robolink.calibration.statement.sentences import statement_line as statement_line
+    from robolink.calibration.statement.sentences import statement_sentences as statement_sentences
+    from robolink.calibration.statement.turn_test import LEAST_TURN_DEG as LEAST_TURN_DEG
+    from robolink.calibration.statement.turn_test import held_to_claim as held_to_claim
+    from robolink.calibration.statement.turn_test import turn_claim as turn_claim
+    from robolink.calibration.statement.turn_test_sentences import (
+        proved_statements as proved_statements,
+    )
+    from robolink.calibration.statement.turn_test_sentences import (
+        turn_test_headline as turn_test_headline,
+    )
+    from robolink.calibration.statement.turn_test_sentences import (
+        turn_test_sentences as turn_test_sentences,
+    )
     from robolink.calibration.touch.length import LengthChange as LengthChange
     from robolink.calibration.touch.length import LengthDecision as LengthDecision
     from robolink.calibration.touch.length import length_change as length_change
@@ -292,7 +296,7 @@ __getattr__ = lazy_exports(
         "pin.pivot_fit": "PivotDesign PivotFit fit_pivot fit_pivot_robust pivot_design",
         "pin.six_point": "FAR_DEG SixPointResult ToolAxis solve_six_point solve_tool_axis",
         "pin.two_pose": "solve_two_pose two_of",
-        "quality.accuracy": "assessed usual_look_sigma_mm",
+        "statement.accuracy": "assessed usual_look_sigma_mm",
         "quality.control_chart": (
             "LEAST_BASELINE USUAL_LAMBDA USUAL_WIDTH ControlChart control_chart"
         ),
@@ -300,7 +304,7 @@ __getattr__ = lazy_exports(
         "quality.doubts": "doubt_sentence known_doubts order_in_words",
         "quality.impact": "Impact PointImpact impact_on",
         "quality.moved_station": "StationShift TipShift judge_shifts",
-        "quality.statements": "RowInWords accurate_sentence basis_words largest_row_sentence "
+        "statement.sentences": "RowInWords accurate_sentence basis_words largest_row_sentence "
         "measured_axes repeatable_sentence rows_in_words seating_sentence stated_mm "
         "statement_line statement_sentences",
         "quality.station_part": "SharedStation StationPart shared_station with_station",
@@ -308,8 +312,8 @@ __getattr__ = lazy_exports(
         "quality.tool_fits": "ToolFit better_fit tool_fits",
         "evidence.approach_bias": "with_approach_bias",
         "evidence.units": "RobotReach require_near require_stored_scale require_within_reach",
-        "quality.turn_test": "LEAST_TURN_DEG held_to_claim turn_claim",
-        "quality.turn_test_words": "proved_statements turn_test_headline turn_test_sentences",
+        "statement.turn_test": "LEAST_TURN_DEG held_to_claim turn_claim",
+        "statement.turn_test_sentences": "proved_statements turn_test_headline turn_test_sentences",
         "quality.update_guard": "Correction NEEDLE_LIMIT_MM require_shrinking update_guard "
         "writes_refused_unattended",
         "quality.verify_drift": "PLACING_TOLERANCE_MM verify_drift",

@@ -93,11 +93,22 @@ def test_a_command_gives_a_machine_one_document_with_units_in_its_keys(cell, nam
     assert done.code == 0, done.err
     document = json.loads(done.out)
     assert document["schema"] == COMMANDS[name][1]
-    assert [key for key in numbers_in(document) if not key.endswith(UNITS)] == []
+    assert [key for key in numbers_in(document) if not key.endswith((*UNITS, *WITHOUT))] == []
 
 
-UNITS = ("_mm", "_deg", "_s", "joints", "pulses", "sigma_gain")
-"""How the name of a number ends; joints are degrees or mm by their kind, a gain has no unit."""
+UNITS = ("_mm", "_deg", "_s", "_percent", "joints", "pulses")
+"""How the name of a number ends; joints are degrees or mm by their kind."""
+
+WITHOUT = (
+    "sigma_gain",
+    "sensitivity",
+    "nu",
+    "nu_eff",
+    "coverage_factor",
+    "probability",
+    "half_width",
+)
+"""A factor, a count and a probability have no unit; that of a row's half width stands beside it."""
 
 
 def numbers_in(value, key=""):

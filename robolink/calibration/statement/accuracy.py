@@ -22,8 +22,8 @@ from robolink.calibration.core.accuracy import (
 from robolink.calibration.core.budget import BudgetRow, UncertaintyBudget
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.statistics import NORMAL_95, chi_square_quantile
-from robolink.calibration.quality.statements import SCATTER, basis_words
 from robolink.calibration.quality.station_part import StationPart, scatter_covariance, with_station
+from robolink.calibration.statement.sentences import SCATTER, basis_words
 from robolink.messages import spoken, tr
 
 if TYPE_CHECKING:

@@ -25,7 +25,7 @@ from robolink.calibration.core.turn_claim import (
     TurnClaim,
     TurnJudgement,
 )
-from robolink.calibration.quality.accuracy import row_covariance, usual_look_sigma_mm
+from robolink.calibration.statement.accuracy import row_covariance, usual_look_sigma_mm
 from robolink.model import angle_difference_deg
 
 _FALSE_ALARMS: Final = 0.001

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from robolink.calibration.core.accuracy import Accuracy
 from robolink.calibration.core.result import CalibrationResult, DriftVerdict, VerifyResult
 from robolink.calibration.core.turn_claim import TurnJudgement
-from robolink.calibration.quality.statements import (
+from robolink.calibration.statement.sentences import (
     measured_axes,
     repeatable_sentence,
     stated_mm,

@@ -81,7 +81,7 @@ def report_of_tool(
         gauges=tuple(GaugeOnRecord(**gauge) for gauge in calibration.get("gauges", ())),
         touches=tuple(_touch(said) for said in calibration.get("touches", ()) if said),
         evidence=calibration.get("evidence") or {},
-        seating=calibration.get("seating"),
+        seating=_seating(calibration.get("seating")),
     )
 
 
@@ -195,6 +195,15 @@ def _verification(entry: Recorded | None, done: Recorded | None) -> VerifyResult
         judgement=TurnJudgement.from_json(said) if (said := details.get("judgement")) else None,
         accurate_to_mm=None if done is None else _length(done.details.get("accurate_to_mm")),
     )
+
+
+def _seating(said: Mapping[str, Any] | None) -> Mapping[str, Any] | None:
+    """Return what an entry says of the seating; of an old one it is not on record.
+
+    Raises:
+        KeyError, TypeError: It cannot be understood.
+    """
+    return None if said is None else {name: said[name] for name in ("within_mm", "changes")}
 
 
 def _length(value: object) -> float | None:

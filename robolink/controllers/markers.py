@@ -4,7 +4,7 @@ What keeps two procedures of this process apart stands here too.
 """
 
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from typing import Final
@@ -90,6 +90,7 @@ class MarkerStore:
         self.outcomes = outcomes
         self.ledger = Ledger()
         self._procedures: dict[MarkerKind, Marker] = {}
+        self._under_way: set[str] = set()
 
     def look(self) -> None:
         """Note the state of the lease before a value is read that a write will rely on.
@@ -113,6 +114,10 @@ class MarkerStore:
     ) -> Marker:
         """Store a marker durably: a new one, or one of before whose work is taken up again.
 
+        Whatever writes, moves or begins a procedure passes here, in a driver of anybody's. So this
+        is where it is refused while something earlier is unsettled (docs/reference/rules.md 1);
+        only what puts back an earlier state goes on, and the work of a marker of before.
+
         Args:
             kind: What it stands for.
             request: What is begun, as a person may read it.
@@ -122,12 +127,16 @@ class MarkerStore:
         Raises:
             ConfigError: That is impossible.
             BusyError: Another process has the controller.
+            OutcomeUnknownError: Something earlier is unsettled; nothing may be sent.
         """
+        if not operation and not self._latch.restores:
+            self._refuse_unsettled(request, besides=self._under_way)
         name = operation or new_operation()
         marker = Marker(name, kind, request, wall_label(), dict(details))
         if not self._recorded(lambda: self.outcomes.begin(marker)):
             self._unstored.add(name)
         self.ledger.begin(marker)
+        self._under_way.add(name)
         if kind in _PROCEDURES:
             self._procedures[kind] = marker
         return marker
@@ -135,6 +144,7 @@ class MarkerStore:
     def clear(self, marker: Marker, *entries: NewEntry) -> None:
         """Forget a marker whose outcome is known, and journal how it ended."""
         self.ledger.ended(marker)
+        self._under_way.discard(marker.operation)
         cleared = True
         if marker.kind in _PROCEDURES:
             self.outcomes.clear(marker.operation, *entries)
@@ -145,6 +155,14 @@ class MarkerStore:
         known = self._procedures.get(marker.kind)
         if known is not None and known.operation == marker.operation:
             del self._procedures[marker.kind]
+
+    def leave_open(self, marker: Marker) -> None:
+        """Count a marker as unsettled whose command has ended without a proof; no-op once cleared.
+
+        Args:
+            marker: It.
+        """
+        self._under_way.discard(marker.operation)
 
     @contextmanager
     def unless_stopped(self, marker: Marker) -> Iterator[None]:
@@ -183,11 +201,14 @@ class MarkerStore:
             OutcomeUnknownError: Names what is unsettled.
             LeaseHeldError: Somebody else is at it.
         """
-        unsettled = self._unsettled()
+        self._refuse_unsettled(request, besides=())
+
+    def _refuse_unsettled(self, request: str, *, besides: Collection[str]) -> None:
+        unsettled = self._unsettled(besides)
         if unsettled:
             # Whoever began it may still be at it, or have finished just now.
             self.outcomes.look()
-            still = {marker.operation for marker in self._unsettled()}
+            still = {marker.operation for marker in self._unsettled(besides)}
             unsettled = [marker for marker in unsettled if marker.operation in still]
         for marker in unsettled:
             raise OutcomeUnknownError(
@@ -216,11 +237,14 @@ class MarkerStore:
             return False
         return True
 
-    def _unsettled(self) -> list[Marker]:
+    def _unsettled(self, besides: Collection[str]) -> list[Marker]:
         own = {
-            marker.operation
-            for kind, marker in self._procedures.items()
-            if kind is not MarkerKind.CHANGE or self.changing
+            *besides,
+            *(
+                marker.operation
+                for kind, marker in self._procedures.items()
+                if kind is not MarkerKind.CHANGE or self.changing
+            ),
         }
         return [m for m in self.outcomes.open_markers() if m.operation not in own]
 
@@ -234,6 +258,8 @@ class MarkerStore:
 
     def unproved(self, request: str, error: RobolinkError) -> OutcomeUnknownError:
         """Return the error for a request after which ``error`` tells nothing of what it did."""
+        # The link is gone with the answer, and with it what was under way on it.
+        self._under_way.clear()
         doubt = OutcomeUnknownError(
             tr(
                 "No clear answer came to {request!r}: it may or may not have run ({cause})",

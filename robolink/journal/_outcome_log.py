@@ -12,7 +12,16 @@ from robolink.journal._naming import Names, Naming
 from robolink.journal._processes import BootClock, LeaseHolder, this_process
 from robolink.journal._traces import leave_trace, traces_of
 from robolink.messages import tr
-from robolink.model import EntryKind, Marker, MarkerKind, NewEntry, Recorded, Signature, Who
+from robolink.model import (
+    NO_HISTORY,
+    EntryKind,
+    Marker,
+    MarkerKind,
+    NewEntry,
+    Recorded,
+    Signature,
+    Who,
+)
 from robolink.timing import Clock
 
 if TYPE_CHECKING:
@@ -157,9 +166,15 @@ class JournalOutcomeLog:
     def append(self, *entries: NewEntry) -> None:
         """Put something on record, in one durable transaction.
 
+        The first entry of a record that was lost would make it look whole, so that nothing of what
+        was unfinished blocks any more. It is refused until a person has looked.
+
         Raises:
             JournalError: It is not stored.
+            OutcomeUnknownError: The record of what was done before is missing; nothing is stored.
         """
+        if any(entry.kind not in NO_HISTORY for entry in entries):
+            self._refuse_lost()
         name = self._named().record
         with self._store.write() as tables:
             self._put(tables, name, entries)
@@ -181,6 +196,19 @@ class JournalOutcomeLog:
                 return found
             self._has_history = tables.entries.history(names)
         return () if self._has_history else (traces.marker(self._journal.location),)
+
+    def _refuse_lost(self) -> None:
+        if self._has_history or not self.durable:
+            return
+        if any(marker.kind is MarkerKind.HISTORY for marker in self.open_markers()):
+            raise OutcomeUnknownError(
+                tr(
+                    "The record of what was done to this controller before is missing: it was "
+                    "deleted, emptied, or is kept somewhere else."
+                ),
+                remedy=tr("Nothing was recorded. Next: 'robolink recover'."),
+                controller=self._named().identity,
+            )
 
     def recorded(
         self, *, tool: int | None = None, change: str = "", kinds: Collection[EntryKind] = ()

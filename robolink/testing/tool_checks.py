@@ -232,6 +232,10 @@ def what_is_unsettled_blocks(subject: Subject) -> None:
             if _is_open(second, marker):  # else the record is kept with the connection only
                 with refused(OutcomeUnknownError, "what is unsettled blocks"):
                     second.require_settled("the next command")
+                tools, stored = second.tools, second.tools.read(subject.tool)
+                with refused(OutcomeUnknownError, "nothing is written over what is unsettled"):
+                    tools.write(subject.tool, another_offset(stored), expected=stored)
+                require(tools.same(tools.read(subject.tool), stored), "the old value is there")
     finally:
         # Ctrl-C in between must not leave it to block whatever comes next.
         with subject.connect() as third:

@@ -4,9 +4,12 @@ import sqlite3
 
 import pytest
 
-from robolink.errors import JournalError
+import robolink
+import robolink.transaction
+from robolink.errors import JournalError, OutcomeUnknownError
 from robolink.journal import open_journal
 from robolink.journal._opening import _closed, _opened, close_files
+from robolink.model import ANY, EntryKind, NewEntry, ToolOffset
 
 
 def forget_connections():
@@ -143,3 +146,70 @@ def test_a_bent_page_of_the_markers_is_noticed(run, changed, simulator):
     assert "it is damaged" in err
     with pytest.raises(JournalError):
         open_journal().log("anybody").look()
+
+
+@pytest.fixture
+def doubted(simulator, state_folder):
+    """A controller that a program wrote to; no answer came, and the first backup was never made."""
+    dropped = []
+
+    def lose_the_answer(_number, request):
+        if "TLSet 1," in request and not dropped:
+            dropped.append(request)
+            simulator.on_request = None
+            simulator.panel.cut_link()
+
+    simulator.on_request = lose_the_answer
+    with robolink.connect(simulator.url) as controller, pytest.raises(OutcomeUnknownError):
+        controller.tools.write(1, ToolOffset(12.5, -3.25, -20), expected=ANY)
+    forget_connections()
+    return state_folder / "journal.db"
+
+
+def test_a_program_does_not_write_again_while_an_outcome_is_unknown(doubted, simulator):
+    """Each way of changing something is refused by what all of them pass."""
+    simulator.machine.tools.set(2, ToolOffset(4, 5, -60))  # at the pendant
+    with robolink.connect(simulator.url) as controller:
+        for change in (
+            lambda: controller.tools.write(1, ToolOffset(1, 2, 3), expected=ANY),
+            lambda: controller.tools.write(2, ToolOffset(1, 2, 3), expected=ANY),
+            lambda: controller.tools.clear(2, expected=ANY, then_select=0),
+            lambda: controller.tools.select(0 if controller.tools.selected() else 2),
+            lambda: controller.io.set_output(3, True),
+            lambda: controller.execute_raw("Off 3"),
+        ):
+            before = controller.tools.read_all(), controller.tools.selected()
+            with pytest.raises(OutcomeUnknownError, match="did not finish"):
+                change()
+            assert (controller.tools.read_all(), controller.tools.selected()) == before
+        assert len(controller.outcomes.open_markers()) == 1
+        found = robolink.transaction.recover(controller, confirm=lambda _finding: True)
+        assert not found.left
+        kinds = {entry.kind for entry in controller.outcomes.recorded()}
+        assert EntryKind.CONFLICT not in kinds
+        controller.tools.write(1, ToolOffset(1, 2, 3), expected=ANY)
+
+
+@pytest.mark.parametrize("lose", [delete, empty])
+def test_the_first_backup_does_not_make_a_lost_record_look_whole(run, doubted, simulator, lose):
+    lose(doubted)
+    stored = simulator.machine.tools.get(1)
+    assert run("tool", "set", "1", "--x", "14", "--yes")[0] == 6
+    assert simulator.machine.tools.get(1) == stored
+    assert run("status")[0] == 0
+    assert run("tool", "set", "1", "--x", "14", "--yes")[0] == 6
+    assert run("recover")[0] == 6
+    assert run("stop")[0] == 0
+
+
+def test_a_program_is_refused_too_where_the_record_is_kept_elsewhere_now(
+    doubted, simulator, tmp_path, monkeypatch
+):
+    monkeypatch.setenv("ROBOLINK_JOURNAL", str(tmp_path / "elsewhere.db"))
+    for _ in range(2):  # and nothing that the first attempt recorded lets the second one pass
+        with robolink.connect(simulator.url) as controller:
+            with pytest.raises(OutcomeUnknownError):
+                controller.outcomes.append(NewEntry(EntryKind.DECISION, verdict="all is well"))
+            with pytest.raises(OutcomeUnknownError):
+                controller.tools.write(1, ToolOffset(1, 2, 3), expected=ANY)
+        forget_connections()

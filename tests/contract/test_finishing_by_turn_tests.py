@@ -151,7 +151,7 @@ def test_touches_that_were_not_made_end_the_test_as_failed(later):
     tested.poll = polled
     with later.connected() as controller:
         operation = settled(controller)
-        controller.tools.select(2)
+        later.cell.simulator.machine.tools.select(2)  # at the pendant
         with pytest.raises(VerifyError) as failed:
             finish_by_turn_test(controller, operation, tested)
         assert failed.value.code == "not_touched"

@@ -12,7 +12,7 @@ from robolink.journal.store.chain import canonical, digest, storable
 from robolink.journal.store.prepared import Prepared, StatementRunner
 from robolink.journal.store.tables import ENTRIES, HEAD, IN_A_CHANGE
 from robolink.messages import plain
-from robolink.model import PROOFS, EntryKind, NewEntry, Signature
+from robolink.model import NO_HISTORY, PROOFS, NewEntry, Signature
 from robolink.timing import wall_time
 
 T = TypeVar("T")
@@ -23,14 +23,6 @@ _LOOKS: Final = 100
 """After so many in which others wrote each time something else is wrong."""
 
 # The kinds whose value was read on the controller.
-# What is recorded of a controller without anything being changed on it.
-_NO_HISTORY: Final = (
-    EntryKind.IDENTITY,
-    EntryKind.RECONNECT,
-    EntryKind.LEASE,
-    EntryKind.CHECK,
-)
-
 _HEAD_OF: Final = select(HEAD.c.number, HEAD.c.hash)
 _SELECT_HEAD: Final = Prepared(_HEAD_OF)
 _LOCK_HEAD: Final = Prepared(_HEAD_OF.with_for_update())
@@ -218,7 +210,7 @@ def _history(places: tuple[str, ...]) -> Prepared:
     """Return the statement that looks for a change under names in these places."""
     columns = ENTRIES.c
     ours = columns.controller.in_(_texts(places, _NAME))
-    changed = [columns.kind != str(kind) for kind in _NO_HISTORY]
+    changed = [columns.kind != str(kind) for kind in NO_HISTORY]
     return Prepared(select(columns.number).where(ours, *changed).limit(1))
 
 

@@ -40,6 +40,14 @@ PROOFS: Final = (
 )
 """Entries whose value was read from the controller: the newest tells what a tool holds."""
 
+NO_HISTORY: Final = (
+    EntryKind.IDENTITY,
+    EntryKind.RECONNECT,
+    EntryKind.LEASE,
+    EntryKind.CHECK,
+)
+"""What is recorded of a controller without anything being changed on it."""
+
 
 @dataclass(frozen=True, slots=True)
 class NewEntry:

@@ -4,7 +4,7 @@ Three things can tell it: the residuals, with Student's t; somebody who knows th
 it; the grid on which the tip was jogged, or a position taken. The one that gives the widest
 interval decides, because a residual can be small by luck and a statement wrong
 (docs/reference/evidence.md 5, 6). Where none of them exists there is no interval, and none is made
-up. Where there is one it is never 0: what two positions hide that are printed alike counts at least.
+up. Where there is one it is never 0: what two positions hide that are printed alike counts.
 """
 
 import math

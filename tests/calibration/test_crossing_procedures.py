@@ -360,7 +360,7 @@ def test_each_touch_tells_how_it_fits_and_the_worst_alone_is_made_again():
     assert [text.partition(" agree")[0] for text in cell.told] == [
         f"{count} touches" for count in (3, 4, 5, 6, 6)
     ]
-    assert " Z: each sure to +-" in cell.told[0]
+    assert " Z: sure to +-" in cell.told[0]
     half, following = map(float, re.findall(r"\+-(\d\.\d+)", cell.told[0]))
     assert "One more at 1 mm/s would make it about" in cell.told[0]
     assert following == pytest.approx(0.745 * half, rel=0.01)

@@ -5,6 +5,7 @@ is in the beam whatever their thickness, and both ways together are free of late
 and backlash (docs/reference/calibration.md 2.6).
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
@@ -135,6 +136,7 @@ def verify_by_crossing(
     angles_deg: Sequence[float],
     tolerance_mm: float,
     aside: ToolOffset = NO_OFFSET,
+    lean: tuple[float, float] = (0.0, 0.0),
 ) -> Procedure[VerifyResult]:
     """Turn about the new tip and cross the beams there again. Runs in the new tool.
 
@@ -146,6 +148,8 @@ def verify_by_crossing(
         tolerance_mm: Largest drift that passes.
         aside: Where the tip is expected, seen from the frame in force; not 0 where a difference
             to a reference was written.
+        lean: By how much the shaft lies beside the tip, X and Y of the frame in mm per mm above
+            it: the beams see the shaft.
 
     The drift at an angle is how far from the place of the reference record the tip is found
     there. It ends lifted.
@@ -177,8 +181,12 @@ def verify_by_crossing(
         found = solve_crossed_beams(_unturned(crossings), station.beams).offset
         plane = FlangePlane.of(drive.frame)
         # The tip dips below the beams, which see the shaft above it.
-        seen_z_mm = aside.z_mm + plan.dip_mm / plane.r33
-        dx, dy = plane.in_base(aside.x_mm, aside.y_mm, seen_z_mm)
+        up_mm = plan.dip_mm / abs(plane.r33)
+        dx, dy = plane.in_base(
+            aside.x_mm + lean[0] * up_mm,
+            aside.y_mm + lean[1] * up_mm,
+            aside.z_mm + math.copysign(up_mm, plane.r33),
+        )
         drifts.append(Drift(angle_deg, dx - found.x_mm, dy - found.y_mm))
     return VerifyResult(tuple(drifts), tolerance_mm)
 

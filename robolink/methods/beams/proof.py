@@ -31,6 +31,8 @@ class CrossingTest(PlacedProof):
         angles_deg: U of the new tool at which they are.
         lean: By how much the shaft lies beside the tip, X and Y of the flange in mm per mm above
             it; ``None`` where it was not looked at, and is taken to be the tool's own Z axis.
+        run_up_mm: In what way the tip reaches the speed of a crossing, where the controller told
+            it.
     """
 
     method: ClassVar[str] = "beams"
@@ -43,6 +45,7 @@ class CrossingTest(PlacedProof):
     plan: BeamsParameters
     angles_deg: tuple[float, ...]
     lean: tuple[float, float] | None = None
+    run_up_mm: float | None = None
 
     def steps(self, here: Pose) -> Procedure[VerifyResult]:
         """Return the steps from wherever the frame is."""
@@ -54,6 +57,7 @@ class CrossingTest(PlacedProof):
             tolerance_mm=self.tolerance_mm,
             aside=seen_from(self.written, self.tip),
             lean=self._lean_in_frame(here),
+            run_up_mm=self.run_up_mm,
         )
 
     def steps_after_a_break(self, here: Pose) -> Procedure[VerifyResult]:

@@ -1,13 +1,13 @@
 """Two crossed light beams in the cell; nobody has to touch anything."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from robolink.calibration import CalibrationResult, tip_pose
 from robolink.messages import tr
 from robolink.methods.beams.parameters import BeamsParameters
-from robolink.model import Pose, ToolOffset, angle_difference_deg
+from robolink.model import MotionGroup, Pose, ToolOffset, angle_difference_deg
 from robolink.procedures import InputSource, MeasurementContext
 from robolink.runner import Procedure
 from robolink.stations import BeamStation
@@ -47,11 +47,16 @@ class BeamsSource(InputSource[BeamsParameters]):
         station: Where the beams are, from the reference record.
         plan: How they are crossed.
         sigma_mm: Standard deviation of one crossing's middle, where it is known.
+        run_up_mm: In what way the tip reaches the speed of a crossing, where its controller told
+            it.
+        step_mm: How finely the controller tells where an edge was, likewise.
     """
 
     station: BeamStation
     plan: BeamsParameters = field(default_factory=BeamsParameters)
     sigma_mm: float | None = None
+    run_up_mm: float | None = None
+    step_mm: float | None = None
 
     @property
     def sentence(self) -> str:
@@ -65,16 +70,46 @@ class BeamsSource(InputSource[BeamsParameters]):
         """What to do when a measurement makes the tip jump."""
         return tr("Were the beams moved since the reference was taken, or does the needle lean?")
 
+    def measure(
+        self, context: MeasurementContext, tool: int, stored: ToolOffset | None
+    ) -> CalibrationResult:
+        """Cross and solve; see :class:`~robolink.procedures.MovingSource`."""
+        group, speed_mm_s = context.controller.groups[0], self.plan.crossing_mm_s
+        told = replace(
+            self, run_up_mm=group.run_up_mm(speed_mm_s), step_mm=group.edge_step_mm(speed_mm_s)
+        )
+        return InputSource.measure(told, context, tool, stored)
+
+    def require_able(self, group: MotionGroup, change_mm: float) -> None:
+        """Refuse crossings that are too fast for their way.
+
+        See :class:`~robolink.procedures.RequiresMotion`.
+
+        Raises:
+            CalibrationError: ``run_up_too_short``.
+        """
+        from robolink.methods.beams.run_up import require_run_up  # numpy, a look does without
+
+        require_run_up(group, self.plan, change_mm)
+
     def _steps(
         self, stored: ToolOffset | None, here: Pose, plan: BeamsParameters
     ) -> Procedure[CalibrationResult]:
         from robolink.methods.beams.procedure import measure_beams  # numpy, a look does without
 
-        return measure_beams(self.station, plan, here=here, stored=stored, sigma_mm=self.sigma_mm)
+        return measure_beams(
+            self.station,
+            plan,
+            here=here,
+            stored=stored,
+            sigma_mm=self.sigma_mm,
+            run_up_mm=self.run_up_mm,
+            step_mm=self.step_mm,
+        )
 
     def proof(
         self,
-        context: MeasurementContext,  # noqa: ARG002 - nothing of it is read
+        context: MeasurementContext,
         tool: int,
         result: CalibrationResult,
         *,
@@ -108,4 +143,5 @@ class BeamsSource(InputSource[BeamsParameters]):
             plan=self.plan,
             angles_deg=(farthest_from(*measured_deg),),
             lean=None if lean is None else (lean.x, lean.y),
+            run_up_mm=context.controller.groups[0].run_up_mm(self.plan.crossing_mm_s),
         )

@@ -204,13 +204,13 @@ def _middles_step_mm(
 ) -> float:
     """Return the step of a crossing's middle that does for all of them as if each had its own.
 
-    A middle lies between two edges, so its step has half of their variances. Crossings of one beam
-    in one direction at one U are all rounded alike.
+    Crossings of one beam in one direction at one U are all rounded alike. So may be both edges of
+    one: the way to the second begins where the step put the first.
     """
     alike = Counter(
         (c.beam, c.direction_over(beams[c.beam]), round(c.entry.u_deg, 3)) for c in crossings
     )
-    return step_mm * math.sqrt(min(alike.values()) / 2)
+    return step_mm * math.sqrt(min(alike.values()))
 
 
 def crossing_sigma_gain(

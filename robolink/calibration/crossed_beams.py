@@ -205,12 +205,14 @@ def _middles_step_mm(
     """Return the step of a crossing's middle that does for all of them as if each had its own.
 
     Crossings of one beam in one direction at one U are all rounded alike. So may be both edges of
-    one: the way to the second begins where the step put the first.
+    one, for the way to the second begins where the step put the first. And what one direction
+    rounds up the other rounds down, for both begin equally far from the expected place: the error
+    of a tip is that of a single edge.
     """
     alike = Counter(
         (c.beam, c.direction_over(beams[c.beam]), round(c.entry.u_deg, 3)) for c in crossings
     )
-    return step_mm * math.sqrt(min(alike.values()))
+    return step_mm * math.sqrt(2 * min(alike.values()))
 
 
 def crossing_sigma_gain(

@@ -11,7 +11,18 @@ from robolink_cli.views.documents import number
 
 def remarks(result: CalibrationResult) -> Iterator[str]:
     """Yield what there is to say about a measurement beside its numbers, a sentence each."""
-    for said in (_fit, _order, _interval, _region, _parts, _ways, _camera, _runout, _chain):
+    for said in (
+        _fit,
+        _order,
+        _interval,
+        _region,
+        _parts,
+        _ways,
+        _needle,
+        _camera,
+        _runout,
+        _chain,
+    ):
         sentence = said(result)
         if sentence:
             yield sentence
@@ -53,7 +64,7 @@ def _interval(result: CalibrationResult) -> str:
         for name, half in zip(result.measured, result.half_width95, strict=True)
     )
     if result.interval_from == "resolution":
-        basis = tr("from the step of the jogs")
+        basis = tr("from the step of the positions")
     elif result.sigma_stated and result.interval_from != "residuals":
         basis = tr("from what was stated")
     else:
@@ -99,6 +110,24 @@ def _ways(result: CalibrationResult) -> str:
     if not isinstance(off_deg, float):
         return ""
     return tr("The moves are {off:.2f} degrees off a right angle.", off=abs(off_deg))
+
+
+def _needle(result: CalibrationResult) -> str:
+    """Return how a needle leans, and what that changed; empty where that shows in no digit."""
+    if "needle" not in result.details():
+        return ""
+    from robolink.calibration import BeamsResult  # numpy, loaded by then
+
+    if not isinstance(result, BeamsResult) or result.lean is None:
+        return ""
+    dx_mm, dy_mm = result.lean.corrected_mm
+    return tr(
+        "the needle leans by {lean:.2f} degrees: its end is X {dx:+.3f} Y {dy:+.3f} mm from where "
+        "the beams saw its shaft",
+        lean=result.lean.angle_deg,
+        dx=dx_mm,
+        dy=dy_mm,
+    )
 
 
 def _camera(result: CalibrationResult) -> str:

@@ -96,13 +96,13 @@ def require_run_up(group: MotionGroup, plan: BeamsParameters, change_mm: float) 
         >>> from robolink.errors import CalibrationError
         >>> from robolink.methods import BeamsParameters
         >>> from robolink.methods.beams.run_up import require_run_up
-        >>> hasty = BeamsParameters(search_mm=1, crossing_mm_s=12)
+        >>> hasty = BeamsParameters(search_mm=1.5, crossing_mm_s=12)
         >>> with robolink.connect("epson+sim://run-up-example") as controller:
         ...     try:
         ...         require_run_up(controller.groups[0], hasty, change_mm=2)
         ...     except CalibrationError as error:
         ...         print(error.code, error.remedy)
-        run_up_too_short Search by 1.8 mm or more, or cross at 2 mm/s or less.
+        run_up_too_short Search by 1.8 mm or more, or cross at 10 mm/s or less.
     """
     needs = RunUp.of(group, plan)
     shift_mm = believed_shift_mm(plan, change_mm)

@@ -19,7 +19,7 @@ from robolink.model import Pose, ToolOffset
 from robolink.procedures import NO_OFFSET
 
 if TYPE_CHECKING:
-    from robolink.calibration import Beam
+    from robolink.calibration import Beam, Lean
 
 _PASSES: Final = 4
 _STILL_MM: Final = 1e-7
@@ -98,6 +98,16 @@ class CrossingSolver:
         """
         up = abs(self._r33)
         return ShaftSeen(crossings, self.dip_mm / up, deeper_mm / up)
+
+    def seen_mm(self, tip: ToolOffset, lean: "Lean") -> tuple[float, float]:
+        """Return X and Y of the place at which the beams see a needle that leans, flange.
+
+        Args:
+            tip: Where its end is.
+            lean: How it leans.
+        """
+        above_mm = self._above_mm(tip)
+        return tip.x_mm + lean.x * above_mm, tip.y_mm + lean.y * above_mm
 
     @property
     def _r33(self) -> float:

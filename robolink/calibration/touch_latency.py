@@ -113,19 +113,22 @@ def _braking(columns: list[Floats], v: Floats) -> float:
     return abs(float(np.linalg.pinv(np.column_stack(columns))[0] @ v**2))
 
 
-def require_plausible(found: TouchFit, sigma_mm: float | None) -> None:
+def require_plausible(
+    found: TouchFit, sigma_mm: float | None, *, step_mm: float | None = None
+) -> None:
     """Refuse a latency or braking that no machine has: speeds or touches are wrong then.
 
     Args:
         found: The fit.
         sigma_mm: Standard deviation of one touch, where it is known; else the residuals tell it.
+        step_mm: How finely its place is told, where it is known: what repeats itself hides that.
 
     Raises:
         CalibrationError: ``implausible_latency``.
     """
     residuals = found.fit.residuals
     dof = residuals.size - found.fit.rank
-    slack = _BEYOND_SIGMAS * (sigma_mm or 0.0)
+    slack = max(_BEYOND_SIGMAS * (sigma_mm or 0.0), step_mm or 0.0)
     if dof > 0:
         # Of a scatter that a few touches tell, as many as are as rare: Student's t.
         scatter = math.sqrt(float(residuals @ residuals) / dof)

@@ -10,6 +10,7 @@ which is believed when an F test says that it is there (docs/reference/evidence.
 """
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -85,6 +86,7 @@ def solve_z_touch(
     deceleration_mm_s2: float = USUAL_DECELERATION_MM_S2,
     deceleration_told: bool = False,
     sigma_mm: float | None = None,
+    step_mm: float | None = None,
     tolerance: Tolerance = PROBE_TOLERANCE,
 ) -> ZTouchResult:
     """Return Z of a tip that touched a surface.
@@ -102,6 +104,8 @@ def solve_z_touch(
         deceleration_told: Whether the controller tells so: then the way of braking is taken out
             of each reading, and the row stays as wide as that.
         sigma_mm: Standard deviation of one reading, when it is known.
+        step_mm: How finely the place of the trigger is told, at the fastest of the touches.
+            Touches that repeat each other fall on the same step, so it counts in full.
         tolerance: Residuals above which the result carries a warning.
 
     Raises:
@@ -127,7 +131,9 @@ def solve_z_touch(
     ahead_s2_per_mm = 1 / (2 * deceleration_mm_s2) if deceleration_told else 0.0
     heights = [touch.z_mm + ahead_s2_per_mm * touch.speed_mm_s**2 for touch in touches]
     found = fit_touches(heights, speeds, latency_s)
-    require_plausible(found, sigma_mm)
+    alike = min(Counter(speeds).values())
+    grid_mm = None if step_mm is None else step_mm * math.sqrt(alike)
+    require_plausible(found, sigma_mm, step_mm=step_mm)
     result = _result(found, len(touches), _length(plane, surface_z_mm, found.flange_z_mm, stored))
     result = judged(
         replace(result, offset=keep_unmeasured(stored, z_mm=result.offset.z_mm)),
@@ -136,6 +142,7 @@ def solve_z_touch(
         unknowns=found.fit.rank,
         sigma_mm=sigma_mm,
         tolerance=tolerance,
+        grid_mm=grid_mm,
     )
     result = replace(result, budget=_budget(result))
     if found.overshoot_s2_per_mm is not None:

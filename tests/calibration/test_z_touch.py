@@ -183,6 +183,18 @@ def test_the_interval_holds_what_no_speed_could_show():
     assert off_mm < given.half_width95[0] < 1.5
 
 
+def test_touches_that_a_latch_rounds_alike_are_not_sure_to_nothing():
+    # Seen in the cycle after, 4 ms: up to 0.004 mm late at 1 mm/s and 0.008 mm at 2 mm/s.
+    seen = [Touch(SURFACE - LENGTH - late, v) for v, late in ((2.0, 0.0), (1.0, 0.004)) * 2]
+    with refused("implausible_latency"):
+        solve_z_touch(seen, SURFACE)
+    found = solve_z_touch(seen, SURFACE, step_mm=0.008)
+    off_mm = abs(found.offset.z_mm - LENGTH)
+    assert off_mm == pytest.approx(0.008)
+    assert off_mm < found.half_width95[0] < 0.02
+    assert found.interval_from == "resolution"
+
+
 BRAKING_MM_S2 = (300.0, 500.0, 800.0, 2000.0, math.inf)
 
 

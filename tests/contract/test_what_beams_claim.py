@@ -167,10 +167,10 @@ def test_a_run_up_that_is_too_short_is_refused_before_anything_moves(search_mm, 
 def test_a_tip_too_far_aside_for_its_run_up_is_refused_in_the_crossing():
     plan = BeamsParameters(search_mm=1.5, crossing_mm_s=8.0)
     with sensor_cell(3) as cell:
-        tip = cell.truth
-        cell.simulator.world.tips[1] = replace(tip, x_mm=cell.stored.x_mm + 1.1)
+        tip, before = cell.truth, cell.stored
+        assert before is not None
+        cell.simulator.world.tips[1] = replace(tip, x_mm=before.x_mm + 1.1)
         cell.mount_beams(cell.beams(), **NOISE)
-        before = cell.stored
         with pytest.raises(CalibrationError, match="too near to where it started") as refused:
             cell.run(BeamsSource(cell.station, plan))
         assert refused.value.code == "run_up_too_short"

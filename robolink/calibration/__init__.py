@@ -62,6 +62,7 @@ if TYPE_CHECKING:
     from robolink.calibration.core.pose_suggestion import sigma_gain as sigma_gain
     from robolink.calibration.core.pose_suggestion import suggest_poses as suggest_poses
     from robolink.calibration.core.result import GUARD_FACTOR as GUARD_FACTOR
+    from robolink.calibration.core.result import LEAST_HALF_WIDTH as LEAST_HALF_WIDTH
     from robolink.calibration.core.result import PERSON_U_DRIFT_MM as PERSON_U_DRIFT_MM
     from robolink.calibration.core.result import PROBE_U_DRIFT_MM as PROBE_U_DRIFT_MM
     from robolink.calibration.core.result import CalibrationResult as CalibrationResult
@@ -235,7 +236,8 @@ __getattr__ = lazy_exports(
         "core.pose_checks": "MIN_ROTATION_DEG angle_spread_deg planar_sigma_gain",
         "core.pose_suggestion": "PoseLimits PosePlan precise_enough select_poses sigma_gain "
         "suggest_poses",
-        "core.result": "CalibrationResult Drift DriftVerdict GUARD_FACTOR PERSON_U_DRIFT_MM "
+        "core.result": "CalibrationResult Drift DriftVerdict GUARD_FACTOR LEAST_HALF_WIDTH "
+        "PERSON_U_DRIFT_MM "
         "PROBE_U_DRIFT_MM ResidualVectors VerifyResult judge_drift offset_sigma_mm worst_of",
         "core.least_squares": "linear_fit",
         "core.robust": "Floats Robust",

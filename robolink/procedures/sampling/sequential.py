@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from robolink.calibration import MOST_RESIDUAL_MM, CalibrationResult
+from robolink.calibration import LEAST_HALF_WIDTH, MOST_RESIDUAL_MM, CalibrationResult
 from robolink.errors import CalibrationError
 from robolink.messages import joined, tr
 from robolink.procedures.sampling.sampler import (
@@ -359,7 +359,7 @@ def _progress(
     if following is None or fit.half95_mm is None:
         return Notify(told, fit=shown)
     better = method.gain([*taken, following]) / method.gain(taken)
-    next_mm = fit.half95_mm * better
+    next_mm = max(fit.half95_mm * better, LEAST_HALF_WIDTH)
     gain = tr(
         "One more at {where} would make it about +-{next:.3f} mm.",
         where=method.named(following),

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import pytest
 from robolink_simulators.cell.world_parameters import WorldParameters
@@ -69,6 +70,17 @@ def test_a_needle_that_stands_upright_is_told_to_lean_by_nothing():
     assert "needle_leans" not in result.notes
     assert math.hypot(*result.lean.corrected_mm) < 0.003
     assert within(report, off_mm) < 1.2
+
+
+@soak
+@pytest.mark.parametrize("turn_deg", [0.0, 180.0])
+def test_a_needle_that_leans_under_a_flange_upside_down_is_corrected_too(turn_deg):
+    plan = BeamsParameters(turn_deg=turn_deg)
+    bent = {"lean_deg": 1.5, "lean_toward_deg": 200.0}
+    report, off_mm = measured(partial(sensor_cell, robot="C4-A601S"), 3, plan, **bent)
+    assert abs(report.proposal.result.inputs[0].w_deg) > 170
+    assert within(report, off_mm) < 1.2
+    assert report.verification.max_drift_mm < 0.012
 
 
 @soak

@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from robolink.calibration.beam_lines import Beam as Beam
     from robolink.calibration.beam_lines import Crossing as Crossing
     from robolink.calibration.beam_lines import find_beams as find_beams
+    from robolink.calibration.beam_shaft import Lean as Lean
+    from robolink.calibration.beam_shaft import ShaftSeen as ShaftSeen
     from robolink.calibration.camera.board import LEAST_SPACING_MM as LEAST_SPACING_MM
     from robolink.calibration.camera.board import solve_board as solve_board
     from robolink.calibration.camera.board_drawing import BoardDrawing as BoardDrawing
@@ -67,6 +69,7 @@ if TYPE_CHECKING:
     from robolink.calibration.core.pose_suggestion import sigma_gain as sigma_gain
     from robolink.calibration.core.pose_suggestion import suggest_poses as suggest_poses
     from robolink.calibration.core.result import GUARD_FACTOR as GUARD_FACTOR
+    from robolink.calibration.core.result import LEAST_HALF_WIDTH as LEAST_HALF_WIDTH
     from robolink.calibration.core.result import PERSON_U_DRIFT_MM as PERSON_U_DRIFT_MM
     from robolink.calibration.core.result import PROBE_U_DRIFT_MM as PROBE_U_DRIFT_MM
     from robolink.calibration.core.result import CalibrationResult as CalibrationResult
@@ -103,6 +106,7 @@ if TYPE_CHECKING:
     from robolink.calibration.core.turn_claim import TurnJudgement as TurnJudgement
     from robolink.calibration.crossed_beams import BeamsResult as BeamsResult
     from robolink.calibration.crossed_beams import crossing_sigma_gain as crossing_sigma_gain
+    from robolink.calibration.crossed_beams import moved_beams as moved_beams
     from robolink.calibration.crossed_beams import solve_crossed_beams as solve_crossed_beams
     from robolink.calibration.crossed_beams import where_they_cross as where_they_cross
     from robolink.calibration.evidence.approach_bias import (
@@ -255,6 +259,7 @@ __getattr__ = lazy_exports(
     __name__,
     {
         "beam_lines": "Beam Crossing find_beams",
+        "beam_shaft": "Lean ShaftSeen",
         "camera.board": "LEAST_SPACING_MM solve_board",
         "camera.board_drawing": "BoardDrawing",
         "camera.board_fit": "solve_board_fit",
@@ -275,7 +280,8 @@ __getattr__ = lazy_exports(
         "core.pose_checks": "MIN_ROTATION_DEG angle_spread_deg planar_sigma_gain",
         "core.pose_suggestion": "PoseLimits PosePlan precise_enough select_poses sigma_gain "
         "suggest_poses",
-        "core.result": "CalibrationResult Drift DriftVerdict GUARD_FACTOR PERSON_U_DRIFT_MM "
+        "core.result": "CalibrationResult Drift DriftVerdict GUARD_FACTOR LEAST_HALF_WIDTH "
+        "PERSON_U_DRIFT_MM "
         "PROBE_U_DRIFT_MM ResidualVectors VerifyResult judge_drift offset_sigma_mm worst_of",
         "core.least_squares": "linear_fit",
         "core.robust": "Floats Robust",
@@ -284,7 +290,9 @@ __getattr__ = lazy_exports(
         "SMALL_ANGLE TurnClaim TurnJudgement",
         "core.statistics": "NORMAL_95 chi_square_quantile f_quantile normal_quantile student_t "
         "studentized_range_0999",
-        "crossed_beams": "BeamsResult crossing_sigma_gain solve_crossed_beams where_they_cross",
+        "crossed_beams": (
+            "BeamsResult crossing_sigma_gain moved_beams solve_crossed_beams where_they_cross"
+        ),
         "flange_plane": "FlangePlane TipHeight carrying height_of solvable_planes",
         "pin.axis_displacement": "GOOD_WAY_MM axis_displacement between_deg require_unturned",
         "pin.joint": "JointResult JointTouch ToolDifference solve_joint",

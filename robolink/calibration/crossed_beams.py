@@ -5,12 +5,14 @@ of the flange, which may lean or hang upside down (docs/reference/evidence.md 3)
 """
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from robolink.calibration.beam_lines import Beam, Crossing, check_crossings, require_crossed
+from robolink.calibration.beam_shaft import Lean, ShaftSeen, lean_exceeds, with_unknown_length
 from robolink.calibration.beam_uncertainty import beams_part
 from robolink.calibration.core.accuracy import ErrorSource
 from robolink.calibration.core.least_squares import LinearFit, linear_fit
@@ -48,10 +50,28 @@ class BeamsResult(CalibrationResult):
             travel; ``None`` where only one direction was driven.
         u_without_beams_mm: Standard uncertainty of X and of Y by the crossings alone; empty
             without an interval.
+        lean: How the needle leans, ``None`` where its shaft was not looked at; X and Y are those
+            of its end, and hold the correction.
+        moved_mm: By how far each beam lies from where it was learnt, across it along its normal;
+            empty where its place was relied on.
+        step_mm: How finely the place of an edge is told; ``None`` where nobody said.
+        seen_above_mm: How far above its end the beams saw the needle, as it was planned; ``None``
+            where a solver alone was called. Without ``lean`` nobody knows what that does to X and
+            Y: half a degree at 1.5 mm is 0.013 mm.
     """
 
     lag_mm: tuple[float | None, float | None]
     u_without_beams_mm: tuple[float, ...] = ()
+    lean: Lean | None = None
+    moved_mm: tuple[float, ...] = ()
+    step_mm: float | None = None
+    seen_above_mm: float | None = None
+
+    def details(self) -> dict[str, object]:
+        """Return how the needle leans, and where the beams were found; see the base class."""
+        lean = {} if self.lean is None else {"needle": self.lean.as_json()}
+        moved = {"beams_moved_mm": list(self.moved_mm)} if self.moved_mm else {}
+        return {**lean, **moved}
 
     @property
     def inputs_per_look(self) -> int:
@@ -67,6 +87,8 @@ def solve_crossed_beams(
     height: TipHeight | None = None,
     sigma_mm: float | None = None,
     beams_may_have_moved: bool = False,
+    shaft: ShaftSeen | None = None,
+    step_mm: float | None = None,
     tolerance: Tolerance = PLANAR_TOLERANCE,
 ) -> BeamsResult:
     """Return the offset of a tip that was driven through two crossed beams.
@@ -76,10 +98,16 @@ def solve_crossed_beams(
         beams: Where the beams are, from :func:`find_beams` with a reference pin; what is
             uncertain about them goes into the interval.
         stored: The offset stored now; Z, U, V and W are kept from it, or 0 without one.
-        height: Z of the tip, for a flange that leans; without it that of ``stored`` counts.
+        height: Z of the tip, for a flange that leans; without it that of ``stored`` counts. Where
+            no shaft is given, Z of the place at which the beams see the needle.
         sigma_mm: Standard deviation of one crossing's middle, across the beam.
         beams_may_have_moved: Take only the directions of the beams as known. Needs crossings
             at two angles of U, best half a turn apart; the offset is then absolute.
+        shaft: Crossings of the shaft, which show how the needle leans: what was seen is corrected
+            for it. The error of the tip's height, or 0.6 mm where nobody knows it, then reaches X
+            and Y by the lean.
+        step_mm: How finely the place of an edge is told. Crossings that repeat each other fall on
+            the same steps, so it counts in full however many there are.
         tolerance: Residuals above which the result carries a warning.
 
     Raises:
@@ -107,11 +135,15 @@ def solve_crossed_beams(
     require_crossed(beams)
     if beams_may_have_moved:
         _require_turned(crossings)
+    if shaft is not None:
+        check_crossings(shaft.crossings, minimum=2)
+        require_flange_in_base([crossing.entry for crossing in shaft.crossings])
     two_ways = _two_ways(crossings, beams)
     if not all(two_ways):
         warnings = (*warnings, "one_direction")
     height = height_of(stored, height)
-    a, b, per_height = _system(crossings, beams, two_ways, beams_may_have_moved, height)
+    system = _System.of(crossings, beams, two_ways, moved=beams_may_have_moved, shaft=shaft)
+    a, b, per_height = system.equations(height)
     fit = linear_fit(a, b) if len(a) >= a.shape[1] else None
     if fit is None or fit.rank < a.shape[1]:
         raise _too_few(len(a))
@@ -125,7 +157,7 @@ def solve_crossed_beams(
         sigma_gain=_gain(fit),
         warnings=warnings,
         inputs=tuple(crossing.entry for crossing in crossings),
-        residuals_mm=_vectors(fit.residuals, crossings, beams),
+        residuals_mm=_vectors(fit.residuals[: len(crossings)], crossings, beams),
         condition_number=fit.condition_number,
         rank=fit.rank,
         unobservable=_KEPT,
@@ -136,20 +168,60 @@ def solve_crossed_beams(
             lags.pop(0) if two_ways[0] else None,
             lags.pop(0) if two_ways[1] else None,
         ),
+        moved_mm=tuple(fit.x[system.moved].tolist()),
+        step_mm=step_mm,
     )
+    # The crossings of the shaft have unknowns of their own and check nobody.
+    own = system.width - system.lean.start if shaft else 0
     result = judged(
         result,
-        fit.residuals[:, None],
+        fit.residuals[: len(crossings), None],
         fit.unit_covariance[:2, :2],
-        unknowns=a.shape[1],
+        unknowns=a.shape[1] - own,
         sigma_mm=sigma_mm,
         tolerance=tolerance,
+        grid_mm=None if step_mm is None else _middles_step_mm(crossings, beams, step_mm),
     )
     by_height = linear_fit(a, per_height).x[:2].tolist()
     result = with_height_error(result, (by_height[0], by_height[1]), height)
+    if shaft is not None:
+        result = _leaning(result, fit, system.lean, shaft, height)
     alone = tuple(math.sqrt(row[index]) for index, row in enumerate(result.covariance))
     result = replace(result, u_without_beams_mm=alone)
-    return with_station(result, beams_part(a, crossings, beams, result.offset))
+    return with_station(result, beams_part(a, system.crossings, beams, result.offset))
+
+
+def _leaning(
+    result: BeamsResult,
+    fit: LinearFit,
+    columns: slice,
+    shaft: ShaftSeen,
+    height: TipHeight | None,
+) -> BeamsResult:
+    """Return a result with how the needle leans, and what an unknown length of it does then."""
+    x, y = fit.x[columns].tolist()
+    variance = (result.sigma_mm or 0.0) ** 2
+    spread = (fit.unit_covariance[columns, columns] * variance).tolist()
+    lean = Lean(x, y, shaft.above_mm, lean_exceeds(x, y, spread))
+    notes = (*result.notes, "needle_leans") if lean.sure else result.notes
+    result = replace(result, lean=lean, notes=notes)
+    return with_unknown_length(result, lean, None if height is None else height.sigma_mm)
+
+
+def _middles_step_mm(
+    crossings: Sequence[Crossing], beams: tuple[Beam, Beam], step_mm: float
+) -> float:
+    """Return the step of a crossing's middle that does for all of them as if each had its own.
+
+    Crossings of one beam in one direction at one U are all rounded alike. So may be both edges of
+    one, for the way to the second begins where the step put the first. And what one direction
+    rounds up the other rounds down, for both begin equally far from the expected place: the error
+    of a tip is that of a single edge.
+    """
+    alike = Counter(
+        (c.beam, c.direction_over(beams[c.beam]), round(c.entry.u_deg, 3)) for c in crossings
+    )
+    return step_mm * math.sqrt(2 * min(alike.values()))
 
 
 def crossing_sigma_gain(
@@ -157,6 +229,7 @@ def crossing_sigma_gain(
     beams: tuple[Beam, Beam],
     *,
     beams_may_have_moved: bool = False,
+    shaft: ShaftSeen | None = None,
 ) -> float:
     """Return the standard deviation of X or Y, the larger, as a multiple of one crossing's.
 
@@ -166,6 +239,7 @@ def crossing_sigma_gain(
         crossings: The crossings that are planned; where they are does not count.
         beams: Where the beams are.
         beams_may_have_moved: As for :func:`solve_crossed_beams`.
+        shaft: Likewise.
 
     Example:
         >>> from robolink import Pose
@@ -180,10 +254,10 @@ def crossing_sigma_gain(
         >>> round(crossing_sigma_gain(once * 4, beams), 3)
         0.5
     """
+    two_ways = _two_ways(crossings, beams)
+    system = _System.of(crossings, beams, two_ways, moved=beams_may_have_moved, shaft=shaft)
     # Height 0 will do: the gain depends on no right side.
-    a, b, _ = _system(
-        crossings, beams, _two_ways(crossings, beams), beams_may_have_moved, TipHeight(0.0)
-    )
+    a, b, _ = system.equations(TipHeight(0.0))
     return _gain(linear_fit(a, b))
 
 
@@ -196,36 +270,87 @@ def _two_ways(crossings: Sequence[Crossing], beams: tuple[Beam, Beam]) -> tuple[
     return ({(0, 1.0), (0, -1.0)} <= driven, {(1, 1.0), (1, -1.0)} <= driven)
 
 
-def _system(
-    crossings: Sequence[Crossing],
-    beams: tuple[Beam, Beam],
-    two_ways: tuple[bool, bool],
-    moved: bool,
-    height: TipHeight | None,
-) -> tuple[Floats, Floats, Floats]:
-    """Return one equation a crossing: n (middle + A t + c t_z) + direction lag = distance.
+@dataclass(frozen=True, slots=True)
+class _System:
+    """One equation a crossing: n (middle + A (t + l h) + c (t_z + h)) + direction lag = distance.
 
-    Columns: t (2), a lag for each beam driven both ways, and with ``moved`` by how far each
-    beam lies from where it was. The last is by how much the right side changes for 1 mm of t_z.
+    Columns: t (2), a lag for each beam driven both ways; with ``moved`` by how far each beam lies
+    from where it was; with a shaft its lean l (2), and lags of its own.
+
+    Attributes:
+        crossings: Those of the tip, then those of the shaft.
+        beams: Where the beams are.
+        above_mm: h of each, how far above its end the needle was seen; 0 without a shaft.
+        lag_columns: Of each crossing, ``None`` for none.
+        moved, lean: Which columns they are.
+        width: How many columns there are.
     """
-    planes = solvable_planes([crossing.entry for crossing in crossings], height)
-    lag_column = {beam: 2 + sum(two_ways[:beam]) for beam in (0, 1) if two_ways[beam]}
-    width = 2 + sum(two_ways) + (2 if moved else 0)
-    a, b = np.zeros((len(crossings), width)), np.zeros(len(crossings))
-    per_height = np.zeros(len(crossings))
-    for row, crossing in enumerate(crossings):
-        beam = beams[crossing.beam]
-        nx, ny = beam.normal
-        (xx, yx), (xy, yy) = planes[row].columns
-        a[row, 0], a[row, 1] = nx * xx + ny * yx, nx * xy + ny * yy
-        per_height[row] = -nx * planes[row].axis[0] - ny * planes[row].axis[1]
-        if crossing.beam in lag_column:
-            a[row, lag_column[crossing.beam]] = -crossing.direction_over(beam)
-        if moved:
-            a[row, width - 2 + crossing.beam] = -1.0
-        x, y = crossing.middle_mm
-        b[row] = beam.distance_mm - nx * x - ny * y
-    return a, b + per_height * known_z_mm(height), per_height
+
+    crossings: tuple[Crossing, ...]
+    beams: tuple[Beam, Beam]
+    above_mm: tuple[float, ...]
+    lag_columns: tuple[int | None, ...]
+    moved: slice
+    lean: slice
+    width: int
+
+    @classmethod
+    def of(
+        cls,
+        crossings: Sequence[Crossing],
+        beams: tuple[Beam, Beam],
+        two_ways: tuple[bool, bool],
+        *,
+        moved: bool,
+        shaft: ShaftSeen | None,
+    ) -> "_System":
+        """Return that of some crossings; the arguments as in :func:`solve_crossed_beams`."""
+        start = 2 + sum(two_ways)
+        own = {beam: 2 + sum(two_ways[:beam]) for beam in (0, 1) if two_ways[beam]}
+        lags = [own.get(crossing.beam) for crossing in crossings]
+        lean = start + (2 if moved else 0)
+        everything, above, width = list(crossings), [0.0] * len(crossings), lean
+        if shaft is not None:
+            both = _two_ways(shaft.crossings, beams)
+            width += 2 + sum(both)
+            own = {beam: lean + 2 + sum(both[:beam]) for beam in (0, 1) if both[beam]}
+            lags += [own.get(crossing.beam) for crossing in shaft.crossings]
+            everything += shaft.crossings
+            above = [shaft.above_mm] * len(crossings)
+            above += [shaft.above_mm + shaft.deeper_mm] * len(shaft.crossings)
+        return cls(
+            tuple(everything),
+            beams,
+            tuple(above),
+            tuple(lags),
+            moved=slice(start, lean),
+            lean=slice(lean, lean + (0 if shaft is None else 2)),
+            width=width,
+        )
+
+    def equations(self, height: TipHeight | None) -> tuple[Floats, Floats, Floats]:
+        """Return matrix, right side, and by how much the latter changes for 1 mm of t_z."""
+        count = len(self.crossings)
+        planes = solvable_planes([crossing.entry for crossing in self.crossings], height)
+        a, b, per_height = np.zeros((count, self.width)), np.zeros(count), np.zeros(count)
+        for row, crossing in enumerate(self.crossings):
+            beam, plane, above_mm = self.beams[crossing.beam], planes[row], self.above_mm[row]
+            nx, ny = beam.normal
+            (xx, yx), (xy, yy) = plane.columns
+            across = nx * xx + ny * yx, nx * xy + ny * yy
+            a[row, :2] = across
+            per_height[row] = -nx * plane.axis[0] - ny * plane.axis[1]
+            lag = self.lag_columns[row]
+            if lag is not None:
+                a[row, lag] = -crossing.direction_over(beam)
+            if self.moved.stop > self.moved.start:
+                a[row, self.moved.start + crossing.beam] = -1.0
+            if self.lean.stop > self.lean.start:
+                a[row, self.lean] = across[0] * above_mm, across[1] * above_mm
+            x, y = crossing.middle_mm
+            z_mm = known_z_mm(height) + math.copysign(above_mm, plane.r33)
+            b[row] = beam.distance_mm - nx * x - ny * y + per_height[row] * z_mm
+        return a, b, per_height
 
 
 def _vectors(
@@ -242,6 +367,24 @@ def where_they_cross(beams: tuple[Beam, Beam]) -> tuple[float, float]:
     normals = np.array([beam.normal for beam in beams])
     x, y = np.linalg.solve(normals, [beam.distance_mm for beam in beams]).tolist()
     return x, y
+
+
+def moved_beams(beams: tuple[Beam, Beam], moved_mm: Sequence[float]) -> tuple[Beam, Beam]:
+    """Return beams at the places where :func:`solve_crossed_beams` found them.
+
+    Args:
+        beams: Where they were learnt.
+        moved_mm: By how far each lies from there, along its normal; empty for nothing.
+    """
+    if not moved_mm:
+        return beams
+    first, second = (
+        replace(
+            beam, x_mm=beam.x_mm + beam.normal[0] * by_mm, y_mm=beam.y_mm + beam.normal[1] * by_mm
+        )
+        for beam, by_mm in zip(beams, moved_mm, strict=True)
+    )
+    return first, second
 
 
 def _too_few(count: int) -> CalibrationError:

@@ -7,13 +7,13 @@ there (docs/reference/evidence.md 13).
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from robolink.calibration.core.least_squares import LinearFit, linear_fit
 from robolink.calibration.core.robust import Floats
-from robolink.calibration.core.statistics import f_quantile
+from robolink.calibration.core.statistics import f_quantile, student_t95
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 
@@ -45,6 +45,11 @@ class TouchFit:
         overshoot_gain: Its standard deviation for a scatter of 1 mm.
         f_quadratic: How much the overshoot explains, ``None`` without a test.
         f_limit: What that has to exceed.
+        overshoot_upper_s2_per_mm: The largest overshoot, in 97.5 %, that the test may have missed;
+            ``None`` without a test.
+        braking_mm2_per_s2: By how much an overshoot of 1 s^2/mm that the fit does not know shifts
+            the height: v1 v2 for a line through two speeds, the mean of v^2 for a latency that
+            was given.
     """
 
     fit: LinearFit
@@ -55,6 +60,8 @@ class TouchFit:
     overshoot_gain: float = 0.0
     f_quadratic: float | None = None
     f_limit: float | None = None
+    overshoot_upper_s2_per_mm: float | None = None
+    braking_mm2_per_s2: float = 0.0
 
     @property
     def gain(self) -> float:
@@ -78,7 +85,7 @@ def fit_touches(
         columns.append(-v)
     else:
         z = z + v * latency_s
-    line = _with(columns, z, latency_s)
+    line = replace(_with(columns, z, latency_s), braking_mm2_per_s2=_braking(columns, v))
     dof = len(z) - len(columns) - 1
     if len(set(speeds_mm_s)) < 3 or dof < 1:
         return line
@@ -88,32 +95,40 @@ def fit_touches(
     floor = len(z) * _ROUNDING_MM**2
     ratio = max(won, 0.0) * dof / max(left, floor)
     limit = f_quantile(_OVERSHOOT_QUANTILE, 1, dof)
+    gain, found = math.sqrt(float(parabola.fit.unit_covariance[-1, -1])), float(parabola.fit.x[-1])
+    upper = max(found, 0.0) + student_t95(dof) * gain * math.sqrt(left / dof)
     best = parabola if ratio > limit else line
-    return TouchFit(
-        best.fit,
-        best.flange_z_mm,
-        best.latency_s,
-        best.latency_gain,
-        float(parabola.fit.x[-1]) if best is parabola else None,
-        math.sqrt(float(parabola.fit.unit_covariance[-1, -1])),
+    return replace(
+        best,
+        overshoot_s2_per_mm=found if best is parabola else None,
+        overshoot_gain=gain,
         f_quadratic=ratio,
         f_limit=limit,
+        overshoot_upper_s2_per_mm=upper,
     )
 
 
-def require_plausible(found: TouchFit, sigma_mm: float | None) -> None:
+def _braking(columns: list[Floats], v: Floats) -> float:
+    """Return by how much the height of a line is off for an overshoot of 1 s^2/mm."""
+    return abs(float(np.linalg.pinv(np.column_stack(columns))[0] @ v**2))
+
+
+def require_plausible(
+    found: TouchFit, sigma_mm: float | None, *, step_mm: float | None = None
+) -> None:
     """Refuse a latency or braking that no machine has: speeds or touches are wrong then.
 
     Args:
         found: The fit.
         sigma_mm: Standard deviation of one touch, where it is known; else the residuals tell it.
+        step_mm: How finely its place is told, where it is known: what repeats itself hides that.
 
     Raises:
         CalibrationError: ``implausible_latency``.
     """
     residuals = found.fit.residuals
     dof = residuals.size - found.fit.rank
-    slack = _BEYOND_SIGMAS * (sigma_mm or 0.0)
+    slack = max(_BEYOND_SIGMAS * (sigma_mm or 0.0), step_mm or 0.0)
     if dof > 0:
         # Of a scatter that a few touches tell, as many as are as rare: Student's t.
         scatter = math.sqrt(float(residuals @ residuals) / dof)

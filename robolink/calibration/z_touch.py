@@ -9,6 +9,8 @@ when the robot brakes before its position is read:
 which is believed when an F test says that it is there (docs/reference/evidence.md 13).
 """
 
+import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -16,6 +18,7 @@ from robolink.calibration.core.accuracy import ErrorSource
 from robolink.calibration.core.budget import DIVISORS, BudgetRow, UncertaintyBudget
 from robolink.calibration.core.pose_checks import keep_unmeasured, require_finite, require_poses
 from robolink.calibration.core.result import CalibrationResult
+from robolink.calibration.core.statistics import NORMAL_95
 from robolink.calibration.flange_plane import FlangePlane, TipHeight, solvable_planes
 from robolink.calibration.quality.fit_quality import judged
 from robolink.calibration.quality.tolerances import Tolerance
@@ -28,8 +31,13 @@ PROBE_TOLERANCE = Tolerance(rms_mm=0.05, max_residual_mm=0.15)
 
 RECOMMENDED_TOUCHES = 3
 
-USUAL_DECELERATION_MM_S2 = 500.0
-"""How a robot brakes where nobody knows it; see docs/reference/evidence.md 13."""
+USUAL_DECELERATION_MM_S2 = 300.0
+"""How hard a robot brakes at least where nobody knows it; see docs/reference/evidence.md 13."""
+
+_ONE_SIDED = 0.72
+"""A shift of always the same size and side is held in 93 % by an interval in which a rectangle of
+half width ``a`` is one part, however large the scatter beside it, up to so much of ``a``
+(computed, docs/reference/evidence.md 13)."""
 
 _SPEEDS_APART = 1.5
 """Speeds that differ by less than this factor do not tell the latency."""
@@ -79,6 +87,7 @@ def solve_z_touch(
     deceleration_mm_s2: float = USUAL_DECELERATION_MM_S2,
     deceleration_told: bool = False,
     sigma_mm: float | None = None,
+    step_mm: float | None = None,
     tolerance: Tolerance = PROBE_TOLERANCE,
 ) -> ZTouchResult:
     """Return Z of a tip that touched a surface.
@@ -91,11 +100,13 @@ def solve_z_touch(
         flange: A pose with the angles of all touches; upright without one. Where it leans, X and
             Y of the tip reach its height and are taken from ``stored``.
         latency_s: Of the trigger, when an earlier measurement found it.
-        deceleration_mm_s2: How the robot brakes. What that shifts Z by, where the speeds cannot
-            show it, is a row of the budget.
+        deceleration_mm_s2: How hard the robot brakes at least. What that may shift Z by, where
+            the speeds cannot show it, is in the interval and a row of the budget.
         deceleration_told: Whether the controller tells so: then the way of braking is taken out
             of each reading, and the row stays as wide as that.
         sigma_mm: Standard deviation of one reading, when it is known.
+        step_mm: How finely the place of the trigger is told, at the fastest of the touches.
+            Touches that repeat each other fall on the same step, so it counts in full.
         tolerance: Residuals above which the result carries a warning.
 
     Raises:
@@ -121,7 +132,9 @@ def solve_z_touch(
     ahead_s2_per_mm = 1 / (2 * deceleration_mm_s2) if deceleration_told else 0.0
     heights = [touch.z_mm + ahead_s2_per_mm * touch.speed_mm_s**2 for touch in touches]
     found = fit_touches(heights, speeds, latency_s)
-    require_plausible(found, sigma_mm)
+    alike = min(Counter(speeds).values())
+    grid_mm = None if step_mm is None else step_mm * math.sqrt(alike)
+    require_plausible(found, sigma_mm, step_mm=step_mm)
     result = _result(found, len(touches), _length(plane, surface_z_mm, found.flange_z_mm, stored))
     result = judged(
         replace(result, offset=keep_unmeasured(stored, z_mm=result.offset.z_mm)),
@@ -130,8 +143,19 @@ def solve_z_touch(
         unknowns=found.fit.rank,
         sigma_mm=sigma_mm,
         tolerance=tolerance,
+        grid_mm=grid_mm,
     )
-    return replace(result, budget=_budget(result, found, speeds, deceleration_mm_s2))
+    result = replace(result, budget=_budget(result))
+    if found.overshoot_s2_per_mm is not None:
+        return result
+    overshoot_s2_per_mm = 1 / (2 * deceleration_mm_s2)
+    if found.overshoot_upper_s2_per_mm is not None and not deceleration_told:
+        overshoot_s2_per_mm = min(overshoot_s2_per_mm, found.overshoot_upper_s2_per_mm)
+    half_mm = found.braking_mm2_per_s2 * overshoot_s2_per_mm / abs(plane.r33)
+    if not deceleration_told:
+        half_mm /= _ONE_SIDED  # never less than nothing, and perhaps all of it
+    origin = tr("{deceleration:g} mm/s^2, not measured", deceleration=deceleration_mm_s2)
+    return _with_braking(result, half_mm / DIVISORS["rectangular"], origin)
 
 
 def _result(found: TouchFit, count: int, z_mm: float) -> ZTouchResult:
@@ -180,10 +204,8 @@ def _length(
     return (surface_z_mm - flange_z_mm - aside) / plane.r33
 
 
-def _budget(
-    result: ZTouchResult, found: TouchFit, speeds: Sequence[float], deceleration_mm_s2: float
-) -> UncertaintyBudget:
-    """Return scatter, and the braking where no speed could show it."""
+def _budget(result: ZTouchResult) -> UncertaintyBudget:
+    """Return the scatter of the touches as a budget."""
     rows = []
     if result.sigma_mm is not None:
         nu = float("inf") if result.sigma_stated else float(result.dof or 1)
@@ -191,22 +213,24 @@ def _budget(
         rows.append(
             BudgetRow(tr("scatter"), result.sigma_mm, nu, result.sigma_gain, origin, kind="A")
         )
-    if found.f_quadratic is None:
-        half = _braking_mm(speeds, deceleration_mm_s2, given=found.fit.rank == 1)
-        rows.append(
-            BudgetRow(
-                tr("braking"),
-                half / DIVISORS["rectangular"],
-                origin=tr("{deceleration:g} mm/s^2, not measured", deceleration=deceleration_mm_s2),
-            )
-        )
     return UncertaintyBudget.of(rows, not_assessed=(tr("height of the surface"),))
 
 
-def _braking_mm(speeds: Sequence[float], deceleration_mm_s2: float, *, given: bool) -> float:
-    """Return by how much braking shifts Z: v1 v2 / (2 a) for a line through two speeds."""
-    slow, fast = min(speeds), max(speeds)
-    return (fast * fast if given else slow * fast) / (2 * deceleration_mm_s2)
+def _with_braking(result: ZTouchResult, u_mm: float, origin: str) -> ZTouchResult:
+    """Return the result with what braking may have shifted Z by, in interval and budget."""
+    row = BudgetRow(tr("braking"), u_mm, origin=origin)
+    result = replace(result, budget=(result.budget or UncertaintyBudget.of(())).with_row(row))
+    if not result.half_width95:
+        return result
+    # Not by degrees of freedom of both together: few touches that agree by luck would make the
+    # factor of their own scatter small as well, and 92 % of the intervals held the truth.
+    half_mm = math.hypot(result.half_width95[0], NORMAL_95 * u_mm)
+    return replace(
+        result,
+        covariance=((result.covariance[0][0] + u_mm**2,),),
+        half_width95=(half_mm,),
+        region95_radius_mm=half_mm,
+    )
 
 
 def _check_touches(touches: Sequence[Touch]) -> None:

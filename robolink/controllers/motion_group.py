@@ -68,6 +68,14 @@ class MotionGroupCore(ABC):
         """Return how it brakes in straight movements; nothing where this kind does not tell."""
         return None
 
+    def run_up_mm(self, speed_mm_s: float) -> float | None:
+        """Return in what way it reaches a speed; nothing where this kind does not tell."""
+        return None
+
+    def edge_step_mm(self, speed_mm_s: float) -> float | None:
+        """Return in what steps it tells where an edge was; nothing where nobody knows."""
+        return None
+
     def require_able(self, purpose: str) -> None:
         """Refuse what no movement could begin in now; see the model."""
 

@@ -31,6 +31,7 @@ from robolink.nozzle_change._plan import (
     require_contacts,
     require_inputs,
     require_measurable,
+    require_motion,
 )
 from robolink.nozzle_change._proposal import (
     ChangeReport,
@@ -153,6 +154,7 @@ class NozzleChange:
                 self._controller.tools.require_writable(one.tool)
             require_measurable(self._controller, self._plan)
         require_contacts(self._controller, self._plan)
+        require_motion(self._controller, self._plan)
         plan, listener, context = self._plan, self._listener, self._context(write=write)
         measuring = Measuring(context, listener)
         measuring.go_to(plan.safe, tr("Moving to the safe pose."))

@@ -15,6 +15,7 @@ from robolink.nozzle_change._proposal import Proposal
 from robolink.nozzle_change._seating import touching_as_recorded
 from robolink.procedures import (
     MovingSource,
+    RequiresMotion,
     RequiresSensor,
     StopsAbovePin,
     TipSource,
@@ -229,6 +230,17 @@ def require_measurable(controller: Controller, plan: ChangePlan) -> None:
     for one in plan.tools:
         if one.method:
             tools.require_measurable(find_method(one.method).measures)
+
+
+def require_motion(controller: Controller, plan: ChangePlan) -> None:
+    """Refuse a plan whose measurement the robot moves too fast for; only reads.
+
+    Raises:
+        CalibrationError: As :meth:`RequiresMotion.require_able`.
+    """
+    for one in plan.tools:
+        if isinstance(one.source, RequiresMotion):
+            one.source.require_able(controller.groups[0], one.criteria.max_change_mm)
 
 
 def require_contact_input(controller: Controller, touch: TouchPlan) -> None:

@@ -21,6 +21,7 @@ from robolink.nozzle_change._plan import (
     require_clearance,
     require_inputs,
     require_measurable,
+    require_motion,
 )
 from robolink.procedures import MovingSource, approach_path
 from robolink.runner import (
@@ -85,12 +86,14 @@ def preview(controller: Controller, plan: ChangePlan) -> tuple[PlannedStep, ...]
         ConfigError: A clearance is below the largest change that is believed, or an input is to
             show contact where there are none.
         RejectedError: The machine's kinematics could not be told what would be measured.
+        CalibrationError: The robot moves too fast for what is measured.
     """
     require_clearance(plan)
     require_inputs(controller, plan)
     require_measurable(controller, plan)
     if not plan.moves:
         return ()
+    require_motion(controller, plan)
     return tuple(_foresee(controller, plan, flange_now(controller)))
 
 

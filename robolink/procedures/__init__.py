@@ -71,6 +71,7 @@ if TYPE_CHECKING:
     from robolink.procedures.source import FindsStation as FindsStation
     from robolink.procedures.source import MeasurementContext as MeasurementContext
     from robolink.procedures.source import MovingSource as MovingSource
+    from robolink.procedures.source import RequiresMotion as RequiresMotion
     from robolink.procedures.source import RequiresSensor as RequiresSensor
     from robolink.procedures.source import StopsAbovePin as StopsAbovePin
     from robolink.procedures.source import TipSource as TipSource
@@ -107,7 +108,8 @@ __getattr__ = lazy_exports(
             "SamplingPolicy TAKE_ALL agreement finalize_samples may_end_early "
             "resume_samples sample_sequentially"
         ),
-        "source": "FindsStation MeasurementContext MovingSource RequiresSensor StopsAbovePin "
+        "source": "FindsStation MeasurementContext MovingSource RequiresMotion RequiresSensor "
+        "StopsAbovePin "
         "TipSource TouchesFurther",
         "surface_proof": "SurfaceProof",
         "surface_touches": "SurfaceTouches",

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from typing import Protocol, TypeVar, runtime_checkable
 
 from robolink.calibration import CalibrationResult, VerifyResult
-from robolink.model import Controller, ControllerSensor, Pose, TipSensor, ToolOffset
+from robolink.model import Controller, ControllerSensor, MotionGroup, Pose, TipSensor, ToolOffset
 from robolink.runner import EndingWatch, Operator, Procedure, Runner, RunSettings, StepDone
 from robolink.stations import Found
 
@@ -296,6 +296,22 @@ class FindsStation(Protocol):
 
     def found_station(self, result: CalibrationResult, tool: int) -> Found | None:
         """Return what a kept measurement says about the station, ``None`` for nothing."""
+
+
+@runtime_checkable
+class RequiresMotion(Protocol):
+    """A source whose measurement holds only where the robot can move as it presumes."""
+
+    def require_able(self, group: MotionGroup, change_mm: float) -> None:
+        """Find out whether it can, before anything moves; only reads.
+
+        Args:
+            group: What moves the tip.
+            change_mm: The largest change of the tip that is believed.
+
+        Raises:
+            CalibrationError: It cannot; its remedy says what to change in the plan.
+        """
 
 
 @runtime_checkable

@@ -1,7 +1,7 @@
 """Two crossed light beams that a program drove its tip through, edge by edge."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import astuple, dataclass, field
+from dataclasses import astuple, dataclass, field, replace
 from typing import TYPE_CHECKING, ClassVar, Final
 
 from robolink.errors import CalibrationError, RemoteProtocolError
@@ -96,7 +96,8 @@ class ProgramCrossings:
     def solve(self, stored: ToolOffset) -> "CalibrationResult":
         """Return the offset; see ``ProgramMeasure``.
 
-        Crossings at two angles of U rely on the directions of the beams only.
+        Crossings at two angles of U rely on the directions of the beams only. X and Y are those of
+        the end of the needle, corrected by how its shaft leans.
 
         Raises:
             CalibrationError: ``too_few_poses``, ``shaft_not_crossed``, ``uneven_depth``,
@@ -104,14 +105,18 @@ class ProgramCrossings:
                 :func:`~robolink.calibration.solve_crossed_beams`.
         """
         from robolink.calibration import MIN_ROTATION_DEG, angle_spread_deg
+        from robolink.methods.beams.solving import require_straight
 
         self._measured.require(LEAST_CROSSINGS)
         crossings, shaft = _by_depth(self._measured.crossings)
         require_poses_sent(len(crossings), LEAST_CROSSINGS)
         solver = self._solver(crossings[0].entry, stored)
-        self._require_straight(solver, crossings, shaft)
+        deeper_mm = _deeper_mm(crossings, shaft)
         spread_deg = angle_spread_deg([_heading_deg(one.entry) for one in crossings])
-        return _both_ways(solver.solved(crossings, moved=spread_deg >= MIN_ROTATION_DEG))
+        moved = spread_deg >= MIN_ROTATION_DEG
+        result = solver.solved(crossings, shaft, deeper_mm=deeper_mm, moved=moved)
+        require_straight(result, self._max_lean_deg)
+        return _both_ways(result)
 
     def prove(self, result: "CalibrationResult", written: ToolOffset) -> "VerifyResult":
         """Return where crossings at another U see the new tip; see ``ProgramMeasure``.
@@ -120,7 +125,13 @@ class ProgramCrossings:
             CalibrationError: ``too_few_poses``, ``insufficient_rotation``, ``one_direction``, and
                 those of :func:`~robolink.calibration.solve_crossed_beams`.
         """
-        from robolink.calibration import Drift, FlangePlane, VerifyResult
+        from robolink.calibration import (
+            BeamsResult,
+            Drift,
+            FlangePlane,
+            VerifyResult,
+            moved_beams,
+        )
 
         self._proving.require(LEAST_OF_A_ROUND)
         crossings = self._proving.crossings
@@ -128,9 +139,15 @@ class ProgramCrossings:
         drifts = []
         for heading_deg in _headings(crossings):
             seen = [one for one in crossings if _is_at(one, heading_deg)]
-            found = _both_ways(self._solver(seen[0].entry, written).solved(seen)).offset
+            solver = self._solver(seen[0].entry, written)
+            off_mm = written.x_mm, written.y_mm
+            if isinstance(result, BeamsResult):
+                solver = replace(solver, beams=moved_beams(solver.beams, result.moved_mm))
+                if result.lean is not None:
+                    off_mm = solver.seen_mm(written, result.lean)
+            found = _both_ways(solver.solved(seen)).offset
             plane = FlangePlane.of(seen[0].entry)
-            off_mm = (found.x_mm - written.x_mm, found.y_mm - written.y_mm)
+            off_mm = (found.x_mm - off_mm[0], found.y_mm - off_mm[1])
             drifts.append(Drift(seen[0].entry.u_deg, *plane.in_base(*off_mm)))
         return VerifyResult(tuple(drifts), self._limits.tolerance_mm)
 
@@ -152,30 +169,25 @@ class ProgramCrossings:
         dip_mm = station.z_mm - tip_z_mm
         return CrossingSolver(station.beams, frame, dip_mm, expected, self._limits.sigma_mm)
 
-    def _require_straight(
-        self,
-        solver: "CrossingSolver",
-        crossings: "Sequence[Crossing]",
-        shaft: "Sequence[Crossing]",
-    ) -> None:
-        """Refuse a needle of which the beams, which see its shaft, do not tell where its tip is."""
-        if len(shaft) < LEAST_OF_A_ROUND or len(_headings(shaft)) > 1:
-            raise CalibrationError(
-                "shaft_not_crossed",
-                tr(
-                    "The shaft was not crossed {depth:g} mm deeper, each beam both ways.",
-                    depth=LEAST_SHAFT_MM,
-                ),
-            )
-        (heading_deg,) = _headings(shaft)
-        beside = [one for one in crossings if _is_at(one, heading_deg)]
-        require_poses_sent(len(beside), LEAST_OF_A_ROUND)
-        solver.require_straight(
-            beside,
-            shaft,
-            shaft_mm=beside[0].entry.z_mm - shaft[0].entry.z_mm,
-            max_lean_deg=self._max_lean_deg,
+
+def _deeper_mm(crossings: "Sequence[Crossing]", shaft: "Sequence[Crossing]") -> float:
+    """Return how much deeper the shaft was crossed; it tells where the end of a needle is.
+
+    Raises:
+        CalibrationError: ``shaft_not_crossed``, ``too_few_poses``.
+    """
+    if len(shaft) < LEAST_OF_A_ROUND or len(_headings(shaft)) > 1:
+        raise CalibrationError(
+            "shaft_not_crossed",
+            tr(
+                "The shaft was not crossed {depth:g} mm deeper, each beam both ways.",
+                depth=LEAST_SHAFT_MM,
+            ),
         )
+    (heading_deg,) = _headings(shaft)
+    beside = [one for one in crossings if _is_at(one, heading_deg)]
+    require_poses_sent(len(beside), LEAST_OF_A_ROUND)
+    return beside[0].entry.z_mm - shaft[0].entry.z_mm
 
 
 def _by_depth(crossings: "Sequence[Crossing]") -> "tuple[list[Crossing], list[Crossing]]":

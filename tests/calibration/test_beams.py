@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from robolink.calibration import Beam, Crossing, find_beams, solve_crossed_beams
-from robolink.model import Pose, angle_difference_deg, rotate_xy
+from robolink.calibration import Beam, Crossing, find_beams, rotation_of, solve_crossed_beams
+from robolink.methods.beams.solving import CrossingSolver
+from robolink.model import Pose, ToolOffset, angle_difference_deg, rotate_xy
 from tests.calibration._simulated import assert_honest, coverage, refused
 
 TRUE = (Beam(300.0, 80.0, 3.0), Beam(300.0, 80.0, 88.0))
@@ -150,3 +151,94 @@ def test_the_interval_holds_the_truth(angles, stated, trials):
         return solve_crossed_beams(seen, TRUE, sigma_mm=stated, beams_may_have_moved=moved)
 
     assert_honest(coverage(measure, TIP, trials), trials, stated=stated is not None)
+
+
+def needle_crossings(frame, tip, lean, *, dip_mm, beams=TRUE, dz_mm=0.0):
+    """Cross both beams both ways with a needle that leans, at the height of the beams, -30.
+
+    The frame is brought where the expected tip, which is ``dz_mm`` shorter along the flange's axis
+    than the real one, is ``dip_mm`` below the beams.
+    """
+    turn = rotation_of(frame)
+    up = math.copysign(1.0, turn[2, 2])
+    end = np.array([*tip, 20.0 * -up])
+    along = np.array([*lean, up])
+    expected = end - np.array([0, 0, -up * dz_mm])
+    z_mm = -30.0 - dip_mm - (turn @ expected)[2]
+    above_mm = (-30.0 - z_mm - (turn @ end)[2]) / (turn @ along)[2]
+    seen = turn @ (end + above_mm * along)
+    found = []
+    for beam, line in enumerate(beams):
+        nx, ny = line.normal
+        for way in (1, -1):
+            ends = [
+                replace(
+                    frame,
+                    x_mm=line.x_mm + nx * way * half - seen[0],
+                    y_mm=line.y_mm + ny * way * half - seen[1],
+                    z_mm=z_mm,
+                )
+                for half in (-0.58, 0.62)
+            ]
+            found.append(Crossing(beam, *ends))
+    return found, ToolOffset(*expected)
+
+
+LEANING_FRAMES = [
+    Pose(0, 0, 0, 0, tool=0),
+    Pose(0, 0, 0, 130, tool=0),
+    Pose(0, 0, 0, 40, 0, 180, tool=0),
+    Pose(0, 0, 0, 20, 4, -6, tool=0),
+    Pose(0, 0, 0, -160, -5, 176, tool=0),
+]
+
+
+@pytest.mark.parametrize("frame", LEANING_FRAMES)
+@pytest.mark.parametrize("lean_deg", [0.5, 1.0, 1.9])
+@pytest.mark.parametrize("turn_deg", [0.0, 180.0, 90.0])
+def test_what_was_seen_of_a_needle_that_leans_is_brought_down_to_its_end(frame, lean_deg, turn_deg):
+    slope = math.tan(math.radians(lean_deg))
+    lean = slope * math.cos(0.7), slope * math.sin(0.7)
+    # Found at two angles it does not matter that the beams were moved.
+    beams = (replace(TRUE[0], y_mm=80.3), replace(TRUE[1], x_mm=299.8)) if turn_deg else TRUE
+    seen, stored = needle_crossings(frame, TIP, lean, dip_mm=1.5, beams=beams)
+    if turn_deg:
+        turned = replace(frame, u_deg=frame.u_deg + turn_deg)
+        seen += needle_crossings(turned, TIP, lean, dip_mm=1.5, beams=beams)[0]
+    deeper, _ = needle_crossings(frame, TIP, lean, dip_mm=4.5, beams=beams)
+    solver = CrossingSolver(TRUE, frame, 1.5, stored, sigma_mm=0.004)
+    moved = bool(turn_deg)
+    found = solver.solved(seen, deeper, deeper_mm=3.0, moved=moved)
+    assert xy(found) == pytest.approx(TIP, abs=1e-4)
+    assert found.lean is not None
+    assert (found.lean.x, found.lean.y) == pytest.approx(lean, rel=0.05)
+    assert found.lean.sure
+    plain = solver.solved(seen, moved=moved)
+    assert math.dist(xy(plain), TIP) == pytest.approx(1.5 * slope, rel=0.25)
+    # 1.5 times what was seen and half of what is deeper, once each.
+    times = {0.0: 1.58, 90.0: 1.38, 180.0: 1.73}[turn_deg]
+    assert found.sigma_gain / plain.sigma_gain == pytest.approx(times, abs=0.1)
+    assert found.dof == plain.dof
+    # Had it been 0.5 mm longer than was thought, the interval would hold that too.
+    seen, stored = needle_crossings(frame, TIP, lean, dip_mm=1.5, dz_mm=0.5)
+    deeper, _ = needle_crossings(frame, TIP, lean, dip_mm=4.5, dz_mm=0.5)
+    longer = CrossingSolver(TRUE, frame, 1.5, stored, sigma_mm=0.004)
+    found = longer.solved(seen, deeper, deeper_mm=3.0)
+    assert 0.4 * slope < math.dist(xy(found), TIP) < 0.6 * slope
+    assert all(
+        abs(got - true) < half
+        for got, true, half in zip(xy(found), TIP, found.half_width95, strict=True)
+    )
+
+
+def test_the_step_of_a_latch_counts_however_often_it_repeats_itself():
+    step_mm = 0.02
+    for repeats in (1, 2, 5):
+        result = solve_crossed_beams(
+            travels(TIP, repeats=repeats), TRUE, step_mm=step_mm, sigma_mm=1e-5
+        )
+        assert result.interval_from == "resolution"
+        assert result.half_width95[0] == pytest.approx(1.96 * step_mm / 12**0.5, rel=0.01)
+    bare = solve_crossed_beams(travels(TIP, repeats=2), TRUE)
+    assert bare.half_width95 == pytest.approx((0.0005, 0.0005))
+    assert bare.region95_radius_mm == pytest.approx(0.0005)

@@ -1,5 +1,7 @@
 """A tool's length, with the trigger's latency taken out."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -51,9 +53,18 @@ def test_too_little_is_named():
 @pytest.mark.parametrize("stated", [None, 0.01])
 @pytest.mark.parametrize("speeds", [SPEEDS, SPEEDS[1:]])
 def test_the_interval_holds_the_truth(speeds, stated, trials):
+    def solved(rng):  # of a robot that stops at the trigger
+        return solve_z_touch(
+            touches(speeds, rng, 0.01),
+            SURFACE,
+            sigma_mm=stated,
+            deceleration_mm_s2=math.inf,
+            deceleration_told=True,
+        )
+
     assert_honest(
         coverage(
-            lambda rng: solve_z_touch(touches(speeds, rng, 0.01), SURFACE, sigma_mm=stated),
+            solved,
             (LENGTH,),
             trials,
         ),
@@ -152,7 +163,65 @@ def budget_rows(speeds):
 
 def test_what_two_speeds_cannot_see_is_a_row_of_the_budget():
     rows = {row.name: row for row in budget_rows((2.0, 20.0) * 2)}
-    assert rows["braking"].u_mm == pytest.approx(2 * 20 / 1000 / 3**0.5)
+    assert rows["braking"].u_mm == pytest.approx(2 * 20 / 600 / 0.72 / 3**0.5)
     assert rows["scatter"].kind == "A"
-    assert budget_rows((1.0, 2.0) * 2)[-1].u_mm < 0.0012
-    assert [row.name for row in budget_rows(THREE)] == ["scatter"]
+    assert budget_rows((1.0, 2.0) * 2)[-1].u_mm < 0.003
+    # Three speeds show it, or how small it must be.
+    assert budget_rows(THREE)[-1].u_mm < 0.001
+
+
+def test_the_interval_holds_what_no_speed_could_show():
+    rng = np.random.default_rng(5)
+    seen = touches((2.0, 20.0) * 4, rng, 0.002, overshoot=1 / (2 * 800))
+    found = solve_z_touch(seen, SURFACE)
+    off_mm = abs(found.offset.z_mm - LENGTH)
+    assert off_mm > 0.02
+    assert off_mm < found.half_width95[0] < 0.15
+    given = solve_z_touch(seen[1::2], SURFACE, latency_s=LATENCY)
+    off_mm = abs(given.offset.z_mm - LENGTH)
+    assert off_mm > 0.2
+    assert off_mm < given.half_width95[0] < 1.5
+
+
+def test_touches_that_a_latch_rounds_alike_are_not_sure_to_nothing():
+    # Seen in the cycle after, 4 ms: up to 0.004 mm late at 1 mm/s and 0.008 mm at 2 mm/s.
+    seen = [Touch(SURFACE - LENGTH - late, v) for v, late in ((2.0, 0.0), (1.0, 0.004)) * 2]
+    with refused("implausible_latency"):
+        solve_z_touch(seen, SURFACE)
+    found = solve_z_touch(seen, SURFACE, step_mm=0.008)
+    off_mm = abs(found.offset.z_mm - LENGTH)
+    assert off_mm == pytest.approx(0.008)
+    assert off_mm < found.half_width95[0] < 0.02
+    assert found.interval_from == "resolution"
+
+
+BRAKING_MM_S2 = (300.0, 500.0, 800.0, 2000.0, math.inf)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize(
+    ("speeds", "latency_s"),
+    [
+        ((2.0, 1.0) * 2, None),
+        ((2.0, 20.0) * 2, None),
+        ((5.0, 10.0) * 4, None),
+        (THREE, None),
+        ((2.0, 10.0, 20.0) * 2, None),
+        ((2.0,) * 4, LATENCY),
+        ((10.0,) * 4, LATENCY),
+    ],
+)
+def test_intervals_hold_the_truth_however_the_robot_brakes(speeds, latency_s):
+    runs, rng = 800, np.random.default_rng(9)
+    for braking_mm_s2 in BRAKING_MM_S2:
+        for sigma_mm in (0.001, 0.005, 0.02):
+            held = 0
+            for _ in range(runs):
+                seen = touches(speeds, rng, sigma_mm, overshoot=1 / (2 * braking_mm_s2))
+                try:
+                    found = solve_z_touch(seen, SURFACE, latency_s=latency_s)
+                except CalibrationError:
+                    held += 1  # refused, so nothing is stated
+                    continue
+                held += abs(found.offset.z_mm - LENGTH) <= found.half_width95[0]
+            assert held / runs >= 0.925, (braking_mm_s2, sigma_mm, held)

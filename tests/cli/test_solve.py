@@ -427,6 +427,21 @@ def test_beams_are_found_and_printed(solved):
     assert [beam["direction_deg"] % 180 for beam in answer["beams"]] == pytest.approx([0, 90])
 
 
+def test_a_needle_that_leans_is_solved_where_its_end_is(solved):
+    def seen(deeper_x):
+        at = {"crossings": crossings((deeper_x, -3.25)), "above_mm": 1.5, "deeper_mm": 3}
+        tip = crossings((12.53, -3.25))
+        return case("crossed_beams", beams=BEAMS, crossings=tip, shaft=at, sigma_mm=0.002)
+
+    code, answer = solved(seen(12.59))
+    assert code == 0
+    assert answer["offset"] == pytest.approx([12.5, -3.25])
+    assert answer["needle"]["lean_deg"] == pytest.approx(1.146, abs=0.001)
+    assert answer["needle"]["corrected_mm"] == pytest.approx([-0.03, 0.0])
+    code, answer = solved(seen(12.66))
+    assert (code, answer["codes"]) == (7, ["bent_needle"])
+
+
 def test_tools_on_one_pin_are_answered_by_number(solved):
     touches = [{"flange": p, "tool": 1} for p in ROUND]
     touches.append({"flange": on_pin(45, tip=(1, 2)), "tool": 4})

@@ -98,6 +98,13 @@ def test_a_bent_needle_is_refused(beams):
 
 
 @pytest.mark.soak
+def test_a_needle_that_leans_a_little_is_corrected_by_its_shaft(beams):
+    world = beams.simulator.world
+    world.set_up(replace(world.parameters, lean_deg=1.5, lean_toward_deg=50.0))
+    kept(beams, 0.025)
+
+
+@pytest.mark.soak
 def test_without_deeper_crossings_nobody_knows_where_the_tip_is(beams):
     beams.store(FIRST, beams.scans(20.0) + beams.scans(20.0)[:4])
     refused(beams, "shaft_not_crossed", [EntryKind.REFUSED])

@@ -9,7 +9,7 @@ import pytest
 from robolink_cli.commands.simulate.serving import world_from
 from robolink_simulators.assist.acts import perform
 from robolink_simulators.cell.camera import CameraOptics, CameraTruth
-from robolink_simulators.cell.tip_switches import LightBeam
+from robolink_simulators.cell.tip_switches import LightBeam, TouchPlate
 from robolink_simulators.cell.world_parameters import WorldParameters, parameter_names
 from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.epson.arm.kinematics import inverse
@@ -96,6 +96,32 @@ def test_a_bent_needle_breaks_a_beam_beside_its_tip(make):
         beam = LightBeam((x_mm, y_mm, z_mm + 10.0), heading + 90.0, nozzle_radius_mm=0.3)
         world.connect(5, beam)
         assert read_input(simulator, 5) is broken
+
+
+@pytest.mark.parametrize(("height_mm", "beside_mm"), [(0.5, 0.5), (4.0, 4.0), (9.0, 4.0)])
+def test_a_needle_bent_at_a_height_stands_upright_above_it(make, height_mm, beside_mm):
+    simulator = make(lean_deg=45.0, lean_up_to_mm=4.0)
+    world = simulator.world
+    along_x, along_y = _toward(simulator)
+    x_mm, y_mm, z_mm = world.tip_mm()
+    heading = math.degrees(math.atan2(along_y, along_x)) + 90.0
+    for off_mm, broken in ((0.0, True), (-0.2, False), (0.2, False)):
+        beside = beside_mm + off_mm
+        place = (x_mm + beside * along_x, y_mm + beside * along_y, z_mm + height_mm)
+        world.connect(5, LightBeam(place, heading, nozzle_radius_mm=0.1))
+        assert read_input(simulator, 5) is broken, off_mm
+
+
+def test_beams_that_were_moved_are_broken_elsewhere(make):
+    simulator = make(beams_moved_mm=2.0, beams_moved_toward_deg=90.0)
+    world = simulator.world
+    x_mm, y_mm, z_mm = world.tip_mm()
+    for away_mm, broken in ((-2.0, True), (0.0, False)):
+        world.connect(5, LightBeam((x_mm, y_mm + away_mm, z_mm + 3.0), 0.0))
+        assert read_input(simulator, 5) is broken
+    plate_z_mm = z_mm + 0.1
+    world.connect(5, TouchPlate(plate_z_mm))
+    assert read_input(simulator, 5), "a plate is no beam and stays"
 
 
 def _toward(simulator):

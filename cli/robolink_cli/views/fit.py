@@ -25,7 +25,7 @@ def remarks(result: CalibrationResult) -> Iterator[str]:
     for said in (_fit, _order):
         yield from filter(None, (said(result),))
     yield from statement_sentences(result)
-    for said in (_each_axis, _ways, _camera, _runout, _chain):
+    for said in (_each_axis, _ways, _needle, _camera, _runout, _chain):
         yield from filter(None, (said(result),))
     yield from known_doubts(note for note in result.notes if note not in _SAID_OTHERWISE)
 
@@ -67,7 +67,7 @@ def _each_axis(result: CalibrationResult) -> str:
         for name, half in zip(result.measured, result.half_width95, strict=True)
     )
     if result.interval_from == "resolution":
-        basis = tr("from the step of the jogs")
+        basis = tr("from the step of the positions")
     elif result.sigma_stated and result.interval_from != "residuals":
         basis = tr("from what was stated")
     else:
@@ -85,6 +85,24 @@ def _ways(result: CalibrationResult) -> str:
     if not isinstance(off_deg, float):
         return ""
     return tr("The moves are {off:.2f} degrees off a right angle.", off=abs(off_deg))
+
+
+def _needle(result: CalibrationResult) -> str:
+    """Return how a needle leans, and what that changed; empty where that shows in no digit."""
+    if "needle" not in result.details():
+        return ""
+    from robolink.calibration import BeamsResult  # numpy, loaded by then
+
+    if not isinstance(result, BeamsResult) or result.lean is None:
+        return ""
+    dx_mm, dy_mm = result.lean.corrected_mm
+    return tr(
+        "the needle leans by {lean:.2f} degrees: its end is X {dx:+.3f} Y {dy:+.3f} mm from where "
+        "the beams saw its shaft",
+        lean=result.lean.angle_deg,
+        dx=dx_mm,
+        dy=dy_mm,
+    )
 
 
 def _camera(result: CalibrationResult) -> str:

@@ -1,9 +1,10 @@
 """How large the placement errors are, and what follows for an interval.
 
 Three things can tell it: the residuals, with Student's t; somebody who knows the cell and states
-it; the grid on which the tip was jogged. The one that gives the widest interval decides, because a
-residual can be small by luck and a statement wrong (docs/reference/evidence.md 5, 6). Where none
-of them exists there is no interval, and none is made up.
+it; the grid on which the tip was jogged, or a position taken. The one that gives the widest
+interval decides, because a residual can be small by luck and a statement wrong
+(docs/reference/evidence.md 5, 6). Where none of them exists there is no interval, and none is made
+up. Where there is one it is never 0: what two positions hide that are printed alike counts.
 """
 
 import math
@@ -19,6 +20,10 @@ from robolink.messages import tr
 Source = Literal["residuals", "stated", "resolution"]
 
 _REGION: Final = 0.95
+
+PRINT_STEP_MM: Final = 0.001
+"""The smallest step in which a controller tells a position, where nobody knows it better: EPSON
+prints three decimals, and no field bus of a robot carries less."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +54,8 @@ class Dispersion:
             sum_of_squares: Of all residual coordinates, mm^2.
             dof: Degrees of freedom that are left.
             stated_mm: The stated sigma, if there is one.
-            grid_mm: Step of the jogs, if it is known: q / sqrt(12) is its standard uncertainty.
+            grid_mm: Step of the jogs, or of the positions, if it is known: q / sqrt(12) is its
+                standard uncertainty.
 
         Raises:
             ConfigError: The stated sigma or the grid is not a positive number.
@@ -65,7 +71,7 @@ class Dispersion:
         stated_mm: float | None,
         grid_mm: float | None = None,
     ) -> Iterator[Self]:
-        """Yield each of the three that there is; see :meth:`of`."""
+        """Yield each of the three that there is, and never only zeros; see :meth:`of`."""
         if dof > 0:
             yield cls(math.sqrt(sum_of_squares / dof), dof, "residuals")
         if stated_mm is not None:
@@ -73,7 +79,10 @@ class Dispersion:
             yield cls(stated_mm, math.inf, "stated")
         if grid_mm is not None:
             require_positive(grid_mm, "grid_mm")
-            yield cls(grid_mm / math.sqrt(12), math.inf, "resolution")
+        elif dof > 0 or stated_mm is not None:
+            grid_mm = PRINT_STEP_MM
+        if grid_mm is not None:
+            yield cls(max(grid_mm, PRINT_STEP_MM) / math.sqrt(12), math.inf, "resolution")
 
     @property
     def factor95(self) -> float:
@@ -95,7 +104,7 @@ class Dispersion:
         name, origin = {
             "residuals": (tr("scatter of the touches"), tr("how well they agree")),
             "stated": (tr("error of a touch"), tr("stated for this cell")),
-            "resolution": (tr("step of the jogs"), tr("the grid that they lie on")),
+            "resolution": (tr("step of the positions"), tr("the grid that they lie on")),
         }[self.source]
         kind: Literal["A", "B"] = "A" if self.source == "residuals" else "B"
         row = BudgetRow(name, self.sigma_mm, self.nu, gain, origin, kind)

@@ -74,9 +74,17 @@ class ResidualVectors(Sequence[tuple[float, ...]]):
         return repr(self._looked_at())
 
 
+LEAST_HALF_WIDTH: Final = 0.0005
+"""No interval is stated narrower: half of the last digit that a controller prints, and that anybody
+reads, in mm and in degrees (docs/reference/evidence.md 6)."""
+
+
 @dataclass(frozen=True, slots=True)
 class CalibrationResult:
     """A proposal for a tool offset. Nothing has been written.
+
+    Whatever method made it, an interval of 0 is none: half widths and the region are at least
+    :data:`LEAST_HALF_WIDTH`.
 
     Attributes:
         method: Name of the calibration method, for example ``two-pose``.
@@ -148,6 +156,14 @@ class CalibrationResult:
     evidence: FitEvidence | None = None
     sources: tuple[ErrorSource, ...] | None = None
     accuracy: Accuracy | None = None
+
+    def __post_init__(self) -> None:
+        """Widen what is narrower than anybody can read."""
+        if self.half_width95 and min(self.half_width95) < LEAST_HALF_WIDTH:
+            widths = tuple(max(half, LEAST_HALF_WIDTH) for half in self.half_width95)
+            object.__setattr__(self, "half_width95", widths)
+        if self.region95_radius_mm is not None and self.region95_radius_mm < LEAST_HALF_WIDTH:
+            object.__setattr__(self, "region95_radius_mm", LEAST_HALF_WIDTH)
 
     def details(self) -> dict[str, object]:
         """Return what the method tells besides, plain JSON; nothing for most."""

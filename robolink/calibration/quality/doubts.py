@@ -122,6 +122,9 @@ _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
         "The poses agree better than the robot can show positions; the +- is taken "
         "from the smallest step it shows."
     ),
+    "needle_leans": lambda: tr(
+        "The needle leans. X and Y are those of its end, corrected by how its shaft leans."
+    ),
     "height_not_assessed": lambda: tr(
         "The flange leans, so an error of the tool's Z reaches X and Y. How accurate Z is "
         "was not given, so the +- leaves it out."

@@ -104,6 +104,10 @@ def _look_scatter(
     """Return the scatter of one look and its degrees of freedom, ``None`` for known."""
     usual_mm = usual_look_sigma_mm(result, by_contact=facts.by_contact)
     of_look = math.sqrt(max(result.inputs_per_look / 2, 1.0))
+    step_mm = (result.evidence.grid_mm if result.evidence is not None else None) or 0.0
+    if usual_mm is not None:
+        # Looks on a grid can be off by its step without scattering at all.
+        usual_mm = max(usual_mm, step_mm / math.sqrt(12) / of_look)
     own_mm = None if result.sigma_mm is None else result.sigma_mm / of_look
     from_residuals = result.interval_from == "residuals"
     if own_mm is not None and from_residuals and (result.dof or 0) >= _ENOUGH_NU:
@@ -114,8 +118,7 @@ def _look_scatter(
     if facts.look_sigma_mm is not None and facts.look_nu >= _ENOUGH_NU:
         return facts.look_sigma_mm, facts.look_nu
     if usual_mm is not None:
-        grid_mm = own_mm if result.interval_from == "resolution" and own_mm else 0.0
-        return max(usual_mm, grid_mm), None
+        return usual_mm, None
     return None if own_mm is None else (own_mm, None)
 
 

@@ -33,6 +33,8 @@ LEAST_LENGTH_CHANGE_MM: Final = 0.10
 
 _NO_CHANGE_QUANTILE: Final = 3.29
 
+_LEAST_HALF_MM: Final = 0.005
+
 
 @dataclass(frozen=True, slots=True)
 class LengthChange:
@@ -59,8 +61,8 @@ class LengthChange:
 
     @property
     def half95_mm(self) -> float:
-        """Half the 95 % interval of the change."""
-        return NORMAL_95 * self.u_mm
+        """Half the 95 % interval of the change; half of the last digit that is told, at least."""
+        return max(NORMAL_95 * self.u_mm, _LEAST_HALF_MM)
 
     @property
     def longer_mm(self) -> float:

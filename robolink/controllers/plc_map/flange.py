@@ -66,6 +66,5 @@ class FlangeReader(MotionGroupCore):
         """Refuse, as :meth:`move_to` does."""
         self.move_to(purpose)
 
-    move_until_input = requests_until = requests_for = obstacle = deceleration_mm_s2 = terms = (
-        stop
-    ) = move_to
+    move_until_input = requests_until = requests_for = obstacle = terms = stop = move_to
+    deceleration_mm_s2 = run_up_mm = edge_step_mm = move_to

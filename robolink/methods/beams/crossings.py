@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from robolink.calibration import BeamsResult, Crossing, crossing_sigma_gain
 from robolink.messages import tr
 from robolink.methods.beams.drive import BeamDrive, BeamScan, BeamTravel
-from robolink.methods.beams.solving import CrossingSolver
+from robolink.methods.beams.solving import CrossingSolver, require_straight
 from robolink.model import ToolOffset
 from robolink.runner import Procedure
 
@@ -23,6 +23,7 @@ class CrossingSampler:
             directions of the beams are relied on.
         stored: The offset stored now.
         sigma_mm: Standard deviation of one crossing's middle, where it is known.
+        step_mm: How finely the place of an edge is told, where it is known.
         shaft: The crossings of the shaft.
     """
 
@@ -31,6 +32,7 @@ class CrossingSampler:
     turned: BeamDrive | None
     stored: ToolOffset | None
     sigma_mm: float | None
+    step_mm: float | None = None
     shaft: list[Crossing] = field(default_factory=list)
 
     @property
@@ -67,14 +69,28 @@ class CrossingSampler:
         """Solve what was taken."""
         at_first = crossings[: len(self.first.rounds())]
         plan, solver = self.first.plan, self._solver
-        if self.shaft:
-            solver.require_straight(
-                at_first, self.shaft, shaft_mm=plan.shaft_mm, max_lean_deg=plan.max_lean_deg
-            )
-        if self.turned is None or len(crossings) > len(at_first):
-            return solver.solved(crossings, moved=self.turned is not None)
-        # Where the beams are is not relied on, so nothing tells yet how sure the tip is.
-        return replace(solver.solved(crossings), half_width95=(), region95_radius_mm=None)
+        known = self.turned is None or len(crossings) > len(at_first)
+        result = solver.solved(
+            crossings,
+            self.shaft,
+            deeper_mm=plan.shaft_mm,
+            moved=self.turned is not None and known,
+        )
+        require_straight(result, plan.max_lean_deg)
+        if not known:
+            # Where the beams are is not relied on, so nothing tells yet how sure the tip is.
+            return replace(result, half_width95=(), region95_radius_mm=None)
+        return result if self.shaft or not plan.shaft_mm else self._widened(result, crossings)
+
+    def _widened(self, result: BeamsResult, crossings: Sequence[Crossing]) -> BeamsResult:
+        """Return a result as sure as it will be once the shaft has been looked at."""
+        times = self.gain(crossings) / result.sigma_gain
+        region_mm = result.region95_radius_mm
+        return replace(
+            result,
+            half_width95=tuple(times * half for half in result.half_width95),
+            region95_radius_mm=None if region_mm is None else times * region_mm,
+        )
 
     def foreseen(self, place: BeamScan) -> Crossing:
         """Return what would be taken there."""
@@ -82,8 +98,17 @@ class CrossingSampler:
 
     def gain(self, crossings: Sequence[Crossing]) -> float:
         """Return the standard deviation as a multiple of a single one's."""
+        plan, shaft = self.first.plan, None
+        if plan.shaft_mm:
+            scans = self.first.round()
+            shaft = self._solver.foreseen_shaft(
+                [self.foreseen(scan) for scan in scans], plan.shaft_mm
+            )
         return crossing_sigma_gain(
-            crossings, self.first.station.beams, beams_may_have_moved=self.turned is not None
+            crossings,
+            self.first.station.beams,
+            beams_may_have_moved=self.turned is not None,
+            shaft=shaft,
         )
 
     def named(self, crossing: Crossing) -> str:
@@ -100,5 +125,10 @@ class CrossingSampler:
     def _solver(self) -> CrossingSolver:
         first = self.first
         return CrossingSolver(
-            first.station.beams, first.frame, first.plan.dip_mm, self.stored, self.sigma_mm
+            first.station.beams,
+            first.frame,
+            first.plan.dip_mm,
+            self.stored,
+            self.sigma_mm,
+            self.step_mm,
         )

@@ -4,8 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from robolink.calibration import Crossing, FlangePlane, carrying, where_they_cross
+from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.methods.beams.parameters import BeamsParameters
+from robolink.methods.beams.run_up import RunUp, require_reached
 from robolink.model import Path, Pose, ToolOffset
 from robolink.procedures import approach_path, seek_or_retract
 from robolink.runner import Move, Procedure, Seek
@@ -21,6 +23,8 @@ class BeamDrive:
         frame: A pose of the frame: its angles, hand, local and tool.
         tip: Where the tip is expected, seen from the frame.
         deeper_mm: How much deeper than planned it dips.
+        told_run_up_mm: In what way it reaches the speed of a crossing, where the controller told
+            it.
     """
 
     station: BeamStation
@@ -28,6 +32,7 @@ class BeamDrive:
     frame: Pose
     tip: ToolOffset
     deeper_mm: float = 0.0
+    told_run_up_mm: float | None = None
 
     @property
     def safe_z_mm(self) -> float:
@@ -88,14 +93,26 @@ class BeamScan:
         """Cross the beam; begins at :attr:`start`, and ends at :attr:`end`.
 
         Raises:
-            CalibrationError: ``no_edge`` or ``edge_passed``, with the tip lifted.
+            CalibrationError: ``no_edge``, ``edge_passed`` or ``run_up_too_short``, with the tip
+                lifted.
         """
-        entry = yield from self._seek(self.start, broken=True)
-        leaving = yield from self._seek(entry, broken=False)
-        yield Move(self.end, Path.STRAIGHT, tr("Moving beside the beam."))
-        return Crossing(self.beam, entry, leaving)
+        start, end, drive = self.start, self.end, self.drive
+        entry = yield from self._seek(end, start, broken=True)
+        leaving = yield from self._seek(end, entry, broken=False)
+        found = Crossing(self.beam, entry, leaving)
+        needs = RunUp.at(drive.plan.crossing_mm_s, drive.told_run_up_mm)
+        try:
+            # Where nothing moves, because it is foreseen only, each search ends at its target.
+            if leaving is not end:
+                require_reached(needs, drive.plan, found, start, end)
+        except CalibrationError:
+            lifted = replace(leaving, z_mm=drive.safe_z_mm)
+            yield Move(lifted, Path.STRAIGHT, tr("Backing away."))
+            raise
+        yield Move(end, Path.STRAIGHT, tr("Moving beside the beam."))
+        return found
 
-    def _seek(self, here: Pose, *, broken: bool) -> Procedure[Pose]:
+    def _seek(self, end: Pose, here: Pose, *, broken: bool) -> Procedure[Pose]:
         number = self.beam + 1
         purpose = (
             tr("Looking for beam {number}.", number=number)
@@ -104,7 +121,7 @@ class BeamScan:
         )
         drive = self.drive
         step = Seek(
-            self.end,
+            end,
             drive.station.edge(self.beam, broken=broken),
             drive.plan.crossing_mm_s,
             purpose,

@@ -5,6 +5,7 @@ is in the beam whatever their thickness, and both ways together are free of late
 and backlash (docs/reference/calibration.md 2.6).
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
@@ -41,6 +42,8 @@ def measure_beams(
     here: Pose,
     stored: ToolOffset | None,
     sigma_mm: float | None = None,
+    run_up_mm: float | None = None,
+    step_mm: float | None = None,
 ) -> Procedure[BeamsResult]:
     """Measure X and Y of a tip with two beams. Runs in Tool 0; see :func:`sample_sequentially`.
 
@@ -52,10 +55,13 @@ def measure_beams(
         here: Where the flange is; its U is that of the measurement.
         stored: The offset stored now; the tip is expected there.
         sigma_mm: Standard deviation of one crossing's middle, where it is known.
+        run_up_mm: In what way the tip reaches the speed of a crossing, where the controller told
+            it; else an acceleration of 100 mm/s^2 is reckoned with.
+        step_mm: How finely it tells where an edge was, likewise.
 
     Raises:
         CalibrationError: ``tilted_pose`` before anything moves; ``no_edge``, ``edge_passed``,
-            ``bent_needle``, and those of :func:`solve_crossed_beams`.
+            ``run_up_too_short``, ``bent_needle``, and those of :func:`solve_crossed_beams`.
 
     Example:
         >>> from robolink.calibration import Beam
@@ -72,11 +78,11 @@ def measure_beams(
         (12.3, -3.9)
     """
     solvable_planes([here], height_of(stored))
-    drive = BeamDrive(station, plan, here, stored or NO_OFFSET)
+    drive = BeamDrive(station, plan, here, stored or NO_OFFSET, told_run_up_mm=run_up_mm)
     turned = None
     if plan.turn_deg:
         turned = replace(drive, frame=replace(here, u_deg=toward_zero(here.u_deg, plan.turn_deg)))
-    crossings = CrossingSampler(BeamTravel(here), drive, turned, stored, sigma_mm)
+    crossings = CrossingSampler(BeamTravel(here), drive, turned, stored, sigma_mm, step_mm)
     scans = crossings.scans
     first = yield from crossings.take(scans[0])
     return (yield from sample_sequentially(crossings, first, scans, plan.sampling))
@@ -90,6 +96,7 @@ def trace_beams(
     tip: ToolOffset,
     tip_sigma_mm: float = 0.0,
     asides_mm: Sequence[float] = REFERENCE_ASIDES_MM,
+    run_up_mm: float | None = None,
 ) -> Procedure[tuple[Beam, Beam]]:
     """Find where both beams are, with a reference pin whose tip is known. Runs in Tool 0.
 
@@ -101,9 +108,11 @@ def trace_beams(
         tip_sigma_mm: Standard deviation of each coordinate of that offset.
         asides_mm: Where along each beam it is crossed, both ways, from where they meet; two
             places or more, and none so near to it that the pin breaks both.
+        run_up_mm: As for :func:`measure_beams`.
 
     Raises:
-        CalibrationError: ``no_edge``, ``edge_passed``, and those of :func:`find_beams`.
+        CalibrationError: ``no_edge``, ``edge_passed``, ``run_up_too_short``, and those of
+            :func:`find_beams`.
 
     Example:
         >>> from robolink.calibration import Beam
@@ -121,7 +130,8 @@ def trace_beams(
     """
     travel, crossings = BeamTravel(here), list[Crossing]()
     for aside_mm in asides_mm:
-        drive = BeamDrive(guess, replace(plan, aside_mm=aside_mm), here, tip)
+        there = replace(plan, aside_mm=aside_mm)
+        drive = BeamDrive(guess, there, here, tip, told_run_up_mm=run_up_mm)
         crossings += yield from travel.through(drive.round())
         yield from travel.lifted()
     return find_beams(crossings, (tip.x_mm, tip.y_mm), tip_sigma_mm=tip_sigma_mm)
@@ -135,6 +145,8 @@ def verify_by_crossing(
     angles_deg: Sequence[float],
     tolerance_mm: float,
     aside: ToolOffset = NO_OFFSET,
+    lean: tuple[float, float] = (0.0, 0.0),
+    run_up_mm: float | None = None,
 ) -> Procedure[VerifyResult]:
     """Turn about the new tip and cross the beams there again. Runs in the new tool.
 
@@ -146,6 +158,9 @@ def verify_by_crossing(
         tolerance_mm: Largest drift that passes.
         aside: Where the tip is expected, seen from the frame in force; not 0 where a difference
             to a reference was written.
+        lean: By how much the shaft lies beside the tip, X and Y of the frame in mm per mm above
+            it: the beams see the shaft.
+        run_up_mm: As for :func:`measure_beams`.
 
     The drift at an angle is how far from the place of the reference record the tip is found
     there. It ends lifted.
@@ -171,14 +186,19 @@ def verify_by_crossing(
     """
     travel, drifts = BeamTravel(here), list[Drift]()
     for angle_deg in angles_deg:
-        drive = BeamDrive(station, plan, replace(here, u_deg=angle_deg), aside)
+        there = replace(here, u_deg=angle_deg)
+        drive = BeamDrive(station, plan, there, aside, told_run_up_mm=run_up_mm)
         crossings = yield from travel.through(drive.round())
         yield from travel.lifted()
         found = solve_crossed_beams(_unturned(crossings), station.beams).offset
         plane = FlangePlane.of(drive.frame)
         # The tip dips below the beams, which see the shaft above it.
-        seen_z_mm = aside.z_mm + plan.dip_mm / plane.r33
-        dx, dy = plane.in_base(aside.x_mm, aside.y_mm, seen_z_mm)
+        up_mm = plan.dip_mm / abs(plane.r33)
+        dx, dy = plane.in_base(
+            aside.x_mm + lean[0] * up_mm,
+            aside.y_mm + lean[1] * up_mm,
+            aside.z_mm + math.copysign(up_mm, plane.r33),
+        )
         drifts.append(Drift(angle_deg, dx - found.x_mm, dy - found.y_mm))
     return VerifyResult(tuple(drifts), tolerance_mm)
 

@@ -38,6 +38,7 @@ def measure_z_touch(
     stored: ToolOffset | None,
     sigma_mm: float | None = None,
     deceleration_mm_s2: float | None = None,
+    step_mm: float | None = None,
 ) -> Procedure[ZTouchResult]:
     """Measure Z of a tip by touching a surface. Runs in Tool 0; see :func:`sample_sequentially`.
 
@@ -48,6 +49,7 @@ def measure_z_touch(
         stored: The offset stored now; the tip is expected there.
         sigma_mm: Standard deviation of one touch, where it is known.
         deceleration_mm_s2: How the robot brakes, where its controller told it.
+        step_mm: How finely it tells where the input switched, at the fastest touch, likewise.
 
     Raises:
         CalibrationError: ``tilted_pose`` before anything moves; ``no_edge``, ``edge_passed``, and
@@ -67,7 +69,7 @@ def measure_z_touch(
     """
     solvable_planes([here], height_of(stored))
     probing = _ZTouchSampler(station, plan, here, stored or NO_OFFSET, here, stored, sigma_mm, here)
-    probing.deceleration_mm_s2 = deceleration_mm_s2
+    probing.deceleration_mm_s2, probing.step_mm = deceleration_mm_s2, step_mm
     first = yield from probing.take(plan.speeds_mm_s[0])
     return (yield from sample_sequentially(probing, first, plan.speeds_mm_s, plan.sampling))
 
@@ -81,6 +83,7 @@ def verify_by_touching(
     tolerance_mm: float,
     aside: ToolOffset = NO_OFFSET,
     deceleration_mm_s2: float | None = None,
+    step_mm: float | None = None,
 ) -> Procedure[VerifyResult]:
     """Turn about the new tip and touch the surface there again. Runs in the new tool.
 
@@ -93,6 +96,7 @@ def verify_by_touching(
         aside: Where the tip is expected, seen from the frame in force; not 0 where a difference
             to a reference was written.
         deceleration_mm_s2: As for :func:`measure_z_touch`.
+        step_mm: Likewise.
 
     Raises:
         CalibrationError: As :func:`measure_z_touch`.
@@ -114,7 +118,7 @@ def verify_by_touching(
     drifts = []
     for angle_deg in angles_deg:
         probing = _ZTouchSampler(station, plan, replace(here, u_deg=angle_deg), aside, here)
-        probing.deceleration_mm_s2 = deceleration_mm_s2
+        probing.deceleration_mm_s2, probing.step_mm = deceleration_mm_s2, step_mm
         touches = []
         for speed_mm_s in plan.speeds_mm_s:
             touches.append((yield from probing.take(speed_mm_s)))
@@ -137,6 +141,7 @@ class _ZTouchSampler:
         stored, sigma_mm: As for :func:`measure_z_touch`.
         flange: A pose of the flange, where the frame is the flange: Z is along its axis.
         deceleration_mm_s2: How the robot brakes, where its controller told it.
+        step_mm: How finely it tells where the input switched, likewise.
         near: Whether the frame is at the clearance or below, not above the surface.
     """
 
@@ -149,6 +154,7 @@ class _ZTouchSampler:
     sigma_mm: float | None = None
     flange: Pose | None = None
     deceleration_mm_s2: float | None = None
+    step_mm: float | None = None
     near: bool = False
 
     @property
@@ -189,6 +195,7 @@ class _ZTouchSampler:
             sigma_mm=self.sigma_mm,
             deceleration_mm_s2=self.deceleration_mm_s2 or USUAL_DECELERATION_MM_S2,
             deceleration_told=self.deceleration_mm_s2 is not None,
+            step_mm=self.step_mm,
         )
 
     def foreseen(self, place: float) -> Touch:

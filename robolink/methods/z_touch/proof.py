@@ -21,6 +21,7 @@ class ProbeTest(PlacedProof):
         plan: How it is touched.
         angles_deg: U of the new tool at which it is.
         deceleration_mm_s2: How the robot brakes, where its controller told it.
+        step_mm: How finely it tells where the input switched, likewise.
     """
 
     method: ClassVar[str] = "z-touch"
@@ -30,6 +31,7 @@ class ProbeTest(PlacedProof):
     plan: ZTouchParameters
     angles_deg: tuple[float, ...]
     deceleration_mm_s2: float | None
+    step_mm: float | None = None
 
     def steps(self, here: Pose) -> Procedure[VerifyResult]:
         """Return the steps from wherever the frame is."""
@@ -41,6 +43,7 @@ class ProbeTest(PlacedProof):
             tolerance_mm=self.tolerance_mm,
             aside=seen_from(self.written, self.tip),
             deceleration_mm_s2=self.deceleration_mm_s2,
+            step_mm=self.step_mm,
         )
 
     def steps_after_a_break(self, here: Pose) -> Procedure[VerifyResult]:

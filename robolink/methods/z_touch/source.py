@@ -24,12 +24,14 @@ class ZTouchSource(InputSource[ZTouchParameters]):
         plan: How it is touched.
         sigma_mm: Standard deviation of one touch, where it is known.
         deceleration_mm_s2: How the robot brakes, where its controller told it.
+        step_mm: How finely the controller tells where an input switched, likewise.
     """
 
     station: TouchStation
     plan: ZTouchParameters = field(default_factory=ZTouchParameters)
     sigma_mm: float | None = None
     deceleration_mm_s2: float | None = None
+    step_mm: float | None = None
 
     @property
     def sentence(self) -> str:
@@ -45,8 +47,10 @@ class ZTouchSource(InputSource[ZTouchParameters]):
         self, context: MeasurementContext, tool: int, stored: ToolOffset | None
     ) -> CalibrationResult:
         """Touch and solve; see :class:`~robolink.procedures.MovingSource`."""
-        braking = replace(self, deceleration_mm_s2=_told_braking(context))
-        return InputSource.measure(braking, context, tool, stored)
+        told = replace(
+            self, deceleration_mm_s2=_told_braking(context), step_mm=_told_step(context, self.plan)
+        )
+        return InputSource.measure(told, context, tool, stored)
 
     def _steps(
         self, stored: ToolOffset | None, here: Pose, plan: ZTouchParameters
@@ -60,6 +64,7 @@ class ZTouchSource(InputSource[ZTouchParameters]):
             stored=stored,
             sigma_mm=self.sigma_mm,
             deceleration_mm_s2=self.deceleration_mm_s2,
+            step_mm=self.step_mm,
         )
 
     def proof(
@@ -87,9 +92,15 @@ class ZTouchSource(InputSource[ZTouchParameters]):
             plan=self.plan,
             angles_deg=(toward_zero(frame.u_deg, self.plan.proof_turn_deg),),
             deceleration_mm_s2=_told_braking(context),
+            step_mm=_told_step(context, self.plan),
         )
 
 
 def _told_braking(context: MeasurementContext) -> float | None:
     """Return how the robot brakes, ``None`` where its controller does not tell."""
     return context.controller.groups[0].deceleration_mm_s2() or None
+
+
+def _told_step(context: MeasurementContext, plan: ZTouchParameters) -> float | None:
+    """Return how finely the place of the fastest touch is told, ``None`` where nobody knows it."""
+    return context.controller.groups[0].edge_step_mm(max(plan.speeds_mm_s))

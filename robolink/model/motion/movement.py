@@ -301,6 +301,26 @@ class MotionGroup(Protocol):
         By that it comes to rest beyond the edge of an input that ends a movement.
         """
 
+    def run_up_mm(self, speed_mm_s: float) -> float | None:
+        """Read in what way a movement until an input reaches a speed, and comes to rest from it.
+
+        Args:
+            speed_mm_s: The speed.
+
+        Returns:
+            The longer of both ways; ``None`` where it does not tell.
+        """
+
+    def edge_step_mm(self, speed_mm_s: float) -> float | None:
+        """Return in what steps it tells where the edge of an input was, at a speed.
+
+        Args:
+            speed_mm_s: The speed.
+
+        Returns:
+            The step; ``None`` where nobody knows it.
+        """
+
     def require_able(self, purpose: str) -> None:
         """Refuse what no movement could begin in now; reads only.
 

@@ -5,7 +5,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from robolink.calibration import MOST_RESIDUAL_MM, CalibrationResult, stated_mm
+from robolink.calibration import (
+    LEAST_HALF_WIDTH,
+    MOST_RESIDUAL_MM,
+    CalibrationResult,
+    stated_mm,
+)
 from robolink.errors import CalibrationError
 from robolink.messages import joined, tr
 from robolink.procedures.sampling.sampler import (
@@ -362,7 +367,7 @@ def _progress(
     if following is None or within_mm is None:
         return Notify(told, fit=shown)
     better = method.gain([*taken, following]) / method.gain(taken)
-    next_mm = within_mm * better
+    next_mm = max(within_mm * better, LEAST_HALF_WIDTH)
     gain = tr(
         "One more at {where} would make it about +-{next} mm.",
         where=method.named(following),

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from robolink.protocols.spel._queries import print_selected_tool as print_selected_tool
     from robolink.protocols.spel._queries import print_speed as print_speed
     from robolink.protocols.spel._queries import print_speed_s as print_speed_s
+    from robolink.protocols.spel._queries import print_speeding_up as print_speeding_up
     from robolink.protocols.spel._queries import print_tool as print_tool
     from robolink.protocols.spel._queries import print_tool_defined as print_tool_defined
     from robolink.protocols.spel._queries import print_tool_x as print_tool_x
@@ -76,7 +77,7 @@ else:
                 "print_motor print_output "
                 "print_point print_point_defined print_power print_real_position "
                 "print_robot print_robot_model print_robot_serial print_robot_type "
-                "print_selected_tool print_speed print_speed_s print_tool "
+                "print_selected_tool print_speed print_speed_s print_speeding_up print_tool "
                 "print_plain_point print_tool_defined print_tool_x print_two_texts "
                 "show_base tilts_tool wait_half_a_second where"
             ),

@@ -156,6 +156,11 @@ def print_speed_s(index: int) -> Statement:
     return Statement(f"Print SpeedS({_which(index)})")
 
 
+def print_speeding_up() -> Statement:
+    """Acceleration of straight movements in mm/s^2 (docs/reference/spel.md 7.2)."""
+    return Statement("Print AccelS(1)")
+
+
 def print_braking() -> Statement:
     """Deceleration of straight movements in mm/s^2 (docs/reference/spel.md 7.2)."""
     return Statement("Print AccelS(2)")

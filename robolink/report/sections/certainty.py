@@ -46,7 +46,7 @@ def interval_sentences(fit: CalibrationResult) -> tuple[str, ...]:
 def _what_it_rests_on(fit: CalibrationResult) -> str:
     if fit.interval_from == "resolution" and fit.sigma_mm is not None:
         return tr(
-            "Repeatability rests on the step of the jogs, {step:g} mm.",
+            "Repeatability rests on the step of the positions, {step:g} mm.",
             step=fit.sigma_mm * math.sqrt(12),
         )
     from_residuals = fit.interval_from == "residuals"

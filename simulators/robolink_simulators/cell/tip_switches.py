@@ -20,6 +20,20 @@ STANDING: Final[Direction] = (0.0, 0.0, 1.0)
 _PARALLEL = 1e-12
 
 
+@dataclass(frozen=True, slots=True)
+class Shaft:
+    """What goes up from a tip.
+
+    Attributes:
+        lean: By how much it leans, X and Y in mm per mm above the tip.
+        bent_up_to_mm: The height above the tip up to which it leans; above that it stands upright,
+            straight over the end of the bent part. 0 where it leans all the way.
+    """
+
+    lean: Lean = UPRIGHT
+    bent_up_to_mm: float = 0.0
+
+
 class Shake:
     """By how much a sensor switches beside its place: drawn anew for each motion.
 
@@ -53,6 +67,27 @@ class TipSwitch(Protocol):
             tip_mm: Where its tip is.
             shaft: Which way its shaft goes from there, in base axes; of any length.
         """
+
+
+def meets(
+    switch: TipSwitch, tip_mm: XyzMm, shaft: Direction, *, bent_up_to_mm: float, upright: Direction
+) -> bool:
+    """Tell whether a nozzle switches it on whose shaft leans, all the way or up to a height.
+
+    Args:
+        switch: What it meets.
+        tip_mm: Where its tip is.
+        shaft: Which way its shaft goes from there, in base axes.
+        bent_up_to_mm: How far up it does; 0 for all the way.
+        upright: Which way it goes from there on, of the same height per length as ``shaft``.
+    """
+    if not bent_up_to_mm or not isinstance(switch, LightBeam):
+        return switch.trips(tip_mm, shaft)
+    up_to = bent_up_to_mm / math.sqrt(dot(upright, upright))
+    if switch.trips(tip_mm, shaft) and switch.passes_at(tip_mm, shaft) <= up_to:
+        return True
+    x, y, z = (at + up_to * way for at, way in zip(tip_mm, shaft, strict=True))
+    return switch.trips((x, y, z), upright)
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +128,12 @@ class LightBeam:
             return False
         beside_mm = abs(dot(to_beam, across)) / math.sqrt(area)
         return beside_mm <= self.nozzle_radius_mm + self.radius_mm
+
+    def passes_at(self, tip_mm: XyzMm, shaft: Direction) -> float:
+        """Return where along a shaft the beam passes it, in lengths of ``shaft``; not parallel."""
+        across = cross(shaft, self._way)
+        to_beam = subtract(self.through_mm, tip_mm)
+        return dot(cross(to_beam, self._way), across) / dot(across, across)
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,7 +23,9 @@ from robolink_simulators.cell.tip_switches import (
     STANDING,
     UPRIGHT,
     Lean,
+    LightBeam,
     PinContact,
+    Shaft,
     TipSwitch,
 )
 from robolink_simulators.cell.world_parameters import WorldParameters
@@ -206,6 +208,18 @@ class Workplace(ABC):
     def lean_of(self, tool: int) -> Lean:
         """Return by how much a nozzle is bent, in the flange's axes."""
         return self.leans.get(tool, UPRIGHT)
+
+    def shaft_of(self, tool: int) -> Shaft:
+        """Return the shaft of a nozzle, in the flange's axes."""
+        bent_up_to_mm = self.parameters.lean_up_to_mm if tool == MOUNTED_TOOL else 0.0
+        return Shaft(self.lean_of(tool), bent_up_to_mm)
+
+    def beside(self, switch: TipSwitch, tip_mm: XyzMm) -> XyzMm:
+        """Return where a switch meets a tip, seen from where it was mounted: beams may be moved."""
+        if not isinstance(switch, LightBeam):
+            return tip_mm
+        (dx, dy), (x_mm, y_mm, z_mm) = self.parameters.beams_moved, tip_mm
+        return x_mm - dx, y_mm - dy, z_mm
 
     def see(self, mark: int = TIP) -> tuple[Pixel, ...]:
         """Take a picture and return everything in it that looks like the tip, or a fiducial.

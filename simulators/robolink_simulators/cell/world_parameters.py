@@ -33,6 +33,10 @@ class WorldParameters:
         backlash_mm: Play of the linear axes.
         lean_deg: By how much the mounted nozzle's shaft is bent.
         lean_toward_deg: Toward which direction, counted from the flange's X.
+        lean_up_to_mm: Height above the tip up to which the shaft leans; above that it stands
+            upright, as where somebody bent it sideways there. 0: it leans all the way.
+        beams_moved_mm, beams_moved_toward_deg: How far, and in which direction of the base, every
+            light beam has been moved from where it was mounted.
         wobble_mm: How far the mounted nozzle's tip circles twice a turn (a second harmonic), as
             on a spindle with a bad bearing. What it meets, a pin or a beam, does not feel it.
         wobble_toward_deg: In which direction of the base it is off with U at 0.
@@ -72,6 +76,9 @@ class WorldParameters:
     backlash_mm: float = 0.0
     lean_deg: float = 0.0
     lean_toward_deg: float = 0.0
+    lean_up_to_mm: float = 0.0
+    beams_moved_mm: float = 0.0
+    beams_moved_toward_deg: float = 0.0
     wobble_mm: float = 0.0
     wobble_toward_deg: float = 0.0
     tool_u_deg: float = 0.0
@@ -114,6 +121,12 @@ class WorldParameters:
         """The bent shaft, in the flange's axes."""
         beside, toward = math.tan(math.radians(self.lean_deg)), math.radians(self.lean_toward_deg)
         return beside * math.cos(toward), beside * math.sin(toward)
+
+    @property
+    def beams_moved(self) -> tuple[float, float]:
+        """By how much the light beams have been moved, X and Y of the base, mm."""
+        toward = math.radians(self.beams_moved_toward_deg)
+        return self.beams_moved_mm * math.cos(toward), self.beams_moved_mm * math.sin(toward)
 
     @property
     def tool_turn(self) -> tuple[float, float, float]:

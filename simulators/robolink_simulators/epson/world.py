@@ -158,7 +158,8 @@ class World(Workplace):
         sense = TipInput(
             switch,
             self.machine.arm,
-            lambda: Nozzle(self.tips.get(tool), self.lean_of(tool)),
+            lambda: Nozzle(self.tips.get(tool), self.shaft_of(tool)),
+            beside=self.beside,
             latency_s=latency_s,
             noise_mm=noise_mm,
             rng=random.Random(f"input {number} {self._seed}"),

@@ -21,7 +21,7 @@ from robolink_simulators.cell.frames import (
 )
 from robolink_simulators.cell.person import SimulatedOperator
 from robolink_simulators.cell.places import Direction
-from robolink_simulators.cell.tip_switches import Lean, Shake, TipSwitch
+from robolink_simulators.cell.tip_switches import UPRIGHT, Lean, Shake, TipSwitch, meets
 from robolink_simulators.cell.workplace import (
     MOUNTED_TOOL,
     Workplace,
@@ -147,7 +147,14 @@ class SoftMotionWorld(Workplace):
             place = add(
                 _tip_at(group, true_axes, self.tips.get(tool)), shake.of(group.movements_started)
             )
-            return switch.trips(place, (*_lean_at(group, true_axes, self.lean_of(tool)), 1.0))
+            shaft = self.shaft_of(tool)
+            return meets(
+                switch,
+                self.beside(switch, place),
+                _way_at(group, true_axes, shaft.lean),
+                bent_up_to_mm=shaft.bent_up_to_mm,
+                upright=_way_at(group, true_axes, UPRIGHT),
+            )
 
         group.inputs.connect(number, sense)
 
@@ -233,9 +240,10 @@ def trailing(group: AxisGroup, axes: AxisValues) -> AxisValues:
     return tuple(axis.trailing(value) for axis, value in zip(group.axes, axes, strict=True))
 
 
-def _lean_at(group: AxisGroup, axes: AxisValues, lean: Lean) -> Lean:
+def _way_at(group: AxisGroup, axes: AxisValues, lean: Lean) -> Direction:
+    """Return which way a shaft goes that leans, in base axes."""
     x, y, _ = _turned_at(group, axes, (*lean, 0.0))
-    return x, y
+    return x, y, 1.0
 
 
 def _turned_at(group: AxisGroup, axes: AxisValues, direction: Direction) -> Direction:

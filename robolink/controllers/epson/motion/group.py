@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Final
 
 from robolink.controllers.epson.link.link import EpsonLink
 from robolink.controllers.epson.link.requests import executes
@@ -21,6 +22,9 @@ from robolink.messages import joined, tr
 from robolink.model import InputEdge, MotionProfile, MotionTerms, Path, Pose, WorkBox
 from robolink.protocols import spel
 from robolink.ways import Way, way
+
+_PRINTED_MM: Final = 0.001
+"""A position is printed with three decimals (docs/reference/spel.md 5.6)."""
 
 
 class EpsonGroup(MotionGroupCore):
@@ -105,6 +109,16 @@ class EpsonGroup(MotionGroupCore):
     def deceleration_mm_s2(self) -> float:
         """Read AccelS: ``Till`` brakes with it (docs/reference/spel.md 7.1)."""
         return spel.parse_number(self._link.window.printed(spel.print_braking()))
+
+    def run_up_mm(self, speed_mm_s: float) -> float:
+        """Read AccelS, the less of both: straight movements speed up and brake with it."""
+        window = self._link.window
+        faster = spel.parse_number(window.printed(spel.print_speeding_up()))
+        return speed_mm_s**2 / (2 * min(faster, self.deceleration_mm_s2()))
+
+    def edge_step_mm(self, speed_mm_s: float) -> float:  # noqa: ARG002 - it is the digits printed
+        """Return the last digit of a position as it is printed."""
+        return _PRINTED_MM
 
     def require_able(self, purpose: str) -> None:
         """Refuse what no movement could begin in now; see :class:`robolink.model.MotionGroup`."""

@@ -3,6 +3,7 @@
 Source: docs/reference/softmotion.md 2.3.
 """
 
+import math
 from typing import Final
 
 from robolink.errors import ConfigError
@@ -19,6 +20,10 @@ _PAST_AN_EDGE_MM: Final = 0.05
 
 _EDGE_RAMP_S: Final = 0.02
 """In this time such a movement reaches its deceleration."""
+
+LATCH_CYCLE_S: Final = 0.004
+"""The longest usual cycle of a motion task. A program notes where an edge was in the cycle in which
+it sees it (the companion's program does), and no mailbox tells how long that is."""
 
 _UM_PER_MM: Final = 1000.0
 
@@ -62,6 +67,23 @@ def up_to_an_edge(speed_mm_s: float, *, unit_um: float) -> Four:
     velocity, *_ = straight(speed_mm_s, unit_um=unit_um)
     deceleration = velocity * speed_mm_s / (2 * _PAST_AN_EDGE_MM)
     return (velocity, deceleration, deceleration, deceleration / _EDGE_RAMP_S)
+
+
+def run_up_mm(speed_mm_s: float) -> float:
+    """Return in what way a movement that an input stops reaches its speed, and comes to rest.
+
+    With acceleration a and jerk j the speed v takes v/a + a/j, or 2 sqrt(v/j) where a is never
+    reached, and half of v times that is the way.
+
+    Raises:
+        ConfigError: The speed is not above 0, or not finite.
+    """
+    velocity, acceleration, _, jerk = up_to_an_edge(speed_mm_s, unit_um=_UM_PER_MM)
+    if velocity < acceleration**2 / jerk:
+        took_s = 2 * math.sqrt(velocity / jerk)
+    else:
+        took_s = velocity / acceleration + acceleration / jerk
+    return velocity * took_s / 2
 
 
 def dynamics_of(profile: MotionProfile, *, unit_um: float) -> Four:

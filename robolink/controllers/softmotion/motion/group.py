@@ -15,7 +15,12 @@ from robolink.controllers.softmotion.link.condition import (
 )
 from robolink.controllers.softmotion.link.mailbox import Mailbox
 from robolink.controllers.softmotion.link.stopping import bring_group_to_rest
-from robolink.controllers.softmotion.motion.dynamics import dynamics_of, up_to_an_edge
+from robolink.controllers.softmotion.motion.dynamics import (
+    LATCH_CYCLE_S,
+    dynamics_of,
+    run_up_mm,
+    up_to_an_edge,
+)
 from robolink.controllers.softmotion.motion.jog import Jog, JogWatch
 from robolink.controllers.softmotion.motion.movement import (
     SoftMotionMotion,
@@ -124,6 +129,14 @@ class SoftMotionGroup(MotionGroupCore):
     ) -> tuple[str, ...]:
         """Return what :meth:`move_until_input` would send besides its reads, in words."""
         return (describe(self._until_draft(target, edge, speed_mm_s)),)
+
+    def run_up_mm(self, speed_mm_s: float) -> float:
+        """Return the way of the acceleration and jerk that such a movement is sent with."""
+        return run_up_mm(speed_mm_s)
+
+    def edge_step_mm(self, speed_mm_s: float) -> float:
+        """Return how far it goes in a cycle: where it sees an edge is noted once a cycle."""
+        return speed_mm_s * LATCH_CYCLE_S
 
     def jog(self, jog: Jog, *, duration_s: float, box: WorkBox) -> Pose:
         """Jog for a time, bring the group to rest, and return where the tip is then.

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from robolink.model import Pose, ToolOffset, rotate_xy
 from robolink.timing import NS_PER_S
 from robolink_simulators.cell.frames import turned
-from robolink_simulators.cell.places import Direction, axis_of
-from robolink_simulators.cell.tip_switches import Lean, Shake, TipSwitch
+from robolink_simulators.cell.places import Direction, XyzMm, axis_of
+from robolink_simulators.cell.tip_switches import UPRIGHT, Lean, Shaft, Shake, TipSwitch, meets
 from robolink_simulators.epson.arm.arm import Arm
 from robolink_simulators.epson.arm.kinematics import frame_of, tip_place
 from robolink_simulators.epson.arm.robots import RobotModel
@@ -20,11 +20,11 @@ class Nozzle:
 
     Attributes:
         tip: Where its tip is, seen from the flange.
-        lean: By how much its shaft leans, in the flange's axes.
+        shaft: How it leans, in the flange's axes.
     """
 
     tip: ToolOffset | None
-    lean: Lean
+    shaft: Shaft
 
 
 class TipInput:
@@ -34,6 +34,7 @@ class TipInput:
         switch: What the tip meets.
         arm: Which carries the nozzle.
         nozzle: Tells what is mounted.
+        beside: Tells where the switch meets a place of the base; it may have been moved.
         latency_s: How late the input follows.
         noise_mm: Standard deviation, per axis, of where it switches; drawn anew for each
             motion.
@@ -46,6 +47,7 @@ class TipInput:
         arm: Arm,
         nozzle: Callable[[], Nozzle],
         *,
+        beside: Callable[[TipSwitch, XyzMm], XyzMm],
         latency_s: float,
         noise_mm: float,
         rng: random.Random,
@@ -53,6 +55,7 @@ class TipInput:
         self._switch = switch
         self._arm = arm
         self._nozzle = nozzle
+        self._beside = beside
         self._latency_ns = round(latency_s * NS_PER_S)
         self._shake = Shake(noise_mm, rng)
 
@@ -65,18 +68,25 @@ class TipInput:
             flange = arm.true_flange_at(instant_ns - self._latency_ns)
         x_mm, y_mm, z_mm = tip_place(arm.model, flange, nozzle.tip)
         dx_mm, dy_mm, dz_mm = self._shake.of(arm.moves_started)
-        place = (x_mm + dx_mm, y_mm + dy_mm, z_mm + dz_mm)
-        return self._switch.trips(place, _shaft(arm.model, flange, nozzle))
+        place = self._beside(self._switch, (x_mm + dx_mm, y_mm + dy_mm, z_mm + dz_mm))
+        shaft = nozzle.shaft
+        return meets(
+            self._switch,
+            place,
+            _way(arm.model, flange, nozzle.tip, shaft.lean),
+            bent_up_to_mm=shaft.bent_up_to_mm,
+            upright=_way(arm.model, flange, nozzle.tip, UPRIGHT),
+        )
 
 
-def _shaft(model: RobotModel, flange: Pose, nozzle: Nozzle) -> Direction:
-    """Return which way the shaft goes from the tip, in base axes.
+def _way(model: RobotModel, flange: Pose, tip: ToolOffset | None, lean: Lean) -> Direction:
+    """Return which way a shaft goes that leans, in base axes.
 
     A SCARA's flange looks up with its Z axis, so the shaft goes along it, less its lean; six axes
     look out of the flange, and the shaft comes back along the tool's own Z.
     """
     if not model.six_axes:
-        return (*rotate_xy(*nozzle.lean, flange.u_deg), 1.0)
-    x, y, z = axis_of(nozzle.tip or ToolOffset(), "z")
-    lean_x, lean_y = nozzle.lean
+        return (*rotate_xy(*lean, flange.u_deg), 1.0)
+    x, y, z = axis_of(tip or ToolOffset(), "z")
+    lean_x, lean_y = lean
     return turned(frame_of(flange).rotation, (lean_x - x, lean_y - y, -z))

@@ -6,6 +6,7 @@ from typing import Final, Literal
 
 from robolink import calibration as cal
 from robolink.messages import tr
+from robolink.methods import BeamsParameters
 from robolink.model import WorkBox
 from robolink_cli.commands.measure.solve.case import (
     Node,
@@ -60,6 +61,8 @@ def one_touch(node: Node) -> Payload:
 
 def crossed_beams(node: Node) -> Payload:
     """Travels through two beams whose places are known."""
+    from robolink.methods.beams.solving import require_straight  # numpy, late
+
     beams = [_beam(child) for child in node.children("beams")]
     if len(beams) != 2:
         raise unusable(node.at("beams"), tr("two beams are needed"))
@@ -71,14 +74,29 @@ def crossed_beams(node: Node) -> Payload:
         height=height,
         sigma_mm=node.optional("sigma_mm", node.number),
         beams_may_have_moved=bool(node.optional("beams_may_have_moved", node.raw)),
+        shaft=node.optional("shaft", lambda name: _shaft(node.child(name))),
+        step_mm=node.optional("step_mm", node.number),
     )
+    require_straight(result, node.number_or("max_lean_deg", BeamsParameters.max_lean_deg))
     covariance = result.covariance
     return result_payload(result) | {
         "lag_mm": list(result.lag_mm),
         "u_mm": [row[index] ** 0.5 for index, row in enumerate(covariance)],
         "u_without_beams_mm": list(result.u_without_beams_mm),
         "half_width95": list(result.half_width95),
+        **result.details(),
     }
+
+
+def _shaft(node: Node) -> cal.ShaftSeen:
+    """Return crossings of a needle's shaft, and how far above its end the beams saw it."""
+    seen = cal.ShaftSeen(
+        [_crossing(child) for child in node.children("crossings")],
+        node.number("above_mm"),
+        node.number("deeper_mm"),
+    )
+    node.finish()
+    return seen
 
 
 def find_beams(node: Node) -> Payload:
@@ -119,6 +137,7 @@ def z_touch(node: Node) -> Payload:
         latency_s=node.optional("latency_s", node.number),
         deceleration_mm_s2=node.number_or("deceleration_mm_s2", cal.USUAL_DECELERATION_MM_S2),
         sigma_mm=node.optional("sigma_mm", node.number),
+        step_mm=node.optional("step_mm", node.number),
     )
     return result_payload(result) | {
         "offset_z": result.offset.z_mm,

@@ -8,7 +8,7 @@ import pytest
 from robolink_simulators.cell.world_parameters import WorldParameters
 
 from robolink.controllers.softmotion import SoftMotionController
-from robolink.errors import CalibrationError
+from robolink.errors import CalibrationError, VerifyError
 from robolink.methods import BeamsParameters, BeamsSource
 from tests.contract._sensor_cell import miss_mm, plc_sensor_cell, sensor_cell
 
@@ -132,8 +132,11 @@ def test_a_beam_that_moves_after_the_measurement_at_two_angles_shows():
 
             with pytest.MonkeyPatch.context() as patch:
                 patch.setattr(BeamsSource, "proof", moved)
-                report = change(controller)
-    assert report.verification.max_drift_mm == pytest.approx(0.06, abs=0.012)
+                with pytest.raises(VerifyError) as contradicted:
+                    change(controller)
+            assert contradicted.value.code == "proof_contradicts_accuracy"
+            (proof, *_) = controller.outcomes.recorded(kinds=(EntryKind.VERIFY,))
+    assert proof.details["max_drift_mm"] == pytest.approx(0.06, abs=0.012)
 
 
 @pytest.mark.parametrize(

@@ -8,9 +8,10 @@ is ``R' (tip - flange)``.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from robolink.calibration.camera.camera_model import CameraModel
+from robolink.calibration.camera.camera_uncertainty import camera_sources
 from robolink.calibration.core.dispersion import Dispersion
 from robolink.calibration.core.pose_checks import check_poses, keep_unmeasured, require_finite
 from robolink.calibration.core.result import CalibrationResult
@@ -84,20 +85,35 @@ def solve_up_camera(
     """
     check_sightings((sighting,))
     if sighting.z_mm is not None:
-        in_space = _seen_in_space(sighting, sighting.z_mm, stored, sigma_mm)
-        return _with_camera(in_space, sighting, camera)
+        in_space, gains = _seen_in_space(sighting, sighting.z_mm, stored, sigma_mm)
+        return _with_camera(in_space, sighting, camera, gains)
     height = height_of(stored, height)
     (plane,) = solvable_planes((sighting.flange,), height)
     x_mm, y_mm = sighting.in_flange_mm(known_z_mm(height))
     result = _one_look(sighting, {"x_mm": x_mm, "y_mm": y_mm}, stored, sigma_mm)
     result = with_height_error(result, plane.in_flange(0.0, 0.0, 1.0), height)
-    return _with_camera(result, sighting, camera)
+    return _with_camera(result, sighting, camera, plane_gains((plane,)))
+
+
+def plane_gains(planes: Sequence[FlangePlane]) -> list[list[float]]:
+    """Return by how much the mean of what was seen, in the flange's axes, changes with each.
+
+    A line for X and for Y; X and Y of the base for each of the sightings, mm for 1 mm.
+    """
+    share = 1 / len(planes)
+    columns = [plane.in_flange(*along) for plane in planes for along in ((1.0, 0.0), (0.0, 1.0))]
+    return [[share * x for x, _ in columns], [share * y for _, y in columns]]
 
 
 def _with_camera(
-    result: CalibrationResult, sighting: Sighting, camera: CameraModel | None
+    result: CalibrationResult,
+    sighting: Sighting,
+    camera: CameraModel | None,
+    gains: Sequence[Sequence[float]],
 ) -> CalibrationResult:
     """Return a result with what its camera is unsure of: as much in every direction."""
+    sources = camera_sources((sighting,), gains, camera=camera, finds_place=False)
+    result = replace(result, sources=sources)
     if camera is None:
         return result
     variance = camera.sigma_at_mm(sighting.x_mm, sighting.y_mm) ** 2
@@ -112,13 +128,16 @@ def _with_camera(
 
 def _seen_in_space(
     sighting: Sighting, z_mm: float, stored: ToolOffset | None, sigma_mm: float | None
-) -> CalibrationResult:
+) -> tuple[CalibrationResult, list[list[float]]]:
+    """Return the result, and by how much it changes with X and Y of what was seen."""
     from robolink.calibration.core.rotations import rotation_of  # numpy, which X and Y do without
 
     flange = sighting.flange
     away = (sighting.x_mm - flange.x_mm, sighting.y_mm - flange.y_mm, z_mm - flange.z_mm)
-    x_mm, y_mm, z_mm = (rotation_of(flange).T @ away).tolist()
-    return _one_look(sighting, {"x_mm": x_mm, "y_mm": y_mm, "z_mm": z_mm}, stored, sigma_mm)
+    turned = rotation_of(flange).T
+    x_mm, y_mm, z_mm = (turned @ away).tolist()
+    found = {"x_mm": x_mm, "y_mm": y_mm, "z_mm": z_mm}
+    return _one_look(sighting, found, stored, sigma_mm), turned[:, :2].tolist()
 
 
 def _one_look(
@@ -129,10 +148,12 @@ def _one_look(
 ) -> CalibrationResult:
     scatter, axes = Dispersion.of(0.0, 0, sigma_mm), range(len(found))
     covariance: tuple[tuple[float, ...], ...] = ()
+    region_mm = None
     if scatter:
         # A rotation leaves errors that are alike in all directions as they are.
         variance = scatter.sigma_mm**2
         covariance = tuple(tuple(variance if i == j else 0.0 for j in axes) for i in axes)
+        region_mm = scatter.region_mm(variance, len(found))
     others = tuple(n for n in ("z_mm", "u_deg", "v_deg", "w_deg") if n not in found)
     place = (sighting.x_mm, sighting.y_mm, sighting.z_mm)
     return CalibrationResult(
@@ -148,6 +169,8 @@ def _one_look(
         half_width95=scatter.half_widths(covariance) if scatter else (),
         sigma_mm=sigma_mm,
         sigma_stated=scatter is not None,
+        region95_radius_mm=region_mm,
+        interval_from=scatter.source if scatter else "",
         rank=len(found),
         dof=0,
         unobservable=others,

@@ -104,9 +104,10 @@ def _of_all(covariance: Sequence[Sequence[float]], count: int) -> "Floats":
     """Return a covariance with nothing for the components that it does not reach."""
     import numpy as np
 
-    short = count - len(covariance)
-    padded: Floats = np.pad(np.asarray(covariance, dtype=float), ((0, short), (0, short)))
-    return padded
+    whole: Floats = np.zeros((count, count))
+    known = slice(len(covariance))
+    whole[known, known] = covariance
+    return whole
 
 
 def _by_normal(result: CalibrationResult) -> bool:

@@ -168,14 +168,16 @@ def _tilted_leverage(result: CalibrationResult) -> float | None:
     """
     if result.by_surface or len(result.reference_point_mm) < 3 or "z_mm" not in result.measured:
         return None
-    if len(result.inputs) < _LEAST_TILTED:
+    # Those that tell directions only leave no residual.
+    poses = result.inputs[: len(result.residuals_mm)]
+    if len(poses) < _LEAST_TILTED:
         return None
     import numpy as np  # which the help of a command does without
 
     from robolink.calibration.core.rotations import rotations
     from robolink.calibration.pin.pivot_fit import pivot_design
 
-    angles = np.array([(one.u_deg, one.v_deg, one.w_deg) for one in result.inputs])
+    angles = np.array([(one.u_deg, one.v_deg, one.w_deg) for one in poses])
     touched = rotations(angles)
     design = pivot_design(touched)
     if not np.isfinite(design.unit_covariance).all():

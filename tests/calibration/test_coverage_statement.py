@@ -199,9 +199,9 @@ def printed(angles_deg, drawing=DRAWING, *, sigma_mm=None):
     return measure
 
 
-def of_unknown_place(random):
+def of_unknown_place(random, image_px=0.5):
     """A camera that is found with the tip sees it up to half a pixel beside."""
-    image = within(random, 0.5)
+    image = within(random, image_px)
     places = [(dx, dy, 0.0) for dx in (-3.0, 3.0) for dy in (-3.0, 3.0)]
     places += [(0.0, 0.0, u_deg) for u_deg in HALF_ROUND]
     sightings = []

@@ -383,7 +383,7 @@ def wobbling_cell(random):
 
 
 def affine_cell(random):
-    result = cells.of_unknown_place(random)
+    result = cells.of_unknown_place(random, image_px=0.0)
     camera: CameraModel = result.camera
 
     def proof(u_deg):
@@ -447,9 +447,9 @@ def test_a_right_result_of_another_kind_is_hardly_ever_contradicted(name):
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize("name", OTHERS)
 def test_no_more_than_one_in_a_thousand_of_another_kind_is_contradicted(name):
-    ((both, _),) = alarms(OTHERS[name], 6_000, counts=(2,))
-    sys.stdout.write(f"| {name} | | {both / 60:.2f} | |\n")
-    assert both <= 12, both
+    ((both, _),) = alarms(OTHERS[name], 4_000, counts=(2,))
+    sys.stdout.write(f"| {name} | | {both / 40:.2f} | |\n")
+    assert both <= 10, both
 
 
 def test_what_a_board_says_of_a_turned_camera_counts_where_its_fiducials_are():

@@ -15,7 +15,7 @@ from robolink.calibration.camera.camera_uncertainty import (
     camera_sources,
     print_source,
 )
-from robolink.calibration.camera.up_camera import (
+from robolink.calibration.camera.sighting import (
     Sighting,
     check_sightings,
     plane_gains,

@@ -16,7 +16,7 @@ from robolink.calibration.camera.camera_uncertainty import (
     camera_sources,
     print_source,
 )
-from robolink.calibration.camera.up_camera import Sighting, check_sightings, seen_in_flange
+from robolink.calibration.camera.sighting import Sighting, check_sightings, seen_in_flange
 from robolink.calibration.core.pose_checks import keep_unmeasured, require_finite, require_poses
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.robust import Floats

@@ -21,7 +21,7 @@ from robolink.calibration.camera.camera_uncertainty import (
     camera_sources,
     print_source,
 )
-from robolink.calibration.camera.up_camera import Sighting
+from robolink.calibration.camera.sighting import Sighting
 from robolink.calibration.core.least_squares import LinearFit, linear_fit
 from robolink.calibration.core.pose_checks import (
     MIN_ROTATION_DEG,

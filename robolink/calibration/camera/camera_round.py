@@ -15,7 +15,8 @@ import numpy as np
 
 from robolink.calibration.camera.camera_model import CameraModel
 from robolink.calibration.camera.camera_uncertainty import camera_sources
-from robolink.calibration.camera.up_camera import Sighting, check_sightings, solve_up_camera
+from robolink.calibration.camera.sighting import Sighting, check_sightings
+from robolink.calibration.camera.up_camera import solve_up_camera
 from robolink.calibration.core.least_squares import linear_fit
 from robolink.calibration.core.pose_checks import (
     MIN_ROTATION_DEG,

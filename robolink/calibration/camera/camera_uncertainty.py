@@ -14,16 +14,14 @@ of a tip at any time, are rows of the budget (docs/reference/evidence.md 19).
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from robolink.calibration.camera.camera_model import CameraModel
+from robolink.calibration.camera.sighting import Sighting
 from robolink.calibration.core.accuracy import ErrorSource
 from robolink.calibration.flange_plane import FlangePlane
 from robolink.calibration.quality.station_part import StationPart
 from robolink.messages import tr
-
-if TYPE_CHECKING:
-    from robolink.calibration.camera.up_camera import Sighting
 
 USUAL_MM_PER_PX: Final = 0.02
 """What a pixel is where the camera answers in millimetres and nothing says it: an image of 1,280
@@ -46,8 +44,8 @@ _STEP = 1e-5
 
 def camera_part(
     camera: CameraModel,
-    sightings: "Sequence[Sighting]",
-    found: "Callable[[Sequence[Sighting]], Sequence[float]]",
+    sightings: Sequence[Sighting],
+    found: Callable[[Sequence[Sighting]], Sequence[float]],
     *,
     angles: Sequence[int] = (),
 ) -> StationPart:
@@ -65,7 +63,7 @@ def camera_part(
     )
     at = complex(*centre)
 
-    def shifted(place: complex, turn: complex) -> "list[Sighting]":
+    def shifted(place: complex, turn: complex) -> list[Sighting]:
         moved = []
         for s in sightings:
             by = place + turn * (complex(s.x_mm, s.y_mm) - at)
@@ -95,7 +93,7 @@ def camera_part(
 
 
 def camera_sources(
-    sightings: "Sequence[Sighting]",
+    sightings: Sequence[Sighting],
     gains: Sequence[Sequence[float]],
     *,
     camera: CameraModel | None = None,
@@ -147,7 +145,7 @@ def camera_sources(
 
 
 def _from_middle(
-    sightings: "Sequence[Sighting]", camera: CameraModel | None, *, finds_place: bool
+    sightings: Sequence[Sighting], camera: CameraModel | None, *, finds_place: bool
 ) -> list[_Shifts]:
     """Return how far from the place that a turn of the camera leaves alone marks were seen.
 
@@ -166,7 +164,7 @@ def _from_middle(
 
 
 def print_source(
-    sightings: "Sequence[Sighting]",
+    sightings: Sequence[Sighting],
     gains: Sequence[Sequence[float]],
     marks: Sequence[tuple[float, float]],
 ) -> ErrorSource:

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robolink.calibration.camera.up_camera import Sighting, check_sightings
+from robolink.calibration.camera.sighting import Sighting, check_sightings
 from robolink.calibration.core.dispersion import Dispersion
 from robolink.calibration.core.least_squares import LinearFit, linear_fit
 from robolink.calibration.core.pose_checks import MIN_ROTATION_DEG, check_planar

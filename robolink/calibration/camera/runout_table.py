@@ -15,7 +15,7 @@ from robolink.calibration.camera.camera_model import CameraModel
 from robolink.calibration.camera.camera_round import CAMERA_MOVED_MM, CameraRound
 from robolink.calibration.camera.camera_uncertainty import camera_sources
 from robolink.calibration.camera.runout import RunoutReport, runout_report
-from robolink.calibration.camera.up_camera import Sighting
+from robolink.calibration.camera.sighting import Sighting
 from robolink.calibration.core.dispersion import Dispersion
 from robolink.calibration.core.pose_checks import keep_unmeasured, require_poses
 from robolink.calibration.core.result import CalibrationResult

@@ -8,16 +8,16 @@ is ``R' (tip - flange)``.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from robolink.calibration.camera.camera_model import CameraModel
 from robolink.calibration.camera.camera_uncertainty import camera_sources
+from robolink.calibration.camera.sighting import Sighting, check_sightings, plane_gains
 from robolink.calibration.core.dispersion import Dispersion
-from robolink.calibration.core.pose_checks import check_poses, keep_unmeasured, require_finite
+from robolink.calibration.core.pose_checks import keep_unmeasured
 from robolink.calibration.core.result import CalibrationResult
-from robolink.calibration.flange_checks import require_flange_in_base, with_height_error
+from robolink.calibration.flange_checks import with_height_error
 from robolink.calibration.flange_plane import (
-    FlangePlane,
     TipHeight,
     height_of,
     known_z_mm,
@@ -25,28 +25,7 @@ from robolink.calibration.flange_plane import (
 )
 from robolink.calibration.quality.station_part import StationPart, with_station
 from robolink.messages import tr
-from robolink.model import Pose, ToolOffset
-
-
-@dataclass(frozen=True, slots=True)
-class Sighting:
-    """Something on the tool, seen by a camera while the flange stood still.
-
-    Attributes:
-        flange: Actual flange pose (Tool 0) at the picture, mm and degrees.
-        x_mm, y_mm: Where it was seen, in the base.
-        z_mm: Its height there, ``None`` for a camera that does not tell it.
-    """
-
-    flange: Pose
-    x_mm: float
-    y_mm: float
-    z_mm: float | None = None
-
-    def in_flange_mm(self, tip_z_mm: float = 0.0) -> tuple[float, float]:
-        """Return X and Y of what was seen, in the flange's axes, where its Z is ``tip_z_mm``."""
-        dx, dy = self.x_mm - self.flange.x_mm, self.y_mm - self.flange.y_mm
-        return FlangePlane.of(self.flange).in_flange(dx, dy, tip_z_mm)
+from robolink.model import ToolOffset
 
 
 def solve_up_camera(
@@ -93,16 +72,6 @@ def solve_up_camera(
     result = _one_look(sighting, {"x_mm": x_mm, "y_mm": y_mm}, stored, sigma_mm)
     result = with_height_error(result, plane.in_flange(0.0, 0.0, 1.0), height)
     return _with_camera(result, sighting, camera, plane_gains((plane,)))
-
-
-def plane_gains(planes: Sequence[FlangePlane]) -> list[list[float]]:
-    """Return by how much the mean of what was seen, in the flange's axes, changes with each.
-
-    A line for X and for Y; X and Y of the base for each of the sightings, mm for 1 mm.
-    """
-    share = 1 / len(planes)
-    columns = [plane.in_flange(*along) for plane in planes for along in ((1.0, 0.0), (0.0, 1.0))]
-    return [[share * x for x, _ in columns], [share * y for _, y in columns]]
 
 
 def _with_camera(
@@ -175,36 +144,3 @@ def _one_look(
         dof=0,
         unobservable=others,
     )
-
-
-def check_sightings(
-    sightings: tuple[Sighting, ...], *, allow_mixed_hand: bool = False
-) -> tuple[str, ...]:
-    """Refuse sightings that are no numbers or do not belong together, or not to the base.
-
-    Raises:
-        CalibrationError: ``non_finite``, ``suspect_units``, ``mixed_hand``, ``mixed_local``,
-            ``mixed_tool``, ``tool_pose`` or ``local_pose``.
-    """
-    for number, sighting in enumerate(sightings, start=1):
-        require_finite(
-            **{f"x_mm of sighting {number}": sighting.x_mm},
-            **{f"y_mm of sighting {number}": sighting.y_mm},
-            **{f"z_mm of sighting {number}": sighting.z_mm or 0.0},
-        )
-    flanges = [sighting.flange for sighting in sightings]
-    doubts = check_poses(flanges, allow_mixed_hand=allow_mixed_hand)
-    require_flange_in_base(flanges)
-    return doubts
-
-
-def seen_in_flange(
-    sightings: Sequence[Sighting], height: TipHeight | None
-) -> list[tuple[float, float]]:
-    """Return X and Y of everything seen, in the flange's axes.
-
-    Raises:
-        CalibrationError: ``tilted_pose``.
-    """
-    solvable_planes([sighting.flange for sighting in sightings], height)
-    return [sighting.in_flange_mm(known_z_mm(height)) for sighting in sightings]

@@ -51,6 +51,8 @@ _WITH_DIRECTION: Final = 3
 
 _LEAST_TILTED: Final = 4
 
+_TELLS_NOTHING: Final = 1e-9
+
 _REGION95: Final = 2.45
 """Of two coordinates with a known scatter, together."""
 
@@ -175,17 +177,17 @@ def _tilted_leverage(result: CalibrationResult) -> float | None:
     import numpy as np  # which the help of a command does without
 
     from robolink.calibration.core.rotations import rotations
-    from robolink.calibration.pin.pivot_fit import pivot_design
 
     angles = np.array([(one.u_deg, one.v_deg, one.w_deg) for one in poses])
     touched = rotations(angles)
-    design = pivot_design(touched)
-    if not np.isfinite(design.unit_covariance).all():
+    count, mean = len(touched), touched.mean(axis=0)
+    told, axes = np.linalg.eigh(count * (np.eye(3) - mean.T @ mean))
+    if told[0] < _TELLS_NOTHING:
         return None
     about = rotations(np.array([(turn, 0.0, 0.0) for turn in range(0, 360, 15)], dtype=float))
-    other = np.einsum("aij,njk->anik", about, touched).reshape(-1, 3, 3) - design.mean
-    spread = other @ design.unit_covariance @ other.transpose(0, 2, 1)
-    return 1 / len(touched) + float(np.linalg.eigvalsh(spread)[:, -1].max())
+    other = np.einsum("aij,njk->anik", about, touched).reshape(-1, 3, 3) - mean
+    spread = other @ ((axes / told) @ axes.T) @ other.transpose(0, 2, 1)
+    return 1 / count + float(np.linalg.eigvalsh(spread)[:, -1].max())
 
 
 def _look_scatter(

@@ -32,7 +32,7 @@ DRAWING = cells.DRAWING
 def look(u_deg, place, *, aside, v_deg=0.0, w_deg=0.0):
     """Return how a place of the flange's axes is seen that was brought near the middle."""
     at = Pose(0, 0, -60, u_deg, v_deg, w_deg)
-    dx, dy = FlangePlane.of(at).in_base(*place, STORED.z_mm)
+    dx, dy = FlangePlane.of(at).in_base(place[0], place[1], STORED.z_mm)
     x_mm, y_mm = MIDDLE[0] + aside[0], MIDDLE[1] + aside[1]
     return Sighting(replace(at, x_mm=x_mm - dx, y_mm=y_mm - dy), x_mm, y_mm)
 

@@ -22,12 +22,16 @@ from robolink.calibration import (
     RowFact,
     Sighting,
     assessed,
+    pin_touched,
+    solve_board,
     solve_board_round,
     solve_camera_affine,
     solve_camera_round,
+    solve_one_touch,
     solve_runout_table,
+    solve_up_camera,
 )
-from robolink.model import Pose, rotate_xy
+from robolink.model import Pose, ToolOffset, rotate_xy
 
 TIP = complex(12.3, -3.9)
 MIDDLE = complex(300.0, 80.0)
@@ -360,6 +364,21 @@ def region_and_axis(measure, trials):
         )
     region, axis = (100 * held / trials).tolist()
     return region, axis
+
+
+def test_a_single_look_or_touch_is_repeatable_to_a_region():
+    """All lengths together: 2.448 sigma in the plane and 2.795 in space, not 1.96 an axis."""
+    flange, tip = Pose(300, 100, -60, 0), ToolOffset(12, -3.5, -20)
+    seen = Sighting(flange, 312.3, 96.3)
+    pair = Sighting(flange, 320.0, 96.0), Sighting(flange, 280.0, 96.0)
+    pin = pin_touched(flange, tip)
+    for result, factor in (
+        (solve_up_camera(seen, sigma_mm=0.01), 2.448),
+        (solve_up_camera(replace(seen, z_mm=-80.0), sigma_mm=0.01), 2.795),
+        (solve_board(*pair, sigma_mm=0.01), 2.448 / math.sqrt(2)),
+        (solve_one_touch(flange, pin, sigma_mm=0.01), 2.795),
+    ):
+        assert result.repeatable_to_mm == pytest.approx(0.01 * factor, rel=0.001)
 
 
 def test_a_row_never_makes_a_result_better_than_its_scatter():

@@ -172,7 +172,7 @@ def test_one_in_a_thousand_right_results_is_contradicted(name):
     found = alarms(CELLS[name], 20_000)
     shares = [both / 200 for both, _ in found]
     sys.stdout.write(f"| {name} | {' | '.join(f'{share:.2f}' for share in shares)} |\n")
-    assert all(0.03 <= share <= 0.18 for share in shares), shares
+    assert all(0.02 <= share <= 0.2 for share in shares), shares
 
 
 @pytest.mark.soak
@@ -183,7 +183,7 @@ def test_accuracy_is_contradicted_as_seldom_where_its_row_is_what_it_says():
     cell = Cell(looking((0.0,), place_sigma_mm=0.02 / math.sqrt(3)), (180.0, 90.0, -90.0), facts)
     shares = [accuracy / 200 for _, accuracy in alarms(cell, 20_000)]
     sys.stdout.write(f"| its place row | {' | '.join(f'{share:.2f}' for share in shares)} |\n")
-    assert all(0.03 <= share <= 0.18 for share in shares), shares
+    assert all(0.02 <= share <= 0.2 for share in shares), shares
 
 
 def beams_claim() -> TurnClaim:

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from robolink.calibration.camera.runout_table import RunoutTable as RunoutTable
     from robolink.calibration.camera.runout_table import RunoutTableResult as RunoutTableResult
     from robolink.calibration.camera.runout_table import solve_runout_table as solve_runout_table
-    from robolink.calibration.camera.up_camera import Sighting as Sighting
+    from robolink.calibration.camera.sighting import Sighting as Sighting
     from robolink.calibration.camera.up_camera import solve_up_camera as solve_up_camera
     from robolink.calibration.core.accuracy import ACCURACY_ROWS as ACCURACY_ROWS
     from robolink.calibration.core.accuracy import Accuracy as Accuracy
@@ -269,7 +269,8 @@ __getattr__ = lazy_exports(
         "camera.camera_round": "CameraRound as_round solve_camera_round",
         "camera.runout": "RunoutReport runout_report",
         "camera.runout_table": "RunoutRow RunoutTable RunoutTableResult solve_runout_table",
-        "camera.up_camera": "Sighting solve_up_camera",
+        "camera.sighting": "Sighting",
+        "camera.up_camera": "solve_up_camera",
         "core.accuracy": "ACCURACY_ROWS Accuracy AccuracyFacts AccuracyRow AssessedRow "
         "ErrorSource RowFact",
         "core.budget": "BudgetRow DIVISORS UncertaintyBudget",

@@ -121,7 +121,11 @@ class Measuring:
                 seating=seating_of(context.controller),
             )
             adjusted = self._listener.adjusted(fresh, context)
-            proposal = replace(adjusted, claim=turn_claim(result, facts))
+            claim = turn_claim(result, facts)
+            if claim is not None and not claim.finds_place and _by_difference(adjusted):
+                # What the place is off by cancels in a difference, and shows in its turn test.
+                claim = None
+            proposal = replace(adjusted, claim=claim)
         entry = calibration_entry(
             proposal,
             plan.criteria,
@@ -176,6 +180,12 @@ class Measuring:
         # The error that is under way matters more than that it cannot be recorded.
         with suppress(ConfigError, RobolinkError):
             self._context.controller.outcomes.append(entry)
+
+
+def _by_difference(proposal: Proposal) -> bool:
+    """Whether X and Y are those of before and a difference, and not as they were measured."""
+    measured, offset = proposal.measured, proposal.offset
+    return measured is not None and (measured.x_mm, measured.y_mm) != (offset.x_mm, offset.y_mm)
 
 
 def told_of_typed(result: CalibrationResult) -> tuple[CalibrationResult, tuple[str, ...]]:

@@ -109,7 +109,10 @@ def camera_station(station: Station) -> CameraStation:
         model = CameraModel(
             ((a, b), (c, d)),
             (x_mm, y_mm),
-            centre_mm=(centre[0], centre[1]) if isinstance(centre, Sequence) else None,
+            # Its middle, where no record tells the point that it knows best.
+            centre_mm=(centre[0], centre[1])
+            if isinstance(centre, Sequence)
+            else _place(station)[:2],
             place_sigma_mm=float(place) if isinstance(place, (int, float)) else 0.0,
             scale_sigma=float(scale) if isinstance(scale, (int, float)) else 0.0,
         )

@@ -10,8 +10,17 @@ import math
 from collections.abc import Sequence
 
 from robolink.calibration.camera.camera_model import CameraModel
-from robolink.calibration.camera.camera_uncertainty import camera_part
-from robolink.calibration.camera.up_camera import Sighting, check_sightings, seen_in_flange
+from robolink.calibration.camera.camera_uncertainty import (
+    camera_part,
+    camera_sources,
+    print_source,
+)
+from robolink.calibration.camera.sighting import (
+    Sighting,
+    check_sightings,
+    plane_gains,
+    seen_in_flange,
+)
 from robolink.calibration.core.dispersion import Dispersion
 from robolink.calibration.core.pose_checks import keep_unmeasured
 from robolink.calibration.core.result import CalibrationResult
@@ -75,10 +84,14 @@ def solve_board(
     check_spacing(spacing, spacing_mm)
     scatter = Dispersion.of(0.0, 0, sigma_mm)
     covariance: tuple[tuple[float, ...], ...] = ()
+    region_mm = None
+    marks_mm = (spacing / 2, 0.0), (-spacing / 2, 0.0)
+    gains = _pair_gains((first, second), places)
     if scatter:
         half = scatter.sigma_mm**2 / 2
         angle = 2 * (math.degrees(scatter.sigma_mm) / spacing) ** 2
         covariance = ((half, 0.0, 0.0), (0.0, half, 0.0), (0.0, 0.0, angle))
+        region_mm = scatter.region_mm(half, 2)
     result = CalibrationResult(
         method="board",
         offset=keep_unmeasured(stored, x_mm=x_mm, y_mm=y_mm, u_deg=u_deg),
@@ -92,10 +105,17 @@ def solve_board(
         half_width95=scatter.half_widths(covariance) if scatter else (),
         sigma_mm=sigma_mm,
         sigma_stated=scatter is not None,
+        region95_radius_mm=region_mm,
+        interval_from=scatter.source if scatter else "",
         rank=3,
         # The spacing is known as well, but only used as a check.
         dof=0,
         unobservable=("z_mm", "v_deg", "w_deg"),
+        sources=(
+            *camera_sources((first, second), gains, camera=camera, finds_place=False),
+            print_source((first, second), gains, marks_mm),
+        ),
+        marks_mm=marks_mm,
     )
     result = with_height_error(result, mean_by_height((first, second)), height)
     if camera is None:
@@ -113,6 +133,21 @@ def _middle_and_direction(places: Sequence[tuple[float, float]]) -> tuple[float,
     """Return the middle of two fiducials in the flange's axes, and the direction to the first."""
     (x1, y1), (x2, y2) = places
     return (x1 + x2) / 2, (y1 + y2) / 2, math.degrees(math.atan2(y1 - y2, x1 - x2))
+
+
+def _pair_gains(
+    pair: Sequence[Sighting], places: Sequence[tuple[float, float]]
+) -> list[list[float]]:
+    """Return by how much middle and direction change with each of two sightings, base X and Y."""
+    planes = [FlangePlane.of(sighting.flange) for sighting in pair]
+    (x1, y1), (x2, y2) = places
+    along, square = (x1 - x2, y1 - y2), (x1 - x2) ** 2 + (y1 - y2) ** 2
+    turns = []
+    for plane, sign in zip(planes, (1.0, -1.0), strict=True):
+        for axis in ((1.0, 0.0), (0.0, 1.0)):
+            dx, dy = plane.in_flange(*axis)
+            turns.append(sign * math.degrees(along[0] * dy - along[1] * dx) / square)
+    return [*plane_gains(planes), turns]
 
 
 def mean_by_height(sightings: Sequence[Sighting]) -> tuple[float, float]:

@@ -11,8 +11,12 @@ import numpy as np
 
 from robolink.calibration.camera.board import SPACING_TOLERANCE, check_spacing, mean_by_height
 from robolink.calibration.camera.camera_model import CameraModel
-from robolink.calibration.camera.camera_uncertainty import camera_part
-from robolink.calibration.camera.up_camera import Sighting, check_sightings, seen_in_flange
+from robolink.calibration.camera.camera_uncertainty import (
+    camera_part,
+    camera_sources,
+    print_source,
+)
+from robolink.calibration.camera.sighting import Sighting, check_sightings, seen_in_flange
 from robolink.calibration.core.pose_checks import keep_unmeasured, require_finite, require_poses
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.robust import Floats
@@ -85,6 +89,7 @@ def solve_board_fit(
     origin, turn = _placed(seen, drawing)
     residuals = seen - origin - turn * drawing
     unit = _unit_covariance(turn, drawing)
+    gains = _gains(unit, turn * drawing, sightings)
     result = CalibrationResult(
         method="board",
         offset=keep_unmeasured(
@@ -102,6 +107,11 @@ def solve_board_fit(
         residuals_mm=_in_base(residuals, sightings),
         rank=UNKNOWNS,
         unobservable=_KEPT,
+        sources=(
+            *camera_sources(sightings, gains, camera=camera, finds_place=False),
+            print_source(sightings, gains, drawing_mm),
+        ),
+        marks_mm=tuple(dict.fromkeys((x, y) for x, y in drawing_mm)),
     )
     result = judged(
         result,
@@ -154,6 +164,39 @@ def _unit_covariance(turn: complex, drawing: Complexes) -> Floats:
     column = np.array([lever.real, lever.imag, math.degrees(1.0)])
     unit: Floats = np.outer(column, column) * angle + np.diag([1, 1, 0]) / len(drawing)
     return unit
+
+
+def _gains(unit: Floats, turned: Complexes, sightings: Sequence[Sighting]) -> list[list[float]]:
+    """Return by how much origin and direction change with each sighting, base X and Y."""
+    degree = math.radians(1.0)
+    design = np.zeros((len(turned), 2, UNKNOWNS))
+    design[:, 0, 0] = design[:, 1, 1] = 1.0
+    design[:, 0, 2], design[:, 1, 2] = -degree * turned.imag, degree * turned.real
+    return gains_in_base(np.einsum("kl,ijl->kij", unit, design), sightings)
+
+
+def gains_in_base(gains: Floats, sightings: Sequence[Sighting]) -> list[list[float]]:
+    """Return gains for shifts in the base from those for shifts in the flange's axes.
+
+    Args:
+        gains: A line for each component, a row for each sighting, X and Y.
+        sightings: With the flange pose of each.
+
+    Example:
+        >>> import numpy as np
+        >>> from robolink import Pose
+        >>> from robolink.calibration import Sighting
+        >>> from robolink.calibration.camera.board_fit import gains_in_base
+        >>> turned = Sighting(Pose(300, 100, -60, 90), 300, 100)
+        >>> gains = gains_in_base(np.eye(2)[:, None], [turned])
+        >>> [[round(g, 6) + 0.0 for g in line] for line in gains]
+        [[0.0, 1.0], [-1.0, 0.0]]
+    """
+    columns = np.array([FlangePlane.of(sighting.flange).columns for sighting in sightings])
+    inverse = np.linalg.inv(columns.transpose(0, 2, 1))
+    in_base = np.einsum("kij,ijl->kil", gains, inverse)
+    found: list[list[float]] = in_base.reshape(len(gains), -1).tolist()
+    return found
 
 
 def _in_base(

@@ -13,11 +13,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from robolink.calibration.camera.board_fit import solve_board_fit
+from robolink.calibration.camera.board_fit import gains_in_base, solve_board_fit
 from robolink.calibration.camera.camera_model import CameraModel
 from robolink.calibration.camera.camera_round import CameraRound, as_round
-from robolink.calibration.camera.camera_uncertainty import camera_part
-from robolink.calibration.camera.up_camera import Sighting
+from robolink.calibration.camera.camera_uncertainty import (
+    camera_part,
+    camera_sources,
+    print_source,
+)
+from robolink.calibration.camera.sighting import Sighting
 from robolink.calibration.core.least_squares import LinearFit, linear_fit
 from robolink.calibration.core.pose_checks import (
     MIN_ROTATION_DEG,
@@ -95,17 +99,20 @@ def solve_board_round(
     z_mm, columns = known_z_mm(height), np.array([plane.columns for plane in planes])
     drawn = np.array([complex(*place) for place in drawing_mm])
 
-    def found(others: Sequence[Sighting]) -> tuple[LinearFit, float]:
+    def found(others: Sequence[Sighting]) -> tuple[LinearFit, Floats, float]:
         seen = np.array([complex(*sighting.in_flange_mm(z_mm)) for sighting in others])
         return _turned_fit(seen, columns, drawn, math.radians(plain.offset.u_deg))
 
-    fit, turn_rad = found(sightings)
+    fit, design, turn_rad = found(sightings)
     x_mm, y_mm, _, error_x, error_y = fit.x.tolist()
     # A row of residuals times the transposed A leads from the flange's axes to the base's.
     vectors = (fit.residuals.reshape(2, -1).T[:, None, :] @ columns)[:, 0, :]
     in_degrees = np.diag((1.0, 1.0, math.degrees(1.0)))
     unit = in_degrees @ fit.unit_covariance[:3, :3] @ in_degrees
     u_deg = math.degrees(math.remainder(turn_rad, math.tau))
+    # Rows are X of all sightings, then Y.
+    by_row = (in_degrees @ fit.gains(design)[:3]).reshape(3, 2, -1).transpose(0, 2, 1)
+    gains = gains_in_base(by_row, sightings)
     # What the plain fit said about itself is said anew.
     fresh = replace(
         plain,
@@ -115,13 +122,17 @@ def solve_board_round(
         condition_number=fit.condition_number,
         rank=fit.rank,
         warnings=(),
+        sources=(
+            *camera_sources(sightings, gains, camera=camera, finds_place=True),
+            print_source(sightings, gains, drawing_mm),
+        ),
     )
     result = judged(fresh, vectors, unit, unknowns=UNKNOWNS, sigma_mm=sigma_mm, tolerance=tolerance)
     result = with_height_error(result, planes[0].in_flange(0.0, 0.0, 1.0), height)
     if camera is not None:
 
         def components(others: Sequence[Sighting]) -> tuple[float, float, float]:
-            moved, turned_rad = found(others)
+            moved, _, turned_rad = found(others)
             return float(moved.x[0]), float(moved.x[1]), math.degrees(turned_rad)
 
         result = with_station(result, camera_part(camera, sightings, components, angles=(2,)))
@@ -130,16 +141,16 @@ def solve_board_round(
 
 def _turned_fit(
     seen: Complexes, columns: Floats, drawn: Complexes, turn_rad: float
-) -> tuple[LinearFit, float]:
-    """Return the last step's fit and the direction, from one that is nearly right."""
+) -> tuple[LinearFit, Floats, float]:
+    """Return the last step's fit, its design and the direction, from one that is nearly right."""
     for _ in range(2):
-        fit = _step(seen, columns, drawn * np.exp(1j * turn_rad))
+        fit, design = _step(seen, columns, drawn * np.exp(1j * turn_rad))
         turn_rad += float(fit.x[2])
-    return fit, turn_rad
+    return fit, design, turn_rad
 
 
-def _step(seen: Complexes, columns: Floats, turned: Complexes) -> LinearFit:
-    """Return the fit of origin, small turn in radians, and camera error."""
+def _step(seen: Complexes, columns: Floats, turned: Complexes) -> tuple[LinearFit, Floats]:
+    """Return the fit of origin, small turn in radians, and camera error, and its design."""
     ones, zeros = np.ones(len(seen)), np.zeros(len(seen))
     inverse = np.linalg.inv(columns.transpose(0, 2, 1))
     a = np.vstack(
@@ -149,4 +160,4 @@ def _step(seen: Complexes, columns: Floats, turned: Complexes) -> LinearFit:
         )
     )
     missing = seen - turned
-    return linear_fit(a, np.concatenate((missing.real, missing.imag)))
+    return linear_fit(a, np.concatenate((missing.real, missing.imag))), a

@@ -18,6 +18,7 @@ from robolink.calibration.camera.camera_model import (
     CameraModel,
     require_same_camera,
 )
+from robolink.calibration.core.accuracy import ErrorSource
 from robolink.calibration.core.least_squares import LinearFit, linear_fit
 from robolink.calibration.core.pose_checks import (
     check_poses,
@@ -149,6 +150,8 @@ def solve_camera_affine(
         condition_number=fit.condition_number,
         rank=fit.rank,
         unobservable=_KEPT,
+        # Place, turn and scale of the camera are found with it.
+        sources=(ErrorSource.of_lengths("tip_image_px", 2, gain=camera.largest_mm_per_px),),
         camera=camera,
     )
     result = judged(

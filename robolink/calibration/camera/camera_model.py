@@ -61,6 +61,13 @@ class CameraModel:
         return math.hypot(a, c), math.hypot(b, d)
 
     @property
+    def largest_mm_per_px(self) -> float:
+        """What a pixel is at most, in whichever direction: the larger singular value."""
+        (a, b), (c, d) = self.mm_per_px
+        half = (a * a + b * b + c * c + d * d) / 2
+        return math.sqrt(half + math.sqrt(max(half * half - self.determinant**2, 0.0)))
+
+    @property
     def turn_deg(self) -> float:
         """Direction of the image's first axis in the base."""
         (a, _), (c, _) = self.mm_per_px

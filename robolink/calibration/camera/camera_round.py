@@ -14,7 +14,9 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from robolink.calibration.camera.camera_model import CameraModel
-from robolink.calibration.camera.up_camera import Sighting, check_sightings, solve_up_camera
+from robolink.calibration.camera.camera_uncertainty import camera_sources
+from robolink.calibration.camera.sighting import Sighting, check_sightings
+from robolink.calibration.camera.up_camera import solve_up_camera
 from robolink.calibration.core.least_squares import linear_fit
 from robolink.calibration.core.pose_checks import (
     MIN_ROTATION_DEG,
@@ -34,7 +36,7 @@ from robolink.calibration.flange_plane import (
 from robolink.calibration.pin.n_angle import solve_n_angle
 from robolink.calibration.quality.fit_quality import judged
 from robolink.calibration.quality.tolerances import PLANAR_TOLERANCE, Tolerance
-from robolink.model import ToolOffset
+from robolink.model import Pose, ToolOffset
 
 CAMERA_MOVED_MM = 0.1
 """A camera that is off by more than this since its own calibration is doubted."""
@@ -78,8 +80,8 @@ def solve_camera_round(
         stored: The offset stored now; Z, U, V and W are kept from it, or 0 without one.
         height: Z of the tip, for a flange that leans; without it that of ``stored`` counts.
         sigma_mm: Standard deviation of one coordinate of one look, where it is known.
-        camera: The camera; what is uncertain about it counts for a single look. Several looks find
-            what it is off by.
+        camera: The camera; how sure its record is of its place counts for a single look. Several
+            looks find what it is off by.
         tolerance: Residuals above which the result carries a warning.
 
     Raises:
@@ -110,7 +112,8 @@ def solve_camera_round(
         )
         return as_round(found)
     if any((s.flange.v_deg, s.flange.w_deg) != (0.0, 0.0) for s in sightings):
-        return _leaning(sightings, stored, height_of(stored, height), sigma_mm, tolerance)
+        known = height_of(stored, height)
+        return _leaning(sightings, stored, known, sigma_mm, tolerance, camera)
     mean_x = sum(sighting.x_mm for sighting in sightings) / len(sightings)
     mean_y = sum(sighting.y_mm for sighting in sightings) / len(sightings)
     on_one_point = [
@@ -124,8 +127,24 @@ def solve_camera_round(
     result = solve_n_angle(on_one_point, stored=stored, sigma_mm=sigma_mm, tolerance=tolerance)
     x_mm, y_mm = result.reference_point_mm
     error_mm = (mean_x - x_mm, mean_y - y_mm)
-    result = replace(result, method="camera", inputs=inputs)
+    sources = camera_sources(sightings, _upright_gains(inputs), camera=camera, finds_place=True)
+    result = replace(result, method="camera", inputs=inputs, sources=sources)
     return as_round(result, camera_error_mm=error_mm)
+
+
+def _upright_gains(flanges: Sequence[Pose]) -> list[list[float]]:
+    """Return by how much the offset of upright flanges changes with each sighting.
+
+    With z = exp(iU) that is conj(z - mean z) / sum |z - mean z|^2 (docs/reference/calibration.md
+    1.1).
+    """
+    z = np.exp(1j * np.radians([flange.u_deg for flange in flanges]))
+    turned = z - z.mean()
+    by = turned.conj() / float(np.vdot(turned, turned).real)
+    # As complex numbers multiply.
+    x = np.column_stack((by.real, -by.imag)).ravel()
+    y = np.column_stack((by.imag, by.real)).ravel()
+    return [x.tolist(), y.tolist()]
 
 
 def _leaning(
@@ -134,6 +153,7 @@ def _leaning(
     height: TipHeight | None,
     sigma_mm: float | None,
     tolerance: Tolerance,
+    camera: CameraModel | None,
 ) -> CameraRound:
     """Solve for t and the camera's error with the flange as it hangs.
 
@@ -154,7 +174,8 @@ def _leaning(
     a[:, 0, 2] = a[:, 1, 3] = 1.0
     seen = np.array([(s.x_mm - s.flange.x_mm, s.y_mm - s.flange.y_mm) for s in sightings])
     lean = np.array([plane.axis for plane in planes]) * known_z_mm(height)
-    fit = linear_fit(a.reshape(-1, _UNKNOWNS), (seen - lean).ravel())
+    design = a.reshape(-1, _UNKNOWNS)
+    fit = linear_fit(design, (seen - lean).ravel())
     x_mm, y_mm, error_x, error_y = fit.x.tolist()
     residuals = fit.residuals.reshape(-1, 2)
     mean = np.mean([(s.x_mm, s.y_mm) for s in sightings], axis=0).tolist()
@@ -171,6 +192,9 @@ def _leaning(
         condition_number=fit.condition_number,
         rank=fit.rank,
         unobservable=_KEPT,
+        sources=camera_sources(
+            sightings, fit.gains(design)[:2].tolist(), camera=camera, finds_place=True
+        ),
     )
     unit = fit.unit_covariance[:2, :2]
     result = judged(

@@ -19,10 +19,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robolink.calibration.camera.up_camera import Sighting, check_sightings
+from robolink.calibration.camera.sighting import Sighting, check_sightings
 from robolink.calibration.core.dispersion import Dispersion
 from robolink.calibration.core.least_squares import LinearFit, linear_fit
 from robolink.calibration.core.pose_checks import MIN_ROTATION_DEG, check_planar
+from robolink.calibration.core.robust import Floats
 from robolink.calibration.core.statistics import f_quantile
 from robolink.calibration.flange_plane import FlangePlane, standing_upright
 from robolink.calibration.pin.planar import Complexes
@@ -59,6 +60,7 @@ class RunoutReport:
         residuals_mm: What they leave of each sighting, base axes.
         noise_mm2: The sum of the squares of that.
         dof: Degrees of freedom behind it.
+        gains: By how much X and Y of the tip change with X and Y of each sighting.
         sigma_gain: Standard deviation of X or Y of the tip as a multiple of a sighting's.
         harmonics_matter: Whether they explain what the offset leaves, beyond the noise.
         distinct_angles: How many angles there are, modulo 360.
@@ -78,6 +80,7 @@ class RunoutReport:
     residuals_mm: tuple[tuple[float, ...], ...]
     noise_mm2: float
     dof: int
+    gains: tuple[tuple[float, ...], ...]
     sigma_gain: float
     harmonics_matter: bool
     distinct_angles: int
@@ -115,14 +118,25 @@ def runout_report(sightings: Sequence[Sighting], *, sigma_mm: float | None = Non
     rank, told_apart = _told_apart(distinct)
     if not told_apart:
         warnings = (*warnings, "wobble_not_identifiable")
-    plain = _harmonics(seen, [np.ones_like(z), z])
+    design = _terms([np.ones_like(z), z])
+    plain = _harmonics(seen, design)
     full = None
     # With four sightings everything fits, and nothing is left to tell a wobble from noise.
     if told_apart and len(seen) > _HARMONICS:
-        full = _harmonics(seen, [np.ones_like(z), z, z.conj(), z**2])
+        design = _terms([np.ones_like(z), z, z.conj(), z**2])
+        full = _harmonics(seen, design)
     upside_down = FlangePlane.of(sightings[0].flange).r33 < 0
+    # Columns are X of all sightings, then Y.
+    gains = (full or plain).gains(design)[2:4].reshape(2, 2, -1).transpose(0, 2, 1).reshape(2, -1)
+    gains[1] *= -1.0 if upside_down else 1.0
     return _report(
-        plain, full, sigma_mm, mirror=upside_down, counts=(len(distinct), rank), warnings=warnings
+        plain,
+        full,
+        sigma_mm,
+        mirror=upside_down,
+        counts=(len(distinct), rank),
+        gains=gains,
+        warnings=warnings,
     )
 
 
@@ -133,6 +147,7 @@ def _report(
     *,
     mirror: bool,
     counts: tuple[int, int],
+    gains: Floats,
     warnings: tuple[str, ...],
 ) -> RunoutReport:
     best, left = full or plain, plain.residuals.reshape(2, -1)
@@ -163,6 +178,7 @@ def _report(
         residuals_mm=tuple(map(tuple, best.residuals.reshape(2, -1).T.tolist())),
         noise_mm2=noise,
         dof=dof,
+        gains=tuple(map(tuple, gains.tolist())),
         sigma_gain=gain,
         harmonics_matter=matters,
         distinct_angles=distinct,
@@ -191,12 +207,18 @@ def _told_apart(angles_deg: Sequence[float]) -> tuple[int, bool]:
     return rank, rank == _HARMONICS and bool(sizes[0] <= _BADLY_TOLD_APART * sizes[-1])
 
 
-def _harmonics(seen: Complexes, terms: Sequence[Complexes]) -> LinearFit:
-    """Fit complex amplitudes; unknowns alternate real and imaginary part, rows are x then y."""
-    a = np.hstack(
+def _terms(terms: Sequence[Complexes]) -> Floats:
+    """Return a design of complex amplitudes.
+
+    Unknowns alternate real and imaginary part, rows are X of all sightings, then Y.
+    """
+    return np.hstack(
         [
             np.vstack((np.column_stack((t.real, -t.imag)), np.column_stack((t.imag, t.real))))
             for t in terms
         ]
     )
-    return linear_fit(a, np.concatenate((seen.real, seen.imag)))
+
+
+def _harmonics(seen: Complexes, design: Floats) -> LinearFit:
+    return linear_fit(design, np.concatenate((seen.real, seen.imag)))

@@ -11,9 +11,11 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 
+from robolink.calibration.camera.camera_model import CameraModel
 from robolink.calibration.camera.camera_round import CAMERA_MOVED_MM, CameraRound
+from robolink.calibration.camera.camera_uncertainty import camera_sources
 from robolink.calibration.camera.runout import RunoutReport, runout_report
-from robolink.calibration.camera.up_camera import Sighting
+from robolink.calibration.camera.sighting import Sighting
 from robolink.calibration.core.dispersion import Dispersion
 from robolink.calibration.core.pose_checks import keep_unmeasured, require_poses
 from robolink.calibration.core.result import CalibrationResult
@@ -99,10 +101,17 @@ class RunoutTableResult(CameraRound):
     Attributes:
         table: That.
         wobble: Whether ellipse or second harmonic are more than noise.
+        between_mm: By how much the straight line between two rows may miss the wobble.
     """
 
     table: RunoutTable
     wobble: bool
+    between_mm: float = 0.0
+
+    @property
+    def held_to_table_mm(self) -> float:
+        """How far off the table may be between its rows."""
+        return self.between_mm
 
     def details(self) -> dict[str, object]:
         """Return the table, and what the camera is off by."""
@@ -119,6 +128,7 @@ def solve_runout_table(
     *,
     stored: ToolOffset | None = None,
     sigma_mm: float | None = None,
+    camera: CameraModel | None = None,
 ) -> RunoutTableResult:
     """Return the constant offset of a tip and the table of what it leaves.
 
@@ -127,6 +137,7 @@ def solve_runout_table(
             anywhere, upright or upside down.
         stored: The offset stored now; Z, U, V and W are kept from it, or 0 without one.
         sigma_mm: Standard deviation of one coordinate of one look, where it is known.
+        camera: The camera, where it is known what its pixels mean.
 
     What the tip does at all angles alike in the base cannot be told from the camera's own error
     and is taken for that.
@@ -161,14 +172,22 @@ def solve_runout_table(
                 "Look all round, at least every {limit:g} degrees of U.", limit=LARGEST_GAP_DEG
             ),
         )
-    plain = _result(sightings, report, stored, sigma_mm)
+    plain = _result(sightings, report, stored, sigma_mm, camera)
     values = {field.name: getattr(plain, field.name) for field in fields(CalibrationResult)}
     return RunoutTableResult(
         **values,
         camera_error_mm=report.centre_mm,
         table=table,
         wobble=report.harmonics_matter,
+        between_mm=_missed_mm(report, table.largest_gap_deg),
     )
+
+
+def _missed_mm(report: RunoutReport, gap_deg: float) -> float:
+    """Return how far half way between two rows lies from the line that joins them, at most."""
+    half = math.radians(gap_deg) / 2
+    ellipse_mm, second_mm = report.ellipse_mm or 0.0, report.second_mm or 0.0
+    return ellipse_mm * (1 - math.cos(half)) + second_mm * (1 - math.cos(2 * half))
 
 
 def _row(sighting: Sighting, report: RunoutReport) -> RunoutRow:
@@ -186,12 +205,15 @@ def _result(
     report: RunoutReport,
     stored: ToolOffset | None,
     sigma_mm: float | None,
+    camera: CameraModel | None,
 ) -> CalibrationResult:
     scatter = Dispersion.of(report.noise_mm2, report.dof, sigma_mm)
     covariance: tuple[tuple[float, ...], ...] = ()
+    region_mm = None
     if scatter is not None:
         variance = (scatter.sigma_mm * report.sigma_gain) ** 2
         covariance = ((variance, 0.0), (0.0, variance))
+        region_mm = scatter.region_mm(variance, 2)
     x_mm, y_mm = report.tip_mm
     moved = max(map(abs, report.centre_mm)) > CAMERA_MOVED_MM
     # A wobble is what is measured here, so it is no doubt.
@@ -216,6 +238,9 @@ def _result(
         rank=report.rank,
         dof=report.dof,
         unobservable=_KEPT,
+        interval_from=scatter.source if scatter else "",
+        region95_radius_mm=region_mm,
+        sources=camera_sources(sightings, report.gains, camera=camera, finds_place=True),
     )
 
 

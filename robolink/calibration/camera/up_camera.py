@@ -8,15 +8,16 @@ is ``R' (tip - flange)``.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 
 from robolink.calibration.camera.camera_model import CameraModel
+from robolink.calibration.camera.camera_uncertainty import camera_sources
+from robolink.calibration.camera.sighting import Sighting, check_sightings, plane_gains
 from robolink.calibration.core.dispersion import Dispersion
-from robolink.calibration.core.pose_checks import check_poses, keep_unmeasured, require_finite
+from robolink.calibration.core.pose_checks import keep_unmeasured
 from robolink.calibration.core.result import CalibrationResult
-from robolink.calibration.flange_checks import require_flange_in_base, with_height_error
+from robolink.calibration.flange_checks import with_height_error
 from robolink.calibration.flange_plane import (
-    FlangePlane,
     TipHeight,
     height_of,
     known_z_mm,
@@ -24,28 +25,7 @@ from robolink.calibration.flange_plane import (
 )
 from robolink.calibration.quality.station_part import StationPart, with_station
 from robolink.messages import tr
-from robolink.model import Pose, ToolOffset
-
-
-@dataclass(frozen=True, slots=True)
-class Sighting:
-    """Something on the tool, seen by a camera while the flange stood still.
-
-    Attributes:
-        flange: Actual flange pose (Tool 0) at the picture, mm and degrees.
-        x_mm, y_mm: Where it was seen, in the base.
-        z_mm: Its height there, ``None`` for a camera that does not tell it.
-    """
-
-    flange: Pose
-    x_mm: float
-    y_mm: float
-    z_mm: float | None = None
-
-    def in_flange_mm(self, tip_z_mm: float = 0.0) -> tuple[float, float]:
-        """Return X and Y of what was seen, in the flange's axes, where its Z is ``tip_z_mm``."""
-        dx, dy = self.x_mm - self.flange.x_mm, self.y_mm - self.flange.y_mm
-        return FlangePlane.of(self.flange).in_flange(dx, dy, tip_z_mm)
+from robolink.model import ToolOffset
 
 
 def solve_up_camera(
@@ -84,20 +64,25 @@ def solve_up_camera(
     """
     check_sightings((sighting,))
     if sighting.z_mm is not None:
-        in_space = _seen_in_space(sighting, sighting.z_mm, stored, sigma_mm)
-        return _with_camera(in_space, sighting, camera)
+        in_space, gains = _seen_in_space(sighting, sighting.z_mm, stored, sigma_mm)
+        return _with_camera(in_space, sighting, camera, gains)
     height = height_of(stored, height)
     (plane,) = solvable_planes((sighting.flange,), height)
     x_mm, y_mm = sighting.in_flange_mm(known_z_mm(height))
     result = _one_look(sighting, {"x_mm": x_mm, "y_mm": y_mm}, stored, sigma_mm)
     result = with_height_error(result, plane.in_flange(0.0, 0.0, 1.0), height)
-    return _with_camera(result, sighting, camera)
+    return _with_camera(result, sighting, camera, plane_gains((plane,)))
 
 
 def _with_camera(
-    result: CalibrationResult, sighting: Sighting, camera: CameraModel | None
+    result: CalibrationResult,
+    sighting: Sighting,
+    camera: CameraModel | None,
+    gains: Sequence[Sequence[float]],
 ) -> CalibrationResult:
     """Return a result with what its camera is unsure of: as much in every direction."""
+    sources = camera_sources((sighting,), gains, camera=camera, finds_place=False)
+    result = replace(result, sources=sources)
     if camera is None:
         return result
     variance = camera.sigma_at_mm(sighting.x_mm, sighting.y_mm) ** 2
@@ -112,13 +97,16 @@ def _with_camera(
 
 def _seen_in_space(
     sighting: Sighting, z_mm: float, stored: ToolOffset | None, sigma_mm: float | None
-) -> CalibrationResult:
+) -> tuple[CalibrationResult, list[list[float]]]:
+    """Return the result, and by how much it changes with X and Y of what was seen."""
     from robolink.calibration.core.rotations import rotation_of  # numpy, which X and Y do without
 
     flange = sighting.flange
     away = (sighting.x_mm - flange.x_mm, sighting.y_mm - flange.y_mm, z_mm - flange.z_mm)
-    x_mm, y_mm, z_mm = (rotation_of(flange).T @ away).tolist()
-    return _one_look(sighting, {"x_mm": x_mm, "y_mm": y_mm, "z_mm": z_mm}, stored, sigma_mm)
+    turned = rotation_of(flange).T
+    x_mm, y_mm, z_mm = (turned @ away).tolist()
+    found = {"x_mm": x_mm, "y_mm": y_mm, "z_mm": z_mm}
+    return _one_look(sighting, found, stored, sigma_mm), turned[:, :2].tolist()
 
 
 def _one_look(
@@ -129,10 +117,12 @@ def _one_look(
 ) -> CalibrationResult:
     scatter, axes = Dispersion.of(0.0, 0, sigma_mm), range(len(found))
     covariance: tuple[tuple[float, ...], ...] = ()
+    region_mm = None
     if scatter:
         # A rotation leaves errors that are alike in all directions as they are.
         variance = scatter.sigma_mm**2
         covariance = tuple(tuple(variance if i == j else 0.0 for j in axes) for i in axes)
+        region_mm = scatter.region_mm(variance, len(found))
     others = tuple(n for n in ("z_mm", "u_deg", "v_deg", "w_deg") if n not in found)
     place = (sighting.x_mm, sighting.y_mm, sighting.z_mm)
     return CalibrationResult(
@@ -148,40 +138,9 @@ def _one_look(
         half_width95=scatter.half_widths(covariance) if scatter else (),
         sigma_mm=sigma_mm,
         sigma_stated=scatter is not None,
+        region95_radius_mm=region_mm,
+        interval_from=scatter.source if scatter else "",
         rank=len(found),
         dof=0,
         unobservable=others,
     )
-
-
-def check_sightings(
-    sightings: tuple[Sighting, ...], *, allow_mixed_hand: bool = False
-) -> tuple[str, ...]:
-    """Refuse sightings that are no numbers or do not belong together, or not to the base.
-
-    Raises:
-        CalibrationError: ``non_finite``, ``suspect_units``, ``mixed_hand``, ``mixed_local``,
-            ``mixed_tool``, ``tool_pose`` or ``local_pose``.
-    """
-    for number, sighting in enumerate(sightings, start=1):
-        require_finite(
-            **{f"x_mm of sighting {number}": sighting.x_mm},
-            **{f"y_mm of sighting {number}": sighting.y_mm},
-            **{f"z_mm of sighting {number}": sighting.z_mm or 0.0},
-        )
-    flanges = [sighting.flange for sighting in sightings]
-    doubts = check_poses(flanges, allow_mixed_hand=allow_mixed_hand)
-    require_flange_in_base(flanges)
-    return doubts
-
-
-def seen_in_flange(
-    sightings: Sequence[Sighting], height: TipHeight | None
-) -> list[tuple[float, float]]:
-    """Return X and Y of everything seen, in the flange's axes.
-
-    Raises:
-        CalibrationError: ``tilted_pose``.
-    """
-    solvable_planes([sighting.flange for sighting in sightings], height)
-    return [sighting.in_flange_mm(known_z_mm(height)) for sighting in sightings]

@@ -93,6 +93,10 @@ class Dispersion:
         """Return the factor for a region of 95 % in several dimensions together."""
         return math.sqrt(dimensions * f_quantile(_REGION, dimensions, self.nu))
 
+    def region_mm(self, variance_mm2: float, dimensions: int) -> float:
+        """Return the radius of the 95 % region of lengths that are known alike."""
+        return self.region_factor(dimensions) * math.sqrt(variance_mm2)
+
     def half_widths(self, covariance: Sequence[Sequence[float]]) -> tuple[float, ...]:
         """Return half of each component's 95 % interval."""
         return tuple(

@@ -32,6 +32,11 @@ class LinearFit:
     rank: int
     weakest: Floats
 
+    def gains(self, a: Floats) -> Floats:
+        """Return by how much the solution changes with each entry of b: (A'A)^-1 A'."""
+        found: Floats = self.unit_covariance @ a.T
+        return found
+
 
 def linear_fit(a: Floats, b: Floats) -> LinearFit:
     """Return the least squares of ``a x = b``; ``a`` has at least as many rows as columns."""

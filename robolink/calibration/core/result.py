@@ -125,6 +125,7 @@ class CalibrationResult:
         evidence: Figures behind notes and doubts.
         sources: Errors that its scatter cannot show, and how each enters; ``None`` where the method
             does not say it.
+        marks_mm: Where the marks that a proof looks at lie on the tool; empty for a tip.
         accuracy: What it is accurate to, once it was held to what the cell knows
             (:func:`~robolink.calibration.assessed`).
     """
@@ -155,6 +156,7 @@ class CalibrationResult:
     budget: UncertaintyBudget | None = None
     evidence: FitEvidence | None = None
     sources: tuple[ErrorSource, ...] | None = None
+    marks_mm: tuple[tuple[float, float], ...] = ()
     accuracy: Accuracy | None = None
 
     def __post_init__(self) -> None:
@@ -209,6 +211,16 @@ class CalibrationResult:
     def inputs_per_look(self) -> int:
         """How many inputs together tell both coordinates once."""
         return 1
+
+    @property
+    def held_to_table_mm(self) -> float | None:
+        """How far off a table may be between its rows, where a proof is held to one as well."""
+        return None
+
+    @property
+    def by_surface(self) -> bool:
+        """Whether a surface was touched, so that no drift is seen but solved for."""
+        return False
 
     @property
     def residual_distances_mm(self) -> tuple[float, ...]:

@@ -22,6 +22,14 @@ class TurnClaim:
         finds_place: Whether the measurement found the place that it turns about.
         place_u_mm: Standard uncertainty of the place where it did not, without its growth by age.
         offset_u_mm: Standard uncertainty of the offset by rows that a turn shows.
+        tilted_leverage: What the scatter of the measurement brings to each drift, as a multiple of
+            the variance of one look, where the tool was tilted; ``None`` where ``headings_deg``
+            tell it.
+        mark_leverage: What it brings besides to a drift of a mark that is not in the middle of the
+            tool, or is held to a table.
+        mark_u_mm: Standard uncertainty of where on the tool the mark of each drift is: how
+            fiducials are printed, how far a table misses between its rows.
+        by_surface: Whether a surface is touched, so that each drift tells itself how sure it is.
         repeatable_mm: What the measurement says it is repeatable to, ``None`` for nothing.
         accurate_mm: What it says it is accurate to, ``None`` for nothing.
         by_camera: Whether the drift itself is seen through a camera whose scale, turn or mirror
@@ -36,6 +44,10 @@ class TurnClaim:
     finds_place: bool
     place_u_mm: float = 0.0
     offset_u_mm: float = 0.0
+    tilted_leverage: float | None = None
+    mark_leverage: float = 0.0
+    mark_u_mm: float = 0.0
+    by_surface: bool = False
     repeatable_mm: float | None = None
     accurate_mm: float | None = None
     by_camera: bool = False

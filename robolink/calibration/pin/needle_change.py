@@ -125,6 +125,7 @@ def solve_needle_change(
         half_width95=halves,
         sigma_mm=sigma_mm,
         sigma_stated=True,
+        region95_radius_mm=scatter.region_mm(now.sigma_mm**2, len(found)),
         rank=len(found),
         dof=0,
         unobservable=others,

@@ -139,6 +139,7 @@ def solve_one_touch(
         half_width95=scatter.half_widths(covariance) if scatter else (),
         sigma_mm=sigma_mm,
         sigma_stated=scatter is not None,
+        region95_radius_mm=scatter.region_mm(scatter.sigma_mm**2, 3) if scatter else None,
         rank=3,
         dof=0,
         unobservable=("u_deg", "v_deg", "w_deg"),

@@ -70,10 +70,10 @@ def with_station(result: ResultT, *parts: StationPart) -> ResultT:
     added = [part for part in parts if np.any(np.asarray(part.covariance))]
     if not result.half_width95 or not added:
         return result
-    count = len(added[0].covariance)
+    count = max(len(part.covariance) for part in added)
     lengths = [i for i in range(count) if result.measured[i].endswith("_mm")]
     touches = scatter_covariance(result)
-    places = [np.asarray(part.covariance) for part in added]
+    places = [_of_all(part.covariance, count) for part in added]
     total = touches.copy()
     for place in places:
         total[:count, :count] += place
@@ -98,6 +98,16 @@ def with_station(result: ResultT, *parts: StationPart) -> ResultT:
         region95_radius_mm=_region(total[np.ix_(lengths, lengths)], freedom[worst]),
         budget=budget,
     )
+
+
+def _of_all(covariance: Sequence[Sequence[float]], count: int) -> "Floats":
+    """Return a covariance with nothing for the components that it does not reach."""
+    import numpy as np
+
+    whole: Floats = np.zeros((count, count))
+    known = slice(len(covariance))
+    whole[known, known] = covariance
+    return whole
 
 
 def _by_normal(result: CalibrationResult) -> bool:

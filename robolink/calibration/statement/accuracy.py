@@ -113,19 +113,24 @@ def assessed(result: ResultT, facts: AccuracyFacts) -> ResultT:
     return replace(
         result,
         accuracy=Accuracy(
-            within_mm=_within_mm(whole),
-            half_width95=whole.half_width95,
+            within_mm=_at_least(whole, scattered),
+            half_width95=tuple(map(max, whole.half_width95, scattered.half_width95)),
             rows=tuple(rows),
             budget=whole.budget or _plain_budget(rows),
-            without_defaults_mm=_within_mm(known) if basis != "default" else 0.0,
+            without_defaults_mm=_at_least(known, scattered) if basis != "default" else 0.0,
         ),
     )
 
 
-def _within_mm(result: CalibrationResult) -> float:
-    within_mm = result.repeatable_to_mm
-    assert within_mm is not None  # noqa: S101 - it has half widths
-    return within_mm
+def _at_least(whole: CalibrationResult, scattered: CalibrationResult) -> float:
+    """Return what a result is known within, never better than its scatter alone lets it be.
+
+    A row that is known well lets the effective degrees of freedom grow, and with them the factor
+    shrinks, at a few residuals by more than the row adds.
+    """
+    within_mm = [result.repeatable_to_mm for result in (whole, scattered)]
+    assert None not in within_mm  # noqa: S101 - they have half widths
+    return max(one for one in within_mm if one is not None)
 
 
 @dataclass(frozen=True, slots=True)

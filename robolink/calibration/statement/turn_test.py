@@ -6,13 +6,16 @@ Of two fresh looks at angles that differ by a it has, in each coordinate,
     v = s^2 + s_offset^2 + (2 sin(a / 2))^2 u_place^2
 
 and against a place that was fitted v = s^2 (1 + h), h being the leverage of the test in the fit.
+A mark beside the middle of a board, a row of a table and a surface have more of it, and each drift
+of a mark has what is uncertain of where it is on the tool.
 Each drift is held to its own limit sqrt(q v) (docs/reference/evidence.md 20).
 """
 
 import cmath
 import math
 from collections.abc import Sequence
-from typing import Final
+from dataclasses import dataclass
+from typing import Final, Self
 
 from robolink.calibration.core.accuracy import AccuracyFacts, ErrorSource
 from robolink.calibration.core.frames import tip_pose
@@ -39,6 +42,16 @@ LEAST_TURN_DEG: Final = 90.0
 
 _SHOWN: Final = 0.5
 """A drift that shows less than this share of an error tells no wider statement."""
+
+_ROUGHER: Final = 0.99
+"""Quantile of chi-square above which looks are rougher than is usual."""
+
+_WITH_DIRECTION: Final = 3
+"""X, Y and the direction of a tool."""
+
+_LEAST_TILTED: Final = 4
+
+_TELLS_NOTHING: Final = 1e-9
 
 _REGION95: Final = 2.45
 """Of two coordinates with a known scatter, together."""
@@ -67,12 +80,13 @@ def turn_claim(result: CalibrationResult, facts: AccuracyFacts) -> TurnClaim | N
     sources = result.sources or ()
     place = [one for one in sources if one.turning == "in_base"]
     aside = [one for one in sources if one.turning == "as_offset"]
+    marks = _Marks.of(result)
     # A look of several inputs has the mean of them in each coordinate.
     single_mm = sigma_mm * math.sqrt(max(result.inputs_per_look / 2, 1.0))
     return TurnClaim(
         look_sigma_mm=sigma_mm,
         look_nu=nu,
-        offset_sigma_mm=single_mm * result.sigma_gain,
+        offset_sigma_mm=single_mm * (marks.middle_gain or result.sigma_gain),
         # Touches of a surface tell a height, at whatever angle.
         headings_deg=tuple(
             tip_pose(pose, result.offset, tool=0).u_deg if pose.tool in (None, 0) else pose.u_deg
@@ -81,21 +95,99 @@ def turn_claim(result: CalibrationResult, facts: AccuracyFacts) -> TurnClaim | N
         or (0.0,),
         inputs_per_look=result.inputs_per_look,
         finds_place=not place,
-        place_u_mm=math.hypot(*(_u_mm(one, facts) for one in place)),
-        offset_u_mm=math.hypot(*(_u_mm(one, facts) for one in aside)),
+        place_u_mm=math.hypot(*(marks.u_mm(one, facts) for one in place)),
+        offset_u_mm=math.hypot(*(marks.u_mm(one, facts) for one in aside)),
+        tilted_leverage=_tilted_leverage(result),
+        mark_leverage=marks.leverage,
+        mark_u_mm=math.hypot(
+            (result.held_to_table_mm or 0.0) / math.sqrt(3),
+            *(marks.printed_u_mm(facts) for one in sources if one.row == "print_mm"),
+        ),
+        by_surface=result.by_surface,
         repeatable_mm=result.repeatable_to_mm,
         accurate_mm=result.accurate_to_mm,
         by_camera=any(one.row == "tip_image_px" for one in sources),
     )
 
 
-def _u_mm(source: ErrorSource, facts: AccuracyFacts) -> float:
-    """Return what a row brings to one coordinate, the worst; without its growth by age.
+@dataclass(frozen=True, slots=True)
+class _Marks:
+    """What a proof looks at, as it lies on the tool.
 
-    The growth is in the statement, but would blunt the test.
+    Attributes:
+        places: X and Y of each in the axes of the tool.
+        leverage: What scatter brings to their drifts by the direction of the tool, or by the table
+            that they are held to, as a multiple of the variance of one look.
+        middle_gain: Gain of the middle of several, ``None`` for a tip.
     """
-    covariance = row_covariance(source, facts.of(source.row).half_width)
-    return math.sqrt(max(covariance.diagonal().tolist(), default=0.0))
+
+    places: tuple[tuple[float, float], ...]
+    leverage: float
+    middle_gain: float | None
+
+    @classmethod
+    def of(cls, result: CalibrationResult) -> Self:
+        """Return those of a method's proof."""
+        looks = max(len(result.inputs), 1)
+        if not result.marks_mm:
+            # At a row it is held to one look, in the place of all.
+            row = 0.0 if result.held_to_table_mm is None else max(1 - 2 / looks, 0.0)
+            return cls(((0.0, 0.0),), row, None)
+        places, count = result.marks_mm, len(result.marks_mm)
+        x_mm, y_mm = (sum(axis) / count for axis in zip(*places, strict=True))
+        squares = [(x - x_mm) ** 2 + (y - y_mm) ** 2 for x, y in places]
+        turned = max(squares) / (sum(squares) * looks / count)
+        return cls(places, turned, 1 / math.sqrt(looks))
+
+    def u_mm(self, source: ErrorSource, facts: AccuracyFacts) -> float:
+        """Return what a row brings to one coordinate of a mark, the worst; without its growth.
+
+        The growth by age is in the statement, but would blunt the test.
+        """
+        half_width, worst = facts.of(source.row).half_width, 0.0
+        if len(self.places) == 1 or len(source.gain) < _WITH_DIRECTION:
+            covariance = row_covariance(source, half_width)
+            return math.sqrt(max(covariance.diagonal().tolist(), default=0.0))
+        along_x, along_y, turn = source.gain[:_WITH_DIRECTION]
+        degree = math.radians(1.0)
+        for x_mm, y_mm in self.places:
+            by_x = sum((g - degree * y_mm * t) ** 2 for g, t in zip(along_x, turn, strict=True))
+            by_y = sum((g + degree * x_mm * t) ** 2 for g, t in zip(along_y, turn, strict=True))
+            worst = max(worst, by_x, by_y)
+        return half_width * math.sqrt(worst / 3)
+
+    def printed_u_mm(self, facts: AccuracyFacts) -> float:
+        """Return how far a fiducial lies from where all of them put it."""
+        share = 1 - 1 / len(self.places)
+        return facts.of("print_mm").half_width * math.sqrt(share / 3)
+
+
+def _tilted_leverage(result: CalibrationResult) -> float | None:
+    """Return the leverage of a test in the fit of a tip that was tilted, the worst; else ``None``.
+
+    h = 1 / N + (R - mean R) C (R - mean R)', with C that of the tip for sigma = 1; R being any of
+    the orientations that were touched, turned as one likes.
+    """
+    if result.by_surface or len(result.reference_point_mm) < 3 or "z_mm" not in result.measured:
+        return None
+    # Those that tell directions only leave no residual.
+    poses = result.inputs[: len(result.residuals_mm)]
+    if len(poses) < _LEAST_TILTED:
+        return None
+    import numpy as np  # which the help of a command does without
+
+    from robolink.calibration.core.rotations import rotations
+
+    angles = np.array([(one.u_deg, one.v_deg, one.w_deg) for one in poses])
+    touched = rotations(angles)
+    count, mean = len(touched), touched.mean(axis=0)
+    told, axes = np.linalg.eigh(count * (np.eye(3) - mean.T @ mean))
+    if told[0] < _TELLS_NOTHING:
+        return None
+    about = rotations(np.array([(turn, 0.0, 0.0) for turn in range(0, 360, 15)], dtype=float))
+    other = np.einsum("aij,njk->anik", about, touched).reshape(-1, 3, 3) - mean
+    spread = other @ ((axes / told) @ axes.T) @ other.transpose(0, 2, 1)
+    return 1 / count + float(np.linalg.eigvalsh(spread)[:, -1].max())
 
 
 def _look_scatter(
@@ -109,12 +201,23 @@ def _look_scatter(
         # Looks on a grid can be off by its step without scattering at all.
         usual_mm = max(usual_mm, step_mm / math.sqrt(12) / of_look)
     own_mm = None if result.sigma_mm is None else result.sigma_mm / of_look
-    from_residuals = result.interval_from == "residuals"
-    if own_mm is not None and from_residuals and (result.dof or 0) >= _ENOUGH_NU:
-        return own_mm, float(result.dof or 0)
+    from_residuals, dof = result.interval_from == "residuals", result.dof or 0
+    if own_mm is not None and from_residuals and dof >= _ENOUGH_NU:
+        return own_mm, float(dof)
     if own_mm is not None and result.sigma_stated:
-        # Residuals of few looks that contradict what was stated are not a better scatter.
-        return (max(own_mm, usual_mm or 0.0) if from_residuals else own_mm), None
+        # Few residuals make the interval wider, by the factor of Student's t, even where they are
+        # small: what was stated stands as long as they do not contradict it.
+        if from_residuals and "sigma_contradicted" in result.warnings:
+            return own_mm, float(dof)
+        ratio = result.evidence.birge_ratio if from_residuals and result.evidence else None
+        return own_mm / (ratio or 1.0), None
+    recorded = facts.look_sigma_mm is not None and facts.look_nu >= _ENOUGH_NU
+    least_mm = facts.look_sigma_mm if recorded else usual_mm
+    # Looks that are rougher than is usual, beyond doubt, say so themselves, however few they are.
+    if own_mm is not None and least_mm and from_residuals and dof:
+        squares = dof * (own_mm / least_mm) ** 2
+        if squares > chi_square_quantile(_ROUGHER, dof):
+            return own_mm, float(dof)
     if facts.look_sigma_mm is not None and facts.look_nu >= _ENOUGH_NU:
         return facts.look_sigma_mm, facts.look_nu
     if usual_mm is not None:
@@ -174,10 +277,15 @@ def _limits(
     if proof.heights_only:
         # The surface is where it was, whatever its height.
         return _both(scatter, 0.0, count, coordinates, claim.look_nu, 180.0)
-    if claim.finds_place:
+    if claim.by_surface:
+        # Twice: the surface is known no better than the touches of the test show it.
+        scatter = 2 * max(look / drift.looks, drift.u_mm**2)
+    elif claim.finds_place:
         scatter = look / drift.looks + look * _leverage(claim, drift.u_deg)
     else:
         place = (abs(_turned(claim.headings_deg, drift.u_deg)) * claim.place_u_mm) ** 2
+    # Where a mark lies on the tool is no movement, so it contradicts neither statement.
+    scatter += look * claim.mark_leverage + claim.mark_u_mm**2
     rows = place + claim.offset_u_mm**2
     turn_deg = max(abs(angle_difference_deg(drift.u_deg, one)) for one in claim.headings_deg)
     return _both(scatter, rows, count, coordinates, claim.look_nu, turn_deg)
@@ -206,6 +314,8 @@ def _leverage(claim: TurnClaim, u_deg: float) -> float:
 
     Where the tool was tilted and not turned its headings say nothing: then that of an even spread.
     """
+    if claim.tilted_leverage is not None:
+        return claim.tilted_leverage
     looks = [cmath.exp(1j * math.radians(one)) for one in claim.headings_deg]
     count = len(looks) / claim.inputs_per_look
     mean = sum(looks) / len(looks)

@@ -61,6 +61,11 @@ class PlaneTouchResult(CalibrationResult):
 
     plane: TouchedPlane
 
+    @property
+    def by_surface(self) -> bool:
+        """A plane was touched."""
+        return True
+
     def details(self) -> dict[str, object]:
         """Return the plane."""
         plane = {"normal": list(self.plane.normal), "distance_mm": self.plane.distance_mm}

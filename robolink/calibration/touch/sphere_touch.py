@@ -42,6 +42,11 @@ class SphereTouchResult(CalibrationResult):
 
     radius_mm: float
 
+    @property
+    def by_surface(self) -> bool:
+        """A sphere was touched."""
+        return True
+
     def details(self) -> dict[str, object]:
         """Return the sphere."""
         return {"sphere": {"centre_mm": list(self.reference_point_mm), "radius_mm": self.radius_mm}}

@@ -47,6 +47,6 @@ def measure_runout_table(
     """
 
     def solve(sightings: Sequence[Sighting]) -> RunoutTableResult:
-        return solve_runout_table(sightings, stored=stored, sigma_mm=sigma_mm)
+        return solve_runout_table(sightings, stored=stored, sigma_mm=sigma_mm, camera=station.model)
 
     return (yield from look_round(station, plan, solve, here=here, stored=stored, retake=retake))

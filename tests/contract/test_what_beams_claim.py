@@ -10,6 +10,7 @@ from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink.controllers.softmotion import SoftMotionController
 from robolink.errors import CalibrationError, VerifyError
 from robolink.methods import BeamsParameters, BeamsSource
+from robolink.model import EntryKind
 from tests.contract._sensor_cell import miss_mm, plc_sensor_cell, sensor_cell
 
 NOISE = {"noise_mm": 0.003}

@@ -6,8 +6,11 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("robolink", "cli/robolink_cli", "simulators/robolink_simulators")
-MOST_MODULES = 12
-MOST_LINES = 400
+MOST_MODULES = 16
+"""Fewer folders are easier to find one's way in than shorter ones: a subject is split when it is
+two, not when it is long."""
+MOST_LINES = 500
+"""Of a module that stays one idea; most are far shorter."""
 
 
 def modules():

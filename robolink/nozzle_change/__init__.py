@@ -6,6 +6,8 @@ from robolink.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from robolink.nozzle_change._acceptance import AcceptanceCriteria as AcceptanceCriteria
+    from robolink.nozzle_change._accuracy import accuracy_facts as accuracy_facts
+    from robolink.nozzle_change._accuracy import assessed_in_cell as assessed_in_cell
     from robolink.nozzle_change._change import DescribeReport as DescribeReport
     from robolink.nozzle_change._change import Earlier as Earlier
     from robolink.nozzle_change._change import NozzleChange as NozzleChange
@@ -46,6 +48,7 @@ __getattr__ = lazy_exports(
     __name__,
     {
         "_acceptance": "AcceptanceCriteria",
+        "_accuracy": "accuracy_facts assessed_in_cell",
         "_change": "DescribeReport Earlier NozzleChange",
         "_length": "known_height",
         "open_turn_test.finishing": "finish_by_turn_test",

@@ -18,6 +18,7 @@ from robolink.nozzle_change import (
     NozzleChange,
     Proposal,
     ToolReport,
+    assessed_in_cell,
 )
 from robolink.procedures import MeasurementContext, PoseMethod
 from robolink.transaction import Order, earlier_corrections
@@ -179,7 +180,7 @@ def _carry_out(
     order: Order | None,
     describe: DescribeReport,
 ) -> ChangeReport:
-    one = frame.tool_plan(given, verify=False)
+    one = frame.tool_plan(given, controller, verify=False)
     attended = not frame.yes and on_terminal()
     change = NozzleChange(
         controller,
@@ -199,7 +200,8 @@ def _dry_run(
     """Propose and judge; return the document with what would be sent."""
     before = controller.tools.read(frame.tool)
     given.found = given.find(controller, frame.tool, before)
-    result = frame.tool_plan(given, verify=False).named(given.found.result)
+    plan = frame.tool_plan(given, controller, verify=False)
+    result = assessed_in_cell(controller, plan, plan.named(given.found.result))
     proposal = Proposal(frame.tool, before, result)
     if not frame.context.json:
         listener.proposed([proposal])

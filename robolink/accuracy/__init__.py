@@ -1,0 +1,45 @@
+"""What a cell knows of its own accuracy: stated, on record, shown, measured.
+
+Each row of a budget (:data:`robolink.calibration.ACCURACY_ROWS`) is stated by the recipe or the
+cell file, learnt from the journal, or a default. docs/accuracy.md explains all three.
+"""
+
+from typing import TYPE_CHECKING
+
+from robolink.lazy_exports import lazy_exports
+
+if TYPE_CHECKING:
+    from robolink.accuracy._age import months_at as months_at
+    from robolink.accuracy._known import CellRecord as CellRecord
+    from robolink.accuracy._known import KnownRow as KnownRow
+    from robolink.accuracy._known import facts_at as facts_at
+    from robolink.accuracy._known import rows_at as rows_at
+    from robolink.accuracy._looks import LooksAlike as LooksAlike
+    from robolink.accuracy._looks import pooled_look as pooled_look
+    from robolink.accuracy._measured import MeasuredRow as MeasuredRow
+    from robolink.accuracy._measured import measured_entry as measured_entry
+    from robolink.accuracy._measured import measured_row as measured_row
+    from robolink.accuracy._remedies import measuring_step as measuring_step
+    from robolink.accuracy._repeats import learnt_rows as learnt_rows
+    from robolink.accuracy._stated import rows_of_station as rows_of_station
+    from robolink.accuracy._stated import stated_rows as stated_rows
+    from robolink.accuracy._studies import MeasuredTip as MeasuredTip
+    from robolink.accuracy._studies import artefact_row as artefact_row
+    from robolink.accuracy._studies import measured_tips as measured_tips
+    from robolink.accuracy._studies import study_row as study_row
+    from robolink.accuracy._studies import tip_image_row as tip_image_row
+    from robolink.accuracy._studies import turned_pairs as turned_pairs
+
+__getattr__ = lazy_exports(
+    __name__,
+    {
+        "_age": "months_at",
+        "_known": "CellRecord KnownRow facts_at rows_at",
+        "_looks": "LooksAlike pooled_look",
+        "_measured": "MeasuredRow measured_entry measured_row",
+        "_remedies": "measuring_step",
+        "_repeats": "learnt_rows",
+        "_stated": "rows_of_station stated_rows",
+        "_studies": "MeasuredTip artefact_row measured_tips study_row tip_image_row turned_pairs",
+    },
+)

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from robolink.accuracy._age import months_at as months_at
     from robolink.accuracy._known import CellRecord as CellRecord
     from robolink.accuracy._known import KnownRow as KnownRow
+    from robolink.accuracy._known import Recall as Recall
     from robolink.accuracy._known import facts_at as facts_at
     from robolink.accuracy._known import rows_at as rows_at
     from robolink.accuracy._looks import LooksAlike as LooksAlike
@@ -34,7 +35,7 @@ __getattr__ = lazy_exports(
     __name__,
     {
         "_age": "months_at",
-        "_known": "CellRecord KnownRow facts_at rows_at",
+        "_known": "CellRecord KnownRow Recall facts_at rows_at",
         "_looks": "LooksAlike pooled_look",
         "_measured": "MeasuredRow measured_entry measured_row",
         "_remedies": "measuring_step",

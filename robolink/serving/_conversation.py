@@ -35,12 +35,12 @@ from robolink.protocols.spel_callback import (
     same_thousandths,
 )
 from robolink.serving._book import ProgramChange, begin_change, open_changes, record_name
-from robolink.serving._judging import CallbackLimits, require_believed
+from robolink.serving._judging import CallbackLimits, believed, facts_for_program
 from robolink.serving._measures import measure_named
 from robolink.stations import Station, StationKind, find_station
 
 if TYPE_CHECKING:
-    from robolink.calibration import CalibrationResult
+    from robolink.calibration import AccuracyFacts, CalibrationResult
     from robolink.config import Cell
     from robolink.journal import Journal, JournalOutcomeLog
     from robolink.serving._measures import ProgramMeasure
@@ -71,6 +71,7 @@ class _Run:
     tool: int
     before: ToolOffset
     measure: "ProgramMeasure"
+    station: str = ""
     result: "CalibrationResult | None" = None
     change: ProgramChange | None = None
     written: bool = False
@@ -218,7 +219,7 @@ class CallbackConversation:
             measure = measure_named(fields[1], self._limits, self._station)
         except ConfigError as error:
             raise CalibrationError("station_unknown", error.what) from error
-        self._run = _Run(tool, before, measure)
+        self._run = _Run(tool, before, measure, fields[1].partition("@")[2])
         return CallbackWord.GO, ()
 
     def _station(self, name: str, kind: StationKind) -> Station:
@@ -278,8 +279,8 @@ class CallbackConversation:
         run = self._require_run()
         if run.change is not None:
             raise RemoteProtocolError(tr("A value was given already."))
-        result = run.measure.solve(run.before)
-        require_believed(result, run.before, self._limits)
+        found = run.measure.solve(run.before)
+        result = believed(found, run.before, self._limits, self._facts(run, found))
         rounded = ToolOffset(*(round(value, 3) for value in result.offset.components()))
         run.result = result
         run.change = begin_change(self._require_log(), run.tool, run.before, rounded)
@@ -287,11 +288,24 @@ class CallbackConversation:
             EntryKind.CALIBRATION,
             result.method,
             known_within_mm=result.repeatable_to_mm,
+            repeatable_to_mm=result.repeatable_to_mm,
+            accurate_to_mm=result.accurate_to_mm,
+            accuracy=result.accuracy.as_json(result.measured) if result.accuracy else None,
             warnings=list(result.warnings),
             peer=self._peer,
             **run.measure.on_record(),
         )
         return CallbackWord.VALUE, (run.change.operation, *offset_fields(rounded))
+
+    def _facts(self, run: _Run, result: "CalibrationResult") -> "AccuracyFacts":
+        return facts_for_program(
+            self._require_log().recorded,
+            self._cell,
+            station=run.station,
+            method=result.method,
+            by_contact=run.measure.by_contact,
+            inputs_per_look=result.inputs_per_look,
+        )
 
     # What it wrote.
 

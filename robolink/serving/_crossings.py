@@ -70,6 +70,7 @@ class ProgramCrossings:
     """
 
     length: ClassVar[int] = 3
+    by_contact: ClassVar[bool] = False
 
     def __init__(
         self, station: "BeamStation", limits: CallbackLimits, *, max_lean_deg: float

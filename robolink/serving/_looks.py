@@ -40,6 +40,7 @@ class ProgramLooks:
     """
 
     length: ClassVar[int] = 3
+    by_contact: ClassVar[bool] = False
 
     def __init__(self, limits: CallbackLimits) -> None:
         self._limits = limits

@@ -19,9 +19,11 @@ class ProgramMeasure(Protocol):
 
     Attributes:
         length: How many fields follow a pose.
+        by_contact: Whether an input showed each touch, so that nobody had to see it.
     """
 
     length: ClassVar[int]
+    by_contact: ClassVar[bool]
 
     def add(self, flange: Pose, seen: Sequence[str], *, proof: bool) -> int:
         """Take a flange pose and what was seen there; return how many there are now.

@@ -59,6 +59,7 @@ class ProgramTouches:
     """
 
     length: ClassVar[int] = 2
+    by_contact: ClassVar[bool] = True
 
     def __init__(self, method: "PoseMethod", limits: CallbackLimits) -> None:
         self._method, self._limits = method, limits

@@ -15,11 +15,15 @@ if TYPE_CHECKING:
     from robolink.accuracy._known import Recall as Recall
     from robolink.accuracy._known import facts_at as facts_at
     from robolink.accuracy._known import rows_at as rows_at
+    from robolink.accuracy._known import rows_on_record as rows_on_record
     from robolink.accuracy._looks import LooksAlike as LooksAlike
     from robolink.accuracy._looks import pooled_look as pooled_look
     from robolink.accuracy._measured import MeasuredRow as MeasuredRow
     from robolink.accuracy._measured import measured_entry as measured_entry
     from robolink.accuracy._measured import measured_row as measured_row
+    from robolink.accuracy._overview import RowsAt as RowsAt
+    from robolink.accuracy._overview import mm_per_px as mm_per_px
+    from robolink.accuracy._overview import rows_of_cell as rows_of_cell
     from robolink.accuracy._remedies import measuring_step as measuring_step
     from robolink.accuracy._repeats import learnt_rows as learnt_rows
     from robolink.accuracy._stated import rows_of_station as rows_of_station
@@ -35,9 +39,10 @@ __getattr__ = lazy_exports(
     __name__,
     {
         "_age": "months_at",
-        "_known": "CellRecord KnownRow Recall facts_at rows_at",
+        "_known": "CellRecord KnownRow Recall facts_at rows_at rows_on_record",
         "_looks": "LooksAlike pooled_look",
         "_measured": "MeasuredRow measured_entry measured_row",
+        "_overview": "RowsAt mm_per_px rows_of_cell",
         "_remedies": "measuring_step",
         "_repeats": "learnt_rows",
         "_stated": "rows_of_station stated_rows",

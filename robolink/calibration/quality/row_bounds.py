@@ -74,7 +74,7 @@ def scatter_of_repeats(
         >>> found = [(0, 0), (0.01, 0), (0, 0.01), (0.01, 0.01), (0, 0), (5, 5)]
         >>> bound = scatter_of_repeats(found, anew_from=0.5)
         >>> bound.count, round(bound.sigma, 4), round(bound.half_width, 3)
-        (5, 0.0087, 0.027)
+        (5, 0.0061, 0.021)
         >>> scatter_of_repeats(found[:4], anew_from=0.5) is None
         True
     """

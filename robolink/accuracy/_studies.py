@@ -1,7 +1,7 @@
 """Rows that are measured for their own sake: an artefact test, a gauge study, turned nozzles."""
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from robolink.accuracy._measured import MeasuredRow
@@ -12,7 +12,7 @@ from robolink.calibration import (
     require_positive,
     require_records,
 )
-from robolink.errors import CalibrationError, ConfigError
+from robolink.errors import CalibrationError, ConfigError, RobolinkError
 from robolink.messages import tr
 from robolink.methods import AnyMethod, find_method
 from robolink.model import EntryKind, Recorded, read_offset
@@ -59,13 +59,10 @@ def measured_tips(entries: Iterable[Recorded]) -> Iterator[MeasuredTip]:
     """
     for entry in entries:
         said, method = entry.details, _method(entry.details.get("method"))
-        tip = read_offset(said.get("tip") or said.get("proposed"))
-        measured = said.get("measured")
+        xy_mm = _measured_xy(said)
         if entry.kind is not EntryKind.CALIBRATION or entry.tool is None or method is None:
             continue
-        if tip is None or not isinstance(measured, list) or not {"x_mm", "y_mm"} <= {*measured}:
-            continue
-        if not (math.isfinite(tip.x_mm) and math.isfinite(tip.y_mm)):
+        if xy_mm is None:
             continue
         by_camera = method.needs.station is StationKind.CAMERA
         if not by_camera and not _by_eye(method, said.get("touches")):
@@ -79,7 +76,7 @@ def measured_tips(entries: Iterable[Recorded]) -> Iterator[MeasuredTip]:
             entry.signature.nozzle,
             entry.signature.station,
             by_camera,
-            (tip.x_mm, tip.y_mm),
+            xy_mm,
         )
 
 
@@ -215,6 +212,18 @@ def tip_image_row(pairs: Sequence[Pair], *, mm_per_px: float, station: str) -> M
         records=tuple(tip.number for pair in pairs for tip in pair),
         details={"sigma_mm": bound.sigma, "mm_per_px": mm_per_px},
     )
+
+
+def _measured_xy(said: Mapping[str, object]) -> tuple[float, float] | None:
+    """Return X and Y of the tip, ``None`` where they were not measured or cannot be read."""
+    measured = said.get("measured")
+    if not isinstance(measured, list) or not {"x_mm", "y_mm"} <= {*map(str, measured)}:
+        return None
+    try:
+        tip = read_offset(said.get("tip") or said.get("proposed"))
+    except (RobolinkError, TypeError, ValueError):
+        return None
+    return None if tip is None else (tip.x_mm, tip.y_mm)
 
 
 def _method(name: object) -> AnyMethod | None:

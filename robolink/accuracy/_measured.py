@@ -130,5 +130,6 @@ def measured_rows(entries: Iterable[Recorded], station: str) -> dict[str, RowFac
 
 
 def _positive(value: object) -> float | None:
-    usable = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return float(value) if usable and math.isfinite(value) and value > 0 else None  # type: ignore[arg-type]
+    if not isinstance(value, (int, float)) or isinstance(value, bool):
+        return None
+    return float(value) if math.isfinite(value) and value > 0 else None

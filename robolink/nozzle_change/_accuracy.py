@@ -44,8 +44,8 @@ def accuracy_facts(
 
 def assessed_in_cell(
     controller: Controller, plan: ToolPlan, result: CalibrationResult
-) -> CalibrationResult:
-    """Return a result with what it is accurate to in this cell.
+) -> tuple[CalibrationResult, AccuracyFacts]:
+    """Return a result with what it is accurate to in this cell, and what that rests on.
 
     Args:
         controller: Whose record is looked at.
@@ -53,7 +53,8 @@ def assessed_in_cell(
         result: What was measured.
     """
     result = with_sources(plan, result)
-    return assessed(result, accuracy_facts(controller, plan, result))
+    facts = accuracy_facts(controller, plan, result)
+    return assessed(result, facts), facts
 
 
 def with_sources(plan: ToolPlan, result: CalibrationResult) -> CalibrationResult:

@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final
 
-from robolink.calibration import CalibrationResult
+from robolink.calibration import CalibrationResult, assessed
 from robolink.errors import CalibrationError, ConfigError, RobolinkError
 from robolink.messages import joined, tr
 from robolink.model import EntryKind, NewEntry, Pose, ToolOffset
-from robolink.nozzle_change._accuracy import assessed_in_cell
+from robolink.nozzle_change._accuracy import accuracy_facts, with_sources
 from robolink.nozzle_change._first_touch import told_by_first_touch
 from robolink.nozzle_change._plan import ToolPlan
 from robolink.nozzle_change._proposal import Listener, Moment, Proposal
@@ -107,7 +107,7 @@ class Measuring:
         before = context.controller.tools.read(tool)
         with self._watched(plan, before):
             result, notes = told_of_typed(plan.named(measure(before)))
-            result = assessed_in_cell(context.controller, plan, result)
+            result = self._assessed(plan, result)
             plan.criteria.judge_fit(result)
             rests_on = self._station_record(plan.station)
             fresh = Proposal(
@@ -125,6 +125,11 @@ class Measuring:
         self._listener.moment(Moment.AFTER_MEASURE, context, tool)
         self.go_to(plan.retreat, tr("Moving away from where tool {tool} is measured.", tool=tool))
         return proposal
+
+    def _assessed(self, plan: ToolPlan, result: CalibrationResult) -> CalibrationResult:
+        """Return a result with what it is accurate to in this cell."""
+        result = with_sources(plan, result)
+        return assessed(result, accuracy_facts(self._context.controller, plan, result))
 
     def _station_record(self, name: str) -> dict[str, object]:
         """Return which entry of the journal says where the station is, so that results compare.

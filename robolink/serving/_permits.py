@@ -263,12 +263,12 @@ class PermitCall:
             CALLED_BACK: True,
             "method": result.method,
             "known_within_mm": result.repeatable_to_mm,
-            "repeatable_to_mm": result.repeatable_to_mm,
-            "accurate_to_mm": result.accurate_to_mm,
-            "accuracy": result.accuracy.as_json(result.measured) if result.accuracy else None,
             "warnings": list(result.warnings),
             "proposed": plain_offset(result.offset),
             **self._touches.on_record(),
+            "repeatable_to_mm": result.repeatable_to_mm,
+            "accurate_to_mm": result.accurate_to_mm,
+            "accuracy": result.accuracy.as_json(result.measured) if result.accuracy else None,
         }
 
     def _note_refusal(self, error: RobolinkError) -> None:

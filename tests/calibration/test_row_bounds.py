@@ -17,6 +17,18 @@ from robolink.errors import CalibrationError
 RUNS = 400
 
 
+def scatter(values, **options):
+    bound = scatter_of_repeats(values, **{"anew_from": 0.5, **options})
+    assert bound is not None
+    return bound
+
+
+def upper(values):
+    bound_mm = gauge_study(values).reproducibility_upper95_mm
+    assert bound_mm is not None
+    return bound_mm
+
+
 def share(holds):
     return sum(holds) / len(holds)
 
@@ -27,7 +39,7 @@ def test_repeated_learning_bounds_its_scatter_in_95_percent(count):
     held = []
     for _ in range(RUNS):
         places = [(rng.gauss(0, 0.01), rng.gauss(0, 0.01)) for _ in range(count)]
-        bound = scatter_of_repeats(places, anew_from=0.5)
+        bound = scatter(places)
         held.append(bound.half_width >= 0.01 * math.sqrt(3))
     assert 0.91 < share(held) < 0.99
 
@@ -35,10 +47,10 @@ def test_repeated_learning_bounds_its_scatter_in_95_percent(count):
 def test_a_step_on_purpose_is_no_scatter_and_a_bump_is():
     steady = [(0.001 * (n % 2), 0.0) for n in range(6)]
     anew = [(5 + 0.001 * (n % 2), 0.0) for n in range(6)]
-    without = scatter_of_repeats(steady, anew_from=0.5)
-    assert scatter_of_repeats(steady + anew, anew_from=0.5).half_width < without.half_width
+    without = scatter(steady)
+    assert scatter(steady + anew).half_width < without.half_width
     bumped = steady + [(x + 0.3, y) for x, y in steady]
-    assert scatter_of_repeats(bumped, anew_from=0.5).half_width > 0.1
+    assert scatter(bumped).half_width > 0.1
 
 
 def test_four_records_or_four_that_follow_each_other_tell_nothing():
@@ -48,7 +60,7 @@ def test_four_records_or_four_that_follow_each_other_tell_nothing():
 
 
 def test_what_never_scatters_has_the_last_digit_left():
-    bound = scatter_of_repeats([(1.0, 2.0)] * 9, anew_from=0.5, floor=0.0003)
+    bound = scatter([(1.0, 2.0)] * 9, floor=0.0003)
     assert bound.half_width > 0.0003
 
 
@@ -85,9 +97,8 @@ def test_fewer_than_five_are_refused(count):
 def test_persons_who_do_not_differ_have_a_bound_that_is_not_0():
     rng = random.Random(1)
     values = [[[n + rng.gauss(0, 0.01) for _ in range(3)] for _ in range(3)] for n in range(10)]
-    study = gauge_study(values)
-    assert study.reproducibility_upper95_mm > study.reproducibility_mm
-    assert study.reproducibility_upper95_mm > 0.001
+    assert upper(values) > gauge_study(values).reproducibility_mm
+    assert upper(values) > 0.001
 
 
 def test_the_bound_of_a_study_holds_what_persons_differ_by():
@@ -95,7 +106,7 @@ def test_the_bound_of_a_study_holds_what_persons_differ_by():
     for _ in range(RUNS):
         persons = [rng.gauss(0, 0.02) for _ in range(3)]
         values = [[[n + p + rng.gauss(0, 0.01) for _ in (1, 2)] for p in persons] for n in range(5)]
-        held.append(gauge_study(values).reproducibility_upper95_mm >= 0.02)
+        held.append(upper(values) >= 0.02)
     assert share(held) > 0.92
 
 

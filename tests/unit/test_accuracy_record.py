@@ -27,7 +27,9 @@ from robolink.timing import wall_time
 ALIKE = LooksAlike("PIN-07", "n-angle")
 
 
-def entry(entry_kind, number=1, /, *, days=0.0, change="", tool=1, station="PIN-07", nozzle="", **details):
+def entry(
+    entry_kind, number=1, /, *, days=0.0, change="", tool=1, station="PIN-07", nozzle="", **details
+):
     at = (wall_time() - timedelta(days=days)).isoformat(timespec="milliseconds")
     return Recorded(
         number=number,
@@ -92,6 +94,7 @@ def test_what_is_stated_goes_before_the_record_and_what_the_record_says_more_is_
     stated = {"place_mm": RowFact(0.01, "stated", told="here")}
     (row,) = rows_at(record(*places), ["place_mm"], station="PIN-07", stated=stated)
     assert (row.half_width, row.fact.basis, row.exceeded) == (0.01, "stated", True)
+    assert row.on_record is not None
     assert row.on_record.half_width > 0.2
 
 
@@ -137,9 +140,7 @@ def test_a_camera_found_again_and_again_tells_turn_scale_and_place():
 
 
 def test_looks_that_were_made_alike_are_pooled():
-    sigma_mm, nu = pooled_look([fit(n) for n in range(3)], ALIKE)
-    assert nu == 12
-    assert sigma_mm == pytest.approx(0.01)
+    assert pooled_look([fit(n) for n in range(3)], ALIKE) == (pytest.approx(0.01), 12)
 
 
 def test_what_was_not_made_alike_is_not_pooled():

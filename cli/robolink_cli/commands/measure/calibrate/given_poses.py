@@ -201,7 +201,7 @@ def _dry_run(
     before = controller.tools.read(frame.tool)
     given.found = given.find(controller, frame.tool, before)
     plan = frame.tool_plan(given, controller, verify=False)
-    result = assessed_in_cell(controller, plan, plan.named(given.found.result))
+    result, _ = assessed_in_cell(controller, plan, plan.named(given.found.result))
     proposal = Proposal(frame.tool, before, result)
     if not frame.context.json:
         listener.proposed([proposal])

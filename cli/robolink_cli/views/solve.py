@@ -3,18 +3,19 @@
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from robolink.calibration import AccuracyFacts, CalibrationResult, assessed
+from robolink.calibration import CalibrationResult
 from robolink.messages import declared, spoken, tr
 from robolink_cli.console.render import say
 
+
 SOLVED: Final = "solved"
-"""Under this key stands the result itself until what the cell knows of it is added."""
+"""Under this key stands the result itself, until what it is accurate to takes its place."""
 
 
 def result_payload(result: CalibrationResult) -> dict[str, object]:
     """Return a result as plain values; lengths in mm, angles in degrees.
 
-    The result itself stands under :data:`SOLVED`, for :func:`accuracy_payload`.
+    The result itself stands under :data:`SOLVED`.
     """
     payload: dict[str, object] = {"codes": list(result.warnings), SOLVED: result}
     lengths = [name for name in ("x_mm", "y_mm", "z_mm") if name in result.measured]
@@ -56,21 +57,6 @@ def result_payload(result: CalibrationResult) -> dict[str, object]:
 def space_payload(result: CalibrationResult) -> dict[str, object]:
     """Return a result with X, Y and Z of the offset, measured or kept."""
     return result_payload(result) | {"offset_xyz": list(result.offset.components()[:3])}
-
-
-def accuracy_payload(result: CalibrationResult, facts: AccuracyFacts) -> dict[str, object]:
-    """Return what a result is repeatable to and accurate to, plain values.
-
-    Args:
-        result: The result.
-        facts: What the case states of the rows of its budget; the others are defaults.
-    """
-    accuracy = assessed(result, facts).accuracy
-    return {
-        "repeatable_to_mm": result.repeatable_to_mm,
-        "accurate_to_mm": None if accuracy is None else accuracy.within_mm,
-        "accuracy": None if accuracy is None else accuracy.as_json(result.measured),
-    }
 
 
 def show_case(document: Mapping[str, object]) -> None:
@@ -122,7 +108,6 @@ def _show_parts(document: Mapping[str, object]) -> None:
                 radius=document["region95_radius_mm"],
             )
         )
-    _show_accuracy(document)
     budget = document.get("budget")
     if isinstance(budget, dict):
         say(
@@ -133,22 +118,6 @@ def _show_parts(document: Mapping[str, object]) -> None:
                 c=budget["u_c_mm"],
             )
         )
-
-
-def _show_accuracy(document: Mapping[str, object]) -> None:
-    """Print what it is repeatable to and accurate to, and the largest row of that."""
-    accuracy = document.get("accuracy")
-    if not isinstance(accuracy, dict):
-        return
-    if document.get("repeatable_to_mm") is not None:
-        say(tr("  repeatable to +-{within:.4f} mm", within=document["repeatable_to_mm"]))
-    say(
-        tr(
-            "  accurate to +-{within:.4f} mm, largest part: {row}",
-            within=accuracy["within_mm"],
-            row=accuracy["rows"][0]["title"],
-        )
-    )
 
 
 def _values(value: object, decimals: int) -> str:

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Final, cast
 
-from robolink.calibration import AccuracyFacts, CalibrationResult
+from robolink.calibration import AccuracyFacts, CalibrationResult, assessed
 from robolink.errors import CalibrationError, ConfigError
 from robolink.files.named import read_named
 from robolink.messages import tr
@@ -22,7 +22,7 @@ from robolink_cli.commands.measure.solve.pose_methods import POSE_METHODS
 from robolink_cli.commands.measure.solve.station_methods import STATION_METHODS
 from robolink_cli.commands.measure.solve.study_methods import STUDY_METHODS
 from robolink_cli.commands.measure.solve.touch_methods import TOUCH_METHODS
-from robolink_cli.views.solve import SOLVED, accuracy_payload
+from robolink_cli.views.solve import SOLVED
 
 CASE_SCHEMA: Final = "robolink-calibration-vectors/1"
 METHODS: Final = {
@@ -126,10 +126,25 @@ def _with_accuracy(found: Mapping[str, object], facts: AccuracyFacts) -> dict[st
     told: dict[str, object] = {}
     for name, value in found.items():
         if name == SOLVED and isinstance(value, CalibrationResult):
-            told |= accuracy_payload(value, facts)
+            told |= _statements(value, facts)
         else:
             told[name] = _with_accuracy(value, facts) if isinstance(value, dict) else value
     return told
+
+
+def _statements(result: CalibrationResult, facts: AccuracyFacts) -> dict[str, object]:
+    """Return what a result is repeatable to and accurate to, plain values.
+
+    Args:
+        result: The result.
+        facts: What the case states of the rows of its budget; the others are defaults.
+    """
+    accuracy = assessed(result, facts).accuracy
+    return {
+        "repeatable_to_mm": result.repeatable_to_mm,
+        "accurate_to_mm": None if accuracy is None else accuracy.within_mm,
+        "accuracy": None if accuracy is None else accuracy.as_json(result.measured),
+    }
 
 
 def _refusal(error: CalibrationError, method: str, given: Node) -> dict[str, object]:

@@ -7,7 +7,6 @@ from robolink.calibration import CalibrationResult
 from robolink.messages import declared, spoken, tr
 from robolink_cli.console.render import say
 
-
 SOLVED: Final = "solved"
 """Under this key stands the result itself, until what it is accurate to takes its place."""
 

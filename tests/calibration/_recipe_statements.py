@@ -61,12 +61,14 @@ def _pin(course: Any) -> CalibrationResult:
 
 
 def _two_pose(recipe: Any, sigma_mm: float) -> CalibrationResult:
-    return _pin(measure_two_pose(TouchPlan(), stored=STORED, sigma_mm=sigma_mm))
+    return _pin(measure_two_pose(TouchPlan(seed=1), stored=STORED, sigma_mm=sigma_mm))
 
 
 def _n_angle(recipe: Any, sigma_mm: float) -> CalibrationResult:
     turns = (90.0, 180.0, 270.0)[: recipe.source.count - 1]
-    return _pin(measure_n_angle(TouchPlan(), turns_deg=turns, stored=STORED, sigma_mm=sigma_mm))
+    return _pin(
+        measure_n_angle(TouchPlan(seed=1), turns_deg=turns, stored=STORED, sigma_mm=sigma_mm)
+    )
 
 
 def _points(recipe: Any, sigma_mm: float) -> CalibrationResult:
@@ -81,7 +83,7 @@ def _one_touch(recipe: Any, sigma_mm: float) -> CalibrationResult:
 
 def _pivot(recipe: Any, sigma_mm: float) -> CalibrationResult:
     tilts = informative_tilts(recipe.source.count, tilt_deg=recipe.source.tilt_deg)
-    return _pin(measure_pivot(TouchPlan(), tilts=tilts, stored=STORED, sigma_mm=sigma_mm))
+    return _pin(measure_pivot(TouchPlan(seed=1), tilts=tilts, stored=STORED, sigma_mm=sigma_mm))
 
 
 def _plane(recipe: Any, sigma_mm: float) -> CalibrationResult:
@@ -89,7 +91,9 @@ def _plane(recipe: Any, sigma_mm: float) -> CalibrationResult:
     survey = PlaneSurvey(count=source.count, tilt_deg=source.tilt_deg, spread_mm=source.spread_mm)
     falls = math.tan(math.radians(20))
     cell = PaperCell(HERE, TIP, lambda at: (at[0], at[1], falls * (at[1] - PIN_MM[1]) - 40.0))
-    course = measure_plane_touch(TouchPlan(), survey, stored=STORED, axes=5, sigma_mm=sigma_mm)
+    course = measure_plane_touch(
+        TouchPlan(seed=1), survey, stored=STORED, axes=5, sigma_mm=sigma_mm
+    )
     return cell.run(course)
 
 
@@ -102,7 +106,9 @@ def _sphere(recipe: Any, sigma_mm: float) -> CalibrationResult:
         return x, y, z
 
     survey = SphereSurvey(count=source.count, tilt_deg=source.tilt_deg, radius_mm=source.radius_mm)
-    course = measure_sphere_touch(TouchPlan(), survey, stored=STORED, axes=5, sigma_mm=sigma_mm)
+    course = measure_sphere_touch(
+        TouchPlan(seed=1), survey, stored=STORED, axes=5, sigma_mm=sigma_mm
+    )
     return PaperCell(Pose(298, 99, 20, 0), TIP, onto_the_ball).run(course)
 
 

@@ -5,8 +5,8 @@ upper 95 % bound of it,
 
     u = s sqrt(nu / chi^2_0.05(nu)),    a = sqrt(3) u
 
-a being the half width of a rectangle with that standard uncertainty (docs/reference/evidence.md
-19). With four degrees of freedom the bound is 2.4 times s, with twenty 1.4 times.
+a being the half width of a rectangle with that standard uncertainty (docs/accuracy.md, "From the
+record"). With four degrees of freedom the bound is 2.4 times s, with twenty 1.4 times.
 """
 
 import math

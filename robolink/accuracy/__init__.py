@@ -10,12 +10,18 @@ from robolink.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from robolink.accuracy._age import months_at as months_at
+    from robolink.accuracy._bounds import LEAST_RECORDS as LEAST_RECORDS
+    from robolink.accuracy._bounds import ArtefactTest as ArtefactTest
+    from robolink.accuracy._bounds import RowBound as RowBound
+    from robolink.accuracy._bounds import artefact_test as artefact_test
+    from robolink.accuracy._bounds import paired_half_width as paired_half_width
+    from robolink.accuracy._bounds import scatter_of_repeats as scatter_of_repeats
+    from robolink.accuracy._bounds import upper_half_width as upper_half_width
     from robolink.accuracy._known import CellRecord as CellRecord
     from robolink.accuracy._known import KnownRow as KnownRow
     from robolink.accuracy._known import Recall as Recall
     from robolink.accuracy._known import facts_at as facts_at
     from robolink.accuracy._known import rows_at as rows_at
-    from robolink.accuracy._known import rows_on_record as rows_on_record
     from robolink.accuracy._looks import LooksAlike as LooksAlike
     from robolink.accuracy._looks import pooled_look as pooled_look
     from robolink.accuracy._measured import MeasuredRow as MeasuredRow
@@ -39,7 +45,9 @@ __getattr__ = lazy_exports(
     __name__,
     {
         "_age": "months_at",
-        "_known": "CellRecord KnownRow Recall facts_at rows_at rows_on_record",
+        "_bounds": "ArtefactTest LEAST_RECORDS RowBound artefact_test paired_half_width "
+        "scatter_of_repeats upper_half_width",
+        "_known": "CellRecord KnownRow Recall facts_at rows_at",
         "_looks": "LooksAlike pooled_look",
         "_measured": "MeasuredRow measured_entry measured_row",
         "_overview": "RowsAt mm_per_px rows_of_cell",

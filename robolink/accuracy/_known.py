@@ -125,14 +125,14 @@ def facts_at(
         look_sigma_mm=sigma_mm,
         look_nu=0.0 if pooled is None else pooled[1],
     )
-    on_record = rows_on_record(record, station, learnt=learnt)
+    on_record = _on_record(record, station, learnt=learnt)
     facts = replace(facts, rows={**on_record, **stated})
     if "plate_mm" not in facts.rows and learnt:
         facts = replace(facts, rows={**facts.rows, **_height_learnt(record, station, facts)})
     return facts
 
 
-def rows_on_record(record: CellRecord, station: str, *, learnt: bool = True) -> dict[str, RowFact]:
+def _on_record(record: CellRecord, station: str, *, learnt: bool = True) -> dict[str, RowFact]:
     """Return what is on record of the rows of a station, empty for none.
 
     Args:

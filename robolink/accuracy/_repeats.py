@@ -8,7 +8,8 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Final
 
-from robolink.calibration import RowBound, RowFact, scatter_of_repeats
+from robolink.accuracy._bounds import RowBound, scatter_of_repeats
+from robolink.calibration import RowFact
 from robolink.messages import tr
 from robolink.model import Recorded
 from robolink.stations import Station, StationKind

@@ -4,14 +4,9 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from robolink.accuracy._bounds import artefact_test, paired_half_width
 from robolink.accuracy._measured import MeasuredRow
-from robolink.calibration import (
-    GaugeStudy,
-    artefact_test,
-    paired_half_width,
-    require_positive,
-    require_records,
-)
+from robolink.calibration import GaugeStudy, require_positive
 from robolink.errors import CalibrationError, ConfigError, RobolinkError
 from robolink.messages import tr
 from robolink.methods import AnyMethod, find_method
@@ -138,6 +133,14 @@ def study_row(study: GaugeStudy, *, persons: int, station: str = "") -> Measured
 
     Raises:
         CalibrationError: ``too_few_records``: fewer than three persons.
+
+    Example:
+        >>> from robolink.accuracy import study_row
+        >>> from robolink.calibration import gauge_study
+        >>> values = [[[n + 0.02 * p, n + 0.02 * p + 0.01] for p in range(3)] for n in range(5)]
+        >>> row = study_row(gauge_study(values), persons=3)
+        >>> row.row, round(row.half_width, 2)
+        ('touch_mm', 0.15)
     """
     bound_mm = study.reproducibility_upper95_mm
     if persons < _LEAST_PERSONS or bound_mm is None:
@@ -201,7 +204,6 @@ def tip_image_row(pairs: Sequence[Pair], *, mm_per_px: float, station: str) -> M
         0.98
     """
     require_positive(mm_per_px, "mm_per_px")
-    require_records(len(pairs))
     bound = paired_half_width([one.xy_mm for one, _ in pairs], [two.xy_mm for _, two in pairs])
     return MeasuredRow(
         row="tip_image_px",

@@ -166,14 +166,6 @@ if TYPE_CHECKING:
     from robolink.calibration.quality.moved_station import StationShift as StationShift
     from robolink.calibration.quality.moved_station import TipShift as TipShift
     from robolink.calibration.quality.moved_station import judge_shifts as judge_shifts
-    from robolink.calibration.quality.row_bounds import LEAST_RECORDS as LEAST_RECORDS
-    from robolink.calibration.quality.row_bounds import ArtefactTest as ArtefactTest
-    from robolink.calibration.quality.row_bounds import RowBound as RowBound
-    from robolink.calibration.quality.row_bounds import artefact_test as artefact_test
-    from robolink.calibration.quality.row_bounds import paired_half_width as paired_half_width
-    from robolink.calibration.quality.row_bounds import require_records as require_records
-    from robolink.calibration.quality.row_bounds import scatter_of_repeats as scatter_of_repeats
-    from robolink.calibration.quality.row_bounds import upper_half_width as upper_half_width
     from robolink.calibration.quality.station_part import SharedStation as SharedStation
     from robolink.calibration.quality.station_part import StationPart as StationPart
     from robolink.calibration.quality.station_part import shared_station as shared_station
@@ -295,8 +287,6 @@ __getattr__ = lazy_exports(
         "quality.tool_fits": "ToolFit better_fit tool_fits",
         "evidence.approach_bias": "with_approach_bias",
         "evidence.units": "RobotReach require_near require_stored_scale require_within_reach",
-        "quality.row_bounds": "ArtefactTest LEAST_RECORDS RowBound artefact_test "
-        "paired_half_width require_records scatter_of_repeats upper_half_width",
         "quality.turn_test": "LEAST_TURN_DEG held_to_claim turn_claim",
         "quality.update_guard": "Correction NEEDLE_LIMIT_MM require_shrinking update_guard "
         "writes_refused_unattended",

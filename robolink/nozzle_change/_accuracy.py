@@ -23,6 +23,17 @@ def accuracy_facts(
         controller: Whose record is looked at.
         plan: How it was measured, and what is stated.
         result: What was measured.
+
+    Example:
+        >>> import robolink
+        >>> from robolink.calibration import solve_two_pose
+        >>> from robolink.model import Pose
+        >>> from robolink.nozzle_change import ToolPlan, accuracy_facts
+        >>> found = solve_two_pose(Pose(298, 99, -60, 0), Pose(322, 91, -60, 180), sigma_mm=0.02)
+        >>> with robolink.connect("epson+sim://accuracy-example") as controller:
+        ...     facts = accuracy_facts(controller, ToolPlan(1), found)
+        >>> facts.of("touch_mm").half_width, facts.of("touch_mm").basis
+        (0.05, 'default')
     """
     touches = [pose for pose in result.inputs if isinstance(pose, TouchedAt)]
     outcomes = controller.outcomes
@@ -51,6 +62,17 @@ def assessed_in_cell(
         controller: Whose record is looked at.
         plan: How it was measured, and what is stated.
         result: What was measured.
+
+    Example:
+        >>> import robolink
+        >>> from robolink.calibration import solve_two_pose
+        >>> from robolink.model import Pose
+        >>> from robolink.nozzle_change import ToolPlan, assessed_in_cell
+        >>> found = solve_two_pose(Pose(298, 99, -60, 0), Pose(322, 91, -60, 180), sigma_mm=0.02)
+        >>> with robolink.connect("epson+sim://accuracy-example") as controller:
+        ...     result, _ = assessed_in_cell(controller, ToolPlan(1), found)
+        >>> round(result.accurate_to_mm, 3)
+        0.079
     """
     result = with_sources(plan, result)
     facts = accuracy_facts(controller, plan, result)

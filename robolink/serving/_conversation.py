@@ -35,12 +35,13 @@ from robolink.protocols.spel_callback import (
     same_thousandths,
 )
 from robolink.serving._book import ProgramChange, begin_change, open_changes, record_name
-from robolink.serving._judging import CallbackLimits, believed, facts_for_program
+from robolink.serving._facts import facts_for_program, statements_on_record
+from robolink.serving._judging import CallbackLimits, believed
 from robolink.serving._measures import measure_named
 from robolink.stations import Station, StationKind, find_station
 
 if TYPE_CHECKING:
-    from robolink.calibration import AccuracyFacts, CalibrationResult
+    from robolink.calibration import CalibrationResult
     from robolink.config import Cell
     from robolink.journal import Journal, JournalOutcomeLog
     from robolink.serving._measures import ProgramMeasure
@@ -280,32 +281,20 @@ class CallbackConversation:
         if run.change is not None:
             raise RemoteProtocolError(tr("A value was given already."))
         found = run.measure.solve(run.before)
-        result = believed(found, run.before, self._limits, self._facts(run, found))
+        log = self._require_log()
+        facts = facts_for_program(log.recorded, self._cell, found, run.measure, run.station)
+        result = believed(found, run.before, self._limits, facts)
         rounded = ToolOffset(*(round(value, 3) for value in result.offset.components()))
         run.result = result
-        run.change = begin_change(self._require_log(), run.tool, run.before, rounded)
+        run.change = begin_change(log, run.tool, run.before, rounded)
         run.change.note(
             EntryKind.CALIBRATION,
             result.method,
-            known_within_mm=result.repeatable_to_mm,
-            repeatable_to_mm=result.repeatable_to_mm,
-            accurate_to_mm=result.accurate_to_mm,
-            accuracy=result.accuracy.as_json(result.measured) if result.accuracy else None,
-            warnings=list(result.warnings),
             peer=self._peer,
+            **statements_on_record(result),
             **run.measure.on_record(),
         )
         return CallbackWord.VALUE, (run.change.operation, *offset_fields(rounded))
-
-    def _facts(self, run: _Run, result: "CalibrationResult") -> "AccuracyFacts":
-        return facts_for_program(
-            self._require_log().recorded,
-            self._cell,
-            station=run.station,
-            method=result.method,
-            by_contact=run.measure.by_contact,
-            inputs_per_look=result.inputs_per_look,
-        )
 
     # What it wrote.
 

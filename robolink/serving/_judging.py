@@ -8,12 +8,9 @@ from typing import TYPE_CHECKING, Final
 from robolink.errors import CalibrationError, ConfigError
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
-from robolink.stations import find_stations
 
 if TYPE_CHECKING:
-    from robolink.accuracy import Recall
     from robolink.calibration import AccuracyFacts, CalibrationResult
-    from robolink.config import Cell
 
 MOST_POSES: Final = 64
 
@@ -77,39 +74,6 @@ def believed(
     _require_known(result, limits.tolerance_mm)
     update_guard(result.offset, stored=stored, max_change_mm=limits.max_change_mm)
     return result
-
-
-def facts_for_program(
-    recall: "Recall",
-    cell: "Cell | None",
-    *,
-    station: str,
-    method: str,
-    by_contact: bool,
-    inputs_per_look: int = 1,
-) -> "AccuracyFacts":
-    """Return what a cell knows of the rows of what a program measured.
-
-    Args:
-        recall: What is on record of its controller.
-        cell: The cell; ``None`` where none is named.
-        station: The station that the program named; empty for none.
-        method: What it measured by.
-        by_contact: Whether an input showed each touch, so that nobody had to see it.
-        inputs_per_look: How many inputs together tell both coordinates once.
-    """
-    from robolink.accuracy import CellRecord, LooksAlike, facts_at, stated_rows
-
-    record = CellRecord(recall)
-    known = find_stations(cell, record.stations).get(station)
-    return facts_at(
-        record,
-        station=station,
-        stated=stated_rows(cell, known or station),
-        alike=LooksAlike(station, method, by_contact=by_contact),
-        learnt=known is not None and known.learnt,
-        inputs_per_look=inputs_per_look,
-    )
 
 
 def _require_known(result: "CalibrationResult", limit_mm: float) -> None:

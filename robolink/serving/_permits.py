@@ -14,7 +14,8 @@ from robolink.errors import CalibrationError, ConfigError, LeaseHeldError, Robol
 from robolink.messages import tr
 from robolink.model import Controller, EntryKind, NewEntry, Pose, ToolOffset, plain_offset
 from robolink.serving._book import CALLED_BACK
-from robolink.serving._judging import CallbackLimits, believed, facts_for_program
+from robolink.serving._facts import facts_for_program, statements_on_record
+from robolink.serving._judging import CallbackLimits, believed
 from robolink.serving._touches import LEAST_PROOFS, LEAST_TOUCHES, touches_by
 from robolink.timing import Deadline
 from robolink.transaction import ToolChange, Wanted
@@ -188,13 +189,8 @@ class PermitCall:
         for _ in range(1, plan.touches):
             self._take(self._next(), before, proof=False)
         found = self._touches.solve(before)
-        facts = facts_for_program(
-            self._controller.outcomes.recorded,
-            self._cell,
-            station="",
-            method=found.method,
-            by_contact=self._touches.by_contact,
-        )
+        recall = self._controller.outcomes.recorded
+        facts = facts_for_program(recall, self._cell, found, self._touches)
         result = believed(found, before, self._limits, facts)
         wanted = Wanted(plan.tool, result.offset, before, details=self._details(result))
         marked = {MACHINE_WAITS: True}
@@ -262,13 +258,9 @@ class PermitCall:
         return {
             CALLED_BACK: True,
             "method": result.method,
-            "known_within_mm": result.repeatable_to_mm,
-            "warnings": list(result.warnings),
             "proposed": plain_offset(result.offset),
             **self._touches.on_record(),
-            "repeatable_to_mm": result.repeatable_to_mm,
-            "accurate_to_mm": result.accurate_to_mm,
-            "accuracy": result.accuracy.as_json(result.measured) if result.accuracy else None,
+            **statements_on_record(result),
         }
 
     def _note_refusal(self, error: RobolinkError) -> None:

@@ -43,6 +43,7 @@ from robolink.methods import (
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import LookPlan, TouchPlan
 from robolink.recipe import load_recipe
+from robolink.runner import Procedure
 from robolink.stations import BeamStation, CameraStation, TouchStation
 from robolink.testing import PaperCell
 
@@ -56,7 +57,7 @@ PIXELS = CameraModel(((0.02, 0.0), (0.0, -0.02)), (293.6, 84.8))
 """A camera whose pixel (320, 240) looks at the middle of its image, X 300, Y 80."""
 
 
-def _pin(course: Any) -> CalibrationResult:
+def _pin(course: Procedure[CalibrationResult]) -> CalibrationResult:
     return PaperCell(HERE, TIP, PIN_MM).run(course)
 
 

@@ -140,7 +140,8 @@ def test_a_camera_found_again_and_again_tells_turn_scale_and_place():
 
 
 def test_looks_that_were_made_alike_are_pooled():
-    assert pooled_look([fit(n) for n in range(3)], ALIKE) == (pytest.approx(0.01), 12)
+    pooled = pooled_look([fit(n) for n in range(3)], ALIKE)
+    assert pooled == pytest.approx((0.01, 12))
 
 
 def test_what_was_not_made_alike_is_not_pooled():

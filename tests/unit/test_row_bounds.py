@@ -5,13 +5,13 @@ import random
 
 import pytest
 
-from robolink.calibration import (
+from robolink.accuracy import (
     artefact_test,
-    gauge_study,
     paired_half_width,
     scatter_of_repeats,
     upper_half_width,
 )
+from robolink.calibration import gauge_study
 from robolink.errors import CalibrationError
 
 RUNS = 400

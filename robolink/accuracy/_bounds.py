@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
-from robolink.calibration.core.statistics import chi_square_quantile, student_t
+from robolink.calibration import chi_square_quantile, student_t
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 
@@ -70,7 +70,7 @@ def scatter_of_repeats(
         floor: The least standard deviation that is believed, such as that of the last digit.
 
     Example:
-        >>> from robolink.calibration import scatter_of_repeats
+        >>> from robolink.accuracy import scatter_of_repeats
         >>> found = [(0, 0), (0.01, 0), (0, 0.01), (0.01, 0.01), (0, 0), (5, 5)]
         >>> bound = scatter_of_repeats(found, anew_from=0.5)
         >>> bound.count, round(bound.sigma, 4), round(bound.half_width, 3)
@@ -126,7 +126,7 @@ def artefact_test(
         CalibrationError: ``too_few_records``: fewer than five measurements.
 
     Example:
-        >>> from robolink.calibration import artefact_test
+        >>> from robolink.accuracy import artefact_test
         >>> seen = [(12.03, -4.01), (12.05, -4.0), (12.04, -3.99), (12.03, -4.0), (12.05, -4.01)]
         >>> test = artefact_test(seen, (12.0, -4.0))
         >>> round(test.bias_mm[0], 3), round(test.half_width_mm, 3)

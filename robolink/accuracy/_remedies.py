@@ -1,14 +1,18 @@
 """Which command measures a row that a cell has by default."""
 
 from robolink.messages import tr
+from robolink.stations import StationKind
 
 
-def measuring_step(key: str, *, station: str = "", tool: int | None = None) -> str:
+def measuring_step(
+    key: str, *, station: str = "", kind: StationKind | None = None, tool: int | None = None
+) -> str:
     """Return how a row is measured in a cell, one sentence with its command.
 
     Args:
         key: Key of the row.
         station: The station that is meant, empty where none is known.
+        kind: What the station is, ``None`` where that is not known.
         tool: The tool that is meant; ``None`` where none is known.
 
     Raises:
@@ -27,7 +31,9 @@ def measuring_step(key: str, *, station: str = "", tool: int | None = None) -> s
             "Measure a gauge tip that is known, five times: {command}",
             command=f"robolink cell accuracy measure touch_mm --tool {number} --true X,Y",
         ),
-        "place_mm": tr("Learn it five times: {command}", command=learn),
+        "place_mm": tr("Measure the camera five times: {command}", command=camera)
+        if kind is StationKind.CAMERA
+        else tr("Learn it five times: {command}", command=learn),
         "camera_turn_deg": tr("Measure the camera five times: {command}", command=camera),
         "camera_scale_percent": tr("Measure the camera five times: {command}", command=camera),
         "plate_mm": tr("Learn its height: {command}", command=learn),

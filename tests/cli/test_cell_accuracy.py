@@ -7,6 +7,7 @@ import pytest
 from robolink_cli import main
 from robolink_simulators.hosting.in_process import epson as in_process
 
+import robolink
 from robolink.journal import EntryKind, forget_memory, memory_journal, open_journal
 from robolink.model import NewEntry, Signature
 
@@ -33,6 +34,15 @@ y_mm = 470.0
 z_mm = -100.0
 sigma_mm = 0.01
 input = 5
+
+[cells.line3.stations.CAM-01]
+kind = "camera"
+x_mm = 170.0
+y_mm = 477.0
+z_mm = -107.0
+mm_per_px = [[0.02, 0.0], [0.0, -0.02]]
+origin_mm = [163.6, 481.8]
+tip_image_px = 1.0
 
 [cells.line3.people]
 "4711" = "operator"
@@ -86,7 +96,13 @@ def test_what_is_stated_what_is_narrower_and_what_nobody_knows(run):
     plate = rows(document, "PLATE-01")["plate_mm"]
     assert plate["basis"] == "stated"
     assert plate["half_width"] == pytest.approx(0.01 * 3**0.5)
-    assert document["defaults"] == 1
+    camera = rows(document, "CAM-01")
+    # Nothing but calibrating it tells where a camera looks.
+    assert "camera-affine --station CAM-01" in camera["place_mm"]["measure"]
+    assert camera["tip_image_px"]["alone_mm"] == pytest.approx(
+        1.0 * 0.02 * 2.4477 / 3**0.5, rel=1e-3
+    )
+    assert document["defaults"] == 5
     code, text, _ = run("-c", "line3", "cell", "accuracy")
     assert code == 0
     assert "PIN-07" in text
@@ -151,6 +167,23 @@ def test_an_artefact_test_finds_a_person_who_is_always_beside_and_is_used_from_t
     used = {row["row"]: row for row in calibrated(run).details["accuracy"]["rows"]}["touch_mm"]
     assert (used["basis"], used["half_width"]) == ("record", found["half_width"])
     assert "artefact test" in used["told"]
+
+
+def test_nozzles_that_were_turned_tell_what_a_camera_sees_beside_them(run):
+    for n in range(12):
+        # 0.02 mm to one side of its nozzle, before and after half a turn of it.
+        tip = [5.0 + (0.02 if n < 6 else -0.02), -1.0, -20.0, 0.0, 0.0, 0.0]
+        said = {"method": "camera", "measured": ["x_mm", "y_mm"], "tip": tip}
+        signature = Signature(station="CAM-01", nozzle=f"N-{n % 6}")
+        with robolink.connect(URL, signature=signature) as controller:
+            controller.outcomes.append(NewEntry(EntryKind.CALIBRATION, tool=1, details=said))
+    words = ("tip_image_px", "--station", "CAM-01", "--tool", "1", "--yes", "--json")
+    code, found, err = run("-c", "line3", "--operator", "9", "cell", "accuracy", "measure", *words)
+    assert code == 0, (found, err)
+    assert (found["count"], len(found["records"])) == (6, 12)
+    # Half the difference is 0.02 mm or one pixel, along one of two axes, bounded with 12 degrees
+    # of freedom.
+    assert found["half_width"] == pytest.approx((0.5 * 3 * 12 / 5.226) ** 0.5, rel=1e-3)
 
 
 @pytest.mark.parametrize(

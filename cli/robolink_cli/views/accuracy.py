@@ -93,9 +93,7 @@ def _row_payload(place: RowsAt, row: KnownRow) -> dict[str, Any]:
         "told": row.fact.told or None,
         "alone_mm": place.alone_mm(row),
         "on_record": None if beside is None else beside.half_width,
-        "measure": measuring_step(row.key, station=_name(place))
-        if row.fact.basis == "default"
-        else None,
+        "measure": _step(place, row) if row.fact.basis == "default" else None,
     }
 
 
@@ -122,8 +120,7 @@ def show_accuracy(known: Sequence[RowsOfRobot]) -> None:
                     )
                 )
             if row.fact.basis == "default":
-                step = measuring_step(row.key, station=_name(place))
-                steps[f"  {row.key}: {step}"] = None
+                steps[f"  {row.key}: {_step(place, row)}"] = None
     if steps:
         say(tr("Nobody has measured or stated these; how to:"))
         for step in steps:
@@ -132,8 +129,11 @@ def show_accuracy(known: Sequence[RowsOfRobot]) -> None:
         say(tr("Every row is stated or on record."))
 
 
-def _name(place: RowsAt) -> str:
-    return "" if place.station is None else place.station.id
+def _step(place: RowsAt, row: KnownRow) -> str:
+    """Return how a row is measured there."""
+    if place.station is None:
+        return measuring_step(row.key)
+    return measuring_step(row.key, station=place.station.id, kind=place.station.kind)
 
 
 def _title(one: RowsOfRobot) -> str:

@@ -35,13 +35,13 @@ from robolink.protocols.spel_callback import (
     same_thousandths,
 )
 from robolink.serving._book import ProgramChange, begin_change, open_changes, record_name
-from robolink.serving._facts import facts_for_program, statements_on_record
+from robolink.serving._facts import facts_for_program, proved, statements_on_record
 from robolink.serving._judging import CallbackLimits, believed
 from robolink.serving._measures import measure_named
 from robolink.stations import Station, StationKind, find_station
 
 if TYPE_CHECKING:
-    from robolink.calibration import CalibrationResult
+    from robolink.calibration import AccuracyFacts, CalibrationResult
     from robolink.config import Cell
     from robolink.journal import Journal, JournalOutcomeLog
     from robolink.serving._measures import ProgramMeasure
@@ -74,6 +74,7 @@ class _Run:
     measure: "ProgramMeasure"
     station: str = ""
     result: "CalibrationResult | None" = None
+    facts: "AccuracyFacts | None" = None
     change: ProgramChange | None = None
     written: bool = False
 
@@ -283,7 +284,7 @@ class CallbackConversation:
         found = run.measure.solve(run.before)
         log = self._require_log()
         facts = facts_for_program(log.recorded, self._cell, found, run.measure, run.station)
-        result = believed(found, run.before, self._limits, facts)
+        run.facts, result = facts, believed(found, run.before, self._limits, facts)
         rounded = ToolOffset(*(round(value, 3) for value in result.offset.components()))
         run.result = result
         run.change = begin_change(log, run.tool, run.before, rounded)
@@ -311,12 +312,8 @@ class CallbackConversation:
         run, change = self._of_change(fields[0])
         if run.result is None or change.requested is None or not run.written:
             raise RemoteProtocolError(tr("Nothing was written that could be proved."))
-        proof = run.measure.prove(run.result, change.requested)
-        if not proof.passed:
-            raise CalibrationError(
-                "drift",
-                tr("The tip is {drift:.3f} mm off when the tool turns.", drift=proof.max_drift_mm),
-            )
+        assert run.facts is not None  # noqa: S101 - a value was given
+        proof = proved(run.measure, run.result, change.requested, run.facts)
         change.allow_keeping(
             tr("proved by what the program saw after it wrote"),
             max_drift_mm=proof.max_drift_mm,

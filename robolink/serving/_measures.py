@@ -47,6 +47,11 @@ class ProgramMeasure(Protocol):
             CalibrationError: It is no proof; its code says why.
         """
 
+    def from_place(
+        self, result: "CalibrationResult", written: ToolOffset, proof: "VerifyResult"
+    ) -> "VerifyResult":
+        """Return a proof as drifts from the place that was measured or is known."""
+
     def on_record(self) -> Mapping[str, object]:
         """Return what was measured, plain JSON."""
 

@@ -14,7 +14,7 @@ from robolink.errors import CalibrationError, ConfigError, LeaseHeldError, Robol
 from robolink.messages import tr
 from robolink.model import Controller, EntryKind, NewEntry, Pose, ToolOffset, plain_offset
 from robolink.serving._book import CALLED_BACK
-from robolink.serving._facts import facts_for_program, statements_on_record
+from robolink.serving._facts import facts_for_program, proved, statements_on_record
 from robolink.serving._judging import CallbackLimits, believed
 from robolink.serving._touches import LEAST_PROOFS, LEAST_TOUCHES, touches_by
 from robolink.timing import Deadline
@@ -199,15 +199,7 @@ class PermitCall:
             written = receipt.read_back or result.offset
             for _ in range(plan.proofs):
                 self._take(self._next(), written, proof=True)
-            proof = self._touches.prove(result, written)
-            if not proof.passed:
-                raise CalibrationError(
-                    "drift",
-                    tr(
-                        "The tip is {drift:.3f} mm off when the tool turns.",
-                        drift=proof.max_drift_mm,
-                    ),
-                )
+            proved(self._touches, result, written, facts)
             change.keep(tr("proved by what the program touched after the write"))
         return written
 

@@ -102,6 +102,20 @@ class ProgramTouches:
             )
         return proof
 
+    def from_place(
+        self, result: "CalibrationResult", written: ToolOffset, proof: "VerifyResult"
+    ) -> "VerifyResult":
+        """Return the same touches as drifts from the measured place; see ``ProgramMeasure``."""
+        from robolink.calibration import Drift, VerifyResult, tip_pose
+
+        place, drifts = result.reference_point_mm, []
+        for pose in self._proving.poses:
+            tip = tip_pose(pose, written, tool=0)
+            seen = (tip.x_mm, tip.y_mm, tip.z_mm)
+            off = [a - b for a, b in zip(seen, place, strict=False)]
+            drifts.append(Drift(pose.u_deg, *off))
+        return VerifyResult(tuple(drifts), proof.tolerance_mm)
+
     def on_record(self) -> Mapping[str, object]:
         """Return what was measured; see ``ProgramMeasure``."""
         return {"flange": [list(astuple(pose)[:6]) for pose in self._measured.poses]}

@@ -112,8 +112,8 @@ class ProgramTouches:
         for pose in self._proving.poses:
             tip = tip_pose(pose, written, tool=0)
             seen = (tip.x_mm, tip.y_mm, tip.z_mm)
-            off = [a - b for a, b in zip(seen, place, strict=False)]
-            drifts.append(Drift(pose.u_deg, *off))
+            dx_mm, dy_mm, *dz_mm = (a - b for a, b in zip(seen, place, strict=False))
+            drifts.append(Drift(pose.u_deg, dx_mm, dy_mm, dz_mm[0] if dz_mm else 0.0))
         return VerifyResult(tuple(drifts), proof.tolerance_mm)
 
     def on_record(self) -> Mapping[str, object]:

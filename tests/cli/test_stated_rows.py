@@ -108,7 +108,9 @@ def test_a_height_that_was_learnt_is_not_as_sure_as_the_one_that_was_stated():
 def row(key="touch_mm"):
     """Return a row of the newest calibration on record."""
     one = next(memory_journal(URL).entries(kinds=(EntryKind.CALIBRATION,)))
-    return {row["row"]: row for row in one.details["accuracy"]["rows"]}[key]
+    accuracy = one.details["accuracy"]
+    assert isinstance(accuracy, dict)
+    return {row["row"]: row for row in accuracy["rows"]}[key]
 
 
 def test_what_is_stated_goes_into_calibrations_and_recipes(run):

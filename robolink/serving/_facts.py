@@ -68,7 +68,7 @@ def proved(
 
     Args:
         measure: What was measured, and seen after the write.
-        result: What was measured, as :func:`believed` returned it.
+        result: What was measured, with what it is accurate to.
         written: The value that was written.
         facts: What the cell knows of the rows of its budget.
 

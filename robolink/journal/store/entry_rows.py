@@ -29,7 +29,6 @@ _NO_HISTORY: Final = (
     EntryKind.RECONNECT,
     EntryKind.LEASE,
     EntryKind.CHECK,
-    EntryKind.ACCURACY,
 )
 
 _HEAD_OF: Final = select(HEAD.c.number, HEAD.c.hash)

@@ -111,6 +111,7 @@ def check_file(path: Path) -> tuple[Problem, ...]:
     """
     from pydantic import ValidationError
 
+    from robolink.config._accuracy_settings import AccuracySettings
     from robolink.config._settings import CellFile, CellSettings
     from robolink.config._station_settings import station_keys
 
@@ -127,7 +128,11 @@ def check_file(path: Path) -> tuple[Problem, ...]:
     try:
         CellFile.model_validate(document)
     except ValidationError as error:
-        known = {1: ["cells"], 3: list(CellSettings.model_fields)}
+        known = {
+            1: ["cells"],
+            3: list(CellSettings.model_fields),
+            4: list(AccuracySettings.model_fields),
+        }
         return (*names, *problems_of(error, known, station_keys()))
     return tuple(names)
 
@@ -178,12 +183,13 @@ def _unchecked() -> Iterator[dict[str, object]]:
 
 
 def _together(farther: _Said, nearer: _Said) -> _Said:
-    """Return what two files say together: the nearer one wins, station by station."""
+    """Return what two files say together: the nearer one wins, station by station, row by row."""
     both = farther | nearer
-    if "stations" in farther and "stations" in nearer:
-        (_, old), (path, new) = farther["stations"], nearer["stations"]
-        assert isinstance(old, dict) and isinstance(new, dict)  # noqa: S101, PT018 - both were checked
-        both["stations"] = (path, old | new)
+    for table in ("stations", "accuracy"):
+        if table in farther and table in nearer:
+            (_, old), (path, new) = farther[table], nearer[table]
+            assert isinstance(old, dict) and isinstance(new, dict)  # noqa: S101, PT018 - both were checked
+            both[table] = (path, old | new)
     return both
 
 

@@ -4,6 +4,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, Field, ValidationInfo, field_validator
 
+from robolink.config._accuracy_settings import AccuracySettings
 from robolink.config._station_settings import STRICT, StationSettings
 from robolink.locale.languages import language_named
 from robolink.messages import tr
@@ -39,7 +40,8 @@ class CellSettings(BaseModel):
         drift_tolerance_mm: Largest drift about the new tip that passes.
         rms_tolerance_mm, residual_tolerance_mm: Largest rms of the residuals of a calibration,
             and largest single one, that is believed.
-        interval_tolerance_mm: Largest half of the 95 % interval of a measured length.
+        interval_tolerance_mm: Largest distance from the truth within which a tip lies in 95 %.
+        accuracy: What is stated of the rows of a budget for the whole cell.
         people: Who works at the cell: badge or name, and ``operator`` or ``engineer``.
         stations: Pins, beams, surfaces and cameras that stand there, by name.
         notes: For people.
@@ -66,6 +68,7 @@ class CellSettings(BaseModel):
     rms_tolerance_mm: Positive | None = None
     residual_tolerance_mm: Positive | None = None
     interval_tolerance_mm: Positive | None = None
+    accuracy: AccuracySettings | None = None
     people: dict[Text, PersonRole] | None = None
     stations: dict[Text, StationSettings] | None = None
     notes: str | None = None

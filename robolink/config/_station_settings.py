@@ -42,9 +42,15 @@ class _Station(BaseModel):
 
 
 class PinSettings(_Station):
-    """A pin that a person brings a tip onto."""
+    """A pin that a person brings a tip onto.
+
+    Attributes:
+        place_mm, touch_mm: What is stated of these rows for this pin, half widths.
+    """
 
     kind: Literal["pin"]
+    place_mm: Positive | None = None
+    touch_mm: Positive | None = None
 
 
 class BeamLineSettings(BaseModel):
@@ -70,12 +76,15 @@ class BeamsSettings(_Station):
     Attributes:
         beams: The two beams, as they are to within a millimetre or two.
         off_when_broken: Whether an input goes off, not on, while its beam is broken.
+        place_mm, bend_deg: What is stated of these rows for these beams, half widths.
     """
 
     kind: Literal["beams"]
     z_mm: float
     beams: Annotated[tuple[BeamLineSettings, ...], Field(strict=False, min_length=2, max_length=2)]
     off_when_broken: bool = False
+    place_mm: Positive | None = None
+    bend_deg: Positive | None = None
 
 
 class TouchSettings(_Station):
@@ -84,6 +93,7 @@ class TouchSettings(_Station):
     Attributes:
         input: The input that it switches.
         off_when_touched: Whether that goes off, not on, at a touch.
+        plate_mm: What is stated of the row of its height, half width.
     """
 
     kind: Literal["touch"]
@@ -92,6 +102,7 @@ class TouchSettings(_Station):
     z_mm: float
     input: InputNumber
     off_when_touched: bool = False
+    plate_mm: Positive | None = None
 
 
 Pair = Annotated[tuple[float, ...], Field(strict=False, min_length=2, max_length=2)]
@@ -104,6 +115,8 @@ class CameraSettings(_Station):
         sensor: Name or URL of the camera.
         mm_per_px: What a pixel is in the base, where that is known without robolink: two rows.
         origin_mm: Base point that is seen at pixel (0, 0), likewise.
+        place_mm, camera_turn_deg, camera_scale_percent, tip_image_px, print_mm: What is stated of
+            these rows for this camera, half widths.
     """
 
     kind: Literal["camera"]
@@ -115,6 +128,11 @@ class CameraSettings(_Station):
         Annotated[tuple[Pair, ...], Field(strict=False, min_length=2, max_length=2)] | None
     ) = None
     origin_mm: Annotated[Pair | None, Field(validate_default=True)] = None
+    place_mm: Positive | None = None
+    camera_turn_deg: Positive | None = None
+    camera_scale_percent: Positive | None = None
+    tip_image_px: Positive | None = None
+    print_mm: Positive | None = None
 
     @field_validator("origin_mm")
     @classmethod

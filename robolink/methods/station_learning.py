@@ -75,7 +75,9 @@ def learn_station(
     courses: dict[StationKind, Callable[[], Procedure[Found]]] = {
         StationKind.PIN: lambda: _pin(station, tool, tip, _with_tip(sigma_mm, tip_sigma_mm), plan),
         StationKind.BEAMS: lambda: _beams(station, here, tool, tip, tip_sigma_mm),
-        StationKind.TOUCH: lambda: _surface(station, here, tool, tip, sigma_mm),
+        StationKind.TOUCH: lambda: _surface(
+            station, here, tool=tool, tip=tip, sigma_mm=sigma_mm, tip_sigma_mm=tip_sigma_mm
+        ),
     }
     return courses[station.kind]()
 
@@ -157,7 +159,13 @@ def _beams(
 
 
 def _surface(
-    station: Station, here: Pose, tool: int, tip: ToolOffset, sigma_mm: float | None
+    station: Station,
+    here: Pose,
+    *,
+    tool: int,
+    tip: ToolOffset,
+    sigma_mm: float | None,
+    tip_sigma_mm: float,
 ) -> Procedure[Found]:
     from robolink.methods.z_touch.procedure import (
         measure_z_touch,  # numpy, which a look does without
@@ -174,7 +182,8 @@ def _surface(
         y_mm=guess.y_mm,
         # A tip that seems too long touched a surface that is too high.
         z_mm=guess.z_mm + tip.z_mm - found.offset.z_mm,
-        sigma_mm=offset_sigma_mm(found),
+        # A tip that is longer than its offset says touches a surface that seems too high.
+        sigma_mm=_with_tip(offset_sigma_mm(found), tip_sigma_mm),
         how=tr("touched with tool {tool}", tool=tool),
         gauge=station.gauge,
         tool=tool,

@@ -5,18 +5,13 @@ What the plan states goes before what the record tells, and that before the defa
 """
 
 from dataclasses import replace
-from datetime import datetime
-from typing import Final
 
+from robolink.accuracy import CellRecord, LooksAlike, facts_at
 from robolink.calibration import AccuracyFacts, CalibrationResult, ErrorSource, assessed
 from robolink.methods import find_method
-from robolink.model import Controller, EntryKind
+from robolink.model import Controller
 from robolink.nozzle_change._plan import ToolPlan
 from robolink.runner import TouchedAt
-from robolink.stations import find_stations
-from robolink.timing import wall_time
-
-_DAYS_A_MONTH: Final = 30.44
 
 
 def accuracy_facts(
@@ -28,12 +23,33 @@ def accuracy_facts(
         controller: Whose record is looked at.
         plan: How it was measured, and what is stated.
         result: What was measured.
+
+    Example:
+        >>> import robolink
+        >>> from robolink.calibration import solve_two_pose
+        >>> from robolink.model import Pose
+        >>> from robolink.nozzle_change import ToolPlan, accuracy_facts
+        >>> found = solve_two_pose(Pose(298, 99, -60, 0), Pose(322, 91, -60, 180), sigma_mm=0.02)
+        >>> with robolink.connect("epson+sim://accuracy-example") as controller:
+        ...     facts = accuracy_facts(controller, ToolPlan(1), found)
+        >>> facts.of("touch_mm").half_width, facts.of("touch_mm").basis
+        (0.05, 'default')
     """
     touches = [pose for pose in result.inputs if isinstance(pose, TouchedAt)]
-    return AccuracyFacts(
-        rows=dict(plan.rows),
-        months=_months(controller, plan.station or plan.pin),
-        by_contact=bool(touches) and all(touch.contact for touch in touches),
+    outcomes = controller.outcomes
+    station = plan.at or plan.station or plan.pin or outcomes.signature.station
+    return facts_at(
+        CellRecord(outcomes.recorded),
+        station=station,
+        stated=plan.rows,
+        alike=LooksAlike(
+            station,
+            result.method,
+            by_contact=bool(touches) and all(touch.contact for touch in touches),
+            change=outcomes.change,
+        ),
+        learnt=bool(plan.station or plan.pin),
+        inputs_per_look=result.inputs_per_look,
     )
 
 
@@ -46,6 +62,17 @@ def assessed_in_cell(
         controller: Whose record is looked at.
         plan: How it was measured, and what is stated.
         result: What was measured.
+
+    Example:
+        >>> import robolink
+        >>> from robolink.calibration import solve_two_pose
+        >>> from robolink.model import Pose
+        >>> from robolink.nozzle_change import ToolPlan, assessed_in_cell
+        >>> found = solve_two_pose(Pose(298, 99, -60, 0), Pose(322, 91, -60, 180), sigma_mm=0.02)
+        >>> with robolink.connect("epson+sim://accuracy-example") as controller:
+        ...     result, _ = assessed_in_cell(controller, ToolPlan(1), found)
+        >>> round(result.accurate_to_mm, 3)
+        0.079
     """
     result = with_sources(plan, result)
     facts = accuracy_facts(controller, plan, result)
@@ -69,15 +96,3 @@ def with_sources(plan: ToolPlan, result: CalibrationResult) -> CalibrationResult
         sources.append(ErrorSource.of_lengths("place_mm", count, turning="in_base"))
     # Without an interval of its own nothing tells how it scatters, and nothing is made up.
     return replace(result, sources=tuple(sources)) if result.half_width95 else result
-
-
-def _months(controller: Controller, station: str) -> float | None:
-    """Return how long ago a station was learnt, ``None`` where nothing says it."""
-    if not station:
-        return None
-    entries = controller.outcomes.recorded(kinds=(EntryKind.STATION,))
-    known = find_stations(None, entries).get(station)
-    if known is None or not known.found_at:
-        return None
-    age = wall_time() - datetime.fromisoformat(known.found_at)
-    return max(age.total_seconds(), 0.0) / 86_400 / _DAYS_A_MONTH

@@ -77,6 +77,7 @@ class ToolPlan:
         method: Name of the calibration method, for the record; empty for what the result says.
         station: Name of the station on whose record the measurement rests; empty where it rests on
             none, because it finds the station itself or is told where it is.
+        at: Name of the station where it is measured, whether its place is on record or not.
         rows: What is stated of the rows of the budget, by their keys
             (:data:`~robolink.calibration.ACCURACY_ROWS`).
     """
@@ -94,6 +95,7 @@ class ToolPlan:
     length: LengthRule = "ask"
     method: str = ""
     station: str = ""
+    at: str = ""
     rows: Mapping[str, RowFact] = field(default_factory=dict)
 
     def named(self, result: CalibrationResult) -> CalibrationResult:

@@ -3,6 +3,8 @@
 from dataclasses import replace
 from pathlib import Path
 
+from robolink.accuracy import stated_rows
+from robolink.config import Cell
 from robolink.methods import MethodParameters, Site, fields_of, source_of
 from robolink.model import Controller, TipSensor
 from robolink.nozzle_change import AcceptanceCriteria, ChangePlan, Limits, ToolPlan
@@ -24,6 +26,7 @@ def plan_of(
     accepted_change_mm: float | None = None,
     sensor: str | TipSensor | None = None,
     stated: Station | None = None,
+    cell: Cell | None = None,
 ) -> ChangePlan:
     """Return what a recipe asks for, on one controller.
 
@@ -36,6 +39,7 @@ def plan_of(
         accepted_change_mm: A larger jump than the recipe's that an engineer accepts this time.
         sensor: The camera, or its name or URL, in place of the recipe's.
         stated: The station as the cell file has it, ``None`` where it says nothing.
+        cell: The cell, whose file may state rows of the budget.
 
     Raises:
         CalibrationError: ``rank_deficient``: this robot cannot tilt its tool.
@@ -53,6 +57,7 @@ def plan_of(
         unattended=not ask_before_write,
         stated=frozenset(("rms_mm", "max_residual_mm", "interval_mm")),
     )
+    rows = stated_rows(cell, station, recipe=recipe.accuracy.stated, recipe_name=recipe.name)
     safe, needs = recipe.poses.safe, recipe.source.of_method.needs
     return ChangePlan(
         tuple(
@@ -78,6 +83,8 @@ def plan_of(
                 length=parameters.length_rule(),
                 method=recipe.source.of_method.name,
                 station="" if needs.finds_pin or not station.learnt else station.id,
+                at=station.id,
+                rows=rows,
             )
             for tool in recipe.tools
         ),

@@ -114,6 +114,7 @@ class RecipeRun:
             accepted_change_mm=accepted_change_mm,
             sensor=sensor,
             stated=find_stations(cell, ()).get(loaded.recipe.station.id),
+            cell=cell,
         )
         if take_reference and not loaded.recipe.source.of_method.by_reference:
             raise ConfigError(

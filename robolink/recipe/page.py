@@ -30,13 +30,14 @@ _TABLES: Final = {
     "Speeds": "`[speeds]`",
     "Box": "`[box]`",
     "Tolerances": "`[tolerances]`",
+    "AccuracyTable": "`[accuracy]`",
     "RefusalTable": "`[refusal]`",
     "Prompt": "`[[prompts]]`",
     "Output": "`[[outputs]]`",
 }
 """The tables in the order of the page, with their headings."""
 
-_UNITS: Final = {"_mm": "mm", "_deg": "degrees", "mm_s": "mm/s", "percent": "%"}
+_UNITS: Final = {"_mm": "mm", "_px": "px", "_deg": "degrees", "mm_s": "mm/s", "percent": "%"}
 
 Schema = Mapping[str, Any]
 

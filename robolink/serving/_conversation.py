@@ -35,12 +35,13 @@ from robolink.protocols.spel_callback import (
     same_thousandths,
 )
 from robolink.serving._book import ProgramChange, begin_change, open_changes, record_name
-from robolink.serving._judging import CallbackLimits, require_believed
+from robolink.serving._facts import facts_for_program, proved, statements_on_record
+from robolink.serving._judging import CallbackLimits, believed
 from robolink.serving._measures import measure_named
 from robolink.stations import Station, StationKind, find_station
 
 if TYPE_CHECKING:
-    from robolink.calibration import CalibrationResult
+    from robolink.calibration import AccuracyFacts, CalibrationResult
     from robolink.config import Cell
     from robolink.journal import Journal, JournalOutcomeLog
     from robolink.serving._measures import ProgramMeasure
@@ -71,7 +72,9 @@ class _Run:
     tool: int
     before: ToolOffset
     measure: "ProgramMeasure"
+    station: str = ""
     result: "CalibrationResult | None" = None
+    facts: "AccuracyFacts | None" = None
     change: ProgramChange | None = None
     written: bool = False
 
@@ -218,7 +221,7 @@ class CallbackConversation:
             measure = measure_named(fields[1], self._limits, self._station)
         except ConfigError as error:
             raise CalibrationError("station_unknown", error.what) from error
-        self._run = _Run(tool, before, measure)
+        self._run = _Run(tool, before, measure, fields[1].partition("@")[2])
         return CallbackWord.GO, ()
 
     def _station(self, name: str, kind: StationKind) -> Station:
@@ -278,17 +281,18 @@ class CallbackConversation:
         run = self._require_run()
         if run.change is not None:
             raise RemoteProtocolError(tr("A value was given already."))
-        result = run.measure.solve(run.before)
-        require_believed(result, run.before, self._limits)
+        found = run.measure.solve(run.before)
+        log = self._require_log()
+        facts = facts_for_program(log.recorded, self._cell, found, run.measure, run.station)
+        run.facts, result = facts, believed(found, run.before, self._limits, facts)
         rounded = ToolOffset(*(round(value, 3) for value in result.offset.components()))
         run.result = result
-        run.change = begin_change(self._require_log(), run.tool, run.before, rounded)
+        run.change = begin_change(log, run.tool, run.before, rounded)
         run.change.note(
             EntryKind.CALIBRATION,
             result.method,
-            known_within_mm=result.repeatable_to_mm,
-            warnings=list(result.warnings),
             peer=self._peer,
+            **statements_on_record(result),
             **run.measure.on_record(),
         )
         return CallbackWord.VALUE, (run.change.operation, *offset_fields(rounded))
@@ -308,12 +312,8 @@ class CallbackConversation:
         run, change = self._of_change(fields[0])
         if run.result is None or change.requested is None or not run.written:
             raise RemoteProtocolError(tr("Nothing was written that could be proved."))
-        proof = run.measure.prove(run.result, change.requested)
-        if not proof.passed:
-            raise CalibrationError(
-                "drift",
-                tr("The tip is {drift:.3f} mm off when the tool turns.", drift=proof.max_drift_mm),
-            )
+        assert run.facts is not None  # noqa: S101 - a value was given
+        proof = proved(run.measure, run.result, change.requested, run.facts)
         change.allow_keeping(
             tr("proved by what the program saw after it wrote"),
             max_drift_mm=proof.max_drift_mm,

@@ -70,6 +70,7 @@ class ProgramCrossings:
     """
 
     length: ClassVar[int] = 3
+    by_contact: ClassVar[bool] = False
 
     def __init__(
         self, station: "BeamStation", limits: CallbackLimits, *, max_lean_deg: float
@@ -150,6 +151,15 @@ class ProgramCrossings:
             off_mm = (found.x_mm - off_mm[0], found.y_mm - off_mm[1])
             drifts.append(Drift(seen[0].entry.u_deg, *plane.in_base(*off_mm)))
         return VerifyResult(tuple(drifts), self._limits.tolerance_mm)
+
+    def from_place(
+        self,
+        result: "CalibrationResult",  # noqa: ARG002 - as others need it
+        written: ToolOffset,  # noqa: ARG002
+        proof: "VerifyResult",
+    ) -> "VerifyResult":
+        """Return the proof, which counts from there already; see ``ProgramMeasure``."""
+        return proof
 
     def on_record(self) -> Mapping[str, object]:
         """Return what was measured; see ``ProgramMeasure``."""

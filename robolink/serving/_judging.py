@@ -10,7 +10,7 @@ from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
 
 if TYPE_CHECKING:
-    from robolink.calibration import CalibrationResult
+    from robolink.calibration import AccuracyFacts, CalibrationResult
 
 MOST_POSES: Final = 64
 
@@ -23,7 +23,8 @@ class CallbackLimits:
     """What a program's measurement is held to.
 
     Attributes:
-        tolerance_mm: Largest drift about the new tip, and the widest 95 % interval, in mm.
+        tolerance_mm: Largest drift about the new tip, and how far from the truth it may be in
+            95 %, in mm.
         max_change_mm: Largest change of the offset that is believed, in mm.
         sigma_mm: Standard deviation of one coordinate of one touch, crossing or look, where it
             is known.
@@ -46,26 +47,55 @@ class CallbackLimits:
                 )
 
 
-def require_believed(
-    result: "CalibrationResult", stored: ToolOffset, limits: CallbackLimits
-) -> None:
-    """Refuse an offset that may not be written with nobody looking on.
+def believed(
+    result: "CalibrationResult",
+    stored: ToolOffset,
+    limits: CallbackLimits,
+    facts: "AccuracyFacts",
+) -> "CalibrationResult":
+    """Return a result with what it is accurate to; refuse what nobody who looks on would catch.
+
+    Args:
+        result: What was measured.
+        stored: The offset that stands.
+        limits: What it is held to.
+        facts: What the cell knows of the rows of its budget.
 
     Raises:
         CalibrationError: Its code says why not.
     """
-    from robolink.calibration import update_guard, writes_refused_unattended
+    from robolink.calibration import assessed, update_guard, writes_refused_unattended
+
+    result = assessed(result, facts)
 
     doubt = writes_refused_unattended(result)
     if doubt:
         raise CalibrationError(doubt, tr("What was measured contradicts itself."))
-    within_mm = result.repeatable_to_mm
-    if within_mm is None or within_mm > limits.tolerance_mm:
+    _require_known(result, limits.tolerance_mm)
+    update_guard(result.offset, stored=stored, max_change_mm=limits.max_change_mm)
+    return result
+
+
+def _require_known(result: "CalibrationResult", limit_mm: float) -> None:
+    """Refuse an offset that may be further off than is allowed, or of which nothing says it.
+
+    Raises:
+        CalibrationError: ``uncertain``, or ``not_judged``.
+    """
+    accuracy = result.accuracy
+    if accuracy is None:
+        raise CalibrationError("not_judged", tr("Nothing says how far off the tip may be."))
+    if accuracy.within_mm > limit_mm:
         raise CalibrationError(
             "uncertain",
-            tr("The tip is not known within {limit:g} mm.", limit=limits.tolerance_mm),
+            tr(
+                "The tip is known within {within:.3f} mm; {limit:g} mm are allowed. The largest "
+                "part is: {row}.",
+                within=accuracy.within_mm,
+                limit=limit_mm,
+                row=accuracy.largest.title,
+            ),
         )
-    update_guard(result.offset, stored=stored, max_change_mm=limits.max_change_mm)
 
 
 def require_room(count: int) -> None:

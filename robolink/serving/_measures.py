@@ -19,9 +19,11 @@ class ProgramMeasure(Protocol):
 
     Attributes:
         length: How many fields follow a pose.
+        by_contact: Whether an input showed each touch, so that nobody had to see it.
     """
 
     length: ClassVar[int]
+    by_contact: ClassVar[bool]
 
     def add(self, flange: Pose, seen: Sequence[str], *, proof: bool) -> int:
         """Take a flange pose and what was seen there; return how many there are now.
@@ -44,6 +46,11 @@ class ProgramMeasure(Protocol):
         Raises:
             CalibrationError: It is no proof; its code says why.
         """
+
+    def from_place(
+        self, result: "CalibrationResult", written: ToolOffset, proof: "VerifyResult"
+    ) -> "VerifyResult":
+        """Return a proof as drifts from the place that was measured or is known."""
 
     def on_record(self) -> Mapping[str, object]:
         """Return what was measured, plain JSON."""

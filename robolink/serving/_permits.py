@@ -14,13 +14,15 @@ from robolink.errors import CalibrationError, ConfigError, LeaseHeldError, Robol
 from robolink.messages import tr
 from robolink.model import Controller, EntryKind, NewEntry, Pose, ToolOffset, plain_offset
 from robolink.serving._book import CALLED_BACK
-from robolink.serving._judging import CallbackLimits, require_believed
+from robolink.serving._facts import facts_for_program, proved, statements_on_record
+from robolink.serving._judging import CallbackLimits, believed
 from robolink.serving._touches import LEAST_PROOFS, LEAST_TOUCHES, touches_by
 from robolink.timing import Deadline
 from robolink.transaction import ToolChange, Wanted
 
 if TYPE_CHECKING:
     from robolink.calibration import CalibrationResult
+    from robolink.config import Cell
 
 _AGAIN_S: Final = 1.0
 
@@ -116,6 +118,7 @@ class PermitCall:
         plan: What its program does.
         limits: What its touches are held to.
         ended: Asked at each look whether to give up.
+        cell: The cell, whose file may state rows of the budget; ``None`` where none is named.
 
     Example:
         >>> import itertools, math
@@ -150,9 +153,10 @@ class PermitCall:
         limits: CallbackLimits,
         *,
         ended: Callable[[], bool] = lambda: False,
+        cell: "Cell | None" = None,
     ) -> None:
         self._controller, self._plan, self._limits = controller, plan, limits
-        self._ended = ended
+        self._ended, self._cell = ended, cell
         self._touches = touches_by(plan.method, limits)
 
     def answer(self) -> ToolOffset | None:
@@ -184,8 +188,10 @@ class PermitCall:
         self._take(first, before, proof=False)
         for _ in range(1, plan.touches):
             self._take(self._next(), before, proof=False)
-        result = self._touches.solve(before)
-        require_believed(result, before, self._limits)
+        found = self._touches.solve(before)
+        recall = self._controller.outcomes.recorded
+        facts = facts_for_program(recall, self._cell, found, self._touches)
+        result = believed(found, before, self._limits, facts)
         wanted = Wanted(plan.tool, result.offset, before, details=self._details(result))
         marked = {MACHINE_WAITS: True}
         with ToolChange(self._controller, (wanted,), verify=True, marked=marked) as change:
@@ -193,15 +199,7 @@ class PermitCall:
             written = receipt.read_back or result.offset
             for _ in range(plan.proofs):
                 self._take(self._next(), written, proof=True)
-            proof = self._touches.prove(result, written)
-            if not proof.passed:
-                raise CalibrationError(
-                    "drift",
-                    tr(
-                        "The tip is {drift:.3f} mm off when the tool turns.",
-                        drift=proof.max_drift_mm,
-                    ),
-                )
+            proved(self._touches, result, written, facts)
             change.keep(tr("proved by what the program touched after the write"))
         return written
 
@@ -252,10 +250,9 @@ class PermitCall:
         return {
             CALLED_BACK: True,
             "method": result.method,
-            "known_within_mm": result.repeatable_to_mm,
-            "warnings": list(result.warnings),
             "proposed": plain_offset(result.offset),
             **self._touches.on_record(),
+            **statements_on_record(result),
         }
 
     def _note_refusal(self, error: RobolinkError) -> None:

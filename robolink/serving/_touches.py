@@ -59,6 +59,7 @@ class ProgramTouches:
     """
 
     length: ClassVar[int] = 2
+    by_contact: ClassVar[bool] = True
 
     def __init__(self, method: "PoseMethod", limits: CallbackLimits) -> None:
         self._method, self._limits = method, limits
@@ -100,6 +101,20 @@ class ProgramTouches:
                 tr("The point is {away:.3f} mm from where it was measured.", away=away_mm),
             )
         return proof
+
+    def from_place(
+        self, result: "CalibrationResult", written: ToolOffset, proof: "VerifyResult"
+    ) -> "VerifyResult":
+        """Return the same touches as drifts from the measured place; see ``ProgramMeasure``."""
+        from robolink.calibration import Drift, VerifyResult, tip_pose
+
+        place, drifts = result.reference_point_mm, []
+        for pose in self._proving.poses:
+            tip = tip_pose(pose, written, tool=0)
+            seen = (tip.x_mm, tip.y_mm, tip.z_mm)
+            dx_mm, dy_mm, *dz_mm = (a - b for a, b in zip(seen, place, strict=False))
+            drifts.append(Drift(pose.u_deg, dx_mm, dy_mm, dz_mm[0] if dz_mm else 0.0))
+        return VerifyResult(tuple(drifts), proof.tolerance_mm)
 
     def on_record(self) -> Mapping[str, object]:
         """Return what was measured; see ``ProgramMeasure``."""

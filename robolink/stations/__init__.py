@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from robolink.stations._places import touch_station as touch_station
     from robolink.stations._records import Found as Found
     from robolink.stations._records import station_entry as station_entry
+    from robolink.stations._records import station_of as station_of
     from robolink.stations._sensors import BeamStation as BeamStation
     from robolink.stations._sensors import CameraStation as CameraStation
     from robolink.stations._sensors import TouchStation as TouchStation
@@ -35,7 +36,7 @@ __getattr__ = lazy_exports(
         "_base": "base_now learnt_elsewhere require_base_of",
         "_finding": "find_station find_stations",
         "_places": "beam_station camera_station pin_of sensor_of touch_station",
-        "_records": "Found station_entry",
+        "_records": "Found station_entry station_of",
         "_sensors": "BeamStation CameraStation TouchStation",
         "_station": "AGREEING_MM Gauge Station StationKind",
     },

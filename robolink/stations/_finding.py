@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
+from robolink.calibration import ACCURACY_ROWS
 from robolink.config import Cell
 from robolink.errors import ConfigError
 from robolink.messages import tr
@@ -14,6 +15,7 @@ from robolink.stations._station import Station, StationKind
 _PLACE = (
     *("x_mm", "y_mm", "z_mm", "sigma_mm"),
     *("gauge", "gauge_due", "check_every_days", "kind", "notes"),
+    *ACCURACY_ROWS,
 )
 
 

@@ -104,6 +104,7 @@ BAD = {
     "calibrate sphere-touch": (["--tool", "1", "--radius", "30"], "must be more than"),
     "calibrate six-point": (["--tool", "0"], "never written"),
     "calibrate points": (["--tool", "1", "--points", "9-1"], "is not a point"),
+    "cell accuracy measure": (["bend_deg"], "not measured by this command"),
     "cell station list": (["all"], "unexpected extra argument"),
     "cell station show": (["B"], "no station 'B'"),
     "cell station learn": (["B", "--tool", "0"], "0 is not in the range"),

@@ -48,6 +48,21 @@ class Elsewhere(NamedTuple):
 
 
 NOT_RUN = {
+    "accuracy.md 2": Elsewhere(
+        "five calibrations of a gauge tip are needed",
+        "tests/cli/test_cell_accuracy.py",
+        ('"accuracy", "measure", "touch_mm", "--tool"', '"--true"'),
+    ),
+    "accuracy.md 3": Elsewhere(
+        "a gauge study is needed",
+        "tests/cli/test_cell_accuracy.py",
+        ('"touch_mm", "--study", "study.json"',),
+    ),
+    "accuracy.md 4": Elsewhere(
+        "five nozzles before a camera are needed, twice",
+        "tests/cli/test_cell_accuracy.py",
+        ('"tip_image_px", "--station", "CAM-01", "--tool", "1"',),
+    ),
     "camera-and-board.md 1": Elsewhere(
         "a camera is needed, three times",
         "tests/contract/test_calibrate_camera.py",

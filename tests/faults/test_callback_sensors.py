@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 from robolink_simulators.epson.vision.calibration import VisionCalibration
 
+from robolink import ambient
 from robolink.journal import memory_journal
 from robolink.model import EntryKind, ToolOffset, new_operation
 from robolink.protocols.spel_callback import CallbackLine, CallbackWord
@@ -88,6 +89,26 @@ def test_beams_that_were_moved_since_they_were_learnt_show_in_the_proof(beams):
     x, y, z = beams.recorded_mm
     beams.stand_at((x + 0.15, y, z))
     refused(beams, "drift", BACK)
+
+
+@pytest.mark.parametrize(
+    ("moved_mm", "code"),
+    [(0.05, "proof_contradicts_accuracy"), (0.03, "proof_contradicts_repeatability")],
+)
+def test_a_proof_inside_its_tolerance_that_contradicts_the_measurement_is_none(
+    beams, moved_mm, code
+):
+    x, y, z = beams.recorded_mm
+    beams.stand_at((x + moved_mm, y, z))
+    refused(beams, code, BACK)
+
+
+def test_beams_that_were_learnt_long_ago_are_not_sure_enough(beams, monkeypatch):
+    """The row of their place has grown to 0.1 mm since, and the limit is 0.1 mm."""
+    ahead_s = 400 * 86_400.0
+    now_s = ambient.wall_s
+    monkeypatch.setattr(ambient, "wall_s", lambda: now_s() + ahead_s)
+    refused(beams, "uncertain", [EntryKind.REFUSED])
 
 
 @pytest.mark.soak

@@ -30,6 +30,7 @@ HEADINGS = {
     "Speeds": "`[speeds]`",
     "Box": "`[box]`",
     "Tolerances": "`[tolerances]`",
+    "AccuracyTable": "`[accuracy]`",
     "RefusalTable": "`[refusal]`",
     "Prompt": "`[[prompts]]`",
     "Output": "`[[outputs]]`",

@@ -57,6 +57,10 @@ _CELL: Final = {
         f"{MEASURE}.station:station",
         declared("Pins, beams, surfaces and cameras of a cell: where, and how well known."),
     ),
+    "accuracy": (
+        f"{MEASURE}.accuracy:accuracy",
+        declared("What a cell knows of its accuracy, and the command that measures each row."),
+    ),
 }
 
 _EXPERT: Final = {

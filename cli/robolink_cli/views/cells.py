@@ -194,5 +194,8 @@ def _checked(path: Path) -> dict[str, Any]:
 
 def _shown(value: object) -> str:
     if isinstance(value, dict):
-        return ", ".join(value)
+        # Rows of the budget are numbers; of people and stations the names are enough.
+        return ", ".join(
+            f"{name} {one:g}" if isinstance(one, float) else name for name, one in value.items()
+        )
     return f"{value:g}" if isinstance(value, float) else str(value)

@@ -1,15 +1,22 @@
 """What ``solve`` shows: the names are those of the shared calibration cases."""
 
 from collections.abc import Mapping, Sequence
+from typing import Final
 
 from robolink.calibration import Accuracy, CalibrationResult, rows_in_words, stated_mm
 from robolink.messages import declared, spoken, tr
 from robolink_cli.console.render import say
 
+SOLVED: Final = "solved"
+"""Under this key stands the result itself, until what it is accurate to takes its place."""
+
 
 def result_payload(result: CalibrationResult) -> dict[str, object]:
-    """Return a result as plain values; lengths in mm, angles in degrees."""
-    payload: dict[str, object] = {"codes": list(result.warnings)}
+    """Return a result as plain values; lengths in mm, angles in degrees.
+
+    The result itself stands under :data:`SOLVED`.
+    """
+    payload: dict[str, object] = {"codes": list(result.warnings), SOLVED: result}
     lengths = [name for name in ("x_mm", "y_mm", "z_mm") if name in result.measured]
     if "x_mm" in lengths:
         payload["offset"] = [getattr(result.offset, name) for name in lengths]

@@ -1,6 +1,6 @@
 """The stations of a cell, as commands show them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -43,7 +43,9 @@ def known_stations(context: CliContext, *, robot: str | None = None) -> list[Sta
     """
     return [
         StationOfRobot(station, name)
-        for name, entries in _records(context, robot, nobodys=True)
+        for name, entries in records_of_robots(
+            context, robot, kinds=(EntryKind.STATION,), nobodys=True
+        )
         for station in find_stations(context.cell, entries).values()
     ]
 
@@ -55,7 +57,7 @@ def known_station(context: CliContext, name: str, *, robot: str | None = None) -
         ConfigError: There is none of that name, or the journal cannot be read; or several robots
             of the controller have one, and none is named.
     """
-    records = _records(context, robot, nobodys=False)
+    records = records_of_robots(context, robot, kinds=(EntryKind.STATION,), nobodys=False)
     learnt = [
         (whose, entries)
         for whose, entries in records
@@ -184,13 +186,19 @@ def _found(station: Station) -> str:
     )
 
 
-def _records(
-    context: CliContext, robot: str | None, *, nobodys: bool
+def records_of_robots(
+    context: CliContext, robot: str | None, *, kinds: Collection[EntryKind], nobodys: bool
 ) -> list[tuple[str, list[Recorded]]]:
-    """Return what is on record about stations for each robot, newest first, by its name.
+    """Return what is on record for each robot, newest first, by its name; no controller is asked.
 
     What stands under a controller of several robots tells none of them, and is one more record
     where ``nobodys``.
+
+    Args:
+        context: The command.
+        robot: The robot that is meant, ``None`` for all.
+        kinds: Of what kinds.
+        nobodys: Whether what is of no robot counts too.
 
     Raises:
         ConfigError: The robot that is meant is none of them.
@@ -203,7 +211,7 @@ def _records(
     if may_exist(default_location()):
         journal = open_journal(read_only=True)
         robots = journal.robots_of(address)
-        entries = list(journal.entries(controller=address, kinds=(EntryKind.STATION,)))
+        entries = list(journal.entries(controller=address, kinds=kinds))
     if robot is not None:
         robots = (_meant(robot, robots),)
     elif not robots:

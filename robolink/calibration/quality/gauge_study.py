@@ -52,6 +52,8 @@ class GaugeStudy:
         repeatability_dof: Degrees of freedom behind it.
         repeatability_limits_mm: Its 95 % interval.
         reproducibility_limits_mm: By chi-square with one less than persons, ``None`` for one.
+        reproducibility_upper95_mm: Upper 95 % bound of it, from how much the means of the persons
+            differ, with what differs from nozzle to nozzle; never 0, ``None`` for one person.
         warnings: ``gauge_marginal`` or ``gauge_unfit``.
         notes: ``few_categories``: fewer than five.
     """
@@ -70,6 +72,7 @@ class GaugeStudy:
     reproducibility_limits_mm: tuple[float, float] | None
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
+    reproducibility_upper95_mm: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +85,7 @@ class _Variances:
     p: float | None
     pooled: bool
     dof: int
+    person_upper: float | None
 
 
 def gauge_study(
@@ -125,6 +129,9 @@ def gauge_study(
         reproducibility_limits_mm=_limits(reproducibility, persons - 1) if persons > 1 else None,
         warnings=_verdict(of_total if of_tolerance is None else of_tolerance),
         notes=("few_categories",) if ndc is not None and ndc < LEAST_CATEGORIES else (),
+        reproducibility_upper95_mm=None
+        if found.person_upper is None
+        else math.sqrt(found.person_upper),
     )
 
 
@@ -143,13 +150,16 @@ def _variances(table: Floats) -> _Variances:
     dof = dof_mixed + dof_repeat if pooled else dof_repeat
     repeat = (ss_mixed + ss_repeat if pooled else ss_repeat) / dof
     against = repeat if pooled else ss_mixed / dof_mixed
-    between = 0.0
+    between, upper = 0.0, None
+    interaction = 0.0 if pooled else max(0.0, (against - repeat) / r)
     if o > 1:
         ms_person = n * r * float(((persons - mean) ** 2).sum()) / (o - 1)
         between = max(0.0, (ms_person - against) / (n * r))
-    interaction = 0.0 if pooled else max(0.0, (against - repeat) / r)
+        # Nothing is taken off for what chance alone makes the means differ by.
+        freedom = (o - 1) / chi_square_quantile(0.05, o - 1)
+        upper = freedom * max(ms_person, against) / (n * r) + interaction
     part = max(0.0, (ms_part - against) / (o * r))
-    return _Variances(repeat, between + interaction, part, p, pooled, dof)
+    return _Variances(repeat, between + interaction, part, p, pooled, dof, upper)
 
 
 def _p(ms_mixed: float, ms_repeat: float, dof_mixed: int, dof_repeat: int) -> float:

@@ -29,6 +29,7 @@ class EntryKind(StrEnum):
     IDENTITY = "identity"
     BACKUP = "backup"
     CHECK = "check"
+    ACCURACY = "accuracy"
     ORDER = "order"
 
 

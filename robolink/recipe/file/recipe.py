@@ -7,6 +7,7 @@ from pydantic import ConfigDict, Field, ValidationInfo, field_validator
 from robolink.methods import method_names
 from robolink.recipe.file.method_tables import AnyKind, MethodTable
 from robolink.recipe.file.tables import (
+    AccuracyTable,
     Box,
     Line,
     Note,
@@ -61,6 +62,8 @@ class Recipe(Table):
     """How far the flange may go from where it is when the recipe starts."""
     tolerances: Tolerances = Field(default_factory=Tolerances)
     """What a measurement must be like to be believed."""
+    accuracy: AccuracyTable = Field(default_factory=AccuracyTable)
+    """What is known of errors that no measurement shows by itself."""
     refusal: RefusalTable = Field(default_factory=RefusalTable)
     """What follows when a measurement is not believed."""
     prompts: Annotated[tuple[Prompt, ...], Field(strict=False)] = ()

@@ -164,9 +164,9 @@ class Tolerances(Table):
     max_mm: Length | None = None
     """Largest single residual, mm, at least rms_mm; not for "two-pose"."""
     interval_mm: Length | None = None
-    """Largest distance within which the tip lies in 95 %, mm, all lengths that are measured
-    together; half the interval of an axis where only that is known. "two-pose" needs sigma_mm for
-    it."""
+    """Largest distance from the truth within which the tip lies in 95 %, mm, all lengths that are
+    measured together and every row of the budget counted, see [accuracy]. "two-pose" needs
+    sigma_mm for it."""
     sigma_mm: Length | None = None
     """Standard deviation of one coordinate of one touch, or of one crossing, mm, where known."""
     jump_mm: Length = 2.0
@@ -174,6 +174,39 @@ class Tolerances(Table):
     that were measured; more is refused. A Z that is typed is not judged."""
     drift_mm: Length = 0.2
     """Largest drift about the new tip that passes the verification, mm."""
+
+
+HalfWidth = Annotated[float, Field(ge=0.0001)]
+
+
+class AccuracyTable(Table):
+    """What is known of errors that no measurement shows by itself: half widths.
+
+    What is not said here counts as in the cell file, as on record, or by its default
+    (docs/accuracy.md).
+    """
+
+    touch_mm: HalfWidth | None = None
+    """How a person sees contact, mm: always beside, on the same side of the tool."""
+    place_mm: HalfWidth | None = None
+    """Place of the station since it was learnt, mm; only where the method uses that place."""
+    camera_turn_deg: HalfWidth | None = None
+    """Turn of the camera since it was calibrated, degrees."""
+    camera_scale_percent: HalfWidth | None = None
+    """Scale of the camera since it was calibrated, percent."""
+    plate_mm: HalfWidth | None = None
+    """Height of the surface, mm."""
+    tip_image_px: HalfWidth | None = None
+    """What the camera sees of a tip beside its middle, pixels."""
+    bend_deg: HalfWidth | None = None
+    """Bend of the needle that is left after its correction, degrees."""
+    print_mm: HalfWidth | None = None
+    """Print of the fiducials, mm."""
+
+    @property
+    def stated(self) -> dict[str, float]:
+        """What is stated, by key."""
+        return {key: value for key, value in self.model_dump().items() if value is not None}
 
 
 class RefusalTable(Table):

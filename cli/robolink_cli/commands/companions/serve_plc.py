@@ -31,7 +31,13 @@ def serve_plc(context: CliContext, plan: "PermitPlan", limits: "CallbackLimits")
         while not termination.came:
             try:
                 with open_controller(context, changes=True) as controller:
-                    call = PermitCall(controller, plan, limits, ended=lambda: termination.came)
+                    call = PermitCall(
+                        controller,
+                        plan,
+                        limits,
+                        ended=lambda: termination.came,
+                        cell=context.cell,
+                    )
                     kept = call.answer()
             except CalibrationError as error:
                 note(str(error))

@@ -180,7 +180,7 @@ def _carry_out(
     order: Order | None,
     describe: DescribeReport,
 ) -> ChangeReport:
-    one = frame.tool_plan(given, verify=False)
+    one = frame.tool_plan(given, controller, verify=False)
     attended = not frame.yes and on_terminal()
     change = NozzleChange(
         controller,
@@ -200,7 +200,7 @@ def _dry_run(
     """Propose and judge; return the document with what would be sent."""
     before = controller.tools.read(frame.tool)
     given.found = given.find(controller, frame.tool, before)
-    plan = frame.tool_plan(given, verify=False)
+    plan = frame.tool_plan(given, controller, verify=False)
     result, _ = assessed_in_cell(controller, plan, plan.named(given.found.result))
     proposal = Proposal(frame.tool, before, result)
     if not frame.context.json:

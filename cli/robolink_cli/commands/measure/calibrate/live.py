@@ -177,7 +177,7 @@ def _calibrate(frame: CalibrationRequest, source: Callable[[Controller], TipSour
             payload = order.done.result
             show_done(order)
         else:
-            payload = _measure(controller, frame, frame.plan(source(controller)), order)
+            payload = _measure(controller, frame, frame.plan(source(controller), controller), order)
     if frame.dry_run:
         context.emit("dry-run", payload, lambda: show_plan(payload))
     else:

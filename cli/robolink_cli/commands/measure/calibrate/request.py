@@ -16,7 +16,9 @@ from robolink_cli.session.context import CliContext
 from robolink_cli.session.ordering import require_no_dry_run
 
 if TYPE_CHECKING:
+    from robolink.calibration import RowFact
     from robolink.methods import LengthRule
+    from robolink.model import Controller
     from robolink.nozzle_change import AcceptanceCriteria, ChangePlan, Limits, ToolPlan
     from robolink.procedures import TipSource
     from robolink.stations import Station
@@ -84,11 +86,11 @@ class CalibrationRequest:
         if self.dry_run:
             _refuse_to_show_nothing(self.impact, self.report)
 
-    def plan(self, source: "TipSource") -> "ChangePlan":
+    def plan(self, source: "TipSource", controller: "Controller") -> "ChangePlan":
         """Return what is to be done with the measurements of ``source``."""
         from robolink.nozzle_change import ChangePlan
 
-        one = self.tool_plan(source, verify=self.verify)
+        one = self.tool_plan(source, controller, verify=self.verify)
         return ChangePlan((one,), limits=self.limits, ask_before_write=not self.yes)
 
     def _stated(self) -> "Station | None":
@@ -97,8 +99,26 @@ class CalibrationRequest:
 
         return find_stations(self.context.cell, ()).get(self.context.station)
 
-    def tool_plan(self, source: "TipSource", *, verify: bool) -> "ToolPlan":
-        """Return what is to be done about the tool."""
+    def _rows(self, controller: "Controller") -> "dict[str, RowFact]":
+        """Return what the cell file states of the rows of the budget."""
+        from robolink.accuracy import stated_rows
+        from robolink.model import EntryKind
+        from robolink.stations import find_stations
+
+        cell, name = self.context.cell, self.context.station
+        entries = controller.outcomes.recorded(kinds=(EntryKind.STATION,)) if name else ()
+        return stated_rows(cell, find_stations(cell, entries).get(name, name))
+
+    def tool_plan(
+        self, source: "TipSource", controller: "Controller", *, verify: bool
+    ) -> "ToolPlan":
+        """Return what is to be done about the tool.
+
+        Args:
+            source: Where its measurement comes from.
+            controller: The controller, whose record tells of the station.
+            verify: Whether the new tip is proved after the write.
+        """
         from robolink.nozzle_change import ToolPlan
 
         stated = self._stated()
@@ -113,6 +133,8 @@ class CalibrationRequest:
             method=self.method,
             length=self.length,
             station=self.station,
+            at=self.context.station,
+            rows=self._rows(controller),
         )
 
 

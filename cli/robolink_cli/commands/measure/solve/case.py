@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Final, TypeVar
 
+from robolink.calibration import ACCURACY_ROWS, AccuracyFacts, RowFact
 from robolink.errors import CalibrationError, ConfigError
 from robolink.messages import tr
 from robolink.model import Hand, Pose, ToolOffset
@@ -198,6 +199,34 @@ def read_pose(node: Node) -> Pose:
     )
     node.finish()
     return node.frames.flange(pose)
+
+
+def read_facts(node: Node) -> AccuracyFacts:
+    """Return what a case states of the rows of its budget.
+
+    Each row is a positive half width by its key; ``months`` says how long ago the station was
+    learnt, ``by_contact`` whether an input showed each touch.
+    """
+    rows = {
+        key: RowFact(_positive(node, key), "stated", told=tr("stated in the case"))
+        for key in ACCURACY_ROWS
+        if key in node
+    }
+    months = node.optional("months", node.number)
+    if months is not None and months < 0:
+        raise unusable(node.at("months"), tr("it is below 0"))
+    by_contact = node.optional("by_contact", node.raw) or False
+    if not isinstance(by_contact, bool):
+        raise unusable(node.at("by_contact"), tr("true or false is expected here"))
+    node.finish()
+    return AccuracyFacts(rows=rows, months=months, by_contact=by_contact)
+
+
+def _positive(node: Node, name: str) -> float:
+    value = node.number(name)
+    if value <= 0:
+        raise unusable(node.at(name), tr("a number above 0 is expected here"))
+    return value
 
 
 def read_frames(node: Node) -> None:

@@ -5,11 +5,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Final, cast
 
+from robolink.calibration import AccuracyFacts, CalibrationResult, assessed
 from robolink.errors import CalibrationError, ConfigError
 from robolink.files.named import read_named
 from robolink.messages import tr
 from robolink_cli.commands.measure.solve.case import (
     Node,
+    read_facts,
     read_frames,
     read_poses,
     unusable,
@@ -20,6 +22,7 @@ from robolink_cli.commands.measure.solve.pose_methods import POSE_METHODS
 from robolink_cli.commands.measure.solve.station_methods import STATION_METHODS
 from robolink_cli.commands.measure.solve.study_methods import STUDY_METHODS
 from robolink_cli.commands.measure.solve.touch_methods import TOUCH_METHODS
+from robolink_cli.views.solve import SOLVED
 
 CASE_SCHEMA: Final = "robolink-calibration-vectors/1"
 METHODS: Final = {
@@ -103,6 +106,7 @@ def solve_case(node: Node) -> dict[str, object]:
     node.optional("units", lambda name: _check_units(node.child(name)))
     head: dict[str, object] = {} if identity is None else {"id": identity}
     head |= {"method": method}
+    facts = node.optional("accuracy", lambda name: read_facts(node.child(name)))
     given = node.child("input")
     node.finish()
     try:
@@ -111,9 +115,36 @@ def solve_case(node: Node) -> dict[str, object]:
     except CalibrationError as error:
         return head | _refusal(error, method, given)
     given.finish()
+    found = _with_accuracy(found, facts or AccuracyFacts())
     codes = found.pop("codes", [])
     status = found.pop("status", "warn" if codes else "ok")
     return head | {"status": status, "codes": codes} | _json_numbers(found)
+
+
+def _with_accuracy(found: Mapping[str, object], facts: AccuracyFacts) -> dict[str, object]:
+    """Return an answer in which each result has what it is accurate to, those inside of it too."""
+    told: dict[str, object] = {}
+    for name, value in found.items():
+        if name == SOLVED and isinstance(value, CalibrationResult):
+            told |= _statements(value, facts)
+        else:
+            told[name] = _with_accuracy(value, facts) if isinstance(value, dict) else value
+    return told
+
+
+def _statements(result: CalibrationResult, facts: AccuracyFacts) -> dict[str, object]:
+    """Return what a result is repeatable to and accurate to, plain values.
+
+    Args:
+        result: The result.
+        facts: What the case states of the rows of its budget; the others are defaults.
+    """
+    accuracy = assessed(result, facts).accuracy
+    return {
+        "repeatable_to_mm": result.repeatable_to_mm,
+        "accurate_to_mm": None if accuracy is None else accuracy.within_mm,
+        "accuracy": None if accuracy is None else accuracy.as_json(result.measured),
+    }
 
 
 def _refusal(error: CalibrationError, method: str, given: Node) -> dict[str, object]:

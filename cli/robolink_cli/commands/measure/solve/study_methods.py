@@ -37,6 +37,24 @@ def _plane(node: Node) -> "cal.TouchedPlane":
     return cal.TouchedPlane((normal[0], normal[1], normal[2]), distance)
 
 
+def study_values(case: Node) -> list[list[list[float]]]:
+    """Return the values of a case of a gauge study: nozzles, of persons, of repeats.
+
+    Raises:
+        CalibrationError: ``non_finite``.
+        ConfigError: It is none.
+    """
+    case.ignore("schema", "id", "units", "note", "expected", "tolerance", "accuracy")
+    case.text("method", "gauge_rr")
+    node = case.child("input")
+    case.finish()
+    axes = node.optional("axes", lambda name: _axes(node, name)) or _AXES
+    node.ignore("tolerance_mm")
+    values = _table(node, axes)
+    node.finish()
+    return values
+
+
 def gauge_rr(node: Node) -> Payload:
     """Nozzles seated and touched by several persons, several times each."""
     axes = node.optional("axes", lambda name: _axes(node, name)) or _AXES
@@ -59,6 +77,7 @@ def gauge_rr(node: Node) -> Payload:
         "repeatability_dof": study.repeatability_dof,
         "repeatability_limits_mm": list(study.repeatability_limits_mm),
         "reproducibility_limits_mm": None if between is None else list(between),
+        "reproducibility_upper95_mm": study.reproducibility_upper95_mm,
     }
 
 

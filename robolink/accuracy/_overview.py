@@ -1,0 +1,124 @@
+"""Which rows count where in a cell, and what each of them makes of a result by itself."""
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from robolink.accuracy._age import months_at
+from robolink.accuracy._known import CellRecord, KnownRow, rows_at
+from robolink.accuracy._stated import stated_rows
+from robolink.calibration import ACCURACY_ROWS, NORMAL_95, chi_square_quantile
+from robolink.config import Cell
+from robolink.methods import all_methods
+from robolink.stations import Station, StationKind, camera_station, find_stations
+
+_AT: Final[Mapping[StationKind, tuple[str, ...]]] = {
+    StationKind.PIN: ("touch_mm", "place_mm"),
+    StationKind.BEAMS: ("place_mm", "bend_deg"),
+    StationKind.TOUCH: ("plate_mm",),
+    StationKind.CAMERA: (
+        "place_mm",
+        "camera_turn_deg",
+        "camera_scale_percent",
+        "tip_image_px",
+        "print_mm",
+    ),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class RowsAt:
+    """The rows at one place of a cell.
+
+    Attributes:
+        station: The station; ``None`` for what needs none.
+        methods: Names of the methods that measure there.
+        months: How long ago it was learnt, or used first; ``None`` where nothing says it.
+        rows: Its rows, as they count now.
+        mm_per_px: Length of a pixel of a camera, ``None`` where that is unknown.
+    """
+
+    station: Station | None
+    methods: tuple[str, ...]
+    months: float | None
+    rows: tuple[KnownRow, ...]
+    mm_per_px: float | None = None
+
+    def alone_mm(self, row: KnownRow) -> float | None:
+        """Return within what a tip would lie in 95 % if this row were all.
+
+        Turn and scale of a camera count for a tip 1 mm from the middle. ``None`` where it depends
+        on the measurement.
+        """
+        unit = ACCURACY_ROWS[row.key].unit
+        mm = {
+            "mm": 1.0,
+            "deg": math.radians(1.0) if row.key.startswith("camera") else None,
+            "percent": 0.01,
+            "px": self.mm_per_px,
+        }[unit]
+        if mm is None:
+            return None
+        u_mm = row.half_width * mm / math.sqrt(3)
+        return NORMAL_95 * u_mm if row.key == "plate_mm" else math.sqrt(_PLANE) * u_mm
+
+
+_PLANE: Final = chi_square_quantile(0.95, 2)
+
+
+def rows_of_cell(cell: Cell | None, record: CellRecord) -> tuple[RowsAt, ...]:
+    """Return all rows of a cell: first those that need no station, then station by station.
+
+    Args:
+        cell: The cell; ``None`` where none is named.
+        record: What is on record.
+
+    Example:
+        >>> from robolink.accuracy import CellRecord, rows_of_cell
+        >>> (touching,) = rows_of_cell(None, CellRecord(lambda *, kinds: iter(())))
+        >>> row = touching.rows[0]
+        >>> row.key, row.fact.basis, round(touching.alone_mm(row), 3)
+        ('touch_mm', 'default', 0.071)
+    """
+    stations = find_stations(cell, record.stations)
+    return (
+        RowsAt(None, _by_touch(), None, _rows(cell, record, None, ("touch_mm",))),
+        *(_rows_at(cell, record, station) for station in stations.values()),
+    )
+
+
+def _rows_at(cell: Cell | None, record: CellRecord, station: Station) -> RowsAt:
+    months = months_at(station.id, stations=record.stations, calibrations=record.all_calibrations)
+    methods = tuple(method.name for method in all_methods() if method.needs.station is station.kind)
+    rows = _rows(cell, record, station, _AT[station.kind])
+    return RowsAt(station, methods, months, rows, mm_per_px(station))
+
+
+def _rows(
+    cell: Cell | None, record: CellRecord, station: Station | None, keys: Iterable[str]
+) -> tuple[KnownRow, ...]:
+    name = "" if station is None else station.id
+    return rows_at(record, keys, station=name, stated=stated_rows(cell, station or name))
+
+
+def _by_touch() -> tuple[str, ...]:
+    return tuple(
+        method.name
+        for method in all_methods()
+        if not method.needs.by_sensor and not method.needs.named
+    )
+
+
+def mm_per_px(station: Station) -> float | None:
+    """Return the length of a pixel of a camera, ``None`` where nobody knows it."""
+    if station.kind is not StationKind.CAMERA or "mm_per_px" not in station.details:
+        return None
+    if None in (station.x_mm, station.y_mm, station.z_mm):
+        return None
+    try:
+        model = camera_station(station).model
+    except (TypeError, ValueError, IndexError):  # a record that is damaged says nothing
+        return None
+    area = 0.0 if model is None else abs(model.determinant)
+    return math.sqrt(area) if math.isfinite(area) and area > 0 else None

@@ -1,0 +1,105 @@
+"""What a cell knows of how sure a program's measurement is, and what its proof is held to."""
+
+from typing import TYPE_CHECKING
+
+from robolink.errors import CalibrationError
+from robolink.messages import tr
+from robolink.model import ToolOffset
+from robolink.stations import find_stations
+
+if TYPE_CHECKING:
+    from robolink.accuracy import Recall
+    from robolink.calibration import AccuracyFacts, CalibrationResult, VerifyResult
+    from robolink.config import Cell
+    from robolink.serving._measures import ProgramMeasure
+
+
+def facts_for_program(
+    recall: "Recall",
+    cell: "Cell | None",
+    result: "CalibrationResult",
+    measure: "ProgramMeasure",
+    station: str = "",
+) -> "AccuracyFacts":
+    """Return what a cell knows of the rows of what a program measured.
+
+    Args:
+        recall: What is on record of its controller.
+        cell: The cell; ``None`` where none is named.
+        result: What was measured.
+        measure: What it measured with.
+        station: The station that the program named; empty for none.
+    """
+    from robolink.accuracy import CellRecord, LooksAlike, facts_at, stated_rows
+
+    record = CellRecord(recall)
+    known = find_stations(cell, record.stations).get(station)
+    return facts_at(
+        record,
+        station=station,
+        stated=stated_rows(cell, known or station),
+        alike=LooksAlike(station, result.method, by_contact=measure.by_contact),
+        learnt=known is not None and known.learnt,
+        inputs_per_look=result.inputs_per_look,
+    )
+
+
+def statements_on_record(result: "CalibrationResult") -> dict[str, object]:
+    """Return what the journal keeps of how sure a result is, plain JSON."""
+    return {
+        "known_within_mm": result.repeatable_to_mm,
+        "repeatable_to_mm": result.repeatable_to_mm,
+        "accurate_to_mm": result.accurate_to_mm,
+        "accuracy": result.accuracy.as_json(result.measured) if result.accuracy else None,
+        "warnings": list(result.warnings),
+    }
+
+
+def proved(
+    measure: "ProgramMeasure",
+    result: "CalibrationResult",
+    written: ToolOffset,
+    facts: "AccuracyFacts",
+) -> "VerifyResult":
+    """Return the proof of a value that was written; refuse one that contradicts its measurement.
+
+    A contradiction of the scatter alone passes where what it shows lies within what the result is
+    accurate to; nobody looks on who could be asked (docs/reference/evidence.md 20).
+
+    Args:
+        measure: What was measured, and seen after the write.
+        result: What was measured, with what it is accurate to.
+        written: The value that was written.
+        facts: What the cell knows of the rows of its budget.
+
+    Raises:
+        CalibrationError: ``drift``, ``proof_contradicts_accuracy``,
+            ``proof_contradicts_repeatability``, or as :meth:`ProgramMeasure.prove`.
+    """
+    from dataclasses import replace
+
+    from robolink.calibration import held_to_claim, turn_claim
+
+    proof = measure.prove(result, written)
+    if not proof.passed:
+        raise CalibrationError(
+            "drift",
+            tr("The tip is {drift:.3f} mm off when the tool turns.", drift=proof.max_drift_mm),
+        )
+    claim = turn_claim(result, facts)
+    if claim is None:
+        return proof
+    judgement = held_to_claim(claim, measure.from_place(result, written, proof))
+    within_mm, allowed_mm = judgement.wider_mm, result.accurate_to_mm
+    explained = within_mm is not None and allowed_mm is not None and within_mm <= allowed_mm
+    if judgement.contradicts_accuracy or (judgement.code and not explained):
+        raise CalibrationError(
+            judgement.code,
+            tr(
+                "The turn test contradicts the measurement: {drift:.3f} mm off, and "
+                "{limit:.3f} mm are explained.",
+                drift=proof.max_drift_mm,
+                limit=judgement.limits[judgement.worst].accurate_mm,
+            ),
+        )
+    return replace(proof, warnings=(*proof.warnings, *judgement.codes))

@@ -1,0 +1,224 @@
+"""cell accuracy: rows stated, on record and by default; rows measured and used from then on."""
+
+import json
+from pathlib import Path
+
+import pytest
+from robolink_cli import main
+from robolink_simulators.hosting.in_process import epson as in_process
+
+import robolink
+from robolink.journal import EntryKind, forget_memory, memory_journal, open_journal
+from robolink.model import NewEntry, Signature
+
+URL = "epson+sim://accuracy-cell"
+BIASED = "world.person_bias_mm=0.04&world.person_bias_frame=tool&world.person_bias_toward_deg=30"
+ADDRESS = "epson+sim://accuracy-cell"
+CELL = f"""
+[cells.line3]
+url = "{URL}"
+remote_timeout_s = 60.0
+remote_timeout_confirmed_by = "Ann, 2026-11-28"
+
+[cells.line3.accuracy]
+touch_mm = 0.03
+
+[cells.line3.stations.PIN-07]
+kind = "pin"
+touch_mm = 0.02
+
+[cells.line3.stations.PLATE-01]
+kind = "touch"
+x_mm = 170.0
+y_mm = 470.0
+z_mm = -100.0
+sigma_mm = 0.01
+input = 5
+
+[cells.line3.stations.CAM-01]
+kind = "camera"
+x_mm = 170.0
+y_mm = 477.0
+z_mm = -107.0
+mm_per_px = [[0.02, 0.0], [0.0, -0.02]]
+origin_mm = [163.6, 481.8]
+tip_image_px = 1.0
+
+[cells.line3.people]
+"4711" = "operator"
+"9" = "engineer"
+"""
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch, capsys):
+    """Run a command in this process; gives exit code, document or text, and messages."""
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "robolink.toml").write_text(CELL)
+
+    def run(*arguments):
+        code = main.run(list(arguments))
+        shown = capsys.readouterr()
+        document = json.loads(shown.out) if "--json" in arguments and shown.out else shown.out
+        return code, document, shown.err
+
+    yield run
+    in_process.unregister("accuracy-cell")
+    forget_memory(ADDRESS)
+
+
+def rows(document, station):
+    (place,) = [one for one in document["places"] if one["station"] == station]
+    return {row["row"]: row for row in place["rows"]}
+
+
+def recorded(*entries, station="", nozzle="", operator=""):
+    signature = Signature(station=station, nozzle=nozzle, operator=operator)
+    open_journal().log(ADDRESS, signature=signature).append(*entries)
+
+
+def learnt(station, kind, **details):
+    said = {"station": station, "kind": kind, **details}
+    return NewEntry(EntryKind.STATION, tool=1, details=said)
+
+
+def test_what_is_stated_what_is_narrower_and_what_nobody_knows(run):
+    code, document, _ = run("-c", "line3", "cell", "accuracy", "--json")
+    assert (code, document["schema"]) == (0, "robolink/cell-accuracy/1")
+    assert rows(document, None)["touch_mm"]["half_width"] == 0.03
+    pin = rows(document, "PIN-07")
+    assert (pin["touch_mm"]["half_width"], pin["touch_mm"]["basis"]) == (0.02, "stated")
+    assert "PIN-07" in pin["touch_mm"]["told"]
+    assert (pin["place_mm"]["half_width"], pin["place_mm"]["basis"]) == (0.02, "default")
+    assert "station learn PIN-07" in pin["place_mm"]["measure"]
+    assert pin["touch_mm"]["measure"] is None
+    plate = rows(document, "PLATE-01")["plate_mm"]
+    assert plate["basis"] == "stated"
+    assert plate["half_width"] == pytest.approx(0.01 * 3**0.5)
+    camera = rows(document, "CAM-01")
+    # Nothing but calibrating it tells where a camera looks.
+    assert "camera-affine --station CAM-01" in camera["place_mm"]["measure"]
+    assert camera["tip_image_px"]["alone_mm"] == pytest.approx(
+        1.0 * 0.02 * 2.4477 / 3**0.5, rel=1e-3
+    )
+    assert document["defaults"] == 5
+    code, text, _ = run("-c", "line3", "cell", "accuracy")
+    assert code == 0
+    assert "PIN-07" in text
+    assert "robolink cell station learn PIN-07" in text
+
+
+def test_a_plate_that_was_learnt_has_its_place_row_and_what_learning_left_unsure(run):
+    at = {"x_mm": 170.0, "y_mm": 470.0, "z_mm": -100.1, "sigma_mm": 0.01, "input": 5}
+    recorded(learnt("PLATE-01", "touch", **at))
+    _, document, _ = run("-c", "line3", "cell", "accuracy", "--json")
+    plate = rows(document, "PLATE-01")["plate_mm"]
+    assert plate["basis"] == "default"
+    assert plate["half_width"] == pytest.approx((0.02**2 + 3 * 0.01**2) ** 0.5)
+
+
+def test_a_station_that_was_learnt_five_times_has_its_place_row_from_the_record(run):
+    places = [(300.0, 100.0), (300.01, 100.0), (300.0, 100.01), (300.01, 100.01), (300.0, 100.0)]
+    for x_mm, y_mm in places:
+        recorded(learnt("PIN-07", "pin", x_mm=x_mm, y_mm=y_mm))
+    recorded(learnt("PIN-07", "pin", x_mm="near", y_mm=None))
+    _, document, _ = run("-c", "line3", "cell", "accuracy", "--json")
+    place = rows(document, "PIN-07")["place_mm"]
+    assert place["basis"] == "record"
+    assert place["half_width"] == pytest.approx(0.0206, abs=5e-4)
+    assert "learnt 5 times" in place["told"]
+
+
+def calibrated(run):
+    """Calibrate on the simulated cell; gives the entry."""
+    words = ("--tool", "1", "--assist", URL, "--sigma", "0.01", "--yes", "--no-verify")
+    told = run("-c", "line3", "--operator", "9", "calibrate", "two-pose", *words, "--json")
+    assert told[0] == 0, told
+    return next(memory_journal(ADDRESS).entries(kinds=(EntryKind.CALIBRATION,)))
+
+
+def four_times_more(one):
+    """Put four more calibrations on record that scatter about one."""
+    log = memory_journal(ADDRESS).log(one.controller, signature=Signature(operator="9"))
+    for dx, dy in ((0.01, 0), (-0.01, 0), (0, 0.01), (0, -0.01)):
+        tip = [one.details["tip"][0] + dx, one.details["tip"][1] + dy, *one.details["tip"][2:]]
+        log.append(NewEntry(EntryKind.CALIBRATION, tool=1, details={**one.details, "tip": tip}))
+
+
+def test_an_artefact_test_finds_a_person_who_is_always_beside_and_is_used_from_then_on(run):
+    Path("robolink.toml").write_text(CELL.replace("touch_mm = 0.03\n", ""))
+    assert run("-c", f"{URL}?{BIASED}", "status")[0] == 0
+    simulator = in_process.simulator_named("accuracy-cell")
+    simulator.machine.motors_on = True
+    four_times_more(calibrated(run))
+    tip = simulator.world.tips[1]
+    measure = ("cell", "accuracy", "measure", "touch_mm", "--tool", "1", "--yes", "--json")
+    true = ("--true", f"{tip.x_mm:.3f},{tip.y_mm:.3f}")
+    code, refused, _ = run("-c", "line3", "--operator", "4711", *measure, *true)
+    assert code != 0
+    assert "engineer" in refused["error"]["what"]
+    code, found, _ = run("-c", "line3", "--operator", "9", *measure, *true)
+    assert code == 0
+    assert len(found["records"]) == 5
+    # The tip is taken to be 0.04 mm short of 30 degrees of the tool, with one two-pose of 0.01 mm.
+    assert found["bias_mm"] == pytest.approx([-0.0346, -0.02], abs=0.03)
+    assert 0.04 < found["half_width"] < 0.1
+    used = {row["row"]: row for row in calibrated(run).details["accuracy"]["rows"]}["touch_mm"]
+    assert (used["basis"], used["half_width"]) == ("record", found["half_width"])
+    assert "artefact test" in used["told"]
+
+
+def test_nozzles_that_were_turned_tell_what_a_camera_sees_beside_them(run):
+    for n in range(12):
+        # 0.02 mm to one side of its nozzle, before and after half a turn of it.
+        tip = [5.0 + (0.02 if n < 6 else -0.02), -1.0, -20.0, 0.0, 0.0, 0.0]
+        said = {"method": "camera", "measured": ["x_mm", "y_mm"], "tip": tip}
+        signature = Signature(station="CAM-01", nozzle=f"N-{n % 6}")
+        with robolink.connect(URL, signature=signature) as controller:
+            controller.outcomes.append(NewEntry(EntryKind.CALIBRATION, tool=1, details=said))
+    words = ("tip_image_px", "--station", "CAM-01", "--tool", "1", "--yes", "--json")
+    code, found, err = run("-c", "line3", "--operator", "9", "cell", "accuracy", "measure", *words)
+    assert code == 0, (found, err)
+    assert (found["count"], len(found["records"])) == (6, 12)
+    # Half the difference is 0.02 mm or one pixel, along one of two axes, bounded with 12 degrees
+    # of freedom.
+    assert found["half_width"] == pytest.approx((0.5 * 3 * 12 / 5.226) ** 0.5, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["place_mm"], "robolink cell station learn"),
+        (["bend_deg"], "cell file"),
+        (["touch_mm", "--tool", "1"], "--true"),
+        (["touch_mm", "--true", "1;2", "--tool", "1"], "X,Y"),
+        (["touch_mm", "--study", "a.json", "--tool", "1"], "--tool"),
+        (["tip_image_px"], "--station"),
+    ],
+)
+def test_what_this_command_does_not_measure_is_told_with_the_way_that_does(run, words, said):
+    code, refused, _ = run("-c", "line3", "cell", "accuracy", "measure", *words, "--yes", "--json")
+    assert code == 2
+    assert said in refused["error"]["remedy"]
+
+
+def test_too_few_measurements_record_nothing(run):
+    assert run("-c", URL, "status")[0] == 0
+    words = ("touch_mm", "--tool", "1", "--true", "12,-4", "--yes", "--json")
+    code, refused, _ = run("-c", "line3", "--operator", "9", "cell", "accuracy", "measure", *words)
+    assert code == 7
+    assert refused["error"]["code"] == "too_few_records"
+    assert not list(memory_journal(ADDRESS).entries(kinds=(EntryKind.ACCURACY,)))
+
+
+def test_a_gauge_study_tells_how_persons_differ(run):
+    assert run("-c", URL, "status")[0] == 0
+    values = [[[n + 0.02 * p + 0.004 * r for r in (0, 1, -1)] for p in range(3)] for n in range(5)]
+    Path("study.json").write_text(json.dumps({"method": "gauge_rr", "input": {"values": values}}))
+    words = ("touch_mm", "--study", "study.json", "--yes", "--json")
+    code, found, err = run("-c", "line3", "--operator", "9", "cell", "accuracy", "measure", *words)
+    assert code == 0, (found, err)
+    # Persons 0.02 apart scatter by 0.02; three of them bound it by 4.4 times that, root 3 of it.
+    assert found["half_width"] == pytest.approx(3**0.5 * 0.02 * (2 / 0.10259) ** 0.5, rel=1e-3)
+    assert found["reproducibility_mm"] < found["reproducibility_upper95_mm"]

@@ -167,8 +167,24 @@ class DriverLink:
         markers, ledger = self.markers, self.markers.ledger
         with self.uninterrupted(), ledger.block():
             marker = markers.begin(MarkerKind.SET, command.request, command.details)
+            unclear: UnclearAnswerError | None = None
             try:
-                found, unclear = self._proved(command, marker)
+                with markers.doubt(command.request):
+                    try:
+                        with markers.unless_stopped(marker):
+                            command.send()
+                        command.acknowledged = True
+                        ledger.answered(marker)
+                    except (RejectedError, ControllerFaultError) as error:
+                        ledger.answered(marker)
+                        if isinstance(error, RejectedError) and self.was_not_executed(error):
+                            markers.clear(marker, *command.refusal(marker, error))
+                        raise
+                    except UnclearAnswerError as error:
+                        ledger.answered(marker)
+                        unclear = error
+                    found = command.read()
+                ledger.proved(marker, found)
                 markers.clear(marker, *command.entries(marker, found))
             finally:
                 markers.leave_open(marker)
@@ -177,34 +193,6 @@ class DriverLink:
             unclear.remedy = command.told_by(found) or unclear.remedy
             raise unclear
         return found
-
-    def _proved(
-        self, command: MarkedCommand[T], marker: Marker
-    ) -> tuple[T, UnclearAnswerError | None]:
-        """Send something that is marked; return what is read then, and an answer that told nothing.
-
-        Raises:
-            OutcomeUnknownError: No answer came.
-        """
-        markers, ledger = self.markers, self.markers.ledger
-        unclear: UnclearAnswerError | None = None
-        with markers.doubt(command.request):
-            try:
-                with markers.unless_stopped(marker):
-                    command.send()
-                command.acknowledged = True
-                ledger.answered(marker)
-            except (RejectedError, ControllerFaultError) as error:
-                ledger.answered(marker)
-                if isinstance(error, RejectedError) and self.was_not_executed(error):
-                    markers.clear(marker, *command.refusal(marker, error))
-                raise
-            except UnclearAnswerError as error:
-                ledger.answered(marker)
-                unclear = error
-            found = command.read()
-        ledger.proved(marker, found)
-        return found, unclear
 
 
 def advise_emergency_stop(error: RobolinkError) -> RobolinkError:

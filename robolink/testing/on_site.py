@@ -104,11 +104,13 @@ def kept_on_site(
 
     Example:
         >>> from robolink import ANY, ToolOffset, connect
+        >>> from robolink.journal import memory_journal
         >>> from robolink.testing import kept_on_site
         >>> def reach(*, leaves=False):
         ...     return connect("epson+sim://site-example")
+        >>> own = memory_journal("a trial").log("a trial")  # what is kept blocks every other write
         >>> with kept_on_site(reach, "a trial of tool 2", tool=2, agree=lambda controller: None):
-        ...     with reach() as controller:
+        ...     with connect("epson+sim://site-example", outcomes=own) as controller:
         ...         receipt = controller.tools.write(2, ToolOffset(5, 6, -70), expected=ANY)
         >>> with reach() as controller:
         ...     print(controller.tools.read(2))
@@ -278,11 +280,13 @@ def _restore_tool(controller: Controller, kept: _Kept, tool: int) -> None:
     now = tools.read(tool)
     written = not tools.same(now, kept.before)
     before = kept.before
-    if written and before is None:
-        selected = kept.selected or 0
-        _once_free(controller, lambda: tools.clear(tool, expected=now, then_select=selected))
-    elif written and before is not None:
-        _once_free(controller, lambda: tools.write(tool, before, expected=now))
+    # A roll-back of this change goes on beside what else is to be put back.
+    with controller.latch.putting_back(tool):
+        if written and before is None:
+            selected = kept.selected or 0
+            _once_free(controller, lambda: tools.clear(tool, expected=now, then_select=selected))
+        elif written and before is not None:
+            _once_free(controller, lambda: tools.write(tool, before, expected=now))
     controller.finish(
         mine,
         NewEntry(

@@ -32,12 +32,24 @@ CROSSINGS = [
 ] * 2
 
 
-def two_pose(sigma_mm: float | None = 0.02) -> CalibrationResult:
+def judged(result, facts):
+    return assessed(result, facts)
+
+
+def one_touched(*given, **stated):
+    return solve_one_touch(*given, **stated)
+
+
+def crossed(*given, **stated):
+    return solve_crossed_beams(*given, **stated)
+
+
+def two_pose(sigma_mm=0.02):
     return solve_two_pose(*TOUCHES, sigma_mm=sigma_mm)
 
 
 def test_a_touch_by_eye_is_accurate_to_what_a_person_sees():
-    found = assessed(two_pose(sigma_mm=0.0001), AccuracyFacts())
+    found = judged(two_pose(sigma_mm=0.0001), AccuracyFacts())
 
     assert found.repeatable_to_mm < 0.001
     assert found.accurate_to_mm == pytest.approx(0.071, abs=0.0005)  # evidence 19
@@ -46,7 +58,7 @@ def test_a_touch_by_eye_is_accurate_to_what_a_person_sees():
 
 
 def test_the_scatter_is_one_row_beside_the_others():
-    found = assessed(two_pose(), AccuracyFacts())
+    found = judged(two_pose(), AccuracyFacts())
 
     assert found.repeatable_to_mm == pytest.approx(0.0346, abs=0.0005)
     assert found.accurate_to_mm == pytest.approx(0.079, abs=0.0005)
@@ -57,20 +69,20 @@ def test_the_scatter_is_one_row_beside_the_others():
 def test_what_the_cell_states_takes_the_place_of_the_default():
     rows = {"touch_mm": RowFact(0.025, "stated", told="recipe")}
 
-    found = assessed(two_pose(), AccuracyFacts(rows=rows))
+    found = judged(two_pose(), AccuracyFacts(rows=rows))
 
     assert found.accurate_to_mm < 0.05
     assert found.accuracy.largest_default is None
 
 
 def test_an_input_that_showed_each_touch_needs_no_eye():
-    found = assessed(two_pose(), AccuracyFacts(by_contact=True))
+    found = judged(two_pose(), AccuracyFacts(by_contact=True))
 
     assert found.accurate_to_mm == pytest.approx(found.repeatable_to_mm)
 
 
 def test_without_a_scatter_of_its_own_a_usual_one_counts_as_a_default():
-    found = assessed(two_pose(sigma_mm=None), AccuracyFacts())
+    found = judged(two_pose(sigma_mm=None), AccuracyFacts())
 
     assert found.repeatable_to_mm is None
     assert found.accurate_to_mm == pytest.approx(
@@ -94,7 +106,7 @@ def test_a_method_that_says_nothing_of_its_errors_and_scatter_is_accurate_to_not
 def test_the_place_of_beams_is_known_worse_the_longer_ago_it_was_learnt(months, within_mm):
     solved = solve_crossed_beams(CROSSINGS, BEAMS, sigma_mm=0.0005)
 
-    found = assessed(solved, AccuracyFacts(months=months))
+    found = judged(solved, AccuracyFacts(months=months))
 
     assert found.accurate_to_mm == pytest.approx(within_mm, abs=0.001)
 
@@ -102,7 +114,7 @@ def test_the_place_of_beams_is_known_worse_the_longer_ago_it_was_learnt(months, 
 def test_a_stated_place_does_not_grow():
     rows = {"place_mm": RowFact(0.01, "stated")}
 
-    found = assessed(
+    found = judged(
         solve_crossed_beams(CROSSINGS, BEAMS, sigma_mm=0.0005), AccuracyFacts(rows, months=30)
     )
 
@@ -122,13 +134,13 @@ def test_beams_whose_places_are_solved_for_rely_on_none():
         ),
     ]
 
-    found = solve_crossed_beams(turned, BEAMS, sigma_mm=0.002, beams_may_have_moved=True)
+    found = crossed(turned, BEAMS, sigma_mm=0.002, beams_may_have_moved=True)
 
     assert [source.row for source in found.sources] == []
 
 
 def test_one_touch_relies_on_the_place_of_the_pin_and_on_the_eye():
-    found = solve_one_touch(Pose(300, 100, -60, 0), Pin(312, 96.5, -80), sigma_mm=0.02)
+    found = one_touched(Pose(300, 100, -60, 0), Pin(312, 96.5, -80), sigma_mm=0.02)
 
     assert {source.row: source.turning for source in found.sources} == {
         "touch_mm": "with_tool",
@@ -139,7 +151,7 @@ def test_one_touch_relies_on_the_place_of_the_pin_and_on_the_eye():
 def test_a_row_in_one_direction_widens_that_direction():
     found = two_pose(sigma_mm=0.001)
     askew = ErrorSource("camera_turn_deg", ((0.2,), (0.0,)), "as_offset")
-    turned = assessed(
+    turned = judged(
         CalibrationResult(
             **{
                 **{name: getattr(found, name) for name in CalibrationResult.__dataclass_fields__},
@@ -156,7 +168,7 @@ def test_a_row_in_one_direction_widens_that_direction():
 
 def test_json_goes_back_and_forth():
     poses = [Pose(298, 99, -60, 0), Pose(322, 91, -60, 180), Pose(306.001, 83, -60, 90)]
-    accuracy = assessed(solve_n_angle(poses), AccuracyFacts()).accuracy
+    accuracy = judged(solve_n_angle(poses), AccuracyFacts()).accuracy
 
     again = Accuracy.from_json(accuracy.as_json(("x_mm", "y_mm")))
 

@@ -6,6 +6,7 @@ import pytest
 
 import robolink
 import robolink.transaction
+from robolink.controllers.epson import EpsonController
 from robolink.errors import JournalError, OutcomeUnknownError
 from robolink.journal import open_journal
 from robolink.journal._opening import _closed, _opened, close_files
@@ -151,7 +152,7 @@ def test_a_bent_page_of_the_markers_is_noticed(run, changed, simulator):
 @pytest.fixture
 def doubted(simulator, state_folder):
     """A controller that a program wrote to; no answer came, and the first backup was never made."""
-    dropped = []
+    dropped: list[str] = []
 
     def lose_the_answer(_number, request):
         if "TLSet 1," in request and not dropped:
@@ -170,6 +171,7 @@ def test_a_program_does_not_write_again_while_an_outcome_is_unknown(doubted, sim
     """Each way of changing something is refused by what all of them pass."""
     simulator.machine.tools.set(2, ToolOffset(4, 5, -60))  # at the pendant
     with robolink.connect(simulator.url) as controller:
+        assert isinstance(controller, EpsonController)
         for change in (
             lambda: controller.tools.write(1, ToolOffset(1, 2, 3), expected=ANY),
             lambda: controller.tools.write(2, ToolOffset(1, 2, 3), expected=ANY),

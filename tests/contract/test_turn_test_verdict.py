@@ -29,10 +29,11 @@ def newest(controller: MemoryController):
 
 
 class Person:
-    def __init__(self, answer: bool):
-        self.answer, self.asked = answer, []
+    def __init__(self, answer):
+        self.answer = answer
+        self.asked: list[str] = []
 
-    def __call__(self, question: str) -> bool:
+    def __call__(self, question):
         self.asked.append(question)
         return self.answer
 

@@ -12,7 +12,7 @@ from tests.packaging._way_to_the_wire import follow_a_tool_write, follow_typed_p
 MOST_FILES = {"set_tool": 80, "change_tools": 41}
 MOST_CALLS = 14
 MOST_FILES_OPEN = 9
-MOST_FILES_TO_SOLVE = 7
+MOST_FILES_TO_SOLVE = 8
 MOST_FILES_OPEN_FROM_THE_POSES = 5
 MOST_FILES_OPEN_FROM_THE_COMMAND = 9
 

@@ -8,9 +8,10 @@ are. The finder errs by Gaussian noise, now and then by much more, and now and t
 import math
 import random
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
+from robolink_simulators.cell.finder_faults import Finder, Pixel
 from robolink_simulators.cell.places import XyzMm
 
 _LENS_MM: Final = 120.0
@@ -18,8 +19,6 @@ _LENS_MM: Final = 120.0
 
 _DEPTH_MM: Final = 2.0
 """Depth of field to each side (assumed); what is farther off is not found."""
-
-Pixel = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,25 +101,40 @@ class CameraTruth:
         middle_mm: Point of the base that the middle of the image looks at, in focus.
         optics: What it does to a place.
         rng: Source of its errors.
+        finder: What looks for marks in its pictures.
     """
 
     middle_mm: XyzMm
     optics: CameraOptics
     rng: random.Random
+    finder: Finder = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Let the finder err by the same source."""
+        self.finder = Finder(self.rng)
 
     def picture(self, places: Iterable[XyzMm]) -> tuple[Pixel, ...]:
         """Return where the finder finds each of some places that are in the image."""
         return tuple(pixel for pixel in self.finds(places) if pixel is not None)
 
-    def finds(self, places: Iterable[XyzMm]) -> tuple[Pixel | None, ...]:
-        """Return for each of some places where the finder finds it, ``None`` if it does not."""
+    def finds(
+        self, places: Iterable[XyzMm], *, exposes: bool = True
+    ) -> tuple[Pixel | None, ...]:
+        """Return for each of some places where the finder finds it, ``None`` if it does not.
+
+        Args:
+            places: Where the marks are.
+            exposes: Whether that is a new picture; not for a second search in the same.
+        """
         optics, rng = self.optics, self.rng
         missed = rng.random() < optics.miss_share
         found = list[Pixel | None]()
         for place in places:
             pixel = optics.pixel(*(a - b for a, b in zip(place, self.middle_mm, strict=True)))
             found.append(None if pixel is None or missed else self._found(pixel))
-        return tuple(found)
+        return self.finder.answers(
+            found, size_px=optics.size_px, noise_px=optics.noise_px, exposes=exposes
+        )
 
     def _found(self, pixel: Pixel) -> Pixel:
         optics, rng = self.optics, self.rng

@@ -26,6 +26,13 @@ if TYPE_CHECKING:
     from robolink.calibration.camera.camera_round import CameraRound as CameraRound
     from robolink.calibration.camera.camera_round import as_round as as_round
     from robolink.calibration.camera.camera_round import solve_camera_round as solve_camera_round
+    from robolink.calibration.camera.known_movement import CameraChangeRows as CameraChangeRows
+    from robolink.calibration.camera.known_movement import Movement as Movement
+    from robolink.calibration.camera.known_movement import SeenMovement as SeenMovement
+    from robolink.calibration.camera.known_movement import camera_changed as camera_changed
+    from robolink.calibration.camera.known_movement import same_radius as same_radius
+    from robolink.calibration.camera.known_movement import spot_changed as spot_changed
+    from robolink.calibration.camera.known_movement import tip_did_not_move as tip_did_not_move
     from robolink.calibration.camera.runout import RunoutReport as RunoutReport
     from robolink.calibration.camera.runout import runout_report as runout_report
     from robolink.calibration.camera.runout_table import RunoutRow as RunoutRow
@@ -220,6 +227,8 @@ __getattr__ = lazy_exports(
         "camera.camera_affine": "CameraCalibration PixelSighting solve_camera_affine",
         "camera.camera_model": "CameraLimits CameraModel require_same_camera",
         "camera.camera_round": "CameraRound as_round solve_camera_round",
+        "camera.known_movement": "CameraChangeRows Movement SeenMovement camera_changed "
+        "same_radius spot_changed tip_did_not_move",
         "camera.runout": "RunoutReport runout_report",
         "camera.runout_table": "RunoutRow RunoutTable RunoutTableResult solve_runout_table",
         "camera.up_camera": "Sighting solve_up_camera",

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from robolink.procedures.approach import offset_z as offset_z
     from robolink.procedures.approach import seek_or_retract as seek_or_retract
     from robolink.procedures.camera_plan import HALF_ROUND_DEG as HALF_ROUND_DEG
+    from robolink.procedures.camera_plan import LEAST_BESIDE_MM as LEAST_BESIDE_MM
     from robolink.procedures.camera_plan import TWO_ANGLES_DEG as TWO_ANGLES_DEG
     from robolink.procedures.camera_plan import LookPlan as LookPlan
     from robolink.procedures.camera_samples import CameraDrive as CameraDrive
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from robolink.procedures.camera_verify import nearest_first as nearest_first
     from robolink.procedures.camera_verify import seen_drift as seen_drift
     from robolink.procedures.camera_verify import verify_by_looking as verify_by_looking
+    from robolink.procedures.camera_watch import SpotWatch as SpotWatch
     from robolink.procedures.input_source import InputSource as InputSource
     from robolink.procedures.lazy_source import LazySource as LazySource
     from robolink.procedures.pin.judging import TOUCH_CODES as TOUCH_CODES
@@ -82,13 +84,14 @@ __getattr__ = lazy_exports(
     __name__,
     {
         "approach": "NO_OFFSET approach_path offset_z seek_or_retract",
-        "camera_plan": "HALF_ROUND_DEG LookPlan TWO_ANGLES_DEG",
+        "camera_plan": "HALF_ROUND_DEG LEAST_BESIDE_MM LookPlan TWO_ANGLES_DEG",
         "camera_samples": "CameraDrive CameraSamples Place",
         "camera_source": (
             "CalibratedCameraSource angles_between calibrated_camera camera_error_of pixel_camera "
             "proof_angles"
         ),
         "camera_verify": "NO_ERROR nearest_first seen_drift verify_by_looking",
+        "camera_watch": "SpotWatch",
         "input_source": "InputSource",
         "lazy_source": "LazySource",
         "pin.judging": "TOUCH_CODES heights_agree jog_mm require_one_height require_touches",

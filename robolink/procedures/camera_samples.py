@@ -2,14 +2,15 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final, Generic
 
-from robolink.calibration import carrying
-from robolink.errors import CalibrationError
+from robolink.calibration import carrying, tip_did_not_move
+from robolink.errors import CalibrationError, ConfigError
 from robolink.messages import tr
 from robolink.model import TIP, Path, Pose, SpotUnit, ToolOffset
-from robolink.procedures.camera_plan import LookPlan
+from robolink.procedures.camera_plan import LEAST_BESIDE_MM, LookPlan
+from robolink.procedures.camera_watch import SpotWatch
 from robolink.procedures.sampling.sampler import ResultT
 from robolink.procedures.sampling.sequential import finalize_samples
 from robolink.runner import Look, Move, Notify, Procedure, SeenAt, first_clear
@@ -17,6 +18,14 @@ from robolink.stations import CameraStation
 
 _SHARES: Final = (1.0, -1.0, 0.5, -0.5)
 """By which the planned turns are scaled where the arm cannot take them up."""
+
+_NEARER: Final = (1.0, 0.5, 0.25)
+"""At which shares of the way beside a place a spot is sought that was not seen all of it away."""
+
+_UNSEEN: Final = frozenset(
+    {"tip_not_seen", "fiducial_not_seen", "several_tips_seen", "several_fiducials_seen"}
+)
+"""What a picture beside a place may be refused for although one nearer to it may do."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,16 +47,40 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class CameraDrive:
-    """The way of one frame from place to place.
+    """The way of one frame from place to place, and whether the spot goes with it.
+
+    Each place is looked at twice: from beside it, where its approach begins anyway, and at it. A
+    spot that is the tip moves by what the robot moved meanwhile; one that does not is met once
+    more, from the same side both times and with all pictures, and refused if it still does not.
 
     Attributes:
         station, plan: Where and how.
         frame: A pose of the frame: its V and W, hand, local and tool.
+        calibrated: Whether it is known what the pixels mean; not where that is measured.
+        watch: What the looks said so far of the camera itself.
+
+    Raises:
+        ConfigError: The plan begins approaches too near to the places for that.
     """
 
     station: CameraStation
     plan: LookPlan
     frame: Pose
+    calibrated: bool = True
+    watch: SpotWatch = field(init=False, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Begin a run of looks."""
+        if self.plan.beside_mm < LEAST_BESIDE_MM:
+            raise ConfigError(
+                tr(
+                    "An approach that begins {beside:g} mm beside its place does not show whether "
+                    "the spot moves with the tip.",
+                    beside=self.plan.beside_mm,
+                ),
+                remedy=tr("Let it begin {least:g} mm beside or more.", least=LEAST_BESIDE_MM),
+            )
+        object.__setattr__(self, "watch", SpotWatch(self.station, self.calibrated))
 
     def looks(
         self, places: Sequence[Place], here: Pose, *, before_camera: bool = False
@@ -60,8 +93,8 @@ class CameraDrive:
             before_camera: Whether it stands where an earlier call ended.
 
         Raises:
-            CalibrationError: ``tip_not_seen``, ``several_tips_seen`` and their like, with the
-                frame lifted.
+            CalibrationError: ``tip_not_seen``, ``several_tips_seen`` and their like;
+                ``tip_did_not_move``, ``camera_changed``, ``spot_changed``; with the frame lifted.
 
         Example:
             >>> from robolink.model import Pose, ToolOffset
@@ -84,10 +117,114 @@ class CameraDrive:
                 )
             else:
                 yield from self._turn_to(place, here)
+            beside = yield from self._look_beside(place)
             here, before_camera = self.pose(place), True
-            yield Move(here, Path.STRAIGHT, tr("Approaching the camera from the same side."))
-            seen.append((yield from self._look(place)))
+            yield from self._approach(here)
+            look = yield from self._look(place)
+            seen.append((yield from self._witnessed(place, beside, look)))
         return seen
+
+    def _witnessed(
+        self, place: Place, beside: SeenAt | None, look: SeenAt
+    ) -> Procedure[SeenAt]:
+        """Return a look whose spot is known to have moved with the robot.
+
+        Raises:
+            CalibrationError: ``tip_did_not_move``, ``camera_changed``, ``spot_changed``.
+        """
+        watch, mark = self.watch, place.mark
+        if beside is None or not watch.follows(mark, beside, look):
+            pair = yield from self._beside_again(place)
+            if not watch.follows(mark, *pair):
+                yield from self.lifted(place)
+                raise watch.refusal(mark, (beside, look), pair)
+            if beside is not None:
+                watch.learn_play(beside, look)
+            beside, look = pair
+        earlier = watch.known_before(mark, place.u_deg, look)
+        if beside is not None and earlier is not None and not watch.follows(mark, earlier, look):
+            pair = yield from self._again(place, earlier)
+            if not watch.follows(mark, *pair):
+                yield from self.lifted(place)
+                raise watch.refusal(mark, (earlier, look), pair)
+            look = pair[1]
+        if beside is not None:
+            watch.keep(mark, place.u_deg, beside, look)
+        return look
+
+    def _beside_again(self, place: Place) -> Procedure[tuple[SeenAt, SeenAt]]:
+        """Look beside a place and at it with all pictures, both met from the same side."""
+        yield Notify(
+            tr("The spot did not move as the robot did. It is looked at once more, more closely.")
+        )
+        at, by_mm = self.pose(place), self.plan.beside_mm
+        refusal: CalibrationError | None = None
+        for share in _NEARER:
+            start = _shifted(at, -share * by_mm)
+            yield from self._met(start)
+            try:
+                before: SeenAt = yield from self._seen(place, start, self.plan.pictures)
+            except CalibrationError as error:
+                if error.code not in _UNSEEN:
+                    yield from self.lifted(place)
+                    raise
+                refusal = error
+                continue
+            yield from self._approach(at)
+            return before, (yield from self._look(place))
+        yield from self.lifted(place)
+        several = refusal is not None and refusal.code.startswith("several")
+        raise refusal if several and refusal else tip_did_not_move(None, in_mm=False)
+
+    def _again(self, place: Place, earlier: SeenAt) -> Procedure[tuple[SeenAt, SeenAt]]:
+        """Look where a mark was looked at before, and at its place, both met from one side."""
+        start, at = self._at_place(place, earlier), self.pose(place)
+        yield Notify(
+            tr("The spot did not move as the robot did. It is looked at once more, more closely.")
+        )
+        yield from self._met(start)
+        try:
+            before: SeenAt = yield from self._seen(place, start, self.plan.pictures)
+        except CalibrationError:
+            yield from self.lifted(place)
+            raise
+        yield from self._met(at)
+        return before, (yield from self._look(place))
+
+    def _at_place(self, place: Place, earlier: SeenAt) -> Pose:
+        return replace(self.pose(place), x_mm=earlier.x_mm, y_mm=earlier.y_mm)
+
+    def _met(self, at: Pose) -> Procedure[None]:
+        """Go to a place beside the camera's middle from the side from which all are met."""
+        yield Move(
+            _shifted(at, -self.plan.beside_mm),
+            Path.STRAIGHT,
+            tr("Moving to the next place over the camera."),
+        )
+        yield from self._approach(at)
+
+    def _approach(self, at: Pose) -> Procedure[None]:
+        yield Move(at, Path.STRAIGHT, tr("Approaching the camera from the same side."))
+
+    def _look_beside(self, place: Place) -> Procedure[SeenAt | None]:
+        """Take one picture where the approach begins; ``None`` where it does not tell."""
+        beside = self._beside(place)
+        try:
+            return (yield from self._seen(place, beside, 1))
+        except CalibrationError as error:
+            if error.code in _UNSEEN:
+                return None
+            yield Move(self._above(beside), Path.STRAIGHT, tr("Lifting off the camera."))
+            raise
+
+    def _seen(self, place: Place, at: Pose, pictures: int) -> Procedure[SeenAt]:
+        """Take pictures with the frame at a pose beside a place."""
+        middle, there = self._middle(place), self.pose(place)
+        expected_mm = (middle[0] + at.x_mm - there.x_mm, middle[1] + at.y_mm - there.y_mm)
+        look: SeenAt = yield Look(
+            tr("Looking whether the spot moves with the tip."), expected_mm, place.mark, pictures
+        )
+        return self.watch.heard(look)
 
     def centred(
         self, places: Sequence[Place], here: Pose, found: Callable[[Sequence[SeenAt]], ToolOffset]
@@ -164,7 +301,8 @@ class CameraDrive:
         return (
             yield from first_clear(
                 [tuple(u_deg + (angle - u_deg) * share for angle in planned) for share in _SHARES],
-                lambda angles: self.looks(places(angles), here),
+                # Followed on paper by a drive of its own: nothing is seen there.
+                lambda angles: replace(self).looks(places(angles), here),
                 here,
             )
         )
@@ -192,8 +330,7 @@ class CameraDrive:
         yield Move(self._beside(place), Path.STRAIGHT, tr("Lowering into the camera's focus."))
 
     def _beside(self, place: Place) -> Pose:
-        pose, by_mm = self.pose(place), self.plan.beside_mm
-        return replace(pose, x_mm=pose.x_mm - by_mm, y_mm=pose.y_mm - by_mm)
+        return _shifted(self.pose(place), -self.plan.beside_mm)
 
     def _look(self, place: Place) -> Procedure[SeenAt]:
         purpose = (
@@ -207,7 +344,7 @@ class CameraDrive:
             yield from self.lifted(place)
             raise
         yield Notify(self._told(seen, self._middle(place)))
-        return seen
+        return self.watch.heard(seen)
 
     def _told(self, seen: SeenAt, middle_mm: tuple[float, float]) -> str:
         if seen.unit is SpotUnit.PIXEL and self.station.model is None:
@@ -224,6 +361,11 @@ class CameraDrive:
 
     def _above(self, pose: Pose) -> Pose:
         return replace(pose, z_mm=pose.z_mm + self.plan.lift_mm)
+
+
+def _shifted(pose: Pose, by_mm: float) -> Pose:
+    """Return a pose as far aside in X as in Y."""
+    return replace(pose, x_mm=pose.x_mm + by_mm, y_mm=pose.y_mm + by_mm)
 
 
 class CameraSamples(Generic[ResultT]):

@@ -63,16 +63,18 @@ def measure_camera_affine(
     _require_pattern(plan)
     solvable_planes([here], height_of(stored))
     tip = stored or NO_OFFSET
-    drive = CameraDrive(station, plan.look, here)
+    drive = CameraDrive(station, plan.look, here, calibrated=False)
     places = [
         Place(toward_zero(here.u_deg, turn), tip, aside_mm=(dx, dy)) for dx, dy, turn in plan.places
     ]
 
     def solve(looks: Sequence[SeenAt]) -> CameraCalibration:
         sightings = [PixelSighting(look, look.spot.x, look.spot.y) for look in looks]
-        return solve_camera_affine(
+        found = solve_camera_affine(
             sightings, stored=stored, sigma_mm=sigma_mm, before=station.model
         )
+        drive.watch.require_followed(found.camera.mm_per_px)
+        return found
 
     return (yield from CameraSamples(drive, solve, here).at(places, retake=plan.retake))
 

@@ -205,7 +205,7 @@ def test_the_assist_port_furnishes_and_spoils_a_cell(make):
     assert isinstance(told, dict)
     assert (told["backlash_deg"], told["board_held"], told["camera_mirrored"]) == (0.5, True, False)
     assert simulator.world.truth()["board"] is not None
-    assert perform(simulator, {"do": "see"}) == {"seen": []}
+    assert perform(simulator, {"do": "see"}) == {"seen": [], "radii_px": []}
     x_mm, y_mm, z_mm = simulator.world.tip_mm()
     place = {"x_mm": x_mm, "y_mm": y_mm, "z_mm": z_mm + 1.0}
     perform(simulator, {"do": "mount_beam", "number": 6, **place, "heading_deg": 20, "tilt_deg": 2})

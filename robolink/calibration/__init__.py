@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from robolink.calibration.camera.camera_affine import CameraCalibration as CameraCalibration
     from robolink.calibration.camera.camera_affine import PixelSighting as PixelSighting
     from robolink.calibration.camera.camera_affine import solve_camera_affine as solve_camera_affine
+    from robolink.calibration.camera.camera_model import USUAL_CAMERA as USUAL_CAMERA
     from robolink.calibration.camera.camera_model import CameraLimits as CameraLimits
     from robolink.calibration.camera.camera_model import CameraModel as CameraModel
     from robolink.calibration.camera.camera_model import require_same_camera as require_same_camera
@@ -225,7 +226,7 @@ __getattr__ = lazy_exports(
         "camera.board_fit": "solve_board_fit",
         "camera.board_round": "solve_board_round",
         "camera.camera_affine": "CameraCalibration PixelSighting solve_camera_affine",
-        "camera.camera_model": "CameraLimits CameraModel require_same_camera",
+        "camera.camera_model": "CameraLimits CameraModel USUAL_CAMERA require_same_camera",
         "camera.camera_round": "CameraRound as_round solve_camera_round",
         "camera.known_movement": "CameraChangeRows Movement SeenMovement camera_changed "
         "same_radius spot_changed tip_did_not_move",

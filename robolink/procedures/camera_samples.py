@@ -124,9 +124,7 @@ class CameraDrive:
             seen.append((yield from self._witnessed(place, beside, look)))
         return seen
 
-    def _witnessed(
-        self, place: Place, beside: SeenAt | None, look: SeenAt
-    ) -> Procedure[SeenAt]:
+    def _witnessed(self, place: Place, beside: SeenAt | None, look: SeenAt) -> Procedure[SeenAt]:
         """Return a look whose spot is known to have moved with the robot.
 
         Raises:

@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 from statistics import median
 from typing import Final
 
+from robolink.calibration import USUAL_CAMERA
 from robolink.calibration.camera.known_movement import (
     CAMERA_SIGMA_MM,
     FOLLOWS_UNCALIBRATED,
     FOLLOWS_WITHIN,
-    LARGEST_MM_PER_PX,
     LEAST_SHARE,
     PIXEL_SIGMA,
     ROBOT_SIGMA_MM,
@@ -41,11 +41,13 @@ class SpotWatch:
     Attributes:
         station: Where the camera is, and what its pixels mean.
         calibrated: Whether that is to be believed; not where it is about to be found.
+        longest_mm_per_px: The longest that a pixel may be where it is not known.
         pairs: The movements that were taken for good.
     """
 
     station: CameraStation
     calibrated: bool
+    longest_mm_per_px: float = USUAL_CAMERA.most_mm_per_px
     pairs: list[SeenMovement] = field(default_factory=list)
     _scatters: list[float] = field(default_factory=list)
     _radii_px: dict[int, list[float]] = field(default_factory=dict)
@@ -177,7 +179,7 @@ class SpotWatch:
 
     def _follows_in_pixels(self, movement: SeenMovement) -> bool:
         # The least that a movement can show in pixels, before any camera is known.
-        least_px = LEAST_SHARE * movement.known_length_mm / LARGEST_MM_PER_PX
+        least_px = LEAST_SHARE * movement.known_length_mm / self.longest_mm_per_px
         if movement.seen_length < max(least_px, 5 * movement.noise):
             return False
         if not self.pairs:

@@ -24,9 +24,6 @@ FOLLOWS_UNCALIBRATED: Final = 0.2
 LEAST_SHARE: Final = 1 / 3
 """A spot that moves less than this share of what is expected stands still."""
 
-LARGEST_MM_PER_PX: Final = 0.2
-"""A pixel is no longer than this in any camera that measures tips: what is expected at least."""
-
 PIXEL_SIGMA: Final = 0.1
 """Standard deviation of a found place, pixels, where the pictures do not tell a larger one."""
 
@@ -72,9 +69,7 @@ class CameraChangeRows:
     @property
     def u_scale(self) -> float:
         """Standard uncertainty of its scale, relative."""
-        return math.hypot(
-            self.scale / math.sqrt(3), self.height / math.sqrt(3), self.scale_sigma
-        )
+        return math.hypot(self.scale / math.sqrt(3), self.height / math.sqrt(3), self.scale_sigma)
 
     @property
     def u_turn_deg(self) -> float:

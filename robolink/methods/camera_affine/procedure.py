@@ -45,8 +45,8 @@ def measure_camera_affine(
     Raises:
         CalibrationError: ``rank_deficient`` and ``insufficient_rotation`` before anything moves
             when the pattern cannot tell, and ``tilted_pose``; ``tip_not_seen``,
-            ``several_tips_seen``, ``camera_changed``, and the others of
-            :func:`solve_camera_affine`.
+            ``several_tips_seen``, ``tip_did_not_move``, ``spot_changed``, ``camera_changed``, and
+            the others of :func:`solve_camera_affine`.
 
     Example:
         >>> from robolink.methods import CameraAffineParameters, measure_camera_affine
@@ -64,6 +64,7 @@ def measure_camera_affine(
     solvable_planes([here], height_of(stored))
     tip = stored or NO_OFFSET
     drive = CameraDrive(station, plan.look, here, calibrated=False)
+    drive.watch.longest_mm_per_px = plan.pixel_limit_mm
     places = [
         Place(toward_zero(here.u_deg, turn), tip, aside_mm=(dx, dy)) for dx, dy, turn in plan.places
     ]
@@ -71,7 +72,11 @@ def measure_camera_affine(
     def solve(looks: Sequence[SeenAt]) -> CameraCalibration:
         sightings = [PixelSighting(look, look.spot.x, look.spot.y) for look in looks]
         found = solve_camera_affine(
-            sightings, stored=stored, sigma_mm=sigma_mm, before=station.model
+            sightings,
+            stored=stored,
+            sigma_mm=sigma_mm,
+            before=station.model,
+            limits=plan.limits,
         )
         drive.watch.require_followed(found.camera.mm_per_px)
         return found

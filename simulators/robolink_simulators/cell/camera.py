@@ -117,9 +117,7 @@ class CameraTruth:
         """Return where the finder finds each of some places that are in the image."""
         return tuple(pixel for pixel in self.finds(places) if pixel is not None)
 
-    def finds(
-        self, places: Iterable[XyzMm], *, exposes: bool = True
-    ) -> tuple[Pixel | None, ...]:
+    def finds(self, places: Iterable[XyzMm], *, exposes: bool = True) -> tuple[Pixel | None, ...]:
         """Return for each of some places where the finder finds it, ``None`` if it does not.
 
         Args:

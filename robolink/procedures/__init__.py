@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from robolink.procedures.camera_source import camera_error_of as camera_error_of
     from robolink.procedures.camera_source import pixel_camera as pixel_camera
     from robolink.procedures.camera_source import proof_angles as proof_angles
+    from robolink.procedures.camera_source import radius_of as radius_of
     from robolink.procedures.camera_verify import NO_ERROR as NO_ERROR
     from robolink.procedures.camera_verify import nearest_first as nearest_first
     from robolink.procedures.camera_verify import seen_drift as seen_drift
@@ -88,7 +89,7 @@ __getattr__ = lazy_exports(
         "camera_samples": "CameraDrive CameraSamples Place",
         "camera_source": (
             "CalibratedCameraSource angles_between calibrated_camera camera_error_of pixel_camera "
-            "proof_angles"
+            "proof_angles radius_of"
         ),
         "camera_verify": "NO_ERROR nearest_first seen_drift verify_by_looking",
         "camera_watch": "SpotWatch",

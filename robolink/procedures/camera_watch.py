@@ -54,6 +54,11 @@ class SpotWatch:
     _looks: dict[tuple[int, float], SeenAt] = field(default_factory=dict)
     _play_mm: float = 0.0
 
+    def expect_radius(self, mark: int, radius_px: float | None) -> None:
+        """Take over how wide a spot was in the measurement that is proved now."""
+        if radius_px is not None:
+            self._radii_px.setdefault(mark, []).append(radius_px)
+
     def heard(self, look: SeenAt) -> SeenAt:
         """Remember how much the pictures of a look scatter, and return the look."""
         if look.scatter is not None:
@@ -154,6 +159,8 @@ class SpotWatch:
         steady = first[0] is None or self.movement(first[0], first[1]).like(
             movement, within=FOLLOWS_WITHIN
         )
+        # One that saw this very movement rightly before, in this run, did not change since.
+        steady = steady and not any(pair.along(movement) for pair in self.pairs)
         if steady and verdict is not Movement.NONE:
             return camera_changed(movement)
         return tip_did_not_move(movement, in_mm=True)

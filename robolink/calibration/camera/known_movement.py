@@ -45,6 +45,9 @@ _FACTOR: Final = 3.0
 _PLAY_AGAIN: Final = 1.5
 """By what play that was found once may differ at another place."""
 
+_SAME_DIRECTION_DEG: Final = 5.0
+"""Movements whose directions differ by less are of one direction."""
+
 _DULLEST: Final = 0.1
 """A movement whose length the scatter makes less sure than this share tells nothing."""
 
@@ -123,6 +126,11 @@ class SeenMovement:
     def turn_deg(self) -> float:
         """By what the camera turned it."""
         return math.degrees(cmath.phase(self.ratio)) if self.seen_length else 0.0
+
+    def along(self, other: "SeenMovement") -> bool:
+        """Return whether the robot made another movement in the same direction."""
+        turn = cmath.phase(complex(*self.known_mm) / complex(*other.known_mm))
+        return abs(math.degrees(turn)) < _SAME_DIRECTION_DEG
 
     @property
     def tells(self) -> bool:

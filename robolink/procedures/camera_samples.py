@@ -132,33 +132,36 @@ class CameraDrive:
         """
         watch, mark = self.watch, place.mark
         if beside is None or not watch.follows(mark, beside, look):
-            pair = yield from self._beside_again(place)
-            if not watch.follows(mark, *pair):
-                yield from self.lifted(place)
-                raise watch.refusal(mark, (beside, look), pair)
+            pair = yield from self._more_closely(place)
             if beside is not None:
                 watch.learn_play(beside, look)
             beside, look = pair
         earlier = watch.known_before(mark, place.u_deg, look)
-        if beside is not None and earlier is not None and not watch.follows(mark, earlier, look):
+        if earlier is not None and not watch.follows(mark, earlier, look):
             pair = yield from self._again(place, earlier)
             if not watch.follows(mark, *pair):
                 yield from self.lifted(place)
-                raise watch.refusal(mark, (earlier, look), pair)
+                raise watch.refusal(mark, [(earlier, look), pair])
             look = pair[1]
-        if beside is not None:
-            watch.keep(mark, place.u_deg, beside, look)
+        watch.keep(mark, place.u_deg, beside, look)
         return look
 
-    def _beside_again(self, place: Place) -> Procedure[tuple[SeenAt, SeenAt]]:
-        """Look beside a place and at it with all pictures, both met from the same side."""
-        yield Notify(
-            tr("The spot did not move as the robot did. It is looked at once more, more closely.")
-        )
-        at, by_mm = self.pose(place), self.plan.beside_mm
-        refusal: CalibrationError | None = None
+    def _more_closely(self, place: Place) -> Procedure[tuple[SeenAt, SeenAt]]:
+        """Look beside a place and at it with all pictures, both met from the same side.
+
+        From nearer where nothing is seen at the whole distance, and where what is seen moves by
+        another vector: a camera that changed shows that one wrong in the same way.
+
+        Raises:
+            CalibrationError: ``tip_did_not_move``, ``camera_changed``, ``spot_changed``;
+                ``several_tips_seen`` and its like.
+        """
+        yield Notify(_in_doubt())
+        wrong = list[tuple[SeenAt, SeenAt]]()
+        unseen = tip_did_not_move(None, in_mm=False)
+        at, watch = self.pose(place), self.watch
         for share in _NEARER:
-            start = _shifted(at, -share * by_mm)
+            start = _shifted(at, -share * self.plan.beside_mm)
             yield from self._met(start)
             try:
                 before: SeenAt = yield from self._seen(place, start, self.plan.pictures)
@@ -166,20 +169,22 @@ class CameraDrive:
                 if error.code not in _UNSEEN:
                     yield from self.lifted(place)
                     raise
-                refusal = error
+                unseen = error if error.code.startswith("several") else unseen
                 continue
             yield from self._approach(at)
-            return before, (yield from self._look(place))
+            pair = before, (yield from self._look(place))
+            if watch.follows(place.mark, *pair):
+                return pair
+            wrong.append(pair)
+            if len(wrong) == 2 or watch.stands_still(place.mark, *pair):
+                break
         yield from self.lifted(place)
-        several = refusal is not None and refusal.code.startswith("several")
-        raise refusal if several and refusal else tip_did_not_move(None, in_mm=False)
+        raise watch.refusal(place.mark, wrong) if wrong else unseen
 
     def _again(self, place: Place, earlier: SeenAt) -> Procedure[tuple[SeenAt, SeenAt]]:
         """Look where a mark was looked at before, and at its place, both met from one side."""
         start, at = self._at_place(place, earlier), self.pose(place)
-        yield Notify(
-            tr("The spot did not move as the robot did. It is looked at once more, more closely.")
-        )
+        yield Notify(_in_doubt())
         yield from self._met(start)
         try:
             before: SeenAt = yield from self._seen(place, start, self.plan.pictures)
@@ -359,6 +364,10 @@ class CameraDrive:
 
     def _above(self, pose: Pose) -> Pose:
         return replace(pose, z_mm=pose.z_mm + self.plan.lift_mm)
+
+
+def _in_doubt() -> str:
+    return tr("The spot did not move as the robot did. It is looked at once more, more closely.")
 
 
 def _shifted(pose: Pose, by_mm: float) -> Pose:

@@ -30,6 +30,9 @@ from robolink.stations import CameraStation
 _OF_A_MEDIAN: Final = 0.75
 """Scatter of the median of two or more pictures, as a share of that of one."""
 
+_BEYOND_NOISE: Final = 5.0
+"""A spot that moves by fewer standard deviations than these may stand still."""
+
 _SHORTEST_MM: Final = 0.1
 """Over a shorter way an error of the camera does no harm, and would not be told from chance."""
 
@@ -90,9 +93,7 @@ class SpotWatch:
             after: The look at the second.
         """
         movement = self.movement(before, after)
-        if not _alike([before.spot.radius_px, after.spot.radius_px]):
-            return False
-        if not all(self._as_wide(mark, look) for look in (before, after)):
+        if not self._same_thing(mark, before, after):
             return False
         if self.in_mm(after):
             verdict = movement.judged(self._rows(after), play_mm=self._play_mm)
@@ -133,37 +134,51 @@ class SpotWatch:
             off_mm = math.dist(movement.seen, movement.known_mm)
             self._play_mm = max(self._play_mm, off_mm)
 
-    def refusal(
-        self, mark: int, first: tuple[SeenAt | None, SeenAt], again: tuple[SeenAt, SeenAt]
-    ) -> CalibrationError:
-        """Return why a spot is not believed that was seen to move wrongly twice.
+    def stands_still(self, mark: int, before: SeenAt, after: SeenAt) -> bool:
+        """Return whether no further picture is needed to refuse a spot that does not follow.
 
         Args:
             mark: What was looked at.
-            first: The two looks of the first time; the first of them may have seen nothing.
-            again: The two looks of the second time, both places met from the same side.
+            before: The look at the first place, in the same orientation.
+            after: The look at the second.
         """
-        for look in again:
-            if not self._as_wide(mark, look) and look.spot.radius_px is not None:
-                return spot_changed(look.spot.radius_px, self._usual_px(mark) or 0.0)
-        before, after = again
         movement = self.movement(before, after)
-        widths = [look.spot.radius_px for look in again]
-        if not _alike(widths):
-            return spot_changed(widths[0] or 0.0, widths[1] or 0.0)
+        if not self._same_thing(mark, before, after):
+            return True
+        if self.in_mm(after):
+            return movement.judged(self._rows(after), play_mm=0.0) is Movement.NONE
+        return movement.seen_length < self._least_px(movement)
+
+    def refusal(self, mark: int, wrong: Sequence[tuple[SeenAt, SeenAt]]) -> CalibrationError:
+        """Return why a spot is not believed.
+
+        Args:
+            mark: What was looked at.
+            wrong: Pairs of looks between which it did not move as the robot did, the last of them
+                with all pictures and both places met from the same side.
+        """
+        before, after = wrong[-1]
+        if not self._same_thing(mark, before, after):
+            told = [after.spot.radius_px, before.spot.radius_px]
+            usual_px = self._usual_px(mark)
+            if usual_px is not None and not self._as_wide(mark, before):
+                told.reverse()
+            other_px = told[1] if usual_px is None else usual_px
+            return spot_changed(told[0] or 0.0, other_px or 0.0)
+        movements = [self.movement(*pair) for pair in wrong]
+        last = movements[-1]
         if not self.in_mm(after):
-            return tip_did_not_move(movement, in_mm=False)
-        verdict = movement.judged(self._rows(after))
-        # A camera that changed shows every movement in the same wrong way. A spot that is the tip
-        # in one picture and a fleck in the next does not.
-        steady = first[0] is None or self.movement(first[0], first[1]).like(
-            movement, within=FOLLOWS_WITHIN
+            return tip_did_not_move(last, in_mm=False)
+        # A camera that changed shows movements in one wrong way, whatever their length, and it did
+        # not change since it saw one rightly in this run. A fleck that is found in place of the
+        # tip in one of two pictures fits neither.
+        steady = (
+            len(movements) > 1
+            and all(one.like(last, within=FOLLOWS_WITHIN) for one in movements[:-1])
+            and last.judged(self._rows(after), play_mm=0.0) is not Movement.NONE
+            and not any(pair.along(last) for pair in self.pairs)
         )
-        # One that saw this very movement rightly before, in this run, did not change since.
-        steady = steady and not any(pair.along(movement) for pair in self.pairs)
-        if steady and verdict is not Movement.NONE:
-            return camera_changed(movement)
-        return tip_did_not_move(movement, in_mm=True)
+        return camera_changed(last) if steady else tip_did_not_move(last, in_mm=True)
 
     def require_followed(self, mm_per_px: Sequence[Sequence[float]]) -> None:
         """Refuse a camera that was just found if a spot did not move as it says.
@@ -185,13 +200,22 @@ class SpotWatch:
                 raise tip_did_not_move(pair, in_mm=False)
 
     def _follows_in_pixels(self, movement: SeenMovement) -> bool:
-        # The least that a movement can show in pixels, before any camera is known.
-        least_px = LEAST_SHARE * movement.known_length_mm / self.longest_mm_per_px
-        if movement.seen_length < max(least_px, 5 * movement.noise):
+        if movement.seen_length < self._least_px(movement):
             return False
         if not self.pairs:
             return True
         return movement.like(self.pairs[0], within=FOLLOWS_UNCALIBRATED)
+
+    def _least_px(self, movement: SeenMovement) -> float:
+        """Return what a movement shows at least in pixels, before any camera is known."""
+        least_px = LEAST_SHARE * movement.known_length_mm / self.longest_mm_per_px
+        return max(least_px, _BEYOND_NOISE * movement.noise)
+
+    def _same_thing(self, mark: int, *looks: SeenAt) -> bool:
+        """Return whether spots are as wide as each other and as those of the run."""
+        told = [look.spot.radius_px for look in looks if look.spot.radius_px is not None]
+        alike = len(told) < len(looks) or same_radius(told[0], told[-1])
+        return alike and all(self._as_wide(mark, look) for look in looks)
 
     def _rows(self, look: SeenAt) -> CameraChangeRows:
         model = self.station.model if look.unit is SpotUnit.PIXEL else None
@@ -215,8 +239,3 @@ class SpotWatch:
     def _usual_px(self, mark: int) -> float | None:
         known = self._radii_px.get(mark)
         return median(known) if known else None
-
-
-def _alike(radii_px: Sequence[float | None]) -> bool:
-    told = [radius_px for radius_px in radii_px if radius_px is not None]
-    return len(told) < 2 or same_radius(told[0], told[1])

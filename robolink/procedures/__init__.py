@@ -12,13 +12,13 @@ if TYPE_CHECKING:
     from robolink.procedures.approach import approach_path as approach_path
     from robolink.procedures.approach import offset_z as offset_z
     from robolink.procedures.approach import seek_or_retract as seek_or_retract
+    from robolink.procedures.camera_drive import CameraDrive as CameraDrive
+    from robolink.procedures.camera_drive import Place as Place
     from robolink.procedures.camera_plan import HALF_ROUND_DEG as HALF_ROUND_DEG
     from robolink.procedures.camera_plan import LEAST_BESIDE_MM as LEAST_BESIDE_MM
     from robolink.procedures.camera_plan import TWO_ANGLES_DEG as TWO_ANGLES_DEG
     from robolink.procedures.camera_plan import LookPlan as LookPlan
-    from robolink.procedures.camera_samples import CameraDrive as CameraDrive
     from robolink.procedures.camera_samples import CameraSamples as CameraSamples
-    from robolink.procedures.camera_samples import Place as Place
     from robolink.procedures.camera_source import CalibratedCameraSource as CalibratedCameraSource
     from robolink.procedures.camera_source import angles_between as angles_between
     from robolink.procedures.camera_source import calibrated_camera as calibrated_camera
@@ -86,7 +86,8 @@ __getattr__ = lazy_exports(
     {
         "approach": "NO_OFFSET approach_path offset_z seek_or_retract",
         "camera_plan": "HALF_ROUND_DEG LEAST_BESIDE_MM LookPlan TWO_ANGLES_DEG",
-        "camera_samples": "CameraDrive CameraSamples Place",
+        "camera_drive": "CameraDrive Place",
+        "camera_samples": "CameraSamples",
         "camera_source": (
             "CalibratedCameraSource angles_between calibrated_camera camera_error_of pixel_camera "
             "proof_angles radius_of"

@@ -130,8 +130,9 @@ class SpotWatch:
     def learn_play(self, before: SeenAt, after: SeenAt) -> None:
         """Remember how far a movement was off because its places were met from two sides."""
         movement = self.movement(before, after)
-        if self.in_mm(after):
-            off_mm = math.dist(movement.seen, movement.known_mm)
+        off_mm = math.dist(movement.seen, movement.known_mm)
+        # More than that was a false find, which is no reason to believe the next.
+        if self.in_mm(after) and off_mm <= FOLLOWS_WITHIN * movement.known_length_mm:
             self._play_mm = max(self._play_mm, off_mm)
 
     def stands_still(self, mark: int, before: SeenAt, after: SeenAt) -> bool:

@@ -192,7 +192,7 @@ def test_what_no_camera_is_like_is_refused_until_the_limit_is_stated(matrix, sai
 )
 def test_looks_that_agree_with_no_camera_are_refused(sigma_px, code, stated):
     plan = [(4 * dx, 4 * dy, u_deg) for dx, dy, u_deg in PLACES + TURNS]
-    seen = pictures(plan, np.random.default_rng(1), sigma_px, matrix=SQUARE * 5)
+    seen = pictures(plan, np.random.default_rng(1), sigma_px, matrix=SQUARE * 9)
     with refused(code):
         solve_camera_affine(seen)
     solve_camera_affine(seen, limits=CameraLimits(**stated))

@@ -22,12 +22,21 @@ if TYPE_CHECKING:
     from robolink.calibration.camera.camera_affine import CameraCalibration as CameraCalibration
     from robolink.calibration.camera.camera_affine import PixelSighting as PixelSighting
     from robolink.calibration.camera.camera_affine import solve_camera_affine as solve_camera_affine
+    from robolink.calibration.camera.camera_model import USUAL_CAMERA as USUAL_CAMERA
     from robolink.calibration.camera.camera_model import CameraLimits as CameraLimits
     from robolink.calibration.camera.camera_model import CameraModel as CameraModel
     from robolink.calibration.camera.camera_model import require_same_camera as require_same_camera
     from robolink.calibration.camera.camera_round import CameraRound as CameraRound
     from robolink.calibration.camera.camera_round import as_round as as_round
     from robolink.calibration.camera.camera_round import solve_camera_round as solve_camera_round
+    from robolink.calibration.camera.known_movement import CameraChangeRows as CameraChangeRows
+    from robolink.calibration.camera.known_movement import MovementVerdict as MovementVerdict
+    from robolink.calibration.camera.known_movement import SeenMovement as SeenMovement
+    from robolink.calibration.camera.known_movement import camera_changed as camera_changed
+    from robolink.calibration.camera.known_movement import mm_camera_noise as mm_camera_noise
+    from robolink.calibration.camera.known_movement import same_radius as same_radius
+    from robolink.calibration.camera.known_movement import spot_changed as spot_changed
+    from robolink.calibration.camera.known_movement import tip_did_not_move as tip_did_not_move
     from robolink.calibration.camera.runout import RunoutReport as RunoutReport
     from robolink.calibration.camera.runout import runout_report as runout_report
     from robolink.calibration.camera.runout_table import RunoutRow as RunoutRow
@@ -265,8 +274,10 @@ __getattr__ = lazy_exports(
         "camera.board_fit": "solve_board_fit",
         "camera.board_round": "solve_board_round",
         "camera.camera_affine": "CameraCalibration PixelSighting solve_camera_affine",
-        "camera.camera_model": "CameraLimits CameraModel require_same_camera",
+        "camera.camera_model": "CameraLimits CameraModel USUAL_CAMERA require_same_camera",
         "camera.camera_round": "CameraRound as_round solve_camera_round",
+        "camera.known_movement": "CameraChangeRows MovementVerdict SeenMovement camera_changed "
+        "mm_camera_noise same_radius spot_changed tip_did_not_move",
         "camera.runout": "RunoutReport runout_report",
         "camera.runout_table": "RunoutRow RunoutTable RunoutTableResult solve_runout_table",
         "camera.sighting": "Sighting",

@@ -46,7 +46,7 @@ from robolink.runner._steps import (
 )
 from robolink.runner._subjects import GuidedOperator, JogRange, JogSubject, MoveSubject, regard
 from robolink.runner._yes_no import ask_yes_no, ask_yes_no_or
-from robolink.sensing import seen_once
+from robolink.sensing import median_spot, scatter_of, seen_in
 from robolink.ways import Way, way
 
 POLL_S = 1.0
@@ -248,8 +248,8 @@ class Runner:
             )
         self._controller.clock.sleep(camera.settle_s)
         pose = self._group.pose()
-        spot = seen_once(camera, step.mark, pictures=step.pictures)
-        return SeenAt.of(pose, spot, camera.unit)
+        spots = seen_in(camera, step.mark, pictures=step.pictures)
+        return SeenAt.of(pose, median_spot(spots), camera.unit, scatter=scatter_of(spots))
 
     def _seek(self, step: Seek) -> Pose:
         settings = self._settings

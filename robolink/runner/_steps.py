@@ -125,19 +125,25 @@ class SeenAt(Pose):
     Attributes:
         spot: Where, in the camera's unit.
         unit: That unit.
+        scatter: Standard deviation of one coordinate of one picture, in that unit; ``None`` where
+            one picture was taken.
     """
 
     spot: Spot
     unit: SpotUnit
+    scatter: float | None = None
 
     @classmethod
-    def of(cls, pose: Pose, spot: Spot, unit: SpotUnit) -> "SeenAt":
+    def of(
+        cls, pose: Pose, spot: Spot, unit: SpotUnit, *, scatter: float | None = None
+    ) -> "SeenAt":
         """Return what was seen from ``pose``.
 
         Args:
             pose: Where the flange was.
             spot: What the camera saw.
             unit: The unit of that.
+            scatter: Standard deviation of one coordinate of one picture.
 
         Example:
             >>> from robolink import Pose, Spot, SpotUnit
@@ -146,7 +152,7 @@ class SeenAt(Pose):
             >>> seen.x_mm, seen.spot.x
             (300, 312.3)
         """
-        return cls(**_as_it_is(pose), spot=spot, unit=unit)
+        return cls(**_as_it_is(pose), spot=spot, unit=unit, scatter=scatter)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -4,6 +4,9 @@ The cameras themselves are brought by other packages through the entry-point gro
 ``robolink.sensors``; the simulated ones come through the same door.
 """
 
+from robolink.sensing._asking import median_spot as median_spot
+from robolink.sensing._asking import scatter_of as scatter_of
+from robolink.sensing._asking import seen_in as seen_in
 from robolink.sensing._asking import seen_once as seen_once
 from robolink.sensing._registry import SENSORS_GROUP as SENSORS_GROUP
 from robolink.sensing._registry import SensorOpener as SensorOpener

@@ -2,11 +2,16 @@
 
 import math
 from collections.abc import Sequence
+from itertools import combinations
 from statistics import median
+from typing import Final
 
 from robolink.errors import CalibrationError, OutcomeUnknownError, StoppedError
 from robolink.messages import tr
 from robolink.model import TIP, Spot, TipSensor
+
+_QUARTER_OF_DIFFERENCES: Final = 0.4506
+"""Lower quartile of |a - b| for two normal numbers of standard deviation 1: 0.3186 sqrt(2)."""
 
 
 def seen_once(sensor: TipSensor, mark: int, *, pictures: int) -> Spot:
@@ -32,8 +37,33 @@ def seen_once(sensor: TipSensor, mark: int, *, pictures: int) -> Spot:
         >>> from robolink.sensing import seen_once
         >>> answers = iter([Spot(312.3, 96.3), Spot(312.4, 96.3), Spot(340.0, 96.3)])
         >>> camera = SimpleNamespace(see=lambda mark: [next(answers)], identity="a camera")
-        >>> seen_once(camera, TIP, pictures=3)
-        Spot(x=312.4, y=96.3)
+        >>> spot = seen_once(camera, TIP, pictures=3)
+        >>> spot.x, spot.y
+        (312.4, 96.3)
+    """
+    return median_spot(seen_in(sensor, mark, pictures=pictures))
+
+
+def seen_in(sensor: TipSensor, mark: int, *, pictures: int) -> tuple[Spot, ...]:
+    """Return where a camera sees a mark, in each of the pictures in which it does.
+
+    Args:
+        sensor: The camera.
+        mark: What is looked for: ``TIP``, or the number of a fiducial.
+        pictures: How many are taken.
+
+    Raises:
+        CalibrationError: As :func:`seen_once`.
+
+    Example:
+        >>> from types import SimpleNamespace
+        >>> from robolink import Spot
+        >>> from robolink.model import TIP
+        >>> from robolink.sensing import seen_in
+        >>> answers = iter([[Spot(312.3, 96.3)], [], [Spot(312.4, 96.3)]])
+        >>> camera = SimpleNamespace(see=lambda mark: next(answers), identity="a camera")
+        >>> [spot.x for spot in seen_in(camera, TIP, pictures=3)]
+        [312.3, 312.4]
     """
     spots = list[Spot]()
     for _ in range(pictures):
@@ -45,7 +75,35 @@ def seen_once(sensor: TipSensor, mark: int, *, pictures: int) -> Spot:
         spots += found
     if 2 * len(spots) <= pictures:
         raise _not_seen(mark, sensor, len(spots), pictures)
-    return Spot(median(spot.x for spot in spots), median(spot.y for spot in spots))
+    return tuple(spots)
+
+
+def median_spot(spots: Sequence[Spot]) -> Spot:
+    """Return the median of each number of some spots; of what none of them tells, ``None``."""
+    radii = [spot.radius_px for spot in spots if spot.radius_px is not None]
+    scores = [spot.score for spot in spots if spot.score is not None]
+    return Spot(
+        median(spot.x for spot in spots),
+        median(spot.y for spot in spots),
+        radius_px=median(radii) if radii else None,
+        score=median(scores) if scores else None,
+    )
+
+
+def scatter_of(spots: Sequence[Spot]) -> float | None:
+    """Return the standard deviation of one coordinate of one picture, ``None`` of one picture.
+
+    From the lower quartile of the differences between any two, so that one false find among three
+    pictures does not make the scatter of the others seem large.
+    """
+    differences = sorted(
+        difference
+        for one, other in combinations(spots, 2)
+        for difference in (abs(one.x - other.x), abs(one.y - other.y))
+    )
+    if not differences:
+        return None
+    return differences[len(differences) // 4] / _QUARTER_OF_DIFFERENCES
 
 
 def _seen(sensor: TipSensor, mark: int) -> Sequence[Spot]:
@@ -67,12 +125,22 @@ def _seen(sensor: TipSensor, mark: int) -> Sequence[Spot]:
 
 def _require_finite(spot: Spot, sensor: TipSensor) -> None:
     # Before anything is calculated from it: the next movement would be.
-    if not (math.isfinite(spot.x) and math.isfinite(spot.y)):
-        raise CalibrationError(
-            "non_finite",
-            tr("{camera} answers {x}, {y}.", camera=sensor.identity, x=spot.x, y=spot.y),
-            remedy=tr("Restart the camera's program, and look at what it finds in its picture."),
+    finite = math.isfinite(spot.x) and math.isfinite(spot.y)
+    radius_px = spot.radius_px
+    if finite and (radius_px is None or (math.isfinite(radius_px) and radius_px > 0)):
+        return
+    told = tr("{camera} answers {x}, {y}.", camera=sensor.identity, x=spot.x, y=spot.y)
+    if finite:
+        told = tr(
+            "{camera} answers with a spot of radius {radius} px.",
+            camera=sensor.identity,
+            radius=radius_px,
         )
+    raise CalibrationError(
+        "non_finite",
+        told,
+        remedy=tr("Restart the camera's program, and look at what it finds in its picture."),
+    )
 
 
 def _not_seen(mark: int, sensor: TipSensor, seen: int, pictures: int) -> CalibrationError:

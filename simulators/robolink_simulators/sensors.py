@@ -15,7 +15,8 @@ from robolink_simulators.assist.port import AssistClient, simulator_at
 SETTLE_S: Final = 0.1
 """How long the simulated camera wants the robot to stand still (assumed)."""
 
-Picture = Callable[[int], Sequence[tuple[float, float]]]
+Picture = Callable[[int], Sequence[tuple[float, float, float | None]]]
+"""Takes a picture for a mark: X, Y and radius in pixels of each spot; ``None`` for no radius."""
 
 
 class SimulatedCamera:
@@ -63,7 +64,7 @@ class SimulatedCamera:
 
     def see(self, mark: int = TIP) -> Sequence[Spot]:
         """Take a picture; see :class:`~robolink.model.TipSensor`."""
-        return [Spot(x, y) for x, y in self._picture(mark)]
+        return [Spot(x, y, radius_px=radius_px) for x, y, radius_px in self._picture(mark)]
 
     def close(self) -> None:
         """Let go of it."""
@@ -78,9 +79,9 @@ def open_in_process(url: str) -> SimulatedCamera:
     """
     simulator = simulator_at(url)
 
-    def picture(mark: int) -> Sequence[tuple[float, float]]:
+    def picture(mark: int) -> Sequence[tuple[float, float, float | None]]:
         with simulator.lock:
-            return simulator.world.see(mark)
+            return simulator.world.spots(mark)
 
     size_px = simulator.world.camera.optics.size_px
     return SimulatedCamera(_identity(url), picture, resolution_px=size_px)

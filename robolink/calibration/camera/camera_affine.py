@@ -40,6 +40,10 @@ UNKNOWNS = 8
 
 MAX_CONDITION = 100.0
 
+LEAST_SPREAD_PX = 5.0
+"""What is seen has to spread over the image by this much in every direction, rms: the finder's
+scatter alone, of a spot that stands still, spreads too, and has a scale and a shear of its own."""
+
 _KEPT = ("z_mm", "u_deg", "v_deg", "w_deg")
 
 
@@ -103,7 +107,8 @@ def solve_camera_affine(
 
     Raises:
         CalibrationError: ``too_few_poses``, ``rank_deficient``, ``insufficient_rotation``,
-            ``camera_changed``, ``implausible_offset``, ``tool_pose``, ``local_pose``,
+            ``camera_implausible``, ``camera_changed``, ``large_pixel_residual``,
+            ``large_interval``, ``implausible_offset``, ``tool_pose``, ``local_pose``,
             ``tilted_pose``, and those of ``pose_checks.check_poses``.
         ConfigError: ``sigma_mm`` is not positive.
 
@@ -130,10 +135,12 @@ def solve_camera_affine(
     require_flange_in_base(poses)
     height = height_of(stored, height)
     pixels = np.array([(sighting.px, sighting.py) for sighting in sightings], dtype=float)
+    _require_spread(pixels)
     a, b, per_height = _system(poses, pixels, height)
     fit = linear_fit(a, b)
     _require_observable(fit)
     camera = _camera(fit.x, pixels.mean(axis=0))
+    limits.require_camera(camera)
     if before is not None:
         require_same_camera(camera, before, limits)
     residuals = fit.residuals.reshape(-1, 2)
@@ -165,6 +172,7 @@ def solve_camera_affine(
     by_height = linear_fit(a, per_height).x[6:].tolist()
     result = with_height_error(result, (by_height[0], by_height[1]), height)
     rms_px = _rms_px(camera, residuals) if result.dof else None
+    limits.require_fit(rms_px, max(result.half_width95, default=None))
     doubts = (*result.warnings, *limits.doubts(camera, rms_px))
     known = _with_spread(camera, fit, offset_sigma_mm(result), pixels.mean(axis=0).tolist())
     return replace(result, rms_px=rms_px, warnings=doubts, camera=known)
@@ -218,6 +226,27 @@ def _camera(x: Floats, mean_pixel: Floats) -> CameraModel:
 def _rms_px(camera: CameraModel, residuals_mm: Floats) -> float:
     in_pixels = residuals_mm @ np.linalg.inv(np.array(camera.mm_per_px)).T
     return math.sqrt(float((in_pixels**2).sum()) / len(in_pixels))
+
+
+def _require_spread(pixels: Floats) -> None:
+    """Refuse pixels that all lie in one point or on one line, but for the finder's scatter."""
+    spread = np.linalg.svd(pixels - pixels.mean(axis=0), compute_uv=False)
+    rms_px = float(spread[-1]) / math.sqrt(len(pixels))
+    if rms_px >= LEAST_SPREAD_PX:
+        return
+    raise CalibrationError(
+        "rank_deficient",
+        tr(
+            "What was seen spreads by {found:.1f} pixels only in one direction of the image, "
+            "limit {limit:g}: its scale and turn are unknown.",
+            found=rms_px,
+            limit=LEAST_SPREAD_PX,
+        ),
+        remedy=tr(
+            "Look at the pictures: does the spot that is found move with the tip? Let the tip go "
+            "further, to places that are not in line."
+        ),
+    )
 
 
 def _require_observable(fit: LinearFit) -> None:

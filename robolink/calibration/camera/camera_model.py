@@ -90,6 +90,11 @@ class CameraLimits:
         rms_px: Largest residual without a warning.
         scale_change: Largest relative change of a scale since the last calibration.
         turn_change_deg: Largest change of turn or shear since then.
+        most_unequal_scale: Largest |scale_x / scale_y - 1| at all: a lens that leans by 37 degrees.
+        most_shear_deg: Largest shear at all: two of the pixels' axes that are no square's.
+        most_rms_px: Largest residual at all: twenty times what a finder scatters.
+        most_mm_per_px: Longest pixel at all: in a longer one 0.1 px are the error of a touch.
+        interval_mm: Largest half 95 % interval of a length of the offset at all.
     """
 
     unequal_scale: float = 0.05
@@ -97,6 +102,11 @@ class CameraLimits:
     rms_px: float = 0.5
     scale_change: float = 0.02
     turn_change_deg: float = 1.0
+    most_unequal_scale: float = 0.25
+    most_shear_deg: float = 20.0
+    most_rms_px: float = 2.0
+    most_mm_per_px: float = 0.2
+    interval_mm: float = 0.05
 
     def doubts(self, camera: CameraModel, rms_px: float | None) -> tuple[str, ...]:
         """Return the names of what is doubtful about a camera."""
@@ -109,6 +119,68 @@ class CameraLimits:
         if rms_px is not None and rms_px > self.rms_px:
             found.append("large_pixel_residual")
         return tuple(found)
+
+    def require_camera(self, camera: CameraModel) -> None:
+        """Refuse what no camera that looks at tips is like.
+
+        Raises:
+            CalibrationError: ``camera_implausible``.
+        """
+        sx, sy = camera.scale_mm_per_px
+        unequal = max(sx, sy) / min(sx, sy) - 1
+        if max(sx, sy) > self.most_mm_per_px:
+            what = tr(
+                "A pixel would be {found:.0f} micrometres long, limit {limit:.0f}.",
+                found=1000 * max(sx, sy),
+                limit=1000 * self.most_mm_per_px,
+            )
+        elif unequal > self.most_unequal_scale:
+            what = tr(
+                "The image's two axes would differ in scale by {found:.0f} %, limit {limit:.0f} %.",
+                found=100 * unequal,
+                limit=100 * self.most_unequal_scale,
+            )
+        elif camera.shear_deg > self.most_shear_deg:
+            what = tr(
+                "The image would be askew by {found:.1f} degrees, limit {limit:.1f}.",
+                found=camera.shear_deg,
+                limit=self.most_shear_deg,
+            )
+        else:
+            return
+        raise CalibrationError("camera_implausible", what, remedy=_seen_wrongly())
+
+    def require_fit(self, rms_px: float | None, half_width95_mm: float | None) -> None:
+        """Refuse looks that agree too badly with any camera, or tell too little.
+
+        Args:
+            rms_px: Root mean square of the residuals, ``None`` without a degree of freedom.
+            half_width95_mm: The widest half interval of the offset, ``None`` where nothing tells.
+
+        Raises:
+            CalibrationError: ``large_pixel_residual`` or ``large_interval``.
+        """
+        if rms_px is not None and rms_px > self.most_rms_px:
+            what = tr(
+                "The looks differ from each other by {found:.1f} pixels, limit {limit:g}.",
+                found=rms_px,
+                limit=self.most_rms_px,
+            )
+            raise CalibrationError("large_pixel_residual", what, remedy=_seen_wrongly())
+        if half_width95_mm is not None and half_width95_mm > self.interval_mm:
+            what = tr(
+                "The offset would be known to +-{found:.3f} mm, limit {limit:g} mm.",
+                found=half_width95_mm,
+                limit=self.interval_mm,
+            )
+            raise CalibrationError("large_interval", what, remedy=_seen_wrongly())
+
+
+def _seen_wrongly() -> str:
+    return tr(
+        "Look at the pictures: is it the tip that was found in all of them? Clean window and tip, "
+        "look after focus and mount, then measure again."
+    )
 
 
 USUAL_CAMERA = CameraLimits()

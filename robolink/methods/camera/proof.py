@@ -27,6 +27,7 @@ class LookTest(PlacedProof):
         plan: Pictures and heights.
         angles_deg: U of the new tool at which the tip is looked at.
         camera_error_mm: What the measurement found the camera to be off by, base X and Y.
+        radius_px: How wide the spot was in the measurement; ``None`` where nobody told.
     """
 
     method: ClassVar[str] = "camera"
@@ -38,6 +39,7 @@ class LookTest(PlacedProof):
     plan: LookPlan
     angles_deg: tuple[float, ...]
     camera_error_mm: tuple[float, float] = (0.0, 0.0)
+    radius_px: float | None = None
 
     @property
     def obstacle(self) -> str:
@@ -70,6 +72,7 @@ class LookTest(PlacedProof):
             tolerance_mm=self.tolerance_mm,
             camera_error_mm=self.camera_error_mm,
             aside=seen_from(self.written, self.tip),
+            radius_px=self.radius_px,
         )
 
     def steps_after_a_break(self, here: Pose) -> Procedure[VerifyResult]:

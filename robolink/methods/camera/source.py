@@ -12,6 +12,7 @@ from robolink.procedures import (
     MeasurementContext,
     camera_error_of,
     proof_angles,
+    radius_of,
 )
 from robolink.runner import Procedure
 from robolink.sensing import sensor_name
@@ -88,4 +89,5 @@ class CameraSource(CalibratedCameraSource):
             plan=self.plan,
             angles_deg=proof_angles(result, tool),
             camera_error_mm=camera_error_of(result),
+            radius_px=radius_of(result),
         )

@@ -45,8 +45,8 @@ def measure_camera_affine(
     Raises:
         CalibrationError: ``rank_deficient`` and ``insufficient_rotation`` before anything moves
             when the pattern cannot tell, and ``tilted_pose``; ``tip_not_seen``,
-            ``several_tips_seen``, ``camera_changed``, and the others of
-            :func:`solve_camera_affine`.
+            ``several_tips_seen``, ``tip_did_not_move``, ``spot_changed``, ``camera_changed``, and
+            the others of :func:`solve_camera_affine`.
 
     Example:
         >>> from robolink.methods import CameraAffineParameters, measure_camera_affine
@@ -56,23 +56,30 @@ def measure_camera_affine(
         >>> camera, here = CameraStation(x_mm=300, y_mm=80, z_mm=-30), Pose(300, 100, 20, 0)
         >>> plan, stored = CameraAffineParameters(), ToolOffset(12, -3.5, -20)
         >>> course = measure_camera_affine(camera, plan, here=here, stored=stored)
-        >>> found = PaperCell(here, ToolOffset(12.2, -3.6, -20)).run(course)
+        >>> found = PaperCell(here, ToolOffset(12.2, -3.6, -20), mm_per_px=0.02).run(course)
         >>> round(found.offset.x_mm, 3), round(found.offset.y_mm, 3)
         (12.2, -3.6)
     """
     _require_pattern(plan)
     solvable_planes([here], height_of(stored))
     tip = stored or NO_OFFSET
-    drive = CameraDrive(station, plan.look, here)
+    drive = CameraDrive(station, plan.look, here, calibrated=False)
+    drive.watch.longest_mm_per_px = plan.pixel_limit_mm
     places = [
         Place(toward_zero(here.u_deg, turn), tip, aside_mm=(dx, dy)) for dx, dy, turn in plan.places
     ]
 
     def solve(looks: Sequence[SeenAt]) -> CameraCalibration:
         sightings = [PixelSighting(look, look.spot.x, look.spot.y) for look in looks]
-        return solve_camera_affine(
-            sightings, stored=stored, sigma_mm=sigma_mm, before=station.model
+        found = solve_camera_affine(
+            sightings,
+            stored=stored,
+            sigma_mm=sigma_mm,
+            before=station.model,
+            limits=plan.limits,
         )
+        drive.watch.require_followed(found.camera.mm_per_px)
+        return found
 
     return (yield from CameraSamples(drive, solve, here).at(places, retake=plan.retake))
 

@@ -7,7 +7,13 @@ from robolink.calibration import CalibrationResult, offset_sigma_mm
 from robolink.messages import tr
 from robolink.methods.camera_affine.parameters import CameraAffineParameters
 from robolink.model import Pose, TipSensor, ToolOffset
-from robolink.procedures import MeasurementContext, ProvesAgain, pixel_camera, proof_angles
+from robolink.procedures import (
+    MeasurementContext,
+    ProvesAgain,
+    pixel_camera,
+    proof_angles,
+    radius_of,
+)
 from robolink.runner import Procedure
 from robolink.sensing import sensor_name
 from robolink.stations import CameraStation, Found, StationKind
@@ -135,4 +141,5 @@ class CameraAffineSource(ProvesAgain):
             station=replace(self.station, model=result.camera),
             plan=self.plan.look,
             angles_deg=proof_angles(result, tool),
+            radius_px=radius_of(result),
         )

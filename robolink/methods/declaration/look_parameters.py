@@ -21,7 +21,7 @@ from robolink.methods.declaration.method import (
     Pair,
     Rows,
 )
-from robolink.procedures import HALF_ROUND_DEG, LookPlan
+from robolink.procedures import HALF_ROUND_DEG, LEAST_BESIDE_MM, LookPlan
 from robolink.ways import Way, way
 
 if TYPE_CHECKING:
@@ -86,10 +86,15 @@ class LookParameters(MethodParameters):
     ] = 10.0
     beside_mm: Annotated[
         float,
-        Ge(0),
+        Ge(LEAST_BESIDE_MM),
         Le(10),
         MM,
-        Help(declared("How far beside each place its approach begins, always on the same side.")),
+        Help(
+            declared(
+                "How far beside each place its approach begins, always on the same side; a "
+                "picture there shows whether the spot moves with the tip."
+            )
+        ),
     ] = 1.0
     retake: Annotated[
         bool,

@@ -21,10 +21,20 @@ class SpotUnit(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Spot:
-    """Where a sensor sees something, in its own unit."""
+    """Where a sensor sees something, in its own unit.
+
+    Attributes:
+        x, y: Where.
+        radius_px: Half the width of what was found, in pixels of the image; ``None`` where the
+            finder does not tell it. All looks of one run have to agree in it.
+        score: How sure the finder is, in its own measure; ``None`` where it does not tell. It is
+            shown, and nothing rests on it: a finder is sure of a fleck, too.
+    """
 
     x: float
     y: float
+    radius_px: float | None = None
+    score: float | None = None
 
 
 class TipSensor(Protocol):

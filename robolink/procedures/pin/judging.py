@@ -22,8 +22,11 @@ TOUCH_CODES: Final = (
     "turned_too_little",
     "not_upright",
     "mixed_tool",
+    "tip_did_not_move",
+    "camera_changed",
+    "spot_changed",
 )
-"""Why touches do not count, in a measurement and in a proof."""
+"""Why touches do not count, in a measurement and in a proof; and why looks of a camera do not."""
 
 
 def was_jogged(touch: TouchedAt) -> bool:

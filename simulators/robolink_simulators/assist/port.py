@@ -261,9 +261,15 @@ class AssistClient(ClosedAtExit):
         flange: dict[str, float] = self.do("jog_onto_pin")["flange"]
         return flange
 
-    def see(self, mark: int) -> list[tuple[float, float]]:
-        """Take a picture and return the pixels at which something looks like a mark."""
-        return [(x, y) for x, y in self.do("see", mark=mark)["seen"]]
+    def see(self, mark: int) -> list[tuple[float, float, float | None]]:
+        """Take a picture and return the pixels at which something looks like a mark.
+
+        With each the radius that was found there, ``None`` where the finder tells none.
+        """
+        answer = self.do("see", mark=mark)
+        seen, radii_px = answer["seen"], answer.get("radii_px") or ()
+        told = radii_px if len(radii_px) == len(seen) else (None,) * len(seen)
+        return [(x, y, radius_px) for (x, y), radius_px in zip(seen, told, strict=True)]
 
     def truth(self) -> dict[str, Any]:
         """Return where the tips and the pin really are."""

@@ -13,9 +13,9 @@ from typing import Any, ClassVar, Final, Protocol
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import TIP, Pose, ToolOffset
-from robolink_simulators.cell.camera import CameraTruth, Pixel
+from robolink_simulators.cell.camera import CameraTruth
 from robolink_simulators.cell.held_board import SimulatedBoard
-from robolink_simulators.cell.places import Axis, Direction, axis_of
+from robolink_simulators.cell.places import Axis, Direction, Pixel, axis_of
 from robolink_simulators.cell.places import XyzMm as XyzMm
 from robolink_simulators.cell.pressing import resistance_n
 from robolink_simulators.cell.surfaces import FlatPlate, RoundBall, Surface, SurfaceContact
@@ -123,6 +123,7 @@ class Workplace(ABC):
         self.operator_sigma_mm = parameters.eye_sigma_mm
         self.leans[MOUNTED_TOOL] = parameters.lean
         self.camera.optics = parameters.optics
+        self.camera.finder.set_up(parameters.finder_faults)
         self.robot.loosen(parameters)
         if not parameters.board_held:
             self.board = None
@@ -227,6 +228,11 @@ class Workplace(ABC):
         Fiducials look alike: every one in the image is found, whichever is asked for.
         """
         return self.camera.picture(place for place, _ in self.marks(mark))
+
+    def spots(self, mark: int = TIP) -> tuple[tuple[float, float, float | None], ...]:
+        """Take a picture as :meth:`see` does; with each pixel the radius, where it is told."""
+        seen, finder = self.see(mark), self.camera.finder
+        return tuple((x, y, finder.radius_px()) for x, y in seen)
 
     def marks(self, mark: int = TIP) -> list[tuple[XyzMm, Direction]]:
         """Return where the tips are, or all fiducials, and how the X axis of each lies."""

@@ -11,7 +11,7 @@ from typing import Final
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink_simulators.cell.camera import CameraOptics
+from robolink_simulators.cell.camera import CameraOptics, FinderFaults
 from robolink_simulators.cell.habits import BiasFrame, PersonHabits, PinBump
 from robolink_simulators.cell.surfaces import Touched
 from robolink_simulators.cell.tip_switches import Lean
@@ -47,6 +47,14 @@ class WorldParameters:
         camera_noise_px: Standard deviation of a found place, per axis.
         camera_outlier_share, camera_outlier_px: Share and size of false finds.
         camera_miss_share: Share of the pictures in which nothing is found.
+        camera_still_share, camera_still_from_picture, camera_still_unseen: Share of the pictures
+            in which the finder answers with a spot that stands still, the first picture to which
+            it applies, and whether only where no mark is in the picture.
+        camera_still_beside_px, camera_still_toward_deg: How far from the middle of the image it
+            stands, and in which direction, from right to down.
+        camera_spot_radius_px: Radius of a found spot that the finder tells; 0 for none.
+        camera_spot_swells_by, camera_spot_swells_from_picture: Share by which that grows, and
+            from which picture on. Pictures count from when the world was set up.
         board_held: Whether the nozzle holds a board, which hides its tip.
         person_stays_share, person_stays_from_touch: Share of the touches for which the person
             only presses ENTER, and the first one to which it applies.
@@ -95,6 +103,14 @@ class WorldParameters:
     camera_outlier_share: float = 0.0
     camera_outlier_px: float = 40.0
     camera_miss_share: float = 0.0
+    camera_still_share: float = 0.0
+    camera_still_from_picture: int = 1
+    camera_still_unseen: bool = False
+    camera_still_beside_px: float = 0.0
+    camera_still_toward_deg: float = 0.0
+    camera_spot_radius_px: float = 0.0
+    camera_spot_swells_by: float = 0.0
+    camera_spot_swells_from_picture: int = 1
     board_held: bool = False
     person_stays_share: float = 0.0
     person_stays_from_touch: int = 1
@@ -140,6 +156,12 @@ class WorldParameters:
         return CameraOptics(**{name: getattr(self, f"camera_{name}") for name in names})
 
     @property
+    def finder_faults(self) -> FinderFaults:
+        """What the camera's finder does wrong."""
+        names = [field.name for field in fields(FinderFaults)]
+        return FinderFaults(**{name: getattr(self, f"camera_{name}") for name in names})
+
+    @property
     def habits(self) -> PersonHabits:
         """The person."""
         names = [field.name for field in fields(PersonHabits)]
@@ -179,11 +201,11 @@ def parameters_from_text(pairs: Mapping[str, str]) -> dict[str, object]:
             raise ConfigError(
                 tr("A pixel cannot be 0 long."), remedy=tr("Give {name} above 0.", name=name)
             )
-    if values.get("person_stays_share", 0.0) > 1:
-        raise ConfigError(
-            tr("A share cannot be above 1."),
-            remedy=tr("Give {name} from 0 to 1.", name="person_stays_share"),
-        )
+    for name in ("person_stays_share", "camera_still_share"):
+        if values.get(name, 0.0) > 1:
+            raise ConfigError(
+                tr("A share cannot be above 1."), remedy=tr("Give {name} from 0 to 1.", name=name)
+            )
     return values
 
 

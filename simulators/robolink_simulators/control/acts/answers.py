@@ -253,9 +253,11 @@ class MarksSeen:
 
     Attributes:
         seen: The pixels, across and down, of what looks like the mark.
+        radii_px: The radius of each, empty where the finder tells none.
     """
 
     seen: tuple[tuple[float, float], ...]
+    radii_px: tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)

@@ -66,7 +66,11 @@ def _change_nozzle(cell: ControlledCell, given: Given) -> Answer:
 
 def _see(cell: ControlledCell, given: Given) -> Answer:
     """Take a picture with the up-looking camera, and tell the pixels of what looks like a mark."""
-    return {"seen": [list(pixel) for pixel in world_of(cell).see(given.get("mark", 0))]}
+    spots = world_of(cell).spots(given.get("mark", 0))
+    return {
+        "seen": [[x, y] for x, y, _ in spots],
+        "radii_px": [radius_px for _, _, radius_px in spots if radius_px is not None],
+    }
 
 
 def _be_asked(cell: ControlledCell, given: Given) -> Answer:

@@ -12,7 +12,7 @@ from typing import Final
 
 from robolink.errors import ConfigError
 from robolink.model import TIP, Pose
-from robolink_simulators.cell.camera import Pixel
+from robolink_simulators.cell.places import Pixel
 from robolink_simulators.cell.workplace import Workplace
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
@@ -28,6 +28,7 @@ from robolink_simulators.epson.vision.project import (
 _FIDUCIAL: Final = TIP + 1
 _EXPOSED_MS: Final = 33
 _US_PER_MS: Final = 1000
+_ALONG_X: Final = (1.0, 0.0, 0.0)
 _SCORES: Final = (850, 999)
 """Of what is found (assumed); the best comes first, so that of two like marks either may."""
 
@@ -273,8 +274,11 @@ class VisionSystem:
         (a, b), (c, d) = world.camera.optics.mm_per_px
         area = a * d - b * c
         finds = list[VisionFind]()
-        pixels = world.camera.finds(place for place, _ in marks)
-        for pixel, (_, (dx, dy, _)) in zip(pixels, marks, strict=True):
+        # Fiducials are looked for in the picture that was taken for the tip.
+        pixels = world.camera.finds((place for place, _ in marks), exposes=mark == TIP)
+        # A finder may answer where there is no mark at all.
+        directions = [axis for _, axis in marks] or [_ALONG_X] * len(pixels)
+        for pixel, (dx, dy, _) in zip(pixels, directions, strict=True):
             if pixel is not None:
                 along, across = (d * dx - b * dy) / area, (a * dy - c * dx) / area
                 angle_deg = math.degrees(math.atan2(across, along))

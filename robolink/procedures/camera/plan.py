@@ -13,6 +13,9 @@ that no controller has two ways to choose from, and all in one direction."""
 TWO_ANGLES_DEG: Final = (0.0, 120.0)
 """Two that tell the camera's own error from what is on the tool."""
 
+LEAST_BESIDE_MM: Final = 0.2
+"""An approach that begins nearer to its place does not show whether the spot moves with the tip."""
+
 
 @dataclass(frozen=True, slots=True)
 class LookPlan:
@@ -27,7 +30,8 @@ class LookPlan:
         search_mm: How far from where it is expected the first look may find the mark; the robot
             does not follow anything farther.
         beside_mm: Every place is approached from this far beside it in X and Y, always from the
-            same side, so that play in the joints shifts all looks alike.
+            same side, so that play in the joints shifts all looks alike. A picture is taken there
+            too: a spot that does not move from there as the robot does is not the tip.
     """
 
     turns_deg: tuple[float, ...] = HALF_ROUND_DEG

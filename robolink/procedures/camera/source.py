@@ -4,6 +4,7 @@ from abc import abstractmethod
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from statistics import median
 
 from robolink.calibration import CalibrationResult, tip_pose, toward_zero
 from robolink.errors import ConfigError
@@ -11,7 +12,7 @@ from robolink.messages import tr
 from robolink.model import Pose, SpotUnit, TipSensor, ToolOffset
 from robolink.procedures.proving.kept_proof import ProvesAgain
 from robolink.procedures.source import MeasurementContext
-from robolink.runner import Procedure
+from robolink.runner import Procedure, SeenAt
 from robolink.sensing import open_sensor
 from robolink.stations import CameraStation
 
@@ -42,6 +43,13 @@ def camera_error_of(result: CalibrationResult) -> tuple[float, float]:
 
     error_mm = result.camera_error_mm if isinstance(result, CameraRound) else None
     return error_mm or (0.0, 0.0)
+
+
+def radius_of(result: CalibrationResult) -> float | None:
+    """Return how wide the spot was in the looks of a measurement, ``None`` where nobody told."""
+    looks = [pose for pose in result.inputs if isinstance(pose, SeenAt)]
+    told = [look.spot.radius_px for look in looks if look.spot.radius_px is not None]
+    return median(told) if told else None
 
 
 @contextmanager

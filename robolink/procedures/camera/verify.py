@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from typing import Final
 
 from robolink.calibration import Drift, FlangePlane, VerifyResult
-from robolink.model import Pose, ToolOffset
+from robolink.model import TIP, Pose, ToolOffset
 from robolink.procedures.approach import NO_OFFSET
-from robolink.procedures.camera_plan import LookPlan
-from robolink.procedures.camera_samples import CameraDrive, Place
+from robolink.procedures.camera.drive import CameraDrive, Place
+from robolink.procedures.camera.plan import LookPlan
 from robolink.runner import Procedure, SeenAt
 from robolink.stations import CameraStation
 
@@ -23,6 +23,7 @@ def verify_by_looking(
     tolerance_mm: float,
     camera_error_mm: tuple[float, float] = NO_ERROR,
     aside: ToolOffset = NO_OFFSET,
+    radius_px: float | None = None,
 ) -> Procedure[VerifyResult]:
     """Turn about the new tip and look at it again. Runs in the new tool; ends lifted.
 
@@ -35,6 +36,7 @@ def verify_by_looking(
         camera_error_mm: What the camera is off by, as the measurement found it.
         aside: Where the tip is expected, seen from the frame in force; not 0 where a difference
             to a reference was written.
+        radius_px: How wide its spot was in the measurement; ``None`` where nobody told.
 
     The drift is how far from where the controller puts it the tip is seen.
 
@@ -55,6 +57,7 @@ def verify_by_looking(
         (False, 0.3)
     """
     drive = CameraDrive(station, plan, here)
+    drive.watch.expect_radius(TIP, radius_px)
     places = [Place(u_deg, aside) for u_deg in nearest_first(angles_deg, here)]
     seen = yield from drive.looks(places, here)
     yield from drive.lifted(places[-1])

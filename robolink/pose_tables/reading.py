@@ -36,6 +36,9 @@ from robolink.pose_tables.values import (
 MOST_BYTES: Final = 32_000_000
 """Half a million poses; a file of more is something else."""
 
+_FAR_MM: Final = 100_000.0
+_TURNED_DEG: Final = 36_000.0
+
 _NEEDED_AS: Final = {"z_mm": "Z", "v_deg": "V", "w_deg": "W"}
 
 
@@ -94,6 +97,7 @@ def parse_poses(data: bytes, choices: ReadingChoices, *, suffix: str = "") -> Po
     if not raw.poses:
         raise UnusableText(tr("there is no pose in it"))
     unit, unit_by = settled_length(raw, choices.length)
+    _require_in_reach(raw, unit.mm)
     return PoseTable(
         tuple(_tabled(one, unit.mm) for one in raw.poses),
         HowRead(
@@ -143,6 +147,24 @@ def _is_json(text: str) -> bool:
     except (ValueError, RecursionError):
         return False
     return True
+
+
+def _require_in_reach(raw: RawTable, mm: float) -> None:
+    """Refuse numbers that no robot stands at: where a point or a sign between two was lost.
+
+    Raises:
+        UnusableText: A place is further away than any axis goes, or an angle is.
+    """
+    for pose in raw.poses:
+        place = {"line": pose.line} if raw.has_lines else {"pose": pose.line}
+        far = max(map(abs, pose.position)) * mm
+        if far > _FAR_MM:
+            why = tr("a place is {far:.0f} m from the base; no robot stands there", far=far / 1000)
+            raise UnusableText(why, **place)
+        turned = max(map(abs, pose.uvw_deg))
+        if turned > _TURNED_DEG:
+            why = tr("an angle of {angle:g} degrees is no angle of a flange", angle=turned)
+            raise UnusableText(why, **place)
 
 
 def _undisputed(raw: RawTable, choices: ReadingChoices) -> RawTable:

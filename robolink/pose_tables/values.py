@@ -140,6 +140,7 @@ class RawTable:
         length: The unit, where the file or its format says one.
         stated_length: Whether the file itself says it, and not only the format's definition.
         unit_in_comment: A comment that speaks of a unit which nothing else says.
+        has_lines: Whether ``line`` of its poses is a line; else it counts the poses.
         angle: Unit of angles, separator, decimal sign, columns, ignored, skipped: as of
             :class:`HowRead`.
     """
@@ -156,3 +157,4 @@ class RawTable:
     columns: tuple[str, ...] = ()
     ignored: tuple[str, ...] = ()
     skipped: int = 0
+    has_lines: bool = True

@@ -34,7 +34,8 @@ _TYPES: Final = "E6POS|E3POS|POS|FRAME"
 
 _OURS: Final = re.compile(
     rf"\bDEFDAT\b|\b(?:{_TYPES})\s+\$?\w+\s*(?:\[[^\]\n]*\])?\s*=|\bE[36]AXIS\b|\bE6POS\b"
-    r"|[{,]\s*(?:\w+\s*:\s*)?[XYZABC](?:[ \t]+[+-]?|[+-])[0-9OIl.]",
+    r"|\{\s*(?:\w+\s*:\s*)?[XYZABC](?:[ \t]+[+-]?|[+-])[0-9OIl.]"
+    r"|,\s*[XYZABC](?:[ \t]+[+-]?|[+-])[0-9OIl.][^\n{]*\}",
     re.IGNORECASE,
 )
 _COMMENT: Final = re.compile(r"(?m)^([^;\"\n]*(?:\"[^\"\n]*\"[^;\"\n]*)*);.*")

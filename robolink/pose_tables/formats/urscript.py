@@ -41,6 +41,8 @@ _NO_PLACES: Final = frozenset(
 _JOINTS_OF: Final = frozenset({"movej", "movel", "movep", "movec", "servoj", "speedj", "stopj"})
 _JOINT_NAME: Final = re.compile(r"(?:.*_)?(?:q|qn|qnear|joints?)\d*", re.IGNORECASE)
 _SIX: Final = 6
+_CUT: Final = re.compile(r"\s*(?:(?:global|local)\b[^=\n]*|\w+(?:[ \t]+\w+)?[ \t]*=|[A-Za-z_]\w*)\s*")
+_WORDS: Final = frozenset({"end", "halt", "return", "break", "continue", "pass", "else"})
 
 
 def read_urscript(text: str) -> RawTable | None:
@@ -57,6 +59,9 @@ def read_urscript(text: str) -> RawTable | None:
         or not re.search(r"\bp\s*[\[(]|move|_q\b", text)
     ):
         return None
+    for number, code in enumerate(text.split("\n"), start=1):
+        if _CUT.fullmatch(code) and code.strip() not in _WORDS:
+            raise UnusableText(tr("the line is not whole"), number)
     line_at = line_counter(text)
     poses: list[RawPose] = []
     lengths: set[str] = set()

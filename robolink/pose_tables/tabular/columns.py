@@ -18,11 +18,13 @@ from robolink.pose_tables.tabular.header import (
     COUNTS,
     LENGTHS,
     SKIPPED,
+    WORDS,
     ColumnHead,
+    nearly_named,
     require_each_once,
 )
 from robolink.pose_tables.tabular.rotations import TurnColumns, turn_columns
-from robolink.pose_tables.values import LengthUnit, RawPose, ReadingChoices
+from robolink.pose_tables.values import AngleUnit, LengthUnit, RawPose, ReadingChoices
 
 _BENIGN: Final = frozenset(
     {
@@ -31,6 +33,9 @@ _BENIGN: Final = frozenset(
     }
 )
 """Columns of numbers that nobody takes for a turn."""
+
+_MOST_RAD: Final = 4 * math.pi
+"""Two turns; degrees under the name of radians are beyond it at once."""
 
 _HANDS: Final = {
     **dict.fromkeys(("right", "r", "/r", "righty", "1"), Hand.RIGHT),
@@ -61,6 +66,7 @@ class PoseColumns:
         number: Callable[[object], float],
     ) -> None:
         require_each_once(heads)
+        _refuse_misspelt(heads)
         self._heads = tuple(heads)
         self._number = number
         self._place = {head.meaning: place for place, head in enumerate(heads)}
@@ -110,11 +116,12 @@ class PoseColumns:
         turns = self.turns
         if turns is None:
             raise UnclearText(*self.questions)
-        if not turns.complete:
+        if not turns.complete or "z" not in self._place:
             self._require_nothing_else_turns(rows)
+        self._require_alike(rows)
         places = [self._place[name] for name in turns.names]
         values = [self._values(line, row, places, turns) for line, row in rows]
-        self._require_unit(turns, values)
+        self._require_unit(turns, values, rows)
         found = []
         for (line, row), angles in zip(rows, values, strict=True):
             position, stated = self._position(line, row)
@@ -125,6 +132,20 @@ class PoseColumns:
                 RawPose(line, position, turns.turn(numbers, line), self._given(line, row), stated)
             )
         return found
+
+    def _require_alike(self, rows: Sequence[tuple[int, Sequence[object]]]) -> None:
+        """Refuse a cell that is empty in some rows only: there a number is missing."""
+        frames = [self._place[name] for name in _OF_FRAME if name in self._place]
+        for name, place in self._place.items():
+            if name in ("name", "number", "hand"):
+                continue
+            filled = any(row[place] not in ("", None) for _, row in rows)
+            for line, row in rows if filled else ():
+                # A row may say nothing of all that a robot adds to a pose, as a typed one does.
+                silent = len(frames) > 1 and all(row[one] in ("", None) for one in frames)
+                if row[place] in ("", None) and not (place in frames and silent):
+                    text = self._heads[place].text.strip() or name
+                    raise UnusableText(tr("there is no {name}", name=text), line)
 
     def _position(
         self, line: int, row: Sequence[object]
@@ -156,7 +177,16 @@ class PoseColumns:
                 found.append(self._required(line, row, name))
         return found
 
-    def _require_unit(self, turns: TurnColumns, values: Sequence[Sequence[float | None]]) -> None:
+    def _require_unit(
+        self,
+        turns: TurnColumns,
+        values: Sequence[Sequence[float | None]],
+        rows: Sequence[tuple[int, Sequence[object]]],
+    ) -> None:
+        if turns.angle is AngleUnit.RAD and not turns.vector:
+            for (line, _), row in zip(rows, values, strict=True):
+                if any(abs(angle or 0.0) > _MOST_RAD for angle in row):
+                    raise UnusableText(tr("its angles are too large for radians"), line)
         if turns.unit_said or turns.angle is None:
             return
         numbers = [[angle or 0.0 for angle in row] for row in values]
@@ -165,9 +195,14 @@ class PoseColumns:
             raise UnclearText(which_angle_unit(turns.names))
 
     def _require_nothing_else_turns(self, rows: Sequence[tuple[int, Sequence[object]]]) -> None:
-        """Ask about columns of numbers without a known name: one of them may be a tilt."""
+        """Ask about columns of numbers without a known name: one may be a tilt, or Z."""
+        turns = self.turns
+        used = {*LENGTHS, *WORDS, *COUNTS, *(turns.names if turns else ())}
         for place, head in enumerate(self._heads):
-            if head.meaning != SKIPPED or head.text.strip().lower() in {*_BENIGN, SKIPPED}:
+            if head.meaning in used or head.text.strip().lower() == SKIPPED:
+                continue
+            tilt_only = turns is None or not turns.complete
+            if tilt_only and head.text.strip().lower() in _BENIGN:
                 continue
             numbers = [self._number(row[place]) for _, row in rows]
             counted = {b - a for a, b in itertools.pairwise(numbers)} == {1.0}
@@ -199,6 +234,23 @@ class PoseColumns:
             raise UnusableText(tr("{name} is not a whole number", name=name), line)
 
 
+def _refuse_misspelt(heads: Sequence[ColumnHead]) -> None:
+    """Refuse a column that says nothing, but is one letter away from one that would.
+
+    Raises:
+        UnusableText: There is one.
+    """
+    present = {head.meaning for head in heads}
+    for head in heads:
+        text = head.text.strip()
+        meant = nearly_named(text) if head.meaning == SKIPPED and text != SKIPPED else ""
+        if meant and meant.partition("_")[0] not in present:
+            raise UnusableText(
+                tr("column {name!r} is not known; is {meant!r} meant?", name=text, meant=meant)
+            )
+
+
+_OF_FRAME: Final = ("hand", "local", "tool")
 _NOTHING: Final = frozenset[str]()
 _Z: Final = frozenset({"z_mm"})
 

@@ -177,6 +177,30 @@ def require_each_once(heads: Sequence[ColumnHead], line: int = 0) -> None:
         raise UnusableText(tr("two columns say {name}", name=twice), line)
 
 
+_LONG_NAMES: Final = (
+    *("name", "hand", "number", "local", "tool", "roll", "pitch"),
+    *(f"{axis}_{unit}" for axis in LENGTHS for unit in ("mm", "cm", "in")),
+    *(f"{angle}_{unit}" for angle in ANGLES for unit in ("deg", "rad")),
+)
+"""Names in which one wrong letter shows; ``u`` for example is one letter away from any other."""
+
+
+def nearly_named(text: str) -> str:
+    """Return the name from which a text differs by one letter or two swapped; empty for none."""
+    plain = text.strip().lower()
+    return next((name for name in _LONG_NAMES if _one_slip(plain, name)), "")
+
+
+def _one_slip(text: str, name: str) -> bool:
+    if abs(len(text) - len(name)) > 1 or text == name:
+        return False
+    same = 0
+    while same < min(len(text), len(name)) and text[same] == name[same]:
+        same += 1
+    a, b = text[same:], name[same:]
+    return a[1:] == b[1:] or a[1:] == b or a == b[1:] or (a[:2] == b[1::-1] and a[2:] == b[2:])
+
+
 def names_place(heads: Sequence[ColumnHead]) -> bool:
     """Tell whether columns hold X and Y: then they are a header."""
     return {"x", "y"} <= {head.meaning for head in heads}

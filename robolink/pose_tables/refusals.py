@@ -35,6 +35,16 @@ def at_line(line: int) -> Iterator[None]:
         raise
 
 
+@contextmanager
+def at_pose(number: int) -> Iterator[None]:
+    """Name the number of the pose of a refusal from inside the block that names no place."""
+    try:
+        yield
+    except UnusableText as cause:
+        cause.pose = cause.pose or (0 if cause.line else number)
+        raise
+
+
 class NotFiniteText(UnusableText):
     """Where a finite number belongs there is something else."""
 

@@ -13,10 +13,15 @@ from typing import Final
 from robolink.messages import tr
 from robolink.pose_tables.formats.matrices import pose_of_rows
 from robolink.pose_tables.lengths import metres_question
+from robolink.pose_tables.numbers import number_of
 from robolink.pose_tables.questions import which_columns
-from robolink.pose_tables.refusals import UnclearText, UnusableText
+from robolink.pose_tables.refusals import UnclearText, UnusableText, at_pose
 from robolink.pose_tables.tabular.columns import PoseColumns
 from robolink.pose_tables.tabular.header import (
+    ANGLES,
+    LENGTHS,
+    MATRIX,
+    QUATERNION,
     column_head,
     column_heads,
     named_by_person,
@@ -25,9 +30,13 @@ from robolink.pose_tables.tabular.header import (
 from robolink.pose_tables.values import LengthUnit, RawPose, RawTable, ReadingChoices
 
 _PARTS: Final = ("position", "orientation", "translation", "rotation")
+_LISTED: Final = {"position": "xyz", "translation": "xyz"}
 _NO_POSES: Final = frozenset({"twist", "covariance", "velocity", "header", "accel", "wrench"})
 _NAMES: Final = ("name", "label", "point")
 _DEEPEST: Final = 60
+_COMPONENTS: Final = frozenset({*LENGTHS, *ANGLES, *QUATERNION, *MATRIX})
+_FEWEST_COMPONENTS: Final = 2
+_OF_FRAME: Final = ("hand", "local", "tool")
 
 Found = dict[str, object] | list[list[float]]
 
@@ -49,7 +58,7 @@ def read_json(text: str, choices: ReadingChoices) -> RawTable:
 
 def _documents(text: str) -> Iterator[object]:
     """Yield the documents of a text; a command whose output was appended leaves several."""
-    decoder, place = json.JSONDecoder(), 0
+    decoder, place = json.JSONDecoder(object_pairs_hook=_each_once), 0
     while True:
         while text[place : place + 1].isspace():
             place += 1
@@ -57,6 +66,20 @@ def _documents(text: str) -> Iterator[object]:
         yield document
         if not text[place:].strip():
             return
+
+
+def _each_once(pairs: list[tuple[str, object]]) -> dict[str, object]:
+    """Return an object whose keys are all different.
+
+    Raises:
+        UnusableText: One stands twice; of two values nobody can tell which counts.
+    """
+    found: dict[str, object] = {}
+    for key, value in pairs:
+        if key in found:
+            raise UnusableText(tr("{name} appears twice", name=key))
+        found[key] = value
+    return found
 
 
 def read_document(document: object, choices: ReadingChoices, *, layout: str) -> RawTable:
@@ -85,6 +108,7 @@ class _Made:
         self._ignored: dict[str, None] = {}
         self._angle = ""
         self._from_ros = False
+        self._shape: tuple[frozenset[str], frozenset[str]] | None = None
 
     def pose(self, place: int, one: Found) -> RawPose:
         try:
@@ -105,6 +129,7 @@ class _Made:
             stated_length=length is not None and not self._from_ros,
             angle=self._angle,
             ignored=tuple(self._ignored),
+            has_lines=False,
         )
 
     def _matrix(self, place: int, rows: list[list[float]]) -> RawPose:
@@ -123,6 +148,7 @@ class _Made:
             self._known[keys] = columns
             self._ask(columns, place, one)
         columns = self._known[keys]
+        self._require_alike(one)
         (pose,) = columns.poses([(place, list(one.values()))])
         turns = columns.turns
         if turns is not None:
@@ -132,6 +158,28 @@ class _Made:
         self._lengths.add(LengthUnit.M if columns.from_ros else columns.length)
         self._ignored |= dict.fromkeys(columns.ignored)
         return pose
+
+    def _require_alike(self, one: dict[str, object]) -> None:
+        """Refuse a pose that says less, or more, than the first.
+
+        Raises:
+            UnusableText: A component, or what else a pose has, is in one of them only.
+        """
+        meanings = {column_head(key).meaning: value for key, value in one.items()}
+        for name in _OF_FRAME:
+            if meanings.get(name) == "":
+                raise UnusableText(tr("there is no {name}", name=name))
+        says = frozenset(name for name in meanings if name in (*_COMPONENTS, *_OF_FRAME))
+        filled = frozenset(
+            name
+            for name in says & _COMPONENTS
+            if meanings[name] is not None and meanings[name] != ""
+        )
+        first = self._shape = self._shape or (says, filled)
+        odd = (first[0] ^ says) | (first[1] ^ filled)
+        if odd:
+            names = ", ".join(sorted(name.upper() for name in odd))
+            raise UnusableText(tr("not all poses have {names}", names=names))
 
     def _ask(self, columns: PoseColumns, place: int, one: dict[str, object]) -> None:
         if columns.questions:
@@ -144,6 +192,8 @@ def as_number(value: object) -> float:
     """Return a number, ``nan`` for what is none; a text may hold one."""
     if isinstance(value, bool):
         return math.nan
+    if isinstance(value, str):
+        return number_of(value)
     try:
         return float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError, OverflowError):
@@ -159,8 +209,7 @@ def _poses_in(node: object, name: str, depth: int) -> Iterator[Found]:
         if matrix:
             yield matrix
             return
-        for one in node:
-            yield from _poses_in(one, name, depth + 1)
+        yield from _in_list(node, name, depth)
     if not isinstance(node, dict):
         return
     flat = _flat(node)
@@ -168,10 +217,46 @@ def _poses_in(node: object, name: str, depth: int) -> Iterator[Found]:
     if names_place([column_head(key) for key in flat]):
         yield flat if not called or any(key in flat for key in _NAMES) else {**flat, "name": called}
         return
+    _refuse_damaged(flat)
     inside = {"poses": node["poses"]} if "poses" in node else node
     for key, value in inside.items():
         if key not in _NO_POSES:
             yield from _poses_in(value, called, depth + 1)
+
+
+def _in_list(node: list[object], name: str, depth: int) -> Iterator[Found]:
+    """Yield the poses of a list; where it holds some, all that is in it holds some.
+
+    Raises:
+        UnusableText: Something in it is no pose.
+    """
+    parts = []
+    for number, one in enumerate(node, start=1):
+        with at_pose(number):
+            parts.append(list(_poses_in(one, name, depth + 1)))
+    if any(parts) and not all(parts):
+        raise UnusableText(tr("it is not a pose, as others of its list are"), pose=_first(parts))
+    for part in parts:
+        yield from part
+
+
+def _first(parts: Sequence[list[Found]]) -> int:
+    """Return the number of the first pose that is missing, from 1."""
+    return sum(len(part) for part in parts[: parts.index([])]) + 1
+
+
+def _refuse_damaged(flat: dict[str, object]) -> None:
+    """Refuse an object that has some names of a pose and lacks others.
+
+    Raises:
+        UnusableText: It has two components of a place or a turn, and no X or Y.
+    """
+    numbers = {key: value for key, value in flat.items() if isinstance(value, (int, float, str))}
+    meanings = {column_head(key).meaning for key in numbers}
+    if len(meanings & _COMPONENTS) < _FEWEST_COMPONENTS:
+        return
+    missing = ", ".join(name.upper() for name in ("x", "y") if name not in meanings)
+    raise UnusableText(tr("there is no {name} beside {names}", name=missing, names=", ".join(numbers)))
 
 
 def _flat(node: dict[str, object]) -> dict[str, object]:
@@ -181,8 +266,13 @@ def _flat(node: dict[str, object]) -> dict[str, object]:
         part = str(key).lower()
         if part in _PARTS and isinstance(value, dict):
             flat |= {f"{part}.{inner}": one for inner, one in value.items()}
-        elif part in ("position", "translation") and isinstance(value, list) and len(value) == 3:
-            flat |= {f"{part}.{axis}": one for axis, one in zip("xyz", value, strict=True)}
+        elif part in _LISTED and isinstance(value, list):
+            if len(value) != len(_LISTED[part]):
+                if not {"orientation", "rotation"} & {str(one).lower() for one in node}:
+                    continue  # positions of joints, for example
+                why = tr("{name} holds {count} numbers", name=key, count=len(value))
+                raise UnusableText(why)
+            flat |= {f"{part}.{axis}": one for axis, one in zip(_LISTED[part], value, strict=True)}
         elif part in _PARTS or not isinstance(value, (dict, list)):
             flat[str(key)] = value
     return flat
@@ -230,4 +320,5 @@ def _listed(rows: Sequence[list[object]], choices: ReadingChoices, layout: str) 
         stated_length=columns.length is not None,
         angle=str(turns.angle or "") if turns else "",
         columns=tuple(head.meaning for head in heads),
+        has_lines=False,
     )

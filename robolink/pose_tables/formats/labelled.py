@@ -11,17 +11,23 @@ from typing import Final
 
 from robolink.messages import tr
 from robolink.pose_tables.formats.documents import read_document
-from robolink.pose_tables.tabular.header import MEANINGS
+from robolink.pose_tables.numbers import NUMBER, plain, why_no_number
+from robolink.pose_tables.refusals import UnusableText, at_line
+from robolink.pose_tables.tabular.header import ANGLES, LENGTHS, MEANINGS
 from robolink.pose_tables.tabular.separators import table_lines
 from robolink.pose_tables.values import RawTable, ReadingChoices
 
 _PAIR: Final = re.compile(
     r"(?<![\w.])([A-Za-z][A-Za-z_]{0,11})(\s*[:=]\s*|\s+)"
-    r"([+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?)(?![\w.])\s*(mm|cm|m|in|deg|rad|°)?(?![\w])"
+    rf"({NUMBER})(?![0-9.])\s*(mm|cm|m|in|deg|rad|°)?(?!\w)"
 )
+_LABEL: Final = re.compile(r"(?<![\w.])([A-Za-z][A-Za-z_]{0,11})\s*[:=]")
+_FLAGS: Final = re.compile(r"/\s*(?:[RLABF]|NF|J[1246]F\d+|\d{1,2})(?!\w)")
 _FLAG: Final = re.compile(r"/\s*([RL]|\d+)\b")
 _POSITION_REGISTERS: Final = re.compile(r"\$POSREG\b")
 _FEWEST: Final = 3
+_FEWEST_LABELS: Final = 2
+_COMPONENTS: Final = frozenset({*LENGTHS, *ANGLES})
 
 
 def read_labelled(lines: Sequence[str], choices: ReadingChoices) -> RawTable | None:
@@ -32,10 +38,15 @@ def read_labelled(lines: Sequence[str], choices: ReadingChoices) -> RawTable | N
         UnusableText: A pose is not whole.
     """
     kept, _ = table_lines(lines)
+    if not any(len(_pairs(plain(text))) >= _FEWEST for _, text in kept):
+        return None
     poses: list[dict[str, object]] = []
     name = ""
-    for _, text in kept:
-        found = [pair for pair in _PAIR.finditer(text) if _is_label(pair)]
+    for line, text in kept:
+        text = plain(text)
+        found = _pairs(text)
+        with at_line(line):
+            _refuse_pieces(text, found)
         pairs = [(pair[1], pair[3], pair[4]) for pair in found]
         if len(pairs) < _FEWEST:
             quoted = re.search(r"['\"]([^'\"]+)['\"]", text)
@@ -47,11 +58,11 @@ def read_labelled(lines: Sequence[str], choices: ReadingChoices) -> RawTable | N
             poses.append({"name": called} if called else {})
             name = ""
         elif not poses:
-            return None
+            raise UnusableText(tr("there is no {name}", name="X, Y"), line)
         for label, value, unit in pairs:
             key = f"{label} [{unit}]" if unit else label
             if key in poses[-1]:
-                return None
+                raise UnusableText(tr("{name} appears twice", name=label), line)
             poses[-1][key] = float(value)
         _add_flags(poses[-1], text)
     if not poses:
@@ -59,6 +70,30 @@ def read_labelled(lines: Sequence[str], choices: ReadingChoices) -> RawTable | N
     if choices.euler is None and any(_POSITION_REGISTERS.search(line) for line in lines[:5]):
         choices = replace(choices, euler="fanuc")
     return read_document(poses, choices, layout=tr("values with names"))
+
+
+def _pairs(text: str) -> list[re.Match[str]]:
+    return [pair for pair in _PAIR.finditer(text) if _is_label(pair)]
+
+
+def _refuse_pieces(text: str, found: Sequence[re.Match[str]]) -> None:
+    """Refuse a line of which something looks like a value and is none.
+
+    Raises:
+        UnusableText: A name of a component has no number, or a number has no name.
+    """
+    taken = {pair.start() for pair in found}
+    labels = [one for one in _LABEL.finditer(text) if one[1].lower() in _COMPONENTS]
+    alone = next((one for one in labels if one.start() not in taken), None)
+    if alone is not None and len(labels) >= _FEWEST_LABELS:
+        rest = text[alone.end() :].split(maxsplit=1)
+        raise UnusableText(why_no_number(alone[1], rest[0].rstrip(",;") if rest else ""))
+    if len(found) < _FEWEST:
+        return
+    rest = _FLAGS.sub(" ", _PAIR.sub(" ", text[found[0].start() :]))
+    stray = re.search(r"\S*[0-9*#?\u2212]\S*", rest)
+    if stray:
+        raise UnusableText(tr("{text!r} has no name", text=stray[0]))
 
 
 def _is_label(pair: re.Match[str]) -> bool:

@@ -137,7 +137,7 @@ class PoseColumns:
         """Refuse a cell that is empty in some rows only: there a number is missing."""
         frames = [self._place[name] for name in _OF_FRAME if name in self._place]
         for name, place in self._place.items():
-            if name in ("name", "number", "hand"):
+            if name in ("name", "number"):
                 continue
             filled = any(row[place] not in ("", None) for _, row in rows)
             for line, row in rows if filled else ():

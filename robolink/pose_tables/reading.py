@@ -19,10 +19,12 @@ from robolink.pose_tables.formats.epson_points import read_points_table
 from robolink.pose_tables.formats.indented import looks_indented, read_indented
 from robolink.pose_tables.formats.labelled import read_labelled
 from robolink.pose_tables.formats.matrices import read_matrices
+from robolink.pose_tables.formats.printed_arrays import read_arrays
 from robolink.pose_tables.formats.robot_programs import READERS
 from robolink.pose_tables.formats.spel_points import read_spel
 from robolink.pose_tables.lengths import settled_length
 from robolink.pose_tables.refusals import UnclearText, UnusableText, refused, unclear
+from robolink.pose_tables.tabular.in_columns import read_in_columns
 from robolink.pose_tables.tabular.table import read_table
 from robolink.pose_tables.values import (
     HowRead,
@@ -133,10 +135,16 @@ def _read(text: str, suffix: str, choices: ReadingChoices) -> RawTable:
     raw = read_matrices(lines) if choices.columns is None else None
     if raw is not None:
         return _undisputed(raw, choices)
+    raw = read_arrays("\n".join(lines), choices)
+    if raw is not None:
+        return raw
     if suffix in (".yaml", ".yml") or looks_indented(lines):
         return read_document(read_indented(lines), choices, layout="YAML")
-    raw = read_labelled(lines, choices) if choices.columns is None else None
-    return read_table(lines, choices) if raw is None else raw
+    for named in (read_labelled, read_in_columns):
+        raw = named(lines, choices)
+        if raw is not None:
+            return raw
+    return read_table(lines, choices)
 
 
 def _is_json(text: str) -> bool:

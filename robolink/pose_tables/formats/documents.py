@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from robolink.messages import tr
-from robolink.pose_tables.formats.matrices import pose_of_rows
+from robolink.pose_tables.formats.matrices import is_matrix, pose_of_rows
 from robolink.pose_tables.lengths import metres_question
 from robolink.pose_tables.numbers import number_of
 from robolink.pose_tables.questions import which_columns
@@ -84,9 +84,9 @@ def _each_once(pairs: list[tuple[str, object]]) -> dict[str, object]:
 
 def read_document(document: object, choices: ReadingChoices, *, layout: str) -> RawTable:
     """Return the poses of a document of lists and dictionaries; see :func:`read_json`."""
-    rows = _rows_of_numbers(document)
+    rows = _rows_of_numbers(document, choices)
     if rows:
-        return _listed(rows, choices, layout)
+        return read_rows(list(enumerate(rows, start=1)), choices, layout, has_lines=False)
     found = list(_poses_in(document, "", 0))
     if not found:
         raise UnusableText(tr("there is no pose in it"))
@@ -285,31 +285,61 @@ def _as_matrix(node: list[object]) -> list[list[float]]:
     return rows if all(map(math.isfinite, (v for row in rows for v in row))) else []
 
 
-def _rows_of_numbers(document: object) -> list[list[object]]:
+def _rows_of_numbers(document: object, choices: ReadingChoices) -> list[list[object]]:
     """Return the rows of a list of lists of numbers, none where it is anything else."""
-    if not isinstance(document, list) or not document or _as_matrix(document):
+    if not isinstance(document, list) or not document:
+        return []
+    if choices.columns is None and is_matrix(_as_matrix(document)):
         return []
     rows = [row for row in document if isinstance(row, list)]
     numbers = all(not isinstance(value, (list, dict)) for row in rows for value in row)
     return rows if len(rows) == len(document) and numbers else []
 
 
-def _listed(rows: Sequence[list[object]], choices: ReadingChoices, layout: str) -> RawTable:
-    width = max(map(len, rows))
+def read_rows(
+    rows: Sequence[tuple[int, Sequence[object]]],
+    choices: ReadingChoices,
+    layout: str,
+    *,
+    has_lines: bool,
+) -> RawTable:
+    """Return the poses of rows without names.
+
+    Args:
+        rows: Each with its line, or its number where there are no lines.
+        choices: What a person says; without columns they are asked.
+        layout: Name of the format.
+        has_lines: Whether the numbers of the rows are lines.
+
+    Raises:
+        UnclearText: The columns have to be named.
+        UnusableText: A row is no pose.
+
+    Example:
+        >>> from robolink.pose_tables import ReadingChoices
+        >>> from robolink.pose_tables.formats.documents import read_rows
+        >>> named = ReadingChoices(columns="x,y,u")
+        >>> read_rows([(1, [287.5, 103.25, 90.0])], named, "rows", has_lines=True).poses[0].uvw_deg
+        (90.0, 0.0, 0.0)
+    """
+    width = max(len(row) for _, row in rows)
     if choices.columns is None:
         raise UnclearText(which_columns(width))
     heads = named_by_person(choices.columns)
-    for place, row in enumerate(rows, start=1):
-        if len(row) != len(heads):
-            why = tr(
-                "it has {count} columns, but {wanted} are named", count=len(row), wanted=len(heads)
-            )
-            raise UnusableText(why, pose=place)
     columns = PoseColumns(heads, choices, as_number)
     try:
-        poses = columns.poses(list(enumerate(rows, start=1)))
+        for number, row in rows:
+            if len(row) != len(heads):
+                why = tr(
+                    "it has {count} columns, but {wanted} are named",
+                    count=len(row),
+                    wanted=len(heads),
+                )
+                raise UnusableText(why, number)
+        poses = columns.poses(rows)
     except UnusableText as cause:
-        cause.line, cause.pose = 0, cause.line
+        if not has_lines:
+            cause.line, cause.pose = 0, cause.line
         raise
     turns = columns.turns
     return RawTable(
@@ -320,5 +350,5 @@ def _listed(rows: Sequence[list[object]], choices: ReadingChoices, layout: str) 
         stated_length=columns.length is not None,
         angle=str(turns.angle or "") if turns else "",
         columns=tuple(head.meaning for head in heads),
-        has_lines=False,
+        has_lines=has_lines,
     )

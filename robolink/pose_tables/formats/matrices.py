@@ -37,7 +37,7 @@ def read_matrices(lines: Sequence[str]) -> RawTable | None:
     """
     kept, comments = table_lines(lines)
     blocks, damaged = _blocks(kept, lines)
-    if any(map(_is_matrix, blocks)):
+    if any(is_matrix(rows) for _, _, rows in blocks):
         _refuse_damaged(blocks, damaged)
     if damaged or not blocks or not _one_shape(blocks):
         return None
@@ -64,9 +64,8 @@ def pose_of_rows(rows: Sequence[Sequence[float]], line: int) -> RawPose | None:
     return None if columns is None else _pose(block, by_columns=columns)
 
 
-def _is_matrix(block: Block) -> bool:
-    """Tell whether a block is a matrix of a pose for certain: 0 0 0 1 and a rotation."""
-    rows = block[2]
+def is_matrix(rows: Sequence[Sequence[float]]) -> bool:
+    """Tell whether rows are a matrix of a pose for certain: 0 0 0 1 and a rotation."""
     if len(rows) != 4 or any(len(row) != 4 for row in rows):
         return False
     last_row, last_column = _is_last(rows[3]), _is_last([row[3] for row in rows])

@@ -17,7 +17,7 @@ from robolink.pose_tables.encoding import decoded, lines_of
 from robolink.pose_tables.formats.documents import read_document, read_json
 from robolink.pose_tables.formats.epson_points import read_points_table
 from robolink.pose_tables.formats.indented import looks_indented, read_indented
-from robolink.pose_tables.formats.labelled import read_labelled
+from robolink.pose_tables.formats.labelled import of_joints_only, read_labelled
 from robolink.pose_tables.formats.matrices import read_matrices
 from robolink.pose_tables.formats.printed_arrays import read_arrays
 from robolink.pose_tables.formats.robot_programs import READERS
@@ -140,6 +140,8 @@ def _read(text: str, suffix: str, choices: ReadingChoices) -> RawTable:
         return raw
     if suffix in (".yaml", ".yml") or looks_indented(lines):
         return read_document(read_indented(lines), choices, layout="YAML")
+    if of_joints_only(lines):
+        raise UnusableText(tr("its points are joint angles, and joint angles are not a pose"))
     for named in (read_labelled, read_in_columns):
         raw = named(lines, choices)
         if raw is not None:

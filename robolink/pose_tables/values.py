@@ -29,6 +29,24 @@ class AngleUnit(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
+class ColumnHead:
+    """What one column holds.
+
+    Attributes:
+        meaning: ``x``, ``u``, ``qw``, ``name`` and so on (docs/poses.md), ``-`` for nothing about a
+            pose.
+        unit: The unit that its name says.
+        text: As the file has it.
+        from_ros: Whether the name is that of a ROS message, whose lengths are metres.
+    """
+
+    meaning: str
+    unit: LengthUnit | AngleUnit | None = None
+    text: str = ""
+    from_ros: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class TabledPose:
     """One pose of a file.
 

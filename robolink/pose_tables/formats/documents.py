@@ -24,10 +24,11 @@ from robolink.pose_tables.tabular.header import (
     QUATERNION,
     column_head,
     column_heads,
+    is_joint,
     named_by_person,
     names_place,
 )
-from robolink.pose_tables.values import LengthUnit, RawPose, RawTable, ReadingChoices
+from robolink.pose_tables.values import ColumnHead, LengthUnit, RawPose, RawTable, ReadingChoices
 
 _PARTS: Final = ("position", "orientation", "translation", "rotation")
 _LISTED: Final = {"position": "xyz", "translation": "xyz"}
@@ -35,6 +36,7 @@ _NO_POSES: Final = frozenset({"twist", "covariance", "velocity", "header", "acce
 _NAMES: Final = ("name", "label", "point")
 _DEEPEST: Final = 60
 _COMPONENTS: Final = frozenset({*LENGTHS, *ANGLES, *QUATERNION, *MATRIX})
+_FEWEST_JOINTS: Final = 3
 _FEWEST_COMPONENTS: Final = 2
 _OF_FRAME: Final = ("hand", "local", "tool")
 
@@ -89,9 +91,14 @@ def read_document(document: object, choices: ReadingChoices, *, layout: str) -> 
         return read_rows(list(enumerate(rows, start=1)), choices, layout, has_lines=False)
     found = list(_poses_in(document, "", 0))
     if not found:
+        if _has_joints(document):
+            raise UnusableText(
+                tr(
+                    "there is no pose in it: its values are joint angles, and joint angles are not a "
+                    "pose"
+                )
+            )
         raise UnusableText(tr("there is no pose in it"))
-    if choices.columns is not None:
-        raise UnusableText(tr("columns were given, but the file names its values itself"))
     made = _Made(choices)
     poses = [made.pose(place, one) for place, one in enumerate(found, start=1)]
     return made.table(poses, layout)
@@ -144,7 +151,10 @@ class _Made:
     def _object(self, place: int, one: dict[str, object]) -> RawPose:
         keys = tuple(one)
         if keys not in self._known:
-            columns = PoseColumns(column_heads(keys), self._choices, as_number)
+            heads = column_heads(keys)
+            if self._choices.columns is not None:
+                heads = self._named(heads)
+            columns = PoseColumns(heads, self._choices, as_number)
             self._known[keys] = columns
             self._ask(columns, place, one)
         columns = self._known[keys]
@@ -158,6 +168,26 @@ class _Made:
         self._lengths.add(LengthUnit.M if columns.from_ros else columns.length)
         self._ignored |= dict.fromkeys(columns.ignored)
         return pose
+
+    def _named(self, heads: Sequence[ColumnHead]) -> tuple[ColumnHead, ...]:
+        """Return the columns as a person names them, in the order of the file.
+
+        Raises:
+            UnusableText: They are not as many, or another component than the file names.
+        """
+        named = named_by_person(self._choices.columns or "")
+        if len(named) != len(heads):
+            raise UnusableText(
+                tr(
+                    "it has {count} values, but {wanted} are named",
+                    count=len(heads),
+                    wanted=len(named),
+                )
+            )
+        for own, said in zip(heads, named, strict=True):
+            if own.meaning in LENGTHS and own.meaning != said.meaning:
+                raise UnusableText(tr("columns were given, but the file names its values itself"))
+        return named
 
     def _require_alike(self, one: dict[str, object]) -> None:
         """Refuse a pose that says less, or more, than the first.
@@ -185,7 +215,10 @@ class _Made:
         if columns.questions:
             silent = columns.length is None and not columns.from_ros and not self._choices.length
             asked = metres_question(columns.positions([(place, list(one.values()))]))
-            raise UnclearText(*columns.questions, *([asked] if silent and asked else []))
+            raise UnclearText(
+                *columns.asked([(place, list(one.values()))]),
+                *([asked] if silent and asked else []),
+            )
 
 
 def as_number(value: object) -> float:
@@ -224,6 +257,22 @@ def _poses_in(node: object, name: str, depth: int) -> Iterator[Found]:
             yield from _poses_in(value, called, depth + 1)
 
 
+def _has_joints(node: object, depth: int = 0) -> bool:
+    """Tell whether a document holds values of joints somewhere."""
+    if depth > _DEEPEST or not isinstance(node, (dict, list)):
+        return False
+    if isinstance(node, dict):
+        if sum(map(is_joint, map(str, node))) >= _FEWEST_JOINTS:
+            return True
+        of_joints = any("joint" in str(key).lower() and node[key] for key in node)
+        names = node.get("name")
+        state = isinstance(names, list) and isinstance(node.get("position"), list)
+        if of_joints or state:
+            return True
+    inside = node.values() if isinstance(node, dict) else node
+    return any(_has_joints(one, depth + 1) for one in inside)
+
+
 def _in_list(node: list[object], name: str, depth: int) -> Iterator[Found]:
     """Yield the poses of a list; where it holds some, all that is in it holds some.
 
@@ -256,7 +305,9 @@ def _refuse_damaged(flat: dict[str, object]) -> None:
     if len(meanings & _COMPONENTS) < _FEWEST_COMPONENTS:
         return
     missing = ", ".join(name.upper() for name in ("x", "y") if name not in meanings)
-    raise UnusableText(tr("there is no {name} beside {names}", name=missing, names=", ".join(numbers)))
+    raise UnusableText(
+        tr("there is no {name} beside {names}", name=missing, names=", ".join(numbers))
+    )
 
 
 def _flat(node: dict[str, object]) -> dict[str, object]:
@@ -324,7 +375,10 @@ def read_rows(
     """
     width = max(len(row) for _, row in rows)
     if choices.columns is None:
-        raise UnclearText(which_columns(width))
+        numbers = [[as_number(value) for value in row] for _, row in rows if len(row) == width]
+        numeric = [all(map(math.isfinite, column)) for column in zip(*numbers, strict=True)]
+        kept = [[v for v, n in zip(row, numeric, strict=True) if n] for row in numbers]
+        raise UnclearText(which_columns(numeric, kept))
     heads = named_by_person(choices.columns)
     columns = PoseColumns(heads, choices, as_number)
     try:

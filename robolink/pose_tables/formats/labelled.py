@@ -22,6 +22,10 @@ _PAIR: Final = re.compile(
     rf"({NUMBER})(?![0-9.])\s*(mm|cm|m|in|deg|rad|°)?(?!\w)"
 )
 _LABEL: Final = re.compile(r"(?<![\w.])([A-Za-z][A-Za-z_]{0,11})\s*[:=]")
+_JOINT_VALUE: Final = re.compile(
+    r"(?:^|(?<=[\s,;{]))((?:j|jt|joint|axis|a|q|theta)[_ ]?[1-7])\s*[:=]\s*[+-]?[.0-9]",
+    re.IGNORECASE | re.MULTILINE,
+)
 _FLAGS: Final = re.compile(r"/\s*(?:[RLABF]|NF|J[1246]F\d+|\d{1,2})(?!\w)")
 _FLAG: Final = re.compile(r"/\s*([RL]|\d+)\b")
 _POSITION_REGISTERS: Final = re.compile(r"\$POSREG\b")
@@ -70,6 +74,15 @@ def read_labelled(lines: Sequence[str], choices: ReadingChoices) -> RawTable | N
     if choices.euler is None and any(_POSITION_REGISTERS.search(line) for line in lines[:5]):
         choices = replace(choices, euler="fanuc")
     return read_document(poses, choices, layout=tr("values with names"))
+
+
+def of_joints_only(lines: Sequence[str]) -> bool:
+    """Tell whether values are those of joints: ``J1: 0.0 J2: -90.0 ..``, or one a line."""
+    text = "\n".join(lines)
+    if {"x", "y"} <= {found[1].lower() for found in _LABEL.finditer(text)}:
+        return False
+    named = {found[1].lower() for found in _JOINT_VALUE.finditer(text)}
+    return len(named) >= _FEWEST
 
 
 def _pairs(text: str) -> list[re.Match[str]]:

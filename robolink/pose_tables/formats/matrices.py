@@ -80,16 +80,16 @@ def _refuse_damaged(blocks: Sequence[Block], damaged: Sequence[int]) -> None:
         UnusableText: A line holds other numbers than four, or a block other lines.
     """
     odd = next((line for line, _, rows in blocks if {len(rows), *map(len, rows)} != {4}), 0)
-    row = next((line + at for line, _, rows in blocks for at, r in enumerate(rows) if len(r) != 4), 0)
+    row = next(
+        (line + at for line, _, rows in blocks for at, r in enumerate(rows) if len(r) != 4), 0
+    )
     lines = [line for line in (*damaged[:1], odd, row) if line]
     if lines:
         line = min(damaged[0] if damaged else row or odd, row or odd or damaged[0])
         raise UnusableText(tr("the matrix does not hold four lines of four numbers"), line)
 
 
-def _blocks(
-    kept: Sequence[tuple[int, str]], lines: Sequence[str]
-) -> tuple[list[Block], list[int]]:
+def _blocks(kept: Sequence[tuple[int, str]], lines: Sequence[str]) -> tuple[list[Block], list[int]]:
     """Return runs of lines of numbers, and lines that seem to hold damaged ones.
 
     Four lines make a block where no blank line ends one.

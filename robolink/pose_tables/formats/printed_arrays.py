@@ -46,7 +46,9 @@ def read_arrays(text: str, choices: ReadingChoices) -> RawTable | None:
     width = len(rows[0][1])
     for line, numbers in rows:
         if len(numbers) != width:
-            why = tr("a row holds {count} numbers, the first {wanted}", count=len(numbers), wanted=width)
+            why = tr(
+                "a row holds {count} numbers, the first {wanted}", count=len(numbers), wanted=width
+            )
             raise UnusableText(why, line)
     layout = tr("printed arrays")
     if choices.columns is None:

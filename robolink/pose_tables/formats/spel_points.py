@@ -104,7 +104,9 @@ def _refuse_other_flags(poses: Sequence[RawPose]) -> None:
     for key in ("hand", "local"):
         without = [pose for pose in poses if key not in pose.given]
         if len(without) == 1 and len(poses) >= _FEWEST_ALIKE:
-            raise UnusableText(tr("there is no {name}, as all others have", name=key), without[0].line)
+            raise UnusableText(
+                tr("there is no {name}, as all others have", name=key), without[0].line
+            )
 
 
 def _is_piece(text: str) -> bool:

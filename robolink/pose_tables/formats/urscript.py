@@ -41,7 +41,9 @@ _NO_PLACES: Final = frozenset(
 _JOINTS_OF: Final = frozenset({"movej", "movel", "movep", "movec", "servoj", "speedj", "stopj"})
 _JOINT_NAME: Final = re.compile(r"(?:.*_)?(?:q|qn|qnear|joints?)\d*", re.IGNORECASE)
 _SIX: Final = 6
-_CUT: Final = re.compile(r"\s*(?:(?:global|local)\b[^=\n]*|\w+(?:[ \t]+\w+)?[ \t]*=|[A-Za-z_]\w*)\s*")
+_CUT: Final = re.compile(
+    r"\s*(?:(?:global|local)\b[^=\n]*|\w+(?:[ \t]+\w+)?[ \t]*=|[A-Za-z_]\w*)\s*"
+)
 _WORDS: Final = frozenset({"end", "halt", "return", "break", "continue", "pass", "else"})
 
 

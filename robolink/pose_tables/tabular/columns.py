@@ -102,6 +102,25 @@ class PoseColumns:
         """Names of columns that say nothing about a pose."""
         return tuple(h.text.strip() for h in self._heads if h.meaning == SKIPPED and h.text.strip())
 
+    def asked(self, rows: Sequence[tuple[int, Sequence[object]]]) -> list[OpenQuestion]:
+        """Return the questions, with examples that fit the rows."""
+        if any(question.about == "columns" for question in self.questions):
+            rest = [question for question in self.questions if question.about != "columns"]
+            return [which_rotation(self._heads, self._numeric(rows)), *rest]
+        return list(self.questions)
+
+    def _numeric(self, rows: Sequence[tuple[int, Sequence[object]]]) -> list[bool]:
+        """Tell for each column whether it holds numbers throughout."""
+        return [
+            bool(rows) and all(math.isfinite(self._number(row[place])) for _, row in rows)
+            for place in range(len(self._heads))
+        ]
+
+    @property
+    def heads(self) -> tuple[ColumnHead, ...]:
+        """All columns."""
+        return self._heads
+
     def positions(self, rows: Iterable[tuple[int, Sequence[object]]]) -> list[tuple[float, ...]]:
         """Return X, Y, Z of rows, 0 where there is no Z."""
         return [self._position(line, row)[0] for line, row in rows]
@@ -192,7 +211,7 @@ class PoseColumns:
         numbers = [[angle or 0.0 for angle in row] for row in values]
         doubtful = may_be_degrees(numbers) if turns.vector else may_be_radians(numbers)
         if doubtful:
-            raise UnclearText(which_angle_unit(turns.names))
+            raise UnclearText(which_angle_unit(self._heads, turns.names))
 
     def _require_nothing_else_turns(self, rows: Sequence[tuple[int, Sequence[object]]]) -> None:
         """Ask about columns of numbers without a known name: one may be a tilt, or Z."""
@@ -207,7 +226,7 @@ class PoseColumns:
             numbers = [self._number(row[place]) for _, row in rows]
             counted = {b - a for a, b in itertools.pairwise(numbers)} == {1.0}
             if numbers and all(map(math.isfinite, numbers)) and not counted:
-                raise UnclearText(which_rotation([h.text.strip() for h in self._heads]))
+                raise UnclearText(which_rotation(self._heads, self._numeric(rows)))
 
     def _given(self, line: int, row: Sequence[object]) -> dict[str, object]:
         given: dict[str, object] = {}

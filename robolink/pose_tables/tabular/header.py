@@ -2,12 +2,11 @@
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Final
 
 from robolink.messages import tr
 from robolink.pose_tables.refusals import UnusableText
-from robolink.pose_tables.values import AngleUnit, LengthUnit
+from robolink.pose_tables.values import AngleUnit, ColumnHead, LengthUnit
 
 SKIPPED: Final = "-"
 
@@ -68,24 +67,13 @@ _TAILED: Final = re.compile(r"(.+?)(?:[_\s/]|, )(?:in )?([a-z°º\"]+\.?)")
 _ROS_TOPIC: Final = re.compile(
     r"(?:.*[./])?(position|orientation|translation|rotation)[./]([xyzw])", re.IGNORECASE
 )
-_JOINT: Final = re.compile(r"(?:j|joint|axis|achse|a|e|q|theta)[_ ]?[1-7]", re.IGNORECASE)
-
-
-@dataclass(frozen=True, slots=True)
-class ColumnHead:
-    """What one column holds.
-
-    Attributes:
-        meaning: One of :data:`MEANINGS`, ``-`` for nothing about a pose.
-        unit: The unit that its name says.
-        text: As the file has it.
-        from_ros: Whether the name is that of a ROS message, whose lengths are metres.
-    """
-
-    meaning: str
-    unit: LengthUnit | AngleUnit | None = None
-    text: str = ""
-    from_ros: bool = False
+_JOINT: Final = re.compile(
+    r"(?:j|jt|joint|axis|achse|a|e|q|theta|j_)[_ ]?[1-7](?:[_ ]?(?:deg|rad|angle|pos|position))?"
+    r"|(?:joint|axis)[_ ]?[slurbt]|(?:base|shoulder|elbow|wrist)(?:[_ ](?:pan|lift|[1-3]))?"
+    r"(?:[_ ]joint)?|wrist[1-3]|\u5173\u8282\s?[1-7]|\u8f74\s?[1-7]",
+    re.IGNORECASE,
+)
+_UNIT_BEHIND: Final = re.compile(r"\s*[(\[].*[)\]]\s*$")
 
 
 def column_head(text: str) -> ColumnHead:
@@ -208,8 +196,13 @@ def names_place(heads: Sequence[ColumnHead]) -> bool:
 
 def are_joints(names: Sequence[str]) -> bool:
     """Tell whether most columns are called like joints."""
-    called = [name for name in names if _JOINT.fullmatch(name.strip())]
+    called = [name for name in names if is_joint(name)]
     return len(called) >= 3 and len(called) * 2 >= len(names)
+
+
+def is_joint(name: str) -> bool:
+    """Tell whether something is called like a joint, with a unit behind it or without."""
+    return _JOINT.fullmatch(_UNIT_BEHIND.sub("", name).strip()) is not None
 
 
 def _meaning(plain: str) -> str:

@@ -69,6 +69,10 @@ def read_in_columns(lines: Sequence[str], choices: ReadingChoices) -> RawTable |
     separator, rows = found
     rows = _with_units(rows)
     count = len(next(row.cells for row in rows if _meaning(row.label) == "x"))
+    first = rows[0]
+    if separator == " " and not _meaning(first.label) and len(first.cells) == count - 1:
+        # Blanks in front of the names of the poses are no cell.
+        rows[0] = _Line(first.line, "", [first.label, *first.cells])
     form = TableForm(separator, _decimal(rows))
     heads, values = [], list[list[str]]()
     for row in rows:
@@ -94,11 +98,17 @@ def _turned(
     if choices.columns is not None:
         named = named_by_person(choices.columns)
         if len(named) != len(heads):
-            why = tr("it has {count} lines with a name, but {wanted} are named", count=len(heads), wanted=len(named))
+            why = tr(
+                "it has {count} lines with a name, but {wanted} are named",
+                count=len(heads),
+                wanted=len(named),
+            )
             raise UnusableText(why)
     columns = PoseColumns(named, choices, lambda cell: form.number(str(cell)))
     try:
-        poses = columns.poses([(at, list(row)) for at, row in enumerate(zip(*values, strict=True), 1)])
+        poses = columns.poses(
+            [(at, list(row)) for at, row in enumerate(zip(*values, strict=True), 1)]
+        )
     except UnusableText as cause:
         cause.line, cause.pose = 0, cause.line
         raise

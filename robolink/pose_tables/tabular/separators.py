@@ -183,11 +183,7 @@ def _columns_of_numbers(form: TableForm, lines: Sequence[Line]) -> int:
     widths = Counter(without_trailing([row]) for row in rows)
     width = max(widths, key=lambda one: (widths[one], one))
     values = [[*row, *[""] * width][:width] for row in rows if without_trailing([row]) == width]
-    columns = [
-        place
-        for place in range(width)
-        if _mostly_numbers([row[place] for row in values])
-    ]
+    columns = [place for place in range(width) if _mostly_numbers([row[place] for row in values])]
     numbers = [row[place] for row in values for place in columns if is_number(row[place])]
     signs = Counter(sign for cell in numbers if (sign := decimal_sign(cell)))
     other = "." if form.decimal == "," else ","

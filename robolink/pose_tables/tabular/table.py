@@ -14,7 +14,9 @@ from robolink.pose_tables.questions import unit_in, which_angle_unit, which_colu
 from robolink.pose_tables.refusals import UnclearText, UnusableText, at_line
 from robolink.pose_tables.tabular.columns import PoseColumns
 from robolink.pose_tables.tabular.header import (
+    ANGLES,
     COUNTS,
+    LENGTHS,
     SKIPPED,
     WORDS,
     ColumnHead,
@@ -95,10 +97,10 @@ def _ask(
     columns: PoseColumns, body: Sequence[Row], choices: ReadingChoices, comments: Sequence[str]
 ) -> None:
     """Ask all that the columns leave open at once."""
-    questions = list(columns.questions)
+    questions = columns.asked(body)
     turns = columns.turns
     if turns and turns.angle and not turns.unit_said and unit_in(comments, angle=True):
-        questions.append(which_angle_unit(turns.names))
+        questions.append(which_angle_unit(columns.heads, turns.names))
     if questions:
         if choices.length is None and columns.length is None and not columns.from_ros:
             speaks = unit_in(comments, angle=False)
@@ -136,7 +138,10 @@ def _headed(
     if heads:
         _refuse_rows(above)
         return heads, body, 0
-    raise UnclearText(which_columns(width))
+    cells = [[*row, *[""] * width][:width] for _, row in body]
+    numeric = [all(map(is_number, column)) for column in zip(*cells, strict=True)]
+    values = [[form.number(c) for c, n in zip(row, numeric, strict=True) if n] for row in cells]
+    raise UnclearText(which_columns(numeric, values))
 
 
 def _trimmed(heads: tuple[ColumnHead, ...], width: int) -> tuple[ColumnHead, ...]:
@@ -236,9 +241,9 @@ def _refuse_strays(heads: Sequence[ColumnHead], body: Sequence[Row], form: Table
 
 
 def _refuse_cut(heads: Sequence[ColumnHead], body: Sequence[Row], form: TableForm) -> None:
-    """Refuse a number without decimals where all others of its column have three or more.
+    """Refuse a number without decimals where all others of its column have as many, three or more.
 
-    It was cut, or lost its point; a program prints both alike.
+    A program prints all alike, so it was cut or lost its point. 0 is printed short now and then.
 
     Raises:
         UnusableText: There is one.
@@ -246,20 +251,17 @@ def _refuse_cut(heads: Sequence[ColumnHead], body: Sequence[Row], form: TableFor
     if len(body) < _FEWEST_ALIKE:
         return
     for place, head in enumerate(heads):
-        if head.meaning in (SKIPPED, *WORDS, *COUNTS):
+        if head.meaning not in (*LENGTHS, *ANGLES):
             continue
-        cells = [cells[place] for _, cells in body]
-        whole = [at for at, cell in enumerate(cells) if _decimals(cell, form) < _FEW_DECIMALS]
-        if len(whole) != 1 or _decimals(cells[whole[0]], form) or form.number(cells[whole[0]]) == 0:
+        decimals = Counter(_decimals(cells[place], form) for _, cells in body)
+        usual = max(decimals)
+        if usual < _FEW_DECIMALS or decimals != {usual: len(body) - 1, 0: 1}:
             continue
-        if not math.isnan(form.number(cells[whole[0]])):
-            raise UnusableText(
-                tr(
-                    "{value} has no decimals, and all others of its column have",
-                    value=cells[whole[0]],
-                ),
-                body[whole[0]][0],
-            )
+        for line, cells in body:
+            cell = cells[place]
+            if not _decimals(cell, form) and math.isfinite(form.number(cell)) and form.number(cell):
+                why = tr("{value} has no decimals, and all others of its column have", value=cell)
+                raise UnusableText(why, line)
 
 
 def _decimals(cell: str, form: TableForm) -> int:

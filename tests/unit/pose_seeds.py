@@ -43,9 +43,7 @@ def _abb(n, x, y, z, q1, q2, q3, q4):
 
 
 def _abb_pose(n, x, y, z, q1, q2, q3, q4):
-    return (
-        f"  VAR pose p{n}:=[[{x:.3f},{y:.3f},{z:.3f}],[{q1:.9f},{q2:.9f},{q3:.9f},{q4:.9f}]];\n"
-    )
+    return f"  VAR pose p{n}:=[[{x:.3f},{y:.3f},{z:.3f}],[{q1:.9f},{q2:.9f},{q3:.9f},{q4:.9f}]];\n"
 
 
 def _fanuc(n, x, y, z, u, v, w):
@@ -80,9 +78,7 @@ def _spel(n, x, y, z, u, v, w):
 
 
 def _where(n, x, y, z, u, v, w):
-    return (
-        f"Pin {n}: X: {x:.3f} Y: {y:.3f} Z: {z:.3f} U: {u:.3f} V: {v:.3f} W: {w:.3f} /R /0\n"
-    )
+    return f"Pin {n}: X: {x:.3f} Y: {y:.3f} Z: {z:.3f} U: {u:.3f} V: {v:.3f} W: {w:.3f} /R /0\n"
 
 
 def _ros(n, x, y, z, q1, q2, q3, q4):
@@ -114,8 +110,12 @@ def _numpy(rows, form=lambda value: f"{value: .8e}"):
 def _thousands(rows):
     lines = ["X;Y;Z;U"]
     for x, y, z, u in rows:
-        grouped = [f"{v:,.3f}".replace(",", "_").replace(".", ",").replace("_", ".") for v in (x, y)]
-        lines.append(";".join([*grouped, f"{z:.3f}".replace(".", ","), f"{u:.1f}".replace(".", ",")]))
+        grouped = [
+            f"{v:,.3f}".replace(",", "_").replace(".", ",").replace("_", ".") for v in (x, y)
+        ]
+        lines.append(
+            ";".join([*grouped, f"{z:.3f}".replace(".", ","), f"{u:.1f}".replace(".", ",")])
+        )
     return "\n".join(lines) + "\n"
 
 
@@ -128,8 +128,14 @@ def _message(x, y, z, q1, q2, q3, q4):
 SEEDS = {
     "kuka.dat": ("DEFDAT PIN\n" + _each(_kuka) + "ENDDAT\n", {}),
     "kuka.src": ("DEF PIN()\nPTP XHOME\n" + _each(_kuka_moves) + "END\n", {}),
-    "kuka.txt": ("".join(_each(_kuka).splitlines(keepends=True)[::2]).replace("DECL E6POS ", ""), {}),
-    "abb.mod": ("MODULE Pin\n  PROC main()\n" + _each(_abb, _with(QUATERNIONS)) + "  ENDPROC\nENDMODULE\n", {}),
+    "kuka.txt": (
+        "".join(_each(_kuka).splitlines(keepends=True)[::2]).replace("DECL E6POS ", ""),
+        {},
+    ),
+    "abb.mod": (
+        "MODULE Pin\n  PROC main()\n" + _each(_abb, _with(QUATERNIONS)) + "  ENDPROC\nENDMODULE\n",
+        {},
+    ),
     "abb_pose.mod": ("MODULE Pin\n" + _each(_abb_pose, _with(QUATERNIONS)) + "ENDMODULE\n", {}),
     "fanuc.ls": (_each(_fanuc), {}),
     "posreg.va": (
@@ -152,7 +158,9 @@ SEEDS = {
     "columns.csv": (_columns(PLANAR, ("X [mm]", "Y [mm]", "Z [mm]", "U [deg]"), ";", ","), {}),
     "columns.txt": (_columns(TILTED, "XYZABC", "\t"), {"euler": "kuka"}),
     "thousands.csv": (
-        _thousands(((1131.9, 1103.25, -50, 0.0), (1140.5, 1087.5, -50, 90.0), (999.25, 1000, -50, 5.5))),
+        _thousands(
+            ((1131.9, 1103.25, -50, 0.0), (1140.5, 1087.5, -50, 90.0), (999.25, 1000, -50, 5.5))
+        ),
         {},
     ),
     "quaternions.csv": (

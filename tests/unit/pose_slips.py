@@ -15,7 +15,10 @@ from pathlib import Path
 from robolink.errors import AmbiguousPosesError, CalibrationError, ConfigError
 from robolink.pose_tables import ReadingChoices, read_poses
 
-NUMBER = re.compile(r"(?<![\w.])[+-]?(?:\d+(?:[.,]\d*)?|\.\d+)(?:[eE][+-]?\d+)?(?![\w])")
+NUMBER = re.compile(
+    r"(?<![\w.])[+-]?(?:\d{1,3}(?:\.\d{3})+,\d+|(?:\d+(?:[.,]\d*)?|\.\d+)(?:[eE][+-]?\d+)?)"
+    r"(?![\w.])(?<![,])|(?<![\w.])[+-]?\d+\.\d+(?=mm|rad|deg)"
+)
 WORD = re.compile(r"[A-Za-z_]+")
 SIGNS = "{}[]()<>,;:=\"'/"
 OTHER = {"{": "(", "}": ")", "[": "(", "]": ")", "(": "[", ")": "]", ",": ";", ";": ",", ":": ";"}
@@ -66,13 +69,12 @@ def _pieces(text: str) -> Iterator[tuple[str, int, int, str]]:
         end = begin + len(line)
         for share in (0.1, 0.25, 0.5, 0.75, 0.9):
             cut = begin + int(len(line) * share)
+            if not text[begin:cut].strip() or not text[cut:end].strip():
+                continue  # the whole line is gone
             # Inside the first or the last number a cut only makes another number of it.
-            inside = any(
-                found.start() < cut < found.end()
-                and not (line[: found.start() - begin].strip() and line[found.end() - begin :].strip())
-                for found in NUMBER.finditer(text, begin, end)
-            )
-            if line.strip() and begin < cut < end and not inside:
+            numbers = [found.span() for found in NUMBER.finditer(text, begin, end)]
+            last = [one for one in numbers if not re.search(r"\d[.,]\d", text[one[1] : end])]
+            if not any(first < cut < after for first, after in (*numbers[:1], *last)):
                 yield "rest of line lost", cut, end, ""
                 yield "begin of line lost", begin, cut, ""
                 yield "line in two", cut, cut, "\n"

@@ -52,6 +52,7 @@ _STRUCTURE: Final = re.compile(
     r"\s*(?:%%%|VERSION|LANGUAGE|(?:LOCAL\s+)?(?:PROC|FUNC|TRAP|RECORD)\b|MODULE\b|END\w+|\w+\s*:$)",
     re.IGNORECASE,
 )
+_GOES_ON: Final = re.compile(r"\s*(?:[\w.+\-]+,|[\])])")
 _ROUTINE: Final = re.compile(r"\s*(?:LOCAL\s+)?(?:PROC|FUNC|TRAP)\b", re.IGNORECASE)
 _NUMBERS: Final = re.compile(r"(?:^|[,\[:=])\s*[+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?(?=\s*[,\];]|\s*$)")
 _FEWEST_NUMBERS: Final = 6
@@ -172,12 +173,16 @@ def _are_joints(value: "Value") -> bool:
 def _refuse_pieces(rest: str) -> None:
     """Refuse what is left of a target: cut short, or without its brackets."""
     data = re.search(r"\bMODULE\b", rest, re.IGNORECASE) is not None
+    complete = True
     for number, line in enumerate(rest.split("\n"), start=1):
         data = data and not _ROUTINE.match(line)
         ended = line.rstrip()[-1:] in ("", ";")
         whole = ended or _STRUCTURE.match(line) is not None
-        if _NO_VALUE.search(line) or (not whole and (data or _DECLARES.match(line))):
+        headless = complete and _GOES_ON.match(line) is not None
+        cut = not whole and (data or _DECLARES.match(line) is not None)
+        if _NO_VALUE.search(line) or headless or cut:
             raise UnusableText(tr("the line is not whole"), number)
+        complete = whole
         if len(_NUMBERS.findall(line)) >= _FEWEST_NUMBERS:
             raise UnusableText(tr("its brackets do not match"), number)
 

@@ -89,7 +89,8 @@ def read_document(document: object, choices: ReadingChoices, *, layout: str) -> 
     rows = _rows_of_numbers(document, choices)
     if rows:
         return read_rows(list(enumerate(rows, start=1)), choices, layout, has_lines=False)
-    found = list(_poses_in(document, "", 0))
+    with at_pose(1):
+        found = list(_poses_in(document, "", 0))
     if not found:
         if _has_joints(document):
             raise UnusableText(

@@ -27,10 +27,12 @@ _JOINT_VALUE: Final = re.compile(
     re.IGNORECASE | re.MULTILINE,
 )
 _FLAGS: Final = re.compile(r"/\s*(?:[RLABF]|NF|J[1246]F\d+|\d{1,2})(?!\w)")
+_FLAG_TWICE: Final = re.compile(r"[0-9]\s+//\s?(?:[RLABF]|NF|\d{1,2})(?:\s|$)")
 _FLAG: Final = re.compile(r"/\s*([RL]|\d+)\b")
 _POSITION_REGISTERS: Final = re.compile(r"\$POSREG\b")
 _FEWEST: Final = 3
 _FEWEST_LABELS: Final = 2
+_CERTAIN: Final = frozenset({*LENGTHS, "u", "v", "w", "rx", "ry", "rz"})
 _COMPONENTS: Final = frozenset({*LENGTHS, *ANGLES})
 
 
@@ -44,6 +46,9 @@ def read_labelled(lines: Sequence[str], choices: ReadingChoices) -> RawTable | N
     kept, _ = table_lines(lines)
     if not any(len(_pairs(plain(text))) >= _FEWEST for _, text in kept):
         return None
+    for line, text in enumerate(lines, start=1):
+        if _FLAG_TWICE.search(text):
+            raise UnusableText(tr("{text!r} is no hand and no local", text="//"), line)
     poses: list[dict[str, object]] = []
     name = ""
     for line, text in kept:
@@ -61,6 +66,10 @@ def read_labelled(lines: Sequence[str], choices: ReadingChoices) -> RawTable | N
             called = before or name
             poses.append({"name": called} if called else {})
             name = ""
+        elif poses and re.search(r"\d", text[: found[0].start()]):
+            raise UnusableText(
+                tr("{text!r} has no name", text=text[: found[0].start()].strip()), line
+            )
         elif not poses:
             raise UnusableText(tr("there is no {name}", name="X, Y"), line)
         for label, value, unit in pairs:
@@ -102,7 +111,14 @@ def _refuse_pieces(text: str, found: Sequence[re.Match[str]]) -> None:
         rest = text[alone.end() :].split(maxsplit=1)
         raise UnusableText(why_no_number(alone[1], rest[0].rstrip(",;") if rest else ""))
     if len(found) < _FEWEST:
+        if any(pair[1].lower() in _CERTAIN and pair[2].strip() for pair in found):
+            raise UnusableText(tr("the pose is not whole"))
         return
+    behind = text[found[-1].end() :].strip(" \t,;)]}")
+    if re.search(r"/|^[RL]\b", behind) and not re.fullmatch(
+        rf"(?:\s*{_FLAGS.pattern}\s*)*", behind
+    ):
+        raise UnusableText(tr("{text!r} is no hand and no local", text=behind))
     rest = _FLAGS.sub(" ", _PAIR.sub(" ", text[found[0].start() :]))
     stray = re.search(r"\S*[0-9*#?\u2212]\S*", rest)
     if stray:

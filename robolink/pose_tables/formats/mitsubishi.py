@@ -1,7 +1,7 @@
 """Position variables of MELFA BASIC, Mitsubishi: ``P1=(+300.00,+100.00,..,+90.00)(7,0)``.
 
 mm and degrees; A, B and C turn about X, Y and Z: R = Rz(C) Ry(B) Rx(A) (docs/reference/pose_files.md
-1). Up to two numbers for additional axes may follow; the second brackets hold the flags of the
+1). Two numbers for additional axes may follow; the second brackets hold the flags of the
 posture and of turns. ``J1=(..)`` are joint angles. The tool is not in it.
 """
 
@@ -35,6 +35,7 @@ _JOINTS: Final = re.compile(
     rf"{_STEP}J\w*\s*(?:\(\s*[0-9]+\s*\))?\s*=\s*\([^()]*\)\s*", re.IGNORECASE
 )
 _NUMBERED: Final = re.compile(r"P[0-9]+", re.IGNORECASE | re.ASCII)
+_END: Final = re.compile(r"^\)|\(\s*[0-9]+\s*,\s*-?[0-9]+\s*\)$|^[+-]?[0-9.]+\)?$", re.ASCII)
 _FORMULA: Final = re.compile(
     rf"{_STEP}P\w*\s*(?:\(\s*\w+\s*\))?\s*=\s*[A-Za-z]\w*(?:[^(\n]|\(\s*\w+\s*\))*", re.I
 )
@@ -54,7 +55,7 @@ def read_mitsubishi(text: str) -> RawTable | None:
     if not _OURS.search(text) or re.search(r"=\s*XY\s*\(", text, re.IGNORECASE):
         return None
     poses: list[RawPose] = []
-    skipped, names = 0, set[str]()
+    skipped, names, counts = 0, set[str](), set[int]()
     for line, whole in enumerate(text.split("\n"), start=1):
         code = whole.partition("'")[0]
         if not code.strip():
@@ -66,6 +67,9 @@ def read_mitsubishi(text: str) -> RawTable | None:
             if name in names:
                 raise UnusableText(tr("{name} appears twice", name=name), line)
             names.add(name)
+            counts.add(code.count(","))
+            if len(counts) > 1:
+                raise UnusableText(tr("it holds other numbers than the positions above"), line)
             poses.append(pose)
         elif _JOINTS.fullmatch(code):
             skipped += 1
@@ -80,14 +84,15 @@ def read_mitsubishi(text: str) -> RawTable | None:
 
 def _is_cut(code: str) -> bool:
     """Tell whether a line is the beginning of a position and no more."""
-    return bool(_NUMBERED.fullmatch(code.strip())) or code.strip().upper() == "P"
+    code = code.strip()
+    return bool(_NUMBERED.fullmatch(code) or _END.search(code)) or code.upper() == "P"
 
 
 def _position(found: re.Match[str], line: int) -> RawPose:
     parts = found["values"].split(",")
-    if not _FEWEST <= len(parts) <= len(_COMPONENTS):
+    if len(parts) not in (_FEWEST, len(_COMPONENTS)):
         raise UnusableText(
-            tr("a position holds six to eight numbers, and this one {count}", count=len(parts)),
+            tr("a position holds six numbers, or eight, and this one {count}", count=len(parts)),
             line,
         )
     numbers = [

@@ -20,6 +20,9 @@ from robolink.pose_tables.values import LengthUnit, RawPose, RawTable
 _TURNED_MOST_DEG: Final = 720.0
 """Makers print angles within a turn, and people type two at most."""
 
+_LEADING_ZERO: Final = re.compile(r"[+-]?0[0-9]+")
+"""What a decimal comma leaves of the decimals; nobody writes a whole number so."""
+
 _CLOSING: Final = {"{": "}", "[": "]", "(": ")"}
 
 
@@ -95,7 +98,7 @@ def required_number(name: str, text: str, line: int) -> float:
         UnusableText: It is none.
     """
     value = number_of(text)
-    if not math.isfinite(value):
+    if not math.isfinite(value) or _LEADING_ZERO.fullmatch(text.strip()):
         raise UnusableText(why_no_number(name, text), line)
     return value
 

@@ -40,7 +40,7 @@ _STATEMENT: Final = re.compile(
     re.IGNORECASE,
 )
 _PIECE: Final = re.compile(
-    r"\bXY\b|^\s*P\s*\W?\s*\d+\s*\W*$|/\s*[RL]\b|=\s*\w*\s*\(|\(\s*[+-]?[\d.]|^\s*P\w{0,4}\s*\d*\s*=|^\s*P\s*$",
+    r"\bXY\b|^\s*P\s*\W?\s*\d+\s*\W*$|/\s*(?:[RLABF]|NF|\d{1,2})\b|^\s*P\s*\d+\s*\(|=\s*\w*\s*\(|\(\s*[+-]?[\d.]|^\s*P\w{0,4}\s*\d*\s*=|^\s*P\s*$",
     re.IGNORECASE,
 )
 _SEVERAL: Final = re.compile(r"(?:[+-]?[\d.]+\s*[,;\s]\s*){2,}[+-]?[\d.]+")

@@ -42,7 +42,7 @@ _JOINTS_OF: Final = frozenset({"movej", "movel", "movep", "movec", "servoj", "sp
 _JOINT_NAME: Final = re.compile(r"(?:.*_)?(?:q|qn|qnear|joints?)\d*", re.IGNORECASE)
 _SIX: Final = 6
 _CUT: Final = re.compile(
-    r"\s*(?:(?:global|local)\b[^=\n]*|\w+(?:[ \t]+\w+)?[ \t]*=|[A-Za-z_]\w*)\s*"
+    r"\s*(?:(?:global|local)\b[^=\n]*|\w+(?:[ \t]+\w+)?[ \t]*=(?:[ \t]*p)?|[A-Za-z_]\w*)\s*"
 )
 _WORDS: Final = frozenset({"end", "halt", "return", "break", "continue", "pass", "else"})
 
@@ -68,15 +68,24 @@ def read_urscript(text: str) -> RawTable | None:
     poses: list[RawPose] = []
     lengths: set[str] = set()
     joints = 0
+    called: dict[str, int] = {}
+    posed: set[str] = set()
     for start, end, calls, written in _lists(text):
         line = line_at(start)
         body = text[start + 1 : end - 1]
         named = _NAMED.search(text[text.rfind("\n", 0, written) + 1 : written])
         name = named[1] if named else ""
         parts = [part.strip() for part in body.split(",")]
-        if text[written:start].strip() != "p":
-            joints += _joints(parts, name, calls, line)
+        before = text[written:start].strip()
+        if before != "p":
+            found = _joints(parts, name, calls, line)
+            if found and before:
+                why = tr("six numbers behind {name}: a pose, or joint angles?", name=before)
+                raise UnusableText(why, line)
+            joints += found
+            called |= {calls[-1]: line} if found and calls else {}
             continue
+        posed |= set(calls[-1:])
         if any(call in _NO_PLACES for call in calls):
             continue
         if any(call not in _MOVES for call in calls):
@@ -91,6 +100,9 @@ def read_urscript(text: str) -> RawTable | None:
         pose, units = _pose(parts, name, line)
         poses.append(pose)
         lengths |= units
+    for call, line in called.items():
+        if call in posed:
+            raise UnusableText(_without_p(), line)
     if not poses and not joints:
         return None
     if len(lengths) > 1 or not lengths <= {"", "mm", "m", "in"}:
@@ -145,7 +157,11 @@ def _joints(parts: list[str], name: str, calls: tuple[str, ...], line: int) -> i
         return 1
     if calls:
         return 0
-    raise UnusableText(tr("six numbers without p before them: a pose, or joint angles?"), line)
+    raise UnusableText(_without_p(), line)
+
+
+def _without_p() -> str:
+    return tr("six numbers without p before them: a pose, or joint angles?")
 
 
 def _pose(parts: list[str], name: str, line: int) -> tuple[RawPose, set[str]]:

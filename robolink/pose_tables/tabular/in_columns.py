@@ -32,6 +32,7 @@ from robolink.pose_tables.tabular.separators import (
     TableForm,
     decimal_sign,
     is_number,
+    rows_in_comments,
     table_lines,
 )
 from robolink.pose_tables.values import RawTable, ReadingChoices
@@ -74,6 +75,7 @@ def read_in_columns(lines: Sequence[str], choices: ReadingChoices) -> RawTable |
         # Blanks in front of the names of the poses are no cell.
         rows[0] = _Line(first.line, "", [first.label, *first.cells])
     form = TableForm(separator, _decimal(rows))
+    rows_in_comments(lines, form, count + 1)
     heads, values = [], list[list[str]]()
     for row in rows:
         with at_line(row.line):

@@ -113,9 +113,11 @@ def rows_in_comments(lines: Sequence[str], form: TableForm, width: int) -> int:
             continue
         rest = text[found.end() :]
         cells = _cells_of(form, (number, rest)) or []
-        if len(cells) < width or sum(map(is_number, cells)) < FEWEST:
+        attached = rest[:1] not in ("", " ", "\t")
+        whole = len(cells) >= width and sum(map(is_number, cells)) >= FEWEST
+        if not whole and not (attached and all(map(is_number, cells))):
             continue
-        if rest[:1] not in ("", " ", "\t"):
+        if attached:
             raise UnusableText(
                 tr("it begins with {sign} and looks like a row; is it a comment?", sign=found[1]),
                 number,

@@ -7,6 +7,7 @@ from robolink.calibration import (
     CalibrationResult,
     DriftVerdict,
     VerifyResult,
+    beyond_tolerance,
     order_in_words,
     require_shrinking,
     writes_refused_unattended,
@@ -51,7 +52,8 @@ class AcceptanceCriteria:
         """Refuse a measurement that does not agree with itself.
 
         Raises:
-            CalibrationError: ``large_rms``, ``large_residual`` or ``large_interval``; where
+            CalibrationError: ``large_rms``, ``large_residual`` or ``large_interval``, the first
+                two for poses that nobody saw being taken even where no limit is stated; where
                 nobody is asked, ``step_in_run_order``, ``drift_in_run_order`` or
                 ``sigma_contradicted``.
         """
@@ -65,6 +67,7 @@ class AcceptanceCriteria:
                     "again, or have a person look at it."
                 ),
             )
+        self._refuse_unwatched(result)
         for verdict in self._of_fit(result):
             if not verdict.passed:
                 raise CalibrationError(
@@ -79,6 +82,25 @@ class AcceptanceCriteria:
                         "Clean pin and tip, check that the nozzle is tight, then measure again."
                     ),
                 )
+
+    def _refuse_unwatched(self, result: CalibrationResult) -> None:
+        """Refuse poses that nobody saw being taken and that disagree, as 'solve' does.
+
+        What a stated limit judges is left to it. Touches that were watched are proved by a turn
+        test instead.
+        """
+        if "touches_not_witnessed" not in result.notes:
+            return
+        stated = {"large_rms": self.rms_mm, "large_residual": self.max_residual_mm}
+        judged = [code for code, limit_mm in stated.items() if limit_mm is not None]
+        codes = beyond_tolerance(result.warnings, judged=judged)
+        if codes:
+            raise CalibrationError(
+                codes[0],
+                _worst_in_words(result),
+                remedy=tr("Nothing was written. Take that pose again, or all of them."),
+                others=codes[1:],
+            )
 
     def judge_change(
         self, proposal: Proposal, *, earlier_mm: Sequence[float] = (), remedy: str = ""
@@ -180,6 +202,17 @@ def _sureness(result: CalibrationResult) -> tuple[str, float | None]:
     region = result.region95_radius_mm is not None
     name = tr("Sure to, all axes together (95 %)") if region else tr("Sure to (95 %)")
     return name, result.known_within_mm
+
+
+def _worst_in_words(result: CalibrationResult) -> str:
+    """Return which pose fits worst, and by how much."""
+    distances = result.residual_distances_mm
+    worst = max(range(len(distances)), key=distances.__getitem__)
+    return tr(
+        "The poses do not agree: pose {number} is {distance:.3f} mm off.",
+        number=worst + 1,
+        distance=distances[worst],
+    )
 
 
 def _out_of_order(result: CalibrationResult) -> str:

@@ -5,10 +5,10 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final
 
-from robolink.messages import tr
+from robolink.messages import joined, tr
 from robolink.pose_tables.conventions import rules_for
 from robolink.pose_tables.refusals import OpenQuestion
-from robolink.pose_tables.values import ColumnHead
+from robolink.pose_tables.values import ColumnHead, LengthUnit
 from robolink.ways import Way, way
 
 _UNIT_IN_COMMENT: Final = re.compile(
@@ -20,6 +20,12 @@ _ANGLE_WORD: Final = re.compile(r"rad", re.IGNORECASE)
 _UNIT_WITHIN: Final = 0.01
 _KEPT: Final = frozenset({"name", "number", "hand", "local", "tool"})
 _NO_TURNS: Final = frozenset({*_KEPT, "x", "y", "z"})
+MOST_RAD: Final = 4 * math.pi
+"""Two turns; degrees under the name of radians are beyond it at once."""
+
+FAR_MM: Final = 100_000.0
+"""No robot stands further from its base, whatever it runs on."""
+
 _METRES_BELOW: Final = 2.0
 _FULL_TURN_RAD: Final = 2 * math.pi * (1 + 1e-6)
 
@@ -142,12 +148,22 @@ def which_rule(letters: Sequence[str]) -> OpenQuestion:
     )
 
 
-def which_angle_unit(heads: Sequence[ColumnHead], names: Sequence[str]) -> OpenQuestion:
+def which_angle_unit(
+    heads: Sequence[ColumnHead], names: Sequence[str], largest: float
+) -> OpenQuestion:
     """Ask for the unit of angles.
 
     Args:
         heads: All columns, in the order of the file.
         names: Meanings of those that are angles.
+        largest: The largest angle; radians are offered only where it can be one.
+
+    Example:
+        >>> from robolink.pose_tables.questions import which_angle_unit
+        >>> from robolink.pose_tables.values import ColumnHead, LengthUnit
+        >>> heads = [ColumnHead("x"), ColumnHead("y"), ColumnHead("u")]
+        >>> which_angle_unit(heads, ["u"], 3.14).remedy
+        'Name the columns with their unit with columns: x,y,u_deg; x,y,u_rad.'
     """
     readings = [
         _named(
@@ -159,6 +175,7 @@ def which_angle_unit(heads: Sequence[ColumnHead], names: Sequence[str]) -> OpenQ
             },
         )
         for unit in ("deg", "rad")
+        if unit == "deg" or largest <= MOST_RAD
     ]
     return OpenQuestion(
         "columns",
@@ -171,10 +188,18 @@ def which_angle_unit(heads: Sequence[ColumnHead], names: Sequence[str]) -> OpenQ
     )
 
 
-def which_length(why: str) -> OpenQuestion:
-    """Ask for the unit of length."""
+def which_length(why: str, positions: Iterable[Sequence[float]]) -> OpenQuestion:
+    """Ask for the unit of length, of those in which a robot could stand there."""
+    far = max((abs(value) for place in positions for value in place), default=0.0)
+    units = [unit for unit in ("mm", "m", "in") if far * LengthUnit(unit).mm <= FAR_MM]
     return OpenQuestion(
-        "length", why, tr("Say the unit with {length}: mm, m or in.", length=way(Way.LENGTH_UNIT))
+        "length",
+        why,
+        tr(
+            "Say the unit with {length}: {units}.",
+            length=way(Way.LENGTH_UNIT),
+            units=joined(tr(" or "), units),
+        ),
     )
 
 

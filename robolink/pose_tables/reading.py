@@ -23,6 +23,7 @@ from robolink.pose_tables.formats.printed_arrays import read_arrays
 from robolink.pose_tables.formats.robot_programs import READERS
 from robolink.pose_tables.formats.spel_points import read_spel
 from robolink.pose_tables.lengths import settled_length
+from robolink.pose_tables.questions import FAR_MM
 from robolink.pose_tables.refusals import UnclearText, UnusableText, refused, unclear
 from robolink.pose_tables.tabular.in_columns import read_in_columns
 from robolink.pose_tables.tabular.table import read_table
@@ -38,7 +39,6 @@ from robolink.pose_tables.values import (
 MOST_BYTES: Final = 32_000_000
 """Half a million poses; a file of more is something else."""
 
-_FAR_MM: Final = 100_000.0
 _TURNED_DEG: Final = 36_000.0
 
 _NEEDED_AS: Final = {"z_mm": "Z", "v_deg": "V", "w_deg": "W"}
@@ -168,7 +168,7 @@ def _require_in_reach(raw: RawTable, mm: float) -> None:
     for pose in raw.poses:
         place = {"line": pose.line} if raw.has_lines else {"pose": pose.line}
         far = max(map(abs, pose.position)) * mm
-        if far > _FAR_MM:
+        if far > FAR_MM:
             why = tr("a place is {far:.0f} m from the base; no robot stands there", far=far / 1000)
             raise UnusableText(why, **place)
         turned = max(map(abs, pose.uvw_deg))

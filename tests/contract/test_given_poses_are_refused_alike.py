@@ -21,9 +21,7 @@ ANGLES = (0.0, 180.0, 90.0, -90.0, -45.0, 45.0)
 
 def touching(u_deg, tip=REAL, off=(0.0, 0.0, 0.0), **more):
     x, y = rotate_xy(tip.x_mm, tip.y_mm, u_deg)
-    return Pose(
-        PIN[0] - x + off[0], PIN[1] - y + off[1], PIN[2] - tip.z_mm + off[2], u_deg, **more
-    )
+    return Pose(PIN[0] - x + off[0], PIN[1] - y + off[1], PIN[2] - tip.z_mm + off[2], u_deg, **more)
 
 
 def six(**off):
@@ -41,9 +39,7 @@ CASES = {
     "insufficient_rotation": [touching(u) for u in (0.0, 5.0, 10.0)],
     "degenerate_angles": [touching(0.0, off=(at, 0.0, 0.0)) for at in range(3)],
     "tilted_pose": [*six()[:3], Pose(310.0, 95.0, -40.0, 10.0, 5.0, 0.0)],
-    "suspect_units": [
-        Pose(p.x_mm / 1000, p.y_mm / 1000, p.z_mm, p.u_deg) for p in six()
-    ],
+    "suspect_units": [Pose(p.x_mm / 1000, p.y_mm / 1000, p.z_mm, p.u_deg) for p in six()],
     "mixed_hand": [
         *(touching(u, hand=Hand.RIGHT) for u in ANGLES[:3]),
         touching(45.0, hand=Hand.LEFT),

@@ -112,9 +112,7 @@ def better_fit(fits: Sequence[ToolFit], *, taught: int, plausible_mm: float) -> 
     return best if much_nearer and best.change_mm <= plausible_mm else None
 
 
-def fits_alike(
-    fits: Sequence[ToolFit], *, taught: int, plausible_mm: float
-) -> tuple[ToolFit, ...]:
+def fits_alike(fits: Sequence[ToolFit], *, taught: int, plausible_mm: float) -> tuple[ToolFit, ...]:
     """Return the other tools that explain the poses as well, and would have another value written.
 
     A tool whose stored offset is small is near to the flange. Poses of either then mean a change

@@ -43,6 +43,7 @@ _GROUP: Final = re.compile(r"\s*GP([0-9]+)\s*:", re.ASCII)
 _FRAME: Final = re.compile(r"U([FT])\s*:\s*([0-9]+|F)")
 _VALUE: Final = re.compile(r"([A-Z][0-9]*)\s*[=:]\s*([^\s,]+)\s*([A-Za-z]*)")
 _JOINT: Final = re.compile(r"[JE][0-9]")
+_DECIMALS: Final = re.compile(r"[0-9]+(?: (?:mm|deg))?")
 _STARS: Final = re.compile(r"\*+\.?\**")
 
 
@@ -144,9 +145,13 @@ def _body(body: str, line: int) -> tuple[dict[str, str], dict[str, str]]:
             into, name, what = values, value[1], value[2]
             _require_known(value, here)
         else:
-            raise UnusableText(
-                tr("{text!r} is not a name and a value", text=" ".join(text.split())), here
-            )
+            shown = " ".join(text.split())
+            if _DECIMALS.fullmatch(shown):
+                why = tr(
+                    "{text!r} has no name: write decimals with a point, not a comma", text=shown
+                )
+                raise UnusableText(why, here)
+            raise UnusableText(tr("{text!r} is not a name and a value", text=shown), here)
         if group != "1":
             continue
         if name in into:

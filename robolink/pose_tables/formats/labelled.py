@@ -22,6 +22,7 @@ _PAIR: Final = re.compile(
     rf"({NUMBER})(?![0-9.])\s*(mm|cm|m|in|deg|rad|°)?(?!\w)"
 )
 _LABEL: Final = re.compile(r"(?<![\w.])([A-Za-z][A-Za-z_]{0,11})\s*[:=]")
+_LISTS: Final = re.compile(r"^\s*(name|position)\s*:\s*\[", re.MULTILINE)
 _JOINT_VALUE: Final = re.compile(
     r"(?:^|(?<=[\s,;{]))((?:j|jt|joint|axis|a|q|theta)[_ ]?[1-7])\s*[:=]\s*[+-]?[.0-9]",
     re.IGNORECASE | re.MULTILINE,
@@ -90,6 +91,9 @@ def of_joints_only(lines: Sequence[str]) -> bool:
     text = "\n".join(lines)
     if {"x", "y"} <= {found[1].lower() for found in _LABEL.finditer(text)}:
         return False
+    keys = {found[1].lower() for found in _LISTS.finditer(text)}
+    if {"name", "position"} <= keys:
+        return True  # a JointState of ROS
     named = {found[1].lower() for found in _JOINT_VALUE.finditer(text)}
     return len(named) >= _FEWEST
 

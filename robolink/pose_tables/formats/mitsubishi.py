@@ -21,7 +21,7 @@ _FEWEST: Final = 6
 _STEP: Final = r"\s*(?:[0-9]+\s+)?"
 _OURS: Final = re.compile(
     rf"(?mi)^{_STEP}P\w*\s*(?:\([^()\n]*\))?\s*=\s*\([^\n()]*\)\s*\([^\n]*\)?|"
-    rf"^{_STEP}P\w*\s*=\s*\((?:[^,()\n]*,){{5,7}}[^,()\n]*\)"
+    rf"^{_STEP}[PJ]\w*\s*=\s*\((?:[^,()\n]*,){{5,7}}[^,()\n]*\)"
 )
 _POSITION: Final = re.compile(
     rf"{_STEP}(?P<name>P\w*)\s*(?:\(\s*(?P<index>[0-9]+)\s*\))?\s*=\s*\((?P<values>[^()]*)\)"

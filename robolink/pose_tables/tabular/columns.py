@@ -8,6 +8,7 @@ from typing import Final
 from robolink.messages import tr
 from robolink.model import Hand
 from robolink.pose_tables.questions import (
+    MOST_RAD,
     may_be_degrees,
     may_be_radians,
     which_angle_unit,
@@ -33,9 +34,6 @@ _BENIGN: Final = frozenset(
     }
 )
 """Columns of numbers that nobody takes for a turn."""
-
-_MOST_RAD: Final = 4 * math.pi
-"""Two turns; degrees under the name of radians are beyond it at once."""
 
 _HANDS: Final = {
     **dict.fromkeys(("right", "r", "/r", "righty", "1"), Hand.RIGHT),
@@ -116,10 +114,12 @@ class PoseColumns:
             for place in range(len(self._heads))
         ]
 
-    @property
-    def heads(self) -> tuple[ColumnHead, ...]:
-        """All columns."""
-        return self._heads
+    def angle_question(self, rows: Sequence[tuple[int, Sequence[object]]]) -> OpenQuestion:
+        """Return the question for the unit of the angles in rows."""
+        names = self.turns.names if self.turns else ()
+        places = [self._place[name] for name in names]
+        angles = [abs(self._number(row[place])) for _, row in rows for place in places]
+        return which_angle_unit(self._heads, names, max(filter(math.isfinite, angles), default=0.0))
 
     def positions(self, rows: Iterable[tuple[int, Sequence[object]]]) -> list[tuple[float, ...]]:
         """Return X, Y, Z of rows, 0 where there is no Z."""
@@ -204,14 +204,14 @@ class PoseColumns:
     ) -> None:
         if turns.angle is AngleUnit.RAD and not turns.vector:
             for (line, _), row in zip(rows, values, strict=True):
-                if any(abs(angle or 0.0) > _MOST_RAD for angle in row):
+                if any(abs(angle or 0.0) > MOST_RAD for angle in row):
                     raise UnusableText(tr("its angles are too large for radians"), line)
         if turns.unit_said or turns.angle is None:
             return
         numbers = [[angle or 0.0 for angle in row] for row in values]
         doubtful = may_be_degrees(numbers) if turns.vector else may_be_radians(numbers)
         if doubtful:
-            raise UnclearText(which_angle_unit(self._heads, turns.names))
+            raise UnclearText(self.angle_question(rows))
 
     def _require_nothing_else_turns(self, rows: Sequence[tuple[int, Sequence[object]]]) -> None:
         """Ask about columns of numbers without a known name: one may be a tilt, or Z."""

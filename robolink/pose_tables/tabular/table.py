@@ -10,7 +10,7 @@ from robolink.messages import tr
 from robolink.pose_tables.lengths import metres_question
 from robolink.pose_tables.numbers import seems_number
 from robolink.pose_tables.orientation import is_rotation
-from robolink.pose_tables.questions import unit_in, which_angle_unit, which_columns, which_length
+from robolink.pose_tables.questions import unit_in, which_columns, which_length
 from robolink.pose_tables.refusals import UnclearText, UnusableText, at_line
 from robolink.pose_tables.tabular.columns import PoseColumns
 from robolink.pose_tables.tabular.header import (
@@ -100,11 +100,12 @@ def _ask(
     questions = columns.asked(body)
     turns = columns.turns
     if turns and turns.angle and not turns.unit_said and unit_in(comments, angle=True):
-        questions.append(which_angle_unit(columns.heads, turns.names))
+        questions.append(columns.angle_question(body))
     if questions:
         if choices.length is None and columns.length is None and not columns.from_ros:
             speaks = unit_in(comments, angle=False)
-            asked = which_length(speaks) if speaks else metres_question(columns.positions(body))
+            places = columns.positions(body)
+            asked = which_length(speaks, places) if speaks else metres_question(places)
             questions += [asked] if asked else []
         raise UnclearText(*questions)
 

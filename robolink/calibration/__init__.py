@@ -261,7 +261,9 @@ __getattr__ = lazy_exports(
         "quality.impact": "Impact PointImpact impact_on",
         "quality.moved_station": "StationShift TipShift judge_shifts",
         "quality.station_part": "SharedStation StationPart shared_station with_station",
-        "quality.tolerances": "BEYOND_TOLERANCE PLANAR_TOLERANCE TOUCH_TOLERANCE Tolerance beyond_tolerance",
+        "quality.tolerances": (
+            "BEYOND_TOLERANCE PLANAR_TOLERANCE TOUCH_TOLERANCE Tolerance beyond_tolerance"
+        ),
         "quality.tool_fits": "ToolFit better_fit fits_alike tool_fits",
         "evidence.approach_bias": "with_approach_bias",
         "evidence.units": "RobotReach require_near require_stored_scale require_within_reach",

@@ -2,6 +2,7 @@
 
 import json
 import re
+from itertools import pairwise
 
 import pytest
 from robolink_cli import main
@@ -22,15 +23,20 @@ FILES = {
     "printed by numpy": "[[287.5 103.25 -50. 0.]\n [296.75 87.5 -50. 90.]]\n",
     "rows of JSON": "[[287.5, 103.25, -50, 0], [296.75, 87.5, -50, 90]]",
     "radians or degrees": "x,y,z,u\n287.5,103.25,-50,0\n296.75,87.5,-50,1.5707963\n",
-    "radians or degrees, another order": "u;name;z;y;x\n0;a;-50;103,25;287,5\n1,57;b;-50;87,5;296\n",
+    "radians or degrees, another order": "u;name;z;y;x\n0;a;-50;103,25;287,5\n"
+    "1,57;b;-50;87,5;296\n",
     "radians or degrees, with units": "name,X [mm],Y [mm],U,Remark\na,287.5,103.25,0,x\n"
     "b,296.75,87.5,3.14,y\n",
-    "radians or degrees, three": "z,y,x,w,v,u\n251.6,-62.9,405.8,3.1,0,0\n247.3,-60.4,444.2,-3,0,1\n",
-    "radians or degrees in JSON": '[{"u": 0, "y": 103.25, "x": 287.5}, {"u": 1.57, "y": 87.5, "x": 29}]',
-    "radians or degrees beside names": "P1: X: 287.5 Y: 103.25 U: 0\nP2: X: 296.75 Y: 87.5 U: 1.57\n",
+    "radians or degrees, three": "z,y,x,w,v,u\n251.6,-62.9,405.8,3.1,0,0\n"
+    "247.3,-60.4,444.2,-3,0,1\n",
+    "radians or degrees in JSON": '[{"u": 0, "y": 103.25, "x": 287.5}, '
+    '{"u": 1.57, "y": 87.5, "x": 29}]',
+    "radians or degrees beside names": "P1: X: 287.5 Y: 103.25 U: 0\n"
+    "P2: X: 296.75 Y: 87.5 U: 1.57\n",
     "radians or degrees in columns": "X 287.5 296.75\nY 103.25 87.5\nU 0 1.57\n",
     "radians in a comment": "# radians\nx,y,z,u\n287.5,103.25,-50,0\n296.75,87.5,-50,90\n",
-    "a column that might be a tilt": "x,y,z,u,theta\n287.5,103.25,-50,0,15\n296.75,87.5,-50,90,-1\n",
+    "a column that might be a tilt": "x,y,z,u,theta\n287.5,103.25,-50,0,15\n"
+    "296.75,87.5,-50,90,-1\n",
     "four numbers without a name": f"x,y,z,q1,q2,q3,q4\n405.8,-62.9,251.6,{QUATERNION}\n",
     "two rotations": f"x,y,z,u,qw,qx,qy,qz\n405.8,-62.9,251.6,40,{QUATERNION}\n",
     "V without W": "x,y,z,u,v\n287.5,103.25,-50,0,0\n296.75,87.5,-50,90,0\n",
@@ -90,9 +96,7 @@ def test_each_hint_is_accepted_as_it_stands(shown, name):
             continue
         error = answer["error"]
         assert (code, error["kind"]) == (2, "AmbiguousPosesError"), (words, error)
-        hints = [
-            (o, v) for o, v in hints_in(error["remedy"]) if (o, v) not in zip(words, words[1:])
-        ]
+        hints = [(o, v) for o, v in hints_in(error["remedy"]) if (o, v) not in pairwise(words)]
         assert hints, (words, error["remedy"])
         by_option = {}
         for option, value in hints:

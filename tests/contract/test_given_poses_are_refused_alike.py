@@ -82,7 +82,7 @@ def through(simulator, tmp_path, capsys):
     def go(door, poses, *more):
         table = tmp_path / "touches.csv"
         rows = [[*p.coordinates(), p.hand or ""] for p in poses]
-        names = "x_mm,y_mm,z_mm,u_deg,v_deg,w_deg,hand".split(",")
+        names = ["x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg", "hand"]
         if not any(p.hand for p in poses):
             names, rows = names[:-1], [row[:-1] for row in rows]
         text = [",".join(names), *(",".join(f"{cell}" for cell in row) for row in rows)]

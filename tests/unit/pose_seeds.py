@@ -26,7 +26,8 @@ def _each(form, rows=TILTED):
 
 def _kuka(n, x, y, z, u, v, w):
     return (
-        f"DECL E6POS XP{n}={{X {x:.3f},Y {y:.3f},Z {z:.3f},A {u:.3f},B {v:.3f},C {w:.3f},S 2,T 35}}\n"
+        f"DECL E6POS XP{n}={{X {x:.3f},Y {y:.3f},Z {z:.3f},A {u:.3f},B {v:.3f},C {w:.3f},S 2,"
+        "T 35}\n"
         f'DECL FDAT FP{n}={{TOOL_NO 0,BASE_NO 0,IPO_FRAME #BASE,POINT2[] " ",TQ_STATE FALSE}}\n'
     )
 
@@ -62,7 +63,8 @@ def _register(n, x, y, z, u, v, w):
 
 
 def _ur(n, x, y, z, a, b, c):
-    return f"  movel(p[{x / 1000:.6f}, {y / 1000:.6f}, {z / 1000:.6f}, {a:.9f}, {b:.9f}, {c:.9f}], a=1.2)\n"
+    place = f"{x / 1000:.6f}, {y / 1000:.6f}, {z / 1000:.6f}"
+    return f"  movel(p[{place}, {a:.9f}, {b:.9f}, {c:.9f}], a=1.2)\n"
 
 
 def _ur_printed(n, x, y, z, a, b, c):

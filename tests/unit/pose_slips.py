@@ -19,6 +19,8 @@ NUMBER = re.compile(
     r"(?<![\w.])[+-]?(?:\d{1,3}(?:\.\d{3})+,\d+|(?:\d+(?:[.,]\d*)?|\.\d+)(?:[eE][+-]?\d+)?)"
     r"(?![\w.])(?<![,])|(?<![\w.])[+-]?\d+\.\d+(?=mm|rad|deg)"
 )
+KEY = re.compile(r"\s*(?:DECL\b[^=\n]*=|\"?\w+\"?\s*[:=]|global\s+\w+\s*=|(?:CONST|VAR)\b.*:=)")
+"""A line that begins with the name of what it says; a row that stands twice is another row."""
 WORD = re.compile(r"[A-Za-z_]+")
 SIGNS = "{}[]()<>,;:=\"'/"
 OTHER = {"{": "(", "}": ")", "[": "(", "]": ")", "(": "[", ")": "]", ",": ";", ";": ",", ":": ";"}
@@ -78,6 +80,8 @@ def _pieces(text: str) -> Iterator[tuple[str, int, int, str]]:
                 yield "rest of line lost", cut, end, ""
                 yield "begin of line lost", begin, cut, ""
                 yield "line in two", cut, cut, "\n"
+        if KEY.match(line):
+            yield "line twice", begin, begin, f"{line}\n"
         if end < len(text):
             yield "line end missing", end, end + 1, ""
         begin = end + 1

@@ -57,7 +57,6 @@ def test_no_slip_changes_a_pose_in_silence(tmp_path, name):
     text, options = SEEDS[name]
     slips = list(slips_of(text))
     silent, unplaced, counted = judged(tmp_path, name, text, options, slips)
-    print(name, counted)
     assert silent == []
     assert len(unplaced) <= 0.1 * counted["refused"], unplaced[:5]
 
@@ -70,7 +69,6 @@ def test_no_slip_changes_a_pose_of_a_table_of_people_in_silence(tmp_path, name):
     text, _ = decoded((SHARED / name).read_bytes())
     slips = list(slips_of(text))
     silent, unplaced, counted = judged(tmp_path, name, text, TABLES[name]["options"], slips)
-    print(name, counted)
     assert silent == []
     assert len(unplaced) <= 0.1 * counted["refused"], unplaced[:5]
 

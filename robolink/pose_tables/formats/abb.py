@@ -71,7 +71,7 @@ def read_abb(text: str) -> RawTable | None:
         return None
     line_at = line_counter(text)
     poses: list[RawPose] = []
-    joints = 0
+    joints, names = 0, set[str]()
     rest, before = text, 0
     for group in groups_of(text, "[", line_at):
         begin = max(before, text.rfind(";", 0, group.start) + 1)
@@ -90,6 +90,9 @@ def read_abb(text: str) -> RawTable | None:
             continue
         assigned = declared or _ASSIGNED.search(head)
         name = assigned["name"] if assigned else ""
+        if declared and name.lower() in names:
+            raise UnusableText(tr("{name} appears twice", name=name), line)
+        names |= {name.lower()} if declared else set()
         found = list(_targets(value, line, kind))
         if found and re.search(r"[)\w]\s*[*+-]\s*$|\(\s*$", head):
             raise UnusableText(

@@ -95,8 +95,8 @@ def read_document(document: object, choices: ReadingChoices, *, layout: str) -> 
         if _has_joints(document):
             raise UnusableText(
                 tr(
-                    "there is no pose in it: its values are joint angles, and joint angles are not a "
-                    "pose"
+                    "there is no pose in it: its values are joint angles, and joint angles are "
+                    "not a pose"
                 )
             )
         raise UnusableText(tr("there is no pose in it"))

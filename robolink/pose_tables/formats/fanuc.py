@@ -33,7 +33,8 @@ _POINT: Final = re.compile(
     re.ASCII,
 )
 _LOOSE: Final = re.compile(
-    r"(?m)^[ \t]*(?:PR?\s*[\[(]?\s*[0-9OlI]+[^\n;]*\{|P\[[^\n;]*$|GP[0-9]+\s*:|U[FT]\s*:|[XYZWPR]\s*=|J[1-9]\s*=|[{}])"
+    r"(?m)^[ \t]*(?:PR?\s*[\[(]?\s*[0-9OlI]+[^\n;]*\{|P\[[^\n;]*$|GP[0-9]+\s*:|U[FT]\s*:"
+    r"|[XYZWPR]\s*=|J[1-9]\s*=|[{}])"
 )
 _REGION: Final = re.compile(r"(?m)^\s*/POS\s*$")
 _END: Final = re.compile(r"\s*(?:/END\s*)?")

@@ -55,7 +55,8 @@ _TYPED: Final = re.compile(r"\s*(\w+)\s*:(.*)", re.DOTALL)
 _NO_POSE: Final = re.compile(r"\$.*|TOOL_DATA|BASE_DATA|LOAD_\w+|MACHINE\w*", re.IGNORECASE)
 _LABELLED: Final = re.compile(r"\b[XYZABC][ \t]*[=:]?[ \t]*[+-]?[0-9.]", re.IGNORECASE)
 _DECLARED: Final = re.compile(
-    rf"(?m)^\s*(?:(?:GLOBAL|DECL|CONST)\s+)*(?:{_TYPES})\s+(\$?\w+)\s*(\[[^\]\n]*\])?[ \t]*(=?)[ \t]*$",
+    rf"(?m)^\s*(?:(?:GLOBAL|DECL|CONST)\s+)*(?:{_TYPES})\s+(\$?\w+)\s*(\[[^\]\n]*\])?"
+    r"[ \t]*(=?)[ \t]*$",
     re.IGNORECASE,
 )
 _LINE_OF_DATA: Final = re.compile(

@@ -1,8 +1,8 @@
 """Position variables of MELFA BASIC, Mitsubishi: ``P1=(+300.00,+100.00,..,+90.00)(7,0)``.
 
-mm and degrees; A, B and C turn about X, Y and Z: R = Rz(C) Ry(B) Rx(A) (docs/reference/pose_files.md
-1). Two numbers for additional axes may follow; the second brackets hold the flags of the
-posture and of turns. ``J1=(..)`` are joint angles. The tool is not in it.
+mm and degrees; A, B and C turn about X, Y and Z: R = Rz(C) Ry(B) Rx(A)
+(docs/reference/pose_files.md 1). Two numbers for additional axes may follow; the second brackets
+hold the flags of the posture and of turns. ``J1=(..)`` are joint angles. The tool is not in it.
 """
 
 import re

@@ -62,7 +62,7 @@ def read_spel(lines: Sequence[str]) -> RawTable | None:
         UnusableText: A point is not given in numbers.
     """
     poses: list[RawPose] = []
-    skipped, pieces = 0, list[int]()
+    skipped, pieces, names = 0, list[int](), set[object]()
     for line, text in enumerate(lines, start=1):
         text = plain(text.partition("'")[0])
         found = _POINT.fullmatch(text)
@@ -77,6 +77,10 @@ def read_spel(lines: Sequence[str]) -> RawTable | None:
                 pieces.append(line)
             continue
         poses.append(_point(line, found))
+        called = poses[-1].given.get("number", poses[-1].given.get("name"))
+        if called in names:
+            raise UnusableText(tr("{name} appears twice", name=called), line)
+        names.add(called)
     if poses and pieces:
         raise UnusableText(tr("it is not a point P1 = XY(..), and looks like one"), pieces[0])
     counts = [len(pose.stated) for pose in poses]

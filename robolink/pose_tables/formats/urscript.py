@@ -67,7 +67,7 @@ def read_urscript(text: str) -> RawTable | None:
     line_at = line_counter(text)
     poses: list[RawPose] = []
     lengths: set[str] = set()
-    joints = 0
+    joints, names = 0, set[str]()
     called: dict[str, int] = {}
     posed: set[str] = set()
     for start, end, calls, written in _lists(text):
@@ -98,6 +98,9 @@ def read_urscript(text: str) -> RawTable | None:
                 tr("what stands beside the pose is not understood; it may change it"), line
             )
         pose, units = _pose(parts, name, line)
+        if name in names:
+            raise UnusableText(tr("{name} appears twice", name=name), line)
+        names |= {name} if name else set()
         poses.append(pose)
         lengths |= units
     for call, line in called.items():

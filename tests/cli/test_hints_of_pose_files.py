@@ -98,7 +98,7 @@ def test_each_hint_is_accepted_as_it_stands(shown, name):
         assert (code, error["kind"]) == (2, "AmbiguousPosesError"), (words, error)
         hints = [(o, v) for o, v in hints_in(error["remedy"]) if (o, v) not in pairwise(words)]
         assert hints, (words, error["remedy"])
-        by_option = {}
+        by_option: dict[str, list[str]] = {}
         for option, value in hints:
             by_option.setdefault(option, []).append(value)
         option = next(iter(by_option))

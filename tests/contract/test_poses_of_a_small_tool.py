@@ -143,7 +143,9 @@ def test_a_person_is_asked_and_the_answer_is_on_record(answers, poses):
             for one in controller.outcomes.recorded(kinds=(EntryKind.DECISION,))
             if "alike" in str(one.details.get("question"))
         ]
-    assert machine.read(1).components()[:2] == pytest.approx((0.78, -0.5), abs=1e-6)
+    written = machine.read(1)
+    assert written is not None
+    assert written.components()[:2] == pytest.approx((0.78, -0.5), abs=1e-6)
     assert len(person.asked) == len(answers)
     assert all("fit tools 0, 1 alike" in question for question in person.asked)
     assert set(recorded) >= {question.partition(" [")[0] for question in person.asked}

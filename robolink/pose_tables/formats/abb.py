@@ -6,7 +6,7 @@ loads and joints are no poses.
 
 import re
 from collections.abc import Iterator, Sequence
-from typing import Final
+from typing import Final, TypeAlias
 
 from robolink.messages import tr
 from robolink.pose_tables import orientation
@@ -23,7 +23,7 @@ from robolink.pose_tables.numbers import plain
 from robolink.pose_tables.refusals import UnusableText
 from robolink.pose_tables.values import RawPose, RawTable
 
-Value = "str | list[Value]"
+Value: TypeAlias = "str | list[Value]"
 
 _ITEM: Final = r"[^\[\],]+"
 _OURS: Final = re.compile(
@@ -108,7 +108,7 @@ def read_abb(text: str) -> RawTable | None:
 
 
 def _targets(
-    value: "Value", line: int, kind: str
+    value: Value, line: int, kind: str
 ) -> Iterator[tuple[list[float], orientation.Matrix]]:
     """Yield place and rotation of each target in a value."""
     if isinstance(value, list) and value and all(_nested(one) for one in value):
@@ -143,13 +143,13 @@ def _targets(
     yield numbers[0], orientation.from_quaternion(q2, q3, q4, q1, line)
 
 
-def _named(part: Sequence["Value"], place: int) -> Iterator[tuple[str, "Value"]]:
+def _named(part: Sequence[Value], place: int) -> Iterator[tuple[str, Value]]:
     names = (_PLACE, _QUATERNION)[place] if place < 2 else ()
     for number, item in enumerate(part, start=1):
         yield (names[number - 1] if names else str(number)), item
 
 
-def _value(body: str) -> "Value":
+def _value(body: str) -> Value:
     """Return what stands in brackets as lists of texts."""
     items: list[Value] = []
     for field in fields_of(body, "["):
@@ -161,11 +161,11 @@ def _value(body: str) -> "Value":
     return items
 
 
-def _nested(value: "Value") -> bool:
+def _nested(value: Value) -> bool:
     return isinstance(value, list) and any(isinstance(one, list) or "[" in one for one in value)
 
 
-def _are_joints(value: "Value") -> bool:
+def _are_joints(value: Value) -> bool:
     return (
         isinstance(value, list)
         and len(value) == 2

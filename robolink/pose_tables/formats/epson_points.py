@@ -126,7 +126,8 @@ def _blocks(text: str) -> Iterator[tuple[int, dict[str, float], str]]:
     counted = _COUNT.search(text)
     blocks = list(_BLOCK.finditer(text))
     if counted is None or int(counted[1]) != len(blocks):
-        raise UnusableText(tr("it is not a complete point file of EPSON RC+"))
+        line = line_at(counted.start(1)) if counted else 1
+        raise UnusableText(tr("it is not a complete point file of EPSON RC+"), line)
     seen: set[float] = set()
     first: tuple[str, ...] = ()
     for number, block in enumerate(blocks, start=1):

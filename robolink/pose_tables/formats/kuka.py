@@ -181,8 +181,8 @@ class _Reader:
                 rf"(?m)^\s*{re.escape(found[1])}\s*(?:\[[^\]\n]*\])?\s*=", self._text, re.IGNORECASE
             )
             if found[3] or (data and not found[2] and not given):
-                line = self._line_at(found.start(1))
-                raise UnusableText(tr("{name} has no value", name=found[1]), line)
+                why = tr("{name} has no value", name=found[1])
+                raise UnusableText(why, self._line_at(found.start(1)))
 
     def _add_frames(self) -> None:
         """Give each point the tool and base of its ``FDAT``.

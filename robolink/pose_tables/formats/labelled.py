@@ -123,8 +123,8 @@ def _refuse_pieces(text: str, found: Sequence[re.Match[str]]) -> None:
         rf"(?:\s*{_FLAGS.pattern}\s*)*", behind
     ):
         raise UnusableText(tr("{text!r} is no hand and no local", text=behind))
-    rest = _FLAGS.sub(" ", _PAIR.sub(" ", text[found[0].start() :]))
-    stray = re.search(r"\S*[0-9*#?\u2212]\S*", rest)
+    left = _FLAGS.sub(" ", _PAIR.sub(" ", text[found[0].start() :]))
+    stray = re.search(r"\S*[0-9*#?\u2212]\S*", left)
     if stray:
         raise UnusableText(tr("{text!r} has no name", text=stray[0]))
 

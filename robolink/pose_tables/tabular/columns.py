@@ -20,12 +20,11 @@ from robolink.pose_tables.tabular.header import (
     LENGTHS,
     SKIPPED,
     WORDS,
-    ColumnHead,
     nearly_named,
     require_each_once,
 )
 from robolink.pose_tables.tabular.rotations import TurnColumns, turn_columns
-from robolink.pose_tables.values import AngleUnit, LengthUnit, RawPose, ReadingChoices
+from robolink.pose_tables.values import AngleUnit, ColumnHead, LengthUnit, RawPose, ReadingChoices
 
 _BENIGN: Final = frozenset(
     {

@@ -22,7 +22,6 @@ from robolink.pose_tables.tabular.columns import PoseColumns
 from robolink.pose_tables.tabular.header import (
     SKIPPED,
     WORDS,
-    ColumnHead,
     column_head,
     is_unit,
     named_by_person,
@@ -35,7 +34,7 @@ from robolink.pose_tables.tabular.separators import (
     rows_in_comments,
     table_lines,
 )
-from robolink.pose_tables.values import RawTable, ReadingChoices
+from robolink.pose_tables.values import ColumnHead, RawTable, ReadingChoices
 
 _SEPARATORS: Final = ("\t", ";", "|", ",", " ")
 _SIGN: Final = re.compile(r"^(\s*[^\s:=;,|\t\"]+(?:\s*[(\[][^)\]]*[)\]])?)\s*[:=]\s*")

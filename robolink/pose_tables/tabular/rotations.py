@@ -10,8 +10,8 @@ from robolink.pose_tables import orientation
 from robolink.pose_tables.conventions import EPSON, RotationRule, order_for, rule_named
 from robolink.pose_tables.questions import which_rotation, which_rule
 from robolink.pose_tables.refusals import UnclearText, UnusableText
-from robolink.pose_tables.tabular.header import ANGLES, MATRIX, QUATERNION, ColumnHead
-from robolink.pose_tables.values import AngleUnit
+from robolink.pose_tables.tabular.header import ANGLES, MATRIX, QUATERNION
+from robolink.pose_tables.values import AngleUnit, ColumnHead
 
 Uvw = tuple[float, float, float]
 

@@ -19,7 +19,6 @@ from robolink.pose_tables.tabular.header import (
     LENGTHS,
     SKIPPED,
     WORDS,
-    ColumnHead,
     are_joints,
     column_heads,
     is_unit,
@@ -37,7 +36,7 @@ from robolink.pose_tables.tabular.separators import (
     table_lines,
     without_trailing,
 )
-from robolink.pose_tables.values import LengthUnit, RawTable, ReadingChoices
+from robolink.pose_tables.values import ColumnHead, LengthUnit, RawTable, ReadingChoices
 
 Row = tuple[int, list[str]]
 
@@ -139,9 +138,9 @@ def _headed(
     if heads:
         _refuse_rows(above)
         return heads, body, 0
-    cells = [[*row, *[""] * width][:width] for _, row in body]
-    numeric = [all(map(is_number, column)) for column in zip(*cells, strict=True)]
-    values = [[form.number(c) for c, n in zip(row, numeric, strict=True) if n] for row in cells]
+    filled = [[*row, *[""] * width][:width] for _, row in body]
+    numeric = [all(map(is_number, column)) for column in zip(*filled, strict=True)]
+    values = [[form.number(c) for c, n in zip(row, numeric, strict=True) if n] for row in filled]
     raise UnclearText(which_columns(numeric, values))
 
 

@@ -5,6 +5,8 @@ begins with; what is left is a table. What the file does not say is asked for an
 (docs/poses.md, "Files of poses").
 """
 
+import math
+import statistics
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
@@ -20,9 +22,9 @@ from robolink.pose_tables.formats.indented import looks_indented, read_indented
 from robolink.pose_tables.formats.labelled import of_joints_only, read_labelled
 from robolink.pose_tables.formats.matrices import read_matrices
 from robolink.pose_tables.formats.printed_arrays import read_arrays
-from robolink.pose_tables.formats.robot_programs import READERS
 from robolink.pose_tables.formats.spel_points import read_spel
 from robolink.pose_tables.lengths import settled_length
+from robolink.pose_tables.programs.readers import READERS
 from robolink.pose_tables.questions import FAR_MM
 from robolink.pose_tables.refusals import UnclearText, UnusableText, refused, unclear
 from robolink.pose_tables.tabular.in_columns import read_in_columns
@@ -40,6 +42,9 @@ MOST_BYTES: Final = 32_000_000
 """Half a million poses; a file of more is something else."""
 
 _TURNED_DEG: Final = 36_000.0
+_AS_FAR: Final = 0.2
+"""Touches of one pin lie as far from the base within this share."""
+
 
 _NEEDED_AS: Final = {"z_mm": "Z", "v_deg": "V", "w_deg": "W"}
 
@@ -100,6 +105,7 @@ def parse_poses(data: bytes, choices: ReadingChoices, *, suffix: str = "") -> Po
         raise UnusableText(tr("there is no pose in it"))
     unit, unit_by = settled_length(raw, choices.length)
     _require_in_reach(raw, unit.mm)
+    _require_one_unit(raw)
     return PoseTable(
         tuple(_tabled(one, unit.mm) for one in raw.poses),
         HowRead(
@@ -175,6 +181,23 @@ def _require_in_reach(raw: RawTable, mm: float) -> None:
         if turned > _TURNED_DEG:
             why = tr("an angle of {angle:g} degrees is no angle of a flange", angle=turned)
             raise UnusableText(why, **place)
+
+
+def _require_one_unit(raw: RawTable) -> None:
+    """Refuse a pose that lies where the others do only when it is read in metres, or they are.
+
+    Raises:
+        UnusableText: There is one: a file that was put together from two.
+    """
+    away = [math.hypot(*pose.position) for pose in raw.poses]
+    usual = statistics.median_high(away)
+    for pose, one in zip(raw.poses, away, strict=True):
+        near = any(abs(one * factor - usual) <= _AS_FAR * usual for factor in (1000.0, 1 / 1000.0))
+        if one and near:
+            place = {"line": pose.line} if raw.has_lines else {"pose": pose.line}
+            raise UnusableText(
+                tr("its lengths are in another unit than those of the others"), **place
+            )
 
 
 def _undisputed(raw: RawTable, choices: ReadingChoices) -> RawTable:

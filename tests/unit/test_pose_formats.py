@@ -349,3 +349,11 @@ def test_thousands_are_grouped_where_the_decimal_sign_follows(read, text):
 def test_rows_left_out_on_purpose_are_counted(read):
     found = read("x,y,u\n287.5,103.25,0\n# 296.75,87.5,90\n312.5,96.75,180\n")
     assert (len(found.poses), found.how.skipped) == (2, 1)
+
+
+@pytest.mark.parametrize("row", ["0.29675,0.0875,-0.05,90", "296750,87500,-50000,90"])
+def test_a_pose_in_another_unit_than_the_others_is_refused(read, row):
+    text = f"x,y,z,u\n287.5,103.25,-50,0\n{row}\n312.5,96.75,-50,180\n"
+    with pytest.raises(ConfigError, match="line 3"):
+        read(text)
+    assert len(read(text.replace(row, "0.5,87.5,-50,90")).poses) == 3

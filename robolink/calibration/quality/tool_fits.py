@@ -22,6 +22,9 @@ from robolink.model import ToolOffset, rotate_xy
 UNSUSPICIOUS_MM = 1.0
 """A change up to this is an ordinary nozzle change and raises no doubt about the tool."""
 
+_NEW_NOZZLE_MM = 2.0
+"""A larger change than this is none of a new nozzle, whatever is accepted this time."""
+
 ALIKE_MM = 0.01
 """Offsets nearer than this are one: whichever tool it was, the same is written."""
 
@@ -101,8 +104,8 @@ def better_fit(fits: Sequence[ToolFit], *, taught: int, plausible_mm: float) -> 
 
     Example:
         >>> from robolink.calibration import ToolFit, better_fit
-        >>> better_fit([ToolFit(2, 0.1), ToolFit(0, 12.6)], taught=0, plausible_mm=2)
-        ToolFit(tool=2, change_mm=0.1)
+        >>> better_fit([ToolFit(2, 0.1), ToolFit(0, 12.6)], taught=0, plausible_mm=2).tool
+        2
     """
     declared = next((fit for fit in fits if fit.tool == taught), None)
     if declared is None or declared.change_mm <= UNSUSPICIOUS_MM:
@@ -135,7 +138,7 @@ def fits_alike(fits: Sequence[ToolFit], *, taught: int, plausible_mm: float) -> 
     declared = next((fit for fit in fits if fit.tool == taught), None)
     if declared is None or declared.change_mm > plausible_mm:
         return ()
-    ordinary_mm = max(UNSUSPICIOUS_MM, MUCH_NEARER * declared.change_mm)
+    ordinary_mm = max(UNSUSPICIOUS_MM, min(MUCH_NEARER * declared.change_mm, _NEW_NOZZLE_MM))
     return tuple(
         fit
         for fit in fits

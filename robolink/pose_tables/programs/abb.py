@@ -11,7 +11,8 @@ from typing import Final, TypeAlias
 from robolink.messages import tr
 from robolink.pose_tables import orientation
 from robolink.pose_tables.encoding import line_counter
-from robolink.pose_tables.formats.program_text import (
+from robolink.pose_tables.numbers import plain
+from robolink.pose_tables.programs.program_text import (
     blanked,
     fields_of,
     groups_of,
@@ -19,7 +20,6 @@ from robolink.pose_tables.formats.program_text import (
     required_number,
     turned,
 )
-from robolink.pose_tables.numbers import plain
 from robolink.pose_tables.refusals import UnusableText
 from robolink.pose_tables.values import RawPose, RawTable
 

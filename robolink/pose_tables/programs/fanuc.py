@@ -10,13 +10,13 @@ from typing import Final
 from robolink.messages import tr
 from robolink.pose_tables.conventions import RULES
 from robolink.pose_tables.encoding import line_counter
-from robolink.pose_tables.formats.program_text import (
+from robolink.pose_tables.numbers import plain
+from robolink.pose_tables.programs.program_text import (
     program,
     radians,
     required_number,
     turned,
 )
-from robolink.pose_tables.numbers import plain
 from robolink.pose_tables.refusals import UnusableText
 from robolink.pose_tables.values import RawPose, RawTable
 

@@ -12,7 +12,8 @@ from typing import Final
 from robolink.messages import tr
 from robolink.pose_tables.conventions import RULES
 from robolink.pose_tables.encoding import line_counter
-from robolink.pose_tables.formats.program_text import (
+from robolink.pose_tables.numbers import number_of, plain
+from robolink.pose_tables.programs.program_text import (
     Group,
     blanked,
     fields_of,
@@ -22,7 +23,6 @@ from robolink.pose_tables.formats.program_text import (
     required_number,
     turned,
 )
-from robolink.pose_tables.numbers import number_of, plain
 from robolink.pose_tables.refusals import UnusableText
 from robolink.pose_tables.values import RawPose, RawTable
 
@@ -85,7 +85,7 @@ class _Reader:
         self._line_at = line_at
         self._joints: set[str] = set()
         self._frames: dict[str, _Frame] = {}
-        self._declared: set[str] = set()
+        self._named: set[str] = set()
         self.poses: list[RawPose] = []
         self.skipped = 0
 
@@ -161,10 +161,10 @@ class _Reader:
         for one in _BESIDE & fields.keys():
             if not re.fullmatch(r"'B[01]+'", fields[one], re.IGNORECASE):
                 required_number(one, fields[one], line)
-        if found := re.match(r"\s*(?:DECL|GLOBAL)\b", head, re.IGNORECASE):
-            if name.upper() in self._declared and "[" not in head[found.end() :]:
+        if name and "[" not in head:
+            if name.upper() in self._named:
                 raise UnusableText(tr("{name} appears twice", name=name), line)
-            self._declared.add(name.upper())
+            self._named.add(name.upper())
         matrix = _RULE.matrix(radians(numbers[3:], line))
         self.poses.append(turned(line, numbers[:3], matrix, {"name": name} if name else {}))
 

@@ -3,11 +3,11 @@
 from collections.abc import Callable
 from typing import Final
 
-from robolink.pose_tables.formats.abb import read_abb
-from robolink.pose_tables.formats.fanuc import read_fanuc
-from robolink.pose_tables.formats.kuka import read_kuka
-from robolink.pose_tables.formats.mitsubishi import read_mitsubishi
-from robolink.pose_tables.formats.urscript import read_urscript
+from robolink.pose_tables.programs.abb import read_abb
+from robolink.pose_tables.programs.fanuc import read_fanuc
+from robolink.pose_tables.programs.kuka import read_kuka
+from robolink.pose_tables.programs.mitsubishi import read_mitsubishi
+from robolink.pose_tables.programs.urscript import read_urscript
 from robolink.pose_tables.values import RawTable
 
 READERS: Final[tuple[Callable[[str], RawTable | None], ...]] = (

@@ -53,7 +53,7 @@ def groups_of(text: str, brackets: str, line_at: Callable[[int], int]) -> Iterat
         UnusableText: A bracket has no partner.
 
     Example:
-        >>> from robolink.pose_tables.formats.program_text import groups_of
+        >>> from robolink.pose_tables.programs.program_text import groups_of
         >>> [group.body for group in groups_of("a={1,{2}} b={3}", "{", lambda place: 1)]
         ['1,{2}', '3']
     """
@@ -153,7 +153,7 @@ def program(
         UnusableText: There are only entries that are no poses.
 
     Example:
-        >>> from robolink.pose_tables.formats.program_text import program
+        >>> from robolink.pose_tables.programs.program_text import program
         >>> from robolink.pose_tables.values import RawPose
         >>> program("KUKA", [RawPose(1, (1, 2, 3), (0, 0, 0))], "R", skipped=0).layout
         'KUKA'

@@ -13,8 +13,8 @@ from typing import Final
 from robolink.messages import tr
 from robolink.pose_tables.conventions import RULES
 from robolink.pose_tables.encoding import line_counter
-from robolink.pose_tables.formats.program_text import blanked, program, turned
 from robolink.pose_tables.numbers import NUMBER, number_of, plain, seems_number, why_no_number
+from robolink.pose_tables.programs.program_text import blanked, program, turned
 from robolink.pose_tables.refusals import UnusableText
 from robolink.pose_tables.values import LengthUnit, RawPose, RawTable
 

@@ -181,11 +181,14 @@ if TYPE_CHECKING:
     from robolink.calibration.quality.station_part import StationPart as StationPart
     from robolink.calibration.quality.station_part import shared_station as shared_station
     from robolink.calibration.quality.station_part import with_station as with_station
+    from robolink.calibration.quality.tolerances import BEYOND_TOLERANCE as BEYOND_TOLERANCE
     from robolink.calibration.quality.tolerances import PLANAR_TOLERANCE as PLANAR_TOLERANCE
     from robolink.calibration.quality.tolerances import TOUCH_TOLERANCE as TOUCH_TOLERANCE
     from robolink.calibration.quality.tolerances import Tolerance as Tolerance
+    from robolink.calibration.quality.tolerances import beyond_tolerance as beyond_tolerance
     from robolink.calibration.quality.tool_fits import ToolFit as ToolFit
     from robolink.calibration.quality.tool_fits import better_fit as better_fit
+    from robolink.calibration.quality.tool_fits import fits_alike as fits_alike
     from robolink.calibration.quality.tool_fits import tool_fits as tool_fits
     from robolink.calibration.quality.update_guard import NEEDLE_LIMIT_MM as NEEDLE_LIMIT_MM
     from robolink.calibration.quality.update_guard import Correction as Correction
@@ -328,8 +331,10 @@ __getattr__ = lazy_exports(
         "measured_axes repeatable_sentence rows_in_words seating_sentence stated_mm "
         "statement_line statement_sentences",
         "quality.station_part": "SharedStation StationPart shared_station with_station",
-        "quality.tolerances": "PLANAR_TOLERANCE TOUCH_TOLERANCE Tolerance",
-        "quality.tool_fits": "ToolFit better_fit tool_fits",
+        "quality.tolerances": (
+            "BEYOND_TOLERANCE PLANAR_TOLERANCE TOUCH_TOLERANCE Tolerance beyond_tolerance"
+        ),
+        "quality.tool_fits": "ToolFit better_fit fits_alike tool_fits",
         "evidence.approach_bias": "with_approach_bias",
         "evidence.units": "RobotReach require_near require_stored_scale require_within_reach",
         "statement.turn_test": "LEAST_TURN_DEG held_to_claim turn_claim",

@@ -7,6 +7,7 @@ from robolink.calibration import (
     CalibrationResult,
     DriftVerdict,
     VerifyResult,
+    beyond_tolerance,
     order_in_words,
     require_shrinking,
     writes_refused_unattended,
@@ -55,7 +56,8 @@ class AcceptanceCriteria:
 
         Raises:
             CalibrationError: ``large_rms``, ``large_residual``, ``large_interval``, or
-                ``not_judged`` where nothing tells what a limit is for; where nobody is asked,
+                ``not_judged`` where nothing tells what a limit is for; the first two for poses that
+                nobody saw being taken even where no limit is stated; where nobody is asked,
                 ``step_in_run_order``, ``drift_in_run_order`` or ``sigma_contradicted``.
         """
         doubt = writes_refused_unattended(result) if self.unattended else ""
@@ -69,6 +71,7 @@ class AcceptanceCriteria:
                 ),
             )
         self._require_judged(result)
+        self._refuse_unwatched(result)
         by_defaults = self.over_by_defaults(result) is not None
         for verdict in self._of_fit(result):
             if by_defaults and verdict.code == "large_interval":
@@ -160,6 +163,25 @@ class AcceptanceCriteria:
                 "how each is measured."
             ),
         )
+
+    def _refuse_unwatched(self, result: CalibrationResult) -> None:
+        """Refuse poses that nobody saw being taken and that disagree, as 'solve' does.
+
+        What a stated limit judges is left to it. Touches that were watched are proved by a turn
+        test instead.
+        """
+        if "touches_not_witnessed" not in result.notes:
+            return
+        stated = {"large_rms": self.rms_mm, "large_residual": self.max_residual_mm}
+        judged = [code for code, limit_mm in stated.items() if limit_mm is not None]
+        codes = beyond_tolerance(result.warnings, judged=judged)
+        if codes:
+            raise CalibrationError(
+                codes[0],
+                _worst_in_words(result),
+                remedy=tr("Nothing was written. Take that pose again, or all of them."),
+                others=codes[1:],
+            )
 
     def judge_change(
         self, proposal: Proposal, *, earlier_mm: Sequence[float] = (), remedy: str = ""
@@ -259,6 +281,17 @@ class AcceptanceCriteria:
         ):
             if found_mm is not None and limit_mm is not None:
                 yield LimitVerdict(code, name, found_mm, limit_mm)
+
+
+def _worst_in_words(result: CalibrationResult) -> str:
+    """Return which pose fits worst, and by how much."""
+    distances = result.residual_distances_mm
+    worst = max(range(len(distances)), key=distances.__getitem__)
+    return tr(
+        "The poses do not agree: pose {number} is {distance:.3f} mm off.",
+        number=worst + 1,
+        distance=distances[worst],
+    )
 
 
 def _out_of_order(result: CalibrationResult) -> str:

@@ -204,7 +204,7 @@ class NozzleChange:
             self._operator,
             start=start,
             settings=settings,
-            offers=self._plan.ask_before_write,
+            offers=self._plan.asks,
             types=write and all(one.verify and one.moving for one in self._plan.tools),
         )
 

@@ -33,12 +33,12 @@ def settled_length(raw: RawTable, said: str | None) -> tuple[LengthUnit, str]:
     if raw.length is not None:
         far = any(abs(value) > _FAR_M for place in positions for value in place)
         if raw.length is LengthUnit.M and far:
-            raise UnclearText(which_length(tr("its lengths should be metres, but are too large")))
+            why = tr("its lengths should be metres, but are too large")
+            raise UnclearText(which_length(why, [*positions, (_FAR_M * 3,)]))
         return raw.length, "file" if raw.stated_length else "format"
     if raw.unit_in_comment:
-        raise UnclearText(
-            which_length(tr("a comment speaks of a unit: {text!r}", text=raw.unit_in_comment))
-        )
+        why = tr("a comment speaks of a unit: {text!r}", text=raw.unit_in_comment)
+        raise UnclearText(which_length(why, positions))
     asked = metres_question(positions)
     if asked:
         raise UnclearText(asked)
@@ -49,7 +49,7 @@ def metres_question(positions: Sequence[Sequence[float]]) -> OpenQuestion | None
     """Return the question for the unit where numbers without one do not look like mm."""
     if not looks_like_metres(positions):
         return None
-    return which_length(tr("its lengths have no unit, and do not look like mm"))
+    return which_length(tr("its lengths have no unit, and do not look like mm"), positions)
 
 
 def _unit(name: str) -> LengthUnit:

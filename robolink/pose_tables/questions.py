@@ -2,57 +2,140 @@
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final
 
-from robolink.messages import tr
+from robolink.messages import joined, tr
 from robolink.pose_tables.conventions import rules_for
 from robolink.pose_tables.refusals import OpenQuestion
+from robolink.pose_tables.values import ColumnHead, LengthUnit
 from robolink.ways import Way, way
 
-_READINGS: Final = {
-    3: "x,y,u",
-    4: "x,y,z,u",
-    5: "name,x,y,z,u",
-    6: "x,y,z,u,v,w; x,y,z,rx,ry,rz",
-    7: "x,y,z,qx,qy,qz,qw; x,y,z,qw,qx,qy,qz",
-    12: "r11,r12,r13,x,r21,r22,r23,y,r31,r32,r33,z",
-}
 _UNIT_IN_COMMENT: Final = re.compile(
     r"\b(?:inch(?:es)?|met(?:er|re)s?|cm|feet|foot|radians?|rad)\b|[(\[](?:in|m)[)\]]"
     r"|\bunits?\s*[:=]\s*(?:in|m)\b",
     re.IGNORECASE,
 )
 _ANGLE_WORD: Final = re.compile(r"rad", re.IGNORECASE)
+_UNIT_WITHIN: Final = 0.01
+_KEPT: Final = frozenset({"name", "number", "hand", "local", "tool"})
+_NO_TURNS: Final = frozenset({*_KEPT, "x", "y", "z"})
+MOST_RAD: Final = 4 * math.pi
+"""Two turns; degrees under the name of radians are beyond it at once."""
+
+FAR_MM: Final = 100_000.0
+"""No robot stands further from its base, whatever it runs on."""
+
 _METRES_BELOW: Final = 2.0
 _FULL_TURN_RAD: Final = 2 * math.pi * (1 + 1e-6)
 
 
-def which_columns(count: int) -> OpenQuestion:
-    """Ask what the columns of a table without a header are."""
-    readings = _READINGS.get(count, "x,y,z,u,-,name")
-    return OpenQuestion(
-        "columns",
-        tr("it has no line that names its {count} columns", count=count),
-        tr(
-            "Name each with {columns}, for example {readings}; '-' skips one.",
-            columns=way(Way.COLUMNS),
-            readings=readings,
-        ),
+def which_columns(numeric: Sequence[bool], rows: Sequence[Sequence[float]] = ()) -> OpenQuestion:
+    """Ask what the columns of a table without a header are.
+
+    Args:
+        numeric: Whether each column holds numbers; a first one of words is taken for names.
+        rows: The numbers of those that do, to see which readings make rotations.
+    """
+    readings = _readings(sum(numeric), rows)
+    written = "; ".join(dict.fromkeys(_placed(reading, numeric) for reading in readings))
+    what = tr("it has no line that names its {count} columns", count=len(numeric))
+    columns = way(Way.COLUMNS)
+    if not written:
+        return OpenQuestion("columns", what, tr("Name each with {columns}.", columns=columns))
+    remedy = tr(
+        "Name each with {columns}, for example {readings}; '-' skips one. Joint values are no "
+        "poses.",
+        columns=columns,
+        readings=written,
     )
+    return OpenQuestion("columns", what, remedy)
 
 
-def which_rotation(names: Sequence[str]) -> OpenQuestion:
-    """Ask what the columns mean of which none, or too little, is known to say how a pose turns."""
-    return OpenQuestion(
-        "columns",
-        tr("how a pose turns is not clear from its columns {names}", names=", ".join(names)),
-        tr(
-            "Name each with {columns}: u, v, w are EPSON's angles, qx, qy, qz, qw a quaternion, "
-            "'-' skips one.",
+def _readings(count: int, rows: Sequence[Sequence[float]]) -> list[str]:
+    """Return what so many columns of numbers may be, the likeliest first."""
+    if count < 3:
+        return []
+    if count == 3:
+        return ["x,y,u"]
+    if count == 6:
+        return ["x,y,z,u,v,w", "x,y,z,rx,ry,rz"]
+    if count == 7 and all(abs(math.hypot(*row[3:]) - 1) < _UNIT_WITHIN for row in rows):
+        return ["x,y,z,qx,qy,qz,qw", "x,y,z,qw,qx,qy,qz"]
+    if count == 12:
+        return ["r11,r12,r13,x,r21,r22,r23,y,r31,r32,r33,z"]
+    named = ["x", "y", "z", "u"] if count < 6 else ["x", "y", "z", "u", "v", "w"]
+    return [",".join([*named, *"-" * (count - len(named))])]
+
+
+def _placed(reading: str, numeric: Sequence[bool]) -> str:
+    """Return a reading of the columns of numbers, with a name for each of the others."""
+    names = iter(reading.split(","))
+    words = iter(["name"])
+    return ",".join(next(names) if number else next(words, "-") for number in numeric)
+
+
+def which_rotation(heads: Sequence[ColumnHead], numeric: Sequence[bool] = ()) -> OpenQuestion:
+    """Ask what the columns mean of which none, or too little, is known to say how a pose turns.
+
+    Args:
+        heads: All columns.
+        numeric: Whether each holds numbers, as far as that is known.
+    """
+    names = ", ".join(head.text.strip() for head in heads)
+    what = tr("how a pose turns is not clear from its columns {names}", names=names)
+    numbers = numeric or [head.meaning not in ("name", "hand") for head in heads]
+    turning = [
+        place
+        for place, head in enumerate(heads)
+        if numbers[place] and head.meaning not in _NO_TURNS and head.text.strip() != "-"
+    ]
+    known = [place for place in turning if heads[place].meaning != "-"]
+    readings = [
+        _named(heads, dict(zip(places, reading, strict=True)))
+        for places, reading in _turns(heads, turning, known)
+    ]
+    if not readings:
+        remedy = tr(
+            "Add a column u with the turn about Z in degrees, or name each column with {columns}.",
             columns=way(Way.COLUMNS),
-        ),
+        )
+        return OpenQuestion("columns", what, remedy)
+    remedy = tr(
+        "Name each with {columns}, for example {readings}: u, v, w are EPSON's angles, qx, qy, qz, "
+        "qw a quaternion, '-' skips one.",
+        columns=way(Way.COLUMNS),
+        readings="; ".join(dict.fromkeys(readings)),
     )
+    return OpenQuestion("columns", what, remedy)
+
+
+def _turns(
+    heads: Sequence[ColumnHead], turning: Sequence[int], known: Sequence[int]
+) -> Iterator[tuple[Sequence[int], Sequence[str]]]:
+    """Yield columns that may turn a pose, and as what."""
+    for names in (("u",), ("u", "v", "w"), ("qx", "qy", "qz", "qw")):
+        places = [place for place in known if heads[place].meaning in names]
+        if len(places) == len(names):
+            yield places, [heads[place].meaning for place in places]
+    if not any(heads[place].meaning in ("u", "qx") for place in known):
+        ways = {1: ["u"], 3: ["u v w", "a b c"], 4: ["qx qy qz qw", "qw qx qy qz"]}
+        for reading in ways.get(len(turning), []):
+            yield turning, reading.split()
+
+
+def _named(heads: Sequence[ColumnHead], turns: Mapping[int, str]) -> str:
+    """Return what a person types for all columns, in the order of the file."""
+    return ",".join(_typed(head, turns.get(place, "")) for place, head in enumerate(heads))
+
+
+def _typed(head: ColumnHead, turn: str) -> str:
+    if turn:
+        return turn
+    if head.meaning in ("x", "y", "z"):
+        unit = "m" if head.from_ros else head.unit
+        return f"{head.meaning}_{unit}" if unit else head.meaning
+    return head.meaning if head.meaning in _KEPT else "-"
 
 
 def which_rule(letters: Sequence[str]) -> OpenQuestion:
@@ -65,24 +148,58 @@ def which_rule(letters: Sequence[str]) -> OpenQuestion:
     )
 
 
-def which_angle_unit(names: Sequence[str]) -> OpenQuestion:
-    """Ask for the unit of angles."""
-    columns = "; ".join(",".join(f"{name}_{unit}" for name in names) for unit in ("deg", "rad"))
+def which_angle_unit(
+    heads: Sequence[ColumnHead], names: Sequence[str], largest: float
+) -> OpenQuestion:
+    """Ask for the unit of angles.
+
+    Args:
+        heads: All columns, in the order of the file.
+        names: Meanings of those that are angles.
+        largest: The largest angle; radians are offered only where it can be one.
+
+    Example:
+        >>> from robolink.pose_tables.questions import which_angle_unit
+        >>> from robolink.pose_tables.values import ColumnHead, LengthUnit
+        >>> heads = [ColumnHead("x"), ColumnHead("y"), ColumnHead("u")]
+        >>> which_angle_unit(heads, ["u"], 3.14).remedy
+        'Name the columns with their unit with columns: x,y,u_deg; x,y,u_rad.'
+    """
+    readings = [
+        _named(
+            heads,
+            {
+                at: f"{head.meaning}_{unit}"
+                for at, head in enumerate(heads)
+                if head.meaning in names
+            },
+        )
+        for unit in ("deg", "rad")
+        if unit == "deg" or largest <= MOST_RAD
+    ]
     return OpenQuestion(
         "columns",
         tr("its angles may be degrees or radians"),
         tr(
             "Name the columns with their unit with {columns}: {names}.",
             columns=way(Way.COLUMNS),
-            names=columns,
+            names="; ".join(readings),
         ),
     )
 
 
-def which_length(why: str) -> OpenQuestion:
-    """Ask for the unit of length."""
+def which_length(why: str, positions: Iterable[Sequence[float]]) -> OpenQuestion:
+    """Ask for the unit of length, of those in which a robot could stand there."""
+    far = max((abs(value) for place in positions for value in place), default=0.0)
+    units = [unit for unit in ("mm", "m", "in") if far * LengthUnit(unit).mm <= FAR_MM]
     return OpenQuestion(
-        "length", why, tr("Say the unit with {length}: mm, m or in.", length=way(Way.LENGTH_UNIT))
+        "length",
+        why,
+        tr(
+            "Say the unit with {length}: {units}.",
+            length=way(Way.LENGTH_UNIT),
+            units=joined(tr(" or "), units),
+        ),
     )
 
 

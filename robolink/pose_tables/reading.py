@@ -5,6 +5,8 @@ begins with; what is left is a table. What the file does not say is asked for an
 (docs/poses.md, "Files of poses").
 """
 
+import math
+import statistics
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
@@ -17,12 +19,15 @@ from robolink.pose_tables.encoding import decoded, lines_of
 from robolink.pose_tables.formats.documents import read_document, read_json
 from robolink.pose_tables.formats.epson_points import read_points_table
 from robolink.pose_tables.formats.indented import looks_indented, read_indented
-from robolink.pose_tables.formats.labelled import read_labelled
+from robolink.pose_tables.formats.labelled import of_joints_only, read_labelled
 from robolink.pose_tables.formats.matrices import read_matrices
-from robolink.pose_tables.formats.robot_programs import READERS
+from robolink.pose_tables.formats.printed_arrays import read_arrays
 from robolink.pose_tables.formats.spel_points import read_spel
 from robolink.pose_tables.lengths import settled_length
+from robolink.pose_tables.programs.readers import READERS
+from robolink.pose_tables.questions import FAR_MM
 from robolink.pose_tables.refusals import UnclearText, UnusableText, refused, unclear
+from robolink.pose_tables.tabular.in_columns import read_in_columns
 from robolink.pose_tables.tabular.table import read_table
 from robolink.pose_tables.values import (
     HowRead,
@@ -35,6 +40,11 @@ from robolink.pose_tables.values import (
 
 MOST_BYTES: Final = 32_000_000
 """Half a million poses; a file of more is something else."""
+
+_TURNED_DEG: Final = 36_000.0
+_AS_FAR: Final = 0.2
+"""Touches of one pin lie as far from the base within this share."""
+
 
 _NEEDED_AS: Final = {"z_mm": "Z", "v_deg": "V", "w_deg": "W"}
 
@@ -94,6 +104,8 @@ def parse_poses(data: bytes, choices: ReadingChoices, *, suffix: str = "") -> Po
     if not raw.poses:
         raise UnusableText(tr("there is no pose in it"))
     unit, unit_by = settled_length(raw, choices.length)
+    _require_in_reach(raw, unit.mm)
+    _require_one_unit(raw)
     return PoseTable(
         tuple(_tabled(one, unit.mm) for one in raw.poses),
         HowRead(
@@ -129,10 +141,18 @@ def _read(text: str, suffix: str, choices: ReadingChoices) -> RawTable:
     raw = read_matrices(lines) if choices.columns is None else None
     if raw is not None:
         return _undisputed(raw, choices)
+    raw = read_arrays("\n".join(lines), choices)
+    if raw is not None:
+        return raw
     if suffix in (".yaml", ".yml") or looks_indented(lines):
         return read_document(read_indented(lines), choices, layout="YAML")
-    raw = read_labelled(lines, choices) if choices.columns is None else None
-    return read_table(lines, choices) if raw is None else raw
+    if of_joints_only(lines):
+        raise UnusableText(tr("its points are joint angles, and joint angles are not a pose"))
+    for named in (read_labelled, read_in_columns):
+        raw = named(lines, choices)
+        if raw is not None:
+            return raw
+    return read_table(lines, choices)
 
 
 def _is_json(text: str) -> bool:
@@ -143,6 +163,41 @@ def _is_json(text: str) -> bool:
     except (ValueError, RecursionError):
         return False
     return True
+
+
+def _require_in_reach(raw: RawTable, mm: float) -> None:
+    """Refuse numbers that no robot stands at: where a point or a sign between two was lost.
+
+    Raises:
+        UnusableText: A place is further away than any axis goes, or an angle is.
+    """
+    for pose in raw.poses:
+        place = {"line": pose.line} if raw.has_lines else {"pose": pose.line}
+        far = max(map(abs, pose.position)) * mm
+        if far > FAR_MM:
+            why = tr("a place is {far:.0f} m from the base; no robot stands there", far=far / 1000)
+            raise UnusableText(why, **place)
+        turned = max(map(abs, pose.uvw_deg))
+        if turned > _TURNED_DEG:
+            why = tr("an angle of {angle:g} degrees is no angle of a flange", angle=turned)
+            raise UnusableText(why, **place)
+
+
+def _require_one_unit(raw: RawTable) -> None:
+    """Refuse a pose that lies where the others do only when it is read in metres, or they are.
+
+    Raises:
+        UnusableText: There is one: a file that was put together from two.
+    """
+    away = [math.hypot(*pose.position) for pose in raw.poses]
+    usual = statistics.median_high(away)
+    for pose, one in zip(raw.poses, away, strict=True):
+        near = any(abs(one * factor - usual) <= _AS_FAR * usual for factor in (1000.0, 1 / 1000.0))
+        if one and near:
+            place = {"line": pose.line} if raw.has_lines else {"pose": pose.line}
+            raise UnusableText(
+                tr("its lengths are in another unit than those of the others"), **place
+            )
 
 
 def _undisputed(raw: RawTable, choices: ReadingChoices) -> RawTable:

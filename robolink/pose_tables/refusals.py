@@ -1,6 +1,7 @@
 """Why a file of poses is refused: broken at a line, not finite, or silent about something."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,6 +23,26 @@ class UnusableText(Exception):
         self.why = why
         self.line = line
         self.pose = pose
+
+
+@contextmanager
+def at_line(line: int) -> Iterator[None]:
+    """Name the line of a refusal from inside the block that names none itself."""
+    try:
+        yield
+    except UnusableText as cause:
+        cause.line = cause.line or (0 if cause.pose else line)
+        raise
+
+
+@contextmanager
+def at_pose(number: int) -> Iterator[None]:
+    """Name the number of the pose of a refusal from inside the block that names no place."""
+    try:
+        yield
+    except UnusableText as cause:
+        cause.pose = cause.pose or (0 if cause.line else number)
+        raise
 
 
 class NotFiniteText(UnusableText):

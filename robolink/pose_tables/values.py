@@ -29,6 +29,24 @@ class AngleUnit(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
+class ColumnHead:
+    """What one column holds.
+
+    Attributes:
+        meaning: ``x``, ``u``, ``qw``, ``name`` and so on (docs/poses.md), ``-`` for nothing about a
+            pose.
+        unit: The unit that its name says.
+        text: As the file has it.
+        from_ros: Whether the name is that of a ROS message, whose lengths are metres.
+    """
+
+    meaning: str
+    unit: LengthUnit | AngleUnit | None = None
+    text: str = ""
+    from_ros: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class TabledPose:
     """One pose of a file.
 
@@ -140,6 +158,7 @@ class RawTable:
         length: The unit, where the file or its format says one.
         stated_length: Whether the file itself says it, and not only the format's definition.
         unit_in_comment: A comment that speaks of a unit which nothing else says.
+        has_lines: Whether ``line`` of its poses is a line; else it counts the poses.
         angle: Unit of angles, separator, decimal sign, columns, ignored, skipped: as of
             :class:`HowRead`.
     """
@@ -156,3 +175,4 @@ class RawTable:
     columns: tuple[str, ...] = ()
     ignored: tuple[str, ...] = ()
     skipped: int = 0
+    has_lines: bool = True

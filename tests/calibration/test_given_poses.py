@@ -110,3 +110,11 @@ def test_a_tilted_pose_is_refused_by_name():
     with pytest.raises(CalibrationError) as caught:
         solve_two_pose(Pose(300, 100, 0, 0), Pose(300, 100, 0, 180, w_deg=180))
     assert caught.value.code == "tilted_pose"
+
+
+def test_an_offset_that_no_tool_has_is_said_by_its_whole_length():
+    long = ToolOffset(1131.9, 930.0, -20)
+    touches = [touched(long, u, ToolOffset()) for u in (0.0, 180.0)]
+    with pytest.raises(CalibrationError, match=r"1465\.0 mm long") as caught:
+        solve_two_pose(*touches)
+    assert caught.value.code == "implausible_offset"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from robolink.errors import AmbiguousPosesError, ConfigError
+from robolink.errors import AmbiguousPosesError, CalibrationError, ConfigError
 from robolink.model import Hand
 from robolink.pose_tables import ReadingChoices, read_poses
 
@@ -217,3 +217,143 @@ def test_columns_that_name_their_axes_are_not_counted(read, columns):
     row = " ".join(str(angles[name]) for name in columns.split())
     (pose,) = read(f"x y z {columns}\n405.8 -62.9 251.6 {row}\n", euler="RzRyRx").poses
     assert pose.coordinates()[3:] == pytest.approx(ANGLES)
+
+
+MELFA = "P1=(+405.80,-62.90,+251.60,-172.00,+12.00,+40.00)(7,0)\n"
+SPELLED = {
+    "MELFA BASIC": (MELFA, {}),
+    "MELFA BASIC with steps and axes": (
+        "10 P1=(405.8,-62.9,251.6,-172,12,40,0,0)(7,0) ' the pin\n20 J1=(0,1,2,3,4,5)\n",
+        {},
+    ),
+    "numpy": (
+        "[[ 4.05800000e+02 -6.29000000e+01  2.51600000e+02  4.00000000e+01\n"
+        "   1.20000000e+01 -1.72000000e+02]]\n",
+        {"columns": "x,y,z,u,v,w"},
+    ),
+    "numpy with commas": (
+        "poses = np.array([[405.8, -62.9, 251.6,\n         40., 12., -172.]], dtype=float64)\n",
+        {"columns": "x,y,z,u,v,w"},
+    ),
+    "numpy, a matrix": (
+        "array([["
+        + "],\n       [".join(", ".join(row.split()) for row in [*ROWS, "0 0 0 1"])
+        + "]])",
+        {},
+    ),
+    "a pose in a column": ("X;405,8\nY;-62,9\nZ;251,6\nU;40\nV;12\nW;-172\n", {}),
+    "a pose in a column, with units": (
+        "component,unit,P1\nX,mm,405.8\nY,mm,-62.9\nZ,mm,251.6\nA,deg,40\nB,deg,12\nC,deg,-172\n",
+        {"euler": "kuka"},
+    ),
+    "KUKA, a sign for a blank": ("XP={X+405.8,Y-62.9,Z+251.6,A+40.0,B 12.0,C-172.0}\n", {}),
+}
+
+
+@pytest.mark.parametrize("form", SPELLED)
+def test_a_pose_is_read_as_it_is_printed(read, form):
+    text, choices = SPELLED[form]
+    (pose,) = read(text, **choices).poses
+    assert pose.coordinates()[:3] == pytest.approx(PLACE, abs=1e-6)
+    turned = Rotation.from_euler("ZYX", (pose.u_deg, pose.v_deg, pose.w_deg), degrees=True)
+    assert np.allclose(turned.as_matrix(), TURNED.as_matrix(), atol=1e-7)
+
+
+def test_poses_in_columns_have_their_names(read):
+    text = "\n".join(["name   P1  P2", "X  287.5 296.75", "Y  103.25 87.5", "U 0 90"])
+    for first in ("name   P1  P2", "       P1  P2"):
+        found = read(text.replace("name   P1  P2", first))
+        assert [entry.name for entry in found.entries] == ["P1", "P2"]
+        assert [pose.x_mm for pose in found.poses] == [287.5, 296.75]
+        assert [pose.u_deg for pose in found.poses] == [0.0, 90.0]
+
+
+ASKED_OR_REFUSED = {
+    "a print with rows left out": (
+        "[[287.5 103.25 -50. 0.]\n ...\n [296.75 87.5 -50. 90.]]\n",
+        "line 2: it was printed with '...'",
+    ),
+    "a print without columns": ("[[287.5 103.25 -50. 0.]]\n", "names its 4 columns"),
+    "commas in a part of a print": (
+        "[[287.5, 103.25, -50. 0.],\n [296.75, 87.5, -50., 90.]]\n",
+        "line 1: some numbers have a comma",
+    ),
+    "a row of a column is short": (
+        "X;287,5;296,75\nY;103,25\nZ;-50;-50\nU;0;90\n",
+        "line 2: it holds 1 values, X 2",
+    ),
+    "a component of a column is misspelt": (
+        "X;287,5;296,75\nY;103,25;87,5\nZz;-50;-50\nU;0;90\n",
+        "line 3: Zz is not the name of a component",
+    ),
+    "MELFA without flags": ("P1=(405.8,-62.9,251.6,-172,12,40)\n", "line 1: it is not a position"),
+    "MELFA with a component left out": (
+        "P1=(405.8,-62.9,251.6,,12,40)(7,0)\n",
+        "line 1: there is no A",
+    ),
+    "MELFA with a comma": (
+        MELFA + MELFA.replace("P1", "P2").replace("12.00", "12,00"),
+        "line 2: a position holds six numbers, or eight, and this one 7",
+    ),
+    "a calculated pose of KUKA": (
+        "XP2=XP1:{X 0.0,Y 0.0,Z 10.0,A 0.0,B 0.0,C 0.0}\n",
+        "line 1: what stands beside the pose",
+    ),
+    "thousands without decimals": (
+        "X;Y;Z;U\n1.131;103,25;-50,0;90\n287,5;1.003,25;-50,0;0\n",
+        "line 2: X is '1.131'",
+    ),
+    "a pose twice": (f"DECL POS XP={KUKA}\nDECL POS XP={KUKA}\n", "line 2: XP appears twice"),
+    "stars": (
+        FANUC.format(n=1, name="") + FANUC.format(n=2, name="").replace("405.800", "*" * 7),
+        "line 7: X is '*******': a number that did not fit",
+    ),
+    "a key twice": ('[{"x_mm": 1, "x_mm": 2, "y_mm": 20, "u_deg": 3}]', "x_mm appears twice"),
+    "an angle of another magnitude": (
+        f"DECL POS XP={KUKA.replace('40.0', '40000')}\n",
+        "line 1: an angle of 40000 degrees",
+    ),
+    "a point that was lost": (
+        "x,y,u\n287500,103.25,0\n297.5,104.25,90\n",
+        "line 2: a place is 288 m",
+    ),
+    "a digit typed with shift": (
+        "x y z u\n287.5 103.25 -50 0\n!87.5 103.25 -50 90\n",
+        "line 3: it begins with !",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", ASKED_OR_REFUSED)
+def test_what_is_not_whole_is_refused_by_its_line(read, case):
+    text, why = ASKED_OR_REFUSED[case]
+    with pytest.raises((ConfigError, CalibrationError)) as caught:
+        read(text)
+    assert why in caught.value.what
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "X;Y;Z;U\n1.131,9;103,25;-50,0;90\n287,5;1.003,25;-50,0;0\n",
+        'X,Y,Z,U\n"1,131.9",103.25,-50.0,90\n287.5,"1,003.25",-50.0,0\n',
+        "X\tY\tZ\tU\n1,131.9\t103.25\t-50.0\t90\n287.5\t1,003.25\t-50.0\t0\n",
+    ],
+)
+def test_thousands_are_grouped_where_the_decimal_sign_follows(read, text):
+    first, second = read(text).poses
+    assert (first.x_mm, first.y_mm) == (1131.9, 103.25)
+    assert (second.x_mm, second.y_mm) == (287.5, 1003.25)
+
+
+def test_rows_left_out_on_purpose_are_counted(read):
+    found = read("x,y,u\n287.5,103.25,0\n# 296.75,87.5,90\n312.5,96.75,180\n")
+    assert (len(found.poses), found.how.skipped) == (2, 1)
+
+
+@pytest.mark.parametrize("row", ["0.29675,0.0875,-0.05,90", "296750,87500,-50000,90"])
+def test_a_pose_in_another_unit_than_the_others_is_refused(read, row):
+    text = f"x,y,z,u\n287.5,103.25,-50,0\n{row}\n312.5,96.75,-50,180\n"
+    with pytest.raises(ConfigError, match="line 3"):
+        read(text)
+    assert len(read(text.replace(row, "0.5,87.5,-50,90")).poses) == 3

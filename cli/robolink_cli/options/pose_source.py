@@ -33,7 +33,8 @@ class PoseSource:
         points: Numbers of taught points.
         typed: Three numbers each, X, Y, U; or four, X, Y, Z, U; or six, X, Y, Z, U, V, W.
         path: A file of poses.
-        taught_tool: The tool whose tip the poses describe; 0 when they are flange poses.
+        taught_tool: The tool whose tip the poses describe, 0 when they are flange poses; ``None``
+            where nobody said it.
         choices: What the file does not say.
     """
 
@@ -41,12 +42,12 @@ class PoseSource:
     points: tuple[int, ...] = ()
     typed: tuple[tuple[float, ...], ...] = ()
     path: Path | None = None
-    taught_tool: int = 0
+    taught_tool: int | None = None
     choices: ReadingChoices = NOTHING_SAID
 
     def payload(self) -> dict[str, object]:
         """Return what the document of a calibration says about it."""
-        body: dict[str, object] = {"kind": self.kind, "taught_tool": self.taught_tool}
+        body: dict[str, object] = {"kind": self.kind, "taught_tool": self.taught_tool or 0}
         if self.kind == "points":
             body["points"] = list(self.points)
         elif self.path is not None:
@@ -63,7 +64,7 @@ class PoseSource:
             named = tr("poses of the file {path}", path=self.path)
         else:
             named = tr("typed poses")
-        return tr("{poses}; taught with tool {tool}", poses=named, tool=self.taught_tool)
+        return tr("{poses}; taught with tool {tool}", poses=named, tool=self.taught_tool or 0)
 
     def poses(self, controller: "Controller", needs: Sequence[str] = ()) -> "tuple[Pose, ...]":
         """Return the poses; taught points are read from the controller.
@@ -152,7 +153,9 @@ def taught_points_option(points: str) -> Callable[[Callable[..., Any]], Callable
 
     def add(function: Callable[..., Any]) -> Callable[..., Any]:
         @wraps(function)
-        def with_points(*args: object, points: str, taught_tool: int, **others: object) -> object:
+        def with_points(
+            *args: object, points: str, taught_tool: int | None, **others: object
+        ) -> object:
             numbers = point_numbers(points)
             poses = PoseSource("points", points=numbers, taught_tool=taught_tool)
             return function(*args, poses=poses, taught_tool=taught_tool, **others)
@@ -190,14 +193,13 @@ def pose_source(
             tr("--columns, --length and --euler belong to a file of poses."),
             remedy=tr("Give it with --poses."),
         )
-    tool = taught_tool or 0
     if points:
-        return PoseSource("points", points=point_numbers(points), taught_tool=tool)
+        return PoseSource("points", points=point_numbers(points), taught_tool=taught_tool)
     if typed:
         poses = tuple(_typed_pose(text) for text in typed)
-        return PoseSource("typed", typed=poses, taught_tool=tool)
+        return PoseSource("typed", typed=poses, taught_tool=taught_tool)
     if path is not None:
-        return PoseSource("file", path=path, taught_tool=tool, choices=choices)
+        return PoseSource("file", path=path, taught_tool=taught_tool, choices=choices)
     if taught_tool is not None:
         raise ConfigError(
             tr("--taught-tool belongs to poses that exist already."),

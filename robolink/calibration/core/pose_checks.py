@@ -107,10 +107,10 @@ def keep_unmeasured(stored: ToolOffset | None, **measured: float) -> ToolOffset:
     """Return ``stored`` with the measured components replaced.
 
     Raises:
-        CalibrationError: ``implausible_offset`` when a length is beyond any tool.
+        CalibrationError: ``implausible_offset`` when it is longer than any tool.
     """
     offset = ToolOffset(**measured) if stored is None else replace(stored, **measured)
-    longest = max(abs(offset.x_mm), abs(offset.y_mm), abs(offset.z_mm))
+    longest = math.hypot(offset.x_mm, offset.y_mm, offset.z_mm)
     if longest > MAX_OFFSET_MM:
         raise CalibrationError(
             "implausible_offset",

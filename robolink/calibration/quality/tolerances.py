@@ -1,6 +1,21 @@
 """Residuals above which a result is given with a warning (docs/reference/calibration.md 3)."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
+
+BEYOND_TOLERANCE: Final = ("large_residual", "large_rms", "large_pixel_residual")
+"""Codes of a result that does not agree with itself, the plainest first: nothing to be written."""
+
+
+def beyond_tolerance(codes: Sequence[str], *, judged: Sequence[str] = ()) -> tuple[str, ...]:
+    """Return the codes for which a result that nobody watched is refused, the plainest first.
+
+    Args:
+        codes: Those of the result.
+        judged: Codes for which somebody stated a limit, which then decides.
+    """
+    return tuple(code for code in BEYOND_TOLERANCE if code in codes and code not in judged)
 
 
 @dataclass(frozen=True, slots=True)

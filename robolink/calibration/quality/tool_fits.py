@@ -22,6 +22,12 @@ from robolink.model import ToolOffset, rotate_xy
 UNSUSPICIOUS_MM = 1.0
 """A change up to this is an ordinary nozzle change and raises no doubt about the tool."""
 
+_NEW_NOZZLE_MM = 2.0
+"""A larger change than this is none of a new nozzle, whatever is accepted this time."""
+
+ALIKE_MM = 0.01
+"""Offsets nearer than this are one: whichever tool it was, the same is written."""
+
 MUCH_NEARER = 4.0
 """Another tool has to explain the poses this many times better before it is named."""
 
@@ -31,11 +37,12 @@ class ToolFit:
     """How well poses fit to having been taught with ``tool``.
 
     ``change_mm`` is by how much the calibrated tool would then have moved against its stored
-    value.
+    value, ``apart_mm`` how far its offset would be from that by the tool that a person named.
     """
 
     tool: int
     change_mm: float
+    apart_mm: float = 0.0
 
 
 def tool_fits(
@@ -68,15 +75,18 @@ def tool_fits(
         return ()
     own, measured = tools[taught], result.offset
     shift = (measured.x_mm - own.x_mm, measured.y_mm - own.y_mm)
+    along = "z_mm" in result.measured
     fits = []
     for tool, offset in tools.items():
         if offset.v_deg or offset.w_deg:
             continue
         dx_mm, dy_mm = rotate_xy(*shift, offset.u_deg - own.u_deg)
-        change_mm = math.hypot(
-            offset.x_mm + dx_mm - reference.x_mm, offset.y_mm + dy_mm - reference.y_mm
-        )
-        fits.append(ToolFit(tool, change_mm))
+        x_mm, y_mm = offset.x_mm + dx_mm, offset.y_mm + dy_mm
+        z_mm = offset.z_mm + measured.z_mm - own.z_mm
+        above = (z_mm - reference.z_mm, z_mm - measured.z_mm) if along else (0.0, 0.0)
+        change_mm = math.hypot(x_mm - reference.x_mm, y_mm - reference.y_mm, above[0])
+        apart_mm = math.hypot(x_mm - measured.x_mm, y_mm - measured.y_mm, above[1])
+        fits.append(ToolFit(tool, change_mm, apart_mm))
     return tuple(sorted(fits, key=lambda fit: (fit.change_mm, fit.tool)))
 
 
@@ -94,8 +104,8 @@ def better_fit(fits: Sequence[ToolFit], *, taught: int, plausible_mm: float) -> 
 
     Example:
         >>> from robolink.calibration import ToolFit, better_fit
-        >>> better_fit([ToolFit(2, 0.1), ToolFit(0, 12.6)], taught=0, plausible_mm=2)
-        ToolFit(tool=2, change_mm=0.1)
+        >>> better_fit([ToolFit(2, 0.1), ToolFit(0, 12.6)], taught=0, plausible_mm=2).tool
+        2
     """
     declared = next((fit for fit in fits if fit.tool == taught), None)
     if declared is None or declared.change_mm <= UNSUSPICIOUS_MM:
@@ -103,3 +113,36 @@ def better_fit(fits: Sequence[ToolFit], *, taught: int, plausible_mm: float) -> 
     best = fits[0]
     much_nearer = best.change_mm * MUCH_NEARER <= declared.change_mm
     return best if much_nearer and best.change_mm <= plausible_mm else None
+
+
+def fits_alike(fits: Sequence[ToolFit], *, taught: int, plausible_mm: float) -> tuple[ToolFit, ...]:
+    """Return the other tools that explain the poses as well, and would have another value written.
+
+    A tool whose stored offset is small is near to the flange. Poses of either then mean a change
+    that a new nozzle explains, and nothing in them tells which it was; but read as those of the
+    wrong one they are wrong by the whole stored offset. One can be told from the other only where
+    its change is out of the ordinary (:data:`UNSUSPICIOUS_MM`) and :data:`MUCH_NEARER` times that
+    of the tool named.
+
+    Args:
+        fits: What :func:`tool_fits` returned.
+        taught: The tool that the poses are taken for; 0 for the flange.
+        plausible_mm: Largest change that is believed.
+
+    Example:
+        >>> from robolink.calibration import ToolFit, fits_alike
+        >>> fits = [ToolFit(0, 0.1), ToolFit(1, 0.9, apart_mm=0.9), ToolFit(2, 12.6, apart_mm=12)]
+        >>> [fit.tool for fit in fits_alike(fits, taught=0, plausible_mm=2)]
+        [1]
+    """
+    declared = next((fit for fit in fits if fit.tool == taught), None)
+    if declared is None or declared.change_mm > plausible_mm:
+        return ()
+    ordinary_mm = max(UNSUSPICIOUS_MM, min(MUCH_NEARER * declared.change_mm, _NEW_NOZZLE_MM))
+    return tuple(
+        fit
+        for fit in fits
+        if fit.tool != taught
+        and fit.apart_mm > ALIKE_MM
+        and fit.change_mm <= min(ordinary_mm, plausible_mm)
+    )

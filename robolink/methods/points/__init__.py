@@ -56,7 +56,7 @@ def _source(parameters: PointsParameters, site: Site) -> "TipSource":
         sentence=tr(
             "points {names} taught on the pendant with tool {tool}",
             names=", ".join(f"P{number}" for number in site.points),
-            tool=parameters.taught_tool,
+            tool=parameters.taught_tool or 0,
         ),
         in_mm=True,
     )
@@ -77,7 +77,7 @@ def _from_file(
         sentence=tr(
             "poses of the file {path}, taught with tool {tool}",
             path=path,
-            tool=parameters.taught_tool,
+            tool=parameters.taught_tool or 0,
         ),
     )
 

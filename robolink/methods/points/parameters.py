@@ -22,7 +22,7 @@ class PointsParameters(MethodParameters):
         Help(declared("Two points for each tool, or three and more that check each other.")),
     ] = "two-pose"
     taught_tool: Annotated[
-        int,
+        int | None,
         Ge(0),
         Le(15),
         Option(metavar="N", moves=False),
@@ -31,7 +31,7 @@ class PointsParameters(MethodParameters):
                 "Number of the tool that was selected when the points were taught; 0 is the flange."
             )
         ),
-    ] = 0
+    ] = None
 
     def problems(self, check: Check) -> Iterator[Problem]:
         """Check that there are as many points as the solver takes."""

@@ -13,6 +13,7 @@ from robolink.calibration import (
     CalibrationResult,
     ToolFit,
     better_fit,
+    fits_alike,
     flange_of,
     require_near,
     require_stored_scale,
@@ -20,10 +21,11 @@ from robolink.calibration import (
     tool_fits,
 )
 from robolink.errors import CalibrationError, RobolinkError, UndefinedToolError
-from robolink.messages import tr
+from robolink.messages import joined, tr
 from robolink.methods.two_pose.source import TwoTouches
 from robolink.model import Controller, PointReader, Pose, ToolOffset
 from robolink.procedures import MeasurementContext, PoseMethod, require_one_height
+from robolink.runner import Confirm, Procedure
 from robolink.ways import Way, way
 
 
@@ -68,7 +70,9 @@ class PointsSource:
     Args:
         poses: Brings the poses, mm and degrees.
         method: How they are solved.
-        taught_tool: The tool whose tip they describe; 0 when they are flange poses.
+        taught_tool: The tool whose tip they describe, 0 when they are flange poses; ``None`` where
+            nobody said it: then they are taken for flange poses, and asked about where another
+            tool fits them as well.
         plausible_mm: Largest change that needs no explanation by another tool.
         sentence: Where they come from, for a report.
         in_mm: Whether they are in mm for certain, as the controller's own points are; others are
@@ -90,14 +94,15 @@ class PointsSource:
         poses: Callable[[], Sequence[Pose]],
         method: PoseMethod | None = None,
         *,
-        taught_tool: int = 0,
+        taught_tool: int | None = None,
         plausible_mm: float = 2.0,
         sentence: str = "",
         in_mm: bool = False,
     ) -> None:
         self._poses = poses
         self._method = TwoTouches() if method is None else method
-        self._taught_tool = taught_tool
+        self._said = taught_tool is not None
+        self._taught_tool = taught_tool or 0
         self._plausible_mm = plausible_mm
         self._sentence = sentence
         self._in_mm = in_mm
@@ -118,7 +123,12 @@ class PointsSource:
             ConfigError: Too many poses for the method.
             UndefinedToolError: The tool with which they were taught has no definition.
         """
-        self.found = self.find(context.controller, tool, stored)
+        try:
+            self.found = self.find(context.controller, tool, stored)
+        except _UnknownTool as unknown:
+            self._taught_tool = _asked(context, unknown)
+            self._said = True
+            self.found = self.find(context.controller, tool, stored)
         return self.found.result
 
     def find(self, controller: Controller, tool: int, stored: ToolOffset | None) -> PosesFound:
@@ -133,7 +143,8 @@ class PointsSource:
 
         Raises:
             CalibrationError: As :meth:`measure`; ``touch_heights_differ``, ``suspect_units`` among
-                others.
+                others; ``taught_tool_unknown`` where nobody said with which tool the poses were
+                taken, and two tools fit them alike.
 
         Example:
             >>> from robolink.methods import PointsSource
@@ -157,17 +168,38 @@ class PointsSource:
         tools = {number: _require_defined(controller, number) for number in sorted(named)}
         if not self._method.upright:
             flange = [tilted_flange_pose(pose, tools[self._tool_of(pose)]) for pose in poses]
-            return PosesFound(self._solved(controller, flange, stored), (), None)
+            return self._compared(
+                controller, tool, self._solved(controller, flange, stored), poses, named
+            )
         for number, taught in tools.items():
             _require_upright(number, taught)
         flange = [flange_of(pose, tools[self._tool_of(pose)]) for pose in poses]
         result = self._solved(controller, flange, stored)
         require_one_height([pose.z_mm for pose in flange], sigma_z_mm=PERSON_SIGMA_Z_MM)
+        return self._compared(controller, tool, result, poses, named)
+
+    def _compared(
+        self,
+        controller: Controller,
+        tool: int,
+        result: CalibrationResult,
+        poses: Sequence[Pose],
+        named: set[int],
+    ) -> PosesFound:
+        """Compare the result with what it would be if the poses were those of other tools.
+
+        Raises:
+            CalibrationError: ``taught_tool_unknown``.
+        """
         if named != {self._taught_tool}:
             return PosesFound(result, (), None)
         # The listing may lack V and W; what is compared and written comes from single reads.
         listed = {number: o for number, o in controller.tools.read_all().items() if o is not None}
         fits = tool_fits(result, taught=self._taught_tool, stored=listed, calibrated=tool)
+        if not self._said and any(pose.tool is None for pose in poses):
+            alike = fits_alike(fits, taught=self._taught_tool, plausible_mm=self._plausible_mm)
+            if alike:
+                raise _UnknownTool(self._taught_tool, alike)
         better = better_fit(fits, taught=self._taught_tool, plausible_mm=self._plausible_mm)
         if better is not None:
             result = replace(result, warnings=(*result.warnings, "other_tool_fits"))
@@ -204,6 +236,54 @@ class PointsSource:
             "({taught_tool}).",
             taught_tool=way(Way.TAUGHT_TOOL),
         )
+
+
+class _UnknownTool(CalibrationError):
+    """Two tools fit the poses alike, and nobody said which one was selected."""
+
+    def __init__(self, taught: int, alike: Sequence[ToolFit]) -> None:
+        self.tools = (*sorted(fit.tool for fit in alike), taught)
+        self.apart_mm = max(fit.apart_mm for fit in alike)
+        ways = [f"{way(Way.TAUGHT_TOOL)} {tool}" for tool in sorted(self.tools)]
+        super().__init__(
+            "taught_tool_unknown",
+            tr(
+                "The poses fit tools {tools} alike, and the values would be {apart:.3f} mm apart: "
+                "which tool was selected when they were taken?",
+                tools=", ".join(map(str, sorted(self.tools))),
+                apart=self.apart_mm,
+            ),
+            remedy=tr(
+                "Nothing was written. Say it with {ways}; 0 is the flange.",
+                ways=joined(tr(" or "), ways),
+            ),
+        )
+
+
+def _asked(context: MeasurementContext, unknown: _UnknownTool) -> int:
+    """Ask a person which tool was selected; what they answer goes on record.
+
+    Raises:
+        CalibrationError: ``taught_tool_unknown``: nobody knows it, or nobody can be asked.
+    """
+
+    def steps() -> Procedure[int | None]:
+        for tool in unknown.tools:
+            question = tr(
+                "The poses fit tools {tools} alike, and the values would be {apart:.3f} mm apart. "
+                "Was tool {tool} selected when they were taken (0: the flange)?",
+                tools=", ".join(map(str, sorted(unknown.tools))),
+                apart=unknown.apart_mm,
+                tool=tool,
+            )
+            if (yield Confirm(question)):
+                return tool
+        return None
+
+    found = context.run(steps())
+    if found is None:
+        raise unknown
+    return found
 
 
 def _live_pose(controller: Controller) -> Pose | None:

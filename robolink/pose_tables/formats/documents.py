@@ -11,25 +11,28 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from robolink.messages import tr
-from robolink.pose_tables.formats.matrices import pose_of_rows
+from robolink.pose_tables.formats.matrices import is_matrix, pose_of_rows
+from robolink.pose_tables.formats.objects import (
+    COMPONENTS,
+    Found,
+    as_matrix,
+    as_number,
+    has_joints,
+    poses_in,
+)
 from robolink.pose_tables.lengths import metres_question
 from robolink.pose_tables.questions import which_columns
-from robolink.pose_tables.refusals import UnclearText, UnusableText
+from robolink.pose_tables.refusals import UnclearText, UnusableText, at_pose
 from robolink.pose_tables.tabular.columns import PoseColumns
 from robolink.pose_tables.tabular.header import (
+    LENGTHS,
     column_head,
     column_heads,
     named_by_person,
-    names_place,
 )
-from robolink.pose_tables.values import LengthUnit, RawPose, RawTable, ReadingChoices
+from robolink.pose_tables.values import ColumnHead, LengthUnit, RawPose, RawTable, ReadingChoices
 
-_PARTS: Final = ("position", "orientation", "translation", "rotation")
-_NO_POSES: Final = frozenset({"twist", "covariance", "velocity", "header", "accel", "wrench"})
-_NAMES: Final = ("name", "label", "point")
-_DEEPEST: Final = 60
-
-Found = dict[str, object] | list[list[float]]
+_OF_FRAME: Final = ("hand", "local", "tool")
 
 
 def read_json(text: str, choices: ReadingChoices) -> RawTable:
@@ -49,7 +52,7 @@ def read_json(text: str, choices: ReadingChoices) -> RawTable:
 
 def _documents(text: str) -> Iterator[object]:
     """Yield the documents of a text; a command whose output was appended leaves several."""
-    decoder, place = json.JSONDecoder(), 0
+    decoder, place = json.JSONDecoder(object_pairs_hook=_each_once), 0
     while True:
         while text[place : place + 1].isspace():
             place += 1
@@ -59,16 +62,36 @@ def _documents(text: str) -> Iterator[object]:
             return
 
 
+def _each_once(pairs: list[tuple[str, object]]) -> dict[str, object]:
+    """Return an object whose keys are all different.
+
+    Raises:
+        UnusableText: One stands twice; of two values nobody can tell which counts.
+    """
+    found: dict[str, object] = {}
+    for key, value in pairs:
+        if key in found:
+            raise UnusableText(tr("{name} appears twice", name=key))
+        found[key] = value
+    return found
+
+
 def read_document(document: object, choices: ReadingChoices, *, layout: str) -> RawTable:
     """Return the poses of a document of lists and dictionaries; see :func:`read_json`."""
-    rows = _rows_of_numbers(document)
+    rows = _rows_of_numbers(document, choices)
     if rows:
-        return _listed(rows, choices, layout)
-    found = list(_poses_in(document, "", 0))
+        return read_rows(list(enumerate(rows, start=1)), choices, layout, has_lines=False)
+    with at_pose(1):
+        found = list(poses_in(document, "", 0))
     if not found:
+        if has_joints(document):
+            raise UnusableText(
+                tr(
+                    "there is no pose in it: its values are joint angles, and joint angles are "
+                    "not a pose"
+                )
+            )
         raise UnusableText(tr("there is no pose in it"))
-    if choices.columns is not None:
-        raise UnusableText(tr("columns were given, but the file names its values itself"))
     made = _Made(choices)
     poses = [made.pose(place, one) for place, one in enumerate(found, start=1)]
     return made.table(poses, layout)
@@ -85,6 +108,7 @@ class _Made:
         self._ignored: dict[str, None] = {}
         self._angle = ""
         self._from_ros = False
+        self._shape: tuple[frozenset[str], frozenset[str]] | None = None
 
     def pose(self, place: int, one: Found) -> RawPose:
         try:
@@ -105,6 +129,7 @@ class _Made:
             stated_length=length is not None and not self._from_ros,
             angle=self._angle,
             ignored=tuple(self._ignored),
+            has_lines=False,
         )
 
     def _matrix(self, place: int, rows: list[list[float]]) -> RawPose:
@@ -119,10 +144,14 @@ class _Made:
     def _object(self, place: int, one: dict[str, object]) -> RawPose:
         keys = tuple(one)
         if keys not in self._known:
-            columns = PoseColumns(column_heads(keys), self._choices, as_number)
+            heads = column_heads(keys)
+            if self._choices.columns is not None:
+                heads = self._named(heads)
+            columns = PoseColumns(heads, self._choices, as_number)
             self._known[keys] = columns
             self._ask(columns, place, one)
         columns = self._known[keys]
+        self._require_alike(one)
         (pose,) = columns.poses([(place, list(one.values()))])
         turns = columns.turns
         if turns is not None:
@@ -133,93 +162,116 @@ class _Made:
         self._ignored |= dict.fromkeys(columns.ignored)
         return pose
 
+    def _named(self, heads: Sequence[ColumnHead]) -> tuple[ColumnHead, ...]:
+        """Return the columns as a person names them, in the order of the file.
+
+        Raises:
+            UnusableText: They are not as many, or another component than the file names.
+        """
+        named = named_by_person(self._choices.columns or "")
+        if len(named) != len(heads):
+            raise UnusableText(
+                tr(
+                    "it has {count} values, but {wanted} are named",
+                    count=len(heads),
+                    wanted=len(named),
+                )
+            )
+        for own, said in zip(heads, named, strict=True):
+            if own.meaning in LENGTHS and own.meaning != said.meaning:
+                raise UnusableText(tr("columns were given, but the file names its values itself"))
+        return named
+
+    def _require_alike(self, one: dict[str, object]) -> None:
+        """Refuse a pose that says less, or more, than the first.
+
+        Raises:
+            UnusableText: A component, or what else a pose has, is in one of them only.
+        """
+        meanings = {column_head(key).meaning: value for key, value in one.items()}
+        for name in _OF_FRAME:
+            if meanings.get(name) == "":
+                raise UnusableText(tr("there is no {name}", name=name))
+        says = frozenset(name for name in meanings if name in (*COMPONENTS, *_OF_FRAME))
+        filled = frozenset(
+            name
+            for name in says & COMPONENTS
+            if meanings[name] is not None and meanings[name] != ""
+        )
+        first = self._shape = self._shape or (says, filled)
+        odd = (first[0] ^ says) | (first[1] ^ filled)
+        if odd:
+            names = ", ".join(sorted(name.upper() for name in odd))
+            raise UnusableText(tr("not all poses have {names}", names=names))
+
     def _ask(self, columns: PoseColumns, place: int, one: dict[str, object]) -> None:
         if columns.questions:
             silent = columns.length is None and not columns.from_ros and not self._choices.length
             asked = metres_question(columns.positions([(place, list(one.values()))]))
-            raise UnclearText(*columns.questions, *([asked] if silent and asked else []))
+            raise UnclearText(
+                *columns.asked([(place, list(one.values()))]),
+                *([asked] if silent and asked else []),
+            )
 
 
-def as_number(value: object) -> float:
-    """Return a number, ``nan`` for what is none; a text may hold one."""
-    if isinstance(value, bool):
-        return math.nan
-    try:
-        return float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError, OverflowError):
-        return math.nan
-
-
-def _poses_in(node: object, name: str, depth: int) -> Iterator[Found]:
-    """Yield objects and matrices that are poses, in the order of the document."""
-    if depth > _DEEPEST:
-        raise UnusableText(tr("it is nested too deeply"))
-    if isinstance(node, list):
-        matrix = _as_matrix(node)
-        if matrix:
-            yield matrix
-            return
-        for one in node:
-            yield from _poses_in(one, name, depth + 1)
-    if not isinstance(node, dict):
-        return
-    flat = _flat(node)
-    called = next((str(node[key]) for key in _NAMES if isinstance(node.get(key), str)), name)
-    if names_place([column_head(key) for key in flat]):
-        yield flat if not called or any(key in flat for key in _NAMES) else {**flat, "name": called}
-        return
-    inside = {"poses": node["poses"]} if "poses" in node else node
-    for key, value in inside.items():
-        if key not in _NO_POSES:
-            yield from _poses_in(value, called, depth + 1)
-
-
-def _flat(node: dict[str, object]) -> dict[str, object]:
-    """Return the plain values of an object, those of a position and an orientation too."""
-    flat: dict[str, object] = {}
-    for key, value in node.items():
-        part = str(key).lower()
-        if part in _PARTS and isinstance(value, dict):
-            flat |= {f"{part}.{inner}": one for inner, one in value.items()}
-        elif part in ("position", "translation") and isinstance(value, list) and len(value) == 3:
-            flat |= {f"{part}.{axis}": one for axis, one in zip("xyz", value, strict=True)}
-        elif part in _PARTS or not isinstance(value, (dict, list)):
-            flat[str(key)] = value
-    return flat
-
-
-def _as_matrix(node: list[object]) -> list[list[float]]:
-    if len(node) not in (3, 4) or not all(isinstance(row, list) and len(row) == 4 for row in node):
-        return []
-    rows = [[as_number(value) for value in row] for row in node if isinstance(row, list)]
-    return rows if all(map(math.isfinite, (v for row in rows for v in row))) else []
-
-
-def _rows_of_numbers(document: object) -> list[list[object]]:
+def _rows_of_numbers(document: object, choices: ReadingChoices) -> list[list[object]]:
     """Return the rows of a list of lists of numbers, none where it is anything else."""
-    if not isinstance(document, list) or not document or _as_matrix(document):
+    if not isinstance(document, list) or not document:
+        return []
+    if choices.columns is None and is_matrix(as_matrix(document)):
         return []
     rows = [row for row in document if isinstance(row, list)]
     numbers = all(not isinstance(value, (list, dict)) for row in rows for value in row)
     return rows if len(rows) == len(document) and numbers else []
 
 
-def _listed(rows: Sequence[list[object]], choices: ReadingChoices, layout: str) -> RawTable:
-    width = max(map(len, rows))
+def read_rows(
+    rows: Sequence[tuple[int, Sequence[object]]],
+    choices: ReadingChoices,
+    layout: str,
+    *,
+    has_lines: bool,
+) -> RawTable:
+    """Return the poses of rows without names.
+
+    Args:
+        rows: Each with its line, or its number where there are no lines.
+        choices: What a person says; without columns they are asked.
+        layout: Name of the format.
+        has_lines: Whether the numbers of the rows are lines.
+
+    Raises:
+        UnclearText: The columns have to be named.
+        UnusableText: A row is no pose.
+
+    Example:
+        >>> from robolink.pose_tables import ReadingChoices
+        >>> from robolink.pose_tables.formats.documents import read_rows
+        >>> named = ReadingChoices(columns="x,y,u")
+        >>> read_rows([(1, [287.5, 103.25, 90.0])], named, "rows", has_lines=True).poses[0].uvw_deg
+        (90.0, 0.0, 0.0)
+    """
+    width = max(len(row) for _, row in rows)
     if choices.columns is None:
-        raise UnclearText(which_columns(width))
+        numbers = [[as_number(value) for value in row] for _, row in rows if len(row) == width]
+        numeric = [all(map(math.isfinite, column)) for column in zip(*numbers, strict=True)]
+        kept = [[v for v, n in zip(row, numeric, strict=True) if n] for row in numbers]
+        raise UnclearText(which_columns(numeric, kept))
     heads = named_by_person(choices.columns)
-    for place, row in enumerate(rows, start=1):
-        if len(row) != len(heads):
-            why = tr(
-                "it has {count} columns, but {wanted} are named", count=len(row), wanted=len(heads)
-            )
-            raise UnusableText(why, pose=place)
     columns = PoseColumns(heads, choices, as_number)
     try:
-        poses = columns.poses(list(enumerate(rows, start=1)))
+        for number, row in rows:
+            if len(row) != len(heads):
+                why = tr(
+                    "it has {count} columns, but {wanted} are named",
+                    count=len(row),
+                    wanted=len(heads),
+                )
+                raise UnusableText(why, number)
+        poses = columns.poses(rows)
     except UnusableText as cause:
-        cause.line, cause.pose = 0, cause.line
+        if not has_lines:
+            cause.line, cause.pose = 0, cause.line
         raise
     turns = columns.turns
     return RawTable(
@@ -230,4 +282,5 @@ def _listed(rows: Sequence[list[object]], choices: ReadingChoices, layout: str) 
         stated_length=columns.length is not None,
         angle=str(turns.angle or "") if turns else "",
         columns=tuple(head.meaning for head in heads),
+        has_lines=has_lines,
     )

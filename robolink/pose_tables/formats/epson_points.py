@@ -44,6 +44,11 @@ _FIELD: Final = re.compile(
     re.MULTILINE | re.ASCII,
 )
 _COUNT: Final = re.compile(r"^nNumberOfPoints=([0-9]{1,6})\s*$", re.MULTILINE | re.ASCII)
+_LINE: Final = re.compile(
+    r"\s*(?=(?:[nr]\w*=-?[0-9][0-9.]*(?:E[+-][0-9]+)?|b\w*=(?:True|False)|s\w*=\"[^\"]*\")\s*$)"
+    r"(\w+)=.*"
+)
+"""A key whose first letter says what its value is: n and r a number, b a truth, s a text."""
 _LABEL: Final = re.compile(r'^\s*sLabel="(.*)"\s*$', re.MULTILINE)
 _XYZU: Final = 0b1111
 _HANDS: Final = {1: Hand.RIGHT, 2: Hand.LEFT}
@@ -121,15 +126,37 @@ def _blocks(text: str) -> Iterator[tuple[int, dict[str, float], str]]:
     counted = _COUNT.search(text)
     blocks = list(_BLOCK.finditer(text))
     if counted is None or int(counted[1]) != len(blocks):
-        raise UnusableText(tr("it is not a complete point file of EPSON RC+"))
+        line = line_at(counted.start(1)) if counted else 1
+        raise UnusableText(tr("it is not a complete point file of EPSON RC+"), line)
     seen: set[float] = set()
+    first: tuple[str, ...] = ()
     for number, block in enumerate(blocks, start=1):
         fields = {name: float(value) for name, value in _FIELD.findall(block[1])}
-        if not set(_FIELDS) <= set(fields) or fields["nNumber"] in seen:
-            raise UnusableText(tr("point block {number} cannot be read", number=number))
+        line = line_at(block.start())
+        keys = _keys(block[1], line)
+        first = first or keys
+        if not set(_FIELDS) <= set(fields) or fields["nNumber"] in seen or keys != first:
+            raise UnusableText(tr("point block {number} cannot be read", number=number), line)
+        if any(name in keys and name not in fields for name in (*_FLAGS, *_ANGLES)):
+            raise UnusableText(tr("point block {number} cannot be read", number=number), line)
         seen.add(fields["nNumber"])
         label = _LABEL.search(block[1])
         yield line_at(block.start()), fields, label[1] if label else ""
+
+
+def _keys(block: str, line: int) -> tuple[str, ...]:
+    """Return the keys of a block; all blocks of a file have the same ones.
+
+    Raises:
+        UnusableText: A line is none of a key and its value, or a key stands twice.
+    """
+    keys: list[str] = []
+    for at, text in enumerate(block.split("\n"), start=line + 1):
+        found = _LINE.fullmatch(text)
+        if text.strip() and (found is None or found[1] in keys):
+            raise UnusableText(tr("{text!r} is not a name and a value", text=text.strip()), at)
+        keys += [found[1]] if found else []
+    return tuple(keys)
 
 
 def _pose(fields: Mapping[str, float]) -> Pose | None:

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from robolink.messages import tr
+from robolink.pose_tables.numbers import NUMBER, seems_number
 from robolink.pose_tables.orientation import checked, is_rotation, uvw_deg
 from robolink.pose_tables.questions import unit_in
 from robolink.pose_tables.refusals import UnusableText
@@ -17,10 +18,11 @@ from robolink.pose_tables.tabular.separators import table_lines
 from robolink.pose_tables.values import RawPose, RawTable
 
 _BRACKETS: Final = re.compile(r"[\[\](){};,|]")
-_NUMBER: Final = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+_NUMBER: Final = re.compile(NUMBER)
 _OTHER_BRACKETS: Final = re.compile(r"[\[\](){};|]")
 _WITH_COMMA: Final = re.compile(r"[+-]?\d+(?:,\d+)?(?:[eE][+-]?\d+)?", re.ASCII)
 _TITLE: Final = re.compile(r"[^\d\s]")
+_FEWEST_NUMBERS: Final = 2
 _LAST: Final = (0.0, 0.0, 0.0, 1.0)
 
 Block = tuple[int, str, list[list[float]]]
@@ -34,8 +36,10 @@ def read_matrices(lines: Sequence[str]) -> RawTable | None:
         UnusableText: A block is no pose.
     """
     kept, comments = table_lines(lines)
-    blocks = _blocks(kept, lines)
-    if not blocks or not _one_shape(blocks):
+    blocks, damaged = _blocks(kept, lines)
+    if any(is_matrix(rows) for _, _, rows in blocks):
+        _refuse_damaged(blocks, damaged)
+    if damaged or not blocks or not _one_shape(blocks):
         return None
     columns = _stored_by_columns(blocks)
     if columns is None:
@@ -60,15 +64,47 @@ def pose_of_rows(rows: Sequence[Sequence[float]], line: int) -> RawPose | None:
     return None if columns is None else _pose(block, by_columns=columns)
 
 
-def _blocks(kept: Sequence[tuple[int, str]], lines: Sequence[str]) -> list[Block]:
-    """Return runs of lines of numbers; four lines make a block where no blank line ends one."""
+def is_matrix(rows: Sequence[Sequence[float]]) -> bool:
+    """Tell whether rows are a matrix of a pose for certain: 0 0 0 1 and a rotation."""
+    if len(rows) != 4 or any(len(row) != 4 for row in rows):
+        return False
+    last_row, last_column = _is_last(rows[3]), _is_last([row[3] for row in rows])
+    turned = [value for row in rows[:3] for value in row[:3]]
+    return last_row != last_column and is_rotation(turned)
+
+
+def _refuse_damaged(blocks: Sequence[Block], damaged: Sequence[int]) -> None:
+    """Refuse what is no matrix among matrices.
+
+    Raises:
+        UnusableText: A line holds other numbers than four, or a block other lines.
+    """
+    odd = next((line for line, _, rows in blocks if {len(rows), *map(len, rows)} != {4}), 0)
+    row = next(
+        (line + at for line, _, rows in blocks for at, r in enumerate(rows) if len(r) != 4), 0
+    )
+    lines = [line for line in (*damaged[:1], odd, row) if line]
+    if lines:
+        line = min(damaged[0] if damaged else row or odd, row or odd or damaged[0])
+        raise UnusableText(tr("the matrix does not hold four lines of four numbers"), line)
+
+
+def _blocks(kept: Sequence[tuple[int, str]], lines: Sequence[str]) -> tuple[list[Block], list[int]]:
+    """Return runs of lines of numbers, and lines that seem to hold damaged ones.
+
+    Four lines make a block where no blank line ends one.
+    """
     blocks: list[Block] = []
+    damaged: list[int] = []
     name, before = "", -1
     for line, text in kept:
         row = _numbers(text)
         if row is None:
-            if not _TITLE.search(text):
-                return []
+            words = _OTHER_BRACKETS.sub(" ", text).replace(",", " ").split()
+            if not _TITLE.search(text) or sum(map(seems_number, words)) >= _FEWEST_NUMBERS:
+                damaged.append(line)
+                before = -1
+                continue
             name, before = text.strip().strip(":").strip(), -1
             continue
         gap = any(not lines[place].strip() for place in range(before, line - 1))
@@ -78,7 +114,7 @@ def _blocks(kept: Sequence[tuple[int, str]], lines: Sequence[str]) -> list[Block
             name = ""
         blocks[-1][2].append(row)
         before = line
-    return blocks
+    return blocks, damaged
 
 
 def _numbers(text: str) -> list[float] | None:

@@ -2,12 +2,11 @@
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Final
 
 from robolink.messages import tr
 from robolink.pose_tables.refusals import UnusableText
-from robolink.pose_tables.values import AngleUnit, LengthUnit
+from robolink.pose_tables.values import AngleUnit, ColumnHead, LengthUnit
 
 SKIPPED: Final = "-"
 
@@ -68,24 +67,13 @@ _TAILED: Final = re.compile(r"(.+?)(?:[_\s/]|, )(?:in )?([a-z°º\"]+\.?)")
 _ROS_TOPIC: Final = re.compile(
     r"(?:.*[./])?(position|orientation|translation|rotation)[./]([xyzw])", re.IGNORECASE
 )
-_JOINT: Final = re.compile(r"(?:j|joint|axis|achse|a|e|q|theta)[_ ]?[1-7]", re.IGNORECASE)
-
-
-@dataclass(frozen=True, slots=True)
-class ColumnHead:
-    """What one column holds.
-
-    Attributes:
-        meaning: One of :data:`MEANINGS`, ``-`` for nothing about a pose.
-        unit: The unit that its name says.
-        text: As the file has it.
-        from_ros: Whether the name is that of a ROS message, whose lengths are metres.
-    """
-
-    meaning: str
-    unit: LengthUnit | AngleUnit | None = None
-    text: str = ""
-    from_ros: bool = False
+_JOINT: Final = re.compile(
+    r"(?:j|jt|joint|axis|achse|a|e|q|theta|j_)[_ ]?[1-7](?:[_ ]?(?:deg|rad|angle|pos|position))?"
+    r"|(?:joint|axis)[_ ]?[slurbt]|(?:base|shoulder|elbow|wrist)(?:[_ ](?:pan|lift|[1-3]))?"
+    r"(?:[_ ]joint)?|wrist[1-3]|\u5173\u8282\s?[1-7]|\u8f74\s?[1-7]",
+    re.IGNORECASE,
+)
+_UNIT_BEHIND: Final = re.compile(r"\s*[(\[].*[)\]]\s*$")
 
 
 def column_head(text: str) -> ColumnHead:
@@ -177,6 +165,30 @@ def require_each_once(heads: Sequence[ColumnHead], line: int = 0) -> None:
         raise UnusableText(tr("two columns say {name}", name=twice), line)
 
 
+_LONG_NAMES: Final = (
+    *("name", "hand", "number", "local", "tool", "roll", "pitch"),
+    *(f"{axis}_{unit}" for axis in LENGTHS for unit in ("mm", "cm", "in")),
+    *(f"{angle}_{unit}" for angle in ANGLES for unit in ("deg", "rad")),
+)
+"""Names in which one wrong letter shows; ``u`` for example is one letter away from any other."""
+
+
+def nearly_named(text: str) -> str:
+    """Return the name from which a text differs by one letter or two swapped; empty for none."""
+    plain = text.strip().lower()
+    return next((name for name in _LONG_NAMES if _one_slip(plain, name)), "")
+
+
+def _one_slip(text: str, name: str) -> bool:
+    if abs(len(text) - len(name)) > 1 or text == name:
+        return False
+    same = 0
+    while same < min(len(text), len(name)) and text[same] == name[same]:
+        same += 1
+    a, b = text[same:], name[same:]
+    return a[1:] == b[1:] or a[1:] == b or a == b[1:] or (a[:2] == b[1::-1] and a[2:] == b[2:])
+
+
 def names_place(heads: Sequence[ColumnHead]) -> bool:
     """Tell whether columns hold X and Y: then they are a header."""
     return {"x", "y"} <= {head.meaning for head in heads}
@@ -184,8 +196,13 @@ def names_place(heads: Sequence[ColumnHead]) -> bool:
 
 def are_joints(names: Sequence[str]) -> bool:
     """Tell whether most columns are called like joints."""
-    called = [name for name in names if _JOINT.fullmatch(name.strip())]
+    called = [name for name in names if is_joint(name)]
     return len(called) >= 3 and len(called) * 2 >= len(names)
+
+
+def is_joint(name: str) -> bool:
+    """Tell whether something is called like a joint, with a unit behind it or without."""
+    return _JOINT.fullmatch(_UNIT_BEHIND.sub("", name).strip()) is not None
 
 
 def _meaning(plain: str) -> str:

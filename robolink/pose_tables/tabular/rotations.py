@@ -10,8 +10,8 @@ from robolink.pose_tables import orientation
 from robolink.pose_tables.conventions import EPSON, RotationRule, order_for, rule_named
 from robolink.pose_tables.questions import which_rotation, which_rule
 from robolink.pose_tables.refusals import UnclearText, UnusableText
-from robolink.pose_tables.tabular.header import ANGLES, MATRIX, QUATERNION, ColumnHead
-from robolink.pose_tables.values import AngleUnit
+from robolink.pose_tables.tabular.header import ANGLES, MATRIX, QUATERNION
+from robolink.pose_tables.values import AngleUnit, ColumnHead
 
 Uvw = tuple[float, float, float]
 
@@ -71,7 +71,7 @@ def turn_columns(heads: Sequence[ColumnHead], euler: str | None) -> TurnColumns:
         quaternion.add("w")
         angles.remove("w")
     if sum(map(bool, (quaternion, matrix, angles))) > 1:
-        raise UnclearText(which_rotation([head.text.strip() for head in heads]))
+        raise UnclearText(which_rotation(heads))
     if angles:
         return _by_angles(angles, heads, rule_named(euler) if euler else None)
     if euler and (quaternion or matrix):
@@ -81,7 +81,7 @@ def turn_columns(heads: Sequence[ColumnHead], euler: str | None) -> TurnColumns:
         return TurnColumns(("qx", "qy", "qz", scalar), "quaternion QX QY QZ QW", _by_quaternion)
     if len(matrix) == len(MATRIX):
         return TurnColumns(MATRIX, "matrix R11 .. R33", _by_matrix)
-    raise UnclearText(which_rotation([head.text.strip() for head in heads]))
+    raise UnclearText(which_rotation(heads))
 
 
 def _angles(present: Sequence[str]) -> list[str]:
@@ -106,7 +106,7 @@ def _by_angles(
     if set(names) == {"rz"} and rule is None:
         return _angles_by(EPSON, ("rz",), unit)  # about Z, a vector and an angle are the same
     if set(names) not in _WHOLE:
-        raise UnclearText(which_rotation([head.text.strip() for head in heads]))
+        raise UnclearText(which_rotation(heads))
     if rule is None and set(names) == set(EPSON.letters):
         rule = EPSON
     if rule is None:

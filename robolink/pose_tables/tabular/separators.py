@@ -6,7 +6,6 @@ number; what can be read both ways is refused.
 """
 
 import csv
-import math
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -14,6 +13,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from robolink.messages import tr
+from robolink.pose_tables.numbers import NUMBER, number_of, plain
 from robolink.pose_tables.refusals import UnusableText
 
 Line = tuple[int, str]
@@ -22,9 +22,15 @@ Line = tuple[int, str]
 _SEPARATORS: Final = (("\t", ";", "|"), (",", " "))
 """The first stand in no number and no name, so that the second are tried only without them."""
 _WORDS: Final = re.compile(r'"[^"]*"|\S+')
-_NUMBER: Final = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+_NUMBER: Final = re.compile(NUMBER)
+_THOUSANDS: Final = {
+    ",": re.compile(r"[+-]?[0-9]{1,3}(?:\.[0-9]{3})+,[0-9]+"),
+    ".": re.compile(r"[+-]?[0-9]{1,3}(?:,[0-9]{3})+\.[0-9]+"),
+}
+"""Groups of three and a decimal part, by the decimal sign. Without the decimal part a group and a
+fraction look alike, so that such a number is none."""
 _NOT_FINITE: Final = re.compile(r"[+-]?(?:nan|inf|infinity|-?1\.#\w+)", re.IGNORECASE)
-_COMMENT: Final = re.compile(r"\s*(?:#|//|!|%(?!time,)|--(?!\d)|;)")
+_COMMENT: Final = re.compile(r"\s*(#|//|!|%(?!time,)|--(?![\d.])|;)")
 _BEHIND: Final = re.compile(r"(?<=[\d.,;|\t)])\s+(?:#|//|!).*$")
 _LOOKED_AT: Final = 200
 FEWEST: Final = 2
@@ -45,10 +51,12 @@ class TableForm:
 
     def number(self, cell: str) -> float:
         """Return the number of a cell, ``nan`` where it holds none."""
-        text = cell.strip().replace("\u2212", "-")
+        text = plain(cell.strip())
+        if _THOUSANDS[self.decimal].fullmatch(text):
+            text = text.replace("." if self.decimal == "," else ",", "")
         if self.decimal == ",":
             text = "?" if "." in text else text.replace(",", ".")
-        return float(text) if _NUMBER.fullmatch(text) else math.nan
+        return number_of(text)
 
     def cells(self, lines: Sequence[Line]) -> Iterator[tuple[int, list[str]]]:
         """Yield the cells of each line; empty ones at the end of a line are left to the caller.
@@ -60,17 +68,17 @@ class TableForm:
             for number, text in lines:
                 yield number, [word.strip('"') for word in _WORDS.findall(text)]
             return
-        reader = csv.reader(
-            (text for _, text in lines),
-            delimiter=self.separator,
-            strict=True,
-            skipinitialspace=True,
-        )
-        for number, _ in lines:
-            try:
-                yield number, [cell.strip() for cell in next(reader)]
-            except (csv.Error, StopIteration) as error:
-                raise UnusableText(tr("a quote is not closed"), number) from error
+        for number, text in lines:
+            yield number, [cell.strip() for cell in self._split(text, number)]
+
+    def _split(self, text: str, line: int) -> list[str]:
+        if '"' not in text:
+            return text.split(self.separator)
+        reader = csv.reader([text], delimiter=self.separator, strict=True, skipinitialspace=True)
+        try:
+            return next(reader)
+        except csv.Error as error:
+            raise UnusableText(tr("a quote is not closed"), line) from error
 
 
 def table_lines(lines: Sequence[str]) -> tuple[list[Line], list[str]]:
@@ -89,6 +97,33 @@ def table_lines(lines: Sequence[str]) -> tuple[list[Line], list[str]]:
             text = text[: found.start()]
         kept.append((number, text.rstrip(" ")))
     return kept, comments
+
+
+def rows_in_comments(lines: Sequence[str], form: TableForm, width: int) -> int:
+    """Return how many rows stand behind the sign of a comment and a blank: left out on purpose.
+
+    Raises:
+        UnusableText: A row follows such a sign at once: it may be a digit that was typed with
+            shift, or what a spreadsheet prints for an error.
+    """
+    left_out = 0
+    for number, text in enumerate(lines, start=1):
+        found = _COMMENT.match(text)
+        if found is None or not _is_comment(text):
+            continue
+        rest = text[found.end() :]
+        cells = _cells_of(form, (number, rest)) or []
+        attached = rest[:1] not in ("", " ", "\t")
+        whole = len(cells) >= width and sum(map(is_number, cells)) >= FEWEST
+        if not whole and not (attached and all(map(is_number, cells))):
+            continue
+        if attached:
+            raise UnusableText(
+                tr("it begins with {sign} and looks like a row; is it a comment?", sign=found[1]),
+                number,
+            )
+        left_out += all(is_number(cell) for cell in cells if cell)
+    return left_out
 
 
 def form_of(lines: Sequence[Line]) -> TableForm:
@@ -121,8 +156,16 @@ def without_trailing(rows: Sequence[list[str]]) -> int:
 
 def is_number(cell: str) -> bool:
     """Tell whether a cell is a number, with either decimal sign, or claims to be one."""
-    plain = cell.strip().replace("\u2212", "-").replace(",", ".")
-    return bool(_NUMBER.fullmatch(plain) or _NOT_FINITE.fullmatch(plain))
+    text = plain(cell.strip())
+    if any(form.fullmatch(text) for form in _THOUSANDS.values()):
+        return True
+    text = text.replace(",", ".")
+    return bool(_NUMBER.fullmatch(text) or _NOT_FINITE.fullmatch(text))
+
+
+def decimal_sign(cell: str) -> str:
+    """Return the decimal sign of a number, empty where it has none: of two signs the last one."""
+    return max(",.", key=cell.rfind) if "," in cell or "." in cell else ""
 
 
 def _is_comment(text: str) -> bool:
@@ -133,10 +176,7 @@ def _is_comment(text: str) -> bool:
 
 def _columns_of_numbers(form: TableForm, lines: Sequence[Line]) -> int:
     """Return how many columns hold numbers throughout; 0 where lines do not agree."""
-    try:
-        rows = [cells for _, cells in form.cells(lines)]
-    except UnusableText:
-        return 0
+    rows = [cells for line in lines if (cells := _cells_of(form, line)) is not None]
     # What stands above the values may be a title; most values decide, and a line that has other
     # columns than most is refused by its number later.
     rows = [row for row in rows if sum(map(is_number, row)) >= FEWEST]
@@ -145,13 +185,25 @@ def _columns_of_numbers(form: TableForm, lines: Sequence[Line]) -> int:
     widths = Counter(without_trailing([row]) for row in rows)
     width = max(widths, key=lambda one: (widths[one], one))
     values = [[*row, *[""] * width][:width] for row in rows if without_trailing([row]) == width]
-    columns = [
-        place
-        for place in range(width)
-        if all(is_number(row[place]) or not row[place] for row in values)
-    ]
-    numbers = [row[place] for row in values for place in columns]
-    with_comma, with_point = (any(sign in cell for cell in numbers) for sign in ",.")
-    if (with_comma and with_point) or with_comma != (form.decimal == ","):
+    columns = [place for place in range(width) if _mostly_numbers([row[place] for row in values])]
+    numbers = [row[place] for row in values for place in columns if is_number(row[place])]
+    signs = Counter(sign for cell in numbers if (sign := decimal_sign(cell)))
+    other = "." if form.decimal == "," else ","
+    # One cell with the other sign is refused by its line later; most decide, and a tie nothing.
+    if signs[other] >= max(signs[form.decimal], 1) or (form.decimal == "," and not signs[","]):
         return 0
     return len(columns) if len(columns) >= FEWEST else 0
+
+
+def _mostly_numbers(cells: Sequence[str]) -> bool:
+    filled = [cell for cell in cells if cell]
+    return 2 * sum(map(is_number, filled)) > len(filled) or not filled
+
+
+def _cells_of(form: TableForm, line: Line) -> list[str] | None:
+    """Return the cells of one line, ``None`` where a quote is open; the line is refused later."""
+    try:
+        ((_, cells),) = form.cells([line])
+    except UnusableText:
+        return None
+    return cells

@@ -1,7 +1,7 @@
 """poses show: what robolink understands of a file of poses. Nothing is connected."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import click
 
@@ -53,11 +53,21 @@ def _payload(found: "PoseTable") -> dict[str, object]:
         "ignored": list(how.ignored),
         "skipped": how.skipped,
     }
-    return {"poses": [_pose_payload(entry) for entry in found.entries], "read_as": read_as}
+    poses = [_pose_payload(entry) for entry in found.entries]
+    # What one pose has all have, so that a list from which something was lost shows it.
+    said = [key for key in _BESIDE if any(pose[key] is not None for pose in poses)]
+    silent = [key for key in _BESIDE if key not in said]
+    for pose in poses:
+        for key in silent:
+            del pose[key]
+    return {"poses": poses, "read_as": read_as}
+
+
+_BESIDE: Final = ("name", "number", "hand", "local", "tool")
 
 
 def _pose_payload(entry: "TabledPose") -> dict[str, object]:
-    """Return a pose with its units in the keys; what the file does not say is left out."""
+    """Return a pose with its units in the keys; ``None`` for what the file does not say."""
     from robolink_cli.views.documents import COMPONENTS
 
     pose = entry.pose
@@ -69,7 +79,7 @@ def _pose_payload(entry: "TabledPose") -> dict[str, object]:
         "local": pose.local if "local" in entry.stated else None,
         "tool": pose.tool,
     }
-    return payload | {key: value for key, value in known.items() if value is not None}
+    return payload | known
 
 
 def _show_table(file: Path, found: "PoseTable") -> None:

@@ -154,7 +154,7 @@ def _calibrate(
             in_mm=source.kind == "points",
         )
         listener = _PosesListener(
-            draft, frame, given, controller=controller, taught_tool=source.taught_tool
+            draft, frame, given, controller=controller, taught_tool=source.taught_tool or 0
         )
         listener.read_points(controller)
 

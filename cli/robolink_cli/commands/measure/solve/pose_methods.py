@@ -30,16 +30,27 @@ class _Given:
         poses: Flange poses, converted where tools and locals are known.
         options: For the solver.
         stored: The offset stored now.
+        as_taught: Whether they are all that is known of touches of one pin, so that what a
+            calibration from given poses refuses is refused here too: a case may know better.
+        planar: Whether they are solved in the plane.
     """
 
     poses: list[Pose]
     options: dict[str, object]
     stored: ToolOffset | None
+    as_taught: bool = False
+    planar: bool = False
 
     def solved(self, solver: Callable[..., CalibrationResult], **more: object) -> CalibrationResult:
         """Return the result, in whose units nothing is suspect."""
-        result = solver(self.poses, allow_mixed_hand=True, **{**self.options, **more})
+        mixed = not (self.as_taught and self.planar)
+        result = solver(self.poses, allow_mixed_hand=mixed, **{**self.options, **more})
         cal.require_stored_scale(result, self.stored)
+        if self.as_taught and self.planar:
+            from robolink.procedures import require_one_height
+
+            heights = [pose.z_mm for pose in self.poses]
+            require_one_height(heights, sigma_z_mm=cal.PERSON_SIGMA_Z_MM)
         return result
 
 
@@ -144,7 +155,8 @@ def _given(node: Node, *, turning: bool) -> _Given:
     in_base = [pose for pose in poses if not pose.local and not pose.tool]
     if len(in_base) == len(poses):
         _require_units(in_base, robot, live)
-    return _Given(poses, options, stored)
+    as_taught = bool(node.optional("as_taught", node.raw))
+    return _Given(poses, options, stored, as_taught, turning)
 
 
 def _require_units(

@@ -38,7 +38,7 @@ def table_case(
             tr("The poses were taken with tool {other}, not {tool}.", other=other, tool=0),
             remedy=tr("Take them with the flange, Tool 0; offline nothing knows another tool."),
         )
-    given: dict[str, object] = {"poses": [_as_case(one) for one in entries]}
+    given: dict[str, object] = {"poses": [_as_case(one) for one in entries], "as_taught": True}
     given |= {} if sigma_mm is None else {"sigma_mm": sigma_mm}
     given |= {} if threshold_mm is None else {"inlier_threshold": threshold_mm}
     return Node({"id": path.name, "method": method, "input": given}, "")

@@ -34,9 +34,6 @@ METHODS: Final = {
     **TOUCH_METHODS,
 }
 
-BEYOND_TOLERANCE: Final = frozenset({"large_rms", "large_residual", "large_pixel_residual"})
-"""Codes of a result that does not agree with itself: no offset to be written."""
-
 _GAINS_OF: Final = ("two_pose", "two_pose_general", "n_angle", "n_angle_robust")
 _SEVERITY: Final = ("ok", "warn", "error")
 _MOST_BYTES: Final = 64_000_000
@@ -187,12 +184,12 @@ def exit_code(document: Mapping[str, object], *, accept_residuals: bool = False)
         document: As :func:`solve_document` returns it.
         accept_residuals: Whether large residuals are no reason.
     """
+    from robolink.calibration import beyond_tolerance
+
     if document["status"] == "error":
         return 7
     results = document.get("results")
     for result in results if isinstance(results, list) else [document]:
-        if not accept_residuals and not BEYOND_TOLERANCE.isdisjoint(
-            cast("list[str]", result["codes"])
-        ):
+        if not accept_residuals and beyond_tolerance(cast("list[str]", result["codes"])):
             return 7
     return 0

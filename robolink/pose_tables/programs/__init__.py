@@ -1,0 +1,1 @@
+"""Poses in programs of robots, a grammar for each maker."""

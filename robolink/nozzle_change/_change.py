@@ -13,7 +13,13 @@ from dataclasses import replace
 from robolink.calibration import VerifyResult
 from robolink.errors import CalibrationError, DeclinedError, StoppedError, VerifyError
 from robolink.messages import tr
-from robolink.model import Controller, ToolReceipt, new_operation, require_engineer
+from robolink.model import (
+    Controller,
+    ToolReceipt,
+    answer_entry,
+    new_operation,
+    require_engineer,
+)
 from robolink.nozzle_change._acceptance import AcceptanceCriteria, require_proved
 from robolink.nozzle_change._length import settle_lengths
 from robolink.nozzle_change._measuring import (
@@ -40,7 +46,7 @@ from robolink.nozzle_change._proposal import (
     ToolReport,
     WriteSubject,
 )
-from robolink.nozzle_change._records import decision_entry, refusal_entry, verification_entry
+from robolink.nozzle_change._records import refusal_entry, verification_entry
 from robolink.nozzle_change._station_check import check_stations, found_with, stations_found
 from robolink.nozzle_change.open_turn_test.marking import marked_turn_tests
 from robolink.procedures import TOUCH_CODES, MeasurementContext
@@ -240,11 +246,17 @@ class NozzleChange:
         self, context: MeasurementContext, proposals: Proposals, offer: FurtherOffer | None
     ) -> FurtherTouch | None:
         """Have the proposals accepted; return the touch that is to be made before that."""
-        outcomes = self._controller.outcomes
-        if not self._plan.ask_before_write:
-            outcomes.append(decision_entry(tr("accepted beforehand"), accepted=True))
-            return None
         numbers = ", ".join(str(plan.tool) for plan in self._plan.tools)
+        question = tr(
+            "Write these values to tool {tool}? 'robolink undo' takes them back.", tool=numbers
+        )
+        if not self._plan.ask_before_write:
+            if self._plan.agreed_by is not None:
+                entry = answer_entry(question, True, self._plan.agreed_by, accepted=True)
+                self._controller.outcomes.append(
+                    replace(entry, verdict=tr("accepted beforehand"))
+                )
+            return None
         judged = [(one, plan.criteria.verdicts(one)) for plan, one in proposals]
         shown, verdicts = zip(*judged, strict=True)
         subject = WriteSubject(
@@ -255,16 +267,12 @@ class NozzleChange:
             stations=found_with(self._controller, [one.tool for one in shown]),
         )
         regard(self._operator, [subject])
-        question = tr(
-            "Write these values to tool {tool}? 'robolink undo' takes them back.", tool=numbers
+        said = context.runner().confirm_or(
+            question, also=() if offer is None else offer.words, decides="accepted"
         )
-        said = context.runner().confirm_or(question, also=() if offer is None else offer.words)
         if offer is not None and isinstance(said, str):
             return offer.meant_by(said)
-        accepted = said is True
-        verdict = tr("accepted") if accepted else tr("declined")
-        outcomes.append(decision_entry(verdict, accepted=accepted))
-        if not accepted:
+        if said is not True:
             raise DeclinedError(
                 tr("You did not accept the new value."), remedy=tr("Nothing was written.")
             )
@@ -323,7 +331,7 @@ class NozzleChange:
             return None
         tool, criteria = receipt.tool, plan.criteria
         with (
-            context.telling(lambda done: self._listener.step(tool, done)),
+            context.telling(lambda done: self._listener.step(tool, done), tool=tool),
             self._touches_counting(tool, criteria),
         ):
             result = source.verify(

@@ -8,7 +8,15 @@ from robolink.calibration import CalibrationResult
 from robolink.errors import ConfigError, RejectedError
 from robolink.messages import tr
 from robolink.methods import LengthRule, TwoPoseSource, find_method
-from robolink.model import Controller, KinematicToolTable, Pose, ToolOffset, WorkBox, plain_offset
+from robolink.model import (
+    AnsweredBy,
+    Controller,
+    KinematicToolTable,
+    Pose,
+    ToolOffset,
+    WorkBox,
+    plain_offset,
+)
 from robolink.nozzle_change._acceptance import AcceptanceCriteria
 from robolink.nozzle_change._pin_record import require_pin_in_base, touch_details
 from robolink.nozzle_change._proposal import Proposal
@@ -143,6 +151,8 @@ class ChangePlan:
         safe: Flange pose to which the robot goes first and last.
         attended: Whether a person may be asked what a measurement leaves open; ``None`` for where
             the write is asked too.
+        agreed_by: How the write was agreed to beforehand, for the record, where it is not asked;
+            ``None`` where the listener asks, and so has the answer on record.
     """
 
     tools: tuple[ToolPlan, ...]
@@ -150,6 +160,7 @@ class ChangePlan:
     ask_before_write: bool = True
     safe: Pose | None = None
     attended: bool | None = None
+    agreed_by: AnsweredBy | None = AnsweredBy.PROGRAM
 
     @property
     def asks(self) -> bool:

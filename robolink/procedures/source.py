@@ -62,15 +62,23 @@ class MeasurementContext:
         self._offers = offers
         self._on_step: Callable[[StepDone], None] | None = None
         self._ending = EndingWatch()
+        self._tool: int | None = None
 
     @contextmanager
-    def telling(self, on_step: Callable[[StepDone], None]) -> Iterator[None]:
-        """Tell ``on_step`` of every step taken inside the block."""
-        self._on_step = on_step
+    def telling(
+        self, on_step: Callable[[StepDone], None], *, tool: int | None = None
+    ) -> Iterator[None]:
+        """Tell ``on_step`` of every step taken inside the block.
+
+        Args:
+            on_step: Told of each.
+            tool: The tool that answers inside the block are about, for the record.
+        """
+        self._on_step, self._tool = on_step, tool
         try:
             yield
         finally:
-            self._on_step = None
+            self._on_step = self._tool = None
 
     def run(
         self,
@@ -116,8 +124,39 @@ class MeasurementContext:
         self.controller.tools.select(0)
         return self.run(steps(self.controller.groups[0].pose()), camera=camera)
 
-    def runner(self, tip: ToolOffset | None = None, camera: TipSensor | None = None) -> Runner:
-        """Return a runner for the flange, or for a tip at an offset from it."""
+    def runner(
+        self,
+        tip: ToolOffset | None = None,
+        camera: TipSensor | None = None,
+        *,
+        tool: int | None = None,
+    ) -> Runner:
+        """Return a runner for the flange, or for a tip at an offset from it.
+
+        Args:
+            tip: That offset, ``None`` for the flange.
+            camera: What looks are taken with.
+            tool: The tool that answers are about, ``None`` for the one that is being measured.
+
+        Example:
+            >>> from robolink.nozzle_change import Limits
+            >>> from robolink.procedures import MeasurementContext
+            >>> from robolink.testing import MemoryController
+            >>> class Person:  # implements robolink.Operator
+            ...     def ask(self, question, kind): ...
+            ...     def poll(self, wait_s):
+            ...         return "y"
+            >>> with MemoryController() as controller:
+            ...     settings = Limits().settings
+            ...     context = MeasurementContext(
+            ...         controller, Person(), start=None, settings=settings
+            ...     )
+            ...     context.runner(tool=1).confirm("Is the new tip exactly as long?")
+            ...     [answer] = controller.outcomes.recorded(tool=1)
+            True
+            >>> answer.details["answer"]
+            'yes'
+        """
         group = self.controller.groups[0]
         if isinstance(camera, ControllerSensor):
             camera = camera.beside(self.controller)
@@ -135,6 +174,7 @@ class MeasurementContext:
             repeats=tip is None,
             types=self._types and tip is None,
             ending=self._ending,
+            tool=self._tool if tool is None else tool,
         )
 
     def _stepped(self, done: StepDone) -> None:

@@ -12,7 +12,7 @@ from robolink.journal._naming import Names, Naming
 from robolink.journal._processes import BootClock, LeaseHolder, this_process
 from robolink.journal._traces import leave_trace, traces_of
 from robolink.messages import tr
-from robolink.model import EntryKind, Marker, MarkerKind, NewEntry, Recorded, Signature, Who
+from robolink.model import PROOFS, EntryKind, Marker, MarkerKind, NewEntry, Recorded, Signature, Who
 from robolink.timing import Clock
 
 if TYPE_CHECKING:
@@ -25,7 +25,9 @@ _BEGINNINGS: Final = {
     MarkerKind.SELECTION: EntryKind.SELECTION,
 }
 
-_REST_ON_ANSWERS: Final = frozenset({EntryKind.INTENT, EntryKind.SELECTION, EntryKind.STATION})
+_REST_ON_ANSWERS: Final = frozenset(
+    {EntryKind.INTENT, EntryKind.SELECTION, EntryKind.STATION, *PROOFS}
+)
 """Entries with which answers go on record where no tool change has an id."""
 
 

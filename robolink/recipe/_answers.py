@@ -173,9 +173,7 @@ def ask_height(context: MeasurementContext, tool: int, name: str) -> float:
 
 def height_question(tool: int, name: str) -> str:
     """Return the question for Z of a new tip."""
-    return tr(
-        "Z of the new tip of tool {tool} {name} in mm from the flange?", tool=tool, name=name
-    )
+    return tr("Z of the new tip of tool {tool} {name} in mm from the flange?", tool=tool, name=name)
 
 
 def length_question(tool: int, name: str) -> str:

@@ -161,9 +161,7 @@ class RecipeListener(Listener):
             self._signature = replace(self._signature, **{prompt.answer: answer})
             self._sign(self._signature)
 
-    def _record(
-        self, question: str, answer: bool | str, by: AnsweredBy, tool: int | None
-    ) -> None:
+    def _record(self, question: str, answer: bool | str, by: AnsweredBy, tool: int | None) -> None:
         """Put on record what was answered beforehand; what is asked, the runner records."""
         entry = answer_entry(question, answer, by, tool=tool, given_beforehand=True)
         self._controller.outcomes.append(entry)

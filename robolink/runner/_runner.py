@@ -338,9 +338,7 @@ class Runner:
         """Ask a yes-or-no question under the same watch; see :func:`ask_yes_no`."""
         return self.confirm_or(question, also=()) is True
 
-    def confirm_or(
-        self, question: str, *, also: Collection[str], decides: str = ""
-    ) -> bool | str:
+    def confirm_or(self, question: str, *, also: Collection[str], decides: str = "") -> bool | str:
         """Ask one that a further word may answer; see :func:`ask_yes_no_or`.
 
         Args:

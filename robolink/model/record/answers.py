@@ -68,3 +68,17 @@ def answer_entry(
         verdict=verdict,
         details={"question": question, "answer": said, "answered_by": str(by), **details},
     )
+
+
+def answered_by_in_words(by: str) -> str:
+    """Return how a question was answered, in words; as it is where it is none of ours."""
+    words = {
+        AnsweredBy.PERSON: tr("asked and answered"),
+        AnsweredBy.STAND_IN: tr("answered by the simulated person"),
+        AnsweredBy.YES: tr("not asked: a yes was given with the command"),
+        AnsweredBy.OPTION: tr("not asked: answered by an option"),
+        AnsweredBy.RECIPE: tr("not asked: answered by the recipe"),
+        AnsweredBy.COMMAND: tr("not asked: the command is the consent"),
+        AnsweredBy.PROGRAM: tr("not asked: answered by the program"),
+    }
+    return next((said for one, said in words.items() if one == by), by)

@@ -138,13 +138,14 @@ def settle_lengths(
 def _chained(controller: Controller, plan: ToolPlan, proposal: Proposal) -> Proposal:
     """Return a proposal that adds a difference, with the origin of the Z that it was added to."""
     last = find_last_touch(controller, plan.tool, plan.pin)
-    origin = {**proposal.kept_record, "z_from": last.z_from}
+    stated = "z_mm" in proposal.result.measured and proposal.tip.z_mm == proposal.offset.z_mm
+    origin = {**proposal.kept_record, "z_from": "measured" if stated else last.z_from}
     notes = proposal.notes
-    if last.z_from == "kept" and "z_mm" in proposal.result.measured:
+    if "z_mm" in proposal.result.changed:
         # A difference is as right as what it was added to.
         kept = tr(
-            "The old Z was kept and never measured. How much longer or shorter the "
-            "new tip is, is known; its length is only as good as the old value."
+            "Z is a change: the old Z was kept or typed and never measured. How much longer or "
+            "shorter the new tip is, is known; its length is only as good as the old value."
         )
         notes = (*notes, kept)
     return replace(proposal, kept_record=origin, notes=notes)

@@ -27,9 +27,7 @@ def finds_pin(result: CalibrationResult) -> bool:
 
 def tells_height(result: CalibrationResult) -> bool:
     """Tell whether the heights of the touches say how long the tip is, beside what was solved."""
-    return "z_mm" not in result.measured and any(
-        method.tells_height for method in _methods_of(result)
-    )
+    return "z_mm" not in result.found and any(method.tells_height for method in _methods_of(result))
 
 
 def _methods_of(result: CalibrationResult) -> Iterator[AnyMethod]:
@@ -192,7 +190,7 @@ def touch_details(station: str, proposal: Proposal) -> dict[str, object]:
         "full_sigma_mm": chain.full_sigma_mm,
         "touch_sigma_mm": _touch_sigma_mm(result),
         # Tilted touches have Z from the fit, and their heights say nothing about it.
-        **({} if "z_mm" in result.measured else _scatter(heights, touched_by(result.inputs))),
+        **({} if "z_mm" in result.found else _scatter(heights, touched_by(result.inputs))),
         "touches": proposal.pin_touches or len(result.inputs) - len(result.rejected),
     }
 

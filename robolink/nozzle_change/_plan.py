@@ -119,6 +119,8 @@ class ToolPlan:
         touch = {"touch": touch_details(self.pin, proposal)} if self.pin else {}
         told = proposal.length
         length = {"length": asdict(told)} if told is not None and told.changed else {}
+        if told is not None and not told.changed:
+            length = {"length_checked": asdict(told)}
         return {**own, **touch, **length, **proposal.kept_record}
 
     def as_recorded(self, controller: Controller) -> "ToolPlan":

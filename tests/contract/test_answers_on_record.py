@@ -1,6 +1,7 @@
 """Every answer on which a written value rests is in the journal: by each face, and how it came."""
 
 from contextlib import contextmanager, nullcontext
+from typing import Any
 
 import pytest
 from robolink_cli.prompts import operator as _operator
@@ -89,7 +90,7 @@ class Person(_operator.AssistedOperator):
 def somebody_at(face, arm, monkeypatch):
     """Let a person sit there: at the wizard's desk, or where lines are typed."""
     with open_eyes(arm.cell.url) as eyes:
-        person = Person.with_eyes(eyes, lambda _text: None, clock=arm.clock)
+        person: Any = Person.with_eyes(eyes, lambda _text: None, clock=arm.clock)
         monkeypatch.setattr("robolink_cli.prompts.operator._plain_terminal", lambda: person)
         for place in ("prompts.questions", "commands.measure.recalibration"):
             monkeypatch.setattr(f"robolink_cli.{place}.on_terminal", lambda: True)

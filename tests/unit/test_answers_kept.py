@@ -4,9 +4,9 @@ import ast
 from pathlib import Path
 
 import pytest
+import robolink_cli
 
 import robolink
-import robolink_cli
 from robolink.journal import EntryKind, memory_journal
 from robolink.model import AnsweredBy, NewEntry, WorkBox, answer_entry, answered_by_in_words
 from robolink.runner import Confirm, Runner, RunSettings

@@ -11,7 +11,18 @@ from robolink_cli.views.documents import number
 
 def remarks(result: CalibrationResult) -> Iterator[str]:
     """Yield what there is to say about a measurement beside its numbers, a sentence each."""
-    for said in (_fit, _order, _interval, _region, _parts, _ways, _camera, _runout, _chain):
+    for said in (
+        _fit,
+        _order,
+        _interval,
+        _region,
+        _change,
+        _parts,
+        _ways,
+        _camera,
+        _runout,
+        _chain,
+    ):
         sentence = said(result)
         if sentence:
             yield sentence
@@ -72,6 +83,23 @@ def _region(result: CalibrationResult) -> str:
         "sure to (95 %, {names} together): {radius:.3f} mm",
         radius=result.region95_radius_mm,
         names=", ".join(names),
+    )
+
+
+def _change(result: CalibrationResult) -> str:
+    """Return by how much Z changed, and what is known of Z itself; empty for other methods."""
+    details = result.details()
+    by_mm, half_mm = details.get("change_z_mm"), details.get("change_z_half95_mm")
+    stored = details.get("stored_z")
+    if not isinstance(by_mm, float) or not isinstance(half_mm, float):
+        return ""
+    told = tr("change of Z (95 %): {by:+.3f} +-{half:.3f} mm", by=by_mm, half=half_mm)
+    if "z_mm" in result.changed or not isinstance(stored, dict):
+        return told
+    return tr(
+        "{told}; the stored Z was measured: entry {number} of the journal",
+        told=told,
+        number=stored["entry"],
     )
 
 

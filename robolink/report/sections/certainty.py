@@ -11,6 +11,20 @@ def interval_sentences(fit: CalibrationResult) -> tuple[str, ...]:
     """Return which interval it is, what it rests on, or why there is none."""
     if not fit.half_width95:
         return (tr("How sure it is cannot be said: too few touches."),)
+    if "z_mm" in fit.changed:
+        return (change_of_z(), *_intervals(fit))
+    return _intervals(fit)
+
+
+def change_of_z() -> str:
+    """Return what a change of Z does not say."""
+    return tr(
+        "Z is a change: only by how much the new tip is longer or shorter was measured. The stored "
+        "Z was never measured, so nothing is stated of how long the tip is."
+    )
+
+
+def _intervals(fit: CalibrationResult) -> tuple[str, ...]:
     said = [_what_it_rests_on(fit)]
     lengths = [name[0].upper() for name in fit.measured if name.endswith("_mm")]
     if len(lengths) > 1:

@@ -18,6 +18,7 @@ class Way:
 
     ACCEPT_JUMP: Final = "accepted_change_mm"
     ANSWER: Final = "Answers(texts={{{number}: TEXT}})"
+    AXES_HELD: Final = "axes_held=True"
     CALIBRATE_AT: Final = "ToolPlan(..., pin={station!r})"
     CALIBRATE_CAMERA_AT: Final = "the method camera-affine, with tool {tool} at {station!r}"
     CALIBRATE_TOOL_AT: Final = "ToolPlan({tool}, ..., pin={station!r})"

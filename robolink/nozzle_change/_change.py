@@ -206,6 +206,7 @@ class NozzleChange:
             start=start,
             settings=settings,
             offers=self._plan.ask_before_write,
+            attended=self._plan.asks,
             types=write and all(one.verify and one.moving for one in self._plan.tools),
         )
 

@@ -5,7 +5,15 @@ from contextlib import contextmanager
 from typing import Protocol, TypeVar, runtime_checkable
 
 from robolink.calibration import CalibrationResult, VerifyResult
-from robolink.model import Controller, ControllerSensor, Pose, TipSensor, ToolOffset
+from robolink.model import (
+    AnsweredBy,
+    Controller,
+    ControllerSensor,
+    Pose,
+    TipSensor,
+    ToolOffset,
+    answer_entry,
+)
 from robolink.runner import EndingWatch, Operator, Procedure, Runner, RunSettings, StepDone
 from robolink.stations import Found
 
@@ -28,6 +36,7 @@ class MeasurementContext:
         settings: Limits and speeds for a tip at an offset from the flange.
         offers: Whether the person is asked about what a procedure offers.
         types: Whether the pose of a touch may be typed: a turn test by touches follows.
+        attended: Whether a person may be asked what a measurement leaves open.
 
     Example:
         >>> from robolink.model import Pose, ToolOffset
@@ -52,8 +61,11 @@ class MeasurementContext:
         settings: Callable[[Pose, ToolOffset | None], RunSettings],
         offers: bool = True,
         types: bool = False,
+        attended: bool = True,
     ) -> None:
         self._types = types
+        self._attended = attended
+        self._asked: dict[str, bool] = {}
         self.controller = controller
         self.operator = operator
         self.start = start
@@ -79,6 +91,35 @@ class MeasurementContext:
             yield
         finally:
             self._on_step = self._tool = None
+
+    def ask_once(self, question: str, *, given: AnsweredBy | None = None) -> bool | None:
+        """Ask what holds for the whole change, once however many tools need it.
+
+        Args:
+            question: What a yes agrees to.
+            given: How a yes was given beforehand, ``None`` where it was not.
+
+        Returns:
+            The answer, which is on record then; ``None`` where nobody is to be asked.
+
+        Example:
+            >>> from robolink.model import AnsweredBy
+            >>> from robolink.nozzle_change import Limits
+            >>> from robolink.procedures import MeasurementContext
+            >>> from robolink.testing import MemoryController
+            >>> with MemoryController() as controller:
+            ...     settings = Limits().settings
+            ...     context = MeasurementContext(controller, None, start=None, settings=settings)
+            ...     context.ask_once("Were all axes held?", given=AnsweredBy.OPTION)
+            True
+        """
+        if question not in self._asked:
+            if given is not None:
+                self.controller.outcomes.append(answer_entry(question, True, given))
+                self._asked[question] = True
+            elif self._attended:
+                self._asked[question] = self.runner().confirm(question)
+        return self._asked.get(question)
 
     def run(
         self,

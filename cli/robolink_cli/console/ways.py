@@ -7,6 +7,7 @@ from robolink.ways import Way
 SHELL_WAYS: Final = {
     Way.ACCEPT_JUMP: "--accept-jump",
     Way.ANSWER: "--answer {number}=TEXT",
+    Way.AXES_HELD: "--axes-held; in a recipe axes_held = true",
     Way.CALIBRATE_AT: "'robolink calibrate n-angle --station {station}'",
     Way.CALIBRATE_CAMERA_AT: "robolink calibrate camera-affine --tool {tool} --station {station}",
     Way.CALIBRATE_TOOL_AT: "robolink calibrate n-angle --tool {tool} --station {station}",

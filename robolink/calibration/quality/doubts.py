@@ -9,6 +9,7 @@ from typing import Final
 
 from robolink.calibration.core.evidence import RunOrder
 from robolink.messages import tr
+from robolink.ways import Way, way
 
 
 def doubt_sentence(code: str) -> str:
@@ -128,6 +129,11 @@ _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
     ),
     "touches_not_witnessed": lambda: tr(
         "Nobody saw these touches being made: the poses were taught, typed or read from a file."
+    ),
+    "axes_not_confirmed": lambda: tr(
+        "Nobody confirmed that all axes were held by their motors (not SFREE) when these poses "
+        "were taught. To confirm it: {option}.",
+        option=way(Way.AXES_HELD),
     ),
     "length_changed": lambda: tr("The length of the tool has changed."),
     "length_not_observable": lambda: tr(

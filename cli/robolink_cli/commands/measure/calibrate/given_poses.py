@@ -151,6 +151,7 @@ def _calibrate(
             plausible_mm=frame.criteria.limit_mm,
             sentence=source.sentence,
             in_mm=source.kind == "points",
+            axes_held=source.axes_held,
         )
         listener = _PosesListener(
             draft, frame, given, controller=controller, taught_tool=source.taught_tool

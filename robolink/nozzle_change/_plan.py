@@ -18,7 +18,7 @@ from robolink.model import (
     plain_offset,
 )
 from robolink.nozzle_change._acceptance import AcceptanceCriteria
-from robolink.nozzle_change._pin_record import require_pin_in_base, touch_details
+from robolink.nozzle_change._pin_record import next_steps, require_pin_in_base, touch_details
 from robolink.nozzle_change._proposal import Proposal
 from robolink.nozzle_change._seating import touching_as_recorded
 from robolink.procedures import (
@@ -121,7 +121,9 @@ class ToolPlan:
         length = {"length": asdict(told)} if told is not None and told.changed else {}
         if told is not None and not told.changed:
             length = {"length_checked": asdict(told)}
-        return {**own, **touch, **length, **proposal.kept_record}
+        steps = [step.as_json() for step in next_steps(proposal.result, self.tool)]
+        following = {"next_steps": steps} if steps else {}
+        return {**own, **touch, **length, **following, **proposal.kept_record}
 
     def as_recorded(self, controller: Controller) -> "ToolPlan":
         """Return the same with what the record says of the touches, where nobody stated it."""

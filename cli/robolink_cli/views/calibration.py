@@ -5,7 +5,13 @@ from collections.abc import Mapping, Sequence
 from robolink.calibration import VerifyResult, known_doubts
 from robolink.messages import tr
 from robolink.model import ToolOffset, ToolReceipt, describe_offset
-from robolink.nozzle_change import LimitVerdict, PlannedStep, Proposal, ToolReport
+from robolink.nozzle_change import (
+    LimitVerdict,
+    PlannedStep,
+    Proposal,
+    ToolReport,
+    next_steps,
+)
 from robolink.runner import TeachPrompt
 from robolink_cli.console.render import note, say
 from robolink_cli.prompts.present import present_desk
@@ -74,16 +80,36 @@ def show_report(report: ToolReport) -> None:
         say(tr("Tool {tool} is written and read back.", tool=tool))
     if report.verification is None:
         say(tr("Not tested yet."))
-        return
-    for drift in report.verification.drifts:
-        say(
-            tr(
-                "  at U {u:.1f}: {distance:.3f} mm off",
-                u=drift.u_deg,
-                distance=drift.distance_mm,
+    else:
+        for drift in report.verification.drifts:
+            say(
+                tr(
+                    "  at U {u:.1f}: {distance:.3f} mm off",
+                    u=drift.u_deg,
+                    distance=drift.distance_mm,
+                )
             )
-        )
-    say(_proof(report.verification))
+        say(_proof(report.verification))
+    for line in next_lines(report):
+        say(line)
+
+
+def next_lines(report: ToolReport, cell: str = "") -> list[str]:
+    """Return what a person does next with a tool that was written; nothing for most methods.
+
+    Args:
+        report: What was done.
+        cell: Name of the cell, for the commands; empty where it need not be named.
+    """
+    steps = next_steps(report.proposal.result, report.proposal.tool) if report.receipt else ()
+    if not steps:
+        return []
+    named = f'robolink -c "{cell}"' if cell else "robolink"
+    lines = [tr("Next:")]
+    for number, step in enumerate(steps, start=1):
+        lines.append(f"  {number}. {step.sentence}")
+        lines.append(f"       {named} {step.command}")
+    return lines
 
 
 def _proof(verification: VerifyResult) -> str:
@@ -117,7 +143,13 @@ def report_payload(report: ToolReport) -> dict[str, object]:
         **judged_payload(report.proposal, report.verdicts),
         "write": receipt_payload(report.receipt) if report.receipt else None,
         "verification": verification_payload(report.verification),
+        **_following(report),
     }
+
+
+def _following(report: ToolReport) -> dict[str, object]:
+    steps = next_steps(report.proposal.result, report.proposal.tool) if report.receipt else ()
+    return {"next_steps": [step.as_json() for step in steps]} if steps else {}
 
 
 def show_course(steps: Sequence[PlannedStep]) -> None:

@@ -18,6 +18,8 @@ class Way:
 
     ACCEPT_JUMP: Final = "accepted_change_mm"
     ANSWER: Final = "Answers(texts={{{number}: TEXT}})"
+    AXES_HELD: Final = "axes_held=True"
+    BOX: Final = "reach_mm"
     CALIBRATE_AT: Final = "ToolPlan(..., pin={station!r})"
     CALIBRATE_CAMERA_AT: Final = "the method camera-affine, with tool {tool} at {station!r}"
     CALIBRATE_TOOL_AT: Final = "ToolPlan({tool}, ..., pin={station!r})"
@@ -51,6 +53,7 @@ class Way:
     TILT: Final = "tilt_deg"
     TOOL: Final = "tool"
     TOOLS: Final = "tools"
+    TURN: Final = "turn_in_air(here, {turn:+g}, lift_mm=10)"
     YES: Final = "Answers(yes=True)"
 
 

@@ -159,6 +159,7 @@ if TYPE_CHECKING:
     from robolink.calibration.pin.six_point import ToolAxis as ToolAxis
     from robolink.calibration.pin.six_point import solve_six_point as solve_six_point
     from robolink.calibration.pin.six_point import solve_tool_axis as solve_tool_axis
+    from robolink.calibration.pin.stored_z import StoredZ as StoredZ
     from robolink.calibration.pin.two_pose import solve_two_pose as solve_two_pose
     from robolink.calibration.pin.two_pose import two_of as two_of
     from robolink.calibration.quality.control_chart import LEAST_BASELINE as LEAST_BASELINE
@@ -313,6 +314,7 @@ __getattr__ = lazy_exports(
         "pin.joint": "JointResult JointTouch ToolDifference solve_joint",
         "pin.n_angle": "solve_n_angle",
         "pin.needle_chain": "NeedleChain NeedleLimits chain_of chain_sigma_mm",
+        "pin.stored_z": "StoredZ",
         "pin.needle_change": "NeedleChangeResult solve_needle_change",
         "pin.one_touch": "Pin pin_touched solve_one_touch",
         "pin.pivot": "solve_pivot",

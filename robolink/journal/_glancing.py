@@ -131,6 +131,10 @@ class GlancingLog:
         """See the model."""
         self._log().append(*entries)
 
+    def answered(self, entry: NewEntry) -> None:
+        """See the model."""
+        self._log().answered(entry)
+
     def look(self) -> None:
         """See the model."""
         self._log().look()

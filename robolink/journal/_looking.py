@@ -114,6 +114,9 @@ class LookingLog:
         """Refuse; see :meth:`begin`."""
         self._refuse()
 
+    def answered(self, entry: NewEntry) -> None:
+        """Nothing can follow from it."""
+
     def look(self) -> None:
         """Refuse: whoever looks at the lease is about to change something."""
         self._refuse()

@@ -14,6 +14,7 @@ from robolink.journal._traces import leave_trace, traces_of
 from robolink.messages import tr
 from robolink.model import (
     NO_HISTORY,
+    PROOFS,
     EntryKind,
     Marker,
     MarkerKind,
@@ -33,6 +34,11 @@ _BEGINNINGS: Final = {
     MarkerKind.CHANGE: EntryKind.INTENT,
     MarkerKind.SELECTION: EntryKind.SELECTION,
 }
+
+_REST_ON_ANSWERS: Final = frozenset(
+    {EntryKind.INTENT, EntryKind.SELECTION, EntryKind.STATION, *PROOFS}
+)
+"""Entries with which answers go on record where no tool change has an id."""
 
 
 class JournalOutcomeLog:
@@ -73,6 +79,8 @@ class JournalOutcomeLog:
         self._lease = Lease(store, controller, self._holder, self._clock)
         self._names = Names(controller)
         self._begun: set[str] = set()
+        self._answers: list[NewEntry] = []
+        self._told = 0
         self._holds = 0
         self._sound = False
         self._has_history = False
@@ -129,7 +137,7 @@ class JournalOutcomeLog:
             name = names.identity
             self._require_sound()
             self._lease.prepare()
-            with self._store.write(_untouched()) as tables:
+            with self._writing(_untouched()) as tables:
                 grip = self._lease.secure(tables.leases, marker.request, self.signature.operator)
                 first = tables.markers.put(name, _of_robot(marker, names.robot))
                 told = _beginning(marker, first=first)
@@ -152,7 +160,7 @@ class JournalOutcomeLog:
         with self._lock:
             names = self._named()
             last = not self._holds and not self._begun - {operation}
-            with self._store.write(_left_open()) as tables:
+            with self._writing(_left_open()) as tables:
                 if last:
                     self._lease.release(tables.leases)
                 known = tables.markers.remove(names.identity, operation)
@@ -175,9 +183,15 @@ class JournalOutcomeLog:
         """
         if any(entry.kind not in NO_HISTORY for entry in entries):
             self._refuse_lost()
-        name = self._named().record
-        with self._store.write() as tables:
-            self._put(tables, name, entries)
+        with self._lock:
+            name = self._named().record
+            with self._writing() as tables:
+                self._put(tables, name, entries)
+
+    def answered(self, entry: NewEntry) -> None:
+        """Keep an answer for the change that it may lead to; see the model."""
+        with self._lock:
+            self._answers.append(entry)
 
     def open_markers(self) -> tuple[Marker, ...]:
         """Return what is unsettled on this controller, oldest first, whoever began it.
@@ -267,7 +281,7 @@ class JournalOutcomeLog:
             name = self._named().record
             self._require_sound()
             self._lease.prepare()
-            with self._store.write(_untouched()) as tables:
+            with self._writing(_untouched()) as tables:
                 grip = self._lease.secure(tables.leases, purpose, self.signature.operator)
                 self._put(tables, name, grip.entries)
             self._lease.settle(grip)
@@ -305,13 +319,24 @@ class JournalOutcomeLog:
         """
         with self._lock:
             name = self._named().record
-            with self._store.write(_untouched()) as tables:
+            with self._writing(_untouched()) as tables:
                 ended = self._lease.end(tables.leases, reason)
                 entries = () if ended is None else (ended,)
                 self._put(tables, name, entries)
             self._lease.look()
 
+    @contextmanager
+    def _writing(self, consequence: str = "") -> Iterator["Tables"]:
+        """Write in one transaction; answers that went on record in it are kept no longer."""
+        self._told = 0
+        with self._store.write(consequence) as tables:
+            yield tables
+        del self._answers[: self._told]
+
     def _put(self, tables: "Tables", name: str, entries: Sequence[NewEntry]) -> None:
+        if entries and (self.change or any(entry.kind in _REST_ON_ANSWERS for entry in entries)):
+            entries = (*self._answers, *entries)
+            self._told = len(self._answers)
         if self.order:
             entries = [
                 replace(entry, details={**entry.details, "order": self.order}) for entry in entries

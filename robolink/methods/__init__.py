@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from robolink.methods.declaration.method import Method as Method
     from robolink.methods.declaration.method import MethodParameters as MethodParameters
     from robolink.methods.declaration.method import Needs as Needs
+    from robolink.methods.declaration.method import NextStep as NextStep
     from robolink.methods.declaration.method import Option as Option
     from robolink.methods.declaration.method import Pair as Pair
     from robolink.methods.declaration.method import PoseHelp as PoseHelp
@@ -151,8 +152,8 @@ __getattr__ = lazy_exports(
         "declaration.checking": "order_of_residuals parameter_problems source_of",
         "declaration.method": (
             "Angle AnyMethod Check DEGREES Former Help InputNumber Length LengthRule "
-            "MM MM_S Method MethodParameters NOTHING_STATED Needs Option Pair "
-            "PoseHelp StatedLimits Unit"
+            "MM MM_S Method MethodParameters NOTHING_STATED Needs NextStep Option "
+            "Pair PoseHelp StatedLimits Unit"
         ),
         "declaration.fields": "ParameterField fields_of",
         "declaration.look_parameters": "LookParameters",

@@ -84,6 +84,9 @@ if TYPE_CHECKING:
     from robolink.model.motion.tip_sensor import TipSensor as TipSensor
     from robolink.model.motion.until_input import InputEdge as InputEdge
     from robolink.model.motion.until_input import MotionUntilInput as MotionUntilInput
+    from robolink.model.record.answers import AnsweredBy as AnsweredBy
+    from robolink.model.record.answers import answer_entry as answer_entry
+    from robolink.model.record.answers import answered_by_in_words as answered_by_in_words
     from robolink.model.record.findings import Finding as Finding
     from robolink.model.record.findings import Resolver as Resolver
     from robolink.model.record.findings import Verdict as Verdict
@@ -117,6 +120,7 @@ else:
             ),
             "motion.geometry": "Elbow Hand Pose Posture Wrist angle_difference_deg rotate_xy",
             "_identity": "ControllerFacts Identity Who is_own_name",
+            "record.answers": "AnsweredBy answer_entry answered_by_in_words",
             "record.journal_entries": "NO_HISTORY PROOFS EntryKind NewEntry Recorded Signature",
             "record.ledger": "Account Ledger",
             "motion.movement": (

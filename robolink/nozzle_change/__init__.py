@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from robolink.nozzle_change._change import Earlier as Earlier
     from robolink.nozzle_change._change import NozzleChange as NozzleChange
     from robolink.nozzle_change._length import known_height as known_height
+    from robolink.nozzle_change._pin_record import next_steps as next_steps
     from robolink.nozzle_change._plan import ChangePlan as ChangePlan
     from robolink.nozzle_change._plan import Limits as Limits
     from robolink.nozzle_change._plan import ToolPlan as ToolPlan
@@ -61,6 +62,7 @@ __getattr__ = lazy_exports(
         "_plan": "ChangePlan Limits ToolPlan clearance_too_small require_contact_input "
         "require_ready usual_box",
         "_preview": "PlannedStep flange_now foresee preview require_inside",
+        "_pin_record": "next_steps",
         "_proposal": "ChangeReport LimitVerdict Listener Moment Proposal ToolReport WriteSubject",
         "_records": "touches_made",
         "_seating": "Seating height_is_known seating_of tip_sigma_mm touching_as_recorded",

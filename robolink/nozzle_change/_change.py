@@ -13,7 +13,13 @@ from dataclasses import replace
 from robolink.calibration import VerifyResult
 from robolink.errors import CalibrationError, DeclinedError, StoppedError, VerifyError
 from robolink.messages import tr
-from robolink.model import Controller, ToolReceipt, new_operation, require_engineer
+from robolink.model import (
+    Controller,
+    ToolReceipt,
+    answer_entry,
+    new_operation,
+    require_engineer,
+)
 from robolink.nozzle_change._acceptance import AcceptanceCriteria
 from robolink.nozzle_change._length import settle_lengths
 from robolink.nozzle_change._measuring import (
@@ -204,7 +210,8 @@ class NozzleChange:
             self._operator,
             start=start,
             settings=settings,
-            offers=self._plan.asks,
+            offers=self._plan.ask_before_write,
+            attended=self._plan.asks,
             types=write and all(one.verify and one.moving for one in self._plan.tools),
         )
 
@@ -276,11 +283,15 @@ class NozzleChange:
         self, context: MeasurementContext, proposals: Proposals, offer: FurtherOffer | None
     ) -> FurtherTouch | None:
         """Have the proposals accepted; return the touch that is to be made before that."""
-        outcomes = self._controller.outcomes
-        if not self._plan.ask_before_write:
-            outcomes.append(decision_entry(tr("accepted beforehand"), accepted=True))
-            return None
         numbers = ", ".join(str(plan.tool) for plan in self._plan.tools)
+        question = tr(
+            "Write these values to tool {tool}? 'robolink undo' takes them back.", tool=numbers
+        )
+        if not self._plan.ask_before_write:
+            if self._plan.agreed_by is not None:
+                entry = answer_entry(question, True, self._plan.agreed_by, accepted=True)
+                self._controller.outcomes.append(replace(entry, verdict=tr("accepted beforehand")))
+            return None
         judged = [(one, plan.criteria.verdicts(one)) for plan, one in proposals]
         shown, verdicts = zip(*judged, strict=True)
         subject = WriteSubject(
@@ -291,16 +302,12 @@ class NozzleChange:
             stations=found_with(self._controller, [one.tool for one in shown]),
         )
         regard(self._operator, [subject])
-        question = tr(
-            "Write these values to tool {tool}? 'robolink undo' takes them back.", tool=numbers
+        said = context.runner().confirm_or(
+            question, also=() if offer is None else offer.words, decides="accepted"
         )
-        said = context.runner().confirm_or(question, also=() if offer is None else offer.words)
         if offer is not None and isinstance(said, str):
             return offer.meant_by(said)
-        accepted = said is True
-        verdict = tr("accepted") if accepted else tr("declined")
-        outcomes.append(decision_entry(verdict, accepted=accepted))
-        if not accepted:
+        if said is not True:
             raise DeclinedError(
                 tr("You did not accept the new value."), remedy=tr("Nothing was written.")
             )
@@ -363,7 +370,7 @@ class NozzleChange:
             return None
         tool, criteria = receipt.tool, plan.criteria
         with (
-            context.telling(lambda done: self._listener.step(tool, done)),
+            context.telling(lambda done: self._listener.step(tool, done), tool=tool),
             self._touches_counting(tool, criteria),
         ):
             result = source.verify(

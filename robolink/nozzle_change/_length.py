@@ -15,7 +15,14 @@ from robolink.calibration import LengthChange, TipShift, chain_of, judge_shifts,
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.methods import find_last_touch
-from robolink.model import Controller, EntryKind, Pose, ToolOffset
+from robolink.model import (
+    AnsweredBy,
+    Controller,
+    EntryKind,
+    Pose,
+    ToolOffset,
+    answer_entry,
+)
 from robolink.nozzle_change._pin_record import tells_height, touch_details, touch_heights_mm
 from robolink.nozzle_change._plan import Proposals, ToolPlan
 from robolink.nozzle_change._proposal import Proposal
@@ -131,13 +138,14 @@ def settle_lengths(
 def _chained(controller: Controller, plan: ToolPlan, proposal: Proposal) -> Proposal:
     """Return a proposal that adds a difference, with the origin of the Z that it was added to."""
     last = find_last_touch(controller, plan.tool, plan.pin)
-    origin = {**proposal.kept_record, "z_from": last.z_from}
+    stated = "z_mm" in proposal.result.measured and proposal.tip.z_mm == proposal.offset.z_mm
+    origin = {**proposal.kept_record, "z_from": "measured" if stated else last.z_from}
     notes = proposal.notes
-    if last.z_from == "kept" and "z_mm" in proposal.result.measured:
+    if "z_mm" in proposal.result.changed:
         # A difference is as right as what it was added to.
         kept = tr(
-            "The old Z was kept and never measured. How much longer or shorter the "
-            "new tip is, is known; its length is only as good as the old value."
+            "Z is a change: the old Z was kept or typed and never measured. How much longer or "
+            "shorter the new tip is, is known; its length is only as good as the old value."
         )
         notes = (*notes, kept)
     return replace(proposal, kept_record=origin, notes=notes)
@@ -271,19 +279,26 @@ def _decided(
     if not told.changed:
         # The height of then stays what is compared with: small changes would else add up unseen.
         return replace(good, length=told, pin_z_mm=known.place_mm[2], pin_touches=known.touches)
-    decision = plan.length
+    decision, by_recipe = plan.length, bool(context.controller.outcomes.signature.recipe)
+    question = tr(
+        "{found} Write Z {new:.3f} instead of keeping {old:.3f}?",
+        found=in_words(plan.tool, told),
+        new=told.z_by_difference_mm,
+        old=told.stored_z_mm,
+    )
     if decision == "ask":
         if not attended:
             raise _undecided(plan.tool, told)
-        question = tr(
-            "{found} Write Z {new:.3f} instead of keeping {old:.3f}?",
-            found=in_words(plan.tool, told),
-            new=told.z_by_difference_mm,
-            old=told.stored_z_mm,
-        )
-        decision = "difference" if context.runner().confirm(question) else "keep"
+        agreed = context.runner(tool=plan.tool).confirm(question)
+        decision, of_answer = "difference" if agreed else "keep", {}
+    else:
+        by = AnsweredBy.RECIPE if by_recipe else AnsweredBy.OPTION
+        of_answer = dict(answer_entry(question, decision, by).details)
     entry = decision_entry(
-        in_words(plan.tool, told), length=decision, z_by_difference_mm=told.z_by_difference_mm
+        in_words(plan.tool, told),
+        length=decision,
+        z_by_difference_mm=told.z_by_difference_mm,
+        **of_answer,
     )
     context.controller.outcomes.append(replace(entry, tool=plan.tool))
     return _with_length(good if decision == "difference" else proposal, told, decision)

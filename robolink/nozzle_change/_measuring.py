@@ -17,7 +17,7 @@ from robolink.nozzle_change._proposal import Listener, Moment, Proposal
 from robolink.nozzle_change._records import calibration_entry, decision_entry, refusal_entry
 from robolink.nozzle_change._seating import seating_of
 from robolink.procedures import MeasurementContext, TouchesFurther, approach_path, touches_of
-from robolink.runner import AGAIN, BACK, MORE, Ask, Confirm, Look, Seek, StepDone
+from robolink.runner import AGAIN, BACK, MORE, Ask, Look, Seek, StepDone
 from robolink.stations import find_stations
 from robolink.ways import Way, way
 
@@ -156,20 +156,15 @@ class Measuring:
     def _watched(self, plan: ToolPlan, before: ToolOffset | None) -> Iterator[None]:
         """Tell of each step; when the measurement ends early, keep its poses on record."""
         poses: list[Pose] = []
-        log = self._context.controller.outcomes
 
         def on_step(done: StepDone) -> None:
             if done.pose is not None and isinstance(done.step, (Ask, Seek, Look)):
                 poses.append(done.pose)
-            if isinstance(done.step, Confirm) and done.accepted is not None:
-                answer = tr("accepted") if done.accepted else done.word or tr("declined")
-                details = {"question": done.step.question, "tool": plan.tool}
-                log.append(decision_entry(answer, **details))
             self._listener.step(plan.tool, done)
             if told := told_by_first_touch(self._context.controller, plan, before, done):
                 self._context.operator.tell(told)
 
-        with self._context.telling(on_step):
+        with self._context.telling(on_step, tool=plan.tool):
             try:
                 yield
             except BaseException as error:

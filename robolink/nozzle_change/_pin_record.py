@@ -13,7 +13,7 @@ from robolink.calibration import (
 )
 from robolink.errors import CalibrationError
 from robolink.messages import tr
-from robolink.methods import AnyMethod, all_methods
+from robolink.methods import AnyMethod, NextStep, all_methods
 from robolink.model import Pose, ToolOffset
 from robolink.nozzle_change._proposal import Proposal
 from robolink.nozzle_change._seating import TouchWitness, touched_by
@@ -27,9 +27,18 @@ def finds_pin(result: CalibrationResult) -> bool:
 
 def tells_height(result: CalibrationResult) -> bool:
     """Tell whether the heights of the touches say how long the tip is, beside what was solved."""
-    return "z_mm" not in result.measured and any(
-        method.tells_height for method in _methods_of(result)
-    )
+    return "z_mm" not in result.found and any(method.tells_height for method in _methods_of(result))
+
+
+def next_steps(result: CalibrationResult, tool: int) -> tuple[NextStep, ...]:
+    """Return what a person does next with a tool that was written; nothing for most methods.
+
+    Args:
+        result: The measurement.
+        tool: Number of the tool.
+    """
+    made = (method.next_steps for method in _methods_of(result))
+    return tuple(step for make in made if make is not None for step in make(tool))
 
 
 def _methods_of(result: CalibrationResult) -> Iterator[AnyMethod]:
@@ -192,7 +201,7 @@ def touch_details(station: str, proposal: Proposal) -> dict[str, object]:
         "full_sigma_mm": chain.full_sigma_mm,
         "touch_sigma_mm": _touch_sigma_mm(result),
         # Tilted touches have Z from the fit, and their heights say nothing about it.
-        **({} if "z_mm" in result.measured else _scatter(heights, touched_by(result.inputs))),
+        **({} if "z_mm" in result.found else _scatter(heights, touched_by(result.inputs))),
         "touches": proposal.pin_touches or len(result.inputs) - len(result.rejected),
     }
 

@@ -8,9 +8,17 @@ from robolink.calibration import CalibrationResult, RowFact
 from robolink.errors import ConfigError, RejectedError
 from robolink.messages import tr
 from robolink.methods import LengthRule, TwoPoseSource, find_method
-from robolink.model import Controller, KinematicToolTable, Pose, ToolOffset, WorkBox, plain_offset
+from robolink.model import (
+    AnsweredBy,
+    Controller,
+    KinematicToolTable,
+    Pose,
+    ToolOffset,
+    WorkBox,
+    plain_offset,
+)
 from robolink.nozzle_change._acceptance import AcceptanceCriteria
-from robolink.nozzle_change._pin_record import require_pin_in_base, touch_details
+from robolink.nozzle_change._pin_record import next_steps, require_pin_in_base, touch_details
 from robolink.nozzle_change._proposal import Proposal
 from robolink.nozzle_change._seating import touching_as_recorded
 from robolink.procedures import (
@@ -117,7 +125,11 @@ class ToolPlan:
         touch = {"touch": touch_details(self.pin, proposal)} if self.pin else {}
         told = proposal.length
         length = {"length": asdict(told)} if told is not None and told.changed else {}
-        return {**own, **touch, **length, **proposal.kept_record}
+        if told is not None and not told.changed:
+            length = {"length_checked": asdict(told)}
+        steps = [step.as_json() for step in next_steps(proposal.result, self.tool)]
+        following = {"next_steps": steps} if steps else {}
+        return {**own, **touch, **length, **following, **proposal.kept_record}
 
     def as_recorded(self, controller: Controller) -> "ToolPlan":
         """Return the same with what the record says of the touches, where nobody stated it."""
@@ -149,6 +161,8 @@ class ChangePlan:
         safe: Flange pose to which the robot goes first and last.
         attended: Whether a person may be asked what a measurement leaves open; ``None`` for where
             the write is asked too.
+        agreed_by: How the write was agreed to beforehand, for the record, where it is not asked;
+            ``None`` where the listener asks, and so has the answer on record.
     """
 
     tools: tuple[ToolPlan, ...]
@@ -156,6 +170,7 @@ class ChangePlan:
     ask_before_write: bool = True
     safe: Pose | None = None
     attended: bool | None = None
+    agreed_by: AnsweredBy | None = AnsweredBy.PROGRAM
 
     @property
     def asks(self) -> bool:

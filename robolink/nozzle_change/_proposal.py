@@ -96,7 +96,7 @@ class Proposal:
         plane_mm = self.plane_change_mm
         if self.before is None or plane_mm is None:
             return None
-        measured_z = "z_mm" in self.result.measured or self.z_from == "measured"
+        measured_z = "z_mm" in self.result.found or self.z_from == "measured"
         if not measured_z or self.z_from == "typed":
             return plane_mm
         return math.hypot(plane_mm, self.offset.z_mm - self.before.z_mm)

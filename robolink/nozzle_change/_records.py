@@ -116,6 +116,7 @@ def _result(result: CalibrationResult) -> dict[str, object]:
         "method": result.method,
         "measured": list(result.measured),
         "kept": list(result.kept),
+        **({"changed": list(result.changed)} if result.changed else {}),
         "reference_point_mm": list(result.reference_point_mm),
         "poses": [_pose(pose) for pose in result.inputs],
         **_seen(result.inputs),

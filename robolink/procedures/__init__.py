@@ -80,10 +80,13 @@ if TYPE_CHECKING:
     from robolink.procedures.source import TouchesFurther as TouchesFurther
     from robolink.procedures.surface_proof import SurfaceProof as SurfaceProof
     from robolink.procedures.surface_touches import SurfaceTouches as SurfaceTouches
+    from robolink.procedures.turning import require_turn_inside as require_turn_inside
+    from robolink.procedures.turning import turn_in_air as turn_in_air
 
 __getattr__ = lazy_exports(
     __name__,
     {
+        "turning": "require_turn_inside turn_in_air",
         "approach": "NO_OFFSET approach_path offset_z seek_or_retract",
         "camera.plan": "HALF_ROUND_DEG LEAST_BESIDE_MM LookPlan TWO_ANGLES_DEG",
         "camera.drive": "CameraDrive Place",

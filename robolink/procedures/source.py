@@ -5,7 +5,16 @@ from contextlib import contextmanager
 from typing import Protocol, TypeVar, runtime_checkable
 
 from robolink.calibration import CalibrationResult, VerifyResult
-from robolink.model import Controller, ControllerSensor, MotionGroup, Pose, TipSensor, ToolOffset
+from robolink.model import (
+    AnsweredBy,
+    Controller,
+    ControllerSensor,
+    MotionGroup,
+    Pose,
+    TipSensor,
+    ToolOffset,
+    answer_entry,
+)
 from robolink.runner import EndingWatch, Operator, Procedure, Runner, RunSettings, StepDone
 from robolink.stations import Found
 
@@ -28,6 +37,7 @@ class MeasurementContext:
         settings: Limits and speeds for a tip at an offset from the flange.
         offers: Whether the person is asked about what a procedure offers.
         types: Whether the pose of a touch may be typed: a turn test by touches follows.
+        attended: Whether a person may be asked what a measurement leaves open.
 
     Example:
         >>> from robolink.model import Pose, ToolOffset
@@ -52,8 +62,11 @@ class MeasurementContext:
         settings: Callable[[Pose, ToolOffset | None], RunSettings],
         offers: bool = True,
         types: bool = False,
+        attended: bool = True,
     ) -> None:
         self._types = types
+        self._attended = attended
+        self._asked: dict[str, bool] = {}
         self.controller = controller
         self.operator = operator
         self.start = start
@@ -62,15 +75,52 @@ class MeasurementContext:
         self._offers = offers
         self._on_step: Callable[[StepDone], None] | None = None
         self._ending = EndingWatch()
+        self._tool: int | None = None
 
     @contextmanager
-    def telling(self, on_step: Callable[[StepDone], None]) -> Iterator[None]:
-        """Tell ``on_step`` of every step taken inside the block."""
-        self._on_step = on_step
+    def telling(
+        self, on_step: Callable[[StepDone], None], *, tool: int | None = None
+    ) -> Iterator[None]:
+        """Tell ``on_step`` of every step taken inside the block.
+
+        Args:
+            on_step: Told of each.
+            tool: The tool that answers inside the block are about, for the record.
+        """
+        self._on_step, self._tool = on_step, tool
         try:
             yield
         finally:
-            self._on_step = None
+            self._on_step = self._tool = None
+
+    def ask_once(self, question: str, *, given: AnsweredBy | None = None) -> bool | None:
+        """Ask what holds for the whole change, once however many tools need it.
+
+        Args:
+            question: What a yes agrees to.
+            given: How a yes was given beforehand, ``None`` where it was not.
+
+        Returns:
+            The answer, which is on record then; ``None`` where nobody is to be asked.
+
+        Example:
+            >>> from robolink.model import AnsweredBy
+            >>> from robolink.nozzle_change import Limits
+            >>> from robolink.procedures import MeasurementContext
+            >>> from robolink.testing import MemoryController
+            >>> with MemoryController() as controller:
+            ...     settings = Limits().settings
+            ...     context = MeasurementContext(controller, None, start=None, settings=settings)
+            ...     context.ask_once("Were all axes held?", given=AnsweredBy.OPTION)
+            True
+        """
+        if question not in self._asked:
+            if given is not None:
+                self.controller.outcomes.append(answer_entry(question, True, given))
+                self._asked[question] = True
+            elif self._attended:
+                self._asked[question] = self.runner().confirm(question)
+        return self._asked.get(question)
 
     def run(
         self,
@@ -116,8 +166,39 @@ class MeasurementContext:
         self.controller.tools.select(0)
         return self.run(steps(self.controller.groups[0].pose()), camera=camera)
 
-    def runner(self, tip: ToolOffset | None = None, camera: TipSensor | None = None) -> Runner:
-        """Return a runner for the flange, or for a tip at an offset from it."""
+    def runner(
+        self,
+        tip: ToolOffset | None = None,
+        camera: TipSensor | None = None,
+        *,
+        tool: int | None = None,
+    ) -> Runner:
+        """Return a runner for the flange, or for a tip at an offset from it.
+
+        Args:
+            tip: That offset, ``None`` for the flange.
+            camera: What looks are taken with.
+            tool: The tool that answers are about, ``None`` for the one that is being measured.
+
+        Example:
+            >>> from robolink.nozzle_change import Limits
+            >>> from robolink.procedures import MeasurementContext
+            >>> from robolink.testing import MemoryController
+            >>> class Person:  # implements robolink.Operator
+            ...     def ask(self, question, kind): ...
+            ...     def poll(self, wait_s):
+            ...         return "y"
+            >>> with MemoryController() as controller:
+            ...     settings = Limits().settings
+            ...     context = MeasurementContext(
+            ...         controller, Person(), start=None, settings=settings
+            ...     )
+            ...     context.runner(tool=1).confirm("Is the new tip exactly as long?")
+            ...     [answer] = controller.outcomes.recorded(tool=1)
+            True
+            >>> answer.details["answer"]
+            'yes'
+        """
         group = self.controller.groups[0]
         if isinstance(camera, ControllerSensor):
             camera = camera.beside(self.controller)
@@ -135,6 +216,7 @@ class MeasurementContext:
             repeats=tip is None,
             types=self._types and tip is None,
             ending=self._ending,
+            tool=self._tool if tool is None else tool,
         )
 
     def _stepped(self, done: StepDone) -> None:

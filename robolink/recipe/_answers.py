@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from robolink.errors import ConfigError, DeclinedError
 from robolink.messages import tr
+from robolink.model import AnsweredBy
 from robolink.procedures import MeasurementContext
 from robolink.recipe.file.recipe import Recipe
 from robolink.recipe.file.tables import Prompt
@@ -59,6 +60,18 @@ class Answers:
             return self.lot or None
         return self.texts.get(number)
 
+    def given_by(self, number: int, prompt: Prompt, tool: int | None = None) -> AnsweredBy:
+        """Return how a prompt was answered beforehand; arguments as for :meth:`prepared`.
+
+        Example:
+            >>> from robolink.recipe import Answers, Prompt
+            >>> str(Answers(yes=True).given_by(1, Prompt(at="start", text="Is the cell clear?")))
+            '--yes'
+        """
+        if (number, tool) in self.early:
+            return AnsweredBy.PERSON
+        return AnsweredBy.YES if prompt.answer == "yes" else AnsweredBy.OPTION
+
     def ids_wanted(self, recipe: Recipe) -> Iterator[tuple[int, Prompt, int | None]]:
         """Yield the prompts for ids that nobody has answered, with the tool each is asked for."""
         for number, prompt in enumerate(recipe.prompts, start=1):
@@ -98,13 +111,34 @@ def require_answers(answers: Answers, recipe: Recipe) -> None:
         )
 
 
-def ask_prompt(context: MeasurementContext, prompt: Prompt) -> str:
-    """Put a question of the recipe to the person and return the answer.
+def ask_prompt(context: MeasurementContext, prompt: Prompt, tool: int | None = None) -> str:
+    """Put a question of the recipe to the person and return the answer, which is on record then.
+
+    Args:
+        context: What asks.
+        prompt: The question.
+        tool: The tool that it is asked for, ``None`` for the whole change.
 
     Raises:
         DeclinedError: A yes was needed.
+
+    Example:
+        >>> from robolink.nozzle_change import Limits
+        >>> from robolink.procedures import MeasurementContext
+        >>> from robolink.recipe import Prompt
+        >>> from robolink.recipe._answers import ask_prompt
+        >>> from robolink.testing import MemoryController
+        >>> class Person:  # implements robolink.Operator
+        ...     def ask(self, question, kind): ...
+        ...     def poll(self, wait_s):
+        ...         return "N-0815"
+        >>> with MemoryController() as controller:
+        ...     settings = Limits().settings
+        ...     context = MeasurementContext(controller, Person(), start=None, settings=settings)
+        ...     ask_prompt(context, Prompt(at="start", text="Which nozzle?", answer="nozzle"))
+        'N-0815'
     """
-    runner = context.runner()
+    runner = context.runner(tool=tool)
     if prompt.answer != "yes":
         return runner.ask_text(prompt.text)
     if not runner.confirm(prompt.text):
@@ -121,15 +155,9 @@ def ask_height(context: MeasurementContext, tool: int, name: str) -> float:
     Raises:
         DeclinedError: No number was typed, however often it was asked.
     """
-    runner = context.runner()
+    runner = context.runner(tool=tool)
     for _ in range(MOST_REFUSED):
-        text = runner.ask_text(
-            tr(
-                "Z of the new tip of tool {tool} {name} in mm from the flange?",
-                tool=tool,
-                name=name,
-            )
-        )
+        text = runner.ask_text(height_question(tool, name))
         try:
             return parse_decimal(text)
         except ConfigError as error:
@@ -143,19 +171,28 @@ def ask_height(context: MeasurementContext, tool: int, name: str) -> float:
     )
 
 
+def height_question(tool: int, name: str) -> str:
+    """Return the question for Z of a new tip."""
+    return tr("Z of the new tip of tool {tool} {name} in mm from the flange?", tool=tool, name=name)
+
+
+def length_question(tool: int, name: str) -> str:
+    """Return the question whether Z may stay as it is."""
+    return tr(
+        "Z of tool {tool} {name} is not measured and stays. Is the new tip exactly as long "
+        "as the old one?",
+        tool=tool,
+        name=name,
+    )
+
+
 def confirm_height(context: MeasurementContext, tool: int, name: str) -> None:
     """Ask whether the new tip is as long as the old one.
 
     Raises:
         DeclinedError: It is not.
     """
-    question = tr(
-        "Z of tool {tool} {name} is not measured and stays. Is the new tip exactly as long "
-        "as the old one?",
-        tool=tool,
-        name=name,
-    )
-    if not context.runner().confirm(question):
+    if not context.runner(tool=tool).confirm(length_question(tool, name)):
         raise DeclinedError(
             tr("The new tip of tool {tool} is not as long as the old one.", tool=tool),
             remedy=tr('Nothing was written. Use a recipe with z = "typed" or "measured".'),

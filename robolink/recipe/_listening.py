@@ -6,10 +6,17 @@ from dataclasses import replace
 from robolink.calibration import VerifyResult
 from robolink.errors import CalibrationError, ConfigError
 from robolink.messages import tr
-from robolink.model import Controller, EntryKind, NewEntry, Signature, ToolReceipt
+from robolink.model import AnsweredBy, Controller, Signature, ToolReceipt, answer_entry
 from robolink.nozzle_change import Listener, Moment, Proposal, known_height
 from robolink.procedures import MeasurementContext
-from robolink.recipe._answers import Answers, ask_height, ask_prompt, confirm_height
+from robolink.recipe._answers import (
+    Answers,
+    ask_height,
+    ask_prompt,
+    confirm_height,
+    height_question,
+    length_question,
+)
 from robolink.recipe._proposing import proposed
 from robolink.recipe._reference import Reference
 from robolink.recipe.file.recipe import Recipe
@@ -117,9 +124,15 @@ class RecipeListener(Listener):
         name = self._names[tool]
         if self._recipe.z == "typed":
             given = self._answers.z_mm.get(tool)
-            return ask_height(context, tool, name) if given is None else given
-        if self._recipe.z == "kept" and not self._answers.yes and not self._told_by_touches(tool):
-            confirm_height(context, tool, name)
+            if given is None:
+                return ask_height(context, tool, name)
+            self._record(height_question(tool, name), f"{given:g}", AnsweredBy.OPTION, tool)
+            return given
+        if self._recipe.z == "kept" and not self._told_by_touches(tool):
+            if self._answers.yes:
+                self._record(length_question(tool, name), True, AnsweredBy.YES, tool)
+            else:
+                confirm_height(context, tool, name)
         return None
 
     def _told_by_touches(self, tool: int) -> bool:
@@ -137,19 +150,21 @@ class RecipeListener(Listener):
         self, context: MeasurementContext, number: int, prompt: Prompt, tool: int | None
     ) -> None:
         answer = self._answers.prepared(number, prompt, tool)
-        given = answer is not None
         if answer is None:
-            answer = ask_prompt(context, prompt)
+            answer = ask_prompt(context, prompt, tool)
+        else:
+            self._record(prompt.text, answer, self._answers.given_by(number, prompt, tool), tool)
         if prompt.answer == "nozzle" and tool is not None:
             self._nozzles[tool] = answer
             self._sign(replace(self._signature, nozzle=answer))
         elif prompt.answer in ("nozzle", "lot"):
             self._signature = replace(self._signature, **{prompt.answer: answer})
             self._sign(self._signature)
-        details = {"question": prompt.text, "answer": answer, "given_beforehand": given}
-        self._controller.outcomes.append(
-            NewEntry(EntryKind.DECISION, tool=tool, verdict=answer, details=details)
-        )
+
+    def _record(self, question: str, answer: bool | str, by: AnsweredBy, tool: int | None) -> None:
+        """Put on record what was answered beforehand; what is asked, the runner records."""
+        entry = answer_entry(question, answer, by, tool=tool, given_beforehand=True)
+        self._controller.outcomes.append(entry)
 
     def _sign(self, signature: Signature) -> None:
         self._controller.outcomes.signature = signature

@@ -6,7 +6,7 @@ from pathlib import Path
 from robolink.accuracy import stated_rows
 from robolink.config import Cell
 from robolink.methods import MethodParameters, Site, fields_of, source_of
-from robolink.model import Controller, TipSensor
+from robolink.model import AnsweredBy, Controller, TipSensor
 from robolink.nozzle_change import AcceptanceCriteria, ChangePlan, Limits, ToolPlan
 from robolink.pose_tables import ReadingChoices
 from robolink.procedures import TipSource
@@ -23,6 +23,7 @@ def plan_of(
     *,
     folder: Path,
     ask_before_write: bool = True,
+    agreed_by: AnsweredBy = AnsweredBy.PROGRAM,
     accepted_change_mm: float | None = None,
     sensor: str | TipSensor | None = None,
     stated: Station | None = None,
@@ -36,6 +37,7 @@ def plan_of(
         controller: The controller; only read, and only where the robot has to tilt.
         folder: Where the recipe lies: files that it names are looked for there.
         ask_before_write: Whether a person accepts the proposals.
+        agreed_by: How the write was agreed to beforehand, where nobody is asked.
         accepted_change_mm: A larger jump than the recipe's that an engineer accepts this time.
         sensor: The camera, or its name or URL, in place of the recipe's.
         stated: The station as the cell file has it, ``None`` where it says nothing.
@@ -90,6 +92,7 @@ def plan_of(
         ),
         limits=_limits(recipe, parameters),
         ask_before_write=ask_before_write,
+        agreed_by=agreed_by,
         safe=safe.pose if safe else None,
     )
 

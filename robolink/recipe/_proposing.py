@@ -46,13 +46,13 @@ def proposed(
     height = contact_z_mm(measured) if recipe.source.of_method.tells_height else None
     if recipe.basis == "difference" and reference is not None:
         # A height that a touch tells is compared below.
-        shown = {name for name in measured.result.measured if name != "z_mm" or height is None}
+        shown = {name for name in measured.result.found if name != "z_mm" or height is None}
         offset = _moved(reference, tip, shown)
         notes.append(_as_moved(reference, offset, shown))
     if recipe.z == "typed" and typed_z_mm is not None:
         offset = replace(offset, z_mm=typed_z_mm)
         notes.append(tr("Z was typed"))
-    elif recipe.z == "kept" and "z_mm" in measured.result.measured:
+    elif recipe.z == "kept" and "z_mm" in measured.result.found:
         offset = replace(offset, z_mm=(measured.before or ToolOffset()).z_mm)
         notes.append(tr("Z was measured, and is kept as it was"))
     elif recipe.z == "measured" and height is not None:

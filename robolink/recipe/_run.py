@@ -8,7 +8,7 @@ from functools import partial
 from robolink.config import Cell
 from robolink.errors import ConfigError, NotAllowedError, RobolinkError
 from robolink.messages import joined, tr
-from robolink.model import Controller, EntryKind, PersonRole, TipSensor
+from robolink.model import AnsweredBy, Controller, EntryKind, PersonRole, TipSensor
 from robolink.nozzle_change import (
     ChangePlan,
     ChangeReport,
@@ -111,6 +111,7 @@ class RecipeRun:
             controller,
             folder=loaded.path.parent,
             ask_before_write=ask_before_write,
+            agreed_by=AnsweredBy.YES if self._answers.yes else AnsweredBy.PROGRAM,
             accepted_change_mm=accepted_change_mm,
             sensor=sensor,
             stated=find_stations(cell, ()).get(loaded.recipe.station.id),

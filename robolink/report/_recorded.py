@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.model import EntryKind, Recorded
+from robolink.model import EntryKind, Recorded, answered_by_in_words
 from robolink.report._recorded_tool import report_of_tool
 from robolink.report._values import Judgement, Record, Report
 from robolink.ways import Way, way
@@ -101,7 +101,7 @@ def _tools(entry: Recorded) -> Iterator[int]:
 def _concerns(entry: Recorded, tool: int) -> bool:
     """Tell whether an entry is about a tool, or about the whole change."""
     if entry.kind in _NOT_ABOUT_A_CHANGE:
-        return entry.kind is EntryKind.DECISION
+        return entry.kind is EntryKind.DECISION and entry.tool in (None, tool)
     return entry.tool in (None, tool)
 
 
@@ -116,8 +116,25 @@ def _people(entries: Sequence[Recorded]) -> Iterator[str]:
 def _judged(entries: Sequence[Recorded]) -> Iterator[Judgement]:
     for entry in entries:
         if entry.tolerance or entry.verdict:
-            found = "; ".join(part for part in (entry.verdict, _fit(entry.details)) if part)
+            said = (_answer(entry) or entry.verdict, _fit(entry.details))
+            found = "; ".join(part for part in said if part)
             yield Judgement(str(entry.kind), entry.tolerance, found)
+
+
+def _answer(entry: Recorded) -> str:
+    """Return what was asked and what was answered, and how; empty for what was no question."""
+    details = entry.details
+    if entry.kind is not EntryKind.DECISION or "question" not in details:
+        return ""
+    by = details.get("answered_by")
+    if by is None:  # older entries do not say it
+        return tr("{question} {answer}", question=details["question"], answer=entry.verdict)
+    return tr(
+        "{question} {answer} ({by})",
+        question=details["question"],
+        answer=entry.verdict,
+        by=answered_by_in_words(str(by)),
+    )
 
 
 def _fit(details: Mapping[str, object]) -> str:

@@ -29,6 +29,7 @@ def recorded_fit(details: Mapping[str, Any]) -> CalibrationResult:
         offset=read_offset(details["proposed"]) or ToolOffset(),
         measured=tuple(details["measured"]),
         kept=tuple(details.get("kept", ())),
+        changed=tuple(details.get("changed", ())),
         reference_point_mm=tuple(details.get("reference_point_mm", ())),
         sigma_gain=details.get("sigma_gain", 1.0),
         warnings=tuple(details.get("warnings", ())),

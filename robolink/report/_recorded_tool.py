@@ -64,7 +64,7 @@ def report_of_tool(
         ending=ending,
         source=str(calibration.get("source", "")) or _undoing(entries),
         method=calibration.get("method"),
-        determined=tuple(calibration.get("measured", ())),
+        determined=(*calibration.get("measured", ()), *calibration.get("changed", ())),
         warnings=(
             *calibration.get("notes", ()),
             *map(doubt_sentence, calibration.get("warnings", ())),

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from robolink.runner._jog_steps import parse_decimal as parse_decimal
     from robolink.runner._jog_steps import parse_steps as parse_steps
     from robolink.runner._jog_steps import refuse_decimal_comma as refuse_decimal_comma
+    from robolink.runner._jog_steps import way_in_words as way_in_words
     from robolink.runner._operator import Operator as Operator
     from robolink.runner._operator import Question as Question
     from robolink.runner._place_question import AGAIN as AGAIN
@@ -72,7 +73,7 @@ __getattr__ = lazy_exports(
         "_capture": "FINEST_STEP NotYet SETTLING_S",
         "_endings": "EndingWatch",
         "_foreseeing": "ForeseenStep considered first_clear foreseen_steps nothing_in_the_way",
-        "_jog_steps": "jog_target parse_decimal parse_steps refuse_decimal_comma",
+        "_jog_steps": "jog_target parse_decimal parse_steps refuse_decimal_comma way_in_words",
         "_operator": "Operator Question",
         "_place_question": "AGAIN MOST_REFUSED TakenAgainError inputs_of",
         "_runner": "POLL_S Runner StepDone ask_for_pose",

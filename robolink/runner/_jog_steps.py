@@ -9,6 +9,7 @@ from robolink.errors import ConfigError, LimitError
 from robolink.messages import tr
 from robolink.model import Path, Pose, angle_difference_deg
 from robolink.runner._settings import RunSettings
+from robolink.ways import Way, way
 
 _STEP: Final = re.compile(
     r"\s*([xyzu])\s*([+-])\s*([0-9]{1,4}(?:\.[0-9]{1,3})?)"
@@ -68,7 +69,7 @@ def jog_target(here: Pose, steps: str, settings: RunSettings) -> tuple[Pose, Pat
                     axis=axis,
                     delta=delta,
                 ),
-                remedy=tr("Steps of up to {limit:g} are allowed; take several.", limit=limit),
+                remedy=_smaller_steps(axis, delta, limit),
             )
     target = replace(
         here,
@@ -79,6 +80,17 @@ def jog_target(here: Pose, steps: str, settings: RunSettings) -> tuple[Pose, Pat
     )
     # A straight move that only turns is an error in SPEL+ without ROT (docs/reference/spel.md 7.1).
     return target, Path.JOINT if "u" in deltas else Path.STRAIGHT
+
+
+def _smaller_steps(axis: str, delta: float, limit: float) -> str:
+    """Return what to do instead of a step that is too large."""
+    if axis != "u":
+        return tr("Steps of up to {limit:g} are allowed; take several.", limit=limit)
+    return tr(
+        "Steps of up to {limit:g} degrees are allowed. To turn by more, lifted first: {turn}.",
+        limit=limit,
+        turn=way(Way.TURN, turn=delta),
+    )
 
 
 def typed_pose(text: str, here: Pose, settings: RunSettings) -> Pose:

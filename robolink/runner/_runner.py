@@ -17,6 +17,7 @@ from robolink.errors import (
 )
 from robolink.messages import tr
 from robolink.model import (
+    AnsweredBy,
     Controller,
     ControllerState,
     MotionGroup,
@@ -25,6 +26,7 @@ from robolink.model import (
     Path,
     Pose,
     TipSensor,
+    answer_entry,
 )
 from robolink.runner._endings import EndingWatch, as_measurement
 from robolink.runner._foreseeing import considered
@@ -45,7 +47,7 @@ from robolink.runner._steps import (
     TakenStep,
 )
 from robolink.runner._subjects import GuidedOperator, JogRange, JogSubject, MoveSubject, regard
-from robolink.runner._yes_no import ask_yes_no, ask_yes_no_or
+from robolink.runner._yes_no import ask_yes_no_or
 from robolink.sensing import median_spot, scatter_of, seen_in
 from robolink.ways import Way, way
 
@@ -94,6 +96,11 @@ class Runner:
             computer fell silent. It is for measuring, where nothing was written yet.
         types: Whether a pose may be typed where its touch says so; touches have to prove it.
         ending: Looks for what ends it, ``None`` for one of its own.
+        tool: Number of the tool that it is about, for the record of what is answered; ``None``
+            where it is about none or several.
+
+    Every answer to a question is put on record before anything follows from it, here and not by
+    whoever asks (docs/journal.md, "What was answered").
 
     Example:
         >>> from robolink.model import Path, Pose, WorkBox
@@ -118,8 +125,10 @@ class Runner:
         repeats: bool = False,
         types: bool = False,
         ending: EndingWatch | None = None,
+        tool: int | None = None,
     ) -> None:
         self._controller = controller
+        self._tool = tool
         self._group = group
         self._operator = operator
         self._settings = settings
@@ -327,11 +336,28 @@ class Runner:
 
     def confirm(self, question: str) -> bool:
         """Ask a yes-or-no question under the same watch; see :func:`ask_yes_no`."""
-        return ask_yes_no(self._operator, question, self._line)
+        return self.confirm_or(question, also=()) is True
 
-    def confirm_or(self, question: str, *, also: Collection[str]) -> bool | str:
-        """Ask one that a further word may answer; see :func:`ask_yes_no_or`."""
-        return ask_yes_no_or(self._operator, question, self._line, also=also)
+    def confirm_or(self, question: str, *, also: Collection[str], decides: str = "") -> bool | str:
+        """Ask one that a further word may answer; see :func:`ask_yes_no_or`.
+
+        Args:
+            question: What a yes agrees to.
+            also: The words.
+            decides: Under which name the record says besides whether it was a yes; empty for none.
+
+        Raises:
+            ConfigError: The answer cannot be recorded.
+        """
+        said = ask_yes_no_or(self._operator, question, self._line, also=also)
+        decided = {decides: said} if decides and isinstance(said, bool) else {}
+        self._record(question, said, **decided)
+        return said
+
+    def _record(self, question: str, answer: bool | str, **details: object) -> None:
+        by = getattr(self._operator, "answers_as", AnsweredBy.PERSON)
+        entry = answer_entry(question, answer, by, tool=self._tool, **details)
+        self._controller.outcomes.append(entry)
 
     def ask_text(self, question: str) -> str:
         """Ask for a line of text under the same watch.
@@ -345,6 +371,7 @@ class Runner:
             if text == "q":
                 raise ended_by_operator()
             if text:
+                self._record(question, text)
                 return text
         raise DeclinedError(
             tr("Nothing was typed, {count} times in a row.", count=MOST_REFUSED),

@@ -101,7 +101,8 @@ def changed_since(controller: Controller, tool: int, now: ToolOffset | None) -> 
 def earlier_corrections(controller: Controller, tool: int) -> tuple[float, ...]:
     """Return the lengths, mm, of the corrections since the nozzle was mounted, oldest first.
 
-    They are those in the plane: Z is often measured by another method. A nozzle is known by the id
+    They are those in the plane: Z is often measured by another method, and a write of
+    Z alone is none. A nozzle is known by the id
     that was given for it; without one nothing is known to be the same nozzle, and there is nothing
     to compare with. What was taken back is none.
     """
@@ -122,5 +123,7 @@ def earlier_corrections(controller: Controller, tool: int) -> tuple[float, ...]:
         value = read_offset(entry.details.get("value"))
         if before is None or value is None:
             break
-        lengths.append(math.hypot(value.x_mm - before.x_mm, value.y_mm - before.y_mm))
+        length_mm = math.hypot(value.x_mm - before.x_mm, value.y_mm - before.y_mm)
+        if length_mm or value.z_mm == before.z_mm:  # a write of Z alone corrected no X and Y
+            lengths.append(length_mm)
     return tuple(reversed(lengths))

@@ -10,7 +10,7 @@ from robolink_cli import main
 from robolink_simulators.hosting.in_process import epson as in_process
 from robolink_simulators.hosting.in_process import softmotion as plc_in_process
 
-from robolink.journal import EntryKind, open_journal
+from robolink.journal import EntryKind, memory_journal, open_journal
 from tests.contract._camera_cell import camera_model, camera_station, furnish
 from tests.contract._sensor_cell import SensorCell
 from tests.faults._nozzle_cell import OLD_TIP, served_cell
@@ -150,6 +150,19 @@ def test_a_board_is_measured_by_its_fiducials(desk):
     assert document["proposed"]["u_deg"] == pytest.approx(truth.u_deg, abs=0.02)
     assert document["verification"]["passed"]
     assert "Looking at fiducial 4." in messages
+    # What follows is said, in the document, and on record with the value.
+    steps = document["next_steps"]
+    assert [one["step"] for one in steps] == ["select", "jog", "teach"]
+    commands = [one["command"] for one in steps]
+    assert commands == ["robolink tool select 1", "robolink robot jog", "robolink robot where"]
+    places = [messages.index(command) for command in ("Next:", *commands)]
+    assert places == sorted(places)
+    kept = memory_journal(opened.url).entries(kinds=(EntryKind.DONE,))
+    assert next(iter(kept)).details["next_steps"] == steps
+    # Each of them is a command that works as it stands.
+    assert opened.run("tool", "select", "1", "--yes")[0] == 0
+    assert opened.run("robot", "jog", "x+1", "--yes")[0] == 0
+    assert opened.run("robot", "where")[0] == 0
 
 
 RECIPE = """

@@ -14,7 +14,7 @@ from robolink_simulators.epson.memory.points import Point
 import robolink
 from robolink.errors import CalibrationError
 from robolink.methods import PointsSource
-from robolink.model import Hand, Pose, ToolOffset, rotate_xy
+from robolink.model import EntryKind, Hand, Pose, ToolOffset, rotate_xy
 
 REAL = ToolOffset(12.3, -3.9, -20.4)
 STORED = ToolOffset(12.0, -3.5, -20.0)
@@ -70,6 +70,7 @@ def command(serve, simulator, capsys):
             shown = capsys.readouterr()
             return code, shown.out, shown.err
 
+        run.url = cell.url
         yield run
     arm = simulator.machine.arm
     assert arm.moves_started == 0
@@ -183,11 +184,83 @@ def test_on_a_terminal_a_no_writes_nothing(command, simulator, monkeypatch):
 
     monkeypatch.setattr(given_poses, "on_terminal", lambda: True)
     monkeypatch.setattr(given_poses, "agree", decline)
-    assert command(*calibrate("--points", "901,902"))[0] == 9
+    assert command(*calibrate("--points", "901,902", "--axes-held"))[0] == 9
     (question,) = asked
     assert "Write it to tool 1 all the same?" in question
     assert "Nobody saw these touches" in question
     assert stored(simulator) == STORED
+
+
+class AtTerminal:
+    """Somebody who answers yes to all but what is said otherwise."""
+
+    def __init__(self, **otherwise):
+        self.asked, self._otherwise = [], otherwise
+
+    def tell(self, text):
+        """Hear it."""
+
+    def ask(self, question, kind):
+        self.asked.append(question)
+
+    def poll(self, wait_s):
+        return self._otherwise.get("held", "y") if "SFREE" in self.asked[-1] else "y"
+
+
+@pytest.mark.parametrize(
+    "given",
+    [("--points", "901,902"),
+     ("--pose", "287.7,103.9,-39.6,0", "--pose", "312.3,96.1,-39.6,180")],
+)  # fmt: skip
+def test_whether_axes_were_held_is_asked_once_and_on_record(command, simulator, monkeypatch, given):
+    person = AtTerminal()
+    monkeypatch.setattr("robolink_cli.prompts.operator._plain_terminal", lambda: person)
+    monkeypatch.setattr(given_poses, "on_terminal", lambda: True)
+    monkeypatch.setattr("robolink_cli.prompts.questions.on_terminal", lambda: True)
+    code, out, err = command(*calibrate(*given, "--json"))
+    assert code == 0, err
+    assert [one for one in person.asked if "SFREE" in one] == [
+        "Were all axes held by their motors (not SFREE) when these poses were taught?"
+    ]
+    assert "axes_not_confirmed" not in json.loads(out)["fit"]["notes"]
+    (said,) = [one for one in decisions(command) if "SFREE" in one["question"]]
+    assert (said["answer"], said["answered_by"]) == ("yes", "person")
+
+
+def decisions(command):
+    with robolink.connect(command.url) as controller:
+        entries = controller.outcomes.recorded(kinds=(EntryKind.DECISION,))
+        return [one.details for one in entries if "question" in one.details]
+
+
+def test_poses_taught_with_axes_let_go_are_refused(command, simulator, monkeypatch):
+    person = AtTerminal(held="n")
+    monkeypatch.setattr("robolink_cli.prompts.operator._plain_terminal", lambda: person)
+    monkeypatch.setattr(given_poses, "on_terminal", lambda: True)
+    code, out, _ = command(*calibrate("--points", "901,902", "--json"))
+    assert code == 7
+    assert json.loads(out)["error"]["code"] == "axes_free"
+    assert stored(simulator) == STORED
+
+
+def test_with_yes_alone_it_is_a_note_that_names_the_option(command, simulator):
+    code, out, err = command(*calibrate("--points", "901,902", "--yes", "--json"))
+    assert code == 0, err
+    assert "axes_not_confirmed" in json.loads(out)["fit"]["notes"]
+    assert "To confirm it: --axes-held" in err
+    assert not [one for one in decisions(command) if "SFREE" in one["question"]]
+    with_it = calibrate("--points", "911,912", "--taught-tool", "1", "--yes", "--json")
+    code, out, err = command(*with_it, "--axes-held")
+    assert code == 0, err
+    assert "axes_not_confirmed" not in json.loads(out)["fit"]["notes"]
+    (said,) = [one for one in decisions(command) if "SFREE" in one["question"]]
+    assert (said["answer"], said["answered_by"]) == ("yes", "option")
+
+
+def test_axes_held_belongs_to_poses_that_exist(command):
+    code, _, err = command(*calibrate("--axes-held"))
+    assert code == 2
+    assert "--axes-held belong to poses that exist already" in err
 
 
 def test_a_dry_run_shows_the_request_and_writes_nothing(command, simulator):

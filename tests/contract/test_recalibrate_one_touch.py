@@ -9,6 +9,9 @@ from robolink_cli.prompts import operator as _operator
 
 from robolink.journal import EntryKind
 from robolink.model import ToolOffset
+from robolink.report import reports_of
+from robolink.report.sections.certainty import interval_sentences
+from robolink.report.sections.offsets import offsets
 from tests.contract._method_cell import KINDS, method_cell
 
 pytestmark = pytest.mark.simulator_only
@@ -94,9 +97,10 @@ def test_the_example_changes_a_needle_with_z_inside_the_stated_interval(cell, tm
     halves = tool["fit"]["half_width95"]
     for axis, change in zip("xyz", changed, strict=False):
         moved_mm = tool["proposed"][f"{axis}_mm"] - getattr(value, f"{axis}_mm")
-        assert abs(moved_mm - change) <= halves[f"{axis}_mm"]
+        half_mm = tool["change_z_half95_mm"] if axis == "z" else halves[f"{axis}_mm"]
+        assert abs(moved_mm - change) <= half_mm
     assert tool["verification"]["passed"]
-    assert any("kept and never measured" in note for note in tool["notes"])
+    assert any("never measured" in note for note in tool["notes"])
     ended = cell.recorded(EntryKind.DONE)[0]
     assert ended.signature.nozzle == "N-1"
     assert 0.5 * took_s < float(str(ended.details["took_s"])) <= took_s + 0.1
@@ -153,8 +157,9 @@ def test_a_recipe_names_beams_and_a_surface_by_their_stations_and_may_end_early(
             assert tool["proposed"][f"{axis}_mm"] == pytest.approx(true, abs=0.02)
         assert "That is enough" in done.err
     # With --yes nobody is asked about the worst, and what nobody was asked nobody declined.
-    said = [entry.verdict for entry in arm.recorded(EntryKind.DECISION)]
-    assert said == ["accepted beforehand"] * 2
+    said = [entry.details for entry in arm.recorded(EntryKind.DECISION)]
+    assert not any("Take it again" in str(one["question"]) for one in said)
+    assert {one["answered_by"] for one in said} == {"--yes"}
 
 
 @pytest.mark.parametrize(
@@ -203,3 +208,65 @@ def test_a_recipe_offers_the_worst_pose_again_and_the_answer_is_on_record(
     assert sum("Take it again?" in question for question in asked) == 3
     said = [entry.details.get("question", "") for entry in arm.recorded(EntryKind.DECISION)]
     assert sum("Take it again?" in str(question) for question in said) == 3
+
+
+def test_a_z_that_nobody_measured_is_changed_and_never_stated(arm, tmp_path):
+    """The stored Z is 0.36 off; one touch said +-0.025 of it."""
+    assert arm.calibrate("n-angle", "--station", "PIN-07", "--count", "4").code == 0
+    off_mm = arm.stored.z_mm - arm.truth.z_mm
+    assert abs(off_mm) > 0.3
+    stored = arm.stored.z_mm
+    arm.lengthen(0.2)
+    done = recalibrate(arm, example_for(arm, tmp_path), "--nozzle", "N-1")
+    assert done.code == 0, done.err
+    (tool,) = done.document["tools"]
+    assert tool["measured"] == ["x_mm", "y_mm"]
+    assert tool["changed"] == ["z_mm"]
+    assert set(tool["fit"]["half_width95"]) == {"x_mm", "y_mm"}
+    assert tool["stored_z"] == {"value_mm": stored, "half95_mm": None, "entry": None}
+    # What is stated is the change, and it is right.
+    assert tool["change_z_mm"] == pytest.approx(tool["proposed"]["z_mm"] - stored, abs=2e-3)
+    assert abs(tool["change_z_mm"] + 0.2) <= tool["change_z_half95_mm"]
+    assert abs(arm.stored.z_mm - arm.truth.z_mm) > 3 * tool["change_z_half95_mm"]
+    assert "change of Z (95 %): -0.2" in done.err or "change of Z (95 %): -0.1" in done.err
+    said = arm.recorded(EntryKind.CALIBRATION)[0].details
+    assert said["changed"] == ["z_mm"]
+    assert said["change_z_mm"] == tool["change_z_mm"]
+    assert len(said["half_width95"]) == 2
+    change = arm.recorded(EntryKind.CALIBRATION)[0].change
+    entries = [entry for entry in reversed(arm.recorded()) if entry.change == change]
+    made = {"made_at": "2026-11-28T08:00:00Z", "robolink_version": "0.4", "check": "whole"}
+    (report,) = reports_of(entries, **made)
+    table = offsets(report)
+    (z,) = [one for one in table.own if one.axis.startswith("Z mm")]
+    assert z.half95 is None
+    assert "only its change" in z.axis
+    assert "never measured" in interval_sentences(report.fit)[0]
+
+
+def test_a_z_that_was_measured_has_its_interval_after_one_touch(arm, tmp_path):
+    """Z by the height of a surface, X and Y of the same needle on the pin, then the next needle."""
+    arm.mount()
+    arm.lengthen(-0.3)
+    assert arm.calibrate("z-touch", "--station", "PLATE", "--nozzle", "N-0").code == 0
+    (measured,) = arm.recorded(EntryKind.CALIBRATION)
+    full = ("n-angle", "--station", "PIN-07", "--count", "4", "--nozzle", "N-0")
+    assert arm.calibrate(*full).code == 0
+    for nozzle, by_mm in (("N-1", 0.2), ("N-2", -0.15)):
+        arm.lengthen(by_mm)
+        done = recalibrate(arm, example_for(arm, tmp_path), "--nozzle", nozzle)
+        assert done.code == 0, done.err
+        (tool,) = done.document["tools"]
+        assert tool["changed"] == []
+        assert tool["stored_z"]["entry"] == measured.number
+        half = tool["fit"]["half_width95"]["z_mm"]
+        assert abs(arm.stored.z_mm - arm.truth.z_mm) <= half
+        assert half > tool["change_z_half95_mm"]
+        assert f"the stored Z was measured: entry {measured.number}" in done.err
+    # Typed, it is a number that nobody measured.
+    assert arm.run("tool", "set", "1", "--z", str(arm.stored.z_mm + 0.01), "--yes").code == 0
+    assert arm.calibrate(*full).code == 0
+    arm.lengthen(0.1)
+    done = recalibrate(arm, example_for(arm, tmp_path), "--nozzle", "N-3")
+    assert done.code == 0, done.err
+    assert done.document["tools"][0]["changed"] == ["z_mm"]

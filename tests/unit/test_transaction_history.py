@@ -96,6 +96,14 @@ def test_corrections_of_one_nozzle_are_told_oldest_first(controller):
     assert earlier_corrections(controller, 2) == ()
 
 
+def test_a_write_of_z_alone_is_no_correction_that_x_and_y_could_have_grown_from(controller):
+    before = controller.tools.read(1)
+    longer = ToolOffset(before.x_mm, before.y_mm, before.z_mm - 0.7)
+    change_tools(controller, [Wanted(1, longer, before)])
+    correct(controller, 0.4)
+    assert earlier_corrections(controller, 1) == pytest.approx((0.4,))
+
+
 def test_corrections_of_the_nozzle_before_do_not_count(cell):
     for nozzle, steps_mm in (("N-6", (0.9,)), ("N-7", (0.3, 0.2))):
         with cell.connected(cell.log(nozzle=nozzle)) as controller:

@@ -7,6 +7,8 @@ from robolink.ways import Way
 SHELL_WAYS: Final = {
     Way.ACCEPT_JUMP: "--accept-jump",
     Way.ANSWER: "--answer {number}=TEXT",
+    Way.AXES_HELD: "--axes-held; in a recipe axes_held = true",
+    Way.BOX: "--box",
     Way.CALIBRATE_AT: "'robolink calibrate n-angle --station {station}'",
     Way.CALIBRATE_CAMERA_AT: "robolink calibrate camera-affine --tool {tool} --station {station}",
     Way.CALIBRATE_TOOL_AT: "robolink calibrate n-angle --tool {tool} --station {station}",
@@ -40,6 +42,7 @@ SHELL_WAYS: Final = {
     Way.TILT: "--tilt",
     Way.TOOL: "--tool",
     Way.TOOLS: "--tool",
+    Way.TURN: "'robolink robot jog --turn {turn:g}'",
     Way.YES: "--yes",
 }
 """Options and commands; a test holds it to every way that there is."""

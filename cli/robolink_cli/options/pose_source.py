@@ -36,6 +36,7 @@ class PoseSource:
         taught_tool: The tool whose tip the poses describe, 0 when they are flange poses; ``None``
             where nobody said it.
         choices: What the file does not say.
+        axes_held: Whether it was stated that all axes were held when they were taught.
     """
 
     kind: Literal["points", "typed", "file"]
@@ -44,6 +45,7 @@ class PoseSource:
     path: Path | None = None
     taught_tool: int | None = None
     choices: ReadingChoices = NOTHING_SAID
+    axes_held: bool = False
 
     def payload(self) -> dict[str, object]:
         """Return what the document of a calibration says about it."""
@@ -93,7 +95,8 @@ def pose_source_options(
 ) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Add what says where poses come from, passed on as ``poses``.
 
-    These are ``--points``, ``--pose``, ``--poses``, ``--taught-tool`` and how a file is read.
+    These are ``--points``, ``--pose``, ``--poses``, ``--taught-tool``, ``--axes-held`` and how a
+    file is read.
 
     Args:
         points: What the help says about taught points.
@@ -116,6 +119,14 @@ def pose_source_options(
             metavar="N",
             help=declared("The tool that was selected when the poses were taught (0, the flange)."),
         ),
+        click.option(
+            "--axes-held",
+            is_flag=True,
+            help=declared(
+                "All axes were held by their motors, none let go (SFREE), when the poses were "
+                "taught; without it a person is asked."
+            ),
+        ),
     )
 
     def add(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -126,11 +137,17 @@ def pose_source_options(
             typed: tuple[str, ...],
             path: Path | None,
             taught_tool: int | None,
+            axes_held: bool,
             choices: ReadingChoices,
             **others: object,
         ) -> object:
             poses = pose_source(
-                points=points, typed=typed, path=path, taught_tool=taught_tool, choices=choices
+                points=points,
+                typed=typed,
+                path=path,
+                taught_tool=taught_tool,
+                choices=choices,
+                axes_held=axes_held,
             )
             return function(*args, poses=poses, **others)
 
@@ -154,11 +171,21 @@ def taught_points_option(points: str) -> Callable[[Callable[..., Any]], Callable
     def add(function: Callable[..., Any]) -> Callable[..., Any]:
         @wraps(function)
         def with_points(
-            *args: object, points: str, taught_tool: int | None, **others: object
+            *args: object,
+            points: str,
+            taught_tool: int | None,
+            axes_held: bool,
+            **others: object,
         ) -> object:
-            numbers = point_numbers(points)
-            poses = PoseSource("points", points=numbers, taught_tool=taught_tool)
-            return function(*args, poses=poses, taught_tool=taught_tool, **others)
+            poses = PoseSource(
+                "points",
+                points=point_numbers(points),
+                taught_tool=taught_tool,
+                axes_held=axes_held,
+            )
+            return function(
+                *args, poses=poses, taught_tool=taught_tool, axes_held=axes_held, **others
+            )
 
         option = click.option("--points", metavar="N,N", required=True, help=points)
         command: Callable[..., Any] = option(with_points)
@@ -174,12 +201,13 @@ def pose_source(
     path: Path | None,
     taught_tool: int | None,
     choices: ReadingChoices,
+    axes_held: bool,
 ) -> PoseSource | None:
     """Return what the options name, ``None`` when the robot is to measure.
 
     Raises:
-        ConfigError: More than one source, or none to which ``--taught-tool`` or what is said about
-            a file belongs.
+        ConfigError: More than one source, or none to which ``--taught-tool``, ``--axes-held`` or
+            what is said about a file belongs.
     """
     given = {"--points": points, "--pose": typed, "--poses": path}
     named = [name for name, value in given.items() if value]
@@ -193,16 +221,17 @@ def pose_source(
             tr("--columns, --length and --euler belong to a file of poses."),
             remedy=tr("Give it with --poses."),
         )
+    of_all: dict[str, Any] = {"taught_tool": taught_tool, "axes_held": axes_held}
     if points:
-        return PoseSource("points", points=point_numbers(points), taught_tool=taught_tool)
+        return PoseSource("points", points=point_numbers(points), **of_all)
     if typed:
         poses = tuple(_typed_pose(text) for text in typed)
-        return PoseSource("typed", typed=poses, taught_tool=taught_tool)
+        return PoseSource("typed", typed=poses, **of_all)
     if path is not None:
-        return PoseSource("file", path=path, taught_tool=taught_tool, choices=choices)
-    if taught_tool is not None:
+        return PoseSource("file", path=path, choices=choices, **of_all)
+    if taught_tool is not None or axes_held:
         raise ConfigError(
-            tr("--taught-tool belongs to poses that exist already."),
+            tr("--taught-tool and --axes-held belong to poses that exist already."),
             remedy=tr("Give them with --points, --pose or --poses."),
         )
     return None

@@ -121,7 +121,7 @@ class ReportDraft:
             "tool": proposal.tool,
             "before": proposal.before,
             "after": result.offset,
-            "determined": result.measured,
+            "determined": result.found,
             "method": result.method,
             "source": source,
             "warnings": warnings,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 from robolink.errors import DeclinedError
 from robolink.messages import tr
+from robolink.model import AnsweredBy
 from robolink.runner import FINEST_STEP, Operator, Question, parse_steps
 from robolink_cli.console.render import note
 from robolink_cli.prompts.lines import QUIET_S, Lines, open_lines
@@ -122,6 +123,8 @@ class AssistedOperator:
         satisfied_mm: Content when less than this is seen on each axis; an eye that reads
             with an error would otherwise jog for ever.
     """
+
+    answers_as = AnsweredBy.STAND_IN
 
     def __init__(
         self,

@@ -1,13 +1,19 @@
-"""Asking a person at the terminal before something changes."""
+"""Asking a person at the terminal before something changes.
+
+Every answer is kept, for the record of what follows from it: here, not by whoever asks.
+"""
 
 import sys
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import click
 
 from robolink.errors import DeclinedError
 from robolink.messages import tr
 from robolink_cli.console.tolerance import is_terminal
+
+if TYPE_CHECKING:
+    from robolink.model import AnsweredBy
 
 WATCHED: Final = "robolink.watched"
 """Where a prompt finds the controller whose status it must read while a person thinks."""
@@ -18,22 +24,60 @@ def on_terminal() -> bool:
     return is_terminal(sys.stdin) and is_terminal(sys.stderr)
 
 
-def agree(question: str, *, yes: bool) -> None:
+def agree(question: str, *, yes: bool, asks: bool = True) -> None:
     """Ask on a terminal; off it, the command itself is the consent (docs/reference/rules.md 7).
+
+    Args:
+        question: What a yes agrees to.
+        yes: Whether it was answered beforehand.
+        asks: Whether a person may be asked where there is a terminal.
 
     Raises:
         DeclinedError: The answer was no.
     """
-    if not yes and on_terminal():
+    from robolink.model import AnsweredBy
+
+    if not yes and asks and on_terminal():
         require_yes(question)
+        return
+    keep_answer(question, True, AnsweredBy.YES if yes else AnsweredBy.COMMAND)
 
 
 def asked(question: str) -> bool:
     """Ask for a yes; anything else is a no (:func:`robolink.runner.ask_yes_no` says what is)."""
+    from robolink.model import AnsweredBy
     from robolink.runner import ask_yes_no
     from robolink_cli.prompts.operator import terminal
 
-    return ask_yes_no(terminal(), question, _answer)
+    said = ask_yes_no(terminal(), question, _answer)
+    keep_answer(question, said, AnsweredBy.PERSON)
+    return said
+
+
+def keep_answer(
+    question: str, answer: bool | str, by: "AnsweredBy", *, tool: int | None = None
+) -> None:
+    """Keep an answer for what follows from it; see :meth:`robolink.model.OutcomeLog.answered`.
+
+    Where no controller is connected yet there is nothing that it could be kept for.
+
+    Args:
+        question: What was asked, as it was shown.
+        answer: Whether it was a yes, or the text itself.
+        by: How it was answered.
+        tool: Number of the tool that it is about.
+
+    Example:
+        >>> from robolink.model import AnsweredBy
+        >>> from robolink_cli.prompts.questions import keep_answer
+        >>> keep_answer("Write tool 1?", True, AnsweredBy.YES)  # no command runs: for nothing
+    """
+    from robolink.model import answer_entry
+
+    context = click.get_current_context(silent=True)
+    controller = None if context is None else context.meta.get(WATCHED)
+    if controller is not None:
+        controller.outcomes.answered(answer_entry(question, answer, by, tool=tool))
 
 
 def asked_for_text(question: str) -> str:
@@ -42,6 +86,7 @@ def asked_for_text(question: str) -> str:
     Raises:
         DeclinedError: None was typed, or ``q``.
     """
+    from robolink.model import AnsweredBy
     from robolink.runner import Question
     from robolink_cli.prompts.operator import terminal
 
@@ -49,6 +94,7 @@ def asked_for_text(question: str) -> str:
     text = _answer().strip()
     if text in ("", "q"):
         raise DeclinedError(tr("No answer was given."), remedy=tr("Nothing was sent."))
+    keep_answer(question, text, AnsweredBy.PERSON)
     return text
 
 

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from robolink.errors import DeclinedError, NotReadyError, NotReadyReason
-from robolink.messages import tr
+from robolink.messages import joined, tr
 from robolink_cli.prompts.present import present_desk
 from robolink_cli.session.motion_consent import (
     agree_to_motion,
@@ -147,8 +147,10 @@ def _answer_to_list(
         DeclinedError: The person leaves.
         NotReadyError: Nothing can move now, and no key of the list changes that.
     """
+    from robolink.model import AnsweredBy
     from robolink.runner import POLL_S, Question
-    from robolink_cli.wizard.check_list import SWITCH_ON, CheckSubject
+    from robolink_cli.prompts.questions import keep_answer
+    from robolink_cli.wizard.check_list import SWITCH_ON, CheckSubject, Mark
 
     off = _motors_are_off(controller, purpose, tried=tried)
     name, terms = _name(controller), controller.groups[0].terms()
@@ -164,6 +166,10 @@ def _answer_to_list(
         return answer
     if answer == "y":
         controller.groups[0].require_able(purpose)
+        for point in _points(name, terms, left, off=off):
+            if point.mark is Mark.YOU:
+                keep_answer(point.text, True, AnsweredBy.PERSON)
+        keep_answer(joined(" ", (plan, tr("Start moving"))), True, AnsweredBy.PERSON)
         return answer
     raise DeclinedError(
         tr("You did not start it."), remedy=tr("To start, give the same command again.")

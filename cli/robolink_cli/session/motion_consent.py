@@ -36,6 +36,7 @@ def agree_to_motion(question: str, *, yes: bool, in_tool: bool = True) -> None:
     """
     heed_what_was_left(yes=yes, in_tool=in_tool)
     if yes:
+        questions.agree(question, yes=True)
         return
     if not questions.on_terminal():
         raise DeclinedError(

@@ -10,7 +10,13 @@ from robolink.calibration import (
 )
 from robolink.messages import tr
 from robolink.model import ToolOffset, ToolReceipt, describe_offset
-from robolink.nozzle_change import LimitVerdict, PlannedStep, Proposal, ToolReport
+from robolink.nozzle_change import (
+    LimitVerdict,
+    PlannedStep,
+    Proposal,
+    ToolReport,
+    next_steps,
+)
 from robolink.runner import TeachPrompt
 from robolink_cli.console.render import note, say
 from robolink_cli.prompts.present import present_desk
@@ -83,20 +89,40 @@ def show_report(report: ToolReport) -> None:
         say(tr("Tool {tool} is written and read back.", tool=tool))
     if report.verification is None:
         say(tr("Not tested yet."))
-        return
-    for drift in report.verification.drifts:
-        say(
-            tr(
-                "  at U {u:.1f}: {distance:.3f} mm off",
-                u=drift.u_deg,
-                distance=drift.distance_mm,
+    else:
+        for drift in report.verification.drifts:
+            say(
+                tr(
+                    "  at U {u:.1f}: {distance:.3f} mm off",
+                    u=drift.u_deg,
+                    distance=drift.distance_mm,
+                )
             )
-        )
-    say(turn_test_headline(report.verification))
-    for sentence in turn_test_sentences(report.verification.judgement, report.proposal.result):
-        say(f"  {sentence}")
-    for sentence in proved_statements(report.proposal.result, report.verification):
-        say(sentence)
+        say(turn_test_headline(report.verification))
+        for sentence in turn_test_sentences(report.verification.judgement, report.proposal.result):
+            say(f"  {sentence}")
+        for sentence in proved_statements(report.proposal.result, report.verification):
+            say(sentence)
+    for line in next_lines(report):
+        say(line)
+
+
+def next_lines(report: ToolReport, cell: str = "") -> list[str]:
+    """Return what a person does next with a tool that was written; nothing for most methods.
+
+    Args:
+        report: What was done.
+        cell: Name of the cell, for the commands; empty where it need not be named.
+    """
+    steps = next_steps(report.proposal.result, report.proposal.tool) if report.receipt else ()
+    if not steps:
+        return []
+    named = f'robolink -c "{cell}"' if cell else "robolink"
+    lines = [tr("Next:")]
+    for number, step in enumerate(steps, start=1):
+        lines.append(f"  {number}. {step.sentence}")
+        lines.append(f"       {named} {step.command}")
+    return lines
 
 
 def judged_payload(proposal: Proposal, verdicts: Sequence[LimitVerdict]) -> dict[str, object]:
@@ -119,7 +145,13 @@ def report_payload(report: ToolReport) -> dict[str, object]:
         **judged_payload(report.proposal, report.verdicts),
         "write": receipt_payload(report.receipt) if report.receipt else None,
         "verification": verification_payload(report.verification),
+        **_following(report),
     }
+
+
+def _following(report: ToolReport) -> dict[str, object]:
+    steps = next_steps(report.proposal.result, report.proposal.tool) if report.receipt else ()
+    return {"next_steps": [step.as_json() for step in steps]} if steps else {}
 
 
 def show_course(steps: Sequence[PlannedStep]) -> None:

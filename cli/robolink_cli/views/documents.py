@@ -49,6 +49,7 @@ def proposal_payload(proposal: "Proposal") -> dict[str, object]:
         "tip": offset_payload(proposal.tip),
         "notes": list(proposal.notes),
         "measured": list(result.measured),
+        "changed": list(result.changed),
         "kept": list(proposal.kept),
         "change_mm": proposal.change_mm,
         "reference_point_mm": list(result.reference_point_mm),

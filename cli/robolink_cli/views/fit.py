@@ -25,7 +25,7 @@ def remarks(result: CalibrationResult) -> Iterator[str]:
     for said in (_fit, _order):
         yield from filter(None, (said(result),))
     yield from statement_sentences(result)
-    for said in (_each_axis, _ways, _needle, _camera, _runout, _chain):
+    for said in (_each_axis, _change, _ways, _needle, _camera, _runout, _chain):
         yield from filter(None, (said(result),))
     yield from known_doubts(note for note in result.notes if note not in _SAID_OTHERWISE)
 
@@ -76,6 +76,23 @@ def _each_axis(result: CalibrationResult) -> str:
         "Each axis alone is repeatable to: {parts}, {basis}.",
         parts="  ".join(parts),
         basis=basis,
+    )
+
+
+def _change(result: CalibrationResult) -> str:
+    """Return by how much Z changed, and what is known of Z itself; empty for other methods."""
+    details = result.details()
+    by_mm, half_mm = details.get("change_z_mm"), details.get("change_z_half95_mm")
+    stored = details.get("stored_z")
+    if not isinstance(by_mm, float) or not isinstance(half_mm, float):
+        return ""
+    told = tr("change of Z (95 %): {by:+.3f} +-{half:.3f} mm", by=by_mm, half=half_mm)
+    if "z_mm" in result.changed or not isinstance(stored, dict):
+        return told
+    return tr(
+        "{told}; the stored Z was measured: entry {number} of the journal",
+        told=told,
+        number=stored["entry"],
     )
 
 

@@ -211,6 +211,8 @@ def said_in(entry: Recorded) -> str:
         if known:
             verdict = f" ({entry.verdict})" if entry.verdict else ""
             return describe_offset(offset) + verdict
+    if entry.kind is EntryKind.DECISION and "question" in entry.details:
+        return f"{entry.details['question']} {entry.verdict}"
     return entry.verdict or str(entry.details.get("request", ""))
 
 

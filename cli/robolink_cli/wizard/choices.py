@@ -6,9 +6,11 @@ from typing import Final
 
 from robolink.errors import DeclinedError
 from robolink.messages import tr
+from robolink.model import AnsweredBy
 from robolink.runner import POLL_S, Question
 from robolink_cli.console.language import other_language, speak_from_now
 from robolink_cli.prompts.present import AskingDesk
+from robolink_cli.prompts.questions import keep_answer
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +79,9 @@ def choose(
     Raises:
         DeclinedError: The person leaves.
     """
-    return _index(_answered(desk, question, subject, watch), subject)
+    index = _index(_answered(desk, question, subject, watch), subject)
+    keep_answer(question, subject.options[index], AnsweredBy.PERSON)
+    return index
 
 
 def _answered(

@@ -91,6 +91,8 @@ class CalibrationResult:
         offset: The proposed offset: measured components, and the others as they were kept.
         measured: Names of the components that the measurement determines.
         kept: Names of the components that were not measured and are proposed unchanged.
+        changed: Names of the components of which only a change was measured: what it was added to
+            never was, so that nothing is stated of the component itself.
         reference_point_mm: Where the reference point lies in the base, (x, y) or (x, y, z);
             empty where a method has none.
         sigma_gain: Standard deviation of each measured length as a multiple of the standard
@@ -158,6 +160,7 @@ class CalibrationResult:
     sources: tuple[ErrorSource, ...] | None = None
     marks_mm: tuple[tuple[float, float], ...] = ()
     accuracy: Accuracy | None = None
+    changed: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Widen what is narrower than anybody can read."""
@@ -170,6 +173,11 @@ class CalibrationResult:
     def details(self) -> dict[str, object]:
         """Return what the method tells besides, plain JSON; nothing for most."""
         return {}
+
+    @property
+    def found(self) -> tuple[str, ...]:
+        """Names of the components that are proposed anew: measured themselves, or their change."""
+        return (*self.measured, *self.changed)
 
     @property
     def interval95(self) -> dict[str, tuple[float, float]]:

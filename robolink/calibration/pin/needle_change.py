@@ -7,16 +7,18 @@ upside down has R' d in place of Rz(-U) d (docs/reference/evidence.md 3).
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from robolink.calibration.core.dispersion import Dispersion, require_positive
 from robolink.calibration.core.pose_checks import check_poses, keep_unmeasured, require_finite
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.rotations import rotation_of
+from robolink.calibration.core.statistics import NORMAL_95
 from robolink.calibration.flange_checks import require_flange_in_base
 from robolink.calibration.flange_plane import FlangePlane
 from robolink.calibration.pin.needle_chain import NeedleChain, NeedleLimits
 from robolink.calibration.pin.one_touch import one_touch_sources
+from robolink.calibration.pin.stored_z import StoredZ
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
@@ -39,11 +41,79 @@ class NeedleChangeResult(CalibrationResult):
         shift_mm: By how much the tip moved, base axes.
         chain: The chain with this change.
         full_calibration_due: Whether the chain asks for a full calibration now.
+        stored_z: What is known of the Z that the change is added to; ``None`` where nobody looked.
+        change_z_mm: Change of Z by the touch, new minus stored; ``None`` without a height.
+        change_z_half95_mm: Half its 95 % interval: that of two touches.
     """
 
     shift_mm: Point
     chain: NeedleChain
     full_calibration_due: bool
+    stored_z: StoredZ | None = None
+    change_z_mm: float | None = None
+    change_z_half95_mm: float | None = None
+
+    def details(self) -> dict[str, object]:
+        """Return the change of Z by name, and what is known of what it is added to."""
+        if self.stored_z is None:
+            return {}
+        return {
+            "change_z_mm": self.change_z_mm,
+            "change_z_half95_mm": self.change_z_half95_mm,
+            "stored_z": self.stored_z.as_json(),
+        }
+
+    def added_to(self, stored: StoredZ, *, touch_sigma_mm: float) -> "NeedleChangeResult":
+        """Return the same with Z named for what it is: a change of the stored one.
+
+        Where an earlier measurement is on record, Z has an interval of its own: that of then, with
+        two touches more, since the touches between cancel (:meth:`NeedleChain.after`).
+
+        Args:
+            stored: What is known of the stored Z.
+            touch_sigma_mm: Standard deviation of one coordinate of one touch.
+
+        Example:
+            >>> from robolink import Pose, ToolOffset
+            >>> from robolink.calibration import NeedleChain, StoredZ, solve_needle_change
+            >>> found = solve_needle_change(
+            ...     Pose(300, 100, -60, 0),
+            ...     before_mm=(312.0, 96.5, -80.0),
+            ...     after_mm=(312.3, 96.3, -79.6),
+            ...     stored=ToolOffset(12, -3.5, -20),
+            ...     chain=NeedleChain(sigma_mm=0.02),
+            ...     sigma_mm=0.01,
+            ... ).added_to(StoredZ(-20.0), touch_sigma_mm=0.01)
+            >>> found.measured, found.changed, round(found.change_z_mm, 3)
+            (('x_mm', 'y_mm'), ('z_mm',), 0.4)
+        """
+        if "z_mm" not in self.measured:
+            return self
+        at = self.measured.index("z_mm")
+        u_mm = math.sqrt(2) * touch_sigma_mm
+        named = replace(
+            self,
+            stored_z=stored,
+            change_z_mm=self.offset.z_mm - stored.value_mm,
+            change_z_half95_mm=NORMAL_95 * u_mm,
+        )
+        if stored.half95_mm is None:
+            return replace(
+                named,
+                measured=self.measured[:at],
+                changed=("z_mm",),
+                covariance=tuple(row[:at] for row in self.covariance[:at]),
+                half_width95=self.half_width95[:at],
+                rank=at,
+            )
+        u_z_mm = math.hypot(stored.half95_mm / NORMAL_95, u_mm)
+        rows = [list(row) for row in self.covariance]
+        rows[at][at] = u_z_mm**2
+        return replace(
+            named,
+            covariance=tuple(map(tuple, rows)),
+            half_width95=(*self.half_width95[:at], NORMAL_95 * u_z_mm),
+        )
 
 
 def solve_needle_change(

@@ -9,6 +9,7 @@ from typing import Final
 
 from robolink.calibration.core.evidence import RunOrder
 from robolink.messages import tr
+from robolink.ways import Way, way
 
 
 def doubt_sentence(code: str) -> str:
@@ -146,6 +147,11 @@ _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
     "tested_at_small_angle": lambda: tr(
         "The turn test turned the tool by less than 90 degrees from where it was measured, so it "
         "shows little."
+    ),
+    "axes_not_confirmed": lambda: tr(
+        "Nobody confirmed that all axes were held by their motors (not SFREE) when these poses "
+        "were taught. To confirm it: {option}.",
+        option=way(Way.AXES_HELD),
     ),
     "length_changed": lambda: tr("The length of the tool has changed."),
     "length_not_observable": lambda: tr(

@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING
 
 from robolink.messages import declared
+from robolink.methods.board.next_steps import board_steps
 from robolink.methods.board.parameters import BoardParameters
 from robolink.methods.declaration.look_parameters import PLACE, UNMEASURED_Z, camera_at
 from robolink.methods.declaration.method import Method, Needs
@@ -45,4 +46,5 @@ METHOD = Method(
     source=_source,
     unmeasured_z=UNMEASURED_Z,
     proof=_proof,
+    next_steps=board_steps,
 )

@@ -221,6 +221,25 @@ class Former:
     usual: bool = False
 
 
+@dataclass(frozen=True, slots=True)
+class NextStep:
+    """What a person does next with a tool that was measured and written.
+
+    Attributes:
+        step: Its name for programs.
+        sentence: What it is for, a sentence.
+        command: The command that does it, after ``robolink`` and the name of the cell.
+    """
+
+    step: str
+    sentence: str
+    command: str
+
+    def as_json(self) -> dict[str, object]:
+        """Return it as plain JSON."""
+        return {"step": self.step, "sentence": self.sentence, "command": f"robolink {self.command}"}
+
+
 P = TypeVar("P", bound=MethodParameters)
 
 
@@ -247,6 +266,8 @@ class Method(Generic[P]):
         changes_left: Tells from the record after how many more changes a full calibration is due,
             0 for now; it returns ``None`` where the record does not say it, and is ``None`` where
             each change is a full calibration.
+        next_steps: Tells what a person does next with the tool of that number, once it is
+            written; ``None`` where nothing follows from the method.
     """
 
     name: str
@@ -264,6 +285,7 @@ class Method(Generic[P]):
     formerly: tuple[Former, ...] = ()
     proof: "Callable[[], type[KeptProof]] | None" = None
     changes_left: "Callable[[P, ToolHistory], int | None] | None" = None
+    next_steps: "Callable[[int], tuple[NextStep, ...]] | None" = None
 
     @property
     def only_z(self) -> bool:

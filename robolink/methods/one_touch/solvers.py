@@ -9,12 +9,13 @@ from robolink.calibration import CalibrationResult, NeedleLimits
 from robolink.errors import CalibrationError, ConfigError
 from robolink.messages import tr
 from robolink.methods.one_touch.last_touch import LastTouch, find_last_touch
+from robolink.methods.one_touch.stored_z import find_stored_z
 from robolink.model import Controller, Pose, ToolOffset
 from robolink.timing import local_label
 from robolink.ways import Way, way
 
 if TYPE_CHECKING:
-    from robolink.calibration import NeedleChangeResult, Pin
+    from robolink.calibration import NeedleChangeResult, Pin, StoredZ
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +26,7 @@ class Difference:
         last: The last touch.
         sigma_mm: Standard deviation of one coordinate of one touch.
         limits: When a shift is not believed, and when a full calibration is due.
+        stored_z: What is known of the stored Z; ``None`` for nothing on record.
     """
 
     upright: ClassVar[bool] = True
@@ -33,6 +35,7 @@ class Difference:
     last: LastTouch
     sigma_mm: float
     limits: "NeedleLimits"
+    stored_z: "StoredZ | None" = None
 
     @property
     def place_mm(self) -> tuple[float, float, float]:
@@ -52,6 +55,7 @@ class Difference:
     def solve(self, flange: Sequence[Pose], stored: ToolOffset | None) -> CalibrationResult:
         """Solve exactly one touch; see :class:`~robolink.procedures.PoseMethod`."""
         from robolink.calibration import (  # numpy, which a look does without
+            StoredZ,
             pin_touched,
             solve_needle_change,
         )
@@ -71,7 +75,8 @@ class Difference:
             # The old tip is where its own touch left it; nobody touches it again.
             shared_touch=True,
         )
-        result = replace(found, method="one-touch")
+        known = self.stored_z or StoredZ(old.z_mm)
+        result = replace(found, method="one-touch").added_to(known, touch_sigma_mm=self.sigma_mm)
         if result.full_calibration_due or not self._one_more(result):
             return result
         return replace(result, warnings=("full_calibration_due",), full_calibration_due=True)
@@ -194,7 +199,8 @@ def difference_from_last(
                 sigma=way(Way.SIGMA),
             ),
         )
-    return Difference(last, sigma, limits)
+    known = find_stored_z(controller, tool, last.value)
+    return Difference(last, sigma, limits, known)
 
 
 def one_of(poses: Sequence[Pose]) -> Pose:

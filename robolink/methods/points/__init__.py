@@ -52,6 +52,7 @@ def _source(parameters: PointsParameters, site: Site) -> "TipSource":
         read,
         _solver(parameters, site),
         taught_tool=parameters.taught_tool,
+        axes_held=parameters.axes_held,
         plausible_mm=site.max_change_mm,
         sentence=tr(
             "points {names} taught on the pendant with tool {tool}",
@@ -73,6 +74,7 @@ def _from_file(
         lambda: read_poses(path, choices).poses,
         _solver(parameters, site),
         taught_tool=parameters.taught_tool,
+        axes_held=parameters.axes_held,
         plausible_mm=site.max_change_mm,
         sentence=tr(
             "poses of the file {path}, taught with tool {tool}",

@@ -32,6 +32,16 @@ class PointsParameters(MethodParameters):
             )
         ),
     ] = None
+    axes_held: Annotated[
+        bool,
+        Option(moves=False),
+        Help(
+            declared(
+                "All axes were held by their motors, none let go (SFREE), when the points were "
+                "taught; without it a person is asked."
+            )
+        ),
+    ] = False
 
     def problems(self, check: Check) -> Iterator[Problem]:
         """Check that there are as many points as the solver takes."""

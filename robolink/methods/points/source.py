@@ -22,10 +22,10 @@ from robolink.calibration import (
 )
 from robolink.errors import CalibrationError, RobolinkError, UndefinedToolError
 from robolink.messages import joined, tr
+from robolink.methods.points.axes_held import were_held
 from robolink.methods.two_pose.source import TwoTouches
 from robolink.model import Controller, PointReader, Pose, ToolOffset
 from robolink.procedures import MeasurementContext, PoseMethod, require_one_height
-from robolink.runner import Confirm, Procedure
 from robolink.ways import Way, way
 
 
@@ -77,6 +77,8 @@ class PointsSource:
         sentence: Where they come from, for a report.
         in_mm: Whether they are in mm for certain, as the controller's own points are; others are
             doubted where the stored tool, or where the robot is, speaks for metres or inches.
+        axes_held: Whether it was stated that all axes were held by their motors when they were
+            taught. Otherwise a person is asked once; where nobody is there, a note says so.
 
     Example:
         >>> from robolink.methods import PointsSource
@@ -98,6 +100,7 @@ class PointsSource:
         plausible_mm: float = 2.0,
         sentence: str = "",
         in_mm: bool = False,
+        axes_held: bool = False,
     ) -> None:
         self._poses = poses
         self._method = TwoTouches() if method is None else method
@@ -106,6 +109,7 @@ class PointsSource:
         self._plausible_mm = plausible_mm
         self._sentence = sentence
         self._in_mm = in_mm
+        self._axes_held = axes_held
         self.found: PosesFound | None = None
 
     @property
@@ -119,27 +123,38 @@ class PointsSource:
         """Solve the poses; see :class:`~robolink.procedures.TipSource`.
 
         Raises:
-            CalibrationError: The poses give no trustworthy result; its code says why.
+            CalibrationError: The poses give no trustworthy result; its code says why, ``axes_free``
+                where they were taught with axes let go.
             ConfigError: Too many poses for the method.
             UndefinedToolError: The tool with which they were taught has no definition.
         """
+        held = were_held(context, stated=self._axes_held)
         try:
-            self.found = self.find(context.controller, tool, stored)
+            self.found = self.find(context.controller, tool, stored, axes_held=held)
         except _UnknownTool as unknown:
             self._taught_tool = _asked(context, unknown)
             self._said = True
-            self.found = self.find(context.controller, tool, stored)
+            self.found = self.find(context.controller, tool, stored, axes_held=held)
         return self.found.result
 
-    def find(self, controller: Controller, tool: int, stored: ToolOffset | None) -> PosesFound:
+    def find(
+        self,
+        controller: Controller,
+        tool: int,
+        stored: ToolOffset | None,
+        *,
+        axes_held: bool | None = None,
+    ) -> PosesFound:
         """Solve the poses and ask which tool they fit. Moves and writes nothing.
 
         Nobody saw these touches being made: the result says so (docs/reference/evidence.md 1).
+        Nor does a pose show whether it was taught with its axes held (docs/reference/epson.md 3.2).
 
         Args:
             controller: The controller, connected; its tools are read.
             tool: Number of the tool.
             stored: The offset stored now, ``None`` where the tool is not defined.
+            axes_held: Whether somebody said that all axes were held; ``None`` for what was stated.
 
         Raises:
             CalibrationError: As :meth:`measure`; ``touch_heights_differ``, ``suspect_units`` among
@@ -156,7 +171,9 @@ class PointsSource:
             'touches_not_witnessed'
         """
         found = self._found(controller, tool, stored)
-        notes = (*found.result.notes, "touches_not_witnessed")
+        held = self._axes_held if axes_held is None else axes_held
+        open_question = () if held else ("axes_not_confirmed",)
+        notes = (*found.result.notes, *open_question, "touches_not_witnessed")
         return replace(found, result=replace(found.result, notes=notes))
 
     def _found(self, controller: Controller, tool: int, stored: ToolOffset | None) -> PosesFound:
@@ -266,24 +283,17 @@ def _asked(context: MeasurementContext, unknown: _UnknownTool) -> int:
     Raises:
         CalibrationError: ``taught_tool_unknown``: nobody knows it, or nobody can be asked.
     """
-
-    def steps() -> Procedure[int | None]:
-        for tool in unknown.tools:
-            question = tr(
-                "The poses fit tools {tools} alike, and the values would be {apart:.3f} mm apart. "
-                "Was tool {tool} selected when they were taken (0: the flange)?",
-                tools=", ".join(map(str, sorted(unknown.tools))),
-                apart=unknown.apart_mm,
-                tool=tool,
-            )
-            if (yield Confirm(question)):
-                return tool
-        return None
-
-    found = context.run(steps())
-    if found is None:
-        raise unknown
-    return found
+    for tool in unknown.tools:
+        question = tr(
+            "The poses fit tools {tools} alike, and the values would be {apart:.3f} mm apart. "
+            "Was tool {tool} selected when they were taken (0: the flange)?",
+            tools=", ".join(map(str, sorted(unknown.tools))),
+            apart=unknown.apart_mm,
+            tool=tool,
+        )
+        if context.ask_once(question):
+            return tool
+    raise unknown
 
 
 def _live_pose(controller: Controller) -> Pose | None:

@@ -117,6 +117,14 @@ class OutcomeLog(Protocol):
             ConfigError: It cannot be recorded.
         """
 
+    def answered(self, entry: NewEntry) -> None:
+        """Keep an answer (:func:`answer_entry`) for the change that it may lead to.
+
+        It goes on record in the transaction in which that begins, under its id: with the first
+        entry of a tool change, of a write, of a selection or of the place of a station. An answer
+        that nothing follows is kept nowhere: nothing rests on it.
+        """
+
     def open_markers(self) -> tuple[Marker, ...]:
         """Return what is unsettled, oldest first."""
 

@@ -32,6 +32,20 @@ def interval_sentences(fit: CalibrationResult) -> tuple[str, ...]:
     notes = tuple(map(doubt_sentence, fit.notes))
     if not fit.half_width95:
         return notes
+    if "z_mm" in fit.changed:
+        return (change_of_z(), *_intervals(fit), *notes)
+    return (*_intervals(fit), *notes)
+
+
+def change_of_z() -> str:
+    """Return what a change of Z does not say."""
+    return tr(
+        "Z is a change: only by how much the new tip is longer or shorter was measured. The stored "
+        "Z was never measured, so nothing is stated of how long the tip is."
+    )
+
+
+def _intervals(fit: CalibrationResult) -> tuple[str, ...]:
     said = [_what_it_rests_on(fit)]
     if sum(name.endswith("_mm") for name in fit.measured) > 1:
         said.append(
@@ -40,7 +54,7 @@ def interval_sentences(fit: CalibrationResult) -> tuple[str, ...]:
                 "together."
             )
         )
-    return (*said, *notes)
+    return tuple(said)
 
 
 def _what_it_rests_on(fit: CalibrationResult) -> str:

@@ -92,4 +92,6 @@ def _components(report: Report) -> Iterator[OffsetComponent]:
         change = None
         if old is not None and new is not None:
             change = angle_difference_deg(new, old) if name.endswith("deg") else new - old
+        if fit is not None and name in fit.changed:
+            axis = tr("{axis} (only its change is known)", axis=axis)
         yield OffsetComponent(axis, old, new, change, halves.get(name), wider.get(name))

@@ -142,11 +142,13 @@ def restore(
         if dry_run:
             context.show_requests(requests)
             return
-        if not (context.json or plan.empty):
-            restoration.show()
+        if not plan.empty:
+            if not context.json:
+                restoration.show()
             agree(
                 tr("Write these values to the controller? 'robolink undo' takes them back."),
                 yes=yes,
+                asks=not context.json,
             )
         payload = restoration.run()
     context.emit("restore", {"file": str(file), **payload}, restoration.show_end)

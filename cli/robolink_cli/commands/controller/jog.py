@@ -1,13 +1,15 @@
 """jog: small steps, in low power, inside a box."""
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import click
+from click.core import ParameterSource
 
 from robolink.errors import ConfigError
 from robolink.messages import declared, tr
 from robolink_cli.access.cell import with_cell_limits
-from robolink_cli.console.numbers import NumberInside
+from robolink_cli.console.numbers import DECIMAL, NumberInside
 from robolink_cli.console.tolerance import may_be_guided
 from robolink_cli.options.consent import dry_run_option, plain_option, yes_option
 from robolink_cli.session.context import CliContext, controller_options
@@ -18,7 +20,11 @@ from robolink_cli.session.opening import open_controller
 if TYPE_CHECKING:
     from robolink.model import Pose
 
-_CELL_KEYS: Final = {"speed_mm_s": "speed_mm_s", "box_mm": "jog_box_mm"}
+_CELL_KEYS: Final = {
+    "speed_mm_s": "speed_mm_s",
+    "box_mm": "jog_box_mm",
+    "lift_mm": "lift_mm",
+}
 """Option to key in the cell file: a box for calibrating is too wide for jogging."""
 
 
@@ -41,6 +47,33 @@ _CELL_KEYS: Final = {"speed_mm_s": "speed_mm_s", "box_mm": "jog_box_mm"}
     help="How far from the start the tool may be jogged, in every direction.",
 )
 @click.option(
+    "--turn",
+    "turn_deg",
+    type=DECIMAL,
+    metavar="DEG",
+    help=declared(
+        "Turn U by so much, also by more than 5 degrees: lift first, check the whole way round, "
+        "turn, and stay lifted."
+    ),
+)
+@click.option(
+    "--lift",
+    "lift_mm",
+    type=NumberInside(1, 100),
+    default=10.0,
+    show_default=True,
+    metavar="MM",
+    help=declared("How far the tool is lifted before it turns."),
+)
+@click.option(
+    "--tip",
+    type=click.IntRange(1, 15),
+    metavar="N",
+    help=declared(
+        "For a turn with tool 0: the tool whose tip swings round; without it all that are defined."
+    ),
+)
+@click.option(
     "--keys",
     is_flag=True,
     help=declared("Jog by single keys on a full screen; on a terminal only."),
@@ -54,6 +87,9 @@ def jog(
     steps: tuple[str, ...],
     speed_mm_s: float,
     box_mm: float,
+    turn_deg: float | None,
+    lift_mm: float,
+    tip: int | None,
     keys: bool,
     dry_run: bool,
     yes: bool,
@@ -62,6 +98,9 @@ def jog(
 
     Each step is one move in Power Low of at most 5 mm or 5 degrees. Negative numbers need no
     quoting: write x-0.1.
+
+    With --turn 180 it lifts the tool, turns U by that, and stays lifted. With a tool selected it
+    turns about the tip and the flange swings; with tool 0 the tip swings.
 
     With --keys each key press is one step: arrows X and Y, PageUp and PageDown Z, Home and End U,
     or the same places of the keypad; + and - the step size (0.01, 0.1, 0.5, 1, 5). What is
@@ -75,13 +114,17 @@ def jog(
 
     if keys:
         _require_keys(steps, dry_run=dry_run)
+    _require_one(steps, turn_deg, keys=keys)
     if steps:
         parse_steps(" ".join(steps))  # a slip of the fingers is told before anything is asked
-    typed = {"speed_mm_s": speed_mm_s, "box_mm": box_mm}
-    speed_mm_s, box_mm = with_cell_limits(context.cell, typed, _CELL_KEYS).values()
+    typed = {"speed_mm_s": speed_mm_s, "box_mm": box_mm, "lift_mm": lift_mm}
+    speed_mm_s, box_mm, lift_mm = with_cell_limits(context.cell, typed, _CELL_KEYS).values()
     line = " ".join(steps)
 
     def work() -> "Pose | None":
+        if turn_deg is not None:
+            turning = _Turning(turn_deg, lift_mm, tip, speed_mm_s=speed_mm_s, box_mm=box_mm)
+            return turning.done(context, dry_run=dry_run, yes=yes)
         return _jogged(context, line, speed_mm_s, box_mm, dry_run=dry_run, yes=yes)
 
     pose = guided_if_alone(context, work, job=tr("Jog"), alone=keys)
@@ -117,6 +160,72 @@ def _jogged(
             if steps:
                 return jog_by_steps(controller, steps, speed_mm_s, box_mm)
             return jog_by_hand(controller, speed_mm_s, box_mm)
+
+
+@dataclass(frozen=True, slots=True)
+class _Turning:
+    """A turn in the air, as it was asked for."""
+
+    turn_deg: float
+    lift_mm: float
+    tip: int | None
+    speed_mm_s: float
+    box_mm: float
+
+    def done(self, context: CliContext, *, dry_run: bool, yes: bool) -> "Pose | None":
+        """Carry it out, and return where the tool is then; ``None`` where it was only shown."""
+        from robolink_cli.prompts.jogging import plan_turn, require_turn, turn
+
+        how = {"lift_mm": self.lift_mm, "speed_mm_s": self.speed_mm_s, "box_mm": self.box_mm}
+        with open_controller(context) as controller:
+
+            def require_inside() -> None:
+                require_turn(
+                    controller,
+                    self.turn_deg,
+                    lift_mm=self.lift_mm,
+                    box_mm=self.box_mm,
+                    tip=self.tip,
+                )
+
+            require_inside()
+            if dry_run:
+                context.show_requests(plan_turn(controller, self.turn_deg, **how))
+                return None
+            purpose = tr(
+                "with tool {tool}: up by {lift:g} mm, then U by {turn:+g} degrees, and stay there",
+                tool=controller.tools.selected(),
+                lift=self.lift_mm,
+                turn=self.turn_deg,
+            )
+            question = motion_question(
+                controller, purpose, speed_mm_s=self.speed_mm_s, box_mm=self.box_mm
+            )
+            agree_to_motion(question, yes=yes)
+            with controller.preserved(tr("jog")):
+                require_inside()  # a person may have moved it while the question was open
+                return turn(controller, self.turn_deg, **how)
+
+
+def _require_one(steps: tuple[str, ...], turn_deg: float | None, *, keys: bool) -> None:
+    """Refuse a turn beside steps, and what belongs to a turn without one.
+
+    Raises:
+        ConfigError: Names what does not go together.
+    """
+    if turn_deg is not None and (steps or keys):
+        raise ConfigError(
+            tr("A turn is a movement of its own."),
+            remedy=tr("Give --turn alone; then the steps in a second command."),
+        )
+    if turn_deg is not None:
+        return
+    given = click.get_current_context().get_parameter_source
+    for name in ("lift_mm", "tip"):
+        if given(name) is ParameterSource.COMMANDLINE:
+            raise ConfigError(
+                tr("--lift and --tip belong to a turn."), remedy=tr("Give them with --turn.")
+            )
 
 
 def _require_keys(steps: tuple[str, ...], *, dry_run: bool) -> None:

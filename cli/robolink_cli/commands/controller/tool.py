@@ -244,13 +244,14 @@ class _Setting:
             allowed=allowed_by(context.cell),
             accepted=accepted,
         )
-        if not (asked or context.json):
+        if not asked:
             agree(
                 tr(
                     "Write these values to tool {tool}? 'robolink undo' takes them back.",
                     tool=number,
                 ),
                 yes=yes,
+                asks=not context.json,
             )
         keep_first_backup(controller, tell=note)
 
@@ -306,8 +307,7 @@ def clear(
         controller.tools.preview_clear(number, then_select=then_select)
         if outcomes.signature.role == PersonRole.OPERATOR:
             require_engineer(outcomes, act)
-        if not context.json:
-            agree(_clear_question(number, then_select), yes=yes)
+        agree(_clear_question(number, then_select), yes=yes, asks=not context.json)
         if before is not None:
             require_engineer(outcomes, act)
         keep_first_backup(controller, tell=note)
@@ -347,10 +347,11 @@ def select(context: CliContext, number: int, dry_run: bool, yes: bool) -> None:
             requests = controller.tools.preview_select(number)
             context.show_requests(requests)
             return
-        if not context.json and before != number:
+        if before != number:
             agree(
                 tr("Select tool {number} in place of {before}?", number=number, before=before),
                 yes=yes,
+                asks=not context.json,
             )
         controller.tools.select(number)
     payload: dict[str, object] = {"before": before, "selected_tool": number}

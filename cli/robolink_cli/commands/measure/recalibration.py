@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from robolink.backup import keep_first_backup
 from robolink.errors import DeclinedError
 from robolink.messages import tr
-from robolink.model import Controller
+from robolink.model import AnsweredBy, Controller
 from robolink.nozzle_change import ChangeReport, preview
 from robolink.recipe import Answers, LoadedRecipe, RecipeRun, require_answers
 from robolink.transaction import Order
@@ -14,7 +14,7 @@ from robolink_cli.commands.measure.recipe_events import EventStream, Progress
 from robolink_cli.console.render import note, say
 from robolink_cli.prompts.operator import operator_at
 from robolink_cli.prompts.present import present_desk
-from robolink_cli.prompts.questions import asked, on_terminal
+from robolink_cli.prompts.questions import asked, keep_answer, on_terminal
 from robolink_cli.session.check_before_start import check_before_start, name_the_needle
 from robolink_cli.session.context import CliContext
 from robolink_cli.session.motion_consent import agree_to_motion, motion_question
@@ -144,8 +144,11 @@ class Recalibration:
         """
         moves = run.plan.moves
         question = None if not moves or self._at_desk else self._question(controller, run)
-        if run.takes_reference and not self._take_reference:
-            self._explain_reference()
+        if run.takes_reference:
+            if self._take_reference:
+                keep_answer(_which_is_mounted(), True, AnsweredBy.OPTION)
+            else:
+                self._explain_reference()
         keep_first_backup(controller, tell=note)
         if not moves:
             self._require_writer(run)
@@ -199,7 +202,7 @@ class Recalibration:
                     "Mount the nozzle that the points were taught with, then give --reference."
                 ),
             )
-        if not asked(tr("Is the nozzle mounted that the points were taught with?")):
+        if not asked(_which_is_mounted()):
             raise DeclinedError(
                 tr("The reference was not taken."),
                 remedy=tr("Mount that nozzle, or restore the tool value that fits this one."),
@@ -268,6 +271,10 @@ class Recalibration:
 
 def _payload(report: ChangeReport) -> dict[str, object]:
     return {"change": report.change, "tools": [report_payload(one) for one in report.tools]}
+
+
+def _which_is_mounted() -> str:
+    return tr("Is the nozzle mounted that the points were taught with?")
 
 
 def _nothing(_payload: dict[str, object]) -> None:

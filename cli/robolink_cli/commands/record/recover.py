@@ -4,6 +4,7 @@ import click
 
 from robolink.errors import ConfigError
 from robolink.messages import declared, tr
+from robolink.model import AnsweredBy
 from robolink.transaction import Recovery
 from robolink_cli.commands.measure.choosing import context_at_desk
 from robolink_cli.commands.record.recovery_choice import BLOCKED, NEW, OLD, chosen_at_desk
@@ -87,6 +88,7 @@ def recover(
                 controller,
                 keep=keep or word == NEW,
                 word=yes or word in (OLD, NEW),
+                by=AnsweredBy.YES if yes else AnsweredBy.OPTION if choose else None,
                 tests=word == NEW and not dry_run and _somebody_there(),
             )
             if word == BLOCKED:
@@ -109,7 +111,8 @@ def recover(
 def resolve(context: CliContext, dry_run: bool, yes: bool, forget: bool) -> int:
     """Do what 'robolink recover' does; without a terminal the command itself is your answer."""
     with open_controller(context, quiet=True, changes=not dry_run) as controller:
-        guide = Guide(controller, keep=False, word=yes or not on_terminal())
+        by = AnsweredBy.YES if yes else AnsweredBy.COMMAND
+        guide = Guide(controller, keep=False, word=yes or not on_terminal(), by=by)
         done, forgotten = _gone_through(guide, forget=forget, yes=yes, dry_run=dry_run)
         payload = guide.payload(done)
     document: dict[str, object] = {

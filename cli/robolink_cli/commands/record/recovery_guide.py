@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Final
 
 from robolink.errors import ControllerError
 from robolink.messages import declared, spoken, tr
-from robolink.model import Controller, Finding, MarkerKind, Pose
+from robolink.model import AnsweredBy, Controller, Finding, MarkerKind, Pose
 from robolink.timing import local_label
 from robolink.transaction import Recovery, Settler, look, recover
 from robolink_cli.console.render import json_is_on, note, say
 from robolink_cli.prompts.operator import operator_at
-from robolink_cli.prompts.questions import agree, asked, on_terminal
+from robolink_cli.prompts.questions import agree, asked, keep_answer, on_terminal
 from robolink_cli.session.check_before_start import agree_to_procedure
 from robolink_cli.views.documents import finding_payload, pose_payload
 
@@ -34,17 +34,24 @@ class Guide:
         controller: The controller, connected.
         keep: Whether new values that nobody verified stay.
         word: Whether a person's word is given beforehand for what reading cannot settle.
+        by: How that was given, for the record; ``None`` where it is on record already.
         tests: Whether a new value is kept only after its turn test, where one can be made: a
             person is at the robot who chose it.
     """
 
     def __init__(
-        self, controller: Controller, *, keep: bool, word: bool, tests: bool = False
+        self,
+        controller: Controller,
+        *,
+        keep: bool,
+        word: bool,
+        by: AnsweredBy | None = None,
+        tests: bool = False,
     ) -> None:
         self._controller = controller
         self._tests = tests
         self._keep = keep
-        self._word = word
+        self._word, self._by = word, by
         self._where: Pose | None = None
         self.declined = False
 
@@ -143,11 +150,14 @@ class Guide:
         _show(finding)
         if finding.marker.kind is MarkerKind.MOVE:
             self._show_where()
+        question = tr("Is that right, and may work go on?")
         if self._word:
+            if self._by is not None:
+                keep_answer(question, True, self._by)
             return True
         if json_is_on() or not on_terminal():
             return False
-        agreed = asked(tr("Is that right, and may work go on?"))
+        agreed = asked(question)
         self.declined = self.declined or not agreed
         return agreed
 

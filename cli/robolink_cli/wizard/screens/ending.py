@@ -12,6 +12,7 @@ from robolink.messages import joined, tr
 from robolink.model import describe_offset, describe_standing
 from robolink.nozzle_change import ChangeReport, ToolReport
 from robolink.standing import UNTOUCHED, standing_after
+from robolink_cli.views.calibration import next_lines
 from robolink_cli.wizard.check_list import CheckSubject
 from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.happenings import WizardCommand
@@ -39,6 +40,8 @@ def done_lines(state: WizardState, report: ChangeReport) -> list[str]:
         )
         lines.append(back)
         lines.append(tr("Run the first part slowly and look at it."))
+    for one in report.tools:
+        lines += next_lines(one, state.header.cell)
     return lines
 
 

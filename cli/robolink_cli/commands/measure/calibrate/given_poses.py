@@ -152,6 +152,7 @@ def _calibrate(
             plausible_mm=frame.criteria.limit_mm,
             sentence=source.sentence,
             in_mm=source.kind == "points",
+            axes_held=source.axes_held,
         )
         listener = _PosesListener(
             draft, frame, given, controller=controller, taught_tool=source.taught_tool or 0
@@ -184,7 +185,7 @@ def _carry_out(
     attended = not frame.yes and on_terminal()
     change = NozzleChange(
         controller,
-        ChangePlan((one,), ask_before_write=False, attended=attended),
+        ChangePlan((one,), ask_before_write=False, attended=attended, agreed_by=None),
         operator=terminal(),
         listener=listener,
         earlier=partial(earlier_corrections, controller),
@@ -243,19 +244,17 @@ def _agree_to_write(tool: int, *, yes: bool) -> None:
 
     Nobody watched these poses being taken, so the command alone is not the consent.
     """
-    if yes:
-        return
-    if not on_terminal():
-        raise DeclinedError(
-            tr("Tool {tool} would be written, but there is nobody to ask.", tool=tool),
-            remedy=tr("Nothing was written. Add --yes, or run it on a terminal."),
-        )
     question = tr(
         "Nobody saw these touches, and the new value is not tested. Write it to tool {tool} "
         "all the same? 'robolink undo' takes it back.",
         tool=tool,
     )
-    agree(question, yes=False)
+    if not yes and not on_terminal():
+        raise DeclinedError(
+            tr("Tool {tool} would be written, but there is nobody to ask.", tool=tool),
+            remedy=tr("Nothing was written. Add --yes, or run it on a terminal."),
+        )
+    agree(question, yes=yes)
 
 
 def _show_end(report: ToolReport) -> None:

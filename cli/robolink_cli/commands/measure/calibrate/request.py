@@ -88,10 +88,16 @@ class CalibrationRequest:
 
     def plan(self, source: "TipSource", controller: "Controller") -> "ChangePlan":
         """Return what is to be done with the measurements of ``source``."""
+        from robolink.model import AnsweredBy
         from robolink.nozzle_change import ChangePlan
 
         one = self.tool_plan(source, controller, verify=self.verify)
-        return ChangePlan((one,), limits=self.limits, ask_before_write=not self.yes)
+        return ChangePlan(
+            (one,),
+            limits=self.limits,
+            ask_before_write=not self.yes,
+            agreed_by=AnsweredBy.YES,
+        )
 
     def _stated(self) -> "Station | None":
         """Return the station as the cell file has it, if it does."""

@@ -7,7 +7,7 @@ the budget with a half width: stated for the cell, learnt from its record, or th
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Final, Literal, Self
 
 from robolink.calibration.core.budget import UncertaintyBudget
@@ -99,6 +99,10 @@ class ErrorSource:
             for line in range(count)
         )
         return cls(row, lines, turning)
+
+    def of_first(self, count: int) -> Self:
+        """Return the same source for the first measured components alone."""
+        return replace(self, gain=self.gain[:count])
 
 
 @dataclass(frozen=True, slots=True)

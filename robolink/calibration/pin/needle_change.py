@@ -13,7 +13,7 @@ from robolink.calibration.core.dispersion import Dispersion, require_positive
 from robolink.calibration.core.pose_checks import check_poses, keep_unmeasured, require_finite
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.rotations import rotation_of
-from robolink.calibration.core.statistics import NORMAL_95
+from robolink.calibration.core.statistics import NORMAL_95, chi_square_quantile
 from robolink.calibration.flange_checks import require_flange_in_base
 from robolink.calibration.flange_plane import FlangePlane
 from robolink.calibration.pin.needle_chain import NeedleChain, NeedleLimits
@@ -104,6 +104,10 @@ class NeedleChangeResult(CalibrationResult):
                 changed=("z_mm",),
                 covariance=tuple(row[:at] for row in self.covariance[:at]),
                 half_width95=self.half_width95[:at],
+                region95_radius_mm=_region_mm(max(self.half_width95[:at]), at),
+                sources=None
+                if self.sources is None
+                else tuple(source.of_first(at) for source in self.sources),
                 rank=at,
             )
         u_z_mm = math.hypot(stored.half95_mm / NORMAL_95, u_mm)
@@ -113,7 +117,15 @@ class NeedleChangeResult(CalibrationResult):
             named,
             covariance=tuple(map(tuple, rows)),
             half_width95=(*self.half_width95[:at], NORMAL_95 * u_z_mm),
+            region95_radius_mm=_region_mm(
+                max(*self.half_width95[:at], NORMAL_95 * u_z_mm), len(self.measured)
+            ),
         )
+
+
+def _region_mm(half95_mm: float, lengths: int) -> float:
+    """Return the radius of the region of lengths of which the worst is known so well alone."""
+    return half95_mm / NORMAL_95 * math.sqrt(chi_square_quantile(0.95, lengths))
 
 
 def solve_needle_change(

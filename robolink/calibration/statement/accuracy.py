@@ -91,6 +91,8 @@ def assessed(result: ResultT, facts: AccuracyFacts) -> ResultT:
         if sigma_mm is None or result.sources is None:
             return replace(result, accuracy=None)
         scattered = _scattering(result, sigma_mm, len(lengths))
+        # Nothing usual is known of angles.
+        sources = tuple(one.of_first(len(lengths)) for one in sources)
         basis = "default" if facts.look_sigma_mm is None else "record"
     parts = list(_parts(sources, facts))
     whole = with_station(scattered, *(one.part for one in parts))

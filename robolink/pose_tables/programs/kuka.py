@@ -22,6 +22,7 @@ from robolink.pose_tables.programs.program_text import (
     radians,
     required_number,
     turned,
+    without,
 )
 from robolink.pose_tables.refusals import UnusableText
 from robolink.pose_tables.values import RawPose, RawTable
@@ -91,13 +92,13 @@ class _Reader:
 
     def read(self) -> None:
         """Read all aggregates, and refuse what looks like one and is none."""
-        rest, before = self._text, 0
+        before, taken = 0, list[tuple[int, int]]()
         for group in groups_of(_STRING.sub(blanked, self._text), "{", self._line_at):
             begin = max(before, self._text.rfind("\n", 0, group.start) + 1)
             self._aggregate(group, begin)
-            rest = f"{rest[:begin]}{_blanks(rest[begin : group.end])}{rest[group.end :]}"
+            taken.append((begin, group.end))
             before = group.end
-        self._refuse_pieces(rest)
+        self._refuse_pieces(without(self._text, taken))
         self._add_frames()
 
     def _aggregate(self, group: Group, begin: int) -> None:
@@ -240,7 +241,3 @@ def _frame(fields: Mapping[str, str], line: int) -> _Frame:
 def _end_of_line(text: str, place: int) -> int:
     end = text.find("\n", place)
     return len(text) if end < 0 else end
-
-
-def _blanks(text: str) -> str:
-    return re.sub(r"[^\n]", " ", text)

@@ -25,7 +25,8 @@ _COMPONENTS: Final = ("X", "Y", "Z", "R", "P", "W")
 _UNITS: Final = {**dict.fromkeys("XYZ", "mm"), **dict.fromkeys("WPR", "deg")}
 
 _OURS: Final = re.compile(
-    r"(?m)^\s*PR?\s*\[\s*[0-9OlI]+[^\]\n]*\]?\s*\{|^\s*GP[0-9]+\s*:|\bU[FT]\s*:\s*\S+\s*,|^\s*/POS\s*$"
+    r"(?m)^[ \t]*PR?\s*\[\s*[0-9OlI]+[^\]\n]*\]?\s*\{|^[ \t]*GP[0-9]+\s*:"
+    r"|\bU[FT]\s*:\s*\S+\s*,|^[ \t]*/POS\s*$"
 )
 _POINT: Final = re.compile(
     r"\s*PR?\[\s*(?P<number>[0-9]+)\s*(?::\s*(?:\"(?P<name>[^\"\n]*)\"|(?P<bare>[^\"\]\n]*)))?\s*\]"
@@ -36,7 +37,7 @@ _LOOSE: Final = re.compile(
     r"(?m)^[ \t]*(?:PR?\s*[\[(]?\s*[0-9OlI]+[^\n;]*\{|P\[[^\n;]*$|GP[0-9]+\s*:|U[FT]\s*:"
     r"|[XYZWPR]\s*=|J[1-9]\s*=|[{}])"
 )
-_REGION: Final = re.compile(r"(?m)^\s*/POS\s*$")
+_REGION: Final = re.compile(r"(?m)^[ \t]*/POS\s*$")
 _SECTION: Final = re.compile(r"\s*/[A-Z]+\b")
 _BLANKS: Final = re.compile(r"\s*")
 _END: Final = re.compile(r"\s*(?:/END\s*)?")

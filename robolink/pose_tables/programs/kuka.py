@@ -56,7 +56,7 @@ _TYPED: Final = re.compile(r"\s*(\w+)\s*:(.*)", re.DOTALL)
 _NO_POSE: Final = re.compile(r"\$.*|TOOL_DATA|BASE_DATA|LOAD_\w+|MACHINE\w*", re.IGNORECASE)
 _LABELLED: Final = re.compile(r"\b[XYZABC][ \t]*[=:]?[ \t]*[+-]?[0-9.]", re.IGNORECASE)
 _DECLARED: Final = re.compile(
-    rf"(?m)^\s*(?:(?:GLOBAL|DECL|CONST)\s+)*(?:{_TYPES})\s+(\$?\w+)\s*(\[[^\]\n]*\])?"
+    rf"(?m)^[ \t]*(?:(?:GLOBAL|DECL|CONST)\s+)*(?:{_TYPES})\s+(\$?\w+)\s*(\[[^\]\n]*\])?"
     r"[ \t]*(=?)[ \t]*$",
     re.IGNORECASE,
 )
@@ -179,7 +179,9 @@ class _Reader:
                 raise UnusableText(tr("the line is not whole"), number)
         for found in _DECLARED.finditer(rest):
             given = re.search(
-                rf"(?m)^\s*{re.escape(found[1])}\s*(?:\[[^\]\n]*\])?\s*=", self._text, re.IGNORECASE
+                rf"(?m)^[ \t]*{re.escape(found[1])}\s*(?:\[[^\]\n]*\])?\s*=",
+                self._text,
+                re.IGNORECASE,
             )
             if found[3] or (data and not found[2] and not given):
                 why = tr("{name} has no value", name=found[1])

@@ -5,6 +5,7 @@ The sample runs by default; all slips, in the shared tables too, with 'make soak
 
 import json
 import random
+import re
 from pathlib import Path
 
 import pytest
@@ -71,6 +72,28 @@ def test_no_slip_changes_a_pose_of_a_table_of_people_in_silence(tmp_path, name):
     silent, unplaced, counted = judged(tmp_path, name, text, TABLES[name]["options"], slips)
     assert silent == []
     assert len(unplaced) <= 0.1 * counted["refused"], unplaced[:5]
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(60)
+@pytest.mark.parametrize("name", ["kuka.dat", "fanuc.ls", "ur.script", "melfa.prg", "spel.txt"])
+def test_a_long_program_is_read_in_seconds(tmp_path, name):
+    text, options = SEEDS[name]
+    begin = text[: text.index("\n") + 1] if name in ("kuka.dat", "ur.script") else ""
+    record = text[len(begin) :].removesuffix("ENDDAT\n").removesuffix("end\n")
+    numbered = re.compile(r"(?<!G)P[123]\b|P\[[123]\]|pin[123]\b")
+    # Points have a number of their own.
+    copies = [numbered.sub(_renumbered(at), record) for at in range(2000)]
+    path = tmp_path / name
+    path.write_text(begin + "".join(copies), encoding="utf-8")
+    assert len(read_as(path, ReadingChoices(**options))) == 6000
+
+
+def _renumbered(at):
+    def renumbered(found):
+        return re.sub(r"[123]", lambda digit: str(10 * at + int(digit[0])), found[0])
+
+    return renumbered
 
 
 FIELD = {

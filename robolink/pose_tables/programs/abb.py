@@ -5,6 +5,7 @@ loads and joints are no poses.
 """
 
 import re
+from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from typing import Final, TypeAlias
 
@@ -19,6 +20,7 @@ from robolink.pose_tables.programs.program_text import (
     program,
     required_number,
     turned,
+    without,
 )
 from robolink.pose_tables.refusals import UnusableText
 from robolink.pose_tables.values import RawPose, RawTable
@@ -72,14 +74,15 @@ def read_abb(text: str) -> RawTable | None:
     line_at = line_counter(text)
     poses: list[RawPose] = []
     joints, names = 0, set[str]()
-    rest, before = text, 0
+    before, spans = 0, list[tuple[int, int]]()
+    moves = _Moves(text)
     for group in groups_of(text, "[", line_at):
         begin = max(before, text.rfind(";", 0, group.start) + 1)
         head = text[begin : group.start]
         before = group.end
         declared = _HEAD.search(head)
         taken = begin + declared.start() if declared else group.start
-        rest = f"{rest[:taken]}{_blanks(rest[taken : group.end])}{rest[group.end :]}"
+        spans.append((taken, group.end))
         kind = declared["type"].lower() if declared else ""
         if kind in _OTHERS:
             continue
@@ -99,9 +102,9 @@ def read_abb(text: str) -> RawTable | None:
                 tr("what stands beside the pose is not understood; it may change it"), line
             )
         for place, matrix in found:
-            _refuse_tool(text, group.start, name, line)
+            moves.refuse_tool(group.start, name, line)
             poses.append(turned(line, place, matrix, {"name": name} if name else {}))
-    _refuse_pieces(rest)
+    _refuse_pieces(without(text, spans))
     if not poses and not joints:
         return None
     return program("ABB", poses, "quaternion Q1 (scalar) Q2 Q3 Q4", joints, angle="")
@@ -190,20 +193,28 @@ def _refuse_pieces(rest: str) -> None:
             raise UnusableText(tr("its brackets do not match"), number)
 
 
-def _refuse_tool(text: str, start: int, name: str, line: int) -> None:
-    """Refuse a target to which the module moves a tool: it is no place of the flange."""
-    for move in _MOVE.finditer(text):
-        within = move.start() < start < move.end()
-        if (within or (name and move["target"] == name)) and move["tool"].lower() != "tool0":
-            raise UnusableText(
-                tr("it is a position of the tool {tool}, not of the flange", tool=move["tool"]),
-                line,
-            )
+class _Moves:
+    """The movements of a module, and the tools that they name."""
+
+    def __init__(self, text: str) -> None:
+        found = [one for one in _MOVE.finditer(text) if one["tool"].lower() != "tool0"]
+        self._starts = [one.start() for one in found]
+        self._found = found
+        self._by_target = {one["target"]: one["tool"] for one in reversed(found) if one["target"]}
+
+    def refuse_tool(self, start: int, name: str, line: int) -> None:
+        """Refuse a target to which the module moves a tool: it is no place of the flange.
+
+        Raises:
+            UnusableText: Names the tool.
+        """
+        before = bisect_left(self._starts, start) - 1
+        inside = before >= 0 and start < self._found[before].end()
+        tool = self._found[before]["tool"] if inside else self._by_target.get(name)
+        if tool is not None:
+            why = tr("it is a position of the tool {tool}, not of the flange", tool=tool)
+            raise UnusableText(why, line)
 
 
 def _quotes(found: re.Match[str]) -> str:
     return f'"{" " * (len(found[0]) - 2)}"'
-
-
-def _blanks(text: str) -> str:
-    return re.sub(r"[^\n]", " ", text)

@@ -25,7 +25,8 @@ _COMPONENTS: Final = ("X", "Y", "Z", "R", "P", "W")
 _UNITS: Final = {**dict.fromkeys("XYZ", "mm"), **dict.fromkeys("WPR", "deg")}
 
 _OURS: Final = re.compile(
-    r"(?m)^\s*PR?\s*\[\s*[0-9OlI]+[^\]\n]*\]?\s*\{|^\s*GP[0-9]+\s*:|\bU[FT]\s*:\s*\S+\s*,|^\s*/POS\s*$"
+    r"(?m)^[ \t]*PR?\s*\[\s*[0-9OlI]+[^\]\n]*\]?\s*\{|^[ \t]*GP[0-9]+\s*:"
+    r"|\bU[FT]\s*:\s*\S+\s*,|^[ \t]*/POS\s*$"
 )
 _POINT: Final = re.compile(
     r"\s*PR?\[\s*(?P<number>[0-9]+)\s*(?::\s*(?:\"(?P<name>[^\"\n]*)\"|(?P<bare>[^\"\]\n]*)))?\s*\]"
@@ -36,7 +37,9 @@ _LOOSE: Final = re.compile(
     r"(?m)^[ \t]*(?:PR?\s*[\[(]?\s*[0-9OlI]+[^\n;]*\{|P\[[^\n;]*$|GP[0-9]+\s*:|U[FT]\s*:"
     r"|[XYZWPR]\s*=|J[1-9]\s*=|[{}])"
 )
-_REGION: Final = re.compile(r"(?m)^\s*/POS\s*$")
+_REGION: Final = re.compile(r"(?m)^[ \t]*/POS\s*$")
+_SECTION: Final = re.compile(r"\s*/[A-Z]+\b")
+_BLANKS: Final = re.compile(r"\s*")
 _END: Final = re.compile(r"\s*(?:/END\s*)?")
 _CONFIG: Final = re.compile(r"CONFIG\s*:\s*'[^'\n]*'\s*(?:,|$)", re.IGNORECASE)
 _ITEM: Final = re.compile(r"\s*([^,]*?)\s*(?:,|$)", re.DOTALL)
@@ -66,9 +69,9 @@ def read_fanuc(text: str) -> RawTable | None:
     points = _Points()
     while not _END.fullmatch(text, place):
         found = _POINT.match(text, place)
-        begins = place + len(text[place:]) - len(text[place:].lstrip())
+        begins = _BLANKS.match(text, place).end()  # type: ignore[union-attr] - of any length
         if found is None:
-            ends = re.compile(r"\s*/[A-Z]+\b").match(text, place)
+            ends = _SECTION.match(text, place)
             if ends and not _LOOSE.search(text, place):
                 break
             raise UnusableText(tr("it is not a point P[..]{..}"), line_at(begins))
@@ -128,7 +131,7 @@ def _body(body: str, line: int) -> tuple[dict[str, str], dict[str, str]]:
     values: dict[str, str] = {}
     group, place = "1", 0
     while body[place:].strip():
-        place += len(body[place:]) - len(body[place:].lstrip())
+        place = _BLANKS.match(body, place).end()  # type: ignore[union-attr] - of any length
         here = line + body[:place].count("\n")
         if begins := _GROUP.match(body, place):
             group, place = begins[1], begins.end()

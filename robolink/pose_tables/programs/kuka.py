@@ -22,6 +22,7 @@ from robolink.pose_tables.programs.program_text import (
     radians,
     required_number,
     turned,
+    without,
 )
 from robolink.pose_tables.refusals import UnusableText
 from robolink.pose_tables.values import RawPose, RawTable
@@ -55,7 +56,7 @@ _TYPED: Final = re.compile(r"\s*(\w+)\s*:(.*)", re.DOTALL)
 _NO_POSE: Final = re.compile(r"\$.*|TOOL_DATA|BASE_DATA|LOAD_\w+|MACHINE\w*", re.IGNORECASE)
 _LABELLED: Final = re.compile(r"\b[XYZABC][ \t]*[=:]?[ \t]*[+-]?[0-9.]", re.IGNORECASE)
 _DECLARED: Final = re.compile(
-    rf"(?m)^\s*(?:(?:GLOBAL|DECL|CONST)\s+)*(?:{_TYPES})\s+(\$?\w+)\s*(\[[^\]\n]*\])?"
+    rf"(?m)^[ \t]*(?:(?:GLOBAL|DECL|CONST)\s+)*(?:{_TYPES})\s+(\$?\w+)\s*(\[[^\]\n]*\])?"
     r"[ \t]*(=?)[ \t]*$",
     re.IGNORECASE,
 )
@@ -91,13 +92,13 @@ class _Reader:
 
     def read(self) -> None:
         """Read all aggregates, and refuse what looks like one and is none."""
-        rest, before = self._text, 0
+        before, taken = 0, list[tuple[int, int]]()
         for group in groups_of(_STRING.sub(blanked, self._text), "{", self._line_at):
             begin = max(before, self._text.rfind("\n", 0, group.start) + 1)
             self._aggregate(group, begin)
-            rest = f"{rest[:begin]}{_blanks(rest[begin : group.end])}{rest[group.end :]}"
+            taken.append((begin, group.end))
             before = group.end
-        self._refuse_pieces(rest)
+        self._refuse_pieces(without(self._text, taken))
         self._add_frames()
 
     def _aggregate(self, group: Group, begin: int) -> None:
@@ -178,7 +179,9 @@ class _Reader:
                 raise UnusableText(tr("the line is not whole"), number)
         for found in _DECLARED.finditer(rest):
             given = re.search(
-                rf"(?m)^\s*{re.escape(found[1])}\s*(?:\[[^\]\n]*\])?\s*=", self._text, re.IGNORECASE
+                rf"(?m)^[ \t]*{re.escape(found[1])}\s*(?:\[[^\]\n]*\])?\s*=",
+                self._text,
+                re.IGNORECASE,
             )
             if found[3] or (data and not found[2] and not given):
                 why = tr("{name} has no value", name=found[1])
@@ -240,7 +243,3 @@ def _frame(fields: Mapping[str, str], line: int) -> _Frame:
 def _end_of_line(text: str, place: int) -> int:
     end = text.find("\n", place)
     return len(text) if end < 0 else end
-
-
-def _blanks(text: str) -> str:
-    return re.sub(r"[^\n]", " ", text)

@@ -20,6 +20,7 @@ from robolink.pose_tables.values import LengthUnit, RawPose, RawTable
 _TURNED_MOST_DEG: Final = 720.0
 """Makers print angles within a turn, and people type two at most."""
 
+_NO_LINE_END: Final = re.compile(r"[^\n]")
 _LEADING_ZERO: Final = re.compile(r"[+-]?0[0-9]+")
 """What a decimal comma leaves of the decimals; nobody writes a whole number so."""
 
@@ -91,6 +92,15 @@ def fields_of(body: str, brackets: str = "") -> list[str]:
     return [*fields, body[begun:]]
 
 
+def without(text: str, spans: Sequence[tuple[int, int]]) -> str:
+    """Return a text with blanks in place of spans, line ends kept, so that lines stay."""
+    parts, place = [], 0
+    for start, end in spans:
+        parts += [text[place:start], _NO_LINE_END.sub(" ", text[start:end])]
+        place = end
+    return "".join([*parts, text[place:]])
+
+
 def required_number(name: str, text: str, line: int) -> float:
     """Return the finite number of a component.
 
@@ -127,7 +137,7 @@ def turned(
 
 def blanked(found: re.Match[str]) -> str:
     """Return blanks for what was found, line ends kept, so that places stay."""
-    return re.sub(r"[^\n]", " ", found[0])
+    return _NO_LINE_END.sub(" ", found[0])
 
 
 def program(

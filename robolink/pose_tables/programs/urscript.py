@@ -41,6 +41,8 @@ _NO_PLACES: Final = frozenset(
 _JOINTS_OF: Final = frozenset({"movej", "movel", "movep", "movec", "servoj", "speedj", "stopj"})
 _JOINT_NAME: Final = re.compile(r"(?:.*_)?(?:q|qn|qnear|joints?)\d*", re.IGNORECASE)
 _SIX: Final = 6
+_CHANGES: Final = re.compile(r"\s*[*+\-/\[]")
+_BARE: Final = re.compile(r"(?<![\w.])[A-Za-z_]\w*\s*$")
 _CUT: Final = re.compile(
     r"\s*(?:(?:global|local)\b[^=\n]*|\w+(?:[ \t]+\w+)?[ \t]*=(?:[ \t]*p)?|[A-Za-z_]\w*)\s*"
 )
@@ -93,7 +95,7 @@ def read_urscript(text: str) -> RawTable | None:
             raise UnusableText(why, line)
         if "[" in body or "\n" in body.strip():
             raise UnusableText(tr("its brackets do not match"), line)
-        if re.match(r"\s*[*+\-/\[]", text[end:]):
+        if _CHANGES.match(text, end):
             raise UnusableText(
                 tr("what stands beside the pose is not understood; it may change it"), line
             )
@@ -138,8 +140,8 @@ def _lists(text: str) -> Iterator[tuple[int, int, tuple[str, ...], int]]:
             _, start, call = opened.pop()
             if partner == "[" and not any(one == "[" for one, _, _ in opened):
                 calls = tuple(name for _, _, name in opened if name)
-                before = text[:start].rstrip()
-                bare = re.search(r"(?<![\w.])[A-Za-z_]\w*$", before)
+                line = text.rfind("\n", 0, start) + 1
+                bare = _BARE.search(text, line, start)
                 yield start, place + 1, calls, bare.start() if bare else start
             if partner == "(" and call == "p":
                 raise UnusableText(tr("p[..] does not hold six numbers"), line_at(start))

@@ -38,6 +38,9 @@ from robolink.pose_tables.values import ColumnHead, RawTable, ReadingChoices
 
 _SEPARATORS: Final = ("\t", ";", "|", ",", " ")
 _SIGN: Final = re.compile(r"^(\s*[^\s:=;,|\t\"]+(?:\s*[(\[][^)\]]*[)\]])?)\s*[:=]\s*")
+_MOST: Final = 60
+"""Lines; components, names and remarks are fewer."""
+
 _FEWEST: Final = 3
 """Lines that begin with the name of a component; a table of fewer is no pose."""
 
@@ -61,6 +64,8 @@ def read_in_columns(lines: Sequence[str], choices: ReadingChoices) -> RawTable |
         UnusableText: A line holds other values than the first, or what is no number.
     """
     kept, _ = table_lines(lines)
+    if len(kept) > _MOST:
+        return None
     found = next(
         (one for separator in _SEPARATORS if (one := _labelled(kept, separator)) is not None), None
     )

@@ -70,7 +70,7 @@ def command(serve, simulator, capsys):
             shown = capsys.readouterr()
             return code, shown.out, shown.err
 
-        run.url = cell.url
+        run.url = cell.url  # type: ignore[attr-defined]
         yield run
     arm = simulator.machine.arm
     assert arm.moves_started == 0

@@ -238,6 +238,8 @@ def test_a_z_that_nobody_measured_is_changed_and_never_stated(arm, tmp_path):
     made = {"made_at": "2026-11-28T08:00:00Z", "robolink_version": "0.4", "check": "whole"}
     (report,) = reports_of(entries, **made)
     table = offsets(report)
+    assert table is not None
+    assert report.fit is not None
     (z,) = [one for one in table.own if one.axis.startswith("Z mm")]
     assert z.half95 is None
     assert "only its change" in z.axis

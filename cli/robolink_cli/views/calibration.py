@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from robolink.calibration import VerifyResult, known_doubts
 from robolink.messages import tr
+from robolink.methods import NextStep
 from robolink.model import ToolOffset, ToolReceipt, describe_offset
 from robolink.nozzle_change import (
     LimitVerdict,
@@ -13,7 +14,7 @@ from robolink.nozzle_change import (
     next_steps,
 )
 from robolink.runner import TeachPrompt
-from robolink_cli.console.render import note, say
+from robolink_cli.console.render import next_lines, note, say
 from robolink_cli.prompts.present import present_desk
 from robolink_cli.views.documents import (
     offset_payload,
@@ -90,26 +91,8 @@ def show_report(report: ToolReport) -> None:
                 )
             )
         say(_proof(report.verification))
-    for line in next_lines(report):
+    for line in next_lines(_steps(report)):
         say(line)
-
-
-def next_lines(report: ToolReport, cell: str = "") -> list[str]:
-    """Return what a person does next with a tool that was written; nothing for most methods.
-
-    Args:
-        report: What was done.
-        cell: Name of the cell, for the commands; empty where it need not be named.
-    """
-    steps = next_steps(report.proposal.result, report.proposal.tool) if report.receipt else ()
-    if not steps:
-        return []
-    named = f'robolink -c "{cell}"' if cell else "robolink"
-    lines = [tr("Next:")]
-    for number, step in enumerate(steps, start=1):
-        lines.append(f"  {number}. {step.sentence}")
-        lines.append(f"       {named} {step.command}")
-    return lines
 
 
 def _proof(verification: VerifyResult) -> str:
@@ -147,8 +130,13 @@ def report_payload(report: ToolReport) -> dict[str, object]:
     }
 
 
+def _steps(report: ToolReport) -> tuple[NextStep, ...]:
+    """Return what a person does next with a tool that was written."""
+    return next_steps(report.proposal.result, report.proposal.tool) if report.receipt else ()
+
+
 def _following(report: ToolReport) -> dict[str, object]:
-    steps = next_steps(report.proposal.result, report.proposal.tool) if report.receipt else ()
+    steps = _steps(report)
     return {"next_steps": [step.as_json() for step in steps]} if steps else {}
 
 

@@ -84,18 +84,18 @@ if TYPE_CHECKING:
     from robolink.model.motion.tip_sensor import TipSensor as TipSensor
     from robolink.model.motion.until_input import InputEdge as InputEdge
     from robolink.model.motion.until_input import MotionUntilInput as MotionUntilInput
-    from robolink.model.record.answers import AnsweredBy as AnsweredBy
-    from robolink.model.record.answers import answer_entry as answer_entry
-    from robolink.model.record.answers import answered_by_in_words as answered_by_in_words
     from robolink.model.record.findings import Finding as Finding
     from robolink.model.record.findings import Resolver as Resolver
     from robolink.model.record.findings import Verdict as Verdict
     from robolink.model.record.journal_entries import NO_HISTORY as NO_HISTORY
     from robolink.model.record.journal_entries import PROOFS as PROOFS
+    from robolink.model.record.journal_entries import AnsweredBy as AnsweredBy
     from robolink.model.record.journal_entries import EntryKind as EntryKind
     from robolink.model.record.journal_entries import NewEntry as NewEntry
     from robolink.model.record.journal_entries import Recorded as Recorded
     from robolink.model.record.journal_entries import Signature as Signature
+    from robolink.model.record.journal_entries import answer_entry as answer_entry
+    from robolink.model.record.journal_entries import answered_by_in_words as answered_by_in_words
     from robolink.model.record.ledger import Account as Account
     from robolink.model.record.ledger import Ledger as Ledger
     from robolink.model.record.method_names import finding_named_now as finding_named_now
@@ -120,8 +120,10 @@ else:
             ),
             "motion.geometry": "Elbow Hand Pose Posture Wrist angle_difference_deg rotate_xy",
             "_identity": "ControllerFacts Identity Who is_own_name",
-            "record.answers": "AnsweredBy answer_entry answered_by_in_words",
-            "record.journal_entries": "NO_HISTORY PROOFS EntryKind NewEntry Recorded Signature",
+            "record.journal_entries": (
+                "AnsweredBy NO_HISTORY PROOFS EntryKind NewEntry Recorded Signature answer_entry "
+                "answered_by_in_words"
+            ),
             "record.ledger": "Account Ledger",
             "motion.movement": (
                 "Motion MotionGroup MotionOutcome MotionProfile MotionTerms Path WorkBox"

@@ -62,7 +62,7 @@ class MeasurementContext:
         settings: Callable[[Pose, ToolOffset | None], RunSettings],
         offers: bool = True,
         types: bool = False,
-        attended: bool = True,
+        attended: bool = False,
     ) -> None:
         self._types = types
         self._attended = attended
@@ -188,7 +188,7 @@ class MeasurementContext:
             ...     def ask(self, question, kind): ...
             ...     def poll(self, wait_s):
             ...         return "y"
-            >>> with MemoryController() as controller:
+            >>> with MemoryController(identity="answer-example") as controller:
             ...     settings = Limits().settings
             ...     context = MeasurementContext(
             ...         controller, Person(), start=None, settings=settings

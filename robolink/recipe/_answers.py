@@ -61,7 +61,12 @@ class Answers:
         return self.texts.get(number)
 
     def given_by(self, number: int, prompt: Prompt, tool: int | None = None) -> AnsweredBy:
-        """Return how a prompt was answered beforehand; arguments as for :meth:`prepared`.
+        """Return how a prompt was answered beforehand.
+
+        Args:
+            number: Number of the prompt in the recipe, from 1.
+            prompt: The prompt.
+            tool: The tool that it is asked for, ``None`` for the whole change.
 
         Example:
             >>> from robolink.recipe import Answers, Prompt

@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     from robolink.runner._place_question import inputs_of as inputs_of
     from robolink.runner._runner import POLL_S as POLL_S
     from robolink.runner._runner import Runner as Runner
-    from robolink.runner._runner import StepDone as StepDone
     from robolink.runner._runner import ask_for_pose as ask_for_pose
     from robolink.runner._settings import RunSettings as RunSettings
     from robolink.runner._steps import Ask as Ask
@@ -48,6 +47,7 @@ if TYPE_CHECKING:
     from robolink.runner._steps import Seek as Seek
     from robolink.runner._steps import SeenAt as SeenAt
     from robolink.runner._steps import Step as Step
+    from robolink.runner._steps import StepDone as StepDone
     from robolink.runner._steps import TakenStep as TakenStep
     from robolink.runner._steps import TeachPrompt as TeachPrompt
     from robolink.runner._steps import TouchedAt as TouchedAt
@@ -76,10 +76,10 @@ __getattr__ = lazy_exports(
         "_jog_steps": "jog_target parse_decimal parse_steps refuse_decimal_comma way_in_words",
         "_operator": "Operator Question",
         "_place_question": "AGAIN MOST_REFUSED TakenAgainError inputs_of",
-        "_runner": "POLL_S Runner StepDone ask_for_pose",
+        "_runner": "POLL_S Runner ask_for_pose",
         "_settings": "RunSettings",
         "_steps": "Ask Confirm Consider Look Move Notify Procedure Seek SeenAt Step TakenStep "
-        "TeachPrompt TouchedAt",
+        "StepDone TeachPrompt TouchedAt",
         "_subjects": "AngleShown FitRow FitSubject GuidedOperator JogRange JogSubject MoveSubject "
         "TouchSubject regard",
         "_yes_no": "BACK MORE ask_yes_no ask_yes_no_or yes_or_no",

@@ -1,7 +1,7 @@
 """Takes the steps of a procedure on one motion group."""
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import starmap
 from typing import Final, TypeVar
 
@@ -17,7 +17,6 @@ from robolink.errors import (
 )
 from robolink.messages import tr
 from robolink.model import (
-    AnsweredBy,
     Controller,
     ControllerState,
     MotionGroup,
@@ -26,13 +25,12 @@ from robolink.model import (
     Path,
     Pose,
     TipSensor,
-    answer_entry,
 )
 from robolink.runner._endings import EndingWatch, as_measurement
 from robolink.runner._foreseeing import considered
 from robolink.runner._jog_steps import jog_target, parse_steps, typed_pose, way_in_words
-from robolink.runner._operator import Operator, Question
-from robolink.runner._place_question import MOST_REFUSED, PlaceQuestion, ended_by_operator
+from robolink.runner._operator import Operator
+from robolink.runner._place_question import PlaceQuestion
 from robolink.runner._settings import RunSettings
 from robolink.runner._steps import (
     Ask,
@@ -44,10 +42,11 @@ from robolink.runner._steps import (
     Procedure,
     Seek,
     SeenAt,
+    StepDone,
     TakenStep,
 )
 from robolink.runner._subjects import GuidedOperator, JogRange, JogSubject, MoveSubject, regard
-from robolink.runner._yes_no import ask_yes_no_or
+from robolink.runner._yes_no import Asking
 from robolink.sensing import median_spot, scatter_of, seen_in
 from robolink.ways import Way, way
 
@@ -61,24 +60,6 @@ _MOST_REPEATS: Final = 2
 """Steps of one procedure that may be repeated: a computer busier than that has to be looked at."""
 
 T = TypeVar("T")
-
-
-@dataclass(frozen=True, slots=True)
-class StepDone:
-    """A step that was taken.
-
-    Attributes:
-        step: Which one.
-        pose: Where the frame was after it, ``None`` for a step that only concerns a person.
-        accepted: Whether a person accepted an offer, ``None`` for other steps and where nobody was
-            asked.
-        word: The further word with which an offer was answered; empty for none.
-    """
-
-    step: TakenStep
-    pose: Pose | None = None
-    accepted: bool | None = None
-    word: str = ""
 
 
 class Runner:
@@ -99,8 +80,7 @@ class Runner:
         tool: Number of the tool that it is about, for the record of what is answered; ``None``
             where it is about none or several.
 
-    Every answer to a question is put on record before anything follows from it, here and not by
-    whoever asks (docs/journal.md, "What was answered").
+    Every answer is put on record here, and not by whoever asks; see :class:`Asking`.
 
     Example:
         >>> from robolink.model import Path, Pose, WorkBox
@@ -334,49 +314,42 @@ class Runner:
         except DeclinedError:  # nobody is there
             return False
 
+    @property
+    def _asking(self) -> Asking:
+        return Asking(self._operator, self._line, self._controller.outcomes, self._tool)
+
     def confirm(self, question: str) -> bool:
-        """Ask a yes-or-no question under the same watch; see :func:`ask_yes_no`."""
+        """Ask a yes-or-no question under the same watch; see :meth:`Asking.confirm_or`."""
         return self.confirm_or(question, also=()) is True
 
     def confirm_or(self, question: str, *, also: Collection[str], decides: str = "") -> bool | str:
-        """Ask one that a further word may answer; see :func:`ask_yes_no_or`.
+        """Ask one that a further word may answer; see :meth:`Asking.confirm_or`.
 
         Args:
             question: What a yes agrees to.
             also: The words.
-            decides: Under which name the record says besides whether it was a yes; empty for none.
+            decides: Under which name the record says besides whether it was a yes.
 
-        Raises:
-            ConfigError: The answer cannot be recorded.
+        Example:
+            >>> from robolink.model import WorkBox
+            >>> from robolink.runner import Runner, RunSettings
+            >>> from robolink.testing import MemoryController
+            >>> class Person:  # implements robolink.Operator
+            ...     def ask(self, question, kind):
+            ...         print(question)
+            ...     def poll(self, wait_s):
+            ...         return "more"
+            >>> controller, settings = MemoryController(), RunSettings(WorkBox())
+            >>> runner = Runner(controller, controller.groups[0], Person(), settings)
+            >>> runner.confirm_or("Keep it?", also=("more",))
+            Keep it?
+            'more'
         """
-        said = ask_yes_no_or(self._operator, question, self._line, also=also)
-        decided = {decides: said} if decides and isinstance(said, bool) else {}
-        self._record(question, said, **decided)
-        return said
-
-    def _record(self, question: str, answer: bool | str, **details: object) -> None:
-        by = getattr(self._operator, "answers_as", AnsweredBy.PERSON)
-        entry = answer_entry(question, answer, by, tool=self._tool, **details)
-        self._controller.outcomes.append(entry)
+        return self._asking.confirm_or(question, also=also, decides=decides)
 
     def ask_text(self, question: str) -> str:
-        """Ask for a line of text under the same watch.
-
-        Raises:
-            DeclinedError: The person ended it with ``q``, or gave none however often asked.
-        """
-        for _ in range(MOST_REFUSED):
-            self._operator.ask(question, Question.TEXT)
-            text = self._line().strip()
-            if text == "q":
-                raise ended_by_operator()
-            if text:
-                self._record(question, text)
-                return text
-        raise DeclinedError(
-            tr("Nothing was typed, {count} times in a row.", count=MOST_REFUSED),
-            remedy=tr("Start again when somebody is there to answer."),
-        )
+        """Ask for a line of text under the same watch; see :meth:`Asking.text`."""
+        return self._asking.text(question)
 
     def _line(self, between: Callable[[], object] | None = None) -> str:
         """Return the next line typed, reading the status at least once a second meanwhile.

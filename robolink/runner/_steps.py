@@ -256,6 +256,25 @@ class Confirm:
 TakenStep = Move | Ask | Seek | Look | Notify | Confirm
 """What happens in the cell, or to a person; it is told of and foreseen."""
 
+
+@dataclass(frozen=True, slots=True)
+class StepDone:
+    """A step that was taken.
+
+    Attributes:
+        step: Which one.
+        pose: Where the frame was after it, ``None`` for a step that only concerns a person.
+        accepted: Whether a person accepted an offer, ``None`` for other steps and where nobody was
+            asked.
+        word: The further word with which an offer was answered; empty for none.
+    """
+
+    step: TakenStep
+    pose: Pose | None = None
+    accepted: bool | None = None
+    word: str = ""
+
+
 Step = TakenStep | Consider
 
 T = TypeVar("T")

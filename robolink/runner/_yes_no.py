@@ -1,10 +1,14 @@
-"""What counts as a yes and as a no, wherever a person is asked."""
+"""Asking a person for a word: what counts as a yes and as a no, and the record of the answer."""
 
 from collections.abc import Callable, Collection
+from dataclasses import dataclass
 from typing import Final
 
+from robolink.errors import DeclinedError
 from robolink.messages import tr
+from robolink.model import AnsweredBy, OutcomeLog, answer_entry
 from robolink.runner._operator import Operator, Question
+from robolink.runner._place_question import MOST_REFUSED, ended_by_operator
 
 _YES: Final = frozenset({"y", "yes", "j", "ja", "是"})
 MORE: Final = "more"
@@ -85,3 +89,75 @@ def ask_yes_no_or(
             )
         )
     return said is True
+
+
+@dataclass(frozen=True, slots=True)
+class Asking:
+    """Questions to one person.
+
+    Whoever asks through it cannot forget the record (docs/journal.md, "What was answered").
+
+    Attributes:
+        operator: Who is asked.
+        line: Fetches what is typed, looking after the controller meanwhile.
+        outcomes: Where the answers go.
+        tool: The tool that they are about; ``None`` for none or several.
+    """
+
+    operator: Operator
+    line: Callable[[], str]
+    outcomes: OutcomeLog
+    tool: int | None = None
+
+    def confirm_or(self, question: str, *, also: Collection[str], decides: str = "") -> bool | str:
+        """Ask a yes-or-no question that a further word may answer; see :func:`ask_yes_no_or`.
+
+        Args:
+            question: What a yes agrees to.
+            also: The words.
+            decides: Under which name the record says besides whether it was a yes; empty for none.
+
+        Raises:
+            ConfigError: The answer cannot be recorded.
+
+        Example:
+            >>> from robolink.journal import memory_journal
+            >>> from robolink.runner._yes_no import Asking
+            >>> class Panel:  # implements robolink.Operator
+            ...     def ask(self, question, kind):
+            ...         print(question)
+            >>> log = memory_journal("asking-example").log("a")
+            >>> Asking(Panel(), lambda: "y", log).confirm_or("Keep it?", also=())
+            Keep it?
+            True
+            >>> [entry.details["answer"] for entry in log.recorded()]
+            ['yes']
+        """
+        said = ask_yes_no_or(self.operator, question, self.line, also=also)
+        decided = {decides: said} if decides and isinstance(said, bool) else {}
+        self._record(question, said, **decided)
+        return said
+
+    def text(self, question: str) -> str:
+        """Ask for a line of text.
+
+        Raises:
+            ConfigError: The answer cannot be recorded.
+            DeclinedError: The person ended it with ``q``, or gave none however often asked.
+        """
+        for _ in range(MOST_REFUSED):
+            self.operator.ask(question, Question.TEXT)
+            text = self.line().strip()
+            if text == "q":
+                raise ended_by_operator()
+            if text:
+                self._record(question, text)
+                return text
+        raise DeclinedError(
+            tr("Nothing was typed, {count} times in a row.", count=MOST_REFUSED),
+            remedy=tr("Start again when somebody is there to answer."),
+        )
+
+    def _record(self, question: str, answer: bool | str, **details: object) -> None:
+        by = getattr(self.operator, "answers_as", AnsweredBy.PERSON)
+        self.outcomes.append(answer_entry(question, answer, by, tool=self.tool, **details))

@@ -15,7 +15,6 @@ from robolink.testing import MemoryController
 PLACES = [Path(robolink.__file__).parent, Path(robolink_cli.__file__).parent]
 
 PRIMITIVES = {
-    "runner/_runner.py",
     "runner/_yes_no.py",
     "prompts/questions.py",
     "wizard/choices.py",
@@ -61,7 +60,7 @@ def test_a_question_of_any_procedure_is_on_record_without_a_measurement():
         second = yield Confirm("Take it again?", also=("more",))
         return first, second
 
-    with MemoryController() as controller:
+    with MemoryController(identity="a procedure") as controller:
         assert runner_of(controller, "y", "more", tool=3).run(asks()) == (True, "more")
         assert said(controller) == [
             ("Take it again?", "more", 3),

@@ -7,10 +7,15 @@ document instead.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import click
 
+from robolink.messages import tr
 from robolink_cli.console.output import beside, drawn_elsewhere, hand_over, sentences, show, visible
+
+if TYPE_CHECKING:
+    from robolink.methods import NextStep
 
 _JSON = "robolink.json"
 _DOCUMENT = "robolink.document"
@@ -102,3 +107,19 @@ def dumps(schema: str, payload: Mapping[str, object]) -> str:
     import json  # here, because --help needs none
 
     return json.dumps({"schema": schema, **payload}, indent=2, allow_nan=False)
+
+
+def next_lines(steps: "Sequence[NextStep]", cell: str = "") -> list[str]:
+    """Return what a person does next, a sentence and a command each; nothing for no step.
+
+    Args:
+        steps: What follows.
+        cell: Name of the cell, for the commands; empty where it need not be named.
+    """
+    if not steps:
+        return []
+    named = f'robolink -c "{cell}"' if cell else "robolink"
+    lines = [tr("Next:")]
+    for number, step in enumerate(steps, start=1):
+        lines += [f"  {number}. {step.sentence}", f"       {named} {step.command}"]
+    return lines

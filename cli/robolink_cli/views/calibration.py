@@ -9,6 +9,7 @@ from robolink.calibration import (
     turn_test_sentences,
 )
 from robolink.messages import tr
+from robolink.methods import NextStep
 from robolink.model import ToolOffset, ToolReceipt, describe_offset
 from robolink.nozzle_change import (
     LimitVerdict,
@@ -18,7 +19,7 @@ from robolink.nozzle_change import (
     next_steps,
 )
 from robolink.runner import TeachPrompt
-from robolink_cli.console.render import note, say
+from robolink_cli.console.render import next_lines, note, say
 from robolink_cli.prompts.present import present_desk
 from robolink_cli.views.documents import (
     offset_payload,
@@ -103,26 +104,8 @@ def show_report(report: ToolReport) -> None:
             say(f"  {sentence}")
         for sentence in proved_statements(report.proposal.result, report.verification):
             say(sentence)
-    for line in next_lines(report):
+    for line in next_lines(_steps(report)):
         say(line)
-
-
-def next_lines(report: ToolReport, cell: str = "") -> list[str]:
-    """Return what a person does next with a tool that was written; nothing for most methods.
-
-    Args:
-        report: What was done.
-        cell: Name of the cell, for the commands; empty where it need not be named.
-    """
-    steps = next_steps(report.proposal.result, report.proposal.tool) if report.receipt else ()
-    if not steps:
-        return []
-    named = f'robolink -c "{cell}"' if cell else "robolink"
-    lines = [tr("Next:")]
-    for number, step in enumerate(steps, start=1):
-        lines.append(f"  {number}. {step.sentence}")
-        lines.append(f"       {named} {step.command}")
-    return lines
 
 
 def judged_payload(proposal: Proposal, verdicts: Sequence[LimitVerdict]) -> dict[str, object]:
@@ -149,8 +132,13 @@ def report_payload(report: ToolReport) -> dict[str, object]:
     }
 
 
+def _steps(report: ToolReport) -> tuple[NextStep, ...]:
+    """Return what a person does next with a tool that was written."""
+    return next_steps(report.proposal.result, report.proposal.tool) if report.receipt else ()
+
+
 def _following(report: ToolReport) -> dict[str, object]:
-    steps = next_steps(report.proposal.result, report.proposal.tool) if report.receipt else ()
+    steps = _steps(report)
     return {"next_steps": [step.as_json() for step in steps]} if steps else {}
 
 

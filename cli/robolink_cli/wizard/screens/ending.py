@@ -10,9 +10,9 @@ from robolink.calibration import (
 from robolink.errors import DeclinedError, OutcomeUnknownError, RobolinkError
 from robolink.messages import joined, tr
 from robolink.model import describe_offset, describe_standing
-from robolink.nozzle_change import ChangeReport, ToolReport
+from robolink.nozzle_change import ChangeReport, ToolReport, next_steps
 from robolink.standing import UNTOUCHED, standing_after
-from robolink_cli.views.calibration import next_lines
+from robolink_cli.console.render import next_lines
 from robolink_cli.wizard.check_list import CheckSubject
 from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.happenings import WizardCommand
@@ -41,7 +41,9 @@ def done_lines(state: WizardState, report: ChangeReport) -> list[str]:
         lines.append(back)
         lines.append(tr("Run the first part slowly and look at it."))
     for one in report.tools:
-        lines += next_lines(one, state.header.cell)
+        if one.receipt is not None:
+            steps = next_steps(one.proposal.result, one.proposal.tool)
+            lines += next_lines(steps, state.header.cell)
     return lines
 
 

@@ -144,6 +144,60 @@ def test_a_bad_camera_is_doubted():
     )
 
 
+SQUARE = np.array([[0.02, 0.0], [0.0, -0.02]])
+
+
+@pytest.mark.parametrize("sigma_px", [0.01, 0.1, 1.0])
+def test_a_spot_that_stands_still_is_no_camera_however_it_scatters(sigma_px):
+    """It was solved: 139,462 micrometres a pixel, shear 78 degrees."""
+    rng = np.random.default_rng(3)
+    still = [
+        replace(one, px=640 + rng.normal(0, sigma_px), py=512 + rng.normal(0, sigma_px))
+        for one in pictures()
+    ]
+    with refused("rank_deficient") as caught:
+        solve_camera_affine(still)
+    assert "spreads by" in caught.value.what
+
+
+def test_pixels_on_one_line_are_no_camera_either():
+    rng = np.random.default_rng(3)
+    line = [replace(one, py=0.5 * one.px + rng.normal(0, 0.2)) for one in pictures()]
+    with refused("rank_deficient"):
+        solve_camera_affine(line)
+
+
+@pytest.mark.parametrize(
+    ("matrix", "said", "stated"),
+    [
+        (SQUARE @ [[1.0, 0.5], [0.0, 1.0]], "askew", {"most_shear_deg": 30.0}),
+        (SQUARE @ np.diag([1.3, 1.0]), "differ in scale", {"most_unequal_scale": 0.4}),
+        (SQUARE * 15, "300 micrometres", {"most_mm_per_px": 0.4}),
+    ],
+)
+def test_what_no_camera_is_like_is_refused_until_the_limit_is_stated(matrix, said, stated):
+    seen = pictures([(20 * dx, 20 * dy, u) for dx, dy, u in PLACES + TURNS], matrix=matrix)
+    with refused("camera_implausible") as caught:
+        solve_camera_affine(seen)
+    assert said in caught.value.what
+    solve_camera_affine(seen, limits=CameraLimits(**stated))
+
+
+@pytest.mark.parametrize(
+    ("sigma_px", "code", "stated"),
+    [
+        (6.0, "large_pixel_residual", {"most_rms_px": 20.0, "interval_mm": 2.0}),
+        (1.0, "large_interval", {"interval_mm": 0.5}),
+    ],
+)
+def test_looks_that_agree_with_no_camera_are_refused(sigma_px, code, stated):
+    plan = [(4 * dx, 4 * dy, u_deg) for dx, dy, u_deg in PLACES + TURNS]
+    seen = pictures(plan, np.random.default_rng(1), sigma_px, matrix=SQUARE * 9)
+    with refused(code):
+        solve_camera_affine(seen)
+    solve_camera_affine(seen, limits=CameraLimits(**stated))
+
+
 @pytest.mark.parametrize("count", [5, 9])
 def test_the_interval_holds_the_truth_with_noise_in_the_pixels(count, trials):
     plan = (PLACES + TURNS)[:3] + TURNS[:2] if count == 5 else PLACES + TURNS

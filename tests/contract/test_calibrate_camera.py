@@ -98,6 +98,22 @@ def test_a_camera_is_found_and_then_sees_the_next_nozzle(desk, kind):
         assert len(seen["fit"]["residuals_mm"]) == 4
 
 
+def test_a_spot_that_stands_still_ends_with_7_and_in_the_proof_with_8(desk):
+    opened = desk()
+    usual = ("--tool", "1", "--station", "CAM", "--sensor", SIM, "--yes", "--json")
+    assert opened.run("calibrate", "camera-affine", "--at", opened.at, *usual)[0] == 0
+    stored = opened.cell.stored
+    opened.cell.simulator.world.change_nozzle()
+    # Five places of four pictures each are the measurement.
+    for from_picture, exit_code in ((1, 7), (21, 8)):
+        furnish(opened.cell, camera_still_share=1.0, camera_still_from_picture=from_picture)
+        code, document, messages = opened.run("calibrate", "camera", *usual)
+        assert code == exit_code, messages
+        assert document["error"]["code"] == "tip_did_not_move"
+        assert "a fleck on the window" in document["error"]["remedy"]
+        assert opened.cell.stored.rounded(3) == stored.rounded(3)
+
+
 def test_a_table_of_runout_is_shown_and_given_as_json(desk):
     opened = desk()
     usual = ("--tool", "1", "--station", "CAM", "--sensor", SIM, "--yes", "--json")

@@ -1,7 +1,9 @@
 """Cameras by name, and what is made of their pictures."""
 
 import math
+import random
 from importlib import metadata
+from statistics import median
 
 import pytest
 from robolink_simulators.sensors import open_in_process
@@ -9,7 +11,7 @@ from robolink_simulators.sensors import open_in_process
 from robolink.errors import CalibrationError, ConfigError, ConnectError, TransportBrokenError
 from robolink.methods import CameraAffineSource, CameraSource
 from robolink.model import TIP, Spot, SpotUnit, TipSensor
-from robolink.sensing import SENSORS_GROUP, open_sensor, seen_once, sensor_name
+from robolink.sensing import SENSORS_GROUP, open_sensor, scatter_of, seen_once, sensor_name
 from tests.contract._camera_cell import camera_model, camera_station, cell_of, run_source
 from tests.contract._sensor_cell import miss_mm
 
@@ -30,6 +32,31 @@ class Pictures:
 
     def close(self):
         self.closed = True
+
+
+def test_a_finder_may_tell_how_wide_a_spot_is_and_how_sure_it_was():
+    camera = Pictures([(3, 4, 12.0, 0.9)], [(3, 5, 12.4)], [(30, 4, 12.1, 0.7)])
+    assert seen_once(camera, TIP, pictures=3) == Spot(3, 4, 12.1, pytest.approx(0.8))
+    assert seen_once(Pictures([(3, 4)]), TIP, pictures=1) == Spot(3, 4)
+
+
+@pytest.mark.parametrize("radius_px", [math.nan, -1.0, 0.0])
+def test_a_radius_that_is_none_is_refused(radius_px):
+    with pytest.raises(CalibrationError, match="radius") as refusal:
+        seen_once(Pictures([(3, 4, radius_px)]), TIP, pictures=1)
+    assert refusal.value.code == "non_finite"
+
+
+def test_the_scatter_of_pictures_leaves_a_false_find_out():
+    rng = random.Random(2)
+    found = []
+    for _ in range(300):
+        spots = [Spot(rng.gauss(0, 0.2), rng.gauss(0, 0.2)) for _ in range(3)]
+        found.append(scatter_of([*spots[:2], Spot(40.0, -30.0)]))
+        found.append(scatter_of(spots))
+    assert 0.15 < median(found) < 0.35
+    assert max(found) < 3.0  # one pair of 40 and 30 has a standard deviation of 20
+    assert scatter_of([Spot(1, 2)]) is None
 
 
 @pytest.fixture

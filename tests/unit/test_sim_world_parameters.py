@@ -268,3 +268,51 @@ def test_play_of_an_arm_that_was_placed_by_hand_is_that_of_its_last_way():
         target = replace(flange, x_mm=flange.x_mm + dx_mm)
         arm.place(inverse(arm.model, target, arm.hand), 0)
     assert math.dist(world.tip_mm()[:2], before[:2]) > 0.01
+
+
+def see(simulator, times=1):
+    return [perform(simulator, {"do": "see"}) for _ in range(times)][-1]
+
+
+def before_the_lens(simulator):
+    world = simulator.world
+    way = (b - a for a, b in zip(world.tip_mm(), world.camera.middle_mm, strict=True))
+    world.robot.carry(world.tips[1], tuple(way))
+
+
+def test_a_finder_takes_a_spot_that_stands_still_for_the_tip(make):
+    simulator = make(camera_noise_px=0.0)
+    before_the_lens(simulator)
+    jogged(simulator, 1.0)
+    width, height = simulator.world.camera.optics.size_px
+    (true,) = see(simulator)["seen"]
+    fleck = pytest.approx([width / 2, height / 2 + 30.0])
+    assert true != fleck
+    faults = {"camera_still_share": 1, "camera_still_beside_px": 30, "camera_still_toward_deg": 90}
+    perform(simulator, {"do": "set_world", **faults, "camera_still_from_picture": 3})
+    assert [see(simulator)["seen"] for _ in range(4)] == [[true], [true], [fleck], [fleck]]
+    # Only where no tip is in the picture.
+    perform(simulator, {"do": "set_world", **faults, "camera_still_unseen": 1})
+    assert see(simulator, 3)["seen"] == [true]
+    jogged(simulator, 10.0, axis=2)
+    assert see(simulator, 3)["seen"] == [fleck]
+    # Now and then, and never with the fault taken away.
+    perform(simulator, {"do": "set_world", "camera_still_share": 0.5, "camera_still_unseen": 0})
+    assert {len(see(simulator)["seen"]) for _ in range(20)} == {0, 1}
+    perform(simulator, {"do": "set_world", "camera_still_share": 0})
+    assert see(simulator)["seen"] == []
+
+
+def test_a_finder_tells_the_radius_of_a_spot_and_it_may_swell(make):
+    simulator = make()
+    before_the_lens(simulator)
+    assert see(simulator)["radii_px"] == []
+    spots = {"camera_spot_radius_px": 12, "camera_spot_swells_by": 0.25}
+    perform(simulator, {"do": "set_world", **spots, "camera_spot_swells_from_picture": 3})
+    radii = [see(simulator)["radii_px"][0] for _ in range(4)]
+    assert radii == pytest.approx([12.0, 12.0, 15.0, 15.0], abs=0.3)
+
+
+def test_a_share_of_still_spots_is_a_share():
+    with pytest.raises(ConfigError, match="above 1"):
+        perform(EpsonSimulator(seed=2), {"do": "set_world", "camera_still_share": 1.5})

@@ -5,6 +5,7 @@ A fleck on the window, a lamp's reflection or a wrong circle stands still wherev
 place of the tip was seen at real cells by others; how often is assumed.
 """
 
+import math
 import random
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,17 +23,18 @@ class FinderFaults:
         still_from_picture: The first picture to which that share applies, counted from when the
             world was last set up.
         still_unseen: The still spot is found only where the picture shows no mark, in that share.
-        still_right_px, still_down_px: Where it stands, from the middle of the image.
+        still_beside_px, still_toward_deg: How far from the middle of the image it stands, and in
+            which direction, from right to down.
         spot_radius_px: Half the width of a spot that is found; 0 for a finder that tells none.
-        spot_swells_by: Share by which the radius grows; below 0 it shrinks.
+        spot_swells_by: Share by which the radius grows.
         spot_swells_from_picture: From which picture on.
     """
 
     still_share: float = 0.0
     still_from_picture: int = 1
     still_unseen: bool = False
-    still_right_px: float = 0.0
-    still_down_px: float = 0.0
+    still_beside_px: float = 0.0
+    still_toward_deg: float = 0.0
     spot_radius_px: float = 0.0
     spot_swells_by: float = 0.0
     spot_swells_from_picture: int = 1
@@ -74,11 +76,12 @@ class Finder:
         self.pictures += exposes
         if not self._stands_still(found):
             return tuple(found)
-        middle = (
-            size_px[0] / 2 + faults.still_right_px,
-            size_px[1] / 2 + faults.still_down_px,
+        toward, beside_px = math.radians(faults.still_toward_deg), faults.still_beside_px
+        place = (
+            size_px[0] / 2 + beside_px * math.cos(toward),
+            size_px[1] / 2 + beside_px * math.sin(toward),
         )
-        x, y = (self._rng.gauss(at, noise_px) for at in middle)
+        x, y = (self._rng.gauss(at, noise_px) for at in place)
         return ((x, y), *(None for _ in found[1:]))
 
     def radius_px(self) -> float | None:

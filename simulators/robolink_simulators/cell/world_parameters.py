@@ -47,7 +47,8 @@ class WorldParameters:
         camera_still_share, camera_still_from_picture, camera_still_unseen: Share of the pictures
             in which the finder answers with a spot that stands still, the first picture to which
             it applies, and whether only where no mark is in the picture.
-        camera_still_right_px, camera_still_down_px: Where it stands, from the middle of the image.
+        camera_still_beside_px, camera_still_toward_deg: How far from the middle of the image it
+            stands, and in which direction, from right to down.
         camera_spot_radius_px: Radius of a found spot that the finder tells; 0 for none.
         camera_spot_swells_by, camera_spot_swells_from_picture: Share by which that grows, and
             from which picture on. Pictures count from when the world was set up.
@@ -99,8 +100,8 @@ class WorldParameters:
     camera_still_share: float = 0.0
     camera_still_from_picture: int = 1
     camera_still_unseen: bool = False
-    camera_still_right_px: float = 0.0
-    camera_still_down_px: float = 0.0
+    camera_still_beside_px: float = 0.0
+    camera_still_toward_deg: float = 0.0
     camera_spot_radius_px: float = 0.0
     camera_spot_swells_by: float = 0.0
     camera_spot_swells_from_picture: int = 1

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from robolink.calibration.camera.known_movement import Movement as Movement
     from robolink.calibration.camera.known_movement import SeenMovement as SeenMovement
     from robolink.calibration.camera.known_movement import camera_changed as camera_changed
+    from robolink.calibration.camera.known_movement import mm_camera_noise as mm_camera_noise
     from robolink.calibration.camera.known_movement import same_radius as same_radius
     from robolink.calibration.camera.known_movement import spot_changed as spot_changed
     from robolink.calibration.camera.known_movement import tip_did_not_move as tip_did_not_move
@@ -229,7 +230,7 @@ __getattr__ = lazy_exports(
         "camera.camera_model": "CameraLimits CameraModel USUAL_CAMERA require_same_camera",
         "camera.camera_round": "CameraRound as_round solve_camera_round",
         "camera.known_movement": "CameraChangeRows Movement SeenMovement camera_changed "
-        "same_radius spot_changed tip_did_not_move",
+        "mm_camera_noise same_radius spot_changed tip_did_not_move",
         "camera.runout": "RunoutReport runout_report",
         "camera.runout_table": "RunoutRow RunoutTable RunoutTableResult solve_runout_table",
         "camera.up_camera": "Sighting solve_up_camera",

@@ -16,13 +16,14 @@ from robolink.serving._judging import (
     require_poses_sent,
     require_room,
 )
+from robolink.serving._look_pairs import look_pairs, require_moving
 
 if TYPE_CHECKING:
     from robolink.calibration import CalibrationResult, Sighting, VerifyResult
 
 LEAST_LOOKS: Final = 4
 LEAST_PROOFS: Final = 3
-"""So many that a picture which stands still is not taken for a tip that does."""
+"""At so many angles; at each the tool stands beside its place first, and at it then."""
 
 _SEEN_APART: Final = 10.0
 """In a proof the tip stays before one place of the camera, within so many tolerances: a scale
@@ -33,7 +34,8 @@ class ProgramLooks:
     """Looks of an up-looking camera, solved as by ``calibrate camera``; a ``ProgramMeasure``.
 
     Each pose is followed by how many candidates were found, and X and Y of the one, base, in whole
-    thousandths of a millimetre.
+    thousandths of a millimetre. At each angle the program looks beside the place and then at it:
+    the last look counts, and those before it show that the spot moves as the robot does.
 
     Args:
         limits: What they are held to.
@@ -74,20 +76,21 @@ class ProgramLooks:
         """Return the offset; see ``ProgramMeasure``.
 
         Raises:
-            CalibrationError: ``too_few_poses``, ``picture_stands_still``, and those of
+            CalibrationError: ``too_few_poses``, ``picture_stands_still``, ``no_look_beside``,
+                ``tip_did_not_move``, ``camera_changed``, and those of
                 :func:`~robolink.calibration.solve_camera_round`.
         """
         from robolink.calibration import solve_camera_round
 
-        require_poses_sent(len(self._measured), LEAST_LOOKS)
-        _require_new_pictures(self._measured)
-        return solve_camera_round(self._measured, stored=stored, sigma_mm=self._limits.sigma_mm)
+        looks = _at_places(self._measured, LEAST_LOOKS)
+        return solve_camera_round(looks, stored=stored, sigma_mm=self._limits.sigma_mm)
 
     def prove(self, result: "CalibrationResult", written: ToolOffset) -> "VerifyResult":
         """Return how far from where the controller puts it the tip is seen; see ``ProgramMeasure``.
 
         Raises:
-            CalibrationError: ``too_few_poses``, ``picture_stands_still``, ``proof_is_a_copy``,
+            CalibrationError: ``too_few_poses``, ``picture_stands_still``, ``no_look_beside``,
+                ``tip_did_not_move``, ``camera_changed``, ``proof_is_a_copy``,
                 ``insufficient_rotation`` or ``not_turned_about_the_tip``.
         """
         from robolink.calibration import (
@@ -99,9 +102,8 @@ class ProgramLooks:
         )
         from robolink.procedures import camera_error_of
 
-        looks, limit_mm = self._proving, self._limits.tolerance_mm
-        require_poses_sent(len(looks), LEAST_PROOFS)
-        _require_new_pictures(looks)
+        limit_mm = self._limits.tolerance_mm
+        looks = _at_places(self._proving, LEAST_PROOFS)
         require_own([look.flange for look in looks], result.inputs)
         if angle_spread_deg([look.flange.u_deg for look in looks]) < MIN_ROTATION_DEG:
             raise CalibrationError(
@@ -131,6 +133,25 @@ class ProgramLooks:
             "flange": [list(astuple(look.flange)[:6]) for look in self._measured],
             "seen": [[look.x_mm, look.y_mm] for look in self._measured],
         }
+
+
+def _at_places(looks: "Sequence[Sighting]", least: int) -> "list[Sighting]":
+    """Return the looks at places, once those beside them have shown that the spot moves.
+
+    Args:
+        looks: All that were sent.
+        least: At how many angles there have to be some.
+
+    Raises:
+        CalibrationError: ``too_few_poses``, ``picture_stands_still``, ``no_look_beside``,
+            ``tip_did_not_move`` or ``camera_changed``.
+    """
+    require_poses_sent(len(looks), least)
+    _require_new_pictures(looks)
+    pairs = look_pairs(looks)
+    require_poses_sent(len(pairs), least)
+    require_moving(pairs)
+    return [pair.at for pair in pairs]
 
 
 def _require_new_pictures(looks: "Sequence[Sighting]") -> None:

@@ -58,25 +58,34 @@ LOOKS = (0.0, 85.0, -85.0, 150.0)
 PROVING_LOOKS = (40.0, -40.0, 110.0)
 _LOOKING = """
 Function LookAll(first As Integer, last As Integer, using As Integer) As Boolean
-  Integer i, n
-  Boolean found
-  Double x, y, u
+  Integer i
   LookAll = True
   Tool using
   For i = first To last
     If LookAll Then
+      Go P(i) -X(1) -Y(1)
+      LookAll = LookOnce()
+    EndIf
+    If LookAll Then
       Go P(i)
-      VRun findTip
-      VGet findTip.tip.NumberFound, n
-      x = 0
-      y = 0
-      If n > 0 Then
-        VGet findTip.tip.RobotXYU(1), found, x, y, u
-      EndIf
-      LookAll = RobolinkSeen(n, x, y)
+      LookAll = LookOnce()
     EndIf
   Next i
   Tool 1
+Fend
+
+Function LookOnce() As Boolean
+  Integer n
+  Boolean found
+  Double x, y, u
+  VRun findTip
+  VGet findTip.tip.NumberFound, n
+  x = 0
+  y = 0
+  If n > 0 Then
+    VGet findTip.tip.RobotXYU(1), found, x, y, u
+  EndIf
+  LookOnce = RobolinkSeen(n, x, y)
 Fend
 """
 

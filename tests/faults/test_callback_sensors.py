@@ -111,7 +111,8 @@ def test_a_proof_at_the_angle_of_the_measurement_proves_nothing(beams):
 
 def test_a_camera_looks_at_the_tip_and_that_is_proved_kept_and_on_record(camera):
     details = kept(camera, 0.02)
-    assert len(details["seen"]) == len(LOOKS)
+    # Beside each place, and at it.
+    assert len(details["seen"]) == 2 * len(LOOKS)
     assert 0 < details["known_within_mm"] < 0.05
 
 
@@ -123,7 +124,7 @@ def test_a_tip_that_is_not_seen_gives_no_value(camera):
 
 
 @pytest.fixture
-def still(tmp_path):
+def frozen(tmp_path):
     """A camera that takes one picture, and shows that again each time."""
     runs = "VRun findTip\n"
     made = CameraCell(
@@ -134,9 +135,9 @@ def still(tmp_path):
     made.close()
 
 
-def test_a_picture_that_stands_still_shows_no_offset(still):
+def test_a_picture_that_stands_still_shows_no_offset(frozen):
     """It agrees with whatever offset the tool was turned by: the old one would be 'proved'."""
-    refused(still, "picture_stands_still", [EntryKind.REFUSED])
+    refused(frozen, "picture_stands_still", [EntryKind.REFUSED])
 
 
 def scaled(truth, factor):
@@ -149,12 +150,46 @@ def scaled(truth, factor):
     return replace(right, mm_per_px=longer, origin_mm=origin)
 
 
+def still(camera, **faults):
+    world = camera.simulator.world
+    world.set_up(replace(world.parameters, camera_still_share=1.0, **faults))
+
+
+def test_a_spot_that_stands_still_gives_no_value_though_no_two_pictures_are_alike(camera):
+    """It confirmed whatever offset the points were taught with."""
+    still(camera)
+    refused(camera, "tip_did_not_move", [EntryKind.REFUSED])
+
+
 @pytest.mark.soak
-def test_a_camera_of_a_wrong_scale_shows_when_the_tool_turns_about_the_new_tip(camera):
+def test_a_spot_that_stands_still_in_the_proof_brings_the_old_value_back(camera):
+    still(camera, camera_still_from_picture=1 + 2 * len(LOOKS))
+    refused(camera, "tip_did_not_move", BACK)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("factor", [1.05, 0.8])
+def test_a_camera_of_a_wrong_scale_shows_in_each_way_to_a_place(camera, factor):
     """Turned 4 mm beside the tip, its circle is too large by as much, and no residual tells."""
-    camera.see(scaled(camera.simulator.world.camera, 1.05))
+    camera.see(scaled(camera.simulator.world.camera, factor))
     camera.look_from(11, LOOKS, ToolOffset(8.0, -3.5, -20.0))
+    refused(camera, "camera_changed", [EntryKind.REFUSED])
+
+
+@pytest.mark.soak
+def test_a_scale_that_no_way_shows_is_seen_when_the_tool_turns_about_the_new_tip(camera):
+    camera.see(scaled(camera.simulator.world.camera, 1.018))
+    camera.look_from(11, LOOKS, ToolOffset(18.0, -3.5, -20.0))
     refused(camera, "drift", BACK)
+
+
+@pytest.mark.soak
+def test_looks_without_one_beside_each_place_show_nothing(tmp_path):
+    beside = "Go P(i) -X(1) -Y(1)"
+    made = CameraCell(tmp_path, main=CameraCell.main.replace(beside, "Go P(i)"))
+    made.change_needle()
+    refused(made, "no_look_beside", [EntryKind.REFUSED])
+    made.close()
 
 
 @pytest.mark.soak

@@ -185,6 +185,11 @@ class SeenMovement:
         return abs(self.ratio - other.ratio) <= min(within * whole + chance, whole / 2)
 
 
+def mm_camera_noise() -> float:
+    """Return the standard deviation of a movement between two pictures of a camera of mm, mm."""
+    return math.hypot(CAMERA_SIGMA_MM, CAMERA_SIGMA_MM, ROBOT_SIGMA_MM)
+
+
 def same_radius(radius_px: float, usual_px: float) -> bool:
     """Return whether a spot is as wide as the others of a run: within 3 %, or 0.3 px."""
     return abs(radius_px - usual_px) <= max(RADIUS_WITHIN * usual_px, LEAST_RADIUS_PX)

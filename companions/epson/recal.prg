@@ -14,7 +14,8 @@
 ' In place of touches, with RobolinkBegin(1, "beams@NAME") or RobolinkBegin(1, "camera"):
 '
 '     RobolinkApproach(8), then twice RobolinkEdge(1, 8)   beam 1 on input 8: broken, free again
-'     RobolinkSeen(n, x, y)                robot at rest: n candidates, and where the one is, RobotXYU
+'     RobolinkSeen(n, x, y)                robot at rest: n candidates, and where the one is, RobotXYU;
+'                                          beside each place first, then at it
 '     RobolinkFinish                       keeps the new value, or puts the old one back
 '     RobolinkClose                        in any case
 '

@@ -344,7 +344,10 @@ class CameraDrive:
         except CalibrationError:
             yield from self.lifted(place)
             raise
-        yield Notify(self._told(seen, self._middle(place)))
+        told, score = self._told(seen, self._middle(place)), seen.spot.score
+        yield Notify(
+            told if score is None else tr("{seen}; score {score:g}", seen=told, score=score)
+        )
         return self.watch.heard(seen)
 
     def _told(self, seen: SeenAt, middle_mm: tuple[float, float]) -> str:

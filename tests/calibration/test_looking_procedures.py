@@ -45,6 +45,7 @@ class IdealCell:
         self.marks, self.frame, self.off_mm = marks, here, off_mm
         self.blind, self.unit, self.steps = blind, unit, []
         self.told, self.offers, self.wrong, self.focus = [], [], {}, True
+        self.score = None
 
     def run(self, procedure):
         try:
@@ -86,7 +87,7 @@ class IdealCell:
             return self.frame
         if len(self.looks) == self.blind:
             raise CalibrationError("tip_not_seen", "nothing there", remedy="look")
-        spot = self._spot(self.marks[step.mark])
+        spot = replace(self._spot(self.marks[step.mark]), score=self.score)
         spot = replace(spot, x=spot.x + self.wrong.get(len(self.looks), 0.0))
         return SeenAt.of(self.frame, spot, self.unit)
 
@@ -207,6 +208,14 @@ def test_the_tool_is_lifted_before_it_turns_and_every_place_is_met_from_one_side
     # The picture beside costs no movement: there, two at the next place, four at each of three
     # further angles, and off.
     assert sum(isinstance(step, Move) for step in cell.steps) == 3 + 2 + 3 * 4 + 1
+
+
+def test_the_score_of_a_finder_is_shown_and_decides_nothing():
+    cell = tip_cell()
+    cell.score = 0.125
+    result = cell.run(measure_camera(STATION, LookPlan(), here=HERE, stored=STORED))
+    assert cell.told[0] == "seen X +0.310 Y +0.346 mm from where it is expected; score 0.125"
+    assert miss(result.offset, TIP) < 1e-9
 
 
 def test_after_the_first_look_the_tip_is_brought_to_the_middle():

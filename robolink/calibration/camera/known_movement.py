@@ -3,7 +3,7 @@
 With the tool held in one orientation, every point of it moves by the vector by which the robot
 moved, so a spot that is the tip moves by that vector too, whatever the offset is. A spot that
 stands still does not, and one seen by a camera whose scale or turn changed moves by another one
-(docs/reference/evidence.md 20).
+(docs/reference/vision.md 7).
 """
 
 import cmath

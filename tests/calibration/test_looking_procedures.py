@@ -191,10 +191,7 @@ def test_the_tool_is_lifted_before_it_turns_and_every_place_is_met_from_one_side
         if isinstance(step, Look) and step not in cell.placed:
             assert isinstance(cell.steps[index - 1], Move)
         elif isinstance(step, Look):
-            beside, _, came = (
-                one if isinstance(one, Look) else one.target
-                for one in cell.steps[index - 3 : index]
-            )
+            beside, came = cell.steps[index - 3].target, cell.steps[index - 1].target
             assert came.z_mm == beside.z_mm == in_focus_mm
             assert came.x_mm - beside.x_mm == pytest.approx(plan.beside_mm)
             assert came.y_mm - beside.y_mm == pytest.approx(plan.beside_mm)

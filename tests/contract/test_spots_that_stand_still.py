@@ -6,6 +6,7 @@ turn test was 0.004: the believed tip is brought back to the middle at every ang
 """
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
@@ -79,6 +80,8 @@ def refusal(cell, source, *, error=CalibrationError, listener=None):
                     controller.take()
                 cell.change(source, listener)(controller)
     after = stored_in(cell)
+    assert before is not None
+    assert after is not None
     assert after.rounded(3) == before.rounded(3)
     assert cell.tip_z_mm > cell.simulator.world.camera.middle_mm[2] + 8.0
     assert raised.value.remedy
@@ -170,6 +173,7 @@ def test_a_spot_that_leaves_the_picture_beside_its_place_is_looked_for_nearer(fl
         truth = cell.truth
         with cell.connected() as controller:
             stored = controller.tools.read(TOOL)
+            assert stored is not None
             # A tip that sits where it is believed stays where the station is.
             cell.simulator.world.tips[TOOL] = replace(truth, x_mm=stored.x_mm, y_mm=stored.y_mm)
         if fleck:
@@ -178,7 +182,7 @@ def test_a_spot_that_leaves_the_picture_beside_its_place_is_looked_for_nearer(fl
         assert miss_mm(report.proposal.result.offset, cell.truth) < 0.01
 
 
-CHANGES = {
+CHANGES: dict[str, dict[str, Any]] = {
     "turned": {"camera_turn_deg": 13.0},
     "turned back": {"camera_turn_deg": 359.0},
     "another scale": {"camera_um_per_px_x": 25.0, "camera_um_per_px_y": 25.0},

@@ -11,8 +11,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Final
 
-from robolink_simulators.cell.finder_faults import Finder, Pixel
-from robolink_simulators.cell.places import XyzMm
+from robolink_simulators.cell.finder_faults import Finder
+from robolink_simulators.cell.places import Pixel, XyzMm
 
 _LENS_MM: Final = 120.0
 """From lens to the plane of focus (assumed)."""

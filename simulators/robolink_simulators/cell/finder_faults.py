@@ -10,7 +10,7 @@ import random
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-Pixel = tuple[float, float]
+from robolink_simulators.cell.places import Pixel
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,7 @@ from robolink.model import ToolOffset
 XyzMm = tuple[float, float, float]
 """X, Y, Z in mm, in the robot's base frame."""
 
+Pixel = tuple[float, float]
 Direction = tuple[float, float, float]
 """A unit vector."""
 

@@ -13,9 +13,9 @@ from typing import Any, ClassVar, Final, Protocol
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import TIP, Pose, ToolOffset
-from robolink_simulators.cell.camera import CameraTruth, Pixel
+from robolink_simulators.cell.camera import CameraTruth
 from robolink_simulators.cell.held_board import SimulatedBoard
-from robolink_simulators.cell.places import Axis, Direction, axis_of
+from robolink_simulators.cell.places import Axis, Direction, Pixel, axis_of
 from robolink_simulators.cell.places import XyzMm as XyzMm
 from robolink_simulators.cell.pressing import resistance_n
 from robolink_simulators.cell.surfaces import FlatPlate, RoundBall, Surface, SurfaceContact

@@ -10,7 +10,8 @@ from enum import IntEnum
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink_simulators.cell.camera import CameraTruth, Pixel
+from robolink_simulators.cell.camera import CameraTruth
+from robolink_simulators.cell.places import Pixel
 
 _FEWEST_POINTS = 3
 

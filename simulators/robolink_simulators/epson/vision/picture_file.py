@@ -8,7 +8,7 @@ import struct
 from collections.abc import Iterable
 from typing import Final
 
-from robolink_simulators.cell.camera import Pixel
+from robolink_simulators.cell.places import Pixel
 
 SUFFIX: Final = ".bmp"
 

@@ -12,7 +12,7 @@ from typing import Final
 
 from robolink.errors import ConfigError
 from robolink.model import TIP, Pose
-from robolink_simulators.cell.camera import Pixel
+from robolink_simulators.cell.places import Pixel
 from robolink_simulators.cell.workplace import Workplace
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from typing import Final
 
 from robolink.model import Pose
-from robolink_simulators.cell.camera import Pixel
+from robolink_simulators.cell.places import Pixel
 from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.refusals import RaisedError
 from robolink_simulators.epson.spel.expressions.values import as_integer

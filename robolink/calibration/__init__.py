@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from robolink.calibration.camera.camera_round import as_round as as_round
     from robolink.calibration.camera.camera_round import solve_camera_round as solve_camera_round
     from robolink.calibration.camera.known_movement import CameraChangeRows as CameraChangeRows
-    from robolink.calibration.camera.known_movement import Movement as Movement
+    from robolink.calibration.camera.known_movement import MovementVerdict as MovementVerdict
     from robolink.calibration.camera.known_movement import SeenMovement as SeenMovement
     from robolink.calibration.camera.known_movement import camera_changed as camera_changed
     from robolink.calibration.camera.known_movement import mm_camera_noise as mm_camera_noise
@@ -229,7 +229,7 @@ __getattr__ = lazy_exports(
         "camera.camera_affine": "CameraCalibration PixelSighting solve_camera_affine",
         "camera.camera_model": "CameraLimits CameraModel USUAL_CAMERA require_same_camera",
         "camera.camera_round": "CameraRound as_round solve_camera_round",
-        "camera.known_movement": "CameraChangeRows Movement SeenMovement camera_changed "
+        "camera.known_movement": "CameraChangeRows MovementVerdict SeenMovement camera_changed "
         "mm_camera_noise same_radius spot_changed tip_did_not_move",
         "camera.runout": "RunoutReport runout_report",
         "camera.runout_table": "RunoutRow RunoutTable RunoutTableResult solve_runout_table",

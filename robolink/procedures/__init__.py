@@ -12,25 +12,24 @@ if TYPE_CHECKING:
     from robolink.procedures.approach import approach_path as approach_path
     from robolink.procedures.approach import offset_z as offset_z
     from robolink.procedures.approach import seek_or_retract as seek_or_retract
-    from robolink.procedures.camera_drive import CameraDrive as CameraDrive
-    from robolink.procedures.camera_drive import Place as Place
-    from robolink.procedures.camera_plan import HALF_ROUND_DEG as HALF_ROUND_DEG
-    from robolink.procedures.camera_plan import LEAST_BESIDE_MM as LEAST_BESIDE_MM
-    from robolink.procedures.camera_plan import TWO_ANGLES_DEG as TWO_ANGLES_DEG
-    from robolink.procedures.camera_plan import LookPlan as LookPlan
-    from robolink.procedures.camera_samples import CameraSamples as CameraSamples
-    from robolink.procedures.camera_source import CalibratedCameraSource as CalibratedCameraSource
-    from robolink.procedures.camera_source import angles_between as angles_between
-    from robolink.procedures.camera_source import calibrated_camera as calibrated_camera
-    from robolink.procedures.camera_source import camera_error_of as camera_error_of
-    from robolink.procedures.camera_source import pixel_camera as pixel_camera
-    from robolink.procedures.camera_source import proof_angles as proof_angles
-    from robolink.procedures.camera_source import radius_of as radius_of
-    from robolink.procedures.camera_verify import NO_ERROR as NO_ERROR
-    from robolink.procedures.camera_verify import nearest_first as nearest_first
-    from robolink.procedures.camera_verify import seen_drift as seen_drift
-    from robolink.procedures.camera_verify import verify_by_looking as verify_by_looking
-    from robolink.procedures.camera_watch import SpotWatch as SpotWatch
+    from robolink.procedures.camera.drive import CameraDrive as CameraDrive
+    from robolink.procedures.camera.drive import Place as Place
+    from robolink.procedures.camera.plan import HALF_ROUND_DEG as HALF_ROUND_DEG
+    from robolink.procedures.camera.plan import LEAST_BESIDE_MM as LEAST_BESIDE_MM
+    from robolink.procedures.camera.plan import TWO_ANGLES_DEG as TWO_ANGLES_DEG
+    from robolink.procedures.camera.plan import LookPlan as LookPlan
+    from robolink.procedures.camera.samples import CameraSamples as CameraSamples
+    from robolink.procedures.camera.source import CalibratedCameraSource as CalibratedCameraSource
+    from robolink.procedures.camera.source import angles_between as angles_between
+    from robolink.procedures.camera.source import calibrated_camera as calibrated_camera
+    from robolink.procedures.camera.source import camera_error_of as camera_error_of
+    from robolink.procedures.camera.source import pixel_camera as pixel_camera
+    from robolink.procedures.camera.source import proof_angles as proof_angles
+    from robolink.procedures.camera.source import radius_of as radius_of
+    from robolink.procedures.camera.verify import NO_ERROR as NO_ERROR
+    from robolink.procedures.camera.verify import nearest_first as nearest_first
+    from robolink.procedures.camera.verify import seen_drift as seen_drift
+    from robolink.procedures.camera.verify import verify_by_looking as verify_by_looking
     from robolink.procedures.input_source import InputSource as InputSource
     from robolink.procedures.lazy_source import LazySource as LazySource
     from robolink.procedures.pin.judging import TOUCH_CODES as TOUCH_CODES
@@ -85,15 +84,14 @@ __getattr__ = lazy_exports(
     __name__,
     {
         "approach": "NO_OFFSET approach_path offset_z seek_or_retract",
-        "camera_plan": "HALF_ROUND_DEG LEAST_BESIDE_MM LookPlan TWO_ANGLES_DEG",
-        "camera_drive": "CameraDrive Place",
-        "camera_samples": "CameraSamples",
-        "camera_source": (
+        "camera.plan": "HALF_ROUND_DEG LEAST_BESIDE_MM LookPlan TWO_ANGLES_DEG",
+        "camera.drive": "CameraDrive Place",
+        "camera.samples": "CameraSamples",
+        "camera.source": (
             "CalibratedCameraSource angles_between calibrated_camera camera_error_of pixel_camera "
             "proof_angles radius_of"
         ),
-        "camera_verify": "NO_ERROR nearest_first seen_drift verify_by_looking",
-        "camera_watch": "SpotWatch",
+        "camera.verify": "NO_ERROR nearest_first seen_drift verify_by_looking",
         "input_source": "InputSource",
         "lazy_source": "LazySource",
         "pin.judging": "TOUCH_CODES heights_agree jog_mm require_one_height require_touches",

@@ -37,8 +37,9 @@ def seen_once(sensor: TipSensor, mark: int, *, pictures: int) -> Spot:
         >>> from robolink.sensing import seen_once
         >>> answers = iter([Spot(312.3, 96.3), Spot(312.4, 96.3), Spot(340.0, 96.3)])
         >>> camera = SimpleNamespace(see=lambda mark: [next(answers)], identity="a camera")
-        >>> seen_once(camera, TIP, pictures=3)
-        Spot(x=312.4, y=96.3)
+        >>> spot = seen_once(camera, TIP, pictures=3)
+        >>> spot.x, spot.y
+        (312.4, 96.3)
     """
     return median_spot(seen_in(sensor, mark, pictures=pictures))
 

@@ -85,7 +85,7 @@ def require_moving(pairs: Sequence[LookPair]) -> None:
     """
     from robolink.calibration import (
         CameraChangeRows,
-        Movement,
+        MovementVerdict,
         camera_changed,
         tip_did_not_move,
     )
@@ -94,7 +94,7 @@ def require_moving(pairs: Sequence[LookPair]) -> None:
     wrong = [
         movement
         for movement in movements
-        if movement.judged(CameraChangeRows(), play_mm=_PLAY_MM) is not Movement.AS_KNOWN
+        if movement.judged(CameraChangeRows(), play_mm=_PLAY_MM) is not MovementVerdict.AS_KNOWN
     ]
     # A camera that changed shows every way in one wrong manner; that play makes one of them seem
     # wrong is no reason to refuse the others.
@@ -105,7 +105,7 @@ def require_moving(pairs: Sequence[LookPair]) -> None:
         ):
             raise tip_did_not_move(movement, in_mm=True)
     if len(wrong) == len(movements):
-        still = wrong[0].judged(CameraChangeRows(), play_mm=0.0) is Movement.NONE
+        still = wrong[0].judged(CameraChangeRows(), play_mm=0.0) is MovementVerdict.NONE
         raise tip_did_not_move(wrong[0], in_mm=True) if still else camera_changed(wrong[0])
 
 

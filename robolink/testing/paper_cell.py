@@ -63,6 +63,7 @@ class PaperCell:
             person brings it from a place.
         switches: Whether an input is on with the tip at a place, by its number.
         marks: What the camera sees, seen from the frame, by number; the tip by default.
+        mm_per_px: How long a pixel of the camera is, ``None`` for one that answers in mm.
 
     Example:
         >>> from robolink import Pose, ToolOffset
@@ -83,6 +84,7 @@ class PaperCell:
         *,
         switches: Mapping[int, Callable[[XyzMm], bool]] | None = None,
         marks: Mapping[int, ToolOffset] | None = None,
+        mm_per_px: float | None = None,
     ) -> None:
         self.here = here
         self.steps: list[Step] = []
@@ -91,6 +93,7 @@ class PaperCell:
         self._touched = touched
         self._switches = switches or {}
         self._marks = {TIP: tip} if marks is None else marks
+        self._mm_per_px = mm_per_px
 
     def run(self, procedure: Procedure[T]) -> T:
         """Take the steps of a procedure and return its result.
@@ -189,7 +192,9 @@ class PaperCell:
         if step.mark not in self._marks:
             raise CalibrationError("tip_not_seen", tr("The camera did not see the tip."))
         x, y, _ = self._place(self._marks[step.mark])
-        return SeenAt.of(self.here, Spot(x, y), SpotUnit.BASE_MM)
+        if self._mm_per_px is None:
+            return SeenAt.of(self.here, Spot(x, y), SpotUnit.BASE_MM)
+        return SeenAt.of(self.here, Spot(x / self._mm_per_px, y / self._mm_per_px), SpotUnit.PIXEL)
 
 
 def _xyz(pose: Pose) -> XyzMm:

@@ -8,7 +8,7 @@ import pytest
 
 from robolink.calibration import (
     CameraChangeRows,
-    Movement,
+    MovementVerdict,
     SeenMovement,
     camera_changed,
     same_radius,
@@ -33,19 +33,19 @@ def turned(degrees, scale=1.0):
 @pytest.mark.parametrize(
     ("factor", "verdict"),
     [
-        (1.0, Movement.AS_KNOWN),
-        (turned(0.7), Movement.AS_KNOWN),
-        (1.015, Movement.AS_KNOWN),
-        (0.985, Movement.AS_KNOWN),
-        (turned(2.0), Movement.ANOTHER),
-        (turned(-10.0), Movement.ANOTHER),
-        (turned(90.0), Movement.ANOTHER),
-        (1.04, Movement.ANOTHER),
-        (1.25, Movement.ANOTHER),
-        (0.8, Movement.ANOTHER),
-        (-1.0, Movement.ANOTHER),
-        (0.3, Movement.NONE),
-        (0.0, Movement.NONE),
+        (1.0, MovementVerdict.AS_KNOWN),
+        (turned(0.7), MovementVerdict.AS_KNOWN),
+        (1.015, MovementVerdict.AS_KNOWN),
+        (0.985, MovementVerdict.AS_KNOWN),
+        (turned(2.0), MovementVerdict.ANOTHER),
+        (turned(-10.0), MovementVerdict.ANOTHER),
+        (turned(90.0), MovementVerdict.ANOTHER),
+        (1.04, MovementVerdict.ANOTHER),
+        (1.25, MovementVerdict.ANOTHER),
+        (0.8, MovementVerdict.ANOTHER),
+        (-1.0, MovementVerdict.ANOTHER),
+        (0.3, MovementVerdict.NONE),
+        (0.0, MovementVerdict.NONE),
     ],
 )
 def test_what_a_calibrated_camera_may_see_of_a_movement(factor, verdict):
@@ -54,16 +54,16 @@ def test_what_a_calibrated_camera_may_see_of_a_movement(factor, verdict):
 
 def test_play_that_was_found_is_allowed_for_up_to_a_tenth():
     off = SeenMovement(KNOWN, (1.08, 0.96), 0.003)
-    assert off.judged(ROWS, play_mm=0.0) is Movement.ANOTHER
-    assert off.judged(ROWS, play_mm=0.07) is Movement.AS_KNOWN
+    assert off.judged(ROWS, play_mm=0.0) is MovementVerdict.ANOTHER
+    assert off.judged(ROWS, play_mm=0.07) is MovementVerdict.AS_KNOWN
     far = SeenMovement(KNOWN, (1.25, 0.95), 0.003)
-    assert far.judged(ROWS, play_mm=5.0) is Movement.ANOTHER
-    assert seen_by(0.0).judged(ROWS, play_mm=5.0) is Movement.NONE
+    assert far.judged(ROWS, play_mm=5.0) is MovementVerdict.ANOTHER
+    assert seen_by(0.0).judged(ROWS, play_mm=5.0) is MovementVerdict.NONE
 
 
 def test_a_camera_that_was_calibrated_badly_may_differ_more():
     assert seen_by(1.05).judged(CameraChangeRows(scale_sigma=0.02), play_mm=0.0) is (
-        Movement.AS_KNOWN
+        MovementVerdict.AS_KNOWN
     )
     assert ROWS.u_scale == pytest.approx(0.0065, abs=1e-4)
     assert ROWS.u_turn_deg == pytest.approx(0.2887, abs=1e-3)
@@ -76,7 +76,7 @@ def test_chance_alone_is_no_alarm(sigma_px):
     for _ in range(2000):
         seen = (1.0 + rng.gauss(0, sigma), 1.0 + rng.gauss(0, sigma))
         verdict = SeenMovement(KNOWN, seen, sigma).judged(ROWS, play_mm=0)
-        alarms += verdict is not Movement.AS_KNOWN
+        alarms += verdict is not MovementVerdict.AS_KNOWN
     # One alone has a closer look; only two of them in a row refuse.
     assert alarms <= 2
 

@@ -80,7 +80,7 @@ class CameraChangeRows:
         return math.hypot(self.turn_deg / math.sqrt(3), math.degrees(self.scale_sigma))
 
 
-class Movement(Enum):
+class MovementVerdict(Enum):
     """What a seen movement says."""
 
     AS_KNOWN = auto()
@@ -137,7 +137,7 @@ class SeenMovement:
         """Whether the movement is long enough to tell anything beside its scatter; in mm."""
         return self.noise <= _DULLEST * self.known_length_mm
 
-    def judged(self, rows: CameraChangeRows, *, play_mm: float = 0.0) -> Movement:
+    def judged(self, rows: CameraChangeRows, *, play_mm: float = 0.0) -> MovementVerdict:
         """Return what it says of a camera that is calibrated.
 
         Args:
@@ -158,18 +158,18 @@ class SeenMovement:
         off_mm = math.dist(self.seen, self.known_mm)
         chance = _FACTOR * self.noise
         if self.seen_length < LEAST_SHARE * length_mm:
-            return Movement.NONE
+            return MovementVerdict.NONE
         play_mm = min(_PLAY_AGAIN * play_mm, FOLLOWS_WITHIN * length_mm)
         if play_mm and off_mm <= play_mm + chance:
-            return Movement.AS_KNOWN
+            return MovementVerdict.AS_KNOWN
         along = abs(self.seen_length / length_mm - 1)
         across = abs(math.radians(self.turn_deg))
         share = self.noise / length_mm
         u_scale = math.hypot(rows.u_scale, share)
         u_turn = math.hypot(math.radians(rows.u_turn_deg), share)
         if along <= _FACTOR * u_scale and across <= _FACTOR * u_turn:
-            return Movement.AS_KNOWN
-        return Movement.ANOTHER
+            return MovementVerdict.AS_KNOWN
+        return MovementVerdict.ANOTHER
 
     def like(self, other: "SeenMovement", *, within: float) -> bool:
         """Return whether two movements were seen alike, each per mm of the robot's own.

@@ -56,7 +56,7 @@ def measure_camera_affine(
         >>> camera, here = CameraStation(x_mm=300, y_mm=80, z_mm=-30), Pose(300, 100, 20, 0)
         >>> plan, stored = CameraAffineParameters(), ToolOffset(12, -3.5, -20)
         >>> course = measure_camera_affine(camera, plan, here=here, stored=stored)
-        >>> found = PaperCell(here, ToolOffset(12.2, -3.6, -20)).run(course)
+        >>> found = PaperCell(here, ToolOffset(12.2, -3.6, -20), mm_per_px=0.02).run(course)
         >>> round(found.offset.x_mm, 3), round(found.offset.y_mm, 3)
         (12.2, -3.6)
     """

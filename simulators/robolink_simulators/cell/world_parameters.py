@@ -11,8 +11,7 @@ from typing import Final
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink_simulators.cell.camera import CameraOptics
-from robolink_simulators.cell.finder_faults import FinderFaults
+from robolink_simulators.cell.camera import CameraOptics, FinderFaults
 from robolink_simulators.cell.habits import BiasFrame, PersonHabits, PinBump
 from robolink_simulators.cell.surfaces import Touched
 from robolink_simulators.cell.tip_switches import Lean

@@ -9,8 +9,8 @@ from robolink.calibration import carrying, tip_did_not_move
 from robolink.errors import CalibrationError, ConfigError
 from robolink.messages import tr
 from robolink.model import TIP, Path, Pose, SpotUnit, ToolOffset
-from robolink.procedures.camera_plan import LEAST_BESIDE_MM, LookPlan
-from robolink.procedures.camera_watch import SpotWatch
+from robolink.procedures.camera.plan import LEAST_BESIDE_MM, LookPlan
+from robolink.procedures.camera.watch import SpotWatch
 from robolink.runner import Look, Move, Notify, Procedure, SeenAt, first_clear
 from robolink.stations import CameraStation
 

@@ -5,7 +5,7 @@ from typing import Generic
 
 from robolink.messages import tr
 from robolink.model import Pose
-from robolink.procedures.camera_drive import CameraDrive, Place
+from robolink.procedures.camera.drive import CameraDrive, Place
 from robolink.procedures.sampling.sampler import ResultT
 from robolink.procedures.sampling.sequential import finalize_samples
 from robolink.runner import Procedure, SeenAt

@@ -15,7 +15,7 @@ from robolink.calibration.camera.known_movement import (
     PIXEL_SIGMA,
     ROBOT_SIGMA_MM,
     CameraChangeRows,
-    Movement,
+    MovementVerdict,
     SeenMovement,
     camera_changed,
     same_radius,
@@ -97,7 +97,7 @@ class SpotWatch:
             return False
         if self.in_mm(after):
             verdict = movement.judged(self._rows(after), play_mm=self._play_mm)
-            return verdict is Movement.AS_KNOWN
+            return verdict is MovementVerdict.AS_KNOWN
         return self._follows_in_pixels(movement)
 
     def known_before(self, mark: int, u_deg: float, look: SeenAt) -> SeenAt | None:
@@ -147,7 +147,7 @@ class SpotWatch:
         if not self._same_thing(mark, before, after):
             return True
         if self.in_mm(after):
-            return movement.judged(self._rows(after), play_mm=0.0) is Movement.NONE
+            return movement.judged(self._rows(after), play_mm=0.0) is MovementVerdict.NONE
         return movement.seen_length < self._least_px(movement)
 
     def refusal(self, mark: int, wrong: Sequence[tuple[SeenAt, SeenAt]]) -> CalibrationError:
@@ -176,7 +176,7 @@ class SpotWatch:
         steady = (
             len(movements) > 1
             and all(one.like(last, within=FOLLOWS_WITHIN) for one in movements[:-1])
-            and last.judged(self._rows(after), play_mm=0.0) is not Movement.NONE
+            and last.judged(self._rows(after), play_mm=0.0) is not MovementVerdict.NONE
             and not any(pair.along(last) for pair in self.pairs)
         )
         return camera_changed(last) if steady else tip_did_not_move(last, in_mm=True)

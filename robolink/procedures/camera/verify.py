@@ -6,8 +6,8 @@ from typing import Final
 from robolink.calibration import Drift, FlangePlane, VerifyResult
 from robolink.model import TIP, Pose, ToolOffset
 from robolink.procedures.approach import NO_OFFSET
-from robolink.procedures.camera_drive import CameraDrive, Place
-from robolink.procedures.camera_plan import LookPlan
+from robolink.procedures.camera.drive import CameraDrive, Place
+from robolink.procedures.camera.plan import LookPlan
 from robolink.runner import Procedure, SeenAt
 from robolink.stations import CameraStation
 

@@ -1,0 +1,1 @@
+"""Marks brought before a camera, looked at, and what the looks say of the camera itself."""

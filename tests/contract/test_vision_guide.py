@@ -71,6 +71,24 @@ def lead_tip_to_camera(cell):
     world.robot.carry(cell.truth, by_mm)
 
 
+CHANGED = {
+    "tip_did_not_move": {"camera_still_share": 1.0},
+    "camera_changed": {"camera_turn_deg": 13.0},
+}
+
+
+@pytest.mark.parametrize("code", CHANGED)
+def test_a_still_spot_or_a_camera_that_was_turned_is_refused_there_too(cell, code):
+    install(cell)
+    furnish(cell, **CHANGED[code])
+    before = stored_in(cell)
+    with pytest.raises(CalibrationError) as refusal:
+        cell.run(CameraSource("vision-guide", camera_station(cell, known=False)))
+    assert refusal.value.code == code
+    assert stored_in(cell) == before
+    assert cell.simulator.machine.flash_writes == 0
+
+
 def test_a_nozzle_is_measured_and_proved_through_the_controllers_own_camera(cell):
     vision = install(cell)
     station = camera_station(cell, known=False)

@@ -210,8 +210,9 @@ class CameraDrive:
     def _look_beside(self, place: Place) -> Procedure[SeenAt | None]:
         """Take one picture where the approach begins; ``None`` where it does not tell."""
         beside = self._beside(place)
+        pictures = self.plan.pictures if self._measures_pixels else 1
         try:
-            return (yield from self._seen(place, beside, 1))
+            return (yield from self._seen(place, beside, pictures))
         except CalibrationError as error:
             if error.code in _UNSEEN:
                 return None
@@ -323,12 +324,23 @@ class CameraDrive:
 
     def _turn_to(self, place: Place, here: Pose) -> Procedure[None]:
         """Lift, go over and turn, come down beside the place."""
-        above = self._above(self._beside(place))
+        beside = self._beside(place)
+        # Where no pixel is known, the first movement is what all others are compared with: play of
+        # the joints is kept out of it.
+        low = _shifted(beside, -self.plan.beside_mm) if self._measures_pixels else beside
+        above = self._above(low)
         high_mm = max(here.z_mm, above.z_mm)
         if here.z_mm < high_mm:
             yield Move(replace(here, z_mm=high_mm), Path.STRAIGHT, tr("Lifting before the turn."))
         yield Move(replace(above, z_mm=high_mm), Path.JOINT, tr("Moving above the camera."))
-        yield Move(self._beside(place), Path.STRAIGHT, tr("Lowering into the camera's focus."))
+        yield Move(low, Path.STRAIGHT, tr("Lowering into the camera's focus."))
+        if low != beside:
+            yield from self._approach(beside)
+
+    @property
+    def _measures_pixels(self) -> bool:
+        """Whether the next movement is the first by which a camera is found."""
+        return not self.calibrated and not self.watch.pairs
 
     def _beside(self, place: Place) -> Pose:
         return _shifted(self.pose(place), -self.plan.beside_mm)

@@ -185,6 +185,7 @@ def test_a_spot_that_leaves_the_picture_beside_its_place_is_looked_for_nearer(fl
 CHANGES: dict[str, dict[str, Any]] = {
     "turned": {"camera_turn_deg": 13.0},
     "turned back": {"camera_turn_deg": 359.0},
+    "turned by little": {"camera_turn_deg": 4.8},
     "another scale": {"camera_um_per_px_x": 25.0, "camera_um_per_px_y": 25.0},
     "one scale": {"camera_um_per_px_y": 18.0},
     "mirrored": {"camera_mirrored": False},

@@ -171,7 +171,11 @@ class CameraDrive:
                 continue
             yield from self._approach(at)
             pair = before, (yield from self._look(place))
-            if watch.follows(place.mark, *pair):
+            # Over a shorter way more is allowed for: what was wrong over the whole one must not
+            # come to be right by that.
+            if watch.follows(place.mark, *pair) and not any(
+                watch.alike(pair, other) for other in wrong
+            ):
                 return pair
             wrong.append(pair)
             if len(wrong) == 2 or watch.stands_still(place.mark, *pair):

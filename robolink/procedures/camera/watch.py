@@ -150,6 +150,10 @@ class SpotWatch:
             return movement.judged(self._rows(after), play_mm=0.0) is MovementVerdict.NONE
         return movement.seen_length < self._least_px(movement)
 
+    def alike(self, one: tuple[SeenAt, SeenAt], other: tuple[SeenAt, SeenAt]) -> bool:
+        """Return whether two movements in one direction were seen in the same way."""
+        return self.movement(*one).like(self.movement(*other), within=FOLLOWS_WITHIN)
+
     def refusal(self, mark: int, wrong: Sequence[tuple[SeenAt, SeenAt]]) -> CalibrationError:
         """Return why a spot is not believed.
 
@@ -170,14 +174,16 @@ class SpotWatch:
         last = movements[-1]
         if not self.in_mm(after):
             return tip_did_not_move(last, in_mm=False)
-        # A camera that changed shows movements in one wrong way, whatever their length, and it did
-        # not change since it saw one rightly in this run. A fleck that is found in place of the
-        # tip in one of two pictures fits neither.
+        # A camera that changed shows movements in one wrong way, whatever their length; and by
+        # more than a tenth it did not change since it saw one rightly in this run. A fleck that is
+        # found in place of the tip in one of two pictures fits neither.
+        off_mm = math.dist(last.seen, last.known_mm)
+        near = off_mm <= FOLLOWS_WITHIN * last.known_length_mm + 3 * last.noise
         steady = (
             len(movements) > 1
             and all(one.like(last, within=FOLLOWS_WITHIN) for one in movements[:-1])
             and last.judged(self._rows(after), play_mm=0.0) is not MovementVerdict.NONE
-            and not any(pair.along(last) for pair in self.pairs)
+            and (near or not any(pair.along(last) for pair in self.pairs))
         )
         return camera_changed(last) if steady else tip_did_not_move(last, in_mm=True)
 

@@ -8,8 +8,14 @@ from robolink_simulators.softmotion.mailbox import PlcFault, PlcFaultAction
 
 from robolink.controllers.softmotion import Jog
 from robolink.controllers.softmotion.link.wire import MailboxWire
-from robolink.errors import ControllerFaultError, LimitError, RejectedError, StoppedError
-from robolink.model import WorkBox
+from robolink.errors import (
+    ControllerFaultError,
+    LeaseLostError,
+    LimitError,
+    RejectedError,
+    StoppedError,
+)
+from robolink.model import InputEdge, MotionProfile, Path, WorkBox
 from robolink.protocols.mailbox import ErrorClass
 from tests.contract._softmotion_cell import SLOW, above, served
 
@@ -61,6 +67,48 @@ def test_a_permit_that_is_withdrawn_ends_the_jog_and_no_status_moves_it_on(cell,
     assert distance_mm(controller, start) == pytest.approx(moved_mm, abs=0.01)
     assert not controller.status().running
     assert cell.open_requests == []
+
+
+def taken_over(cell, controller, command):
+    """Let a second program insist on the mailbox a while after a command was written."""
+    cell.simulator.faults.add(
+        PlcFault(PlcFaultAction.TAKE_OWNERSHIP, match=f"write_command {command}", seconds=0.4)
+    )
+
+
+def test_a_jog_that_another_program_takes_over_ends_at_once(cell, controller):
+    group = controller.groups[0]
+    start = group.pose()
+    taken_over(cell, controller, "JOG")
+    with pytest.raises(RejectedError, match="another program has taken it over") as refusal:
+        group.jog(BACK_ALONG_X, duration_s=5.0, box=box_around(start, 60.0))
+    assert refusal.value.code == ErrorClass.NOT_OWNER
+    assert 1.0 < distance_mm(controller, start) < 6.0
+    assert not controller.status().running
+    assert cell.open_requests == []
+    with pytest.raises(LeaseLostError):
+        group.jog(BACK_ALONG_X, duration_s=1.0, box=ANYWHERE)
+    assert cell.commands == ["JOG"]
+
+
+@pytest.mark.parametrize("kind", ["LINEAR", "DIRECT", "UNTIL_INPUT"])
+def test_a_movement_that_another_program_takes_over_is_said_to_be(cell, controller, kind):
+    group = controller.groups[0]
+    start = group.pose()
+    taken_over(cell, controller, f"MOVE_{kind}")
+    with pytest.raises(RejectedError, match="another program has taken it over") as refusal:
+        if kind == "UNTIL_INPUT":
+            edge = InputEdge(3)
+            motion = group.move_until_input(above(start, 20.0), edge, speed_mm_s=2.0, box=ANYWHERE)
+            motion.wait(timeout_s=30)
+        else:
+            profile = SLOW if kind == "LINEAR" else MotionProfile(Path.JOINT, speed_percent=1)
+            group.move_to(above(start, 20.0), profile, box=ANYWHERE).wait(timeout_s=30)
+    assert refusal.value.code == ErrorClass.NOT_OWNER
+    assert distance_mm(controller, start) < 15.0
+    assert cell.open_requests == []
+    with pytest.raises(LeaseLostError):
+        group.move_to(start, SLOW, box=ANYWHERE)
 
 
 def test_a_stop_from_another_thread_ends_the_jog_and_is_no_success(cell, controller, monkeypatch):

@@ -4,6 +4,7 @@ import csv
 import io
 import re
 import xml.etree.ElementTree as ElementTree
+from pathlib import Path
 
 import pytest
 from blark.parse import parse_source_code
@@ -11,7 +12,7 @@ from robolink_cli import main
 from robolink_cli.commands.companions.plc_export import plc_texts
 from robolink_simulators.softmotion.program.structured_plc import PROGRAM_SOURCES
 from robolink_simulators.structured_text import SourceText, StructuredProgram, TextDialect
-from robolink_simulators.structured_text.parse import parse
+from robolink_simulators.structured_text.parse import RESERVED_WORDS, is_vendor_word, parse
 
 from robolink.protocols.mailbox import (
     COMMAND,
@@ -57,6 +58,79 @@ def test_the_core_stays_in_the_common_subset(profile):
     assert core.dialect is TextDialect.COMMON
     made = StructuredProgram([core], "RL_SlotTable")
     assert made.value("begun") is False
+
+
+SHIPPED = Path(__file__).parents[2] / "companions" / "codesys"
+LISTS = ("RL_Kept.st", "RL_Machine.st")
+GLOBAL = re.compile(r"^(?:TYPE|FUNCTION_BLOCK|PROGRAM)\s+(\w+)", re.MULTILINE)
+
+
+def plain(text):
+    return re.sub(r"\{[^}]*\}", "", COMMENT.sub("", text))
+
+
+def declared_names(text):
+    """Return every name that a text declares: of types, blocks, members, variables, codes."""
+    text = plain(text)
+    names = GLOBAL.findall(text)
+    for section in re.findall(r"\bVAR(?:_\w+)?\b(.*?)\bEND_VAR\b", text, re.DOTALL):
+        names += re.findall(r"^\s*(\w+)(?:\s+AT\s+%\w+)?\s*:", section, re.MULTILINE)
+    for kind in ("STRUCT", "UNION"):
+        for inside in re.findall(rf":\s*{kind}\b(.*?)\bEND_{kind}\b", text, re.DOTALL):
+            names += re.findall(r"^\s*(\w+)\s*:", inside, re.MULTILINE)
+    for inside in re.findall(r"TYPE\s+\w+\s*:\s*\((.*?)\)", text, re.DOTALL):
+        names += re.findall(r"(\w+)\s*:=", inside)
+    return names
+
+
+def shipped_texts():
+    return {path.name: path.read_text() for path in sorted(SHIPPED.glob("*.st"))}
+
+
+def test_no_name_of_a_shipped_text_is_reserved_anywhere():
+    texts = shipped_texts()
+    assert {*PROGRAM_FILES, "robolink_mailbox_types.st"} == texts.keys()
+    names = {name: declared_names(text) for name, text in texts.items()}
+    assert {"RL_MailboxCore", "beat", "i0", "nowMs"} <= {*names["robolink_core.st"]}
+    assert {"BIT_POWERED", "OP_JOG", "client_heartbeat", "words"} <= {
+        *names["robolink_mailbox_types.st"]
+    }
+    assert sum(map(len, names.values())) > 500
+    found = [
+        f"{file}: {name}"
+        for file, named in names.items()
+        for name in named
+        if name.upper() in RESERVED_WORDS or is_vendor_word(name.upper()) or name.endswith("_")
+    ]
+    assert found == []
+
+
+def test_a_reserved_name_in_a_shipped_text_is_found():
+    text = shipped_texts()["robolink_core.st"].replace("    beat : WORD;", "    Bit : WORD;")
+    assert "Bit" in declared_names(text)
+    assert is_vendor_word("BIT")
+
+
+def test_types_blocks_lists_and_the_program_have_a_name_each():
+    names = []
+    for file, text in shipped_texts().items():
+        if "VAR_GLOBAL" in text:
+            names.append(file.partition(".")[0])
+        names += GLOBAL.findall(plain(text))
+    low = [name.lower() for name in names]
+    assert {"rl_kept", "rl_keptmemory", "rl_machine", "rl_prg"} <= {*low}
+    assert sorted({name for name in low if low.count(name) > 1}) == []
+
+
+def test_no_variable_has_the_name_of_a_type_or_a_block():
+    texts = shipped_texts().values()
+    told = {name.lower() for text in texts for name in GLOBAL.findall(plain(text))}
+    told |= {name.partition(".")[0].lower() for name in LISTS}
+    for text in texts:
+        own = [name.lower() for name in declared_names(text)]
+        for name in GLOBAL.findall(plain(text)):
+            own.remove(name.lower())
+        assert told.isdisjoint(own)
 
 
 def test_the_tools_profile_moves_nothing():
@@ -149,7 +223,7 @@ def test_the_xml_holds_every_unit_of_the_texts(profile):
 KINDS = ("inputVars", "outputVars", "inOutVars")
 
 
-@pytest.mark.parametrize("name", ["RL_Kept.st", "RL_Machine.st"])
+@pytest.mark.parametrize("name", LISTS)
 def test_a_foreign_parser_reads_the_lists(name):
     assert parse_source_code(program_texts(FULL)[name]).exception is None
 

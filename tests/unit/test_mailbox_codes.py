@@ -56,6 +56,13 @@ def test_only_stop_halt_and_ownership_need_no_owner():
     assert free == {Opcode.STOP, Opcode.HALT, Opcode.OWNERSHIP}
 
 
+def test_to_end_a_jog_needs_no_owner_and_to_press_a_button_does():
+    assert not Command(1, Opcode.JOG, operands=(0, 0, 5, 0)).needs_owner
+    assert Command(1, Opcode.JOG, operands=(1, 0, 0, 0)).needs_owner
+    assert Command(1, Opcode.JOG, operands=(0, 1, 0, 0)).needs_owner
+    assert Command(1, Opcode.JOG, operands=(1, 1, 0, 0)).needs_owner
+
+
 def test_what_reads_or_stops_needs_no_permit():
     free = {code for code in OPCODES if not Command(1, code).needs_permit}
     assert free == {

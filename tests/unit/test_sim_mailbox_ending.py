@@ -146,11 +146,10 @@ def test_what_only_ends_needs_no_permit_and_what_begins_does():
     assert client.now().group_state == GroupState.STOPPING
 
 
-def test_ending_a_jog_and_interrupting_take_the_owner_and_stopping_does_not():
+def test_interrupting_takes_the_owner_and_stopping_does_not():
     client, _ = owning()
     sequence = jogging(client)
     other = another(client)
-    assert other.refused(Opcode.JOG, 0, 0, MCS) == ErrorClass.NOT_OWNER
     assert other.refused(Opcode.INTERRUPT) == ErrorClass.NOT_OWNER
     assert client.now().bits & Bits.JOGGING
     other.done(Opcode.STOP)
@@ -158,13 +157,131 @@ def test_ending_a_jog_and_interrupting_take_the_owner_and_stopping_does_not():
     assert not client.now().bits & Bits.JOGGING
 
 
+def test_anybody_ends_a_jog_with_or_without_a_permit_and_its_owner_is_told():
+    client, simulator = owning()
+    sequence = jogging(client)
+    other = another(client)
+    since = tcp_mm(client)
+    other.done(Opcode.JOG, 0, 0, MCS)
+    client.wait(0.5)
+    assert distance_mm(client, since) < BRAKING_MM + 2 * CYCLE_S * SPEED_MM_S
+    assert client.now().finished[0] == (sequence, CommandState.ABORTED, ErrorClass.NONE)
+    for nothing_pressed in ((1, 0), (1, 1)):
+        assert other.refused(Opcode.JOG, *nothing_pressed, MCS) == ErrorClass.NOT_OWNER
+    simulator.panel.withdraw_permit()
+    other.done(Opcode.JOG, 0, 0, MCS)
+    client.sequence = other.sequence
+    client.done(Opcode.OWNERSHIP, 0)
+    other.sequence = client.sequence
+    other.done(Opcode.JOG, 0, 0, MCS)  # nobody owns it
+
+
+def test_a_jog_whose_owner_presses_again_after_another_let_go_is_his_to_end():
+    client, _ = owning()
+    sequence = jogging(client)
+    other = another(client)
+    other.tell(Opcode.JOG, 0, 0, MCS)
+    client.sequence = other.sequence
+    client.tell(Opcode.JOG, 0, BACK_ALONG_X, MCS, dynamics=FAST)
+    client.wait(0.2)
+    assert client.now().bits & Bits.JOGGING
+    client.done(Opcode.JOG, 0, 0, MCS)
+    client.wait(0.5)
+    assert sequence not in [end.sequence for end in client.now().finished]
+
+
+EXPELLED = (CommandState.ABORTED, ErrorClass.NOT_OWNER)
+
+
+def test_a_jog_ends_with_its_owner_and_the_new_one_goes_on_from_there():
+    client, _ = owning()
+    sequence = jogging(client)
+    other = another(client)
+    since = tcp_mm(client)
+    other.take(insist=1)
+    other.wait(1.0)
+    assert BRAKING_MM / 2 < distance_mm(client, since) < BRAKING_MM + 3 * CYCLE_S * SPEED_MM_S
+    assert client.now().finished[0] == (sequence, *EXPELLED)
+    assert client.now().group_state == GroupState.STANDBY
+    assert client.now().tool_slot == 1
+    client.sequence = other.sequence
+    client.done(Opcode.JOG, 0, 0, MCS)
+    assert client.refused(Opcode.JOG, 0, BACK_ALONG_X, MCS, dynamics=FAST) == ErrorClass.NOT_OWNER
+    other.sequence = client.sequence
+    moved = other.move(z=-5.0).ack_head
+    assert other.end_of(moved).state == CommandState.DONE
+
+
+def test_a_movement_of_the_new_owner_that_comes_while_the_old_one_brakes_is_not_ended():
+    client, _ = owning()
+    old = client.move(z=-150.0, dynamics=FAST).ack_head
+    client.wait(0.3)
+    other = another(client)
+    other.take(insist=1)
+    new = other.move(z=20.0, dynamics=SLOW).ack_head
+    assert other.end_of(new) == (new, CommandState.DONE, ErrorClass.NONE)
+    assert (old, *EXPELLED) in other.now().finished
+
+
+def test_every_movement_of_the_old_owner_ends_whatever_kind_it_is():
+    client, _ = owning()
+    pose = shifted(client.now().tcp, z=-60.0)
+    commanded = (
+        (Opcode.MOVE_LINEAR, 0, 0, MCS, 1),
+        (Opcode.MOVE_UNTIL_INPUT, 3, 0, MCS, 0),
+    )
+    for opcode, *operands in commanded:
+        sequence = client.tell(opcode, *operands, pose=pose, dynamics=SLOW).ack_head
+        client.wait(0.2)
+        other = another(client, owner=0x1000 + sequence)
+        other.take(insist=1)
+        assert other.end_of(sequence) == (sequence, *EXPELLED)
+        client.sequence = other.sequence
+        client.take(insist=1)
+    axes = shifted(client.now().axes, 90.0)
+    slowly = (0.02, 0.5, 0.5, 0.5)
+    direct = client.tell(Opcode.MOVE_DIRECT, pose=axes, dynamics=slowly).ack_head
+    client.wait(0.2)
+    other.sequence = client.sequence
+    other.take(insist=1)
+    assert other.end_of(direct) == (direct, *EXPELLED)
+
+
+def test_a_stranger_at_the_plc_ends_what_the_owner_has_under_way():
+    client, simulator = owning()
+    sequence = jogging(client)
+    since = tcp_mm(client)
+    simulator.panel.take_ownership()
+    pass_silently(client, simulator, 0.4)
+    assert distance_mm(client, since) < BRAKING_MM + 3 * CYCLE_S * SPEED_MM_S
+    assert (sequence, *EXPELLED) in client.now().finished
+
+
+def test_an_owner_who_takes_it_again_ends_nothing_of_his_own():
+    client, _ = owning()
+    sequence = client.move(z=-20.0).ack_head
+    client.wait(0.1)
+    client.take()
+    assert client.end_of(sequence).state == CommandState.DONE
+
+
+def test_a_refused_take_ends_nothing():
+    client, _ = owning()
+    sequence = client.move(z=-20.0).ack_head
+    client.wait(0.1)
+    other = another(client)
+    assert other.refused(Opcode.OWNERSHIP, 1, 0) == ErrorClass.NOT_OWNER
+    assert client.end_of(sequence).state == CommandState.DONE
+
+
+@pytest.mark.parametrize("insist", [0, 1])
 @pytest.mark.parametrize("what", ["jog", "movement"])
-def test_an_owner_who_leaves_has_what_is_unfinished_halted_first(what):
+def test_an_owner_who_leaves_has_what_is_unfinished_halted_first(what, insist):
     client, simulator = owning()
     sequence = jogging(client) if what == "jog" else client.move(z=-40.0, dynamics=SLOW).ack_head
     client.wait(0.1)
     since = tcp_mm(client)
-    now = client.tell(Opcode.OWNERSHIP, 0)
+    now = client.tell(Opcode.OWNERSHIP, 0, insist)
     assert (now.answer.holder, now.state) == (0, CommandState.BUFFERED)
     other = another(client)
     assert CommandState.ERROR in {end.state for end in refused_meanwhile(other)}

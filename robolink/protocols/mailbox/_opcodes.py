@@ -45,7 +45,8 @@ class OpcodeFacts:
         capability: The group of opcodes that it belongs to.
         operands: What the operands mean.
         answer: What stands in the answer words afterwards.
-        needs_owner: Only the owner of the mailbox may send it.
+        needs_owner: Only the owner of the mailbox may send it; where its operands decide, see
+            :attr:`Command.needs_owner`.
         needs_permit: It can change something, so the machine must permit it; where its operands
             only end something it needs no permit (see :attr:`Command.needs_permit`).
     """
@@ -80,7 +81,8 @@ OPCODES: Final[Mapping[Opcode, OpcodeFacts]] = MappingProxyType(
         Opcode.JOG: OpcodeFacts(
             "jog",
             _MOTION,
-            "i0 forward mask, i1 backward mask (bits 0..5; both 0 ends it, permit or not), "
+            "i0 forward mask, i1 backward mask (bits 0..5; both 0 ends it, for anybody, "
+            "permit or not), "
             "i2 coordinate system, dyn",
         ),
         Opcode.MOVE_DIRECT: OpcodeFacts(
@@ -125,7 +127,8 @@ OPCODES: Final[Mapping[Opcode, OpcodeFacts]] = MappingProxyType(
         Opcode.OWNERSHIP: OpcodeFacts(
             "take or release the ownership",
             Capability(0),
-            "i0 1 take, 0 release (halts what is unfinished); i1 1 a person insists",
+            "i0 1 take (ends what another owner has unfinished, 14 with 106), "
+            "0 release (halts what is unfinished); i1 1 a person insists",
             "words 12-13 holder, word 14 epoch",
             needs_owner=False,
             needs_permit=False,

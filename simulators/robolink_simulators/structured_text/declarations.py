@@ -48,6 +48,7 @@ class Declarations:
         self.types: dict[str, DataType] = {**ELEMENTARY, **known}
         self.globals: Listed = {}
         self.lists: dict[str, Listed] = {}
+        self._own_lists: set[str] = set()
         self.runtime = runtime
 
     def scope(self, file: str, dialect: TextDialect, members: dict[str, TextVariable]) -> TextScope:
@@ -81,8 +82,23 @@ class Declarations:
     def require_free(self, name: Token, file: str, dialect: TextDialect) -> None:
         """Refuse the name of a type or block that is there already, or no compiler takes."""
         require_name(name, file, dialect)
-        if name.upper() in self.types:
-            raise refused(TextPlace.of(file, name), tr("{name} appears twice", name=str(name)))
+        self._require_alone(str(name), TextPlace.of(file, name))
+
+    def _require_alone(self, name: str, place: TextPlace) -> None:
+        if name.upper() in self.types or name.lower() in self._own_lists:
+            raise refused(place, tr("{name} appears twice", name=name))
+
+    def list_named(self, name: str, place: TextPlace) -> Listed:
+        """Return a list of global variables, which is empty before its first declaration.
+
+        Raises:
+            StructuredTextError: A type or a block has its name; they are names of one kind.
+        """
+        low = name.lower()
+        if low not in self._own_lists:
+            self._require_alone(name, place)
+            self._own_lists.add(low)
+        return self.lists.setdefault(low, {})
 
     def type_of(self, tree: Node, file: str, dialect: TextDialect) -> DataType:
         """Return the type that a text names.

@@ -89,15 +89,55 @@ _BEYOND_TEXT: Final = """
     SIZEOF AND_THEN OR_ELSE CONTINUE JMP STRING WSTRING VAR_EXTERNAL VAR_TEMP VAR_STAT ACTION
     STEP TRANSITION NAMESPACE THIS SUPER ABSTRACT FINAL
 """
-_RESERVED_TEXT: Final = """
-    STEP ACTION TASK WITH ON EN ENO LIMIT LEN FINAL METHOD
+_TYPE_TEXT: Final = """
+    BOOL BIT BYTE WORD DWORD LWORD SINT USINT INT UINT DINT UDINT LINT ULINT REAL LREAL STRING
+    WSTRING CHAR WCHAR TIME LTIME DATE LDATE DT LDT DATE_AND_TIME LDATE_AND_TIME TOD LTOD
+    TIME_OF_DAY LTIME_OF_DAY PVOID XINT UXINT XWORD ANY ANY_BIT ANY_CHARS ANY_DATE ANY_DERIVED
+    ANY_DURATION ANY_ELEMENTARY ANY_INT ANY_MAGNITUDE ANY_NUM ANY_REAL ANY_SIGNED ANY_STRING
+"""
+_VENDOR_TEXT: Final = """
+    ABSTRACT ACTION ARRAY AT BY CASE CLASS CONSTANT CONTINUE DO ELSE ELSIF END_ACTION END_CASE
+    END_FOR END_FUNCTION END_FUNCTION_BLOCK END_IF END_INTERFACE END_METHOD END_PROGRAM
+    END_PROPERTY END_REPEAT END_STRUCT END_TYPE END_UNION END_VAR END_WHILE EXIT EXTENDS FALSE
+    FINAL FOR FUNCTION FUNCTION_BLOCK IF IMPLEMENTS INTERFACE INTERNAL JMP METHOD NAMESPACE OF
+    PARAMS PERSISTENT POINTER PRIVATE PROGRAM PROPERTY PROTECTED PUBLIC READ_ONLY READ_WRITE
+    REFERENCE REF_TO REPEAT RETAIN RETURN STRUCT SUPER THEN THIS TO TRUE TYPE UNION UNTIL USING
+    VAR VAR_ACCESS VAR_CONFIG VAR_EXTERNAL VAR_GLOBAL VAR_IN_OUT VAR_INPUT VAR_INST VAR_OUTPUT
+    VAR_STAT VAR_TEMP WHILE
+
+    ABS ACOS ADD ADR AND AND_THEN ASIN ATAN ATAN2 BITADR COS DIV EQ EXP EXPT GE GT INDEXOF INI
+    LE LIMIT LN LOG LOWER_BOUND LT MAX MIN MOD MOVE MUL MUX NE NOT OR OR_ELSE ROL ROR SEL SHL
+    SHR SIN SIZEOF SQRT SUB TAN TRUNC TRUNC_INT UPPER_BOUND XOR XSIZEOF
+    CHAR_TO WCHAR_TO
+"""
+_LISTS_TEXT: Final = """
+    ANDN CAL CALC CALCN JMPC JMPCN LD LDN ORN R RET RETC RETCN S ST STN XORN
+    CD CLK CU ET IN PT PV Q Q1 QD QU R1 S1
+"""
+_STANDARD_TEXT: Final = """
+    CONFIGURATION END_CLASS END_CONFIGURATION END_NAMESPACE END_RESOURCE END_STEP END_TRANSITION
+    FROM F_EDGE INITIAL_STEP INTERVAL NON_RETAIN NULL ON OVERLAP OVERRIDE PRIORITY REF RESOURCE
+    R_EDGE SINGLE STEP TASK TRANSITION WITH EN ENO
+
+    CONCAT DELETE FIND INSERT LEFT LEN MID REPLACE RIGHT
+    CTD CTU CTUD F_TRIG RS RTC R_TRIG SEMA SR TOF TON TP
 """
 
 _KEYWORDS: Final = frozenset(_KEYWORD_TEXT.split())
 _TELLING: Final = frozenset(_TELLING_TEXT.split())
 """Keywords that stay in the tree, because of what they tell; lark leaves out the others."""
 _BEYOND: Final = frozenset(_BEYOND_TEXT.split())
-_RESERVED: Final = frozenset(_RESERVED_TEXT.split())
+_TYPE_WORDS: Final = frozenset(_TYPE_TEXT.split())
+_VENDOR_WORDS: Final = _TYPE_WORDS | frozenset(_VENDOR_TEXT.split())
+"""Keywords, operators and data types of CODESYS and TwinCAT; no name of theirs may be one."""
+INSTRUCTION_WORDS: Final = frozenset(_LISTS_TEXT.split())
+"""Of instruction lists, with the pins of standard blocks; Structured Text may use them as names,
+which compilers take, and our own programs do not."""
+_STANDARD_WORDS: Final = frozenset(_STANDARD_TEXT.split())
+"""What IEC 61131-3 reserves beyond that: keywords of other languages, functions and blocks."""
+RESERVED_WORDS: Final = _VENDOR_WORDS | INSTRUCTION_WORDS | _STANDARD_WORDS
+"""All of them (docs/reference/structured_text.md 1.1), in capital letters."""
+_CONVERSION: Final = re.compile(r"(?:([A-Z_]+)_)?TO_([A-Z_]+)")
 _SIGNS: Final = {
     "NAME": "a name",
     "INTEGER": "a number",
@@ -230,16 +270,36 @@ def _explained(file: str, error: UnexpectedInput) -> StructuredTextError:
 def require_name(name: Token, file: str, dialect: TextDialect) -> str:
     """Return a declared name in small letters, which every compiler must take.
 
+    Source: docs/reference/structured_text.md 1.1.
+
     Raises:
-        StructuredTextError: It is reserved somewhere.
+        StructuredTextError: It is reserved somewhere, in whatever case it is written.
     """
-    if dialect is TextDialect.COMMON and (name.upper() in _RESERVED or name.endswith("_")):
+    word = name.upper()
+    if is_vendor_word(word):
+        raise refused(
+            TextPlace.of(file, name),
+            tr("{name} is a keyword or data type of CODESYS, and no name", name=str(name)),
+            tr("Give it another name; small and capital letters are the same there."),
+        )
+    if word in _BEYOND:
+        raise refused(
+            TextPlace.of(file, name), tr("{word} does not belong to the subset", word=word)
+        )
+    if dialect is TextDialect.COMMON and (word in _STANDARD_WORDS or name.endswith("_")):
         raise refused(
             TextPlace.of(file, name), tr("not every compiler takes the name {name}", name=str(name))
         )
-    if name.upper() in _BEYOND:
-        raise refused(
-            TextPlace.of(file, name),
-            tr("{word} does not belong to the subset", word=name.upper()),
-        )
     return name.lower()
+
+
+def is_vendor_word(word: str) -> bool:
+    """Whether CODESYS or TwinCAT keeps a word in capital letters for itself.
+
+    Its keywords, data types and operators, the conversions between types, and every name with
+    two underscores in a row.
+    """
+    if word in _VENDOR_WORDS or "__" in word:
+        return True
+    conversion = _CONVERSION.fullmatch(word)
+    return conversion is not None and _TYPE_WORDS.issuperset(filter(None, conversion.groups()))

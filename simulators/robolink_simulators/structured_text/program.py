@@ -224,8 +224,8 @@ class StructuredProgram:
         variables = self._declared.variables(iter([section]), source.name, source.dialect)
         frame = [variable.initial() for variable in variables.values()]
         listed = {name: (frame, variable) for name, variable in variables.items()}
-        stem = source.name.partition(".")[0].lower()
-        self._declared.lists.setdefault(stem, {}).update(listed)
+        stem = source.name.partition(".")[0]
+        self._declared.list_named(stem, TextPlace.of(source.name, tree)).update(listed)
         self._declared.globals.update(listed)
 
     def _block(self, tree: Node, source: SourceText) -> None:

@@ -256,6 +256,8 @@ class Plc:
         if not take:
             self.owner = 0
         elif self.owner in (0, command.owner) or insist or self._owner_is_silent():
+            if command.owner != self.owner:
+                self.end_all(ErrorClass.NOT_OWNER)
             self.owner, self.epoch = command.owner, next_number(self.epoch)
         else:
             return CommandState.ERROR, ErrorClass.NOT_OWNER

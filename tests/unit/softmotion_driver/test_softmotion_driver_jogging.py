@@ -7,6 +7,7 @@ import pytest
 from robolink.controllers.softmotion import Jog
 from robolink.errors import (
     ControllerFaultError,
+    LeaseLostError,
     OutcomeUnknownError,
     RejectedError,
     TransportClosedError,
@@ -105,6 +106,7 @@ def ended_by_plc(plc, state, error, *, seen="head"):
         (CommandState.ABORTED, ErrorClass.NOT_PERMITTED, RejectedError),
         (CommandState.ABORTED, ErrorClass.HEARTBEAT_LOST, ControllerFaultError),
         (CommandState.ABORTED, ErrorClass.NONE, ControllerFaultError),
+        (CommandState.ABORTED, ErrorClass.NOT_OWNER, RejectedError),
         (CommandState.ERROR, ErrorClass.UNREACHABLE, RejectedError),
     ],
 )
@@ -142,3 +144,63 @@ def test_looking_does_not_keep_a_movement_going(cell, plc, controller):
     assert len(cell.link.beats) == before
     with pytest.raises(ControllerFaultError, match="heartbeat was missing"):
         motions[3].wait(timeout_s=5)
+
+
+OTHERS = 0x0BAD_CAFE
+
+
+def seized(plc, *, moves_on=True, tells=True):
+    """Let another client take the mailbox; what moves from then on is his."""
+
+    def seize():
+        (command,) = plc.executed
+        plc.owner, plc.epoch = OTHERS, plc.epoch + 1
+        end = Finished(command.sequence, CommandState.ABORTED, ErrorClass.NOT_OWNER)
+        ends = (end, *plc.now.finished[:3]) if tells else plc.now.finished
+        bits = plc.now.bits if moves_on else plc.now.bits & ~Bits.JOGGING
+        plc.now = replace(plc.now, finished=ends, bits=bits, ack_head=9999, ack_owner=OTHERS)
+
+    return seize
+
+
+def test_a_jog_that_another_program_takes_over_is_said_to_be_and_what_he_moves_is_his(
+    cell, plc, controller
+):
+    cell.link.before("read_head", seized(plc), nth=20)
+    with pytest.raises(RejectedError, match="another program has taken it over") as failure:
+        jog(controller, duration_s=30.0)
+    assert failure.value.code == ErrorClass.NOT_OWNER
+    assert plc.opcodes() == [Opcode.JOG]
+    assert cell.open_requests() == []
+    with pytest.raises(LeaseLostError, match="another client took the mailbox"):
+        jog(controller)
+    assert plc.opcodes() == [Opcode.JOG]
+
+
+def test_the_end_of_a_jog_goes_out_although_the_mailbox_is_lost(cell, plc, controller):
+    cell.link.before("read_head", seized(plc, tells=False), nth=20)
+    jog(controller, duration_s=3.0)
+    assert plc.opcodes() == [Opcode.JOG, Opcode.JOG]
+    end = plc.executed[-1]
+    assert end.only_ends
+    assert end.owner != plc.owner
+    assert plc.now.ack_head == end.sequence
+    assert (plc.now.state, plc.now.error_class) == (CommandState.DONE, ErrorClass.NONE)
+    assert moves_nothing(plc)
+
+
+def test_the_end_of_a_jog_goes_out_once_it_is_known_that_the_mailbox_is_lost(cell, plc, controller):
+    lose = controller._mailbox.commands.ownership.lose
+    cell.link.before("read_head", lambda: (seized(plc, tells=False)(), lose()), nth=20)
+    jog(controller, duration_s=3.0)
+    assert plc.executed[-1].only_ends
+    assert moves_nothing(plc)
+
+
+def test_an_older_program_that_refuses_the_end_is_halted(cell, plc, controller):
+    plc.refuses = lambda command: ErrorClass.NOT_OWNER if ends_a_jog(command) else 0
+    with pytest.raises(RejectedError, match="106"):
+        jog(controller)
+    assert plc.opcodes() == [Opcode.JOG, Opcode.JOG, Opcode.HALT]
+    with pytest.raises(LeaseLostError):
+        jog(controller)

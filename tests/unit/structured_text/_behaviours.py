@@ -5,6 +5,7 @@ not know.
 """
 
 import json
+import math
 from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any
@@ -32,7 +33,7 @@ from robolink.protocols.mailbox import (
     program_texts,
 )
 from robolink.transport import open_mailbox_link
-from tests.unit._mailbox_client import LINE, NO_TOOL, MailboxClient, linked
+from tests.unit._mailbox_client import LINE, NO_TOOL, MailboxClient, linked, shifted
 
 HEARTBEAT, CRC = 9, 110
 NUMBERS = SmcNumbers(
@@ -313,6 +314,107 @@ def block_of_before(bench):
     assert client.now().ack_head < 10
 
 
+STRANGER = 0xBADCAFE
+AT_SPEED = (100.0, 1000.0, 1000.0, 10000.0)
+BRAKING_MM = AT_SPEED[0] ** 2 / (2 * AT_SPEED[2])
+BACK_ALONG_X = 0b1
+
+
+def taken_over(bench):
+    """Let another client take the mailbox, because a person insists; return it."""
+    other = MailboxClient(bench.client.link, STRANGER)
+    other.take(insist=1)
+    return other
+
+
+def moved_mm(client, since):
+    """Return how far the TCP comes from there while a client beats on."""
+    client.wait(2.0)
+    return math.dist(client.now().tcp[:3], since)
+
+
+def without_places(bench):
+    """Compare no positions: a block's answer comes a cycle later in the program."""
+    bench.taken = [words[:12] + words[88:] for words in bench.taken]
+
+
+def jog_of_an_owner_who_lost_it(bench):
+    """Not one of the sixteen: docs/mailbox.md, "What ends by itself"."""
+    bench.enable()
+    dynamics = {"dynamics": AT_SPEED}
+    jog = bench.client.tell(Opcode.JOG, 0, BACK_ALONG_X, CoordinateSystem.MCS, **dynamics)
+    bench.client.wait(0.3)
+    since = bench.client.now().tcp[:3]
+    assert moved_mm(taken_over(bench), since) < BRAKING_MM + 3 * CYCLE_S * AT_SPEED[0]
+    bench.note()
+    assert bench.taken[-1][96:99] == [jog.ack_head, 14, 106]
+    assert bench.tell(Opcode.JOG, 0, 0, CoordinateSystem.MCS) == [10, 0]
+    assert bench.tell(Opcode.JOG, 0, BACK_ALONG_X, CoordinateSystem.MCS, **dynamics) == [15, 106]
+    without_places(bench)
+
+
+def movements_of_an_owner_who_lost_it(bench):
+    """Not one of the sixteen: docs/mailbox.md, "What ends by itself"."""
+    bench.enable()
+    pose = shifted(bench.client.now().tcp, z=-150.0)
+    moves = [
+        bench.client.tell(opcode, *operands, pose=pose, dynamics=AT_SPEED).ack_head
+        for opcode, operands in (
+            (Opcode.MOVE_LINEAR, (0, 0, CoordinateSystem.MCS, 1)),
+            (Opcode.MOVE_UNTIL_INPUT, (3, 1, CoordinateSystem.MCS, 1)),
+        )
+    ]
+    bench.client.wait(0.3)
+    since = bench.client.now().tcp[:3]
+    assert moved_mm(taken_over(bench), since) < BRAKING_MM + 3 * CYCLE_S * AT_SPEED[0]
+    bench.note()
+    ends = sorted([bench.taken[-1][96:99], bench.taken[-1][99:102]])
+    assert ends == [[sequence, 14, 106] for sequence in moves]
+    without_places(bench)
+
+
+def interrupted_movement_of_an_owner_who_lost_it(bench):
+    """Not one of the sixteen: nobody can continue what another began."""
+    bench.enable()
+    move = bench.client.move(z=-40.0, dynamics=AT_SPEED).ack_head
+    bench.client.wait(0.1)
+    bench.client.done(Opcode.INTERRUPT)
+    other = taken_over(bench)
+    bench.note()
+    assert bench.taken[-1][96:99] == [move, 14, 106]
+    assert other.refused(Opcode.CONTINUE) == 206
+    bench.note()
+    without_places(bench)
+
+
+def jog_that_another_client_ends(bench):
+    """Not one of the sixteen: to end a jog takes no ownership, and its owner is told."""
+    bench.enable()
+    dynamics = {"dynamics": AT_SPEED}
+    jog = bench.client.tell(Opcode.JOG, 0, BACK_ALONG_X, CoordinateSystem.MCS, **dynamics)
+    bench.client.wait(0.3)
+    other = MailboxClient(bench.client.link, STRANGER)
+    since = other.now().tcp[:3]
+    other.done(Opcode.JOG, 0, 0, CoordinateSystem.MCS)
+    assert moved_mm(bench.client, since) < BRAKING_MM + 3 * CYCLE_S * AT_SPEED[0]
+    bench.note()
+    assert bench.taken[-1][96:99] == [jog.ack_head, 14, 0]
+    without_places(bench)
+
+
+def owner_who_leaves_and_insists(bench):
+    """Not one of the sixteen: whatever i1 is, what is unfinished is halted before."""
+    bench.enable()
+    move = bench.client.move(z=-150.0, dynamics=AT_SPEED).ack_head
+    bench.client.wait(0.3)
+    since = bench.client.now().tcp[:3]
+    bench.client.settled(bench.client.tell(Opcode.OWNERSHIP, 0, 1))
+    assert moved_mm(bench.client, since) < BRAKING_MM + 3 * CYCLE_S * AT_SPEED[0]
+    bench.note()
+    assert bench.taken[-1][96:99] == [move, 14, 0]
+    without_places(bench)
+
+
 def high_first(text):
     """Return a text whose author laid the words of an LREAL the other way round."""
     return text.replace("* 65536.0;\n    part := TRUNC(mant);\n    w0 := DINT_TO_WORD(part);", SWAP)
@@ -383,6 +485,11 @@ RUNS = [
     (reads_of_no_movement, "Kin_Scara3_Z"),
     (read_of_what_was_interrupted, "Kin_Scara3_Z"),
     (refused_kinematics, "Kin_Gantry3+Kin_CAxis"),
+    (jog_of_an_owner_who_lost_it, "Kin_Scara3_Z"),
+    (movements_of_an_owner_who_lost_it, "Kin_Scara3_Z"),
+    (interrupted_movement_of_an_owner_who_lost_it, "Kin_Scara3_Z"),
+    (jog_that_another_client_ends, "Kin_Scara3_Z"),
+    (owner_who_leaves_and_insists, "Kin_Scara3_Z"),
 ]
 """Each behaviour with each kinematics that it names; the sixteenth is of its own kind."""
 

@@ -112,13 +112,13 @@ def test_what_would_trap_is_refused_when_it_runs(body):
 
 def test_an_instance_keeps_its_variables_and_changes_what_it_is_handed():
     made = program(
-        "add(more := 2, total := r, last => seen); add(total := r);",
-        "r, seen : INT; add : Adder;",
+        "summing(more := 2, total := r, last => seen); summing(total := r);",
+        "r, seen : INT; summing : Adder;",
         ADDER,
     )
     for _ in range(3):
         made.cycle(0)
-    assert (made.value("r"), made.value("seen"), made.value("add.last")) == (12, 8, 10)
+    assert (made.value("r"), made.value("seen"), made.value("summing.last")) == (12, 8, 10)
 
 
 def test_structures_are_copied_and_handed_in_by_reference():
@@ -139,7 +139,7 @@ def test_structures_are_copied_and_handed_in_by_reference():
 
 def test_a_pin_by_reference_must_be_connected():
     with pytest.raises(StructuredTextError, match="total must be connected"):
-        program("add(more := 2);", "add : Adder;", ADDER)
+        program("summing(more := 2);", "summing : Adder;", ADDER)
 
 
 def test_what_is_retained_outlives_a_restart_and_fits_json():

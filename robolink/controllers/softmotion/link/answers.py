@@ -26,6 +26,9 @@ _POSED: Final = frozenset(
     {Opcode.MOVE_DIRECT, Opcode.MOVE_LINEAR, Opcode.MOVE_UNTIL_INPUT, Opcode.WRITE_TOOL}
 )
 
+DISPOSSESSED: Final = frozenset({ErrorClass.NOT_OWNER, ErrorClass.STALE_EPOCH})
+"""Error classes that say that the mailbox is not ours any more."""
+
 _OUTSIDE_MOTION_TASK: Final = 12108
 """ErrorID of a movement block that another task calls (docs/reference/softmotion.md 1.4)."""
 
@@ -86,6 +89,17 @@ def command_ended_early(command: Command) -> ControllerFaultError:
 
 def motion_failure(request: str, now: Response, error_class: int) -> ControllerError:
     """Return the error for a movement that did not end as it should."""
+    if error_class in DISPOSSESSED:
+        return RejectedError(
+            tr(
+                "The PLC ended {request!r}: another program has taken it over ({number}).",
+                request=request,
+                number=error_class,
+            ),
+            code=error_class,
+            remedy=tr("Nothing was repeated. {remedy}", remedy=_remedy(error_class)),
+            request=request,
+        )
     kind: type[ControllerError]
     fault = error_class // 100 in _FAULTS or now.group_state == GroupState.ERRORSTOP
     kind = ControllerFaultError if fault else RejectedError

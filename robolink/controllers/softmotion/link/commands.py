@@ -16,9 +16,11 @@ from typing import Final
 from robolink import ambient
 from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.controllers.softmotion.link.answers import (
+    DISPOSSESSED,
     Ended,
     command_ended_early,
     describe,
+    motion_failure,
     refused,
 )
 from robolink.controllers.softmotion.link.motion_tracking import has_ended
@@ -27,6 +29,7 @@ from robolink.controllers.softmotion.link.snapshots import Snapshots
 from robolink.controllers.softmotion.link.wire import MailboxWire
 from robolink.errors import (
     ConfigError,
+    ControllerError,
     RejectedError,
     RemoteProtocolError,
     StoppedError,
@@ -79,8 +82,6 @@ COMPLETION_S: Final = 10.0
 _WRITES: Final = 3
 _OVERTAKEN: Final = frozenset({Opcode.STOP, Opcode.HALT})
 """Commands whose end another stop or halt may hide: it does the same, and rest is looked for."""
-
-_DISPOSSESSED: Final = frozenset({ErrorClass.NOT_OWNER, ErrorClass.STALE_EPOCH})
 
 
 class CommandSender:
@@ -152,12 +153,26 @@ class CommandSender:
             self._wire.beat()
             return command
 
+    def motion_failure(self, request: str, now: Response, error_class: int) -> ControllerError:
+        """Return the error for a movement or jog of ours that did not end as it should.
+
+        Where another client took the mailbox over, nothing more is sent that needs it.
+
+        Args:
+            request: The movement in words.
+            now: The snapshot that shows its end.
+            error_class: That of the end.
+        """
+        if error_class in DISPOSSESSED:
+            self.ownership.lose()
+        return motion_failure(request, now, error_class)
+
     def _possess(self, draft: Command) -> None:
         if draft.needs_owner:
             self.ownership.require(describe(draft))
 
     def _refusal(self, command: Command, now: Response, error_class: int) -> RejectedError:
-        if error_class in _DISPOSSESSED and command.needs_owner:
+        if error_class in DISPOSSESSED and command.opcode != Opcode.OWNERSHIP:
             self.ownership.lose()
         return refused(command, now, error_class)
 

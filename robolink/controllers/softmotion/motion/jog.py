@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from typing import Final
 
 from robolink.controllers.softmotion.link.answers import (
+    DISPOSSESSED,
     command_ended_early,
     describe,
-    motion_failure,
 )
 from robolink.controllers.softmotion.link.commands import is_own
 from robolink.controllers.softmotion.link.condition import is_moving
@@ -41,6 +41,9 @@ from robolink.timing import Deadline
 
 _REST_S = 5.0
 """Longest time in which a jog comes to rest."""
+
+_BRAKING_S: Final = 1.0
+"""What moves for longer after another client took the mailbox is moved by that client."""
 
 _STRONGER: Final = (Command(0, Opcode.HALT), Command(0, Opcode.STOP))
 """What brings the group to rest when the end of a jog is not taken."""
@@ -142,6 +145,8 @@ class JogWatch:
                     self._bring_to_rest()
                 raise
             now = self._bring_to_rest(ended=isinstance(failure, ControllerError))
+        if failure is None and self._taken_over(now):
+            failure = self._ended_by_plc(now)
         if failure is not None:
             failure.controller = failure.controller or self._mailbox.identity
             raise failure
@@ -187,18 +192,31 @@ class JogWatch:
 
         Its end stands in the head while it is the last command, and else among the last ends.
         """
+        end = self._bad_end(now)
         command = self._command
-        assert command is not None  # noqa: S101 - it was begun
+        if end is None or command is None:
+            return None
+        if end.error_class == ErrorClass.NONE:
+            return command_ended_early(command)
+        return self._mailbox.commands.motion_failure(self.request, now, end.error_class)
+
+    def _bad_end(self, now: Response) -> Finished | None:
+        command = self._command
+        if command is None:
+            return None  # its beginning was not acknowledged
         ends = [end for end in now.finished if end.sequence == command.sequence]
         if is_own(command, now) and has_ended(now.state):
             ends.insert(0, Finished(command.sequence, now.state, now.error_class))
         bad = (end for end in ends if end.state != CommandState.DONE)
-        end = next(bad, None)
-        if end is None:
-            return None
-        if end.error_class == ErrorClass.NONE:
-            return command_ended_early(command)
-        return motion_failure(self.request, now, end.error_class)
+        return next(bad, None)
+
+    def _taken_over(self, now: Response) -> bool:
+        """Whether the PLC ended it because another client took the mailbox.
+
+        What moves from then on is that client's.
+        """
+        end = self._bad_end(now)
+        return end is not None and end.error_class in DISPOSSESSED
 
     def _bring_to_rest(self, *, ended: bool = False) -> Response:
         """End the jog, unless the PLC has, and see the group at rest. No beat goes out any more.
@@ -246,8 +264,11 @@ class JogWatch:
     def _await_rest(self) -> Response:
         mailbox = self._mailbox
         deadline = Deadline.after(mailbox.wire.clock, _REST_S)
+        ours = Deadline.after(mailbox.wire.clock, _BRAKING_S)
         now = mailbox.snapshots.take()
         while is_moving(now):
+            if ours.expired and self._taken_over(now):
+                break
             if deadline.expired:
                 raise mailbox.wire.ended(self._unproved(None))
             now = mailbox.snapshots.news(now)

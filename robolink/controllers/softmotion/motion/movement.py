@@ -3,7 +3,7 @@
 from contextlib import suppress
 
 from robolink.controllers.motion_group import stopped_before_edge
-from robolink.controllers.softmotion.link.answers import describe, motion_failure
+from robolink.controllers.softmotion.link.answers import describe
 from robolink.controllers.softmotion.link.commands import is_own
 from robolink.controllers.softmotion.link.condition import is_moving
 from robolink.controllers.softmotion.link.mailbox import Mailbox
@@ -127,7 +127,7 @@ class SoftMotionMotion:
         ):
             return MotionOutcome.STOPPED
         now = self._mailbox.snapshots.take()
-        error = motion_failure(self._request, now, end.error_class)
+        error = self._mailbox.commands.motion_failure(self._request, now, end.error_class)
         error.controller = self._mailbox.identity
         raise error
 

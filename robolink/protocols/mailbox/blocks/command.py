@@ -65,9 +65,9 @@ class Command:
 
     @property
     def needs_owner(self) -> bool:
-        """Whether only the owner of the mailbox may send it."""
-        if self.opcode == Opcode.STOP:
-            return self.operands[0] == _RELEASE
+        """Whether only the owner of the mailbox may send it; whoever wants a jog to end may."""
+        if self.opcode in (Opcode.STOP, Opcode.JOG):
+            return not self.only_ends
         return OPCODES[Opcode(self.opcode)].needs_owner
 
     @property

@@ -136,12 +136,13 @@ class MailboxProgram:
     def seize(self, now_ns: int) -> None:
         """Let a client take the mailbox that nobody here knows, because a person insists."""
         self.ownership.seize(now_ns)
+        self.jobs.end_moving(ErrorClass.NOT_OWNER)
 
     def next_change(self, now_ns: int) -> int | None:
         """Return when :meth:`run` will next do something by itself, if ever."""
         deadline_ns = self._watch.deadline_ns
-        if self.jobs.moving and self._reason_to_end(now_ns):
-            # The permit went since the last cycle, or a halt was refused: try again.
+        if self.jobs.moving and (self._reason_to_end(now_ns) or self.jobs.expelled):
+            # The permit or the owner went since the last cycle, or a halt was refused: try again.
             deadline_ns = self._next_cycle_ns(now_ns)
         if self._look_ns is None or deadline_ns is None:
             return deadline_ns if self._look_ns is None else self._look_ns
@@ -161,7 +162,7 @@ class MailboxProgram:
                 self.inbox.hold_back(command, owned=owned)
                 self.jobs.note(Finished(command.sequence, CommandState.ERROR, ErrorClass.BUSY))
                 return
-            told = self._carried_out(command, now_ns)
+            told = self._carried_out(command, now_ns, owned=owned)
             job = Job(command, told.execution)
         except Rejected as rejected:
             told = Told(BlockExecution())
@@ -185,15 +186,20 @@ class MailboxProgram:
         if not self.permitted and command.needs_permit:
             raise Rejected(ErrorClass.NOT_PERMITTED)
 
-    def _carried_out(self, command: Command, now_ns: int) -> Told:
+    def _carried_out(self, command: Command, now_ns: int, *, owned: bool) -> Told:
         if command.opcode == Opcode.OWNERSHIP:
+            before = self.holder
             moving = not self._group.motion.resting or any(
                 axis.moving_alone for axis in self._group.axes
             )
             told = self._halted_for_release(command)
             self.ownership.carry_out(command, now_ns, moving=moving)
+            if self.holder not in (0, before):
+                self.jobs.end_moving(ErrorClass.NOT_OWNER)
             return told
         told = self._handlers[command.opcode](command)
+        if command.opcode == Opcode.JOG:
+            self.jobs.note_buttons(owned=owned)
         if command.opcode in _CHANGING_TOOLS:
             self._memory.tool_changed = True
         return told
@@ -205,7 +211,7 @@ class MailboxProgram:
 
     def _halted_for_release(self, command: Command) -> Told:
         """Halt what is unfinished before its owner leaves; done when the group is at rest."""
-        leaves = not any(command.operands[:2]) and self.ownership.owns(command)
+        leaves = command.operands[:2] in ((0, 0), (0, 1)) and self.ownership.owns(command)
         return Told(self._group.halt()) if leaves and self.jobs.moving else done()
 
     def _supervise(self, now_ns: int) -> None:
@@ -215,10 +221,10 @@ class MailboxProgram:
         if not moving:
             return
         cause = self._reason_to_end(now_ns)
-        if not cause:
+        if cause:
+            self.jobs.end_moving(cause)
+        elif not self.jobs.expelled:
             return
-        for job in moving:
-            job.cause = job.cause or cause
         self._group.halt()
         self._follow()
         self._watch.watch(moving=bool(self.jobs.moving), now_ns=now_ns)

@@ -16,7 +16,7 @@ class ProgramMemory(RetainedMemory):
     """Boot counter, epoch, number and slots where the program has them.
 
     Args:
-        program: Holds ``RL_Kept.memory`` of the type RL_Kept.
+        program: Holds ``RL_Kept.memory`` of the type RL_KeptMemory.
         device_id: The PLC's number; 0 lets the program draw one.
     """
 

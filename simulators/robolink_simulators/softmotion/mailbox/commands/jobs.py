@@ -34,6 +34,7 @@ class Job:
         error_class: Why it ended otherwise than done.
         raw: ErrorID of the block.
         cause: Why it will end aborted, when the program itself ends it.
+        cut_short: Whether another client than its owner has ended it; so it is not done.
     """
 
     def __init__(self, command: Command, execution: BlockExecution) -> None:
@@ -43,6 +44,7 @@ class Job:
         self.error_class = ErrorClass.NONE
         self.raw = 0
         self.cause = ErrorClass.NONE
+        self.cut_short = False
 
     @property
     def is_movement(self) -> bool:
@@ -60,6 +62,8 @@ class Job:
             return
         outputs = self.execution.outputs
         self.state = _STATES[outputs.state]
+        if self.cut_short and self.state is CommandState.DONE:
+            self.state = CommandState.ABORTED
         if outputs.error is not None:
             self._complain(outputs.error, group.state)
         elif self.state is CommandState.ABORTED:
@@ -123,6 +127,11 @@ class Jobs:
         return [job for job in self._unfinished if job.is_movement or job.is_jog]
 
     @property
+    def expelled(self) -> bool:
+        """Whether something of an owner who lost the mailbox has not ended yet."""
+        return any(job.cause is ErrorClass.NOT_OWNER for job in self.moving)
+
+    @property
     def in_work(self) -> bool:
         """Whether a command is unfinished that is neither movement nor jog."""
         return len(self.moving) < len(self._unfinished)
@@ -153,6 +162,17 @@ class Jobs:
             if job.state.final and (job.is_movement or job.state is CommandState.ABORTED):
                 self.note(job.end())
         self._unfinished = [job for job in self._unfinished if not job.state.final]
+
+    def end_moving(self, cause: ErrorClass) -> None:
+        """Note why everything that moves will end now; what has a reason keeps it."""
+        for job in self.moving:
+            job.cause = job.cause or cause
+
+    def note_buttons(self, *, owned: bool) -> None:
+        """Note whose buttons the jog under way obeys: its owner's, or those that another let go."""
+        for job in self._unfinished:
+            if job.is_jog:
+                job.cut_short = not owned
 
     def note(self, end: Finished) -> None:
         """Add an end to the last ones."""

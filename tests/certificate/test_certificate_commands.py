@@ -11,8 +11,9 @@ from robolink_simulators.cell.tip_switches import LightBeam
 
 from robolink.errors import VerifyError
 from robolink.methods import BeamsSource
+from robolink.model import ToolOffset, rotate_xy
 from tests.certificate.live import BEAM_NOISE, slips, wrong_by
-from tests.contract._method_cell import method_cell
+from tests.contract._method_cell import KINDS, method_cell
 from tests.contract._sensor_cell import TOOL, miss_mm, sensor_cell
 from tests.contract.test_proof_after_a_break import Later
 
@@ -110,3 +111,78 @@ def test_what_happened_before_a_turn_test_after_a_break_brings_the_old_value_bac
             assert controller.tools.same(controller.tools.read(TOOL), old)
             assert controller.outcomes.open_markers() == ()
         assert later.verified() == [False]
+
+
+ONE_TOUCH = """
+schema = "robolink/recipe/1"
+name = "one touch"
+basis = "difference"
+z = "measured"
+[source]
+kind = "one-touch"
+[station]
+id = "PIN-07"
+[[tools]]
+number = 1
+[tolerances]
+sigma_mm = 0.01
+"""
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("kind", KINDS)
+def test_one_touch_states_a_change_of_a_z_that_nobody_measured(kind, tmp_path, monkeypatch):
+    """The stored Z is some tenths of a millimetre wrong, and so is the new one; nothing is said."""
+    path = tmp_path / "one-touch.toml"
+    path.write_text(ONE_TOUCH)
+    with method_cell(kind, tmp_path, monkeypatch) as cell:
+        assert cell.calibrate("n-angle", "--station", "PIN-07", "--count", "4").code == 0
+        stored, true = cell.stored, cell.truth
+        assert abs(stored.z_mm - true.z_mm) > 0.2
+        cell.lengthen(0.35, 0.25, -0.3)
+        done = cell.run("recalibrate", str(path), "--assist", cell.cell.url, "--yes", "--json")
+        assert done.code == 0, done.err
+        (tool,) = done.document["tools"]
+        assert set(tool["fit"]["half_width95"]) == {"x_mm", "y_mm"}
+        assert abs(tool["change_z_mm"] - (cell.truth.z_mm - true.z_mm)) < (
+            1.2 * tool["change_z_half95_mm"]
+        )
+        assert abs(cell.stored.z_mm - cell.truth.z_mm) > 0.2, "as wrong as it was"
+        off_mm = miss_mm(cell.stored, cell.truth)
+        assert off_mm < tool["fit"]["accuracy"]["within_mm"]
+
+
+SMALL = ToolOffset(0.55, -0.7, -20.0)
+"""A tool so short that poses of its tip and of the flange fit alike."""
+
+
+@pytest.mark.parametrize("kind", [pytest.param("plc", marks=pytest.mark.soak), "epson"])
+@pytest.mark.parametrize("tool", [None, 1])
+def test_poses_of_a_small_tool_are_asked_about(kind, tool, tmp_path, monkeypatch):
+    with method_cell(kind, tmp_path, monkeypatch) as cell:
+        tip = ToolOffset(0.7, -0.9, -20.0)
+        cell.world.tips[1] = tip
+        with cell.cell.connected() as controller:
+            if hasattr(controller, "take"):
+                controller.take()
+            controller.tools.write(1, SMALL, expected=controller.tools.read(1))
+        path = tmp_path / "poses.csv"
+        path.write_text("x_mm,y_mm,z_mm,u_deg\n" + "\n".join(taught(tip)))
+        said = () if tool is None else ("--taught-tool", str(tool))
+        done = cell.run(
+            "calibrate", "two-pose", "--tool", "1", "--poses", str(path), "--yes", "--json", *said
+        )
+        if tool is None:
+            assert done.code == 7, done.err
+            assert done.document["error"]["code"] == "taught_tool_unknown"
+            assert cell.stored == SMALL
+        else:
+            assert done.code == 0, done.err
+            assert miss_mm(cell.stored, tip) < 0.003
+
+
+def taught(tip):
+    """Yield the poses of two touches as a pendant with that tool selected shows them."""
+    for u_deg in (10.0, -170.0):
+        x, y = rotate_xy(tip.x_mm - SMALL.x_mm, tip.y_mm - SMALL.y_mm, u_deg)
+        yield f"{300 - x:.4f},{100 - y:.4f},-60.0,{u_deg}"

@@ -104,7 +104,9 @@ class NeedleChangeResult(CalibrationResult):
                 changed=("z_mm",),
                 covariance=tuple(row[:at] for row in self.covariance[:at]),
                 half_width95=self.half_width95[:at],
+                region95_radius_mm=_region_mm(self.covariance[0][0], at, touch_sigma_mm),
                 rank=at,
+                sources=one_touch_sources(at),
             )
         u_z_mm = math.hypot(stored.half95_mm / NORMAL_95, u_mm)
         rows = [list(row) for row in self.covariance]
@@ -113,7 +115,16 @@ class NeedleChangeResult(CalibrationResult):
             named,
             covariance=tuple(map(tuple, rows)),
             half_width95=(*self.half_width95[:at], NORMAL_95 * u_z_mm),
+            region95_radius_mm=_region_mm(
+                max(self.covariance[0][0], u_z_mm**2), at + 1, touch_sigma_mm
+            ),
         )
+
+
+def _region_mm(variance: float, lengths: int, sigma_mm: float) -> float | None:
+    """Return the radius of the region of so many lengths, the worst of which has a variance."""
+    scatter = Dispersion.of(0.0, 0, sigma_mm)
+    return None if scatter is None else scatter.region_mm(variance, lengths)
 
 
 def solve_needle_change(

@@ -119,8 +119,7 @@ def _weighed(
         VerifyError: None does.
     """
     outcomes, wider_mm = controller.outcomes, judgement.wider_mm
-    explained = stated_mm is not None and wider_mm is not None and wider_mm <= stated_mm
-    if judgement.contradicts_repeatability and explained:
+    if not judgement.fails:
         if confirm is None:
             return stated_mm
         question = joined(

@@ -90,9 +90,7 @@ def proved(
     if claim is None:
         return proof
     judgement = held_to_claim(claim, measure.from_place(result, written, proof))
-    within_mm, allowed_mm = judgement.wider_mm, result.accurate_to_mm
-    explained = within_mm is not None and allowed_mm is not None and within_mm <= allowed_mm
-    if judgement.contradicts_accuracy or (judgement.code and not explained):
+    if judgement.fails:
         raise CalibrationError(
             judgement.code,
             tr(

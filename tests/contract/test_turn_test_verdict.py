@@ -72,10 +72,16 @@ def test_a_contradicted_repeatability_is_a_warning_while_the_accuracy_still_cove
 
 
 def test_a_contradicted_repeatability_that_the_accuracy_does_not_cover_ends_it():
+    controller = MemoryController()
+
     with pytest.raises(VerifyError) as refused:
-        conclude_turn_test(MemoryController(), 1, shown(0.06), claim=BEAMS)
+        conclude_turn_test(controller, 1, shown(0.06), claim=BEAMS)
 
     assert refused.value.code == "proof_contradicts_repeatability"
+    entry = newest(controller)
+    assert entry.details["passed"] is False, "what was taken back is not on record as passed"
+    assert entry.details["verdict"] == "proof_contradicts_repeatability"
+    assert "passed" not in entry.verdict
 
 
 def test_a_person_takes_a_wider_statement_and_it_is_on_record():

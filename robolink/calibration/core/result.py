@@ -249,7 +249,16 @@ class DriftVerdict(Enum):
     PASSED = ""
     UNDECIDED = "drift_undecided"
     CONTRADICTED = "proof_contradicts_accuracy"
+    DOUBTED = "proof_contradicts_repeatability"
     FAILED = "large_drift"
+
+
+_WORST_FIRST: Final = (
+    DriftVerdict.FAILED,
+    DriftVerdict.CONTRADICTED,
+    DriftVerdict.DOUBTED,
+    DriftVerdict.UNDECIDED,
+)
 
 
 def judge_drift(drift_mm: float, u_mm: float, tolerance_mm: float) -> DriftVerdict:
@@ -281,7 +290,7 @@ def judge_drift(drift_mm: float, u_mm: float, tolerance_mm: float) -> DriftVerdi
 def worst_of(verdicts: Iterable[DriftVerdict]) -> DriftVerdict:
     """Return what drifts at several angles say together."""
     found = set(verdicts)
-    for verdict in (DriftVerdict.FAILED, DriftVerdict.CONTRADICTED, DriftVerdict.UNDECIDED):
+    for verdict in _WORST_FIRST:
         if verdict in found:
             return verdict
     return DriftVerdict.PASSED
@@ -337,17 +346,14 @@ class VerifyResult:
     @property
     def verdict(self) -> DriftVerdict:
         """What the drifts say, each with its guard band."""
-        contradicted = self.judgement is not None and self.judgement.contradicts_accuracy
-        return worst_of(
-            [
-                *(judge_drift(one.distance_mm, one.u_mm, self.tolerance_mm) for one in self.drifts),
-                *([DriftVerdict.CONTRADICTED] if contradicted else []),
-            ]
-        )
+        found = [judge_drift(one.distance_mm, one.u_mm, self.tolerance_mm) for one in self.drifts]
+        if self.judgement is not None and self.judgement.fails:
+            found.append(DriftVerdict(self.judgement.code))
+        return worst_of(found)
 
     @property
     def passed(self) -> bool:
-        """Whether every drift is inside the tolerance and contradicts no statement of accuracy.
+        """Whether every drift is inside the tolerance, and what is stated explains it.
 
         Its touches have to count, too.
         """

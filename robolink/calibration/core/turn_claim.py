@@ -81,6 +81,7 @@ class TurnJudgement:
             ``None`` where no turn was large enough to tell.
         offers_wider: Whether that may be taken as a statement: not while the drifts were seen
             through what may be wrong itself.
+        covered: Whether it is no more than what was said.
     """
 
     code: str
@@ -89,6 +90,7 @@ class TurnJudgement:
     small_angle: bool = False
     wider_mm: float | None = None
     offers_wider: bool = True
+    covered: bool = False
 
     @property
     def contradicts_accuracy(self) -> bool:
@@ -99,6 +101,14 @@ class TurnJudgement:
     def contradicts_repeatability(self) -> bool:
         """Whether only what it says it is repeatable to is contradicted."""
         return self.code == CONTRADICTS_REPEATABILITY
+
+    @property
+    def fails(self) -> bool:
+        """Whether it is no pass as long as nobody takes a wider statement.
+
+        What contradicts the repeatability alone, and is covered by the accuracy, is a doubt.
+        """
+        return bool(self.code) and not (self.contradicts_repeatability and self.covered)
 
     @property
     def good(self) -> bool:
@@ -129,6 +139,7 @@ class TurnJudgement:
             bool(document["small_angle"]),
             None if wider_mm is None else float(wider_mm),
             bool(document["offers_wider"]),
+            bool(document["covered"]),
         )
 
     def as_json(self) -> dict[str, object]:
@@ -147,4 +158,5 @@ class TurnJudgement:
             "small_angle": self.small_angle,
             "wider_mm": self.wider_mm,
             "offers_wider": self.offers_wider,
+            "covered": self.covered,
         }

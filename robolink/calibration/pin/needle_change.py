@@ -13,7 +13,7 @@ from robolink.calibration.core.dispersion import Dispersion, require_positive
 from robolink.calibration.core.pose_checks import check_poses, keep_unmeasured, require_finite
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.rotations import rotation_of
-from robolink.calibration.core.statistics import NORMAL_95, chi_square_quantile
+from robolink.calibration.core.statistics import NORMAL_95
 from robolink.calibration.flange_checks import require_flange_in_base
 from robolink.calibration.flange_plane import FlangePlane
 from robolink.calibration.pin.needle_chain import NeedleChain, NeedleLimits
@@ -104,11 +104,9 @@ class NeedleChangeResult(CalibrationResult):
                 changed=("z_mm",),
                 covariance=tuple(row[:at] for row in self.covariance[:at]),
                 half_width95=self.half_width95[:at],
-                region95_radius_mm=_region_mm(max(self.half_width95[:at]), at),
-                sources=None
-                if self.sources is None
-                else tuple(source.of_first(at) for source in self.sources),
+                region95_radius_mm=_region_mm(self.covariance[0][0], at, touch_sigma_mm),
                 rank=at,
+                sources=one_touch_sources(at),
             )
         u_z_mm = math.hypot(stored.half95_mm / NORMAL_95, u_mm)
         rows = [list(row) for row in self.covariance]
@@ -118,14 +116,15 @@ class NeedleChangeResult(CalibrationResult):
             covariance=tuple(map(tuple, rows)),
             half_width95=(*self.half_width95[:at], NORMAL_95 * u_z_mm),
             region95_radius_mm=_region_mm(
-                max(*self.half_width95[:at], NORMAL_95 * u_z_mm), len(self.measured)
+                max(self.covariance[0][0], u_z_mm**2), at + 1, touch_sigma_mm
             ),
         )
 
 
-def _region_mm(half95_mm: float, lengths: int) -> float:
-    """Return the radius of the region of lengths of which the worst is known so well alone."""
-    return half95_mm / NORMAL_95 * math.sqrt(chi_square_quantile(0.95, lengths))
+def _region_mm(variance: float, lengths: int, sigma_mm: float) -> float | None:
+    """Return the radius of the region of so many lengths, the worst of which has a variance."""
+    scatter = Dispersion.of(0.0, 0, sigma_mm)
+    return None if scatter is None else scatter.region_mm(variance, lengths)
 
 
 def solve_needle_change(

@@ -259,13 +259,15 @@ def held_to_claim(claim: TurnClaim, proof: VerifyResult) -> TurnJudgement:
             range(len(pairs)), key=lambda i: pairs[i][0].distance_mm / pairs[i][1].repeatable_mm
         )
     turned = max(limit.turn_deg for limit in limits)
+    wider_mm, stated_mm = _wider_mm(claim, pairs), claim.accurate_mm
     return TurnJudgement(
         code,
         limits,
         worst,
         small_angle=not proof.heights_only and turned < LEAST_TURN_DEG - 0.5,
-        wider_mm=_wider_mm(claim, pairs),
+        wider_mm=wider_mm,
         offers_wider=not claim.by_camera,
+        covered=wider_mm is not None and stated_mm is not None and wider_mm <= stated_mm,
     )
 
 

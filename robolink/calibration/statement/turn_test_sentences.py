@@ -30,7 +30,7 @@ def turn_test_headline(result: VerifyResult) -> str:
         return tr("Turn test not decided: {drift:.3f} mm off, limit {limit:.3f} mm.", **found)
     if result.codes or result.verdict is DriftVerdict.FAILED:
         return tr("Turn test failed: {drift:.3f} mm off, limit {limit:.3f} mm.", **found)
-    if judgement is not None and judgement.contradicts_accuracy:
+    if judgement is not None and judgement.fails:
         return tr(
             "Turn test contradicts the measurement: {drift:.3f} mm off at most, limit "
             "{limit:.3f} mm.",

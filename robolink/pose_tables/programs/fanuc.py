@@ -69,7 +69,7 @@ def read_fanuc(text: str) -> RawTable | None:
     points = _Points()
     while not _END.fullmatch(text, place):
         found = _POINT.match(text, place)
-        begins = _BLANKS.match(text, place).end()  # type: ignore[union-attr] - of any length
+        begins = _past_blanks(text, place)
         if found is None:
             ends = _SECTION.match(text, place)
             if ends and not _LOOSE.search(text, place):
@@ -125,13 +125,19 @@ class _Points:
         self.poses.append(turned(line, numbers[:3], matrix, given))
 
 
+def _past_blanks(text: str, place: int) -> int:
+    """Return where the blanks at a place end."""
+    blanks = _BLANKS.match(text, place)
+    return place if blanks is None else blanks.end()
+
+
 def _body(body: str, line: int) -> tuple[dict[str, str], dict[str, str]]:
     """Return frames and values of the first group of axes, all of whose items are understood."""
     frames: dict[str, str] = {}
     values: dict[str, str] = {}
     group, place = "1", 0
     while body[place:].strip():
-        place = _BLANKS.match(body, place).end()  # type: ignore[union-attr] - of any length
+        place = _past_blanks(body, place)
         here = line + body[:place].count("\n")
         if begins := _GROUP.match(body, place):
             group, place = begins[1], begins.end()

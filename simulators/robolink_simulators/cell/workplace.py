@@ -14,6 +14,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import TIP, Pose, ToolOffset
 from robolink_simulators.cell.camera import CameraTruth
+from robolink_simulators.cell.frames import add
 from robolink_simulators.cell.held_board import SimulatedBoard
 from robolink_simulators.cell.places import Axis, Direction, Pixel, axis_of
 from robolink_simulators.cell.places import XyzMm as XyzMm
@@ -240,9 +241,16 @@ class Workplace(ABC):
         if mark == TIP:
             # A held board hides the tip of its nozzle.
             shown = [tool for tool in self.tips if not (board and tool == MOUNTED_TOOL)]
-            return [(self.tip_mm(tool), self.axis("x", tool)) for tool in shown]
+            return [(self._seen_tip_mm(tool), self.axis("x", tool)) for tool in shown]
         seen = board.fiducials(nozzle) if board else ()
         return [(self.robot.tip_mm(p), self.robot.turned(axis_of(p, "x"))) for p in seen]
+
+    def _seen_tip_mm(self, tool: int) -> XyzMm:
+        """Return where a camera sees a physical tip: beside it, on a side fixed in the tool."""
+        x_mm, y_mm = self.parameters.tip_seen_beside_mm
+        if not x_mm and not y_mm:
+            return self.tip_mm(tool)
+        return add(self.tip_mm(tool), self.robot.turned((x_mm, y_mm, 0.0)))
 
     def tip_mm(self, tool: int = MOUNTED_TOOL) -> XyzMm:
         """Return where a physical tip is now; the mounted one as its spindle wobbles."""

@@ -55,6 +55,9 @@ class WorldParameters:
         camera_spot_radius_px: Radius of a found spot that the finder tells; 0 for none.
         camera_spot_swells_by, camera_spot_swells_from_picture: Share by which that grows, and
             from which picture on. Pictures count from when the world was set up.
+        camera_tip_beside_px, camera_tip_beside_toward_deg: How far beside where it is the camera
+            sees a tip, and in which direction, counted from the flange's X: a rough edge, a bevel.
+            It turns with the tool.
         board_held: Whether the nozzle holds a board, which hides its tip.
         person_stays_share, person_stays_from_touch: Share of the touches for which the person
             only presses ENTER, and the first one to which it applies.
@@ -111,6 +114,8 @@ class WorldParameters:
     camera_spot_radius_px: float = 0.0
     camera_spot_swells_by: float = 0.0
     camera_spot_swells_from_picture: int = 1
+    camera_tip_beside_px: float = 0.0
+    camera_tip_beside_toward_deg: float = 0.0
     board_held: bool = False
     person_stays_share: float = 0.0
     person_stays_from_touch: int = 1
@@ -154,6 +159,13 @@ class WorldParameters:
         """The camera."""
         names = [field.name for field in fields(CameraOptics) if field.name != "size_px"]
         return CameraOptics(**{name: getattr(self, f"camera_{name}") for name in names})
+
+    @property
+    def tip_seen_beside_mm(self) -> tuple[float, float]:
+        """How far beside where it is the camera sees a tip, X and Y of the flange."""
+        toward = math.radians(self.camera_tip_beside_toward_deg)
+        beside_mm = self.camera_tip_beside_px * self.camera_um_per_px_x / 1000
+        return beside_mm * math.cos(toward), beside_mm * math.sin(toward)
 
     @property
     def finder_faults(self) -> FinderFaults:

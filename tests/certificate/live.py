@@ -1,0 +1,584 @@
+"""Live nozzle changes in which the tip is known: by every method, on both kinds of controllers.
+
+The real driver and the real procedures work on a simulator in process, in virtual time. What is
+wrong in a cell is put into it after its stations were described, so that nobody is told.
+"""
+
+import math
+import random
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass, field, replace
+from itertools import count
+from types import SimpleNamespace
+from typing import Any, Final
+
+from robolink_cli.prompts.operator import AssistedOperator
+from robolink_simulators.assist.port import InProcessEyes
+from robolink_simulators.cell.clock import ManualClock
+from robolink_simulators.cell.tip_switches import TouchPlate
+from robolink_simulators.hosting.in_process import softmotion
+from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
+
+import robolink
+from robolink.calibration import BoardDrawing, Pin, RowFact, VerifyResult, carrying
+from robolink.controllers.softmotion import SoftMotionController
+from robolink.errors import RobolinkError, VerifyError
+from robolink.methods import (
+    Absolute,
+    AllRoundPlan,
+    AxisTeachPlan,
+    BeamsParameters,
+    BeamsSource,
+    BoardSource,
+    CameraAffineSource,
+    CameraSource,
+    NAngleSource,
+    OneTouchSource,
+    PivotSource,
+    PlaneSurvey,
+    PlaneTouchSource,
+    PointsSource,
+    RunoutTableSource,
+    SixPointSource,
+    SphereSurvey,
+    SphereTouchSource,
+    TwoPoseSource,
+    ZTouchSource,
+    informative_tilts,
+)
+from robolink.model import Pose, ToolOffset, ToolReceipt
+from robolink.nozzle_change import (
+    AcceptanceCriteria,
+    ChangePlan,
+    Limits,
+    Listener,
+    NozzleChange,
+    Proposal,
+    ToolPlan,
+)
+from robolink.procedures import LookPlan, TouchPlan
+from tests.contract._camera_cell import camera_station, furnish
+from tests.contract._sensor_cell import PLATE_INPUT, TOOL, plc_sensor_cell, sensor_cell
+
+QUICK: Final = Limits(speed_percent=100, speed_mm_s=2000.0)
+"""Faster than commands let it, which changes nothing but how long a test takes."""
+
+BEAM_NOISE: Final = {"noise_mm": 0.003}
+PLATE_NOISE: Final = {"noise_mm": 0.002}
+PERSON_SIGMA_MM: Final = 0.01
+"""What a cell states of its person: what the eye errs by."""
+
+ABOVE_BALL_MM: Final = 15.0
+
+_names = count()
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a change ended.
+
+    Attributes:
+        code: Why it was refused; empty where the value was written and stands.
+        taken_back: Whether it had been written and the old value came back.
+        doubts: What was doubted by name, though the value stands.
+        off_mm: How far what was found is from the truth, all measured lengths together.
+        accurate_mm: What it is said to be accurate to at the end.
+        repeatable_mm: What it is said to be repeatable to.
+        proof: The turn test, with what it says about the measurement.
+        proposal: What was proposed.
+    """
+
+    code: str = ""
+    taken_back: bool = False
+    doubts: tuple[str, ...] = ()
+    off_mm: float | None = None
+    accurate_mm: float | None = None
+    repeatable_mm: float | None = None
+    proof: VerifyResult | None = field(default=None, repr=False)
+    proposal: Proposal | None = field(default=None, repr=False)
+
+    @property
+    def good(self) -> bool:
+        """Whether the value stands and nothing is said against it."""
+        return not self.code and not self.doubts
+
+    @property
+    def share(self) -> float:
+        """How far off the truth it is, as a multiple of what it is said to be accurate to."""
+        assert self.off_mm is not None
+        assert self.accurate_mm is not None, "it says nothing"
+        return self.off_mm / self.accurate_mm
+
+
+@dataclass(frozen=True)
+class Course:
+    """A method on a controller, and what there is in its cell.
+
+    Attributes:
+        method: Its name, with its manner where there are several.
+        kind: Of controller.
+        opened: Sets a cell up, by a seed.
+        source: Returns what measures in it. It may draw how.
+        rows: The rows of its budget that a cell can be wrong by.
+        proves: Whether there is a turn test.
+        approach: Returns where it begins; ``None`` for wherever the robot is.
+        truth: What the measurement is held to.
+    """
+
+    method: str
+    kind: str
+    opened: Callable[[int], AbstractContextManager[Any]]
+    source: Callable[[Any, random.Random], Any]
+    rows: tuple[str, ...] = ()
+    proves: bool = True
+    approach: Callable[[Any], Pose] | None = None
+    truth: Callable[[Any], ToolOffset] = lambda cell: cell.simulator.world.tips[TOOL]
+
+    @property
+    def name(self) -> str:
+        """Method and kind."""
+        return f"{self.method} on {self.kind}"
+
+
+class Hears(Listener):
+    """Keeps what was proposed and what the turn test said, and lets the world change meanwhile."""
+
+    def __init__(self, at_write: Callable[[], None] = lambda: None) -> None:
+        self.proposal: Proposal | None = None
+        self.proof: VerifyResult | None = None
+        self._at_write = at_write
+
+    def proposed(self, proposals: Sequence[Proposal]) -> None:
+        """Keep it."""
+        (self.proposal,) = proposals
+
+    def wrote(self, receipt: ToolReceipt) -> None:
+        """Let happen what happens while the tool is written."""
+        self._at_write()
+
+    def verified(self, tool: int, result: VerifyResult) -> None:
+        """Keep it."""
+        self.proof = result
+
+
+class Person(AssistedOperator):
+    """The person of the cell, who answers questions with yes or no by a rule."""
+
+    says: Callable[[str], bool] = staticmethod(lambda _question: True)
+    asked: list[str]
+
+    def ask(self, question: str, kind: Any) -> None:
+        """Keep the question."""
+        self.asked = [*getattr(self, "asked", []), question]
+        super().ask(question, kind)
+
+    def poll(self, wait_s: float) -> str | None:
+        """Answer."""
+        answer = super().poll(wait_s)
+        return "n" if answer == "y" and not self.says(self.asked[-1]) else answer
+
+
+def person_at(cell: Any) -> Person:
+    """Return the person of a cell."""
+    eyes = InProcessEyes(cell.simulator)
+    found = Person.with_eyes(eyes, lambda _text: None, way_mm=12.0, clock=cell.clock)
+    assert isinstance(found, Person)
+    return found
+
+
+def change(
+    course: Course,
+    seed: int,
+    *,
+    wrong: Callable[[Any], None] = lambda _cell: None,
+    at_write: Callable[[Any], None] = lambda _cell: None,
+    attended: bool = False,
+    person: Callable[[Any], Person] = person_at,
+    interval_mm: float | None = None,
+    rows: Mapping[str, float] | None = None,
+    role: str = "",
+) -> Ended:
+    """Change the nozzle in a new cell, and return how that ended.
+
+    Args:
+        course: By what, on what.
+        seed: Of the cell and of its errors.
+        wrong: What is otherwise in the cell than it was when its stations were described.
+        at_write: What happens while the tool is written.
+        attended: Whether a person is asked; else all of it is as under ``--yes``.
+        person: Who they are.
+        interval_mm: What the process allows the tip to be off.
+        rows: What the cell states of the rows of its budget.
+        role: Of whoever does it, where the cell names people.
+    """
+    with course.opened(seed) as cell:
+        source = course.source(cell, random.Random(f"{course.name} {seed}"))
+        wrong(cell)
+        hears = Hears(lambda: at_write(cell))
+        one = ToolPlan(
+            TOOL,
+            source,
+            AcceptanceCriteria(interval_mm=interval_mm, unattended=not attended),
+            approach=None if course.approach is None else course.approach(cell),
+            rows={key: RowFact(half, "stated") for key, half in (rows or {}).items()},
+        )
+        code, taken_back, report = "", False, None
+        with robolink.connect(cell.url) as controller:
+            if isinstance(controller, SoftMotionController):
+                controller.take()
+            if role:
+                outcomes = controller.outcomes
+                outcomes.signature = replace(outcomes.signature, operator="Kim", role=role)
+            before = controller.tools.read(TOOL)
+            plan = ChangePlan((one,), QUICK, ask_before_write=attended)
+            try:
+                report = NozzleChange(controller, plan, operator=person(cell), listener=hears).run()
+            except RobolinkError as error:
+                code, taken_back = named(error), isinstance(error, VerifyError)
+                assert controller.tools.same(controller.tools.read(TOOL), before), "not put back"
+        return _ended(course, cell, hears, report, code=code, taken_back=taken_back)
+
+
+def named(error: RobolinkError) -> str:
+    """Return the code of an error, or what it is where it has none."""
+    return str(getattr(error, "code", "") or type(error).__name__)
+
+
+def _ended(
+    course: Course, cell: Any, hears: Hears, report: Any, *, code: str, taken_back: bool
+) -> Ended:
+    proposal, proof = hears.proposal, hears.proof
+    if report is not None:
+        proof = report.tools[0].verification or proof
+    if proposal is None:
+        return Ended(code, taken_back=taken_back)
+    found, truth = proposal.result, course.truth(cell)
+    off_mm = math.hypot(
+        *(
+            getattr(found.offset, name) - getattr(truth, name)
+            for name in found.measured
+            if name.endswith("_mm")
+        )
+    )
+    doubts = (*found.warnings, *(proof.warnings if proof is not None else ()))
+    stated_mm = found.accurate_to_mm
+    if proof is not None and proof.accurate_to_mm is not None:
+        stated_mm = proof.accurate_to_mm
+    return Ended(
+        code, taken_back, doubts, off_mm, stated_mm, found.repeatable_to_mm, proof, proposal
+    )
+
+
+# Cells.
+
+
+@contextmanager
+def tilting(seed: int, **world: Any) -> Iterator[Any]:
+    """Set a PLC up whose flange leaves the vertical."""
+    name, simulator = f"certificate-{next(_names)}", SoftMotionSimulator("Kin_5Axes", seed=seed)
+    clock = ManualClock()
+    url = softmotion.register(name, simulator, clock=clock)
+    cell = SimpleNamespace(simulator=simulator, url=url, clock=clock)
+    furnish(cell, **world)
+    try:
+        yield cell
+    finally:
+        softmotion.unregister(name)
+
+
+@contextmanager
+def on_a_plate(seed: int) -> Iterator[Any]:
+    """A plane is touched in place of the pin."""
+    leaning = {"plane_lean_deg": 20.0, "plane_lean_toward_deg": 30.0}
+    with tilting(seed, person_touches="plane", **leaning) as cell:
+        yield cell
+
+
+@contextmanager
+def on_a_ball(seed: int) -> Iterator[Any]:
+    """A sphere is touched in place of the pin."""
+    with tilting(seed, person_touches="sphere") as cell:
+        yield cell
+
+
+def over_the_pin(cell: Any) -> Pose:
+    """Return the flange pose in which the stored tip is straight over the pin."""
+    stored = cell.simulator.plc.memory.defined()[TOOL].tool
+    x_mm, y_mm, z_mm = cell.simulator.world.pin_mm
+    u_deg = cell.simulator.world.robot.flange().u_deg
+    return carrying(
+        Pose(0, 0, 0, u_deg), ToolOffset(*stored[:3]), (x_mm, y_mm, z_mm + ABOVE_BALL_MM)
+    )
+
+
+KINDS: Final = {"EPSON": sensor_cell, "PLC": plc_sensor_cell}
+
+
+# Sources.
+
+
+def stated(rng: random.Random, sigma_mm: float) -> float | None:
+    """Return what is stated of the scatter: half the cells do."""
+    return sigma_mm if rng.random() < 0.5 else None
+
+
+def two_pose(_cell: Any, rng: random.Random) -> Any:
+    """Two touches."""
+    return TwoPoseSource(sigma_mm=stated(rng, PERSON_SIGMA_MM))
+
+
+def n_angle(_cell: Any, rng: random.Random) -> Any:
+    """Four touches, or six."""
+    turns = rng.choice(((90.0, 180.0, 270.0), (60.0, 120.0, 180.0, 240.0, 300.0)))
+    return NAngleSource(turns, sigma_mm=stated(rng, PERSON_SIGMA_MM))
+
+
+def one_touch(cell: Any, _rng: random.Random) -> Any:
+    """One touch of a pin whose place is known."""
+    pin = Pin(*cell.simulator.world.pin_mm, sigma_mm=0.005)
+    return OneTouchSource(Absolute(pin, PERSON_SIGMA_MM))
+
+
+def points(cell: Any, rng: random.Random) -> Any:
+    """Poses that a person taught at two angles."""
+
+    def taught() -> list[Pose]:
+        simulator, poses = cell.simulator, []
+        operator, robot = simulator.world.operator, simulator.world.robot
+        # The pendant of an EPSON controller moves the arm in Teach mode only.
+        live = hasattr(simulator.panel, "teach")
+        if live:
+            simulator.panel.teach()
+        for turn_deg in (0.0, 180.0):
+            robot.turn(turn_deg)
+            poses.append(replace(operator.jog_onto_pin(), tool=0))
+        if live:
+            simulator.panel.auto()
+        return poses
+
+    return PointsSource(taught, in_mm=True)
+
+
+def beams(cell: Any, rng: random.Random, turn_deg: float = 0.0, **plan: Any) -> Any:
+    """Two crossed beams."""
+    cell.mount_beams(cell.beams(radius_mm=0.1), **BEAM_NOISE)
+    return BeamsSource(
+        cell.station,
+        BeamsParameters(turn_deg=turn_deg, repeats=rng.choice((2, 3)), **plan),
+    )
+
+
+def beams_turned(cell: Any, rng: random.Random) -> Any:
+    """The same at two angles."""
+    return beams(cell, rng, rng.choice((90.0, 180.0)))
+
+
+def z_touch(cell: Any, _rng: random.Random) -> Any:
+    """A plate that switches."""
+    cell.mount_plate(**PLATE_NOISE)
+    return ZTouchSource(cell.plate)
+
+
+def camera(cell: Any, _rng: random.Random) -> Any:
+    """A camera, at four angles."""
+    return CameraSource(cell.url, camera_station(cell))
+
+
+def camera_one_look(cell: Any, _rng: random.Random) -> Any:
+    """A camera, at one."""
+    return CameraSource(cell.url, camera_station(cell), LookPlan(turns_deg=(0.0,)))
+
+
+def camera_affine(cell: Any, _rng: random.Random) -> Any:
+    """A camera of which nothing is known."""
+    return CameraAffineSource(cell.url, camera_station(cell, known=False))
+
+
+def runout_table(cell: Any, rng: random.Random) -> Any:
+    """A camera that looks at a wobbling tip all round."""
+    turns = tuple(30.0 * step for step in range(12))
+    furnish(cell, wobble_mm=rng.uniform(0, 0.06), wobble_toward_deg=rng.uniform(0, 360))
+    return RunoutTableSource(cell.url, camera_station(cell), AllRoundPlan(turns_deg=turns))
+
+
+def board(cell: Any, rng: random.Random) -> Any:
+    """A held board with two fiducials or four."""
+    furnish(cell, board_held=True)
+    drawing = BoardDrawing(cell.simulator.world.board.drawing_mm[: rng.choice((2, 4))])
+    return BoardSource(cell.url, camera_station(cell), drawing)
+
+
+def held_board(cell: Any) -> ToolOffset:
+    """Return where the board is."""
+    world = cell.simulator.world
+    frame: ToolOffset = world.board.frame(world.tips[TOOL])
+    return frame
+
+
+def pivot(_cell: Any, rng: random.Random) -> Any:
+    """A pin touched by a tool that is tilted."""
+    count_ = rng.choice((4, 6))
+    return PivotSource(informative_tilts(count_, 20.0), sigma_mm=stated(rng, PERSON_SIGMA_MM))
+
+
+def six_point(_cell: Any, rng: random.Random) -> Any:
+    """The same, with its axes shown."""
+    return SixPointSource(
+        informative_tilts(4, 20.0),
+        sigma_mm=stated(rng, PERSON_SIGMA_MM),
+        ways=AxisTeachPlan(10.0),
+    )
+
+
+def plane_touch(_cell: Any, rng: random.Random) -> Any:
+    """A plane."""
+    return PlaneTouchSource(TouchPlan(lift_mm=15.0), PlaneSurvey(rng.choice((10, 12))), axes=5)
+
+
+def sphere_touch(_cell: Any, _rng: random.Random) -> Any:
+    """A sphere."""
+    return SphereTouchSource(TouchPlan(lift_mm=15.0), SphereSurvey(10.0, 12), axes=5)
+
+
+_SEEN: Final = ("tip_image_px", "camera_turn_deg", "camera_scale_percent")
+
+COURSES: Final[tuple[Course, ...]] = (
+    *(
+        course
+        for kind, opened in KINDS.items()
+        for course in (
+            Course("two-pose", kind, opened, two_pose, ("touch_mm",)),
+            Course("n-angle", kind, opened, n_angle, ("touch_mm",)),
+            Course("one-touch", kind, opened, one_touch, ("touch_mm", "place_mm")),
+            Course("points", kind, opened, points, ("touch_mm",), proves=False),
+            Course("beams", kind, opened, beams, ("place_mm", "bend_deg")),
+            Course("beams --turn", kind, opened, beams_turned, ("place_mm", "bend_deg")),
+            Course("z-touch", kind, opened, z_touch, ("plate_mm",)),
+            Course("camera", kind, opened, camera, (*_SEEN, "place_mm")),
+            Course("camera, one look", kind, opened, camera_one_look, (*_SEEN, "place_mm")),
+            Course("camera-affine", kind, opened, camera_affine, ("tip_image_px",)),
+            Course("runout-table", kind, opened, runout_table, (*_SEEN, "place_mm")),
+            Course(
+                "board",
+                kind,
+                opened,
+                board,
+                ("camera_turn_deg", "camera_scale_percent", "print_mm", "place_mm"),
+                truth=held_board,
+            ),
+        )
+    ),
+    Course("pivot", "PLC", tilting, pivot, ("touch_mm",)),
+    Course("six-point", "PLC", tilting, six_point, ("touch_mm",)),
+    Course("plane-touch", "PLC", on_a_plate, plane_touch, ("touch_mm",)),
+    Course("sphere-touch", "PLC", on_a_ball, sphere_touch, ("touch_mm",), approach=over_the_pin),
+)
+
+BY_NAME: Final[Mapping[str, Course]] = {course.name: course for course in COURSES}
+
+
+# What is wrong.
+
+
+def wrong_by(rows: Mapping[str, tuple[float, ...]]) -> Callable[[Any], None]:
+    """Return what makes a cell wrong by so much in each row, in the unit of the row.
+
+    Args:
+        rows: X and Y of each row that lies in the plane, one number of each other; of ``print_mm``
+            X and Y of each fiducial, one after the other; of ``bend_deg`` how far, and in which
+            direction.
+    """
+
+    def put_in(cell: Any) -> None:
+        for key, by in rows.items():
+            _WRONG[key](cell, *by)
+
+    return put_in
+
+
+def _polar(x: float, y: float) -> tuple[float, float]:
+    return math.hypot(x, y), math.degrees(math.atan2(y, x))
+
+
+def _touch(cell: Any, x_mm: float, y_mm: float) -> None:
+    beside_mm, toward_deg = _polar(x_mm, y_mm)
+    furnish(
+        cell,
+        person_bias_mm=beside_mm,
+        person_bias_frame="tool",
+        person_bias_toward_deg=toward_deg % 360.0,
+    )
+
+
+def _place(cell: Any, x_mm: float, y_mm: float) -> None:
+    """Move everything that a method could rely on."""
+    world = cell.simulator.world
+    moved_mm, toward_deg = _polar(x_mm, y_mm)
+    furnish(cell, beams_moved_mm=moved_mm, beams_moved_toward_deg=toward_deg % 360.0)
+    for one in (world, world.camera):
+        name = "pin_mm" if one is world else "middle_mm"
+        x, y, z = getattr(one, name)
+        setattr(one, name, (x + x_mm, y + y_mm, z))
+
+
+def _camera_turn(cell: Any, by_deg: float) -> None:
+    furnish(cell, camera_turn_deg=cell.simulator.world.parameters.camera_turn_deg + by_deg)
+
+
+def _camera_scale(cell: Any, percent: float) -> None:
+    said = cell.simulator.world.parameters
+    # What is larger in the image is told as longer: a pixel is shorter than it was.
+    by = 1 / (1 + percent / 100)
+    furnish(
+        cell,
+        camera_um_per_px_x=said.camera_um_per_px_x * by,
+        camera_um_per_px_y=said.camera_um_per_px_y * by,
+    )
+
+
+def _tip_image(cell: Any, x_px: float, y_px: float) -> None:
+    beside_px, toward_deg = _polar(x_px, y_px)
+    furnish(cell, camera_tip_beside_px=beside_px, camera_tip_beside_toward_deg=toward_deg % 360.0)
+
+
+def _plate(cell: Any, z_mm: float) -> None:
+    world = cell.simulator.world
+    world.connect(PLATE_INPUT, TouchPlate(cell.plate.z_mm + z_mm), **PLATE_NOISE)
+
+
+def _bend(cell: Any, lean_deg: float, toward_deg: float) -> None:
+    furnish(cell, lean_deg=lean_deg, lean_toward_deg=toward_deg)
+
+
+def _print(cell: Any, *beside_mm: float) -> None:
+    world = cell.simulator.world
+    drawn = world.board.drawing_mm
+    by = list(zip(beside_mm[::2], beside_mm[1::2], strict=True))
+    printed = tuple((x + dx, y + dy) for (x, y), (dx, dy) in zip(drawn, by, strict=True))
+    world.board = replace(world.board, drawing_mm=printed)
+
+
+_WRONG: Final[Mapping[str, Callable[..., None]]] = {
+    "touch_mm": _touch,
+    "place_mm": _place,
+    "camera_turn_deg": _camera_turn,
+    "camera_scale_percent": _camera_scale,
+    "tip_image_px": _tip_image,
+    "plate_mm": _plate,
+    "bend_deg": _bend,
+    "print_mm": _print,
+}
+
+
+def slips(dx_mm: float, dy_mm: float, dz_mm: float = 0.0) -> Callable[[Any], None]:
+    """Return what lets the nozzle slip in its mount by so much, in the axes of the tool."""
+
+    def slip(cell: Any) -> None:
+        tips = cell.simulator.world.tips
+        tip = tips[TOOL]
+        tips[TOOL] = replace(
+            tip, x_mm=tip.x_mm + dx_mm, y_mm=tip.y_mm + dy_mm, z_mm=tip.z_mm + dz_mm
+        )
+
+    return slip

@@ -1,0 +1,209 @@
+"""Four populations of nozzle changes: what is wrong in each, and how it is drawn.
+
+Each run is decided by its population, its course and its number, so any of them can be run alone.
+"""
+
+import cmath
+import math
+import random
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Final
+
+from robolink.calibration import ACCURACY_ROWS, TurnClaim
+from tests.certificate.live import COURSES, Course, Ended, change, slips, wrong_by
+from tests.contract._camera_cell import furnish
+
+CLEAN: Final = "clean"
+IN_ROW: Final = "up to one row"
+BEYOND: Final = "one to two rows"
+VISIBLE: Final = "visible to the turn test"
+POPULATIONS: Final = (CLEAN, IN_ROW, BEYOND, VISIBLE)
+
+_PLANE: Final = ("touch_mm", "place_mm", "tip_image_px")
+"""Rows of a vector in the plane; each coordinate lies anywhere within the half width."""
+
+_COSTLY: Final[Mapping[str, float]] = {
+    "beams on PLC": 0.5,
+    "beams --turn on PLC": 0.4,
+    "z-touch on PLC": 0.5,
+    "plane-touch on PLC": 0.5,
+    "sphere-touch on PLC": 0.5,
+    "six-point on PLC": 0.7,
+}
+"""Share of the runs of the others: these take most of the time."""
+
+LEAST_FACTOR: Final = 1.5
+MOST_FACTOR: Final = 6.0
+"""A visible fault makes a drift of so many times the limit that the claim sets it for scatter
+alone: at 3.7 standard deviations a limit is passed by half of the drifts that are as large, at 1.5
+times the limit by 97 %."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """One change of a population.
+
+    Attributes:
+        population: Which one.
+        course: By what, on what.
+        seed: Of everything in it.
+        fault: What is wrong, in words.
+        ended: How it ended.
+    """
+
+    population: str
+    course: Course
+    seed: int
+    fault: str
+    ended: Ended
+
+
+def shares(total: int, population: str) -> Iterator[tuple[Course, int]]:
+    """Yield how many of so many runs each course has in a population."""
+    courses = [one for one in COURSES if population != VISIBLE or _visible_in(one)]
+    weights = [_COSTLY.get(one.name, 1.0) for one in courses]
+    given, due = 0, 0.0
+    for course, weight in zip(courses, weights, strict=True):
+        due += total * weight / sum(weights)
+        yield course, round(due) - given
+        given = round(due)
+
+
+def run_one(population: str, course: Course, seed: int) -> Run:
+    """Make one change of a population."""
+    rng = random.Random(f"{population} {course.name} {seed}")
+    if population == VISIBLE:
+        return _visible(course, seed, rng)
+    rows = {} if population == CLEAN else _drawn(course, rng, beyond=population == BEYOND)
+    told = ", ".join(f"{key} {_in_words(by)}" for key, by in rows.items())
+    return Run(population, course, seed, told, change(course, seed, wrong=_wrong(rows)))
+
+
+def _in_words(by: Sequence[float]) -> str:
+    return "/".join(f"{value:.3f}" for value in by)
+
+
+def _wrong(rows: Mapping[str, tuple[float, ...]]) -> Callable[[Any], None]:
+    def put_in(cell: Any) -> None:
+        for key, by in rows.items():
+            if key == "print_mm":
+                count = len(cell.simulator.world.board.drawing_mm)
+                wrong_by({key: by[: 2 * count]})(cell)
+            else:
+                wrong_by({key: by})(cell)
+
+    return put_in
+
+
+def _drawn(course: Course, rng: random.Random, *, beyond: bool) -> dict[str, tuple[float, ...]]:
+    """Return how wrong a cell is in each row of a course: anywhere within it.
+
+    Beyond, one of the rows is exceeded by up to its half width.
+    """
+    exceeded = rng.choice(course.rows) if beyond else ""
+    found = {}
+    for key in course.rows:
+        half, count = ACCURACY_ROWS[key].default, 2 if key in _PLANE else 1
+        if key == "print_mm":
+            count = 8
+        by = _anywhere(rng, half, count, beyond=key == exceeded)
+        found[key] = (abs(by[0]), rng.uniform(0.0, 360.0)) if key == "bend_deg" else by
+    return found
+
+
+def _anywhere(rng: random.Random, half: float, count: int, *, beyond: bool) -> tuple[float, ...]:
+    while True:
+        wide = 2 * half if beyond else half
+        by = tuple(rng.uniform(-wide, wide) for _ in range(count))
+        if not beyond or max(map(abs, by)) > half:
+            return by
+
+
+# Faults that a turn test can see.
+
+
+def _visible_in(course: Course) -> bool:
+    return course.proves
+
+
+_MOVES: Final = ("beams", "camera, one look", "one-touch")
+"""Methods that rely on the place of a station, so that one that was moved turns into drift."""
+
+_BUMPS: Final = ("two-pose", "n-angle")
+
+
+def _visible(course: Course, seed: int, rng: random.Random) -> Run:
+    """Make a change in which something moves by more than the claim of the same cell lets pass."""
+    right = change(course, seed)
+    proposal, proof = right.proposal, right.proof
+    if right.code or proposal is None or proposal.claim is None or proof is None:
+        return Run(VISIBLE, course, seed, "refused without a fault", right)
+    assert proof.judgement is not None
+    claim = proposal.claim
+    limits = [one.repeatable_mm for one in proof.judgement.limits]
+    turned = [drift.u_deg for drift in proof.drifts]
+    factor = LEAST_FACTOR * (MOST_FACTOR / LEAST_FACTOR) ** rng.random()
+    toward = cmath.exp(1j * rng.uniform(0.0, math.tau))
+    kinds = ["slip"]
+    if course.method in _MOVES:
+        kinds.append("station moved")
+    if course.method in _BUMPS:
+        kinds.append("pin bumped")
+    kind = rng.choice(kinds)
+    wrong: Callable[[Any], None] = _nothing
+    at_write: Callable[[Any], None] = _nothing
+    if kind == "slip":
+        size_mm = factor * min(limits)
+        by = size_mm * toward
+        if course.method == "z-touch":
+            at_write = slips(0.0, 0.0, math.copysign(size_mm, toward.real))
+        else:
+            at_write = slips(by.real, by.imag)
+    elif kind == "station moved":
+        size_mm = factor * _of_unit(limits, [abs(z) for z in _shown_of_place(claim, turned)])
+        by = size_mm * toward
+        wrong = wrong_by({"place_mm": (by.real, by.imag)})
+    else:
+        after = rng.randrange(1, len(claim.headings_deg) + 1)
+        size_mm = factor * _of_unit(limits, _shown_of_bump(claim, turned, after))
+        wrong = partial(
+            furnish,
+            pin_bumped_after_touch=after,
+            pin_bump_mm=size_mm,
+            pin_bump_toward_deg=math.degrees(cmath.phase(toward)) % 360.0,
+        )
+        kind = f"pin bumped after touch {after}"
+    ended = change(course, seed, wrong=wrong, at_write=at_write)
+    return Run(VISIBLE, course, seed, f"{kind} by {size_mm:.3f}, {factor:.1f} limits", ended)
+
+
+def _nothing(_cell: Any) -> None:
+    pass
+
+
+def _of_unit(limits: Sequence[float], shown: Sequence[float]) -> float:
+    """Return how large something is that brings the drift that shows it best to its limit."""
+    return min(limit / max(share, 1e-3) for limit, share in zip(limits, shown, strict=True))
+
+
+def _shown_of_place(claim: TurnClaim, turned_deg: Sequence[float]) -> list[complex]:
+    """Return what drifts show of a place that all looks were off by."""
+    looks = [cmath.exp(1j * math.radians(one)) for one in claim.headings_deg]
+    mean = sum(1 / look for look in looks) / len(looks)
+    return [1 - cmath.exp(1j * math.radians(one)) * mean for one in turned_deg]
+
+
+def _shown_of_bump(claim: TurnClaim, turned_deg: Sequence[float], after: int) -> list[float]:
+    """Return what drifts show of a pin that is bumped after a touch, for a bump by 1 mm.
+
+    The touches before it fit the pin where it was, those after it where it is: f = p - z t.
+    """
+    import numpy as np
+
+    z = np.exp(1j * np.radians(claim.headings_deg))
+    f = np.array([0.0 if number < after else 1.0 for number in range(len(z))], dtype=complex)
+    (tip, pin), *_ = np.linalg.lstsq(np.stack([-z, np.ones_like(z)], axis=1), f, rcond=None)
+    tests = np.exp(1j * np.radians(turned_deg))
+    return [abs(complex(1.0 + one * tip - pin)) for one in tests]

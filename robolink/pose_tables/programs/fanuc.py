@@ -39,7 +39,6 @@ _LOOSE: Final = re.compile(
 )
 _REGION: Final = re.compile(r"(?m)^[ \t]*/POS\s*$")
 _SECTION: Final = re.compile(r"\s*/[A-Z]+\b")
-_BLANKS: Final = re.compile(r"\s*")
 _END: Final = re.compile(r"\s*(?:/END\s*)?")
 _CONFIG: Final = re.compile(r"CONFIG\s*:\s*'[^'\n]*'\s*(?:,|$)", re.IGNORECASE)
 _ITEM: Final = re.compile(r"\s*([^,]*?)\s*(?:,|$)", re.DOTALL)
@@ -69,7 +68,7 @@ def read_fanuc(text: str) -> RawTable | None:
     points = _Points()
     while not _END.fullmatch(text, place):
         found = _POINT.match(text, place)
-        begins = _BLANKS.match(text, place).end()  # type: ignore[union-attr] - of any length
+        begins = _past_blanks(text, place)
         if found is None:
             ends = _SECTION.match(text, place)
             if ends and not _LOOSE.search(text, place):
@@ -80,6 +79,12 @@ def read_fanuc(text: str) -> RawTable | None:
     if not points.poses and not points.skipped:
         return None
     return program("FANUC", points.poses, _RULE.formula, points.skipped, stated=True)
+
+
+def _past_blanks(text: str, place: int) -> int:
+    while place < len(text) and text[place].isspace():
+        place += 1
+    return place
 
 
 class _Points:
@@ -131,7 +136,7 @@ def _body(body: str, line: int) -> tuple[dict[str, str], dict[str, str]]:
     values: dict[str, str] = {}
     group, place = "1", 0
     while body[place:].strip():
-        place = _BLANKS.match(body, place).end()  # type: ignore[union-attr] - of any length
+        place = _past_blanks(body, place)
         here = line + body[:place].count("\n")
         if begins := _GROUP.match(body, place):
             group, place = begins[1], begins.end()

@@ -346,6 +346,29 @@ def test_thousands_are_grouped_where_the_decimal_sign_follows(read, text):
     assert (second.x_mm, second.y_mm) == (287.5, 1003.25)
 
 
+COMMENTED = {
+    "KUKA": (f"DECL POS XA={KUKA}\n{{}}DECL POS XB={KUKA}\n", ";"),
+    "ABB": (f"CONST robtarget a:={TARGET};\n{{}}CONST robtarget b:={TARGET};\n", "!"),
+    "URScript": (
+        f"a=p[{', '.join([*METRES, *VECTOR])}]\n{{}}b=p[{', '.join([*METRES, *VECTOR])}]\n",
+        "#",
+    ),
+    "SPEL+": ("P1 = XY(1, 2, 3, 4)\n{}P2 = XY(11, 12, 13, 14)\n", "'"),
+    "MELFA": (MELFA + "{}" + MELFA.replace("P1", "P2"), "'"),
+}
+
+
+@pytest.mark.parametrize("maker", COMMENTED)
+def test_a_pose_in_a_comment_is_counted_and_one_behind_a_sign_alone_refused(read, maker):
+    text, sign = COMMENTED[maker]
+    before, _, behind = text.partition("{}")
+    assert len(read(before + behind).poses) == 2
+    found = read(f"{before}{sign} {behind}")
+    assert (len(found.poses), found.how.skipped) == (1, 1)
+    with pytest.raises(ConfigError, match="line 2: it begins with"):
+        read(f"{before}{sign}{behind}")
+
+
 def test_rows_left_out_on_purpose_are_counted(read):
     found = read("x,y,u\n287.5,103.25,0\n# 296.75,87.5,90\n312.5,96.75,180\n")
     assert (len(found.poses), found.how.skipped) == (2, 1)

@@ -13,6 +13,7 @@ from robolink.messages import tr
 from robolink.model import Hand
 from robolink.pose_tables.conventions import EPSON
 from robolink.pose_tables.numbers import number_of, plain, why_no_number
+from robolink.pose_tables.programs.program_text import left_out
 from robolink.pose_tables.refusals import UnusableText
 from robolink.pose_tables.values import LengthUnit, RawPose, RawTable
 
@@ -89,6 +90,8 @@ def read_spel(lines: Sequence[str]) -> RawTable | None:
         why = tr("the point has other numbers than those above: four, or six")
         raise UnusableText(why, poses[odd].line)
     _refuse_other_flags(poses)
+    if poses:
+        skipped += left_out("\n".join(lines), "'", r"=\s*XY\s*\(")
     if not poses:
         if skipped:
             raise UnusableText(tr("its points are not given in coordinates"))

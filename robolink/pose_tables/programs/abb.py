@@ -17,6 +17,7 @@ from robolink.pose_tables.programs.program_text import (
     blanked,
     fields_of,
     groups_of,
+    left_out,
     program,
     required_number,
     turned,
@@ -68,7 +69,8 @@ def read_abb(text: str) -> RawTable | None:
     Raises:
         UnusableText: What looks like a target is none; says the line.
     """
-    text = _COMMENT.sub(blanked, _STRING.sub(_quotes, plain(text)))
+    whole = plain(text)
+    text = _COMMENT.sub(blanked, _STRING.sub(_quotes, whole))
     if not _OURS.search(text):
         return None
     line_at = line_counter(text)
@@ -107,6 +109,7 @@ def read_abb(text: str) -> RawTable | None:
     _refuse_pieces(without(text, spans))
     if not poses and not joints:
         return None
+    joints += left_out(whole, "!", r"\[\s*\[[^\[\]]*\]\s*,\s*\[")
     return program("ABB", poses, "quaternion Q1 (scalar) Q2 Q3 Q4", joints, angle="")
 
 

@@ -39,7 +39,6 @@ _LOOSE: Final = re.compile(
 )
 _REGION: Final = re.compile(r"(?m)^[ \t]*/POS\s*$")
 _SECTION: Final = re.compile(r"\s*/[A-Z]+\b")
-_BLANKS: Final = re.compile(r"\s*")
 _END: Final = re.compile(r"\s*(?:/END\s*)?")
 _CONFIG: Final = re.compile(r"CONFIG\s*:\s*'[^'\n]*'\s*(?:,|$)", re.IGNORECASE)
 _ITEM: Final = re.compile(r"\s*([^,]*?)\s*(?:,|$)", re.DOTALL)
@@ -80,6 +79,12 @@ def read_fanuc(text: str) -> RawTable | None:
     if not points.poses and not points.skipped:
         return None
     return program("FANUC", points.poses, _RULE.formula, points.skipped, stated=True)
+
+
+def _past_blanks(text: str, place: int) -> int:
+    while place < len(text) and text[place].isspace():
+        place += 1
+    return place
 
 
 class _Points:

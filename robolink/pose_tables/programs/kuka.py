@@ -18,6 +18,7 @@ from robolink.pose_tables.programs.program_text import (
     blanked,
     fields_of,
     groups_of,
+    left_out,
     program,
     radians,
     required_number,
@@ -221,6 +222,8 @@ def read_kuka(text: str) -> RawTable | None:
         return None
     reader = _Reader(commentless, line_counter(commentless))
     reader.read()
+    if reader.poses:
+        reader.skipped += left_out(text, ";", r"\{[^{}]*\bX[ \t]*[+-]?[0-9.]")
     if not reader.poses and not reader.skipped:
         return None
     return program("KUKA", reader.poses, _RULE.formula, reader.skipped)

@@ -11,7 +11,13 @@ from typing import Final
 from robolink.messages import tr
 from robolink.pose_tables.conventions import RULES
 from robolink.pose_tables.numbers import plain
-from robolink.pose_tables.programs.program_text import program, radians, required_number, turned
+from robolink.pose_tables.programs.program_text import (
+    left_out,
+    program,
+    radians,
+    required_number,
+    turned,
+)
 from robolink.pose_tables.refusals import UnusableText
 from robolink.pose_tables.values import RawPose, RawTable
 
@@ -79,6 +85,7 @@ def read_mitsubishi(text: str) -> RawTable | None:
             skipped += 1
     if not poses and not skipped:
         return None
+    skipped += left_out(text, "'", r"\bP\w*\s*=\s*\([^()]*\)\s*\(")
     return program("MELFA BASIC", poses, _RULE.formula, skipped)
 
 

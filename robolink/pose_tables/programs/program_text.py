@@ -101,6 +101,35 @@ def without(text: str, spans: Sequence[tuple[int, int]]) -> str:
     return "".join([*parts, text[place:]])
 
 
+def left_out(text: str, sign: str, pose: str) -> int:
+    """Return how many poses stand in comments of their own: left out on purpose, and counted.
+
+    Args:
+        text: With its comments.
+        sign: What begins one.
+        pose: A pattern of what looks like a pose on one line.
+
+    Raises:
+        UnusableText: One follows the sign at once: it may have been typed by mistake.
+
+    Example:
+        >>> from robolink.pose_tables.programs.program_text import left_out
+        >>> left_out("; {X 1,Y 2}", ";", r"[{]X")
+        1
+    """
+    comment = re.compile(rf"[ \t]*{re.escape(sign)}(?P<apart>[ \t]?).*?(?:{pose})", re.IGNORECASE)
+    count = 0
+    for number, line in enumerate(text.split("\n") if sign in text else (), start=1):
+        found = comment.match(line)
+        if found and not found["apart"]:
+            raise UnusableText(
+                tr("it begins with {sign} and looks like a pose; is it a comment?", sign=sign),
+                number,
+            )
+        count += found is not None
+    return count
+
+
 def required_number(name: str, text: str, line: int) -> float:
     """Return the finite number of a component.
 

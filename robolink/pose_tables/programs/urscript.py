@@ -14,7 +14,7 @@ from robolink.messages import tr
 from robolink.pose_tables.conventions import RULES
 from robolink.pose_tables.encoding import line_counter
 from robolink.pose_tables.numbers import NUMBER, number_of, plain, seems_number, why_no_number
-from robolink.pose_tables.programs.program_text import blanked, program, turned
+from robolink.pose_tables.programs.program_text import blanked, left_out, program, turned
 from robolink.pose_tables.refusals import UnusableText
 from robolink.pose_tables.values import LengthUnit, RawPose, RawTable
 
@@ -55,7 +55,8 @@ def read_urscript(text: str) -> RawTable | None:
     Raises:
         UnusableText: What looks like a pose is none, or has units that are none of its.
     """
-    text = plain(text)
+    whole = plain(text)
+    text = whole
     text = _COMMENT.sub(blanked, _STRING.sub(blanked, text))
     if (
         "[" not in text + "]"
@@ -110,6 +111,7 @@ def read_urscript(text: str) -> RawTable | None:
             raise UnusableText(_without_p(), line)
     if not poses and not joints:
         return None
+    joints += left_out(whole, "#", r"\bp\s*\[")
     if len(lengths) > 1 or not lengths <= {"", "mm", "m", "in"}:
         raise UnusableText(tr("its lengths have different units"))
     raw = program("URScript", poses, _RULE.formula, joints, angle="rad")

@@ -1,4 +1,4 @@
-"""Commands drawn at random, right, wrong and damaged, and what a mailbox makes of them."""
+"""What is drawn at random, commands and owners, and what a mailbox makes of it."""
 
 import random
 from typing import Any
@@ -14,9 +14,10 @@ from robolink.protocols.mailbox import (
     encode_command,
     heartbeat_word,
 )
-from tests.unit._mailbox_client import FACTORS, LINE, shifted
+from tests.unit._mailbox_client import FACTORS, LINE, MailboxClient, shifted
 
 STATE, BITS, RAW, CRC = 7, 8, 4, 61
+HEARTBEAT, ANSWER, AFTER_PLACES = 9, 12, 88
 NUMBERS = (0, 0, 1, 1, 2, 3, 15, 16, -1, 31, 32, 255)
 LENGTHS = (0.0, 1.5, -20.0, 9999.0, 10001.0, 1e300, float("inf"), float("nan"), 5e-324, -0.0)
 TELLING = (2, 3, 4, 5, 11, 15, 19, 48, 49, 56, 57, 58, 59, 60)
@@ -115,3 +116,82 @@ def _bring_back(bench):
         return
     for opcode in (Opcode.STOP, Opcode.RESET, Opcode.ENABLE):
         bench.tell(opcode, *([1] if opcode is Opcode.STOP else []))
+
+
+ACTS = ("take", "take", "jog", "move", "until", "direct", "end", "interrupt", "continue")
+RARE_ACTS = ("halt", "stop", "release", "release", "leave", "permit")
+SLOWLY = (5.0, 50.0, 50.0, 500.0)
+BACK_ALONG_X = 0b1
+
+
+def drawn_owners(seed: int, acts: int):
+    """Return a behaviour: three clients who take the mailbox from each other while things move.
+
+    Each act is mostly one of the owner, and else of a client drawn; whoever owns it then beats.
+    Nothing new is begun while a movement is interrupted: which of the two is then the active one
+    is shown differently (docs/structured-text.md), and is not what is compared.
+    """
+
+    def behaviour(bench):
+        draw = random.Random(seed)
+        bench.enable()
+        others = (MailboxClient(bench.client.link, owner) for owner in (0x111, 0x222))
+        clients = [bench.client, *others]
+        for _ in range(acts):
+            holder = bench.plc.plc.program.holder
+            owning = [one for one in clients if one.owner == holder]
+            act = draw.choice((*ACTS, draw.choice(RARE_ACTS)))
+            now = bench.client.now()
+            if now.group_state == GroupState.STOPPING and draw.random() < 0.7:
+                act = "release"  # nothing else has an effect
+            if now.bits & Bits.INTERRUPTED:
+                act = draw.choice(("take", "continue", "end", "halt", "leave"))
+            by_owner = owning and act != "take" and draw.random() < 0.8
+            client = draw.choice(owning if by_owner else clients)
+            client.sequence = max(one.sequence for one in clients)
+            _act(draw, bench, client, act)
+            holder = bench.plc.plc.program.holder
+            beating = next((one for one in clients if one.owner == holder), client)
+            beating.wait(draw.choice((0.2, 0.4)))
+            words = list(client.link.read_response())
+            words[RAW : RAW + 2] = 0, 0  # a number that nobody knows (error_numbers.py)
+            words[HEARTBEAT] = 0
+            bench.taken.append(words[:ANSWER] + words[AFTER_PLACES:-2])  # without the checksum
+
+    return behaviour
+
+
+def _act(draw: random.Random, bench, client, act):
+    system = CoordinateSystem.MCS
+    tcp = client.now().tcp
+    if act == "take":
+        now = client.tell(Opcode.OWNERSHIP, 1, draw.choice((1, 1, 0)))
+        if now.answer.holder == client.owner:
+            client.epoch = now.answer.epoch
+    elif act == "jog":
+        client.tell(Opcode.JOG, 0, BACK_ALONG_X, system, dynamics=SLOWLY)
+    elif act == "move":
+        client.move(z=draw.choice((-15.0, 15.0)), mode=draw.choice((0, 1)), dynamics=SLOWLY)
+    elif act == "until":
+        operands = (3, 0, system, 0)
+        client.tell(Opcode.MOVE_UNTIL_INPUT, *operands, pose=shifted(tcp, z=-2.0), dynamics=SLOWLY)
+    elif act == "direct":
+        slow = (0.1, 0.1, 0.1, 0.1)
+        client.tell(Opcode.MOVE_DIRECT, 0, 0, system, 0, pose=shifted(tcp, z=2.0), dynamics=slow)
+    elif act == "permit":
+        bench.plc.panel.withdraw_permit()
+        client.wait(0.05)
+        bench.plc.panel.give_permit()
+    else:
+        client.tell(*_TELLING_ACTS[act])
+
+
+_TELLING_ACTS = {
+    "end": (Opcode.JOG, 0, 0, CoordinateSystem.MCS),
+    "interrupt": (Opcode.INTERRUPT,),
+    "continue": (Opcode.CONTINUE,),
+    "halt": (Opcode.HALT,),
+    "stop": (Opcode.STOP, 0),
+    "release": (Opcode.STOP, 1),
+    "leave": (Opcode.OWNERSHIP, 0, 1),
+}

@@ -26,7 +26,9 @@ def file_name(identity: str) -> str:
     from hashlib import sha256
 
     readable = re.sub(r"[^A-Za-z0-9.]+", "-", identity).strip("-.")[:60]
-    return f"{readable or 'controller'}-{sha256(identity.encode()).hexdigest()[:16]}.json"
+    # A name may hold what no encoding knows; it is this name all the same.
+    digest = sha256(identity.encode(errors="surrogatepass")).hexdigest()
+    return f"{readable or 'controller'}-{digest[:16]}.json"
 
 
 def make_folder(folder: Path) -> None:

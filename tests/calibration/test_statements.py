@@ -108,8 +108,8 @@ def test_a_row_of_another_version_keeps_the_title_it_was_recorded_with():
     assert rows_in_words(replace(found, rows=rows))[0].title == "a later row"
 
 
-def judged(code="", *, small=False):
-    return TurnJudgement(code, (LIMITS,), small_angle=small)
+def judged(code="", *, small=False, covered=False):
+    return TurnJudgement(code, (LIMITS,), small_angle=small, covered=covered)
 
 
 @pytest.mark.parametrize(
@@ -118,8 +118,13 @@ def judged(code="", *, small=False):
         (None, "Turn test passed: 0.012", None),
         (judged(), "Turn test passed: 0.012", "It contradicts nothing that is stated"),
         (
-            judged("proof_contradicts_repeatability"),
+            judged("proof_contradicts_repeatability", covered=True),
             "Turn test within its limit, with a doubt: 0.012",
+            "Scatter alone explains 0.016 mm, no more",
+        ),
+        (
+            judged("proof_contradicts_repeatability"),
+            "Turn test contradicts the measurement: 0.012",
             "Scatter alone explains 0.016 mm, no more",
         ),
         (

@@ -333,6 +333,7 @@ MAKERS = {
     "simulated-softmotion.md 1": nothing,
     "simulated-softmotion.md 2": nothing,
     "solvers.md 1": four_poses,
+    "solvers.md 2": nothing,
     "softmotion-controller.md 1": one_plc,
     "softmotion-controller.md 2": a_connected_plc,
     "spel-programs.md 1": nothing,

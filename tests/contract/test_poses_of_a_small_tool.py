@@ -131,7 +131,7 @@ class Person:
 def test_a_person_is_asked_and_the_answer_is_on_record(answers, poses):
     person = Person(*answers)
     plan = ChangePlan(
-        (ToolPlan(1, PointsSource(lambda: poses), verify=False),),
+        (ToolPlan(1, PointsSource(lambda: poses, axes_held=True), verify=False),),
         ask_before_write=False,
         attended=True,
     )
@@ -155,7 +155,7 @@ def test_who_does_not_know_writes_nothing():
     from robolink.errors import CalibrationError
 
     plan = ChangePlan(
-        (ToolPlan(1, PointsSource(lambda: OF_TOOL), verify=False),),
+        (ToolPlan(1, PointsSource(lambda: OF_TOOL, axes_held=True), verify=False),),
         ask_before_write=False,
         attended=True,
     )

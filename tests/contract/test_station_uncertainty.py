@@ -2,7 +2,7 @@
 
 import pytest
 
-from robolink.calibration import Pin, solve_one_touch
+from robolink.calibration import AccuracyFacts, Pin, RowFact, assessed, solve_one_touch
 from robolink.errors import CalibrationError
 from robolink.journal import EntryKind
 from robolink.model import NewEntry, Pose, ToolOffset, plain_offset
@@ -90,8 +90,10 @@ def test_the_limit_of_a_process_is_compared_with_the_region():
     # 1.96 and 2.80 times 0.014: each axis alone, and all three together.
     assert found.half95_mm == pytest.approx(0.0277, abs=1e-4)
     assert found.region95_radius_mm == pytest.approx(0.0395, abs=1e-4)
+    rows = {key: RowFact(0.0001, "stated") for key in ("touch_mm", "place_mm")}
+    found = assessed(found, AccuracyFacts(rows))
     AcceptanceCriteria(interval_mm=0.041).judge_fit(found)
-    with pytest.raises(CalibrationError, match="all axes together") as refused:
+    with pytest.raises(CalibrationError, match="Accurate to") as refused:
         AcceptanceCriteria(interval_mm=0.03).judge_fit(found)
     assert refused.value.code == "large_interval"
 

@@ -130,12 +130,6 @@ class _Points:
         self.poses.append(turned(line, numbers[:3], matrix, given))
 
 
-def _past_blanks(text: str, place: int) -> int:
-    """Return where the blanks at a place end."""
-    blanks = _BLANKS.match(text, place)
-    return place if blanks is None else blanks.end()
-
-
 def _body(body: str, line: int) -> tuple[dict[str, str], dict[str, str]]:
     """Return frames and values of the first group of axes, all of whose items are understood."""
     frames: dict[str, str] = {}

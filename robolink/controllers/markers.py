@@ -13,6 +13,7 @@ from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.errors import (
     BusyError,
     JournalError,
+    LeaseLostError,
     OutcomeUnknownError,
     RemoteProtocolError,
     RobolinkError,
@@ -128,9 +129,11 @@ class MarkerStore:
             ConfigError: That is impossible.
             BusyError: Another process has the controller.
             OutcomeUnknownError: Something earlier is unsettled; nothing may be sent.
+            LeaseLostError: Somebody else was at it and has just ended.
         """
-        if not operation and not self._latch.restores:
+        if not operation and not self._latch.restores and self._unsettled(self._under_way):
             self._refuse_unsettled(request, besides=self._under_way)
+            raise self._overtaken(request)
         name = operation or new_operation()
         marker = Marker(name, kind, request, wall_label(), dict(details))
         if not self._recorded(lambda: self.outcomes.begin(marker)):
@@ -222,6 +225,22 @@ class MarkerStore:
                 controller=self._identity,
                 request=request,
             )
+
+    def _overtaken(self, request: str) -> LeaseLostError:
+        """Return the error where somebody else ended just now what was unsettled.
+
+        What was read before that may be old, and the look at the lease that would tell has just
+        been made anew.
+        """
+        return LeaseLostError(
+            tr(
+                "Not done: {request}. Another program changed this controller just now.",
+                request=request,
+            ),
+            remedy=tr("Nothing was sent. Read the tools again, then start again."),
+            controller=self._identity,
+            request=request,
+        )
 
     def _recorded(self, keep: Callable[[], object]) -> bool:
         """Keep something on record; return whether that was possible.

@@ -15,6 +15,7 @@ from robolink_simulators.faults import Fault, FaultAction
 import robolink
 from robolink.checkpoints import observed
 from robolink.errors import LoginUnansweredError, StoppedError
+from robolink.journal import memory_journal
 from robolink.model import Controller, ToolOffset
 from robolink.testing import kept_on_site, on_site
 
@@ -257,8 +258,9 @@ def test_whoever_stopped_the_checks_may_have_the_login_when_it_is_put_back(epson
             raise refusals.pop()
         return robolink.connect(epson.fixture.url)
 
+    own = memory_journal("a trial").log("a trial")
     with kept_on_site(reach, "a trial", tool=2, agree=begun.append):
-        with robolink.connect(epson.fixture.url) as controller:
+        with robolink.connect(epson.fixture.url, outcomes=own) as controller:
             controller.tools.write(2, ToolOffset(7.0), expected=OLD)
     assert (len(begun), refusals) == (1, [])
     assert (epson.kept(), epson.open_markers()) == (epson.before, ())

@@ -5,6 +5,7 @@ command that is added and takes ``--yes`` fails here until it has a row.
 """
 
 import io
+import json
 import os
 import re
 import subprocess
@@ -39,6 +40,19 @@ origin_mm = [1.0, 2.0]
 POSES = ("--pose", "287.7,103.9,0", "--pose", "312.3,96.1,180")
 TOOL = ("--tool", "1")
 SEEN = (*TOOL, "--station", "CAM")
+
+STUDY = {
+    "method": "gauge_rr",
+    "input": {
+        "values": [
+            [
+                [0.01 * nozzle + 0.002 * person + 0.001 * again for again in range(3)]
+                for person in range(3)
+            ]
+            for nozzle in range(5)
+        ]
+    },
+}
 
 ASKS: dict[str, list[tuple[str, ...]]] = {
     "change": [(), ("recipe.toml",)],
@@ -82,6 +96,7 @@ CONSENT: dict[str, tuple[str, ...]] = {
     "robot io set": ("1", "on"),
     "robot variable set": ("g_Long", "1", "--type", "Long"),
     "recover": (),
+    "cell accuracy measure": ("touch_mm", "--study", "study.json"),
 }
 """Where the command itself is the consent, or reading decides; it is done at once."""
 
@@ -114,11 +129,12 @@ def cell(request, tmp_path_factory):
             assert made.run("tool", "backup", "kept.json").code == 0
             assert made.run("tool", "set", "3", "--x", "1").code == 0
             assert written_recipe(folder).name == "recipe.toml"
+            (folder / "study.json").write_text(json.dumps(STUDY))
             x, y, z = made.world.pin_mm
             about = ((-12.3, 3.9, 0), (12.3, -3.9, 180), (-3.9, -12.3, 90))
             touches = (f"{x + dx},{y + dy},{z + 20},{u}" for dx, dy, u in about)
             typed = [word for touch in touches for word in ("--pose", touch)]
-            words = (*TOOL, *typed, "--station", "PIN-07", "--yes")
+            words = (*TOOL, *typed, "--taught-tool", "0", "--station", "PIN-07", "--yes")
             assert made.run("calibrate", "n-angle", *words).code == 0
         yield made
 
@@ -146,8 +162,8 @@ def test_what_asks_ends_with_9_and_says_that_nobody_is_there(cell, monkeypatch, 
     monkeypatch.setattr(sys, "stdin", NobodyThere())
     before, at_ns = done_by(cell), cell.clock.now_ns()
     ended = cell.run(*name.split(), *words)
-    (said,) = re.findall(r"^robolink: (.*)", ended.err, re.MULTILINE)
     assert ended.code == 9, ended.err
+    (said,) = re.findall(r"^robolink: (.*)", ended.err, re.MULTILINE)
     assert NOBODY in said
     assert "--yes" in ended.err
     assert done_by(cell) == before

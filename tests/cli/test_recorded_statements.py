@@ -124,13 +124,22 @@ def test_a_report_has_the_statement_that_stands_and_is_no_proof_with_a_doubt(sho
         "X, Y: repeatable to ± 0.035 mm (95 %).",
         "X, Y: accurate to ± 0.150 mm (95 %), widened after the turn test.",
         "Seating: mounted anew, the tip lies within ± 0.130 mm of here",
-        "Within its limit, with a doubt",
+        "It contradicts the measurement",
         "Conformity is not stated: the turn test leaves a doubt.",
     ):
         assert said in text
     assert "dashed circle, radius 0.1500 mm" in text
     assert "accurate to, 95 %" not in text  # that of each axis alone no longer stands
     assert "The tool conforms" not in text
+
+
+def test_a_drift_that_the_accuracy_covers_is_a_doubt_on_the_page(shown, tmp_path):
+    record(sigma_mm=0.02, drift_mm=0.02)
+    page = tmp_path / "page.html"
+    shown("journal", "report", "c0ffee", str(page), "--json")
+    text = page.read_text(encoding="utf-8")
+    assert "Within its limit, with a doubt" in text
+    assert "Written and read back; the turn test leaves a doubt" in text
 
 
 def test_a_report_of_a_good_change_conforms(shown, tmp_path):

@@ -225,6 +225,7 @@ def test_an_owner_that_died_is_named_and_displaced_after_its_silence(cell):
         assert f"{cell.owner:08X}" in refusal.value.what
         assert "10 s after its last sign" in refusal.value.remedy
         cell.clock.advance(OWNER_SILENCE_S)
+        recover(next_one)  # what the dead one left is read first
         next_one.tools.write(3, NEW, expected=None)
     assert (cell.slot_changes(SCRATCH), cell.slot_changes(3)) == (1, 1)
 

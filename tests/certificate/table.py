@@ -20,6 +20,7 @@ from tests.certificate.populations import (
     BEYOND,
     CLEAN,
     IN_ROW,
+    NEAR,
     POPULATIONS,
     VISIBLE,
     run_one,
@@ -31,7 +32,7 @@ BEGIN: Final = "<!-- certificate: written by python -m tests.certificate.table -
 END: Final = "<!-- certificate: end -->"
 
 FIRST_SEED: Final = 90_001
-RUNS: Final = {CLEAN: 1000, IN_ROW: 600, BEYOND: 600, VISIBLE: 400}
+RUNS: Final = {CLEAN: 1000, IN_ROW: 600, BEYOND: 600, VISIBLE: 400, NEAR: 400}
 
 MOST_OUTSIDE: Final = 0.05
 MOST_REFUSED: Final = 0.025

@@ -400,7 +400,8 @@ class Answers:
     """Says yes to all but questions that name a word, and keeps what was asked."""
 
     def __init__(self, no_to: str = ""):
-        self.no_to, self.asked = no_to, []
+        self.no_to = no_to
+        self.asked: list[str] = []
 
     def __call__(self, question: str) -> bool:
         self.asked.append(question)

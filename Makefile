@@ -40,6 +40,7 @@ soak: $(VENV)/.installed-dev $(if $(SEEDS),,docs) ## Run what make test leaves o
 ifeq ($(SEEDS),)
 	$(BIN)/python -m pytest -n 2 -m soak
 	$(BIN)/python -m tests.soak.mutant_table
+	$(BIN)/python -m tests.certificate.table
 else
 	$(BIN)/python -m robolink_simulators.soak --seeds $(SEEDS) --hours $(HOURS)
 endif

@@ -279,7 +279,7 @@ def tilting(seed: int, **world: Any) -> Iterator[Any]:
     name, simulator = f"certificate-{next(_names)}", SoftMotionSimulator("Kin_5Axes", seed=seed)
     clock = ManualClock()
     url = softmotion.register(name, simulator, clock=clock)
-    cell = SimpleNamespace(simulator=simulator, url=url, clock=clock)
+    cell: Any = SimpleNamespace(simulator=simulator, url=url, clock=clock)
     furnish(cell, **world)
     try:
         yield cell
@@ -336,7 +336,8 @@ def n_angle(_cell: Any, rng: random.Random) -> Any:
 
 def one_touch(cell: Any, _rng: random.Random) -> Any:
     """One touch of a pin whose place is known."""
-    pin = Pin(*cell.simulator.world.pin_mm, sigma_mm=0.005)
+    x_mm, y_mm, z_mm = cell.simulator.world.pin_mm
+    pin = Pin(x_mm, y_mm, z_mm, sigma_mm=0.005)
     return OneTouchSource(Absolute(pin, PERSON_SIGMA_MM))
 
 

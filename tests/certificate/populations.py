@@ -1,4 +1,4 @@
-"""Four populations of nozzle changes: what is wrong in each, and how it is drawn.
+"""Populations of nozzle changes: what is wrong in each, and how it is drawn.
 
 Each run is decided by its population, its course and its number, so any of them can be run alone.
 """
@@ -19,7 +19,10 @@ CLEAN: Final = "clean"
 IN_ROW: Final = "up to one row"
 BEYOND: Final = "one to two rows"
 VISIBLE: Final = "visible to the turn test"
-POPULATIONS: Final = (CLEAN, IN_ROW, BEYOND, VISIBLE)
+NEAR: Final = "near the limit of the turn test"
+POPULATIONS: Final = (CLEAN, IN_ROW, BEYOND, VISIBLE, NEAR)
+"""The last one has no goal of its own but that nothing is far outside: whatever a turn test lets
+pass has to be small against what is stated."""
 
 _PLANE: Final = ("touch_mm", "place_mm", "tip_image_px")
 """Rows of a vector in the plane; each coordinate lies anywhere within the half width."""
@@ -34,8 +37,12 @@ _COSTLY: Final[Mapping[str, float]] = {
 }
 """Share of the runs of the others: these take most of the time."""
 
-LEAST_FACTOR: Final = 1.5
-MOST_FACTOR: Final = 6.0
+UNREACHABLE: Final = ("402",)
+"""The arm cannot turn about the pin where it was put up: another cell is drawn."""
+
+ANOTHER: Final = 1_000_000
+
+FACTORS: Final[Mapping[str, tuple[float, float]]] = {VISIBLE: (1.5, 6.0), NEAR: (0.4, 1.5)}
 """A visible fault makes a drift of so many times the limit that the claim sets it for scatter
 alone: at 3.7 standard deviations a limit is passed by half of the drifts that are as large, at 1.5
 times the limit by 97 %."""
@@ -62,7 +69,7 @@ class Run:
 
 def shares(total: int, population: str) -> Iterator[tuple[Course, int]]:
     """Yield how many of so many runs each course has in a population."""
-    courses = [one for one in COURSES if population != VISIBLE or _visible_in(one)]
+    courses = [one for one in COURSES if one.proves or population not in FACTORS]
     weights = [_COSTLY.get(one.name, 1.0) for one in courses]
     given, due = 0, 0.0
     for course, weight in zip(courses, weights, strict=True):
@@ -73,9 +80,16 @@ def shares(total: int, population: str) -> Iterator[tuple[Course, int]]:
 
 def run_one(population: str, course: Course, seed: int) -> Run:
     """Make one change of a population."""
+    found = _run_one(population, course, seed)
+    while found.ended.code in UNREACHABLE:
+        found = _run_one(population, course, found.seed + ANOTHER)
+    return found
+
+
+def _run_one(population: str, course: Course, seed: int) -> Run:
     rng = random.Random(f"{population} {course.name} {seed}")
-    if population == VISIBLE:
-        return _visible(course, seed, rng)
+    if population in FACTORS:
+        return _moving(population, course, seed, rng)
     rows = {} if population == CLEAN else _drawn(course, rng, beyond=population == BEYOND)
     told = ", ".join(f"{key} {_in_words(by)}" for key, by in rows.items())
     return Run(population, course, seed, told, change(course, seed, wrong=_wrong(rows)))
@@ -124,27 +138,24 @@ def _anywhere(rng: random.Random, half: float, count: int, *, beyond: bool) -> t
 # Faults that a turn test can see.
 
 
-def _visible_in(course: Course) -> bool:
-    return course.proves
-
-
 _MOVES: Final = ("beams", "camera, one look", "one-touch")
 """Methods that rely on the place of a station, so that one that was moved turns into drift."""
 
 _BUMPS: Final = ("two-pose", "n-angle")
 
 
-def _visible(course: Course, seed: int, rng: random.Random) -> Run:
-    """Make a change in which something moves by more than the claim of the same cell lets pass."""
+def _moving(population: str, course: Course, seed: int, rng: random.Random) -> Run:
+    """Make a change in which something moves, by what the claim of the same cell lets pass."""
     right = change(course, seed)
     proposal, proof = right.proposal, right.proof
     if right.code or proposal is None or proposal.claim is None or proof is None:
-        return Run(VISIBLE, course, seed, "refused without a fault", right)
+        return Run(population, course, seed, "refused without a fault", right)
     assert proof.judgement is not None
     claim = proposal.claim
     limits = [one.repeatable_mm for one in proof.judgement.limits]
     turned = [drift.u_deg for drift in proof.drifts]
-    factor = LEAST_FACTOR * (MOST_FACTOR / LEAST_FACTOR) ** rng.random()
+    least, most = FACTORS[population]
+    factor = least * (most / least) ** rng.random()
     toward = cmath.exp(1j * rng.uniform(0.0, math.tau))
     kinds = ["slip"]
     if course.method in _MOVES:
@@ -176,7 +187,7 @@ def _visible(course: Course, seed: int, rng: random.Random) -> Run:
         )
         kind = f"pin bumped after touch {after}"
     ended = change(course, seed, wrong=wrong, at_write=at_write)
-    return Run(VISIBLE, course, seed, f"{kind} by {size_mm:.3f}, {factor:.1f} limits", ended)
+    return Run(population, course, seed, f"{kind} by {size_mm:.3f}, {factor:.1f} limits", ended)
 
 
 def _nothing(_cell: Any) -> None:

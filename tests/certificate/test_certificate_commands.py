@@ -68,7 +68,8 @@ def test_the_needle_recipe_with_beams_where_they_were_is_certified(needle):
     assert miss_mm(needle.stored, needle.truth) < 0.02
 
 
-@pytest.mark.parametrize("kind", [pytest.param("epson", marks=pytest.mark.soak), "plc"])
+@pytest.mark.soak
+@pytest.mark.parametrize("kind", KINDS)
 def test_a_command_with_beams_that_were_moved_ends_with_8(kind, tmp_path, monkeypatch):
     with method_cell(kind, tmp_path, monkeypatch) as cell:
         cell.mount()

@@ -339,6 +339,26 @@ def test_a_finder_tells_the_radius_of_a_spot_and_it_may_swell(make):
     assert radii == pytest.approx([12.0, 12.0, 15.0, 15.0], abs=0.3)
 
 
+def test_what_a_camera_sees_beside_the_tip_turns_with_it(make):
+    simulator = make(camera_noise_px=0.0)
+    before_the_lens(simulator)
+    world, seen = simulator.world, {}
+    for turn_deg in (0.0, 180.0):
+        world.robot.turn(turn_deg)
+        before_the_lens(simulator)
+        for beside_px in (0.0, 8.0):
+            tip = {"camera_tip_beside_px": beside_px, "camera_tip_beside_toward_deg": 30}
+            perform(simulator, {"do": "set_world", **tip})
+            (seen[turn_deg, beside_px],) = see(simulator)["seen"]
+    shifts = []
+    for turn_deg in (0.0, 180.0):
+        (x0, y0), (x1, y1) = seen[turn_deg, 0.0], seen[turn_deg, 8.0]
+        shifts.append((x1 - x0, y1 - y0))
+        assert math.hypot(*shifts[-1]) == pytest.approx(8.0, abs=0.1)
+    assert shifts[0] == pytest.approx((-shifts[1][0], -shifts[1][1]), abs=0.2)
+    assert math.dist(world.tip_mm()[:2], world.camera.middle_mm[:2]) < 0.01, "it is where it was"
+
+
 def test_a_share_of_still_spots_is_a_share():
     with pytest.raises(ConfigError, match="above 1"):
         perform(EpsonSimulator(seed=2), {"do": "set_world", "camera_still_share": 1.5})

@@ -207,22 +207,34 @@ def _look_scatter(
     if own_mm is not None and result.sigma_stated:
         # Few residuals make the interval wider, by the factor of Student's t, even where they are
         # small: what was stated stands as long as they do not contradict it.
-        if from_residuals and "sigma_contradicted" in result.warnings:
-            return own_mm, float(dof)
         ratio = result.evidence.birge_ratio if from_residuals and result.evidence else None
-        return own_mm / (ratio or 1.0), None
+        stated_mm = own_mm / (ratio or 1.0)
+        if from_residuals and "sigma_contradicted" in result.warnings:
+            return _together(own_mm, dof, stated_mm)
+        return stated_mm, None
     recorded = facts.look_sigma_mm is not None and facts.look_nu >= _ENOUGH_NU
     least_mm = facts.look_sigma_mm if recorded else usual_mm
     # Looks that are rougher than is usual, beyond doubt, say so themselves, however few they are.
     if own_mm is not None and least_mm and from_residuals and dof:
         squares = dof * (own_mm / least_mm) ** 2
         if squares > chi_square_quantile(_ROUGHER, dof):
-            return own_mm, float(dof)
+            return _together(own_mm, dof, least_mm)
     if facts.look_sigma_mm is not None and facts.look_nu >= _ENOUGH_NU:
         return facts.look_sigma_mm, facts.look_nu
     if usual_mm is not None:
         return usual_mm, None
     return None if own_mm is None else (own_mm, None)
+
+
+def _together(own_mm: float, dof: int, expected_mm: float) -> tuple[float, float]:
+    """Return a scatter that few residuals tell, with what was expected of it, and its freedom.
+
+    Residuals that are few, and rough by chance, would let a turn test pass whatever is seen: F is
+    five times as large at four degrees of freedom as at ten. So what was expected counts as much as
+    the residuals that it takes to do without it (docs/reference/evidence.md 20).
+    """
+    nu = _ENOUGH_NU + dof
+    return math.sqrt((_ENOUGH_NU * expected_mm**2 + dof * own_mm**2) / nu), float(nu)
 
 
 def held_to_claim(claim: TurnClaim, proof: VerifyResult) -> TurnJudgement:

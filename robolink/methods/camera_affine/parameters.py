@@ -64,7 +64,7 @@ class CameraAffineParameters(LookParameters):
         float,
         Ge(0.01),
         Le(1),
-        Option(flag="--unequal-limit", moves=False),
+        Option(flag="--unequal-limit", metavar="SHARE", moves=False),
         Help(
             declared(
                 "Largest share by which the scales of the image's axes may differ; above 0.05 it "
@@ -76,7 +76,7 @@ class CameraAffineParameters(LookParameters):
         float,
         Ge(0.1),
         Le(50),
-        Option(flag="--residual-limit", moves=False),
+        Option(flag="--residual-limit", metavar="PX", moves=False),
         Help(
             declared(
                 "Largest root mean square by which the looks may differ from the camera that is "

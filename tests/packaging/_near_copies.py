@@ -48,7 +48,7 @@ def near_copies(said: Iterable[str]) -> Iterator[Pair]:
 
 def reviewed() -> set[Pair]:
     """Return the pairs that somebody has read and left as they are."""
-    blocks = REVIEWED.read_text("utf-8").strip().split("\n\n")
+    blocks = REVIEWED.read_text("utf-8").strip("\n").split("\n\n")
     return {(one, other) for one, other in (block.split("\n") for block in blocks)}
 
 

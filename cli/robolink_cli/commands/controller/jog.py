@@ -63,7 +63,7 @@ _CELL_KEYS: Final = {
     default=10.0,
     show_default=True,
     metavar="MM",
-    help=declared("How far the tool is lifted before it turns."),
+    help=declared("How far the tip is lifted before it turns."),
 )
 @click.option(
     "--tip",

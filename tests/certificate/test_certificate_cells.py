@@ -13,7 +13,9 @@ from typing import Any
 
 import pytest
 
-from robolink.methods import TwoPoseSource
+from robolink.methods import NAngleSource, PlaneSurvey, PlaneTouchSource, TwoPoseSource
+from robolink.model import InputEdge
+from robolink.procedures import TouchPlan
 from tests.certificate.live import (
     BY_NAME,
     Course,
@@ -105,6 +107,13 @@ def without_noise(cell: Any, rng: random.Random) -> Any:
     return source
 
 
+def with_contact_input(cell: Any, _rng: random.Random) -> Any:
+    """The input shows that the tip is on the pin, wherever on it."""
+    furnish(cell, contact_input=9)
+    return NAngleSource((90.0, 180.0, 270.0), TouchPlan(contact=InputEdge(9)))
+
+
+BY_INPUT = by_sensors("n-angle on EPSON", source=with_contact_input)
 SURE_PERSON = by_sensors(
     "two-pose on EPSON", source=lambda _cell, _rng: TwoPoseSource(sigma_mm=0.01)
 )
@@ -263,6 +272,11 @@ CELLS = (
         Cell("always 0.1 beside", "two-pose on PLC", WITHIN, (), beside(0.1), times=2.0),
         Cell("always 0.1 beside", "n-angle on EPSON", WITHIN, (), beside(0.1), times=2.0),
     ),
+    Cell("always 0.05 beside, contact input", BY_INPUT, WITHIN, (), beside(0.05)),
+    *soak(
+        Cell("contact input, nothing wrong", BY_INPUT, WITHIN),
+        Cell("always 0.1 beside, contact input", BY_INPUT, WITHIN, (), beside(0.1), times=2.0),
+    ),
     Cell(
         "always 0.1 beside, limit 0.05",
         "two-pose on EPSON",
@@ -362,6 +376,25 @@ def test_a_cell_in_which_the_tip_is_wrong_ends_as_it_must(cell):
 def test_so_it_does_under_other_seeds(cell):
     for seed in range(12, 18):
         judge(cell, seed)
+
+
+@pytest.mark.soak
+def test_of_a_plane_whose_contact_an_input_shows_nobody_sees_anything():
+    def source(cell: Any, _rng: random.Random) -> Any:
+        furnish(cell, contact_input=9)
+        return PlaneTouchSource(
+            TouchPlan(lift_mm=15.0, contact=InputEdge(9)), PlaneSurvey(10), axes=5
+        )
+
+    course = BY_NAME["plane-touch on PLC"]
+    by_eye, by_input = change(course, 11), change(replace(course, source=source), 11)
+    for ended, sees in ((by_eye, True), (by_input, False)):
+        assert not ended.code
+        assert ended.proposal is not None
+        accuracy = ended.proposal.result.accuracy
+        assert accuracy is not None
+        assert ("touch_mm" in [row.key for row in accuracy.rows]) is sees
+        assert ended.share < 1.2
 
 
 # A person at the contradicted turn test.

@@ -47,7 +47,7 @@ from robolink.methods import (
     ZTouchSource,
     informative_tilts,
 )
-from robolink.model import Pose, ToolOffset, ToolReceipt
+from robolink.model import InputEdge, Pose, ToolOffset, ToolReceipt
 from robolink.nozzle_change import (
     AcceptanceCriteria,
     ChangePlan,
@@ -70,6 +70,8 @@ PERSON_SIGMA_MM: Final = 0.01
 """What a cell states of its person: what the eye errs by."""
 
 ABOVE_BALL_MM: Final = 15.0
+CONTACT: Final = 9
+"""The input that nozzle and pin switch, where they are wired."""
 
 _names = count()
 
@@ -334,6 +336,14 @@ def n_angle(_cell: Any, rng: random.Random) -> Any:
     return NAngleSource(turns, sigma_mm=stated(rng, PERSON_SIGMA_MM))
 
 
+def by_input(cell: Any, rng: random.Random) -> Any:
+    """Four touches that an input shows as well."""
+    furnish(cell, contact_input=CONTACT)
+    touch = TouchPlan(contact=InputEdge(CONTACT))
+    sigma_mm = stated(rng, PERSON_SIGMA_MM)
+    return NAngleSource((90.0, 180.0, 270.0), touch, sigma_mm=sigma_mm)
+
+
 def one_touch(cell: Any, _rng: random.Random) -> Any:
     """One touch of a pin whose place is known."""
     x_mm, y_mm, z_mm = cell.simulator.world.pin_mm
@@ -451,6 +461,7 @@ COURSES: Final[tuple[Course, ...]] = (
         for course in (
             Course("two-pose", kind, opened, two_pose, ("touch_mm",)),
             Course("n-angle", kind, opened, n_angle, ("touch_mm",)),
+            Course("n-angle, contact input", kind, opened, by_input, ("touch_mm",)),
             Course("one-touch", kind, opened, one_touch, ("touch_mm", "place_mm")),
             Course("points", kind, opened, points, ("touch_mm",), proves=False),
             Course("beams", kind, opened, beams, ("place_mm", "bend_deg")),

@@ -141,7 +141,7 @@ def _anywhere(rng: random.Random, half: float, count: int, *, beyond: bool) -> t
 _MOVES: Final = ("beams", "camera, one look", "one-touch")
 """Methods that rely on the place of a station, so that one that was moved turns into drift."""
 
-_BUMPS: Final = ("two-pose", "n-angle")
+_BUMPS: Final = ("two-pose", "n-angle", "n-angle, contact input")
 
 
 def _moving(population: str, course: Course, seed: int, rng: random.Random) -> Run:

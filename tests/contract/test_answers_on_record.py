@@ -92,7 +92,11 @@ def somebody_at(face, arm, monkeypatch):
     with open_eyes(arm.cell.url) as eyes:
         person: Any = Person.with_eyes(eyes, lambda _text: None, clock=arm.clock)
         monkeypatch.setattr("robolink_cli.prompts.operator._plain_terminal", lambda: person)
-        for place in ("prompts.questions", "commands.measure.recalibration"):
+        for place in (
+            "prompts.questions",
+            "commands.measure.recalibration",
+            "commands.record.undo",
+        ):
             monkeypatch.setattr(f"robolink_cli.{place}.on_terminal", lambda: True)
         with sitting_at(person) if face == "wizard" else nullcontext():
             yield

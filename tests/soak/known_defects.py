@@ -98,7 +98,7 @@ DEFECTS: Final = (
     ),
     KnownDefect(
         "what is unsettled blocks nothing",
-        {"robolink.controllers.markers.MarkerStore.require_settled": stand_ins.nothing},
+        {"robolink.controllers.markers.MarkerStore._unsettled": stand_ins.none_of_them},
         found_by="a jog after a killed calibration",
     ),
     KnownDefect("a movement leaves no durable mark", {_BEGIN: stand_ins.unmarked(MarkerKind.MOVE)}),

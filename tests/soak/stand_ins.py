@@ -28,6 +28,11 @@ from robolink.transaction._settling import Settler
 Function = Callable[..., Any]
 
 
+def none_of_them(*_given: object) -> list[Any]:
+    """Find nothing."""
+    return []
+
+
 def nothing(*_given: object, **_named: object) -> None:
     """Stand in for a look that refuses."""
 

@@ -1,5 +1,6 @@
 """A defect that is put in is found, told, cut short, and becomes a test."""
 
+from collections.abc import Callable
 from functools import cache
 
 import pytest
@@ -28,8 +29,8 @@ LONGER = History(
 HISTORIES = pytest.mark.parametrize(
     "history", [HISTORY, pytest.param(LONGER, marks=pytest.mark.soak)], ids=["two hours", "three"]
 )
-FORGETFUL = {
-    "robolink.controllers.markers.MarkerStore.require_settled": lambda _store, _request: None
+FORGETFUL: dict[str, Callable[..., object]] = {
+    "robolink.controllers.markers.MarkerStore._unsettled": lambda _store, _besides: []
 }
 """A driver that moves although an earlier movement was not answered."""
 

@@ -1,6 +1,6 @@
 """What a cell knows of its own accuracy: stated, on record, shown, measured.
 
-Each row of a budget (:data:`robolink.calibration.ACCURACY_ROWS`) is stated by the recipe or the
+Each row of a budget (``robolink.calibration.ACCURACY_ROWS``) is stated by the recipe or the
 cell file, learnt from the journal, or a default. docs/accuracy.md explains all three.
 """
 

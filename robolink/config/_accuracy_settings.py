@@ -12,7 +12,7 @@ Positive = Annotated[float, Field(gt=0)]
 class AccuracySettings(BaseModel):
     """Half widths of rows that are stated for a cell; what is not said is not known.
 
-    The keys are those of :data:`robolink.calibration.ACCURACY_ROWS`; what is stated for a station
+    The keys are those of ``robolink.calibration.ACCURACY_ROWS``; what is stated for a station
     goes before.
 
     Attributes:

@@ -87,7 +87,7 @@ class ToolPlan:
             none, because it finds the station itself or is told where it is.
         at: Name of the station where it is measured, whether its place is on record or not.
         rows: What is stated of the rows of the budget, by their keys
-            (:data:`~robolink.calibration.ACCURACY_ROWS`).
+            (``robolink.calibration.ACCURACY_ROWS``).
     """
 
     tool: int

@@ -3,7 +3,7 @@
 A fit that agrees with itself to a hundredth says nothing about a station that was moved, a camera
 that was turned, or a person who always sees contact on the same side. Each of these is a row of
 the budget with a half width: stated for the cell, learnt from its record, or the default of
-:data:`ACCURACY_ROWS` (docs/reference/evidence.md 19).
+``ACCURACY_ROWS`` (docs/reference/evidence.md 19).
 """
 
 from collections.abc import Mapping, Sequence

@@ -263,7 +263,7 @@ class EpsonSimulator(TimeStepping):
 
     @property
     def machine_name(self) -> str:
-        """See :attr:`~robolink_simulators.device.hosted.HostedDevice.machine_name`."""
+        """Kind, and the models of its robots."""
         return " ".join((self.kind, *(model.name for model in self._models)))
 
     @property
@@ -308,12 +308,12 @@ class EpsonSimulator(TimeStepping):
 
     @property
     def failure(self) -> StateNotKeptError | None:
-        """See :attr:`~robolink_simulators.device.hosted.HostedDevice.failure`."""
+        """Why it can keep its state no longer; ``None`` while it can."""
         return self._flash.failure if self.durable else None
 
     @property
     def executes_program(self) -> bool:
-        """See :attr:`~robolink_simulators.device.hosted.HostedDevice.executes_program`."""
+        """Whether a SPEL+ program was loaded, whose variables no snapshot holds."""
         return self.program is not None
 
     def _renew(self) -> None:

@@ -8,6 +8,7 @@ docs/reference/evidence.md.
 import argparse
 import statistics
 import sys
+import textwrap
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -332,12 +333,13 @@ def _in_prose(counts: dict[str, Count], seed: int) -> list[str]:
         for certified, off in (count.formerly,)
         if certified
     ]
-    return [
-        f"Seeds from {seed:,} on, never run before. Of the clean runs {100 * beyond:.1f} % lie",
-        "outside what they are repeatable to, r. Of the same runs these would have been called",
-        "good while a turn test was held to the limit of the process alone, more than 3 r off:",
-        f"{', '.join(former)}.",
-    ]
+    told = (
+        f"Seeds from {seed:,} on, never run before. Of the clean runs {100 * beyond:.1f} % lie "
+        "outside what they are repeatable to, r. Of the same runs these would have been called "
+        "good while a turn test was held to the limit of the process alone, more than 3 r off: "
+        f"{', '.join(former)}."
+    )
+    return textwrap.wrap(told, 120)
 
 
 def counts_in(goal: Goal, counts: dict[str, Count]) -> bool:

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from robolink.calibration import (
+    ACCURACY_ROWS,
     CalibrationResult,
     DriftVerdict,
     VerifyResult,
@@ -15,6 +16,7 @@ from robolink.calibration import (
 from robolink.errors import CalibrationError, VerifyError
 from robolink.messages import joined, tr
 from robolink.nozzle_change._proposal import LimitVerdict, Proposal
+from robolink.stations import StationKind
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +124,14 @@ class AcceptanceCriteria:
                     ),
                 )
 
-    def over_by_defaults(self, result: CalibrationResult) -> CalibrationError | None:
+    def over_by_defaults(
+        self,
+        result: CalibrationResult,
+        *,
+        station: str = "",
+        kind: StationKind | None = None,
+        tool: int | None = None,
+    ) -> CalibrationError | None:
         """Return why a statement is over the limit that only default rows carry there.
 
         The error names the largest of them and what measures it. ``None`` where the statement is
@@ -130,6 +139,19 @@ class AcceptanceCriteria:
 
         Args:
             result: The measurement, with what it is accurate to.
+            station: Where it was made; empty where no name is known.
+            kind: What that is.
+            tool: The tool.
+
+        Example:
+            >>> from robolink.calibration import AccuracyFacts, assessed, solve_two_pose
+            >>> from robolink.model import Pose
+            >>> from robolink.nozzle_change import AcceptanceCriteria
+            >>> touches = Pose(298, 99, -60, 0), Pose(322, 91, -60, 180)
+            >>> found = assessed(solve_two_pose(*touches, sigma_mm=0.02), AccuracyFacts())
+            >>> refusal = AcceptanceCriteria(interval_mm=0.05).over_by_defaults(found, tool=1)
+            >>> refusal.code, "cell accuracy measure touch_mm --tool 1" in refusal.remedy
+            ('large_interval', True)
         """
         accuracy, limit_mm = result.accuracy, self.interval_mm
         if accuracy is None or limit_mm is None or accuracy.within_mm <= limit_mm:
@@ -158,9 +180,14 @@ class AcceptanceCriteria:
         return CalibrationError(
             "large_interval",
             found,
-            remedy=tr(
-                "Nothing was written. 'robolink cell accuracy' shows which rows are defaults and "
-                "how each is measured."
+            remedy=joined(
+                " ",
+                (
+                    tr(
+                        "Nothing was written. 'robolink cell accuracy' shows all rows of this cell."
+                    ),
+                    _how_measured(row.key, station=station, kind=kind, tool=tool),
+                ),
             ),
         )
 
@@ -281,6 +308,15 @@ class AcceptanceCriteria:
         ):
             if found_mm is not None and limit_mm is not None:
                 yield LimitVerdict(code, name, found_mm, limit_mm)
+
+
+def _how_measured(key: str, *, station: str, kind: StationKind | None, tool: int | None) -> str:
+    """Return what measures a row that is a default, one sentence."""
+    if key not in ACCURACY_ROWS:
+        return tr("State the scatter of one touch (--sigma), or make six touches or more.")
+    from robolink.accuracy import measuring_step  # what only looks does without
+
+    return measuring_step(key, station=station, kind=kind, tool=tool)
 
 
 def _worst_in_words(result: CalibrationResult) -> str:

@@ -13,6 +13,7 @@ from dataclasses import replace
 from robolink.calibration import VerifyResult
 from robolink.errors import CalibrationError, DeclinedError, StoppedError, VerifyError
 from robolink.messages import tr
+from robolink.methods import find_method
 from robolink.model import (
     Controller,
     ToolReceipt,
@@ -258,7 +259,12 @@ class NozzleChange:
             DeclinedError: The person said no.
         """
         criteria, outcomes = plan.criteria, self._controller.outcomes
-        refusal = criteria.over_by_defaults(proposal.result)
+        refusal = criteria.over_by_defaults(
+            proposal.result,
+            station=plan.station or plan.pin,
+            kind=find_method(plan.method).needs.station if plan.method else None,
+            tool=plan.tool,
+        )
         if refusal is None:
             return
         if not self._plan.asks:

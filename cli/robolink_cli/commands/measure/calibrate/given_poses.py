@@ -207,7 +207,7 @@ def _dry_run(
     if not frame.context.json:
         listener.proposed([proposal])
     frame.criteria.judge_fit(proposal.result)
-    if refusal := frame.criteria.over_by_defaults(proposal.result):
+    if refusal := frame.criteria.over_by_defaults(proposal.result, tool=frame.tool):
         raise refusal
     frame.criteria.judge_change(proposal, remedy=given.remedy)
     requests = list(controller.tools.preview_write(frame.tool, proposal.offset))

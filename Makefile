@@ -39,8 +39,8 @@ HOURS := 20
 soak: $(VENV)/.installed-dev $(if $(SEEDS),,docs) ## Run what make test leaves out for its length; SEEDS=0-499 the adversary only.
 ifeq ($(SEEDS),)
 	$(BIN)/python -m pytest -n 2 -m soak
-	$(BIN)/python -m tests.soak.mutant_table
 	$(BIN)/python -m tests.certificate.table
+	$(BIN)/python -m tests.soak.mutant_table
 else
 	$(BIN)/python -m robolink_simulators.soak --seeds $(SEEDS) --hours $(HOURS)
 endif

@@ -208,6 +208,11 @@ class CalibrationResult:
         return half_mm if region_mm is None or half_mm is None else max(region_mm, half_mm)
 
     @property
+    def known_within_mm(self) -> float | None:
+        """The former name of :attr:`repeatable_to_mm`, for one version."""
+        return self.repeatable_to_mm
+
+    @property
     def accurate_to_mm(self) -> float | None:
         """Within which of the truth the tip lies in 95 %, every row of the budget counted.
 

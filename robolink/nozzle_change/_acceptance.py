@@ -313,7 +313,7 @@ class AcceptanceCriteria:
 def _how_measured(key: str, *, station: str, kind: StationKind | None, tool: int | None) -> str:
     """Return what measures a row that is a default, one sentence."""
     if key not in ACCURACY_ROWS:
-        return tr("State the scatter of one touch (--sigma), or make six touches or more.")
+        return tr("State the scatter of one touch, or make six touches or more.")
     from robolink.accuracy import measuring_step  # what only looks does without
 
     return measuring_step(key, station=station, kind=kind, tool=tool)

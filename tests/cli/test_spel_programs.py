@@ -8,8 +8,10 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from robolink_cli.commands.simulate.kinds.epson import ProjectSurroundings
+from robolink_cli.commands.simulate.kinds.epson import ProjectSurroundings, load_programs
 from robolink_simulators.epson import EpsonSimulator
+
+from robolink.errors import ConfigError
 
 GOOD = (
     'Function main\n  Print "one", 2\n  Wait 0.5\n  other\nFend\nFunction other\n  Print 3\nFend\n'
@@ -184,7 +186,118 @@ def test_what_goes_with_a_program_is_refused_without_one(ended, option, tmp_path
 
 def test_a_served_program_has_the_line_and_the_folder_that_were_named(tmp_path, program):
     simulator = EpsonSimulator()
-    runner = simulator.load([Path(program(GOOD))])
-    ProjectSurroundings(lines=["2=/dev/pts/9"], folder=tmp_path).install(simulator)
+    surroundings = ProjectSurroundings(lines=["2=/dev/pts/9"], folder=tmp_path)
+    runner = surroundings.load(simulator, [Path(program(GOOD))], [])
     assert runner.ports.devices == {2: "/dev/pts/9"}
     assert runner.session.files.root == tmp_path
+
+
+POINT = """ENVT0100
+Point1 {
+\tnNumber=1
+\tsLabel="LABEL"
+\tnUndefined=0
+\trX=250
+\trY=NUMBER
+\trZ=-5
+\trU=0
+\tnLocal=0
+\tnHand=1
+}
+"""
+PROJECT = """ENVT0100
+ProgramFile1 {
+\tsName="Main.prg"
+}
+nPointFileCount=2
+PointFile1 {
+\tsName="other.pts"
+\tnRobot=1
+\tbDefault=False
+}
+PointFile2 {
+\tsName="robot1.pts"
+\tnRobot=1
+\tbDefault=True
+}
+"""
+
+
+@pytest.fixture
+def project(tmp_path, program):
+    """Return a project file; beside it lies a program that it does not list."""
+    program(POINT.replace("LABEL", "tray").replace("NUMBER", "100"), "robot1.pts")
+    program(POINT.replace("LABEL", "bin").replace("NUMBER", "-100"), "other.pts")
+    program("Function main\n  Nonsense (\nFend\n", "old_main.prg")
+    program('Function main\n  Print CY(tray)\n  LoadPoints "other.pts"\n  Print CY(bin)\nFend\n')
+    return program(PROJECT, "cell.sprj")
+
+
+def test_a_project_file_stands_for_the_files_that_it_lists(ended, project):
+    end = ended("spel", "check", project, "--json")
+    assert end.code == 0
+    document = json.loads(end.out)
+    assert [Path(name).name for name in document["files"]] == ["main.prg"]
+    assert document["labels_known"] is True
+    assert ended("spel", "run", project).out == "100\n-100\n"
+
+
+def test_a_project_file_is_refused_by_what_is_wrong_with_it(ended, program, project):
+    both = ended("spel", "check", project, project.replace("cell.sprj", "main.prg"))
+    assert both.code == 2
+    assert "stands alone" in both.err
+    missing = program(PROJECT.replace("other.pts", "gone.pts"), "missing.sprj")
+    assert "gone.pts, which is not beside it" in ended("spel", "check", missing).err
+    assert "lists no program" in ended("spel", "check", program("ENVT0100\n", "no.sprj")).err
+
+
+def test_every_fault_is_in_the_json_document(ended, program):
+    end = ended("spel", "check", program("Function main\nPrint (\nGoTo away\nFend\n"), "--json")
+    assert end.code == 2
+    first, second = json.loads(end.out)["faults"]
+    assert (first["file"], first["line"], first["column"]) == ("main.prg", 2, 8)
+    assert "NUMBER" in first["expected"]
+    assert (second["line"], second["column"]) == (3, None)
+    assert "3108" in second["text"]
+
+
+@pytest.mark.parametrize(
+    ("text", "encoding", "told"),
+    [("等待信号", "gbk", "gbk"), ("ハンド開閉", "cp932", "cp932"), ("等待", "utf-8", "")],
+)
+def test_the_code_page_is_found_out_and_told(ended, tmp_path, text, encoding, told):
+    path = tmp_path / "main.prg"
+    path.write_bytes(f'Function main\n  Print "{text}"\nFend\n'.encode(encoding))
+    end = ended("spel", "run", str(path))
+    assert end.out == f"{text}\n"
+    assert (f"read as {told}" in end.err) is bool(told)
+    named = ended("spel", "run", str(path), "--encoding", encoding)
+    assert (named.out, named.err) == (f"{text}\n", "")
+    assert "no code page" in ended("spel", "check", str(path), "--encoding", "gbk9").err
+
+
+def test_a_function_says_first_what_the_project_keeps_outside(ended, program):
+    main = program("Function main\n  Home\n  Print CX(TLSet(2)), AtHome\nFend\n")
+    setup = program(
+        "Function setup\n  HomeSet 0, 0, 0, 0\n  TLSet 2, XY(5, 0, 0, 0)\nFend\n", "setup.prg"
+    )
+    assert ended("spel", "run", main).code == 5
+    end = ended("spel", "run", main, setup, "--before", "setup")
+    assert (end.code, end.out) == (0, "5 -1\n")
+    assert "no function gone" in ended("spel", "run", main, "--before", "gone").err
+
+
+def test_the_robot_that_nobody_named_is_named_when_a_point_is_out_of_reach(ended, program):
+    path = program("Function main\n  Go XY(900, 0, 0, 0)\nFend\n")
+    assert "The robot was T6-602S" in ended("spel", "run", path).err
+    assert "The robot was" not in ended("spel", "run", path, "--robot", "T6-602S").err
+
+
+def test_a_served_controller_is_prepared_before_it_is_served(program):
+    simulator = EpsonSimulator()
+    text = "Function setup\n  TLSet 2, XY(5, 0, 0, 0)\nFend\nFunction bad\n  Tool 9\nFend\n"
+    path = Path(program(text))
+    load_programs(simulator, [path], [], ProjectSurroundings(before="setup"))
+    assert simulator.machine.tools.get(2) is not None
+    with pytest.raises(ConfigError, match="bad of --before fails"):
+        load_programs(simulator, [path], [], ProjectSurroundings(before="bad"))

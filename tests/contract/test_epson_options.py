@@ -100,6 +100,10 @@ def test_every_option_with_named_values_is_varied_here():
         "windows_status",
         "globals_at_start",
         "ports_of_ended_task",
+        "input_blank",
+        "blank_before_dollar",
+        "old_here",
+        "io_bits",
     }
     assert {field.name for field in fields(EpsonOptions)} == varied | settled_elsewhere
 

@@ -14,6 +14,7 @@ from robolink.messages import declared, tr
 from robolink_cli.console.help_sections import HelpSection
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import note
+from robolink_cli.options.program_encoding import encoding_option
 
 Judged = Callable[[click.Context, click.Parameter, Any], Any]
 """Is told an option and what was given for it; returns that, or refuses it."""
@@ -38,7 +39,9 @@ SECTIONS: Final[tuple[HelpSection, ...]] = (
     ),
     (
         declared("Programs of the controller"),
-        frozenset({"--program", "--points", "--vision", "--com", "--files"}),
+        frozenset(
+            {"--program", "--points", "--encoding", "--before", "--vision", "--com", "--files"}
+        ),
     ),
     (
         declared("How it is controlled, and when it ends"),
@@ -269,6 +272,13 @@ def faults_option(function: F) -> F:
 
 
 _PROJECT_OPTIONS: tuple[Callable[[Any], Any], ...] = (
+    encoding_option,
+    click.option(
+        "--before",
+        metavar="NAME",
+        help="A function that runs to its end first: what the project keeps outside its programs, "
+        "as HomeSet, TLSet, SetNet and SetCom say it.",
+    ),
     click.option(
         "--vision",
         type=click.Path(exists=True, dir_okay=False, path_type=Path),
@@ -295,7 +305,11 @@ _PROJECT_OPTIONS: tuple[Callable[[Any], Any], ...] = (
 
 
 def project_options(function: Any) -> Any:  # noqa: ANN401 - a decorator of click
-    """Add ``--vision``, ``--com`` and ``--files``: ``vision``, ``lines`` and ``folder``."""
+    """Add what goes with programs.
+
+    ``--encoding``, ``--before``, ``--vision``, ``--com`` and ``--files`` are given as
+    ``encoding``, ``before``, ``vision``, ``lines`` and ``folder``.
+    """
     for option in reversed(_PROJECT_OPTIONS):
         function = option(function)
     return function

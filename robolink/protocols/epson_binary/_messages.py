@@ -44,8 +44,9 @@ def write_answer(answer: Reply | Refusal, dialect: Dialect) -> bytes:
     """
     letter = letter_of(answer.name)
     if isinstance(answer, Refusal):
-        # What could not be read has no letter to echo; the manual does not say what stands there.
-        echoed = letter.byte if letter is not None else 0
+        # A refusal carries the letter that came, known or not (docs/reference/epson.md 2.1); what
+        # was no frame has none, and the manual does not say what stands there.
+        echoed = letter.byte if letter is not None else ord(answer.name[:1] or "\0")
         return framed(NAK, echoed, _code(answer, dialect))
     if letter is None:
         raise _refused(answer.name, tr("it has no letter"))
@@ -104,7 +105,7 @@ def read_request(frame: SerialFrame, dialect: Dialect) -> Request | BadRequest:
     if not frame.intact:
         return BadRequest(name, ErrorCode.CHECKSUM)
     if letter is None or (not letter.documented and dialect.letters is Letters.DOCUMENTED):
-        return BadRequest(name, ErrorCode.UNKNOWN_COMMAND)
+        return BadRequest(name or chr(frame.letter), ErrorCode.UNKNOWN_COMMAND)
     parameters: list[str] = []
     at = 0
     for part in letter.request:

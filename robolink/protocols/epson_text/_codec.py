@@ -26,6 +26,7 @@ from robolink.protocols.epson_text._events import (
 )
 from robolink.protocols.epson_text._framing import MessageBuffer
 from robolink.protocols.epson_text._messages import (
+    BLANKS,
     next_request,
     read_answer,
     read_request,
@@ -190,6 +191,8 @@ class EpsonTextCodec(EpsonCodec):
         unterminated: DEVICE only: a request may lack its terminator, as one controller was
             seen to accept (docs/reference/epson.md 1.1). It ends where the next one begins, or with
             :meth:`end_of_request`.
+        skips_blanks: DEVICE only: blanks before the ``$`` of a request are skipped. Else they are
+            what the request begins with, so that it is refused with error 10.
 
     Raises:
         ConfigError: An argument is none of these.
@@ -202,7 +205,14 @@ class EpsonTextCodec(EpsonCodec):
         'GetStatus'
     """
 
-    __slots__ = ("_blank_allowed", "_buffer", "_encoding", "_terminator", "_unterminated")
+    __slots__ = (
+        "_blank_allowed",
+        "_buffer",
+        "_encoding",
+        "_skips_blanks",
+        "_terminator",
+        "_unterminated",
+    )
 
     def __init__(
         self,
@@ -212,6 +222,7 @@ class EpsonTextCodec(EpsonCodec):
         max_line: int = 65536,
         encoding: str = "latin-1",
         unterminated: bool = False,
+        skips_blanks: bool = False,
     ) -> None:
         if terminator not in _TERMINATORS:
             _misconfigured(tr("{value!r} is not CR, LF or CRLF.", value=terminator))
@@ -220,6 +231,7 @@ class EpsonTextCodec(EpsonCodec):
         self._terminator = terminator
         self._encoding = _known_encoding(encoding)
         self._unterminated = unterminated
+        self._skips_blanks = skips_blanks
         self._buffer = MessageBuffer(
             max_line,
             quoted_replies=role is Role.HOST,
@@ -270,6 +282,8 @@ class EpsonTextCodec(EpsonCodec):
     def _next_event(self) -> Event | Literal[Need.DATA]:
         while (line := self._buffer.take()) is not None:
             if self._role is Role.DEVICE:
+                if self._skips_blanks:
+                    line = line.lstrip(BLANKS)
                 return read_request(line, self._encoding)
             if line:
                 self._blank_allowed = True

@@ -103,13 +103,19 @@ def next_request(data: bytes | bytearray, start: int) -> int:
     """Return where, from ``start`` on, the next request begins in ``data``, -1 for nowhere.
 
     That is a ``$``, the name of a command, and what ends a name; a lone ``$`` ends names of
-    strings. Behind an Execute it follows the closing quote, for a statement may print anything.
+    strings. Blanks before a ``$`` are no request of their own. Behind an Execute it follows the
+    closing quote, for a statement may print anything.
     """
     if data.find(b"$", start) < 0:
         return -1
+    if data[:1].isspace():
+        start = max(start, len(data) - len(data.lstrip(BLANKS)) + 1)
     pattern = _BEHIND_STATEMENT if data[:9].lower() == b"$execute," else _BEHIND_REQUEST
     found = pattern.search(data, start)
     return -1 if found is None else found.start(1)
+
+
+BLANKS = b" \t"
 
 
 def _echo(text: str) -> str:

@@ -147,7 +147,8 @@ class EpsonSimulator(TimeStepping):
     def _make(self, serial: str) -> None:
         """Make the controller and its world, as they are at first."""
         model, *others = self._models
-        self.machine = Machine(model, serial=serial, others=others)
+        bits = self.options.io_bits
+        self.machine = Machine(model, serial=serial, others=others, io_bits=bits)
         self.machine.switch_all_motors(True)
         self.worlds = tuple(
             World.seeded(
@@ -203,13 +204,16 @@ class EpsonSimulator(TimeStepping):
         points: Sequence[Path] = (),
         *,
         ports: Mapping[int, tuple[str, int]] | None = None,
+        encoding: str | None = None,
     ) -> ProgramRunner:
         r"""Load a project, in place of the one before: Start,n runs its function mainN.
 
         Args:
-            programs: Its .prg files; IOLabels.dat is taken from beside them.
+            programs: Its .prg files, or the .sprj file that lists them; IOLabels.dat and
+                UserErrors.dat are taken from beside them.
             points: Its .pts files.
             ports: Where its TCP/IP ports lead whatever SetNet says.
+            encoding: The code page of its files; without it UTF-8, code page 932 and GBK are tried.
 
         Raises:
             ProgramRefused: It cannot be built.
@@ -229,7 +233,7 @@ class EpsonSimulator(TimeStepping):
             True
         """
         with self.acting():
-            project = load_project(self._session, programs, points)
+            project = load_project(self._session, programs, points, encoding)
             if self.program is not None:
                 self.program.forget()
             self.program = ProgramRunner(self._session, self.condition, project, Ports(ports))

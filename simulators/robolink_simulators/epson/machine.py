@@ -59,6 +59,7 @@ class Machine:
         backlash_deg: See :class:`Arm`.
         serial: What RobotSerial$ gives of it; the controller's own number follows from it.
         others: Further robots, number 2 and on.
+        io_bits: How many inputs there are, and how many outputs.
 
     Attributes:
         robots: All of them.
@@ -98,6 +99,7 @@ class Machine:
         backlash_deg: float = 0.0,
         serial: str = "SIM00001",
         others: Sequence[RobotModel] = (),
+        io_bits: int = IO_BITS,
     ) -> None:
         first = DrivenRobot(model, joints=joints, backlash_deg=backlash_deg, serial=serial)
         more = [
@@ -109,10 +111,10 @@ class Machine:
         for number, robot in enumerate(self.robots, start=1):
             robot.arm.on_started = partial(self.motions.add, robot=number)
         self.robot_number = 1
-        self.inputs = InputBits(IO_BITS)
+        self.inputs = InputBits(io_bits)
         for robot in self.robots:
             robot.latch.listen(self.inputs)
-        self.outputs = BitBank(IO_BITS)
+        self.outputs = BitBank(io_bits)
         self.memory = BitBank(
             MEMORY_BITS, no_bit=RefusalKind.MEMORY_BIT, no_byte=RefusalKind.MEMORY_BYTE
         )

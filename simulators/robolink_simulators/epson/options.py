@@ -190,6 +190,8 @@ class EpsonOptions:
         where_width: Width of the value field of Where [open].
         requests_end_with_silence: A request may lack its terminator; it ends where the next
             one begins, or when nothing has come for 0.1 s [R, one controller; the time is I].
+        blank_before_dollar: A request that begins with a blank is error 10 [D: it does not begin
+            with a dollar sign], or its blanks are skipped [U, one client sends it].
         login_without_parameter: What ``$Login`` without a comma is [U, three clients send it].
         missing_robot_number: What SetMotorsOn, SetMotorsOff and Home without a number act on;
             12 is inferred, since the manual lists the number as needed [U].
@@ -242,6 +244,12 @@ class EpsonOptions:
             Cont and Reset Error [D; that it is on is assumed, as samples use all three].
         windows_status: What WindowsStatus tells: 1 for a PC, 2 for RC+, 3 for both [D; that
             neither is connected is assumed].
+        input_blank: Where a blank separates the data of Input: between variables, so that the last
+            text takes it along [R: a program of a VT6 reads ``reach 100 450 600`` whole into one],
+            or everywhere [D, one sentence].
+        old_here: ``P*`` is the present position, as in programs of RC+ 3 to 5 [R], or is refused.
+        io_bits: Inputs and outputs that the hardware has [D: 512; a fieldbus slave's begin there, a
+            fieldbus master's at 6144 in the project files of others, R].
         ports_of_ended_task: A task that ends closes its ports, or leaves them open [U].
         rs232_numbers: How Remote RS232 writes numbers [D in three languages, D otherwise in one].
         rs232_nak_code: How the code of a refusal is written there [U].
@@ -281,6 +289,7 @@ class EpsonOptions:
     tlset_of_undefined: Literal["zeros", "error"] = "zeros"
     where_width: Literal[9, 8] = 9
     requests_end_with_silence: bool = True
+    blank_before_dollar: Literal["error_10", "skipped"] = "error_10"
     login_without_parameter: Literal["empty_password", "error_12"] = "empty_password"
     missing_robot_number: Literal["error_12", "current", "all"] = "error_12"
     robot_zero: Literal["keeps", "error_12"] = "keeps"
@@ -313,6 +322,9 @@ class EpsonOptions:
     background_tasks: str = ""
     advanced_task_commands: bool = True
     windows_status: Literal[0, 1, 2, 3] = 0
+    input_blank: Literal["between_variables", "everywhere"] = "between_variables"
+    old_here: Literal["refused", "position"] = "refused"
+    io_bits: int = 512
     ports_of_ended_task: Literal["closed", "open"] = "closed"
     rs232_numbers: Literal["binary", "ascii_hex"] = "binary"
     rs232_nak_code: Literal["digits", "binary"] = "digits"
@@ -351,6 +363,8 @@ def option_names() -> tuple[str, ...]:
 def options_from_text(pairs: Mapping[str, str]) -> EpsonOptions:
     """Return the defaults with ``pairs`` applied.
 
+    With ``rc_plus=5`` GetStatus prints 10 flags, unless ``status_flags`` says otherwise.
+
     Raises:
         ConfigError: An option is unknown, or a value does not fit it.
     """
@@ -361,6 +375,8 @@ def options_from_text(pairs: Mapping[str, str]) -> EpsonOptions:
 def _options(in_order: tuple[tuple[str, str], ...]) -> EpsonOptions:
     """Make them once for all controllers with the same ones: thousands of a fleet."""
     pairs = dict(in_order)
+    if pairs.get("rc_plus") == "5":
+        pairs.setdefault("status_flags", "10")
     require_known(pairs, option_names(), kind="EPSON")
     numbers = values_from_text(SpelNumbers, pairs, prefix=_NUMBERS)
     own = values_from_text(EpsonOptions, pairs)

@@ -42,3 +42,14 @@ def test_wrong_numbers_of_data_and_silence_are_one_error(cell):
     made.runner.channels.window.ask = lambda: None
     made.run()
     assert made.runner.failure.number == 2505
+
+
+def test_a_blank_separates_variables_and_belongs_to_the_last_text(cell):
+    asking = "Function main\nString s$, t$\nInteger n\nInput s$\nInput n, t$\nPrint s$, n, t$\nFend"
+    made = cell(asking)
+    made.runner.channels.window.type("reach 100 450 600", "7 two words")
+    assert made.run() == ["??reach 100 450 600 7two words"]
+    made = cell(asking, input_blank="everywhere")
+    made.runner.channels.window.type("reach 100 450 600")
+    made.run()
+    assert made.runner.failure.number == 2505

@@ -9,16 +9,21 @@ import click
 from robolink.errors import ControllerFaultError
 from robolink.messages import tr
 from robolink.timing import NS_PER_S
+from robolink_cli.console.exit_codes import USAGE
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import emit_json, json_is_on, note, say
+from robolink_cli.options.program_encoding import encoding_option, tell_encoding
 from robolink_cli.options.shared import json_option
 from robolink_cli.options.simulation import project_options
 
 if TYPE_CHECKING:
     from robolink_simulators.epson import EpsonSimulator
+    from robolink_simulators.epson.spel.programs.loading import CheckedProject
+    from robolink_simulators.epson.spel.tasks.runner import ProgramRunner
     from robolink_simulators.epson.spel.tasks.task import TaskFailure
 
 LONGEST_RUN_S: Final = 3600.0
+DEFAULT_ROBOT: Final = "T6-602S"
 
 _FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 
@@ -37,35 +42,55 @@ def programs_argument(function: Any) -> Any:  # noqa: ANN401 - a decorator of cl
 
 @click.command("check", short_help="Build SPEL+ programs and tell every fault.")
 @programs_argument
+@encoding_option
 @json_option
-def check(files: tuple[Path, ...], points: tuple[Path, ...]) -> None:
+def check(files: tuple[Path, ...], points: tuple[Path, ...], encoding: str | None) -> int:
     """Build SPEL+ programs and tell every fault with its file, line and column.
 
-    All files together are one project. Point files and IOLabels.dat that lie beside them are
-    read for the names in them. Nothing runs and no controller is asked.
+    All files together are one project; a .sprj file stands for those that it lists. Point files,
+    IOLabels.dat and UserErrors.dat that lie beside them are read for the names in them. Nothing
+    runs and no controller is asked.
     """
     from robolink_simulators.epson.spel.programs.loading import check_project
     from robolink_simulators.epson.spel.source.faults import ProgramRefused
 
-    try:
-        project, labels_known = check_project(files, points)
-    except ProgramRefused as refused:
-        for fault in refused.faults:
-            note(str(fault))
-        raise
-    names = sorted(function.spelled for function in project.functions.values())
+    checked = check_project(files, points, encoding=encoding)
     if json_is_on():
-        document = {"files": [str(p) for p in files], "functions": names}
-        emit_json("robolink/spel-check/1", {**document, "labels_known": labels_known})
-        return
-    say(tr("{count} functions, no fault found.", count=len(names)))
-    if not labels_known:
+        emit_json("robolink/spel-check/1", _document(checked))
+        return USAGE if checked.faults else 0
+    tell_encoding(checked.data.encoding, named=encoding)
+    for fault in checked.faults:
+        note(str(fault))
+    if checked.faults:
+        raise ProgramRefused(checked.faults)
+    say(tr("{count} functions, no fault found.", count=len(checked.functions)))
+    if not checked.data.known:
         note(
             tr(
                 "No point file and no IOLabels.dat lies beside the programs: names that nobody "
                 "declares were taken for labels."
             )
         )
+    return 0
+
+
+def _document(checked: "CheckedProject") -> dict[str, object]:
+    return {
+        "files": [str(path) for path in checked.data.programs],
+        "functions": list(checked.functions),
+        "labels_known": checked.data.known,
+        "encoding": checked.data.encoding,
+        "faults": [
+            {
+                "file": fault.place.file,
+                "line": fault.place.line,
+                "column": fault.column or None,
+                "text": fault.text,
+                "expected": list(fault.expected),
+            }
+            for fault in checked.faults
+        ],
+    }
 
 
 @click.command("run", short_help="Run SPEL+ programs on a simulated controller.")
@@ -78,9 +103,7 @@ def check(files: tuple[Path, ...], points: tuple[Path, ...]) -> None:
 )
 @project_options
 @click.option("--trace", is_flag=True, help="Show each statement before it is carried out.")
-@click.option(
-    "--robot", metavar="MODEL", default="T6-602S", show_default=True, help="Model of the robot."
-)
+@click.option("--robot", metavar="MODEL", help=f"Model of the robot.  [default: {DEFAULT_ROBOT}]")
 @click.option(
     "--option",
     "options",
@@ -102,12 +125,14 @@ def run(
     *,
     files: tuple[Path, ...],
     points: tuple[Path, ...],
+    encoding: str | None,
     function: str | None,
+    before: str | None,
     vision: Path | None,
     lines: tuple[str, ...],
     folder: Path | None,
     trace: bool,
-    robot: str,
+    robot: str | None,
     options: tuple[str, ...],
     most_s: float,
 ) -> None:
@@ -123,16 +148,19 @@ def run(
 
     from robolink_cli.commands.simulate.kinds.epson import ProjectSurroundings, habits
 
-    simulator = EpsonSimulator(robot, options=habits(options, None))
+    simulator = EpsonSimulator(robot or DEFAULT_ROBOT, options=habits(options, None))
     printed = list[str]()
-    simulator.load(files, points)
-    ProjectSurroundings(vision, lines, folder).install(simulator)
+    runner = ProjectSurroundings(vision, lines, folder, encoding).load(simulator, files, points)
     if function is None and not simulator.options.background_tasks:
         function = "main"
-    ended = _run(simulator, function, most_s, trace=trace, printed=printed)
-    program = simulator.program
-    if program is not None and program.failure is not None:
-        raise _failed(program.failure)
+    ended = True
+    for name in (function,) if before is None else (before, function):
+        ended = _run(simulator, runner, name, most_s, trace=trace, printed=printed)
+        if runner.failure is not None:
+            too_far = runner.failure.number == simulator.options.numbers.out_of_reach
+            raise _failed(runner.failure, DEFAULT_ROBOT if too_far and robot is None else None)
+        if not ended:
+            break
     if json_is_on():
         seconds = simulator.now_ns / NS_PER_S
         document = {"printed": "".join(printed), "ended": ended, "simulated_s": seconds}
@@ -143,6 +171,7 @@ def run(
 
 def _run(
     simulator: "EpsonSimulator",
+    runner: "ProgramRunner",
     function: str | None,
     most_s: float,
     *,
@@ -150,11 +179,9 @@ def _run(
     printed: list[str],
 ) -> bool:
     """Run a program to its end; tell whether that came in time."""
-    from robolink_simulators.epson.refusals import SpelRefusal
     from robolink_simulators.epson.spel.tasks.driving import run_to_end
 
-    runner = simulator.program
-    assert runner is not None  # noqa: S101 - loaded before
+    from robolink_cli.commands.simulate.kinds.epson import start_function
 
     def show(text: str) -> None:
         printed.append(text)
@@ -166,13 +193,8 @@ def _run(
         runner.on_statement = lambda task, file, line, text: note(
             f"{task.now_ns / NS_PER_S:12.6f} {task.task_number:3} {file}:{line}: {text}"
         )
-    try:
-        if function is not None:
-            runner.start(function, simulator.now_ns)
-    except SpelRefusal as refusal:
-        raise click.UsageError(
-            tr("There is no function {name} without arguments.", name=function)
-        ) from refusal
+    if function is not None:
+        start_function(runner, function, simulator.now_ns)
     try:
         return run_to_end(runner, simulator.advance, simulator.next_change, most_s=most_s)
     finally:
@@ -185,7 +207,15 @@ def _typed_line() -> str | None:
     return line.rstrip("\r\n") if line else None
 
 
-def _failed(failure: "TaskFailure") -> ControllerFaultError:
+def _failed(failure: "TaskFailure", default_robot: str | None) -> ControllerFaultError:
+    """Return how a program ended; with the robot, where a default one may be the cause."""
+    remedy = tr("Mend that line, or let OnErr deal with the error.")
+    if default_robot is not None:
+        remedy = tr(
+            "The robot was {robot}, taken because none was named. Name the program's own with "
+            "--robot, or mend that line.",
+            robot=default_robot,
+        )
     return ControllerFaultError(
         tr(
             "Error {number} in {function}, {file}:{line}, task {task}: {text}.",
@@ -197,5 +227,5 @@ def _failed(failure: "TaskFailure") -> ControllerFaultError:
             text=failure.text,
         ),
         code=failure.number,
-        remedy=tr("Mend that line, or let OnErr deal with the error."),
+        remedy=remedy,
     )

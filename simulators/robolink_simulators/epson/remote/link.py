@@ -102,6 +102,7 @@ class EpsonServerLink:
                 Role.DEVICE,
                 terminator=_TERMINATORS[options.terminator],
                 unterminated=options.requests_end_with_silence,
+                skips_blanks=options.blank_before_dollar == "skipped",
             )
             if dialect is None
             else EpsonBinaryCodec(Role.DEVICE, dialect)

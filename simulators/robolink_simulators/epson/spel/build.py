@@ -6,6 +6,7 @@ from lark import Token, Transformer, v_args
 
 from robolink_simulators.epson.spel.expressions.values import number_value
 from robolink_simulators.epson.spel.tree import (
+    OLD_HERE,
     AssignCoordinate,
     AssignPoint,
     AssignVariable,
@@ -36,7 +37,7 @@ from robolink_simulators.epson.spel.tree import (
     Target,
     Unary,
     Until,
-    shifted,
+    modified,
 )
 
 Items = tuple[Expression, ...]
@@ -132,13 +133,21 @@ class TreeBuilder(Transformer[Token, tuple[Statement, ...]]):
         """Build an output that Pass switches."""
         return SwitchOnTheWay(word.lower(), number)
 
-    def point_pair(self, local: PointExpression, base: PointExpression) -> PointPair:
-        """Build ``(P1:P11)``."""
-        return PointPair(local, base)
+    def point_pair(self, local: Expression, base: Expression) -> PointPair:
+        """Build ``(P1:P11)`` or ``(here:there)``."""
+        return PointPair(_as_point(local), _as_point(base))
+
+    def pair_of_labels(self, local: Token, word: Token, number: Token) -> PointPair:
+        """Build ``(here:z1)``, whose second label was read as a coordinate to be replaced."""
+        return self.point_pair(Name(local.lower()), Name((word[1:].strip() + number).lower()))
 
     def empty_call(self, word: Token) -> Name:
         """Build ``f()``."""
         return Name(word.lower(), ())
+
+    def call_of_port(self, word: Token, channel: Expression, items: Items | None) -> Name:
+        """Build ``SelectDB(#501, ...)``."""
+        return Name(word.lower(), (channel, *(items or ())))
 
     def assign_point(self, word: Token, value: Expression | Coordinates) -> AssignPoint:
         """Build ``P1 = ...``."""
@@ -184,8 +193,8 @@ class TreeBuilder(Transformer[Token, tuple[Statement, ...]]):
         return PointExpression(ComputedPoint(Name(word.lower(), arguments)), modifiers=modifiers)
 
     def replaced(self, value: Expression, *modifiers: Modifier) -> PointExpression:
-        """Build ``label :U(0)`` or ``label -Z(10) :U(0)``, whose shift was read as a difference."""
-        return shifted(value, modifiers)
+        """Build ``label @1`` or ``label -Z(10) :U(0)``, whose shift was read as a difference."""
+        return modified(value, modifiers)
 
     def error_on(self, _: Token) -> Name:
         """Build ``Error On``, which a client writes for ErrorOn."""
@@ -227,6 +236,10 @@ class TreeBuilder(Transformer[Token, tuple[Statement, ...]]):
     def point_function(self, word: Token, items: Items | None) -> PointFunction:
         """Build XY(..) and its kin."""
         return PointFunction(word.lower(), items or ())
+
+    def point_function_of_old(self, _: Token) -> PointFunction:
+        """Build ``P*``, which programs of RC+ 3 to 5 write for Here."""
+        return PointFunction(OLD_HERE)
 
     def flag(self, word: Token) -> Modifier:
         """Build ``/R`` or ``/1``."""
@@ -300,6 +313,10 @@ def _with_area_local(items: Items) -> Items:
             if digits.isdecimal():
                 return (*before, left, Literal("/local"), Literal(int(digits)))
     return items
+
+
+def _as_point(side: Expression) -> PointExpression:
+    return side if isinstance(side, PointExpression) else modified(side)
 
 
 def _as_expression(value: Expression | Token) -> Expression:

@@ -67,7 +67,7 @@ _OF_PROGRAMS_ALONE = """
     rundialog simget gshow declare vrun vget vset vload vsave vcls vdeftool vdefarm vdeflocal
     vgocenter vteach vstatsreset vstatssave vstatsshow vcreateobject vcreatesequence
     vdeleteobject vdeletesequence vsaveimage vloadmodel vsavemodel vxcalib vxcalsave vxcalload
-    vxcaldelete closedb opendb selectdb updatedb deletedb setpriority copyfile
+    gset gget vxcaldelete closedb opendb selectdb updatedb deletedb setpriority copyfile
 """
 
 _UNSIMULATED_FUNCTIONS = """
@@ -75,7 +75,7 @@ _UNSIMULATED_FUNCTIONS = """
     hand_on hand_off aio_in aio_inw aio_out aio_outw lookup
     areacorrection areacorrectiondef
     taskstate tmout dispdev loadtype
-    robotname joint restart setcom here eval
+    robotname joint restart setcom here eval selectdb
 """
 
 _WITH_A_FORM_OF_THEIR_OWN = """

@@ -4,6 +4,7 @@ import random
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
+from typing import NamedTuple
 
 from robolink_simulators.epson.condition import Condition
 from robolink_simulators.epson.machine import Machine
@@ -47,6 +48,18 @@ class WindowMemory:
     last_error: int = 0
 
 
+class UserError(NamedTuple):
+    """An error that a project defines.
+
+    Attributes:
+        number: 8000 to 8999.
+        text: What ErrMsg$ gives for it.
+    """
+
+    number: int
+    text: str
+
+
 @dataclass(slots=True)
 class Session:
     """The machine, the controller's state and habits, and what was said before.
@@ -62,6 +75,7 @@ class Session:
         files: The folder that file statements reach.
         point_files: The point files of the project, by their names in lower case.
         project_name: What the project is called.
+        user_errors: Errors 8000 to 8999 of the project, by their labels in lower case.
     """
 
     machine: Machine
@@ -74,3 +88,4 @@ class Session:
     files: FileFolder = field(default_factory=FileFolder)
     point_files: dict[str, PointFile] = field(default_factory=dict)
     project_name: str = ""
+    user_errors: dict[str, UserError] = field(default_factory=dict)

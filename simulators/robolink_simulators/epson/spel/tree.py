@@ -1,5 +1,6 @@
 """Statements and expressions after parsing: plain values, nothing evaluated yet."""
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass
 from enum import Enum
@@ -57,6 +58,10 @@ class PointFunction:
 
     name: str
     arguments: "tuple[Expression, ...]" = ()
+
+
+OLD_HERE = "p*"
+"""The name under which ``P*`` stands among the point functions."""
 
 
 class ModifierKind(Enum):
@@ -283,41 +288,60 @@ SHIFTING = frozenset(
 )
 """Axes of the shifts behind a point."""
 
+_FLAG = re.compile(r"[RLABF]|NF|J[14]F[01]|J[26]F[0-9]+")
 
-def shifted(value: "Expression", modifiers: tuple[Modifier, ...] = ()) -> PointExpression:
-    """Return what looks like a difference as a point and its shifts: ``label -Z(10)``.
+
+def modified(value: "Expression", modifiers: tuple[Modifier, ...] = ()) -> PointExpression:
+    """Return what looks like a difference or a quotient as a point and its modifiers.
+
+    The grammar cannot tell the label of a point from a number, so ``label -Z(10) /L`` arrives as
+    an operation.
 
     Args:
         value: It.
         modifiers: Those that stand behind it.
     """
-    while isinstance(value, Binary) and value.operator in ("+", "-"):
-        match value.right:
-            case Name(axis, (amount,)) if axis.upper() in SHIFTING:
-                by = Unary("-", amount) if value.operator == "-" else amount
-                modifiers = (Modifier(ModifierKind.SHIFT, axis.upper(), by), *modifiers)
-                value = value.left
-            case _:
-                break
-    return PointExpression(ComputedPoint(value), modifiers=modifiers)
+    base, read = _taken_apart(value)
+    return PointExpression(ComputedPoint(base), modifiers=(*read, *modifiers))
 
 
-def shifts_a_label(value: "Expression", known: Callable[[str], bool]) -> bool:
-    """Tell whether what looks like a difference is the label of a point and its shifts.
+def label_in(value: "Expression", known: Callable[[str], bool]) -> str | None:
+    """Return the label that what looks like an operation begins with, if it can be a point's.
 
     Args:
         value: It.
         known: Tells whether a name is a variable's.
     """
-    axes = list[str]()
-    while isinstance(value, Binary) and value.operator in ("+", "-"):
-        match value.right:
-            case Name(axis, (_,)) if axis.upper() in SHIFTING:
-                axes.append(axis)
-                value = value.left
-            case _:
-                return False
+    base, modifiers = _taken_apart(value)
+    match base:
+        case Name(label, None) if modifiers:
+            words = (label, *(modifier.word.lower() for modifier in modifiers))
+            return None if any(map(known, words)) else label
+    return None
+
+
+def _taken_apart(value: "Expression") -> "tuple[Expression, tuple[Modifier, ...]]":
+    """Return what an operation begins with and what can be read as modifiers behind it."""
     match value:
-        case Name(label, None):
-            return bool(axes) and not any(map(known, (label, *axes)))
-    return False
+        case Binary("/", left, right) if (flag := _flag(right)) is not None:
+            base, before = _taken_apart(left)
+            return base, (*before, flag)
+        case Binary("+" | "-" as sign, left, right):
+            # "/" binds closer than the sign: label -Z(10) /L arrives as label - (Z(10) / L).
+            match _taken_apart(right):
+                case Name(axis, (amount,)), flags if axis.upper() in SHIFTING:
+                    by = Unary("-", amount) if sign == "-" else amount
+                    base, before = _taken_apart(left)
+                    return base, (*before, Modifier(ModifierKind.SHIFT, axis.upper(), by), *flags)
+    return value, ()
+
+
+def _flag(value: "Expression") -> Modifier | None:
+    match value:
+        case Name(word, None) if _FLAG.fullmatch(word.upper()):
+            return Modifier(ModifierKind.FLAG, word.upper())
+        case Name("j1a" | "j4a" as word, (angle,)):
+            return Modifier(ModifierKind.ANGLE, word.upper(), angle)
+        case Literal(int(local)):
+            return Modifier(ModifierKind.FLAG, str(local))
+    return None

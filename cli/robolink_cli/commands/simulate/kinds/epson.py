@@ -11,7 +11,10 @@ import click
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson import EpsonOptions, EpsonSimulator
 from robolink_simulators.epson.options import options_from_text, read_profile
+from robolink_simulators.epson.refusals import SpelRefusal
 from robolink_simulators.epson.spel.tasks.channels.serial_link import COM_NUMBERS
+from robolink_simulators.epson.spel.tasks.driving import run_to_end
+from robolink_simulators.epson.spel.tasks.runner import ProgramRunner
 from robolink_simulators.epson.vision.vision_file import install_vision
 from robolink_simulators.faults import LinkKind
 from robolink_simulators.hosting.streams.epson_serial import serve_serial
@@ -24,6 +27,7 @@ from robolink_cli.commands.simulate.kinds.planned_faults import plan_faults
 from robolink_cli.commands.simulate.kinds.simulated_kind import SimulatedKind
 from robolink_cli.commands.simulate.serving import host_and_port, named_values, world_from
 from robolink_cli.console.render import note
+from robolink_cli.options.program_encoding import tell_encoding
 
 
 def make_epson(
@@ -40,6 +44,8 @@ def make_epson(
     vision: Path | None,
     lines: Sequence[str],
     folder: Path | None,
+    encoding: str | None,
+    before: str | None,
     faults: Path | None,
     serial: str | None,
     cell: str = "",
@@ -61,7 +67,7 @@ def make_epson(
         state_path=state,
         world=world_from(world) if world else None,  # which need not be made to be judged
     )
-    surroundings = ProjectSurroundings(vision, lines, folder)
+    surroundings = ProjectSurroundings(vision, lines, folder, encoding, before)
     load_programs(simulator, programs, points, surroundings, cell=cell)
     link = LinkKind.EPSON_SERIAL if serial else LinkKind.EPSON_TCP
     plan_faults(simulator, faults, {link}, cell=cell)
@@ -93,6 +99,8 @@ def _title(simulator: EpsonSimulator) -> str:
     return tr("SIMULATED EPSON {robot} (seed {seed}). No robot moves.", robot=robot, seed=seed)
 
 
+_LONGEST_PREPARATION_S: Final = 60.0
+
 EPSON_KIND: Final = SimulatedKind(
     make_epson,
     _place,
@@ -104,38 +112,52 @@ EPSON_KIND: Final = SimulatedKind(
 
 @dataclass(frozen=True, slots=True)
 class ProjectSurroundings:
-    """What a project needs beside its files: what ``--vision``, ``--com`` and ``--files`` name.
+    """What a project needs beside its files: what the options that go with programs name.
 
     Attributes:
         vision: The vision project.
         lines: Serial lines, as they were typed.
         folder: Where files lie.
+        encoding: The code page of its files.
+        before: The function that runs first.
     """
 
     vision: Path | None = None
     lines: Sequence[str] = ()
     folder: Path | None = None
+    encoding: str | None = None
+    before: str | None = None
 
     @property
     def named(self) -> str | None:
         """The first of the options that was given, ``None`` where none was."""
-        given = (("--vision", self.vision), ("--com", self.lines), ("--files", self.folder))
+        given = (
+            ("--vision", self.vision),
+            ("--com", self.lines),
+            ("--files", self.folder),
+            ("--encoding", self.encoding),
+            ("--before", self.before),
+        )
         return next((option for option, value in given if value), None)
 
-    def install(self, simulator: EpsonSimulator) -> None:
-        """Give them to a simulator whose program is loaded.
+    def load(
+        self, simulator: EpsonSimulator, programs: Sequence[Path], points: Sequence[Path]
+    ) -> ProgramRunner:
+        """Load a project with them.
 
         Raises:
-            ConfigError: The vision project makes no sense.
+            ConfigError: It cannot be built, a file cannot be read, or the vision project makes no
+                sense.
             click.UsageError: A serial line makes none.
         """
-        runner = simulator.program
-        assert runner is not None  # noqa: S101 - loaded before
+        runner = simulator.load(programs, points, encoding=self.encoding)
+        tell_encoding(runner.project.encoding, named=self.encoding)
         runner.ports.devices |= _lines(self.lines)
         if self.folder is not None:
             runner.session.files.root = self.folder
         if self.vision is not None:
             install_vision(simulator, self.vision)
+        return runner
 
 
 def load_programs(
@@ -166,10 +188,44 @@ def load_programs(
         if named is not None:
             raise click.UsageError(tr("{option} goes with --program.", option=named))
         return
-    runner = simulator.load(programs, points)
-    surroundings.install(simulator)
+    runner = surroundings.load(simulator, programs, points)
     before = f"{cell}: " if cell else ""
     runner.on_print = lambda text: note(before + text.rstrip("\r\n"))
+    if surroundings.before is not None:
+        run_first(simulator, runner, surroundings.before)
+
+
+def run_first(simulator: EpsonSimulator, runner: ProgramRunner, function: str) -> None:
+    """Run the function that says what the project keeps outside its programs.
+
+    Raises:
+        ConfigError: It fails, or does not end.
+        click.UsageError: There is none of that name.
+    """
+    start_function(runner, function, simulator.now_ns)
+    ended = run_to_end(
+        runner, simulator.advance, simulator.next_change, most_s=_LONGEST_PREPARATION_S
+    )
+    if runner.failure is not None or not ended:
+        why = str(runner.failure) if runner.failure is not None else tr("it does not end")
+        raise ConfigError(
+            tr("{function} of --before fails: {why}.", function=function, why=why),
+            remedy=tr("Keep to settings in it: HomeSet, TLSet, SetNet, SetCom, MemOn."),
+        )
+
+
+def start_function(runner: ProgramRunner, name: str, now_ns: int) -> None:
+    """Start a function of a project.
+
+    Raises:
+        click.UsageError: There is none of that name without arguments.
+    """
+    try:
+        runner.start(name, now_ns)
+    except SpelRefusal as refusal:
+        raise click.UsageError(
+            tr("There is no function {name} without arguments.", name=name)
+        ) from refusal
 
 
 def password_in(variable: str | None) -> Secret | None:

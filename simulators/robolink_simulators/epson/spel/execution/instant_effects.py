@@ -47,6 +47,10 @@ def effect(evaluator: Evaluator, statement: Statement) -> StatementOutcome:
             _print_to(evaluator, statement)
         case AssignPoint() | AssignCoordinate():
             _store(evaluator, statement)
+        case AssignVariable(name, value) if (
+            number := evaluator.session.machine.points.labelled(name)
+        ) is not None:
+            evaluator.session.machine.points.store(number, evaluator.point_of(value))
         case AssignVariable(name, Coordinates()):
             raise SpelRefusal(RefusalKind.TYPE_MISMATCH, f"{name} cannot hold coordinates")
         case AssignVariable(name, expression) if not isinstance(expression, Coordinates):

@@ -32,8 +32,8 @@ from robolink_simulators.epson.spel.tree import (
     PointPair,
     ResultSlot,
     Unary,
-    shifted,
-    shifts_a_label,
+    label_in,
+    modified,
 )
 
 
@@ -119,12 +119,10 @@ def closure(expression: Expression, scope: Scope) -> Run:
         case Unary(sign, operand):
             inner = closure(operand, scope)
             return lambda t: unary(sign, inner(t))
-        case Binary() if shifts_a_label(
-            expression, lambda name: scope.named(name, None) is not None
-        ):
-            point = shifted(expression)
-            return lambda t: t.point(point)
         case Binary(sign, left, right):
+            label = label_in(expression, lambda name: scope.named(name, None) is not None)
+            if label is not None:
+                return _point_or_operation(label, expression, scope)
             return _binary(sign, closure(left, scope), closure(right, scope))
         case PointExpression():
             return lambda t: t.point(expression)
@@ -132,6 +130,23 @@ def closure(expression: Expression, scope: Scope) -> Run:
             return lambda t: t.results[index]
         case PointPair() | ByReference():
             raise SpelRefusal(RefusalKind.SYNTAX, "This is no value")
+
+
+def _point_or_operation(label: str, expression: Binary, scope: Scope) -> Run:
+    """Read ``label /2`` as a point where the label is a point's, else as what it looks like."""
+    closure(Name(label), scope)
+    point = modified(expression)
+    try:
+        left, right = closure(expression.left, scope), closure(expression.right, scope)
+    except SpelRefusal:
+        return lambda t: t.point(point)
+    operation = _binary(expression.operator, left, right)
+
+    def run(t: Surroundings) -> Value:
+        names_a_point = t.session.machine.points.labelled(label) is not None
+        return t.point(point) if names_a_point else operation(t)
+
+    return run
 
 
 def _binary(sign: str, left: Run, right: Run) -> Run:

@@ -17,6 +17,10 @@ _NUMBERS = """
     setlatch_port_cu_0=24 setlatch_port_cu_1=25 setlatch_port_cu_2=26 setlatch_port_cu_3=27
     setlatch_triggermode_trailingedge=0 setlatch_triggermode_leadingedge=1 withtoolarm=0
     withouttoolarm=1 shutdown_epsonrc2=2
+    mb_ok=0 mb_okcancel=1 mb_abortretryignore=2 mb_yesnocancel=3 mb_yesno=4 mb_retrycancel=5
+    mb_iconstop=16 mb_iconquestion=32 mb_iconexclamation=48 mb_iconinformation=64
+    mb_defbutton1=0 mb_defbutton2=256
+    idok=1 idcancel=2 idabort=3 idretry=4 idignore=5 idyes=6 idno=7
     mode_standard=0 mode_boost=1 mode_low=2 devid_self=21 devid_tp=24
 """
 

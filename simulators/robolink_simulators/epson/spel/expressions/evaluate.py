@@ -162,7 +162,7 @@ class Evaluator:
         return _bounded(self._modified(point, expression.modifiers))
 
     def of_the_project(self, name: str) -> Value:
-        """Return a point by its label, a variable, or the number of an input or output.
+        """Return a point by its label, a variable, or the number of an input, output or error.
 
         Raises:
             Refusal: Nothing is called so.
@@ -178,6 +178,8 @@ class Evaluator:
         labelled = self.session.machine.io_labels.get(name)
         if labelled is not None:
             return labelled.number
+        if name in self.session.user_errors:
+            return self.session.user_errors[name].number
         raise SpelRefusal(RefusalKind.NAME_UNDEFINED, f"Nothing is called {name}")
 
     def point_number(self, argument: Expression) -> int:

@@ -62,6 +62,7 @@ from robolink_simulators.epson.spel.expressions.values import (
     out_of_range,
 )
 from robolink_simulators.epson.spel.session import Session
+from robolink_simulators.epson.spel.tree import OLD_HERE
 
 _PER_HOUR: Final = (1, 60, 3600)
 _CLOCK_AT_START: Final = datetime(2026, 1, 1, 8)  # noqa: DTZ001 - a controller has no zone
@@ -329,6 +330,12 @@ def _here(session: Session, _: Arguments) -> Point:
     return session.machine.here()
 
 
+def _old_here(session: Session, arguments: Arguments) -> Point:
+    if session.options.old_here == "refused":
+        raise SpelRefusal(RefusalKind.SYNTAX, "P* is of older versions: write Here")
+    return _here(session, arguments)
+
+
 def _real_position(session: Session, _: Arguments) -> Point:
     noise_mm = session.options.real_pos_noise_mm
     return session.machine.point_at(session.machine.real_tip(session.rng, noise_mm))
@@ -380,6 +387,7 @@ POINT_FUNCTIONS: Final[dict[str, tuple[range, PointFunction]]] = {
     "pallet": (range(2, 4), _on_pallet),
     "here": (range(1), _here),
     "curpos": (range(1), _here),
+    OLD_HERE: (range(1), _old_here),
     "realpos": (range(1), _real_position),
     "findpos": (range(1), _found_position),
     "latchpos": (range(3), _latched_position),

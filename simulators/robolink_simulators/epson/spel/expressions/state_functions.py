@@ -32,6 +32,9 @@ def _error_text(session: Session, arguments: Arguments) -> Value:
     number = as_integer(arguments[0])
     if len(arguments) > 1 and not 0 <= as_integer(arguments[1]) <= _HIGHEST_LANGUAGE:
         raise out_of_range("No such language")
+    for error in session.user_errors.values():
+        if error.number == number and error.text:
+            return error.text
     return session.messages.get(number, f"Error {number}")
 
 

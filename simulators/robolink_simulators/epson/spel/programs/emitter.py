@@ -20,13 +20,10 @@ from robolink_simulators.epson.spel.tasks.compiled import (
 )
 from robolink_simulators.epson.spel.tasks.task import SpelTask
 from robolink_simulators.epson.spel.tree import (
-    Binary,
     ByReference,
     Expression,
     Name,
     ResultSlot,
-    shifted,
-    shifts_a_label,
 )
 
 _NAMES_A_TASK: Final = frozenset({"taskstate", "taskdone", "taskinfo", "taskinfo$"})
@@ -134,8 +131,6 @@ class Emitter:
                 return node
         if not is_dataclass(node) or isinstance(node, type):
             return node
-        if isinstance(node, Binary) and shifts_a_label(node, self.scope.holds):
-            return self.hoisted(shifted(node))  # type: ignore[return-value]
         parts = {part.name: getattr(node, part.name) for part in fields(node)}
         new = {name: self.hoisted(part) for name, part in parts.items()}
         if all(new[name] is parts[name] for name in parts):

@@ -53,6 +53,7 @@ from robolink_simulators.epson.spel.tasks.task import SpelTask
 from robolink_simulators.epson.spel.tree import (
     AssignPoint,
     AssignVariable,
+    Binary,
     Coordinates,
     Expression,
     If,
@@ -61,6 +62,8 @@ from robolink_simulators.epson.spel.tree import (
     Name,
     PointExpression,
     Statement,
+    label_in,
+    modified,
 )
 
 Line = tuple[SourcePlace, str | None, Sequence[LineNode]]
@@ -283,6 +286,8 @@ class FunctionCompiler:
             self._emitter.checked(node)
         elif isinstance(node, LabelledPoint):
             self._emitter.checked(Name(node.name))
+        elif isinstance(node, Binary) and label_in(node, self._emitter.scope.holds) is not None:
+            self._check(modified(node))
         elif hasattr(node, "__dataclass_fields__"):
             for name in node.__dataclass_fields__:
                 self._check(getattr(node, name))

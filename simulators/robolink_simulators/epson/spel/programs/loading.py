@@ -12,13 +12,17 @@ from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.epson.spel.programs.io_label_file import read_io_labels
 from robolink_simulators.epson.spel.programs.project import build_project
-from robolink_simulators.epson.spel.session import PointFile, Session
+from robolink_simulators.epson.spel.programs.project_file import PROJECT_SUFFIX, project_files
+from robolink_simulators.epson.spel.programs.user_error_file import read_user_errors
+from robolink_simulators.epson.spel.session import PointFile, Session, UserError
+from robolink_simulators.epson.spel.source.faults import ProgramFault, ProgramRefused
 from robolink_simulators.epson.spel.source.point_file import read_points
 from robolink_simulators.epson.spel.source.source_text import encoding_of
 from robolink_simulators.epson.spel.tasks.compiled import CompiledFunction, SpelProject
 from robolink_simulators.epson.spel.tasks.task_table import MOST_IN_BACKGROUND
 
 IO_LABELS: Final = "IOLabels.dat"
+USER_ERRORS: Final = "UserErrors.dat"
 
 
 @dataclass(slots=True)
@@ -29,44 +33,67 @@ class ProjectData:
         points: Points by their numbers.
         point_labels: Their numbers by their labels.
         io_labels: Labels of inputs, outputs and memory bits.
+        user_errors: Errors of the project's own by their labels.
         files: What each point file holds.
         known: Whether any file said so; if none did, a build cannot tell labels from mistakes.
         encoding: The code page of all its files, ``None`` where no one fits them all.
+        programs: Its program files.
     """
 
     points: dict[int, Point] = field(default_factory=dict)
     point_labels: dict[str, int] = field(default_factory=dict)
     io_labels: dict[str, IOLabel] = field(default_factory=dict)
+    user_errors: dict[str, UserError] = field(default_factory=dict)
     files: dict[str, PointFile] = field(default_factory=dict)
     known: bool = False
     encoding: str | None = None
+    programs: tuple[Path, ...] = ()
 
     @property
     def labels(self) -> frozenset[str] | None:
         """All labels in lower case, ``None`` where they are not known."""
         if not self.known:
             return None
-        return frozenset(name.lower() for name in (*self.point_labels, *self.io_labels))
+        names = (*self.point_labels, *self.io_labels, *self.user_errors)
+        return frozenset(name.lower() for name in names)
 
 
-def project_data(programs: Sequence[Path], points: Sequence[Path] = ()) -> ProjectData:
-    """Return points and labels: of the files that are named, and of IOLabels.dat beside a program.
+def project_data(
+    programs: Sequence[Path], points: Sequence[Path] = (), encoding: str | None = None
+) -> ProjectData:
+    """Return what a project says beside its programs.
+
+    Beside a program IOLabels.dat and UserErrors.dat are read.
+
+    Args:
+        programs: Its programs, or one .sprj file that lists them.
+        points: Point files, beside those that a .sprj file lists.
+        encoding: The code page of its files, ``None`` where it is to be found out.
 
     Raises:
         ConfigError: A file cannot be read.
     """
-    folders = sorted({path.parent for path in programs})
+    files = project_files(programs, points)
+    every_point_file = (*files.further_points, *files.points)
+    folders = sorted({path.parent for path in files.programs})
     beside = [path for folder in folders for path in sorted(folder.glob("*.inc"))]
     listed = [path for folder in folders if (path := folder / IO_LABELS).is_file()]
-    encoding = encoding_of((*programs, *points, *beside, *listed))
-    data = ProjectData(known=bool(points or listed), encoding=encoding)
-    for path in points:
+    errors = [path for folder in folders if (path := folder / USER_ERRORS).is_file()]
+    if encoding is None:
+        texts = (*files.programs, *every_point_file, *beside, *listed, *errors)
+        encoding = encoding_of(texts)
+    known = bool(every_point_file or listed)
+    data = ProjectData(known=known, encoding=encoding, programs=files.programs)
+    for path in every_point_file:
         read, labels = read_points(path, encoding)
-        data.points |= read
+        if path in files.points:
+            data.points |= read
         data.point_labels |= labels
         data.files[path.name.lower()] = (read, labels)
     for path in listed:
         data.io_labels |= read_io_labels(path, encoding)
+    for path in errors:
+        data.user_errors |= read_user_errors(path, encoding)
     return data
 
 
@@ -82,17 +109,26 @@ def points_beside(programs: Sequence[Path]) -> list[Path]:
 
 
 def load_project(
-    session: Session, programs: Sequence[Path], points: Sequence[Path] = ()
+    session: Session,
+    programs: Sequence[Path],
+    points: Sequence[Path] = (),
+    encoding: str | None = None,
 ) -> SpelProject:
     """Build a project and put its points, labels and preserved variables into a controller.
+
+    The arguments are those of :func:`project_data`.
 
     Raises:
         ProgramRefused: It cannot be built; the controller is as it was.
         ConfigError: A file cannot be read, or what is to begin in the background cannot.
     """
-    data = project_data(programs, points)
-    project = build_project(programs, session.options, labels=data.labels, encoding=data.encoding)
+    data = project_data(programs, points, encoding)
+    project = build_project(
+        data.programs, session.options, labels=data.labels, encoding=data.encoding
+    )
+    project.encoding = data.encoding
     project.background = _in_the_background(project, session.options.background_tasks)
+    session.user_errors = data.user_errors
     session.point_files.clear()
     session.point_files.update(data.files)
     session.files.encoding = (data.encoding or "utf-8").removesuffix("-sig")
@@ -128,14 +164,37 @@ def _in_the_background(project: SpelProject, names: str) -> tuple[CompiledFuncti
     return tuple(found)
 
 
+@dataclass(frozen=True, slots=True)
+class CheckedProject:
+    """A project that was built for its faults alone.
+
+    Attributes:
+        data: What it says beside its programs.
+        functions: Its functions as they are spelled, in alphabetical order.
+        faults: All that is wrong with it.
+    """
+
+    data: ProjectData
+    functions: tuple[str, ...]
+    faults: tuple[ProgramFault, ...]
+
+
 def check_project(
-    programs: Sequence[Path], points: Sequence[Path] = (), options: EpsonOptions | None = None
-) -> tuple[SpelProject, bool]:
-    """Build a project for its faults alone; tell too whether its labels were known.
+    programs: Sequence[Path],
+    points: Sequence[Path] = (),
+    options: EpsonOptions | None = None,
+    encoding: str | None = None,
+) -> CheckedProject:
+    """Build a project for its faults alone; without point files those beside it are read.
 
     Raises:
-        ProgramRefused: It cannot be built.
         ConfigError: A file cannot be read.
     """
-    data = project_data(programs, points or points_beside(programs))
-    return build_project(programs, options, labels=data.labels, encoding=data.encoding), data.known
+    whole = any(path.suffix.lower() == PROJECT_SUFFIX for path in programs)
+    data = project_data(programs, points or (() if whole else points_beside(programs)), encoding)
+    try:
+        project = build_project(data.programs, options, labels=data.labels, encoding=data.encoding)
+    except ProgramRefused as refused:
+        return CheckedProject(data, (), refused.faults)
+    names = sorted(function.spelled for function in project.functions.values())
+    return CheckedProject(data, tuple(names), ())

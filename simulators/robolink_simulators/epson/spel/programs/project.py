@@ -39,6 +39,7 @@ from robolink_simulators.epson.spel.tasks.compiled import (
     LocalSlot,
     SpelProject,
 )
+from robolink_simulators.epson.spel.tree import OLD_HERE, names_in
 
 LONGEST_FUNCTION_NAME: Final = 64
 LONGEST_NAME: Final = 32
@@ -118,6 +119,8 @@ class ProjectBuilder:
         """Take a line up; return the function that is open behind it."""
         label = label_of(line)
         nodes: tuple[LineNode, ...] = () if label is not None else parsed(line)
+        if self._options.old_here == "refused" and "*" in line.text and OLD_HERE in names_in(nodes):
+            raise ProgramFault(line.place, tr("P* is of older versions: write Here"))
         if nodes and isinstance(nodes[0], FunctionHeader):
             if current is not None:
                 self._faults.append(

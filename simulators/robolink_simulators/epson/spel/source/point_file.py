@@ -55,7 +55,8 @@ def blocks(text: str) -> Iterator[tuple[tuple[str, ...], Pairs]]:
 def read_points(path: Path, encoding: str | None = None) -> tuple[dict[int, Point], dict[str, int]]:
     """Return the points of a file by their numbers, and the numbers of their labels.
 
-    A point is left out where one of its first six coordinates is marked undefined.
+    A point is left out where one of its first six coordinates is marked undefined; its label names
+    it all the same, since a program may fill it.
 
     Raises:
         ConfigError: It cannot be read, or a point makes no sense.
@@ -71,11 +72,10 @@ def read_points(path: Path, encoding: str | None = None) -> tuple[dict[int, Poin
             raise _not_understood(path, str(pairs.get("nNumber", "?"))) from error
         if not 0 <= number <= HIGHEST_POINT or not 0 <= point.local <= HIGHEST_LOCAL:
             raise _not_understood(path, str(number))
-        if int(pairs.get("nUndefined", "0")) & _UNDEFINED_AXES:
-            continue
-        points[number] = point
         if pairs.get("sLabel"):
             labels[pairs["sLabel"]] = number
+        if not int(pairs.get("nUndefined", "0")) & _UNDEFINED_AXES:
+            points[number] = point
     return points, labels
 
 

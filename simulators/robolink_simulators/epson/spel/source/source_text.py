@@ -22,6 +22,9 @@ LARGEST_PROGRAM: Final = 8 * 2**20
 _DEEPEST_INCLUDE: Final = 8
 _ENCODINGS: Final = ("utf-8-sig", "cp932", "gbk")
 
+_ASCII: Final = 0x7F
+_HALFWIDTH_KATAKANA = re.compile(r"[\uff61-\uff9f]")
+
 _LINE_END = re.compile(r"\r\n|\n|\r")
 _DIRECTIVE = re.compile(r"\s*#\s*([a-z]+)\b\s*(.*?)\s*$", re.IGNORECASE)
 _NAME = re.compile(r"[a-z][a-z0-9_]*$", re.IGNORECASE)
@@ -39,23 +42,32 @@ class SourceLine:
 
 
 def encoding_of(paths: Iterable[Path]) -> str | None:
-    """Return the first code page in which every file of a project can be read, if there is one.
+    """Return the code page in which every file of a project can be read, if there is one.
 
     One PC has written them all, and a label is to be the same text in each: what is no UTF-8 may
-    be read in two code pages, file by file, as different letters.
+    be read in two code pages, file by file, as different letters. What can be read in both is
+    taken for GBK where code page 932 would give mostly halfwidth katakana, which Chinese text
+    looks like there and Japanese programs seldom hold.
 
     Raises:
         ConfigError: A file cannot be read.
     """
     contents = [_content(path) for path in paths]
-    for encoding in _ENCODINGS:
-        try:
-            for content in contents:
-                content.decode(encoding)
-        except UnicodeDecodeError:
-            continue
-        return encoding
-    return None
+    fitting = [encoding for encoding in _ENCODINGS if _fits(contents, encoding)]
+    if fitting[:2] == ["cp932", "gbk"]:
+        letters = [c for content in contents for c in content.decode("cp932") if ord(c) > _ASCII]
+        narrow = sum(_HALFWIDTH_KATAKANA.match(letter) is not None for letter in letters)
+        return "gbk" if narrow > len(letters) / 2 else "cp932"
+    return next(iter(fitting), None)
+
+
+def _fits(contents: Iterable[bytes], encoding: str) -> bool:
+    try:
+        for content in contents:
+            content.decode(encoding)
+    except UnicodeDecodeError:
+        return False
+    return True
 
 
 def decoded(content: bytes, encoding: str | None = None) -> str:

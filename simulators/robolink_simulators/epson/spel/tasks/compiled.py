@@ -84,6 +84,7 @@ class SpelProject:
         modules: Variables of each file.
         sources: The lines of each file, for those who follow a run.
         background: The functions that begin with the controller, as background tasks.
+        encoding: The code page of its files, ``None`` where no one fits them all.
     """
 
     functions: dict[str, CompiledFunction] = field(default_factory=dict)
@@ -91,6 +92,7 @@ class SpelProject:
     modules: dict[str, dict[str, Variable]] = field(default_factory=dict)
     sources: dict[SourcePlace, str] = field(default_factory=dict)
     background: tuple[CompiledFunction, ...] = ()
+    encoding: str | None = None
 
     def clear_globals(self) -> None:
         """Forget what is not preserved, as the start of a function does."""

@@ -34,7 +34,8 @@ _TERMINATORS: Final = {"cr": b"\r", "lf": b"\n", "crlf": b"\r\n"}
 _PARITIES: Final[dict[str, Literal["N", "O", "E"]]] = {"n": "N", "o": "O", "e": "E"}
 _SLOWEST_BAUD: Final = 110
 _FASTEST_BAUD: Final = 115_200
-_SEPARATORS: Final = re.compile(r"\s*,\s*|\s+")
+_COMMA_OR_BLANK: Final = re.compile(r"\s*,\s*|\s+")
+_COMMA: Final = re.compile(r"\s*,\s*")
 _BYTE: Final = 0xFF
 
 
@@ -202,16 +203,36 @@ def _input(emitter: Emitter, node: ChannelStatement) -> Operation:
         variables = [reference(t) for reference in references]
 
         def take(line: str) -> None:
-            parts = _SEPARATORS.split(line.strip()) if line.strip() else []
+            texts = [variable.kind.name == "string" for variable in variables]
+            together = t.session.options.input_blank == "between_variables"
+            parts = _data(line, len(variables), ends_with_text=together and texts[-1])
             if len(parts) != len(variables):
                 raise SpelRefusal(RefusalKind.INPUT_COUNT, f"{len(parts)} data came")
-            for variable, part in zip(variables, parts, strict=True):
-                text = variable.kind.name == "string"
+            for variable, part, text in zip(variables, parts, texts, strict=True):
                 variable.values[0] = variable.kind.store(part if text else _value(part))
 
         return _line(t, number(t), take)
 
     return go
+
+
+def _data(line: str, count: int, *, ends_with_text: bool) -> list[str]:
+    """Return the data of a line: more than are wanted, or fewer, where their count is wrong.
+
+    Args:
+        line: What came.
+        count: How many are wanted.
+        ends_with_text: Whether the last of them is a text, to which blanks belong.
+    """
+    rest, parts = line.strip(), list[str]()
+    while rest or parts[-1:] == [""]:
+        last = ends_with_text and len(parts) == count - 1
+        part, *behind = (_COMMA if last else _COMMA_OR_BLANK).split(rest, maxsplit=1)
+        parts.append(part)
+        if not behind:
+            break
+        rest = behind[0]
+    return parts
 
 
 def _value(text: str) -> int | float:

@@ -1,0 +1,59 @@
+"""The code page of SPEL+ programs: named by a person, or found out and told."""
+
+import codecs
+from typing import Any, Final
+
+import click
+
+from robolink.messages import tr
+from robolink_cli.console.render import note
+
+_PLAIN: Final = frozenset({"utf-8", "utf-8-sig"})
+
+
+class _Encoding(click.ParamType[str]):
+    """A code page that Python knows."""
+
+    name = "encoding"
+
+    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Return the name, or refuse it."""
+        try:
+            codecs.lookup(value)
+        except LookupError:
+            self.fail(
+                tr("There is no code page {name}: gbk, cp932, cp1250 ...", name=value), param, ctx
+            )
+        return value
+
+
+def encoding_option(function: Any) -> Any:  # noqa: ANN401 - a decorator of click
+    """Add ``--encoding``."""
+    return click.option(
+        "--encoding",
+        type=_Encoding(),
+        metavar="NAME",
+        help="Code page of the files: utf-8, gbk, cp932, cp1250 ... Without it the first of UTF-8, "
+        "cp932 and GBK that fits is taken, and told.",
+    )(function)
+
+
+def tell_encoding(taken: str | None, *, named: str | None) -> None:
+    """Say which code page was taken, where nobody named it and the text may look wrong."""
+    if named is not None or taken in _PLAIN:
+        return
+    if taken is None:
+        note(
+            tr(
+                "No code page fits all files; letters that are not ASCII may look wrong. Name it "
+                "with --encoding."
+            )
+        )
+        return
+    note(
+        tr(
+            "The files were read as {encoding}. If their text looks wrong, name another with "
+            "--encoding.",
+            encoding=taken,
+        )
+    )

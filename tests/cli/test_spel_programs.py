@@ -246,8 +246,12 @@ def test_a_project_file_is_refused_by_what_is_wrong_with_it(ended, program, proj
     both = ended("spel", "check", project, project.replace("cell.sprj", "main.prg"))
     assert both.code == 2
     assert "stands alone" in both.err
-    missing = program(PROJECT.replace("other.pts", "gone.pts"), "missing.sprj")
-    assert "gone.pts, which is not beside it" in ended("spel", "check", missing).err
+    missing = program(PROJECT.replace("Main.prg", "gone.prg"), "missing.sprj")
+    assert "gone.prg, which is not beside it" in ended("spel", "check", missing).err
+    points = program(PROJECT.replace("other.pts", "gone.pts"), "points.sprj")
+    end = ended("spel", "check", points)
+    assert end.code == 0
+    assert "Not beside the project file: gone.pts" in end.err
     assert "lists no program" in ended("spel", "check", program("ENVT0100\n", "no.sprj")).err
 
 

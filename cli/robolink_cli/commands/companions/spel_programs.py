@@ -64,7 +64,15 @@ def check(files: tuple[Path, ...], points: tuple[Path, ...], encoding: str | Non
     if checked.faults:
         raise ProgramRefused(checked.faults)
     say(tr("{count} functions, no fault found.", count=len(checked.functions)))
-    if not checked.data.known:
+    if checked.data.missing_points:
+        note(
+            tr(
+                "Not beside the project file: {names}. Names that nobody declares were taken for "
+                "labels.",
+                names=", ".join(checked.data.missing_points),
+            )
+        )
+    elif not checked.data.known:
         note(
             tr(
                 "No point file and no IOLabels.dat lies beside the programs: names that nobody "
@@ -79,6 +87,7 @@ def _document(checked: "CheckedProject") -> dict[str, object]:
         "files": [str(path) for path in checked.data.programs],
         "functions": list(checked.functions),
         "labels_known": checked.data.known,
+        "missing_points": list(checked.data.missing_points),
         "encoding": checked.data.encoding,
         "faults": [
             {

@@ -38,6 +38,7 @@ class ProjectData:
         known: Whether any file said so; if none did, a build cannot tell labels from mistakes.
         encoding: The code page of all its files, ``None`` where no one fits them all.
         programs: Its program files.
+        missing_points: Names of point files that a .sprj file lists and that are not beside it.
     """
 
     points: dict[int, Point] = field(default_factory=dict)
@@ -48,6 +49,7 @@ class ProjectData:
     known: bool = False
     encoding: str | None = None
     programs: tuple[Path, ...] = ()
+    missing_points: tuple[str, ...] = ()
 
     @property
     def labels(self) -> frozenset[str] | None:
@@ -82,8 +84,13 @@ def project_data(
     if encoding is None:
         texts = (*files.programs, *every_point_file, *beside, *listed, *errors)
         encoding = encoding_of(texts)
-    known = bool(every_point_file or listed)
-    data = ProjectData(known=known, encoding=encoding, programs=files.programs)
+    known = bool(every_point_file or listed) and not files.missing_points
+    data = ProjectData(
+        known=known,
+        encoding=encoding,
+        programs=files.programs,
+        missing_points=files.missing_points,
+    )
     for path in every_point_file:
         read, labels = read_points(path, encoding)
         if path in files.points:

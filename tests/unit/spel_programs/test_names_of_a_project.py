@@ -166,3 +166,9 @@ def test_what_needs_options_of_the_controller_is_refused_when_it_is_reached(prin
 def test_bits_of_a_fieldbus_are_an_option_of_the_hardware(printed, failure):
     assert failure("On 6150").number == 2344
     assert printed("On 6150", "Print Oport(6150)", io_bits=8192) == ["1"]
+
+
+def test_a_mistake_in_the_first_line_of_a_function_is_told_once(faults):
+    text = "Function f(a AsInteger)\n  Print 1\n  Print 2\nFend\nFunction main\nFend\n"
+    (fault,) = faults(text)
+    assert fault.startswith("main.prg:1:")

@@ -1,5 +1,6 @@
 """Files to a project: every function compiled, or every fault told (docs/reference/spel.md 16)."""
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -43,6 +44,7 @@ from robolink_simulators.epson.spel.tree import OLD_HERE, names_in
 
 LONGEST_FUNCTION_NAME: Final = 64
 LONGEST_NAME: Final = 32
+_BEGINS_A_FUNCTION: Final = re.compile(r"\s*function\b", re.IGNORECASE)
 
 
 @dataclass(slots=True)
@@ -107,6 +109,9 @@ class ProjectBuilder:
                 current = self._line(line, module, current)
             except ProgramFault as fault:
                 self._faults.append(fault)
+                if current is None and _BEGINS_A_FUNCTION.match(line.text):
+                    # What follows is inside all the same: one mistake is told once.
+                    current = _Outline(FunctionHeader("", "", (), None), line.place, module)
         self._faults += preprocessor.faults
         if current is not None:
             self._faults.append(

@@ -1,8 +1,8 @@
 """Starts a map from a register list, as PLC programmers keep one in a spreadsheet.
 
-CSV with a header line, comma or semicolon. ``name`` and one of ``address`` (counted from 0)
-and ``register`` (as 40101) are needed; ``type``, ``unit`` and ``scale`` are taken when they
-are there::
+CSV with a header line; commas, semicolons or tabs; UTF-8 or GBK. ``name`` and one of ``address``
+(counted from 0) and ``register`` (as 40101) are needed; ``type``, ``unit`` and ``scale`` are taken
+when they are there, each in English or Chinese::
 
     name,register,type
     Tool1_X,40101,REAL
@@ -11,7 +11,8 @@ are there::
     Commit,00001,BOOL
 
 A column ``address`` that holds nothing but numbers as 40101 is read as ``register``, and the draft
-says so. A row that cannot be used is named with its line; the others are kept.
+says so. A hexadecimal address is written 0x1F4, 16#1F4 or 1F4h, or its heading says hex. A row
+that cannot be used is named with its line; the others are kept.
 
 What a list does not say (word order, handshake) is left open in the draft and named there;
 a draft is no map before a person has filled it in.
@@ -19,6 +20,7 @@ a draft is no map before a person has filled it in.
 
 import csv
 import re
+import unicodedata
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -46,6 +48,16 @@ _TYPES: Final = {
     "REAL": {"real", "float", "float32"},
     "LREAL": {"lreal", "double", "float64"},
 }
+_HEADINGS: Final = {
+    "name": {"name", "variable", "symbol", "tag", "名称", "变量", "变量名", "变量名称", "标签"},
+    "address": {"address", "addr", "地址", "起始地址", "modbus地址", "modbus address"},
+    "register": {"register", "寄存器", "寄存器地址", "寄存器号"},
+    "type": {"type", "data type", "datatype", "类型", "数据类型"},
+    "unit": {"unit", "单位"},
+    "scale": {"scale", "factor", "系数", "比例", "倍率"},
+}
+_HEX_HEADING: Final = re.compile(r"\s*[(\[]?\s*(?:hex|十六进制|16进制)\s*[)\]]?\s*$")
+_HEX: Final = re.compile(r"(?:0x|16#)([0-9a-f]{1,4})|([0-9][0-9a-f]{0,4})h", re.IGNORECASE)
 _UNITS: Final = frozenset({"mm", "um", "m", "inch", "deg", "rad"})
 _MOST_BYTES: Final = 1_000_000
 _DIGITS: Final = len(str(LAST_ADDRESS))
@@ -123,24 +135,43 @@ def draft_from_csv(path: Path) -> MapDraft:
 
 def _rows(path: Path) -> Iterator[tuple[int, dict[str, str]]]:
     try:
-        text = read_named(path, most_bytes=_MOST_BYTES).decode("utf-8-sig")
+        text = _text(read_named(path, most_bytes=_MOST_BYTES))
     except OSError as error:
         raise _unusable(path, error.strerror or str(error)) from error
     except UnicodeError as error:
-        raise _unusable(path, tr("it is not UTF-8 text")) from error
+        raise _unusable(path, tr("it is neither UTF-8 nor GBK text")) from error
     lines = text.splitlines()
     header = lines[0] if lines else ""
-    reader = csv.reader(lines, delimiter=";" if header.count(";") > header.count(",") else ",")
+    reader = csv.reader(lines, delimiter=max(",;\t", key=header.count))
     try:
-        names = [name.strip().lower() for name in next(reader, [])]
+        headings = [unicodedata.normalize("NFKC", it).strip().lower() for it in next(reader, [])]
+        columns = [_HEX_HEADING.sub("", heading) for heading in headings]
+        names = [
+            next((name for name, spelt in _HEADINGS.items() if column in spelt), column)
+            for column in columns
+        ]
+        hexadecimal = any(
+            name == "address" and column != heading
+            for name, column, heading in zip(names, columns, headings, strict=True)
+        )
         if "name" not in names or not {"address", "register"} & set(names):
             raise _unusable(path, tr("its first line must name the columns name and address"))
         for cells in reader:
             row = dict(zip(names, (cell.strip() for cell in cells), strict=False))
+            if hexadecimal and row.get("address"):
+                row["address"] = f"16#{row['address'].removeprefix('16#').removeprefix('0x')}"
             if row.get("name"):
                 yield reader.line_num, row
     except csv.Error as error:  # a cell of more than 131072 characters: a quote that is left open
         raise _unusable(path, str(error)) from error
+
+
+def _text(content: bytes) -> str:
+    """Return the text of a list; what is no UTF-8 is GBK, as Chinese spreadsheets save it."""
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return content.decode("gb18030")
 
 
 def _are_references(addresses: Iterable[str]) -> bool:
@@ -159,6 +190,9 @@ def _place(row: Mapping[str, str], *, references: bool) -> str:
     register = _REGISTER.fullmatch(text)
     if register is not None and 1 <= int(register[2]) <= LAST_ADDRESS + 1:
         return f'table = "{_TABLES[register[1]]}", address = {int(register[2]) - 1}'
+    sixteen = _HEX.fullmatch(address)
+    if sixteen is not None and int(sixteen[1] or sixteen[2], 16) <= LAST_ADDRESS:
+        return f"address = {int(sixteen[1] or sixteen[2], 16)}"
     counted = not references and address.isascii() and address.isdigit() and len(address) <= _DIGITS
     if counted and int(address) <= LAST_ADDRESS:
         return f"address = {int(address)}"

@@ -6,6 +6,7 @@ indices, prefixes that tell the type (``rX``, ``diTool1X``), and words behind th
 """
 
 import re
+import unicodedata
 from typing import Final, NamedTuple
 
 from robolink.register_maps._map import COMPONENTS
@@ -29,6 +30,19 @@ _HIGHEST: Final = 15
 _MOST_DIGITS: Final = 9
 
 
+_CHINESE: Final = {
+    **dict.fromkeys(("刀具", "工具", "吸嘴", "喷嘴", "针头", "针嘴", "刀"), "tool"),
+    **dict.fromkeys(("偏移量", "偏移", "偏置", "补偿值", "补偿", "位置", "坐标"), "offset"),
+    **dict.fromkeys(("数据", "值"), "value"),
+    "毫米": "mm",
+    "微米": "um",
+    **dict.fromkeys(("角度", "轴", "向", "号"), ""),
+}
+"""Words of Chinese register lists. A name with others is something else: an old value, say."""
+
+_CHINESE_WORD: Final = re.compile("|".join(_CHINESE))
+
+
 class Component(NamedTuple):
     """A component of a tool.
 
@@ -45,6 +59,10 @@ class Component(NamedTuple):
 
 def component_of(name: str) -> Component | None:
     """Return what a variable stands for, ``None`` where its name does not clearly say it."""
+    name = unicodedata.normalize("NFKC", name)
+    name = _CHINESE_WORD.sub(lambda word: f" {_CHINESE[word[0]]} ", name)
+    if not name.isascii():
+        return None
     identifiers = [_PREFIX.sub("", it) for it in _IDENTIFIER.findall(name)]
     for position, identifier in enumerate(identifiers):
         words = [word.lower() for word in _WORD.findall(identifier)]

@@ -7,16 +7,20 @@ from pathlib import Path
 import pytest
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.faults import Fault, FaultAction
+from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
 from robolink_simulators.plc import PlcSimulator, serve_plc, serve_plc_line
+from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
 from robolink import ANY, ToolOffset
+from robolink.controllers.plc_map.controller import PlcMapController
 from robolink.errors import (
     BusyError,
     ConfigError,
     ConnectError,
     OutcomeUnknownError,
     ReadBackError,
+    RejectedError,
     RemoteProtocolError,
     ReservedToolError,
     ToolChangedError,
@@ -259,3 +263,71 @@ def test_a_map_of_another_machine_is_found_out_when_connecting(tmp_path):
         with pytest.raises(RemoteProtocolError, match='word_order = "low_first"'):
             robolink.connect(f"{url}&map={turned}")
     assert served.plc.writes == []
+
+
+FAR_APART = """
+schema = "robolink/plc-map/1"
+name = "far apart"
+[numbers]
+type = "REAL"
+word_order = "low_first"
+[[tools]]
+number = 1
+x = { address = 100 }
+y = { address = 170 }
+z = { address = 198 }
+[commit]
+kind = "level"
+request = { table = "coil", address = 10 }
+acknowledge = { table = "discrete", address = 10 }
+"""
+
+
+def machine(controller):
+    """Return the name under which a confirmation is kept."""
+    assert isinstance(controller, PlcMapController)
+    return controller.who().name
+
+
+def test_a_server_that_gives_few_registers_is_read_in_parts(tmp_path):
+    path = tmp_path / "far.toml"
+    path.write_text(FAR_APART)
+    far = load_map(path)
+    plc = PlcSimulator(far, seed=7, most_registers=50)
+    with serve_plc(plc, path, clock=ScaledClock(10.0)) as host:
+        with (
+            robolink.connect(host.url) as controller,
+            pytest.raises(RejectedError, match="exception 3") as caught,
+        ):
+            controller.tools.read(1)
+        assert "most_registers=50" in str(caught.value.remedy)
+        with robolink.connect(f"{host.url}&most_registers=50") as controller:
+            confirm(machine(controller), far, by="test", compared="1.x")
+            controller.tools.write(1, ToolOffset(1.5, 2.5, 3.5), expected=ANY)
+            assert controller.tools.read(1) == ToolOffset(1.5, 2.5, 3.5)
+
+
+def test_a_length_beyond_what_the_map_allows_is_told_by_the_key_that_decides(tmp_path):
+    path = tmp_path / "far.toml"
+    path.write_text(FAR_APART.replace("[numbers]", "largest_mm = 50\n[numbers]"))
+    wide = tmp_path / "wide.toml"
+    wide.write_text(FAR_APART)
+    plc = PlcSimulator(load_map(wide), seed=7)
+    with serve_plc(plc, path, clock=ScaledClock(10.0)) as host:
+        with robolink.connect(host.url.replace("far.toml", "wide.toml")) as controller:
+            confirm(machine(controller), load_map(wide), by="test", compared="1.x")
+            controller.tools.write(1, ToolOffset(1.5, 2.5, 120), expected=ANY)
+        with (
+            robolink.connect(host.url) as controller,
+            pytest.raises(RemoteProtocolError, match=r"120 mm, more than the 50 mm .*largest_mm"),
+        ):
+            controller.tools.read(1)
+
+
+def test_a_mailbox_says_by_number_how_many_registers_it_needs_at_once():
+    with (
+        serve_modbus_tcp(SoftMotionSimulator()) as host,
+        pytest.raises(ConfigError, match="112 registers") as caught,
+    ):
+        robolink.connect(f"{host.url}{'&' if '?' in host.url else '?'}most_registers=61")
+    assert "64 in one write" in str(caught.value.remedy)

@@ -25,6 +25,7 @@ class LocalClient:
         self.identity = identity
         self.place = identity.partition("://")[2]
         self.clock = ManualClock()
+        self.most_registers = 125
         self.lose = set()
         self.refuse = set()
         self.cut = False

@@ -173,8 +173,9 @@ def test_damage_on_a_serial_line_is_an_error_and_the_line_finds_its_place_again(
     damaged = bytearray(rtu(words(41)))
     damaged[3] ^= 1
     line, client = over_rtu(lambda frame: [bytes(damaged)], honest, lambda frame: [rtu(words(42))])
-    with pytest.raises(RemoteProtocolError, match="not Modbus"):
+    with pytest.raises(RemoteProtocolError, match="not Modbus") as caught:
         client.read_input(0, 1)
+    assert "baud rate" in str(caught.value.remedy)
     assert client.read_input(0, 1) == (42,)
     assert not line.closed
 
@@ -205,3 +206,10 @@ def test_an_echo_that_does_not_come_is_named(heard):
 def test_a_written_coil_comes_back_as_it_was_sent():
     _, client = over_rtu(lambda frame: [frame])
     client.write_coil(3, True)
+
+
+def test_a_zero_before_the_answer_of_an_rs_485_line_is_explained():
+    _, client = over_rtu(lambda frame: [b"\0" + rtu(words(41))])
+    with pytest.raises(TransportTimeoutError) as caught:
+        client.read_input(0, 1)
+    assert "bias resistors" in str(caught.value.remedy)

@@ -4,6 +4,7 @@ import tomllib
 
 import pytest
 
+from robolink.errors import ConfigError
 from robolink.register_maps import draft_from_csv
 from robolink.register_maps._variable_names import component_of
 
@@ -31,6 +32,11 @@ def draft_of(tmp_path, text):
         ("needle1 y mm", (1, "y", "mm")),
         ("PLC_PRG.fbTool.aOffset[2].rY", (2, "y", "")),
         ("wTool1W", (1, "w", "")),
+        ("刀具1_X", (1, "x", "")),
+        ("刀具\uff11\uff3f\uff38", (1, "x", "")),
+        ("工具2.Y轴偏移(mm)", (2, "y", "mm")),
+        ("GVL.吸嘴[3].Z补偿值", (3, "z", "")),
+        ("针头3号U角度", (3, "u", "")),
     ],
 )
 def test_names_that_plc_people_write_are_understood(name, found):
@@ -42,6 +48,7 @@ def test_names_that_plc_people_write_are_understood(name, found):
     [
         *("OldTool1_X", "oldTool1_X", "cmdTool1X", "Tool1_XY", "Tool1.Speed", "Tool1_X_Act"),
         *("Tool0_X", "Tool16_X", "Tool[1,1].X", "T1.xDone", "Timer1_x", "Table1.X", "Tool1"),
+        *("刀具1_X_旧", "旧刀具1_X", "刀具1_X设定", "刀具_X", "刀具1速度"),
         *("ToolX", "x_Tool1", "%MW100", "Tool1_X_mm_deg", "", "1", "T1.x.y"),
     ],
 )
@@ -108,3 +115,52 @@ def test_a_unit_in_the_name_counts_unless_the_list_says_another(tmp_path):
     text = "name,address,unit\nTOOL1_X_UM,1,\nTOOL1_Y_UM,3,mm\n"
     (tool,) = tomllib.loads(draft_of(tmp_path, text).text)["tools"]
     assert (tool["x"]["unit"], tool["y"]["unit"]) == ("um", "mm")
+
+
+CHINESE = (
+    "序号;名称;地址;数据类型;单位\n1;刀具1_X;100;REAL;mm\n2;刀具1_Y;102;REAL;mm\n3;急停;5;BOOL;\n"
+)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "gbk"])
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+def test_chinese_lists_are_read_as_spreadsheets_save_them(tmp_path, encoding, separator):
+    path = tmp_path / "list.csv"
+    path.write_bytes(CHINESE.replace(";", separator).encode(encoding))
+    draft = draft_from_csv(path)
+    (tool,) = tomllib.loads(draft.text)["tools"]
+    assert tool["x"] == {"address": 100, "type": "REAL", "unit": "mm"}
+    assert tool["y"]["address"] == 102
+    assert draft.left == ("急停",)
+
+
+def test_a_list_of_no_known_text_is_refused(tmp_path):
+    path = tmp_path / "list.csv"
+    path.write_bytes(b"name,address\nTool1_X\xff\xff,1\n")
+    with pytest.raises(ConfigError, match="neither UTF-8 nor GBK"):
+        draft_from_csv(path)
+
+
+@pytest.mark.parametrize(
+    ("heading", "address", "found"),
+    [
+        ("address", "0x1F4", 500),
+        ("address", "16#1f4", 500),
+        ("address", "1F4h", 500),
+        ("address (hex)", "1F4", 500),
+        ("address (hex)", "100", 256),
+        ("地址\uff08十六进制\uff09", "0x1F4", 500),
+        ("address", "100", 100),
+    ],
+)
+def test_an_address_may_be_hexadecimal_where_it_is_said(tmp_path, heading, address, found):
+    draft = draft_of(tmp_path, f"name,{heading}\nTool1_X,{address}\n")
+    (tool,) = tomllib.loads(draft.text)["tools"]
+    assert tool["x"]["address"] == found
+
+
+@pytest.mark.parametrize("address", ["1F4", "0x1FFFF", "F4h", "0x"])
+def test_an_address_that_only_may_be_hexadecimal_is_asked_for(tmp_path, address):
+    text = f"name,address\nTool1_X,{address}\nTool1_Y,2\n"
+    draft = draft_of(tmp_path, text)
+    assert draft.bad[0].startswith("line 2 (Tool1_X): it has no place")

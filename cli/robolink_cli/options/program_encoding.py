@@ -33,7 +33,7 @@ def encoding_option(function: Any) -> Any:  # noqa: ANN401 - a decorator of clic
         "--encoding",
         type=_Encoding(),
         metavar="NAME",
-        help="Code page of the files: utf-8, gbk, cp932, cp1250 ... Without it the first of UTF-8, "
+        help="Code page of the files: utf-8, gbk, cp932, cp1250. Without it the first of UTF-8, "
         "cp932 and GBK that fits is taken, and told.",
     )(function)
 

@@ -32,6 +32,7 @@ SECTIONS: Final[tuple[HelpSection, ...]] = (
         frozenset(
             {
                 *("--robot", "--kinematics", "--param", "--map", "--seed", "--state", "--speed"),
+                "--most-registers",
                 "--exchange",
                 *("--option", "--profile", "--world", "--password-env", "--replay", "--faults"),
             }

@@ -31,6 +31,10 @@ class RegisterClient(Protocol):
     def clock(self) -> Clock:
         """The clock on which its time passes."""
 
+    @property
+    def most_registers(self) -> int:
+        """How many registers it gives in one read."""
+
     def read_holding(self, address: int, count: int) -> tuple[int, ...]:
         """Return holding registers."""
 
@@ -75,16 +79,24 @@ class Registers:
         self._writing = ambient.lock()
 
     def read(self, table: RegisterTable, addresses: range) -> tuple[int, ...]:
-        """Return what stands there, in one request."""
+        """Return what stands there: in one request, or in parts where the server gives fewer.
+
+        Parts may be of different moments: whoever needs them to belong together reads twice.
+        """
         readers = {
             RegisterTable.HOLDING: self._client.read_holding,
             RegisterTable.INPUT: self._client.read_input,
             RegisterTable.COIL: self._client.read_coils,
             RegisterTable.DISCRETE: self._client.read_discrete,
         }
-        with self.gate:
-            self.exchanges += 1
-            return tuple(map(int, readers[table](addresses.start, len(addresses))))
+        words = table in (RegisterTable.HOLDING, RegisterTable.INPUT)
+        most = self._client.most_registers if words else len(addresses)
+        found: list[int] = []
+        for start in range(addresses.start, addresses.stop, most):
+            with self.gate:
+                self.exchanges += 1
+                found += map(int, readers[table](start, min(most, addresses.stop - start)))
+        return tuple(found)
 
     def read_twice(self, table: RegisterTable, addresses: range) -> tuple[int, ...]:
         """Return what stands there as soon as two reads agree.

@@ -145,6 +145,22 @@ class OffsetValues:
         value = number.decode(tuple(words[address] for address in number.registers))
         if not number.is_absurd(value) and abs(value) <= limit:
             return value
+        if not number.is_absurd(value) and name not in ANGLES and limit == self._map.largest_mm:
+            raise RemoteProtocolError(
+                tr(
+                    "{axis} at {place} reads {value:g} mm, more than the {limit:g} mm that the map "
+                    "allows (largest_mm).",
+                    axis=name.upper(),
+                    place=number.place,
+                    value=value,
+                    limit=limit,
+                ),
+                remedy=tr(
+                    "If the tool is so long, state a larger largest_mm in the map; else compare "
+                    "address, type, scale and word_order with the PLC's register list."
+                ),
+                controller=self._identity,
+            )
         raise RemoteProtocolError(
             tr(
                 "{axis} at {place} reads {value:g}, which cannot be true.",

@@ -71,6 +71,8 @@ class ModbusClient:
         identity: Names the far end: the URL, with the unit where it is not the usual one.
         unit: Asked unless a call names another.
         timeout_s: Longest time for one request and its whole answer.
+        most_registers: How many registers the server gives in one read; the standard allows 125,
+            some give 61 or 50.
 
     Each method that reads or writes raises:
         ConfigError: The address, the count or a value cannot be sent; nothing was.
@@ -88,7 +90,9 @@ class ModbusClient:
         identity: str,
         unit: int,
         timeout_s: float,
+        most_registers: int = MOST_REGISTERS_READ,
     ) -> None:
+        self.most_registers = most_registers
         self._transport = transport
         self._exchange = exchange
         self._identity = identity
@@ -122,11 +126,11 @@ class ModbusClient:
         return self._exchange.takes_s(6 + 2 * count, 5)
 
     def read_holding(self, address: int, count: int, *, unit: int | None = None) -> tuple[int, ...]:
-        """Return holding registers (function 3), at most 125."""
+        """Return holding registers (function 3), at most ``most_registers``."""
         return self._read(Area.HOLDING, address, count, unit)
 
     def read_input(self, address: int, count: int, *, unit: int | None = None) -> tuple[int, ...]:
-        """Return input registers (function 4), at most 125."""
+        """Return input registers (function 4), at most ``most_registers``."""
         return self._read(Area.INPUT, address, count, unit)
 
     def read_coils(self, address: int, count: int, *, unit: int | None = None) -> tuple[bool, ...]:
@@ -161,7 +165,7 @@ class ModbusClient:
 
     def _read(self, area: Area, address: int, count: int, unit: int | None) -> tuple[int, ...]:
         bits = area in (Area.COILS, Area.DISCRETE)
-        self._require_range(area, address, count, MOST_BITS_READ if bits else MOST_REGISTERS_READ)
+        self._require_range(area, address, count, MOST_BITS_READ if bits else self.most_registers)
         request = ModbusRequest(self._asked(unit), area.read_function, area, address, count)
         return self._ask(request).values
 

@@ -38,7 +38,9 @@ def describe(request: ModbusRequest) -> str:
     return tr("read {count} from {where}", count=request.count, where=where)
 
 
-def unanswered(identity: str, request: ModbusRequest, held: bytes) -> TransportTimeoutError:
+def unanswered(
+    identity: str, request: ModbusRequest, held: bytes, *, serial: bool
+) -> TransportTimeoutError:
     """Return the error for an answer that did not come, or not whole."""
     if held:
         what = tr(
@@ -51,13 +53,18 @@ def unanswered(identity: str, request: ModbusRequest, held: bytes) -> TransportT
         what = tr(
             "{identity} did not answer: {request}.", identity=identity, request=describe(request)
         )
-    return TransportTimeoutError(
-        what,
-        remedy=tr(
+    remedy = tr(
+        "Check cable and power of the PLC and the unit ({unit}), then try again.", unit=request.unit
+    )
+    if serial:
+        remedy = _noise(held) or tr(
             "Check cable and power of the PLC, the baud rate and the unit ({unit}), then try "
             "again.",
             unit=request.unit,
-        ),
+        )
+    return TransportTimeoutError(
+        what,
+        remedy=remedy,
         controller=identity,
         request=describe(request),
         raw=held,
@@ -109,14 +116,27 @@ def hung_up(identity: str) -> TransportBrokenError:
     )
 
 
-def unintelligible(identity: str, request: ModbusRequest, raw: bytes) -> RemoteProtocolError:
+def _noise(raw: bytes) -> str:
+    """Return what to do about a 00 before an answer; empty where there is none."""
+    if raw[:1] != b"\0":
+        return ""
+    return tr(
+        "The 00 before the answer is noise of an RS-485 line that nobody drives: fit its bias "
+        "resistors and terminators, or let the adapter switch over later. Else check the baud "
+        "rate and the parity."
+    )
+
+
+def unintelligible(
+    identity: str, request: ModbusRequest, raw: bytes, *, serial: bool
+) -> RemoteProtocolError:
     """Return the error for bytes that are no Modbus."""
+    remedy = tr("Check that this is the PLC's Modbus port.")
+    if serial:
+        remedy = _noise(raw) or tr("Check the baud rate, the parity and the cable.")
     return RemoteProtocolError(
         tr("What {identity} sent is not Modbus.", identity=identity),
-        remedy=tr(
-            "Check that this is the PLC's Modbus port; on a serial line, the baud rate, the "
-            "parity and the cable."
-        ),
+        remedy=remedy,
         controller=identity,
         request=describe(request),
         raw=raw,
@@ -207,7 +227,10 @@ def _remedy(code: int, unit: int) -> str:
             "Check the addresses in the URL (a register printed 40001 is address 0) and the "
             "sizes of the areas in the PLC's Modbus device."
         ),
-        3: tr("Check that the PLC's Modbus device allows this many registers at once."),
+        3: tr(
+            "The PLC's Modbus device may give fewer registers at once: let it allow more, or say "
+            "how many in the URL (most_registers=50)."
+        ),
         6: tr("Wait until the PLC has finished what it does, then try again."),
         _GATEWAY_NO_PATH: tr(
             "The gateway knows no unit {unit}: give another one with unit= in the URL.", unit=unit

@@ -75,6 +75,25 @@ def open_modbus_link(
         url, options, probe=probe, timeout_s=timeout_s, clock=clock, registers_only=own_frames
     )
 
+    if client.most_registers < RESPONSE_WORDS:
+        client.close()
+        raise ConfigError(
+            tr(
+                "A mailbox is read whole, {read} registers, for its checksum; {identity} gives "
+                "{most} in one read.",
+                read=RESPONSE_WORDS,
+                most=client.most_registers,
+                identity=client.identity,
+            ),
+            remedy=tr(
+                "Let the PLC's Modbus device allow {read} registers in one read and {written} in "
+                "one write, or use a map of registers.",
+                read=RESPONSE_WORDS,
+                written=COMMAND_WORDS,
+            ),
+            controller=client.identity,
+        )
+
     def again(timeout_s: float) -> ModbusMailboxLink:
         return open_modbus_link(url, timeout_s=timeout_s, clock=clock)
 

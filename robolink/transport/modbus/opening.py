@@ -10,7 +10,7 @@ from robolink.transport._url import LinkUrl
 from robolink.transport._url_options import UrlOptions
 from robolink.transport.modbus.client import ModbusClient
 from robolink.transport.modbus.framing import Framing
-from robolink.transport.modbus.messages import Area
+from robolink.transport.modbus.messages import MOST_REGISTERS_READ, Area
 from robolink.transport.modbus.register_frames import RegisterRtuFraming, RegisterTcpFraming
 from robolink.transport.modbus.tcp import TcpExchange
 from robolink.transport.stream.dial import dial
@@ -18,6 +18,9 @@ from robolink.transport.stream.tcp import TcpTransport
 
 if TYPE_CHECKING:
     from robolink.transport.stream.serial_port import SerialSettings
+
+MOST_REGISTERS: Final = "most_registers"
+"""Option of a URL: how many registers the server gives in one read."""
 
 TCP_MEDIUM: Final = "modbus-tcp"
 RTU_MEDIUM: Final = "modbus-rtu"
@@ -53,7 +56,8 @@ def open_modbus(
     """Open a client for ``KIND+modbus-tcp://host:502`` or ``KIND+modbus-rtu:///dev/ttyUSB0``.
 
     Args:
-        url: Options are ``unit``; on a serial line also ``baud`` (19200), ``parity`` (even,
+        url: Options are ``unit`` and ``most_registers`` (125: how many the server gives in one
+            read); on a serial line also ``baud`` (19200), ``parity`` (even,
             none or odd), ``stopbits`` (1, or 2 without parity: Modbus over serial line 1.02,
             2.5.1) and ``echo`` (yes when an RS-485 adapter hears itself).
         timeout_s: Longest wait for the connection, and for each answer.
@@ -105,6 +109,7 @@ def _open_tcp(
     url: LinkUrl, options: UrlOptions, framing: Framing, *, timeout_s: float, clock: Clock
 ) -> ModbusClient:
     unit = options.take_int("unit", _DEFAULT_UNITS[TCP_MEDIUM], 0, 255)
+    most = options.take_int(MOST_REGISTERS, MOST_REGISTERS_READ, 4, MOST_REGISTERS_READ)
     options.finish()
     if not url.host or url.path:
         raise ConfigError(
@@ -116,7 +121,14 @@ def _open_tcp(
     transport = TcpTransport(dial(server, timeout_s=timeout_s, deadline=deadline), server, clock)
     identity = _identity(server, unit)
     exchange = TcpExchange(transport, identity, framing)
-    return ModbusClient(transport, exchange, identity=identity, unit=unit, timeout_s=timeout_s)
+    return ModbusClient(
+        transport,
+        exchange,
+        identity=identity,
+        unit=unit,
+        timeout_s=timeout_s,
+        most_registers=most,
+    )
 
 
 def _open_rtu(
@@ -135,6 +147,7 @@ def _open_rtu(
     unit = options.take_int("unit", _DEFAULT_UNITS[RTU_MEDIUM], 1, 247)
     settings = take_settings(options, baud=19_200, parity="even", stop_bits_without_parity="2")
     echo = options.take_choice("echo", "no", _NO_YES)
+    most = options.take_int(MOST_REGISTERS, MOST_REGISTERS_READ, 4, MOST_REGISTERS_READ)
     options.finish()
     timed = settings.baud <= _FASTEST_TIMED_BAUD
     line = RtuLine(
@@ -156,7 +169,14 @@ def _open_rtu(
     except BaseException:
         transport.close()
         raise
-    return ModbusClient(transport, exchange, identity=identity, unit=unit, timeout_s=timeout_s)
+    return ModbusClient(
+        transport,
+        exchange,
+        identity=identity,
+        unit=unit,
+        timeout_s=timeout_s,
+        most_registers=most,
+    )
 
 
 def _identity(url: LinkUrl, unit: int) -> str:

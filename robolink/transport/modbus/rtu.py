@@ -184,7 +184,9 @@ class RtuExchange:
                 try:
                     reply = self._framing.take(self._buffer)
                 except FrameError as error:
-                    raise errors.unintelligible(self._identity, request, error.raw) from error
+                    raise errors.unintelligible(
+                        self._identity, request, error.raw, serial=True
+                    ) from error
                 if reply is not None:
                     return reply
             self._receive(request, deadline)
@@ -199,13 +201,13 @@ class RtuExchange:
 
     def _receive(self, request: ModbusRequest, deadline: Deadline) -> None:
         if deadline.expired:  # also when frames of no request of ours keep coming
-            raise errors.unanswered(self._identity, request, bytes(self._buffer))
+            raise errors.unanswered(self._identity, request, bytes(self._buffer), serial=True)
         try:
             came = self._transport.receive(deadline=deadline)
             self._count(came, request)
             self._buffer += came
         except TransportTimeoutError as error:
             held = bytes(self._buffer)
-            raise errors.unanswered(self._identity, request, held) from error
+            raise errors.unanswered(self._identity, request, held, serial=True) from error
         finally:
             self._quiet_since_ns = self._transport.clock.now_ns()

@@ -63,7 +63,7 @@ class TcpExchange:
             while self._framing.take(self._buffer) is not None:
                 pass
         except FrameError as error:
-            raise errors.unintelligible(self._identity, request, error.raw) from error
+            raise errors.unintelligible(self._identity, request, error.raw, serial=False) from error
         return bool(self._buffer)
 
     def _next(self, request: ModbusRequest, deadline: Deadline) -> ModbusReply:
@@ -71,16 +71,18 @@ class TcpExchange:
             try:
                 reply = self._framing.take(self._buffer) if self._buffer else None
             except FrameError as error:
-                raise errors.unintelligible(self._identity, request, error.raw) from error
+                raise errors.unintelligible(
+                    self._identity, request, error.raw, serial=False
+                ) from error
             if reply is not None:
                 return reply
             if deadline.expired:  # also when frames of no request of ours keep coming
-                raise errors.unanswered(self._identity, request, bytes(self._buffer))
+                raise errors.unanswered(self._identity, request, bytes(self._buffer), serial=False)
             try:
                 self._keep(self._transport.receive(deadline=deadline), request)
             except TransportTimeoutError as error:
                 held = bytes(self._buffer)
-                raise errors.unanswered(self._identity, request, held) from error
+                raise errors.unanswered(self._identity, request, held, serial=False) from error
 
     def _keep(self, data: bytes, request: ModbusRequest) -> None:
         """Take what came; the longest answer is far shorter than what is taken for one request.

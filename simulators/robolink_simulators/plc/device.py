@@ -6,7 +6,7 @@ from math import isfinite
 from typing import Any, Final
 
 from robolink.model import ToolOffset
-from robolink.register_maps import RegisterMap
+from robolink.register_maps import RegisterMap, RegisterTable
 from robolink_simulators.device.hosted import HostedDevice
 from robolink_simulators.device.motion_log import MotionLog
 from robolink_simulators.faults import Departure, FaultAction, FaultPlan
@@ -14,6 +14,7 @@ from robolink_simulators.faults.links import PLC_LINKS
 from robolink_simulators.plc.frames import (
     ILLEGAL_ADDRESS,
     ILLEGAL_FUNCTION,
+    ILLEGAL_VALUE,
     NO_SUCH_UNIT,
     Frames,
     PlcRequest,
@@ -25,6 +26,8 @@ from robolink_simulators.plc.panel import MappedPlcPanel
 from robolink_simulators.plc.program import PlcProgram
 
 MOST_WRITES: Final = 2000
+MOST_REGISTERS_READ: Final = 125
+"""What the standard allows in one read."""
 
 
 class PlcSimulator(HostedDevice):
@@ -45,6 +48,8 @@ class PlcSimulator(HostedDevice):
         unit: The unit identifier; another one is answered with exception 11 over TCP, and not
             at all on a serial line.
         seed: Other tools.
+        most_registers: How many registers it gives in one read; more is refused with exception 3,
+            as servers do that give 61 or 50.
 
     Example:
         >>> from pathlib import Path
@@ -60,8 +65,16 @@ class PlcSimulator(HostedDevice):
 
     kind = "plc"
 
-    def __init__(self, register_map: RegisterMap, *, unit: int = 1, seed: int = 1) -> None:
+    def __init__(
+        self,
+        register_map: RegisterMap,
+        *,
+        unit: int = 1,
+        seed: int = 1,
+        most_registers: int = MOST_REGISTERS_READ,
+    ) -> None:
         super().__init__(seed)
+        self.most_registers = most_registers
         self.register_map = register_map
         self.unit = unit
         self.faults = FaultPlan(seed=seed, links=PLC_LINKS)
@@ -174,6 +187,9 @@ class PlcSimulator(HostedDevice):
             return frames.refusal(request, NO_SUCH_UNIT)
         if request.table is None:
             return frames.refusal(request, ILLEGAL_FUNCTION)
+        words = request.table in (RegisterTable.HOLDING, RegisterTable.INPUT)
+        if words and request.values is None and request.count > self.most_registers:
+            return frames.refusal(request, ILLEGAL_VALUE)
         addresses = range(request.address, request.address + request.count)
         try:
             found = self.program.memory.read(request.table, addresses)

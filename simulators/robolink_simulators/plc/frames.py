@@ -27,6 +27,7 @@ from robolink.register_maps import Number, NumberType, RegisterTable
 
 ILLEGAL_FUNCTION: Final = 1
 ILLEGAL_ADDRESS: Final = 2
+ILLEGAL_VALUE: Final = 3
 NO_SUCH_UNIT: Final = 11
 
 _HEADER: Final = 7

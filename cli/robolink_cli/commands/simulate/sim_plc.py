@@ -42,6 +42,14 @@ from robolink_cli.options.simulation import (
     show_default=True,
     help="The unit identifier that answers; 1 to 247 on a serial line.",
 )
+@click.option(
+    "--most-registers",
+    type=click.IntRange(4, 125),
+    metavar="N",
+    default=125,
+    show_default=True,
+    help="Registers that one read gives; some servers give 61 or 50.",
+)
 @seed_option
 @pace_options
 @faults_option

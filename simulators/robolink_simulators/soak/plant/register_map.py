@@ -245,6 +245,7 @@ class TappedRegisters:
         self.place = client.place
         self.clock = client.clock
         self.close = client.close
+        self.most_registers = client.most_registers
 
     def read_holding(self, address: int, count: int) -> tuple[int, ...]:
         """See :class:`robolink.controllers.plc_map.registers.RegisterClient`."""

@@ -21,6 +21,7 @@ def make_plc(
     map_file: Path,
     unit: int,
     seed: int,
+    most_registers: int,
     faults: Path | None,
     address: str | None,
     serial: str | None,
@@ -34,7 +35,9 @@ def make_plc(
     Raises:
         ConfigError: One of them makes no sense.
     """
-    simulator = PlcSimulator(load_map(map_file), unit=unit, seed=seed)
+    simulator = PlcSimulator(
+        load_map(map_file), unit=unit, seed=seed, most_registers=most_registers
+    )
     served = {LinkKind.PLC_RTU} if serial is not None else set()
     if address is not None or serial is None:
         served |= {LinkKind.PLC_TCP}

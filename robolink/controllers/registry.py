@@ -202,6 +202,11 @@ def connect(
         ready 1
     """
     if not isinstance(url, str):
+        if not hasattr(url, "tools"):
+            raise ConfigError(
+                tr("{given!r} is neither a URL nor a controller.", given=url),
+                remedy=tr("Give a URL such as epson+tcp://192.168.0.1:5000."),
+            )
         return url
     link = parse_url(url)
     terms = ConnectionTerms(

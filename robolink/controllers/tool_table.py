@@ -18,6 +18,7 @@ from typing import ClassVar
 from robolink.controllers.driver_link import DriverLink, MarkedCommand
 from robolink.controllers.markers import MarkerStore
 from robolink.errors import (
+    ConfigError,
     ControllerError,
     ReadBackError,
     RejectedError,
@@ -165,6 +166,8 @@ class ToolTableCore(ABC):
     def write(self, tool: int, offset: ToolOffset, *, expected: Expected) -> ToolReceipt:
         """Write and read back; see :class:`robolink.model.ToolTable`."""
         self.require_writable(tool)
+        _require_offset(offset)
+        _require_expected(expected)
         return self._set(tool, self._storable(tool, offset), expected)
 
     def clear(
@@ -172,6 +175,7 @@ class ToolTableCore(ABC):
     ) -> ToolReceipt:
         """Clear and read back; see :class:`robolink.model.ToolTable`."""
         self.require_writable(tool)
+        _require_expected(expected)
         with self._driver.lock.held(self._clear_request(tool)):
             self._require_clearable(tool)
             if not self._would_lose_selection(tool, expected, then_select):
@@ -184,6 +188,7 @@ class ToolTableCore(ABC):
         Empty when the value is stored already. Reads only; raises what the write would.
         """
         self.require_writable(tool)
+        _require_offset(offset)
         self._require_readable(tool)
         requested = self._storable(tool, offset)
         requests = self._requests(tool, requested)
@@ -295,11 +300,35 @@ class ToolTableCore(ABC):
         return offset
 
     def _require_known(self, tool: int, *, lowest: int = 0) -> None:
-        there = isinstance(tool, int) and not isinstance(tool, bool)
-        if not there or not (tool in self.indices() or tool == lowest == 0):
+        if not isinstance(tool, int) or isinstance(tool, bool):
+            raise ToolIndexError(
+                tr(
+                    "A tool is named by its number, an int, and not by {given!r} ({kind}).",
+                    given=tool,
+                    kind=type(tool).__name__,
+                ),
+                remedy=self._known(lowest),
+            )
+        if not (tool in self.indices() or tool == lowest == 0):
             raise ToolIndexError(
                 tr("There is no tool {tool}.", tool=tool), remedy=self._known(lowest)
             )
+
+
+def _require_offset(offset: object) -> None:
+    if not isinstance(offset, ToolOffset):
+        raise ConfigError(
+            tr("An offset is a ToolOffset, not {given}.", given=type(offset).__name__),
+            remedy=tr("Write ToolOffset(x, y, z, u, v, w), in mm and degrees. Nothing was sent."),
+        )
+
+
+def _require_expected(expected: object) -> None:
+    if expected is not None and expected is not ANY and not isinstance(expected, ToolOffset):
+        raise ConfigError(
+            tr("What is expected is a ToolOffset, None or ANY, not {given}.", given=expected),
+            remedy=tr("Give what read() returned before. Nothing was sent."),
+        )
 
 
 class _Selection(MarkedCommand[int | None]):

@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
+from numbers import Real
 from typing import Final, Literal, Protocol, runtime_checkable
 
 from robolink.errors import ConfigError, ToolChangedError
@@ -24,7 +25,8 @@ _COMPONENTS: Final = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
 class ToolOffset:
     """Where the tip is, seen from the flange (Tool 0).
 
-    Lengths in mm, angles in degrees, ``R = Rz(U) Ry(V) Rx(W)`` as EPSON defines it.
+    Lengths in mm, angles in degrees, ``R = Rz(U) Ry(V) Rx(W)`` as EPSON defines it. Numbers of
+    other libraries, such as numpy's, become floats.
 
     Raises:
         ConfigError: A component is not a finite number.
@@ -42,7 +44,10 @@ class ToolOffset:
         if _NUMBERS.issuperset(map(type, values)) and all(map(math.isfinite, values)):
             return  # nearly always; what is another kind of number is looked at one by one
         for name, value in zip(_COMPONENTS, values, strict=True):
-            if not isinstance(value, (int, float)) or not math.isfinite(value):
+            if isinstance(value, Real) and not isinstance(value, (int, float)):
+                # A number of numpy, say; what is kept and sent is Python's own.
+                object.__setattr__(self, name, float(value))
+            if not isinstance(value, Real) or not math.isfinite(value):
                 raise ConfigError(
                     tr("{name} is not a number: {value!r}.", name=name, value=value),
                     remedy=tr("Give a finite decimal number."),

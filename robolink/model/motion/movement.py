@@ -4,9 +4,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum, StrEnum
+from numbers import Real
 from typing import Protocol
 
-from robolink.errors import LimitError
+from robolink.errors import ConfigError, LimitError
 from robolink.messages import tr
 from robolink.model.motion.geometry import Pose
 from robolink.model.motion.until_input import InputEdge, MotionUntilInput
@@ -121,8 +122,17 @@ class WorkBox:
         """Refuse a target outside the box.
 
         Raises:
+            ConfigError: It is no pose.
             LimitError: Names the axis, the value and the limit.
         """
+        numbers = isinstance(target, Pose) and all(
+            isinstance(value, Real) for value in target.coordinates()
+        )
+        if not numbers:
+            raise ConfigError(
+                tr("A target is a Pose of numbers, not {given!r}.", given=target),
+                remedy=tr("Write Pose(x, y, z, u), in mm and degrees. Nothing moved."),
+            )
         for axis in "xyz":
             value = getattr(target, f"{axis}_mm")
             low, high = getattr(self, f"{axis}_min_mm"), getattr(self, f"{axis}_max_mm")

@@ -3,6 +3,9 @@
 from dataclasses import dataclass
 from enum import Enum, auto
 
+from robolink.errors import ConfigError
+from robolink.messages import tr
+
 
 class FaultAction(Enum):
     """What goes wrong with one exchange."""
@@ -69,7 +72,7 @@ class Fault:
     """One planned fault. It fires once.
 
     Attributes:
-        action: What goes wrong.
+        action: What goes wrong; its name in small letters will do.
         on_exchange: Which of the requests that ``match``, counted from 0.
         match: Text that a request must contain to be counted; empty counts all.
         seconds: A delay in simulated time, where the action has one. With 0 a stop or error
@@ -78,6 +81,9 @@ class Fault:
         position: Index of a byte; ``None`` takes the middle (DISCONNECT: nothing leaves;
             GARBLE: drawn from the plan's seed). Past the end it counts from the front again.
         bit: Which bit of that byte, 0 to 7; ``None`` draws it from the plan's seed.
+
+    Raises:
+        ConfigError: There is no such action.
     """
 
     action: FaultAction
@@ -87,3 +93,16 @@ class Fault:
     code: int = 0
     position: int | None = None
     bit: int | None = None
+
+    def __post_init__(self) -> None:
+        if isinstance(self.action, FaultAction):
+            return
+        named = FaultAction.__members__.get(str(self.action).upper())
+        if named is None:
+            raise ConfigError(
+                tr("There is no fault {action!r}.", action=self.action),
+                remedy=tr(
+                    "These are known: {known}.", known=", ".join(FaultAction.__members__).lower()
+                ),
+            )
+        object.__setattr__(self, "action", named)

@@ -221,6 +221,10 @@ class ControllerCore(ABC):
         """Hold Ctrl-C back for a block that must be seen through."""
         return self._driver.uninterrupted()
 
+    def signs_of_life(self) -> AbstractContextManager[None]:
+        """Let others see within the block that this process is at work; see the model."""
+        return self._driver.signs_of_life.shown()
+
     def preserved(self, reason: str) -> AbstractContextManager[None]:
         """Put back, at the end of the block, the tool and what goes with it; see the model."""
         return self._preserver.preserved(reason)

@@ -16,11 +16,12 @@ move, and a lost answer leaves nothing that the next connection would not set ag
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
-from contextlib import AbstractContextManager
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
 from typing import Generic, TypeVar
 
 from robolink.controllers.markers import MarkerStore, ProcedureLock
+from robolink.controllers.signs_of_life import SignsOfLife
 from robolink.errors import (
     ConfigError,
     ControllerFaultError,
@@ -96,6 +97,7 @@ class DriverLink:
         latch: What holds requests back while a stop is in force.
         markers: The durable markers of what was begun.
         lock: One procedure at a time.
+        signs_of_life: Given while a block is open.
 
     Args:
         identity: Which controller.
@@ -131,7 +133,33 @@ class DriverLink:
         self.latch = latch
         self.markers = MarkerStore(identity, outcomes, latch)
         self.lock = ProcedureLock(identity, latch)
+        self.signs_of_life = SignsOfLife(self._sign_of_life)
         self._gate = gate
+        self._waiting: list[None] = []
+
+    @contextmanager
+    def awaited(self) -> Iterator[None]:
+        """Surround the wait for the end of a movement: it is watched meanwhile."""
+        self._waiting.append(None)
+        try:
+            yield
+        finally:
+            self._waiting.pop()
+
+    @property
+    def waited_on(self) -> bool:
+        """Whether a thread of this process waits for the end of a movement."""
+        return bool(self._waiting)
+
+    def show_life(self) -> None:
+        """Tell the controller that this process is there, if it listens to that; no command."""
+
+    def _sign_of_life(self) -> None:
+        """Give a sign of life, unless a movement was begun here that nobody waits on."""
+        if self.markers.moving and not self.waited_on:
+            return
+        self.markers.beat()
+        self.show_life()
 
     def uninterrupted(self) -> AbstractContextManager[None]:
         """Hold Ctrl-C back over exchanges that belong together; it is raised at their end."""

@@ -258,6 +258,20 @@ class Controller(Protocol):
     def uninterrupted(self) -> AbstractContextManager[None]:
         """Hold Ctrl-C back for a block that must be seen through."""
 
+    def signs_of_life(self) -> AbstractContextManager[None]:
+        """Let others see within the block, once a second, that this process is at work.
+
+        The record and the controller are told, for lease and ownership alone: no command is
+        sent and no movement kept going. While a movement is unfinished on which nobody waits,
+        none is given.
+
+        Example:
+            >>> import robolink
+            >>> with robolink.connect("epson+sim://life-example") as controller:
+            ...     with controller.outcomes.hold("a look"), controller.signs_of_life():
+            ...         tools = controller.tools.read(1)
+        """
+
     def preserved(self, reason: str) -> AbstractContextManager[None]:
         """Put back, at the end of the block, the tool, power and speed in force at its start.
 

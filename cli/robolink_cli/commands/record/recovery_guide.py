@@ -65,7 +65,7 @@ class Guide:
             self._tell_untested()
         if not self._tests:
             return self._settled()
-        with self._controller.outcomes.hold(tr("recover")):
+        with self._controller.outcomes.hold(tr("recover")), self._controller.signs_of_life():
             tests = TurnTests(self._controller)
             done = self._settled(later=tests.operations)
             if not done.left:

@@ -2,6 +2,7 @@
 
 import math
 
+from robolink import ambient
 from robolink.controllers.driver_link import DriverLink
 from robolink.controllers.softmotion.link.commands import CommandSender
 from robolink.controllers.softmotion.link.condition import require_permit
@@ -20,6 +21,7 @@ from robolink.protocols.mailbox import (
     from_frame,
     to_frame,
 )
+from robolink.timing import SteppedClock
 
 TOLERANCE = 1e-9
 """Two LREALs this near are equal: user units, and elements of a rotation matrix
@@ -53,6 +55,17 @@ class Mailbox(DriverLink):
         self.snapshots = snapshots
         self.commands = CommandSender(wire, snapshots)
         super().__init__(wire.identity, wire.clock, wire.latch, outcomes, gate=wire.uninterrupted())
+
+    @property
+    def waited_on(self) -> bool:
+        """Whether a thread of this process waits on a movement or keeps a jog going."""
+        return self.wire.waited_on
+
+    def show_life(self) -> None:
+        """Beat for the ownership alone: nothing while a movement or jog is unfinished."""
+        # Time that only a test lets pass goes on for nobody beside it.
+        if ambient.steps_time() or not isinstance(self.clock, SteppedClock):
+            self.wire.beat_at_rest()
 
     @property
     def unit_um(self) -> float:

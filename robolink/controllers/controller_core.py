@@ -194,6 +194,10 @@ class ControllerCore(ABC):
         """Let this process act again after :meth:`stop`, because a person says so."""
         self.latch.release()
 
+    def take_over(self, reason: str) -> None:
+        """Take the controller over from whoever works on it; see the model."""
+        self.outcomes.take_over(reason)
+
     def require_settled(self, request: str) -> None:
         """Refuse ``request`` while something earlier is unsettled.
 

@@ -153,7 +153,13 @@ class MarkerStore:
         return marker
 
     def clear(self, marker: Marker, *entries: NewEntry) -> None:
-        """Forget a marker whose outcome is known, and journal how it ended."""
+        """Forget a marker whose outcome is known, and journal how it ended.
+
+        Raises:
+            LeaseLostError: Somebody else took over meanwhile, and what becomes of a procedure is
+                for him to say.
+            OutcomeUnknownError: The same of something that was sent: what it left may be changed.
+        """
         self.ledger.ended(marker)
         self._under_way.discard(marker.operation)
         self._moves.discard(marker.operation)
@@ -161,7 +167,15 @@ class MarkerStore:
         if marker.kind in _PROCEDURES:
             self.outcomes.clear(marker.operation, *entries)
         else:
-            cleared = self._recorded(lambda: self.outcomes.clear(marker.operation, *entries))
+            try:
+                cleared = self._recorded(lambda: self.outcomes.clear(marker.operation, *entries))
+            except LeaseLostError as lost:
+                raise OutcomeUnknownError(
+                    lost.what,
+                    remedy=lost.remedy,
+                    controller=self._identity,
+                    request=marker.request,
+                ) from lost
         if cleared or marker.operation in self._unstored:
             self.ledger.recorded(marker)
         known = self._procedures.get(marker.kind)

@@ -10,11 +10,13 @@ from robolink.errors import JournalError, LeaseLostError, OutcomeUnknownError
 from robolink.journal._lease import Lease
 from robolink.journal._naming import Names, Naming
 from robolink.journal._processes import BootClock, LeaseHolder, this_process
+from robolink.journal._runs import forget_client, note_client, run_of
 from robolink.journal._traces import leave_trace, traces_of
 from robolink.messages import tr
 from robolink.model import (
     NO_HISTORY,
     PROOFS,
+    ClientRun,
     EntryKind,
     Marker,
     MarkerKind,
@@ -335,6 +337,21 @@ class JournalOutcomeLog:
                 entries = () if ended is None else (ended,)
                 self._put(tables, name, entries)
             self._lease.look()
+
+    def note_client(self, client: str) -> None:
+        """Note under which token this process owns a mailbox, where the controller outlives it."""
+        if self.durable:
+            operator = self.signature.operator or self._holder.operator
+            note_client(client, replace(self._holder, operator=operator))
+
+    def forget_client(self, client: str) -> None:
+        """Forget a token; see the model."""
+        if self.durable:
+            forget_client(client)
+
+    def run_of(self, client: str) -> ClientRun | None:
+        """Return the run of a token; see the model."""
+        return run_of(client, self._holder) if self.durable else None
 
     @contextmanager
     def _writing(self, consequence: str = "") -> Iterator["Tables"]:

@@ -215,6 +215,19 @@ class Controller(Protocol):
     def motors(self, on: bool) -> None:
         """Switch the motors."""
 
+    def take_over(self, reason: str) -> None:
+        """Take the controller over from whoever works on it, because a person insists.
+
+        The record keeps who insisted and why. The next act of whoever had it is refused: its
+        lease has another epoch, and so has a PLC's mailbox. What it began stays open here.
+
+        Args:
+            reason: Why, in the person's words.
+
+        Raises:
+            ConfigError: It cannot be recorded; nothing was taken.
+        """
+
     def require_settled(self, request: str) -> None:
         """Refuse ``request`` while something earlier is unsettled.
 

@@ -289,10 +289,19 @@ class ToolChange:
         for result in done:
             self._tell(result.sentence)
         self._select_again()
+        refusal = next((result.error for result in done if result.error is not None), None)
+        try:
+            self._record(done)
+        except LeaseLostError as lost:
+            refusal = refusal or lost
         if isinstance(error, RobolinkError):
             sentences = (result.sentence for result in done)
             error.remedy = joined(" ", filter(None, (error.remedy, *sentences)))
-        self._record(done)
+        elif refusal is not None and (error is None or isinstance(error, Exception)):
+            # Whoever leaves the block takes the old values for back.
+            others = (result.sentence for result in done if result.error is None)
+            refusal.remedy = joined(" ", filter(None, (refusal.remedy, *others)))
+            raise refusal from error
 
     def _proved_begun(self) -> Iterator[Step]:
         """Return what was begun, with what was read before each write, not what was believed."""

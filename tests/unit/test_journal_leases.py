@@ -199,7 +199,7 @@ def test_a_person_may_insist_and_the_other_is_told(leases):
     assert "Anna has gone home" in entry.verdict
     assert entry.details["insisted"]["operator"] == "Bert"
     assert entry.details["epoch"] == 2
-    with pytest.raises(LeaseLostError, match="Bert .* took over"):
+    with pytest.raises(LeaseLostError, match=r"Bert .* took over"):
         anna.begin(marker("c"))
     assert [known.operation for known in bert.open_markers()] == ["a", "b"]
 

@@ -1,12 +1,14 @@
 """What every part of this driver works with: one mailbox, its commands and its markers."""
 
 import math
+from collections.abc import Callable
 
 from robolink import ambient
 from robolink.controllers.driver_link import DriverLink
 from robolink.controllers.softmotion.link.commands import CommandSender
 from robolink.controllers.softmotion.link.condition import require_permit
 from robolink.controllers.softmotion.link.device import identity_of
+from robolink.controllers.softmotion.link.ownership import Bystanders
 from robolink.controllers.softmotion.link.snapshots import Snapshots
 from robolink.controllers.softmotion.link.wire import MailboxWire
 from robolink.errors import RemoteProtocolError
@@ -48,12 +50,13 @@ class Mailbox(DriverLink):
         outcomes: OutcomeLog,
         *,
         device_id: int | None,
+        tell: Callable[[str], None] = lambda _sentence: None,
     ) -> None:
         self.wire = wire
         self.device_id = device_id
         outcomes.ask(lambda: identity_of(wire, device_id))
         self.snapshots = snapshots
-        self.commands = CommandSender(wire, snapshots)
+        self.commands = CommandSender(wire, snapshots, Bystanders(outcomes, tell))
         super().__init__(wire.identity, wire.clock, wire.latch, outcomes, gate=wire.uninterrupted())
 
     @property

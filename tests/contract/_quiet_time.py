@@ -5,6 +5,8 @@ from typing import Protocol
 
 from robolink.ambient import Ambience
 
+_EVERY_S = 1.0
+
 
 class Steps(Protocol):
     """A clock that a test can step."""
@@ -28,6 +30,7 @@ class QuietTime(Ambience):
     def __init__(self, clock: Steps) -> None:
         self._clock = clock
         self._acts: dict[object, Callable[[], None]] = {}
+        self._since_s = 0.0
 
     @property
     def going_on(self) -> int:
@@ -35,19 +38,28 @@ class QuietTime(Ambience):
         return len(self._acts)
 
     def regularly(self, every_s: float, act: Callable[[], None], name: str) -> Callable[[], None]:
-        """See :meth:`robolink.ambient.Ambience.regularly`; a second is the step here."""
-        assert every_s == 1.0, name
+        """See :meth:`robolink.ambient.Ambience.regularly`."""
+        assert every_s == _EVERY_S, name
         key = object()
         self._acts[key] = act
-        return lambda: self._acts.pop(key, None) and None
+
+        def end() -> None:
+            del self._acts[key]
+
+        return end
 
     def now_ns(self) -> int:
         """Return the time in nanoseconds."""
         return self._clock.now_ns()
 
     def sleep(self, seconds: float) -> None:
-        """Let some seconds pass, one by one."""
-        for _ in range(round(seconds)):
-            self._clock.advance(1.0)
-            for act in [*self._acts.values()]:
-                act()
+        """Let some seconds pass, and others act once in each."""
+        while seconds > 0:
+            step_s = min(seconds, _EVERY_S - self._since_s)
+            self._clock.advance(step_s)
+            self._since_s += step_s
+            seconds -= step_s
+            if self._since_s >= _EVERY_S:
+                self._since_s = 0.0
+                for act in [*self._acts.values()]:
+                    act()

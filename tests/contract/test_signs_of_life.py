@@ -7,6 +7,8 @@ test lets the time pass, on every link.
 from dataclasses import replace
 
 import pytest
+from robolink_simulators.cell.clock import ManualClock
+from robolink_simulators.epson.device import EpsonSimulator
 
 import robolink
 from robolink.ambient import replaced
@@ -23,6 +25,7 @@ from robolink.model import ANY, EntryKind, Signature, ToolOffset, WorkBox
 from robolink.transaction import ToolChange, Wanted, recover
 from tests.contract._quiet_time import QuietTime
 from tests.contract._softmotion_cell import SLOW, above, served
+from tests.contract.conftest import served as epson_served
 
 OLD, NEW, OTHER = (ToolOffset(12.0, -3.5, z_mm) for z_mm in (-20.0, -20.5, -21.0))
 QUIET_S = 30.0
@@ -66,7 +69,7 @@ def made(backend, folder):
             yield plc
 
 
-@pytest.fixture(params=["sim", "modbus-tcp", "can-multicast"])
+@pytest.fixture(params=["sim", "modbus-tcp", pytest.param("can-multicast", marks=pytest.mark.soak)])
 def plc(request, tmp_path):
     yield from made(request.param, tmp_path)
 
@@ -96,6 +99,30 @@ def test_a_quiet_change_is_not_taken_back_by_a_second_pc(plc):
     assert plc.time.going_on == 0
 
 
+@pytest.mark.parametrize("backend", ["sim", "tcp"])
+def test_the_lease_of_an_epson_controller_is_renewed_while_its_login_is_held(backend, tmp_path):
+    simulator = EpsonSimulator(seed=7)
+    journal, time = open_journal(str(tmp_path / "shared.db")), QuietTime(ManualClock())
+    with epson_served(backend, simulator) as cell, replaced(time):
+        log, others = (
+            journal.log(cell.url, holder=holder, clock=time)
+            for holder in (ANN, replace(ANN, pid=12, process_start=""))
+        )
+        with cell.connect(outcomes=log) as first:
+            before = first.tools.read(1)
+            with changed(first, before=before) as change:
+                change.write()
+                sent = first.exchanges
+                time.sleep(QUIET_S)
+                assert first.exchanges == sent, "the controller was sent something"
+                with pytest.raises(LeaseHeldError, match="Last sign of life: 0 s ago"):
+                    journal.log(
+                        log.identity, holder=replace(ANN, pid=12, process_start=""), clock=time
+                    ).look()
+                change.keep("parts were good")
+        assert others.at_work() == ""
+
+
 def test_a_second_pc_that_shares_only_the_plc_is_refused_by_it(plc):
     with plc.connect(ANN) as first, changed(first) as change:
         change.write()
@@ -103,6 +130,26 @@ def test_a_second_pc_that_shares_only_the_plc_is_refused_by_it(plc):
         with plc.connect(BOB, plc.others) as second, pytest.raises(LeaseHeldError) as told:
             second.tools.write(1, OTHER, expected=NEW)
         assert f"client {plc.cell.owner:08X}" in told.value.what
+        assert plc.held == NEW.z_mm
+        change.keep("parts were good")
+
+
+def test_its_recover_of_what_it_left_itself_is_refused_too(in_process):
+    plc = in_process
+    with plc.connect(BOB, plc.others) as second:
+        left = changed(second, OTHER)
+        left.__enter__().write()
+        left._signs_of_life.close()
+        second._mailbox.wire.close()
+    plc.time.sleep(QUIET_S)
+    with plc.connect(ANN) as first, changed(first, before=OTHER) as change:
+        change.write()
+        plc.time.sleep(QUIET_S)
+        with plc.connect(BOB, plc.others) as second, pytest.raises(RobolinkError) as told:
+            recover(second, confirm=lambda _: True)
+        assert "ann (process 11 on pc-1) has commanded the PLC" in str(told.value) or (
+            f"client {plc.cell.owner:08X}" in str(told.value)
+        )
         assert plc.held == NEW.z_mm
         change.keep("parts were good")
 

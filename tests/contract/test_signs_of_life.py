@@ -134,23 +134,27 @@ def test_a_second_pc_that_shares_only_the_plc_is_refused_by_it(plc):
         change.keep("parts were good")
 
 
-def test_its_recover_of_what_it_left_itself_is_refused_too(in_process):
+def test_its_recover_of_what_it_left_itself_is_refused_too(in_process, tmp_path, monkeypatch):
+    def at(holder):
+        monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / holder.host))
+        return plc.connect(holder, plc.others if holder is BOB else plc.shared)
+
     plc = in_process
-    with plc.connect(BOB, plc.others) as second:
+    with at(BOB) as second:
         left = changed(second, OTHER)
         left.__enter__().write()
         left._signs_of_life.close()
         second._mailbox.wire.close()
     plc.time.sleep(QUIET_S)
-    with plc.connect(ANN) as first, changed(first, before=OTHER) as change:
+    with at(ANN) as first, ToolChange(first, [Wanted(2, NEW, ANY)], verify=True) as change:
         change.write()
         plc.time.sleep(QUIET_S)
-        with plc.connect(BOB, plc.others) as second, pytest.raises(RobolinkError) as told:
+        with at(BOB) as second, pytest.raises(RobolinkError) as told:
             recover(second, confirm=lambda _: True)
         assert "ann (process 11 on pc-1) has commanded the PLC" in str(told.value) or (
             f"client {plc.cell.owner:08X}" in str(told.value)
         )
-        assert plc.held == NEW.z_mm
+        assert plc.held == OTHER.z_mm
         change.keep("parts were good")
 
 

@@ -128,7 +128,21 @@ def waiting_room() -> WaitingRoom:
 
 
 def regularly(every_s: float, act: Callable[[], None], name: str) -> Callable[[], None]:
-    """Have ``act`` called every so many seconds; see :meth:`Ambience.regularly`."""
+    """Have ``act`` called every so many seconds; see :meth:`Ambience.regularly`.
+
+    Args:
+        every_s: How often.
+        act: What is called; it raises nothing.
+        name: Of the thread in which that is done.
+
+    Returns:
+        What ends it.
+
+    Example:
+        >>> from robolink import ambient
+        >>> end = ambient.regularly(60.0, lambda: None, "once a minute")
+        >>> end()
+    """
     return _present.regularly(every_s, act, name)
 
 

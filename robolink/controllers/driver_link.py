@@ -18,6 +18,7 @@ move, and a lost answer leaves nothing that the next connection would not set ag
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
+from functools import cached_property
 from typing import Generic, TypeVar
 
 from robolink.controllers.markers import MarkerStore, ProcedureLock
@@ -97,7 +98,6 @@ class DriverLink:
         latch: What holds requests back while a stop is in force.
         markers: The durable markers of what was begun.
         lock: One procedure at a time.
-        signs_of_life: Given while a block is open.
 
     Args:
         identity: Which controller.
@@ -133,9 +133,13 @@ class DriverLink:
         self.latch = latch
         self.markers = MarkerStore(identity, outcomes, latch)
         self.lock = ProcedureLock(identity, latch)
-        self.signs_of_life = SignsOfLife(self._sign_of_life)
         self._gate = gate
         self._waiting: list[None] = []
+
+    @cached_property
+    def signs_of_life(self) -> SignsOfLife:
+        """Given while a block is open, to the record and to the controller."""
+        return SignsOfLife(self._sign_of_life)
 
     @contextmanager
     def awaited(self) -> Iterator[None]:

@@ -22,7 +22,7 @@ def time():
 
 
 def test_they_are_given_within_a_block_and_never_after_it(time):
-    given = []
+    given: list[object] = []
     signs = SignsOfLife(lambda: given.append(time.now_ns()))
     time.sleep(2)
     with signs.shown():
@@ -32,7 +32,7 @@ def test_they_are_given_within_a_block_and_never_after_it(time):
 
 
 def test_blocks_inside_of_a_block_give_no_more(time):
-    given = []
+    given: list[object] = []
     signs = SignsOfLife(lambda: given.append(None))
     with signs.shown():
         with signs.shown(), signs.shown():
@@ -43,7 +43,7 @@ def test_blocks_inside_of_a_block_give_no_more(time):
 
 
 def test_one_that_cannot_be_given_does_not_hinder_the_next(time):
-    tried = []
+    tried: list[object] = []
 
     def fails():
         tried.append(None)
@@ -55,7 +55,7 @@ def test_one_that_cannot_be_given_does_not_hinder_the_next(time):
 
 
 def test_a_thread_that_ended_in_its_block_gives_none(time):
-    given = []
+    given: list[object] = []
     signs = SignsOfLife(lambda: given.append(None))
     left_open = signs.shown()
     thread = threading.Thread(target=left_open.__enter__)
@@ -67,7 +67,7 @@ def test_a_thread_that_ended_in_its_block_gives_none(time):
 
 
 def test_a_block_of_another_thread_goes_on_when_one_is_left(time):
-    given = []
+    given: list[object] = []
     signs = SignsOfLife(lambda: given.append(None))
     inside, leave = threading.Event(), threading.Event()
 

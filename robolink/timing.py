@@ -5,7 +5,7 @@ monotonic time. Wall time appears in records only, as a label.
 """
 
 from functools import lru_cache
-from typing import TYPE_CHECKING, NamedTuple, Protocol, Self
+from typing import TYPE_CHECKING, NamedTuple, Protocol, Self, runtime_checkable
 
 from robolink import ambient
 
@@ -26,6 +26,14 @@ class Clock(Protocol):
 
     def sleep(self, seconds: float) -> None:
         """Let ``seconds`` of this clock's time pass; zero or less returns at once."""
+
+
+@runtime_checkable
+class SteppedClock(Clock, Protocol):
+    """A clock that stands still until somebody waits on it or moves it."""
+
+    def advance_to(self, now_ns: int) -> None:
+        """Move the time forward to an instant; one that has passed changes nothing."""
 
 
 class SystemClock:

@@ -15,8 +15,10 @@ from robolink.ambient.present import monotonic_ns as monotonic_ns
 from robolink.ambient.present import random_bytes as random_bytes
 from robolink.ambient.present import random_number as random_number
 from robolink.ambient.present import reentrant_lock as reentrant_lock
+from robolink.ambient.present import regularly as regularly
 from robolink.ambient.present import replaced as replaced
 from robolink.ambient.present import sleep as sleep
+from robolink.ambient.present import steps_time as steps_time
 from robolink.ambient.present import waiting_room as waiting_room
 from robolink.ambient.present import wall_s as wall_s
 from robolink.ambient.waiting import WaitingLock as WaitingLock

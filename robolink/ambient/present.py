@@ -3,14 +3,22 @@
 import os
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from robolink.ambient.regularly import in_a_thread
 from robolink.ambient.waiting import WaitingLock, WaitingRoom
 
 
 class Ambience:
-    """The real surroundings; a subclass stands in for them."""
+    """The real surroundings; a subclass stands in for them.
+
+    Attributes:
+        steps_time: Whether time passes here only where it is stepped, so that what is done
+            regularly keeps to the time of clocks that stand still by themselves.
+    """
+
+    steps_time = False
 
     def random_bytes(self, count: int) -> bytes:
         """Return bytes that nobody can know beforehand."""
@@ -44,6 +52,19 @@ class Ambience:
     def waiting_room(self) -> WaitingRoom:
         """Return a new condition variable."""
         return threading.Condition()
+
+    def regularly(self, every_s: float, act: Callable[[], None], name: str) -> Callable[[], None]:
+        """Have ``act`` called every so many seconds, beside what this thread does.
+
+        Args:
+            every_s: How often.
+            act: What is called; it raises nothing.
+            name: Of the thread in which that is done, for whoever looks at a list of them.
+
+        Returns:
+            What ends it; ``act`` is not under way any more when that returns.
+        """
+        return in_a_thread(every_s, act, name)
 
 
 _present = Ambience()
@@ -104,3 +125,27 @@ def reentrant_lock() -> WaitingLock:
 def waiting_room() -> WaitingRoom:
     """Return a new condition variable."""
     return _present.waiting_room()
+
+
+def regularly(every_s: float, act: Callable[[], None], name: str) -> Callable[[], None]:
+    """Have ``act`` called every so many seconds; see :meth:`Ambience.regularly`.
+
+    Args:
+        every_s: How often.
+        act: What is called; it raises nothing.
+        name: Of the thread in which that is done.
+
+    Returns:
+        What ends it.
+
+    Example:
+        >>> from robolink import ambient
+        >>> end = ambient.regularly(60.0, lambda: None, "once a minute")
+        >>> end()
+    """
+    return _present.regularly(every_s, act, name)
+
+
+def steps_time() -> bool:
+    """Tell whether time passes only where it is stepped; see :class:`Ambience`."""
+    return _present.steps_time

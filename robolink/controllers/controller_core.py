@@ -194,6 +194,10 @@ class ControllerCore(ABC):
         """Let this process act again after :meth:`stop`, because a person says so."""
         self.latch.release()
 
+    def take_over(self, reason: str) -> None:
+        """Take the controller over from whoever works on it; see the model."""
+        self.outcomes.take_over(reason)
+
     def require_settled(self, request: str) -> None:
         """Refuse ``request`` while something earlier is unsettled.
 
@@ -220,6 +224,10 @@ class ControllerCore(ABC):
     def uninterrupted(self) -> AbstractContextManager[None]:
         """Hold Ctrl-C back for a block that must be seen through."""
         return self._driver.uninterrupted()
+
+    def signs_of_life(self) -> AbstractContextManager[None]:
+        """Let others see within the block that this process is at work; see the model."""
+        return self._driver.signs_of_life.shown()
 
     def preserved(self, reason: str) -> AbstractContextManager[None]:
         """Put back, at the end of the block, the tool and what goes with it; see the model."""

@@ -16,11 +16,13 @@ move, and a lost answer leaves nothing that the next connection would not set ag
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
-from contextlib import AbstractContextManager
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
+from functools import cached_property
 from typing import Generic, TypeVar
 
 from robolink.controllers.markers import MarkerStore, ProcedureLock
+from robolink.controllers.signs_of_life import SignsOfLife
 from robolink.errors import (
     ConfigError,
     ControllerFaultError,
@@ -132,6 +134,36 @@ class DriverLink:
         self.markers = MarkerStore(identity, outcomes, latch)
         self.lock = ProcedureLock(identity, latch)
         self._gate = gate
+        self._waiting: list[None] = []
+
+    @cached_property
+    def signs_of_life(self) -> SignsOfLife:
+        """Given while a block is open, to the record and to the controller."""
+        return SignsOfLife(self._sign_of_life)
+
+    @contextmanager
+    def awaited(self) -> Iterator[None]:
+        """Surround the wait for the end of a movement: it is watched meanwhile."""
+        self._waiting.append(None)
+        try:
+            yield
+        finally:
+            self._waiting.pop()
+
+    @property
+    def waited_on(self) -> bool:
+        """Whether a thread of this process waits for the end of a movement."""
+        return bool(self._waiting)
+
+    def show_life(self) -> None:
+        """Tell the controller that this process is there, if it listens to that; no command."""
+
+    def _sign_of_life(self) -> None:
+        """Give a sign of life, unless a movement was begun here that nobody waits on."""
+        if self.markers.moving and not self.waited_on:
+            return
+        self.markers.beat()
+        self.show_life()
 
     def uninterrupted(self) -> AbstractContextManager[None]:
         """Hold Ctrl-C back over exchanges that belong together; it is raised at their end."""

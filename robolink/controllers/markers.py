@@ -92,6 +92,7 @@ class MarkerStore:
         self.ledger = Ledger()
         self._procedures: dict[MarkerKind, Marker] = {}
         self._under_way: set[str] = set()
+        self._moves: set[str] = set()
 
     def look(self) -> None:
         """Note the state of the lease before a value is read that a write will rely on.
@@ -104,6 +105,11 @@ class MarkerStore:
     def beat(self) -> None:
         """Let others see that this process is alive."""
         self.outcomes.beat()
+
+    @property
+    def moving(self) -> bool:
+        """Whether a movement was begun here whose end is not proved."""
+        return bool(self._moves)
 
     def begin(
         self,
@@ -140,19 +146,36 @@ class MarkerStore:
             self._unstored.add(name)
         self.ledger.begin(marker)
         self._under_way.add(name)
+        if kind is MarkerKind.MOVE:
+            self._moves.add(name)
         if kind in _PROCEDURES:
             self._procedures[kind] = marker
         return marker
 
     def clear(self, marker: Marker, *entries: NewEntry) -> None:
-        """Forget a marker whose outcome is known, and journal how it ended."""
+        """Forget a marker whose outcome is known, and journal how it ended.
+
+        Raises:
+            LeaseLostError: Somebody else took over meanwhile, and what becomes of a procedure is
+                for him to say.
+            OutcomeUnknownError: The same of something that was sent: what it left may be changed.
+        """
         self.ledger.ended(marker)
         self._under_way.discard(marker.operation)
+        self._moves.discard(marker.operation)
         cleared = True
         if marker.kind in _PROCEDURES:
             self.outcomes.clear(marker.operation, *entries)
         else:
-            cleared = self._recorded(lambda: self.outcomes.clear(marker.operation, *entries))
+            try:
+                cleared = self._recorded(lambda: self.outcomes.clear(marker.operation, *entries))
+            except LeaseLostError as lost:
+                raise OutcomeUnknownError(
+                    lost.what,
+                    remedy=lost.remedy,
+                    controller=self._identity,
+                    request=marker.request,
+                ) from lost
         if cleared or marker.operation in self._unstored:
             self.ledger.recorded(marker)
         known = self._procedures.get(marker.kind)

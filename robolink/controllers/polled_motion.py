@@ -129,7 +129,7 @@ class PolledMotion:
             StoppedError: A stop came, whatever the movement did.
         """
         request = self._marker.request
-        with self._link.latch.ending(request):
+        with self._link.latch.ending(request), self._link.awaited():
             try:
                 arrived = self._arrived_within(timeout_s)
             except KeyboardInterrupt:

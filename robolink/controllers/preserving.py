@@ -74,7 +74,8 @@ class Preserver:
             try:
                 with self._link.uninterrupted():
                     marker = markers.begin(MarkerKind.SELECTION, reason, details)
-                yield
+                with self._link.signs_of_life.shown():
+                    yield
             except BaseException as error:
                 if marker is not None:
                     self._restore_after(error, marker)

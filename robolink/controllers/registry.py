@@ -6,6 +6,7 @@ are found in the entry-point group ``robolink.controllers``, by the full scheme 
 knows the kind: a stop and a look are timed (docs/decisions/0017).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Final, Protocol, cast
@@ -56,6 +57,7 @@ class ConnectionTerms:
         trace: Told of all traffic, where that can be told.
         outcomes: The record to keep; ``None`` for the journal of this user.
         glance: Whether this is for a look only.
+        tell: Told, in sentences, what is waited for.
     """
 
     signature: Signature
@@ -66,6 +68,7 @@ class ConnectionTerms:
     trace: TraceSink | None = None
     outcomes: OutcomeLog | None = None
     glance: bool = False
+    tell: Callable[[str], None] = lambda _sentence: None
 
     def record_of(self, link: OpenLink) -> OutcomeLog:
         """Return the record of what a link leads to; the link is closed when that fails."""
@@ -162,6 +165,7 @@ def connect(
     outcomes: OutcomeLog | None = None,
     signature: Signature | None = None,
     glance: bool = False,
+    tell: Callable[[str], None] = lambda _sentence: None,
 ) -> Controller:
     """Connect to a controller; log in where there is a login.
 
@@ -185,6 +189,8 @@ def connect(
         glance: Whether this is for a look, so that a journal in which nothing is unfinished is
             not opened before something has to be recorded. The controller is not asked for its
             identity then.
+        tell: Told, in sentences, what is waited for: ten seconds at most, until a PLC gives away
+            the mailbox of a run that has ended.
 
     Raises:
         ConfigError: The URL or an option is wrong.
@@ -218,5 +224,6 @@ def connect(
         trace=trace,
         outcomes=outcomes,
         glance=glance,
+        tell=tell,
     )
     return find_opener(link)(link, terms)

@@ -14,7 +14,18 @@ from typing import Any, Final, NamedTuple
 from robolink.errors import ConfigError
 from robolink.journal._opening import open_log
 from robolink.journal._places import default_location, place_of
-from robolink.model import EntryKind, Marker, NewEntry, OutcomeLog, Recorded, Signature, Who
+from robolink.journal._processes import this_process
+from robolink.journal._runs import forget_client, note_client, run_of
+from robolink.model import (
+    ClientRun,
+    EntryKind,
+    Marker,
+    NewEntry,
+    OutcomeLog,
+    Recorded,
+    Signature,
+    Who,
+)
 
 _QUESTION: Final = """
     SELECT
@@ -146,6 +157,18 @@ class GlancingLog:
     def take_over(self, reason: str) -> None:
         """See the model."""
         self._log().take_over(reason)
+
+    def note_client(self, client: str) -> None:
+        """See the model; no journal is opened for that."""
+        note_client(client, this_process(self.signature.operator))
+
+    def forget_client(self, client: str) -> None:
+        """See the model."""
+        forget_client(client)
+
+    def run_of(self, client: str) -> ClientRun | None:
+        """See the model."""
+        return run_of(client, this_process())
 
     def beat(self) -> None:
         """See the model; nobody waits for the sign of one who has begun nothing."""

@@ -8,7 +8,7 @@ nothing. Whether a holder still lives is judged by what is certain first: a proc
 ended is gone; else he counts as silent when his beats stood still for :data:`LEASE_S`.
 """
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
@@ -63,6 +63,7 @@ class Lease:
         self._epoch = 0
         self._beaten_ns = 0
         self._lost = False
+        self._taken = LeaseSighting()  # as it was when its loss was noticed
         self._seen: tuple[LeaseSighting, str] | None = None  # and why its holder may be replaced
 
     @property
@@ -127,13 +128,13 @@ class Lease:
             self._beaten_ns = now_ns
             return Grip(self._epoch)
         if self.held or self._lost or self._seen is None:
-            self._lose()
+            self._lose(rows)
             raise self._lost_error()
         (seen, because), self._seen = self._seen, None
         claim = self._claim(purpose, operator, now_ns)
         epoch = rows.take(self.controller, seen, claim)
         if epoch == 0:
-            now = rows.sight(self.controller)
+            now = self._taken = rows.sight(self.controller)
             raise self._held_error(now) if now.token != FREE else self._lost_error()
         self._beaten_ns = now_ns
         return Grip(epoch, (seen.taken_entry(because),) if because else ())
@@ -153,20 +154,39 @@ class Lease:
             return
         self._beaten_ns = now_ns
         with self._store.write() as tables:
-            kept = tables.leases.renew(self.controller, self._epoch, self._token, now_ns)
-        if not kept:
-            self._lose()
+            if not tables.leases.renew(self.controller, self._epoch, self._token, now_ns):
+                self._lose(tables.leases)
 
-    def release(self, rows: "LeaseRows") -> None:
-        """Free it inside the caller's transaction; one that was lost is left alone."""
+    def release(self, rows: "LeaseRows") -> bool:
+        """Free it inside the caller's transaction; one that was lost is left alone.
+
+        Returns:
+            Whether it was not lost.
+        """
         if self.held:
-            rows.release(self.controller, self._epoch, self._token)
+            return rows.release(self.controller, self._epoch, self._token)
+        return not self._lost
+
+    def prove(self, rows: "LeaseRows", *, last: bool) -> None:
+        """Prove inside the caller's transaction that it was not lost, before an end is recorded.
+
+        Args:
+            rows: Of the transaction.
+            last: Whether it is freed with that.
+
+        Raises:
+            LeaseLostError: Somebody else has taken it, so what was true here need not be now.
+        """
+        kept = self.release(rows) if last else self._renewed(rows)
+        if not kept:
+            self._lose(rows)
+            raise self._lost_error(sent=True)
 
     def forget(self) -> None:
         """Note, after the commit, that it was freed; what was seen before is of no use now."""
         self._epoch, self._seen = 0, None
 
-    def end(self, rows: "LeaseRows", reason: str) -> NewEntry | None:
+    def end(self, rows: "LeaseRows", reason: str, operator: str) -> NewEntry | None:
         """End the lease of whoever has it, inside the caller's transaction.
 
         Returns:
@@ -175,8 +195,9 @@ class Lease:
         seen = rows.sight(self.controller)
         if seen.token == self._token:
             return None
-        rows.end(self.controller)
-        return seen.taken_entry(reason)
+        rows.end(self.controller, self._claim(reason, operator, self._clock.now_ns()))
+        insisting = replace(self._holder, operator=operator or self._holder.operator)
+        return seen.taken_entry(reason, insisting)
 
     def _judged(self, seen: LeaseSighting) -> tuple[LeaseSighting, str]:
         """Return a lease that can be taken, and why if it is another's; or raise LeaseHeldError."""
@@ -219,7 +240,15 @@ class Lease:
             "purpose": storable(purpose),
         }
 
-    def _lose(self) -> None:
+    def _renewed(self, rows: "LeaseRows") -> bool:
+        if self.held:
+            now_ns = self._clock.now_ns()
+            return rows.renew(self.controller, self._epoch, self._token, now_ns)
+        return not self._lost
+
+    def _lose(self, rows: "LeaseRows") -> None:
+        if not self._lost:
+            self._taken = rows.sight(self.controller)
         self._epoch, self._lost = 0, True
 
     def _held_error(self, seen: LeaseSighting) -> LeaseHeldError:
@@ -231,10 +260,20 @@ class Lease:
             sign = tr("while it was watched just now")
         return seen.held_error(self.controller, sign)
 
-    def _lost_error(self) -> LeaseLostError:
+    def _lost_error(self, *, sent: bool = False) -> LeaseLostError:
+        """Return the error that says who took it.
+
+        Args:
+            sent: Whether it is about the end of something that was sent before.
+        """
         return LeaseLostError(
-            tr("Somebody else took over {controller} meanwhile.", controller=self.controller),
+            self._taken.took_over(self.controller),
             remedy=tr(
+                "How this ended here is not on record: what was begun stays open, for whoever "
+                "took over. Read the tools again: 'robolink journal list' shows who did what."
+            )
+            if sent
+            else tr(
                 "Nothing was sent. Read the tool again before you write: 'robolink journal list' "
                 "shows who did what."
             ),

@@ -5,7 +5,9 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, NoReturn
 
 from robolink.errors import JournalError
-from robolink.model import EntryKind, Marker, NewEntry, Recorded, Signature, Who
+from robolink.journal._processes import this_process
+from robolink.journal._runs import forget_client, note_client, run_of
+from robolink.model import ClientRun, EntryKind, Marker, NewEntry, Recorded, Signature, Who
 
 if TYPE_CHECKING:
     from robolink.journal._outcome_log import JournalOutcomeLog
@@ -137,6 +139,18 @@ class LookingLog:
     def take_over(self, reason: str) -> None:  # noqa: ARG002
         """Refuse; see :meth:`begin`."""
         self._refuse()
+
+    def note_client(self, client: str) -> None:
+        """See the model; what needs no journal is noted all the same."""
+        note_client(client, this_process(self.signature.operator))
+
+    def forget_client(self, client: str) -> None:
+        """See the model."""
+        forget_client(client)
+
+    def run_of(self, client: str) -> ClientRun | None:
+        """See the model."""
+        return run_of(client, this_process())
 
     def beat(self) -> None:
         """Nobody sees it."""

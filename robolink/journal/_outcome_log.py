@@ -6,15 +6,17 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 from robolink import ambient
-from robolink.errors import JournalError, OutcomeUnknownError
+from robolink.errors import JournalError, LeaseLostError, OutcomeUnknownError
 from robolink.journal._lease import Lease
 from robolink.journal._naming import Names, Naming
 from robolink.journal._processes import BootClock, LeaseHolder, this_process
+from robolink.journal._runs import forget_client, note_client, run_of
 from robolink.journal._traces import leave_trace, traces_of
 from robolink.messages import tr
 from robolink.model import (
     NO_HISTORY,
     PROOFS,
+    ClientRun,
     EntryKind,
     Marker,
     MarkerKind,
@@ -154,14 +156,17 @@ class JournalOutcomeLog:
 
         Raises:
             JournalError: It is not stored; the marker stays.
-            OutcomeUnknownError: Another has settled it meanwhile, so nothing is recorded: what
-                was true here need not be true any more.
+            LeaseLostError: Another has taken over what was begun here, so nothing is recorded:
+                what was true here need not be true any more.
+            OutcomeUnknownError: Another has settled it meanwhile; nothing is recorded either.
         """
         with self._lock:
             names = self._named()
             last = not self._holds and not self._begun - {operation}
             with self._writing(_left_open()) as tables:
-                if last:
+                if operation in self._begun:
+                    self._proved(tables, operation, last=last)
+                elif last:
                     self._lease.release(tables.leases)
                 known = tables.markers.remove(names.identity, operation)
                 if operation in self._begun and not known:
@@ -170,6 +175,14 @@ class JournalOutcomeLog:
             self._begun.discard(operation)
             if last:
                 self._lease.forget()
+
+    def _proved(self, tables: "Tables", operation: str, *, last: bool) -> None:
+        """Prove that what was begun here still is this log's to end."""
+        try:
+            self._lease.prove(tables.leases, last=last)
+        except LeaseLostError:
+            self._begun.discard(operation)  # it is for whoever took over now
+            raise
 
     def append(self, *entries: NewEntry) -> None:
         """Put something on record, in one durable transaction.
@@ -320,10 +333,25 @@ class JournalOutcomeLog:
         with self._lock:
             name = self._named().record
             with self._writing(_untouched()) as tables:
-                ended = self._lease.end(tables.leases, reason)
+                ended = self._lease.end(tables.leases, reason, self.signature.operator)
                 entries = () if ended is None else (ended,)
                 self._put(tables, name, entries)
             self._lease.look()
+
+    def note_client(self, client: str) -> None:
+        """Note under which token this process owns a mailbox, where the controller outlives it."""
+        if self.durable:
+            operator = self.signature.operator or self._holder.operator
+            note_client(client, replace(self._holder, operator=operator))
+
+    def forget_client(self, client: str) -> None:
+        """Forget a token; see the model."""
+        if self.durable:
+            forget_client(client)
+
+    def run_of(self, client: str) -> ClientRun | None:
+        """Return the run of a token; see the model."""
+        return run_of(client, self._holder) if self.durable else None
 
     @contextmanager
     def _writing(self, consequence: str = "") -> Iterator["Tables"]:

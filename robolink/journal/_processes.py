@@ -41,12 +41,15 @@ class LeaseHolder:
 
         A container has process numbers of its own, so only the same PID namespace counts.
         """
+        _, _, start = other.process_start.partition(" ")
+        return self.can_tell(other) and _has_ended(other.pid, start)
+
+    def can_tell(self, other: "LeaseHolder") -> bool:
+        """Whether this process can see at all whether ``other`` still runs."""
         namespace, _, start = other.process_start.partition(" ")
         if not self.shares_clock_with(other) or not start:
             return False
-        if namespace != self.process_start.partition(" ")[0]:
-            return False
-        return _has_ended(other.pid, start)
+        return namespace == self.process_start.partition(" ")[0]
 
 
 class BootClock:

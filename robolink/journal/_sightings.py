@@ -85,20 +85,47 @@ class LeaseSighting:
         )
         return f"{said} {alive}"
 
-    def taken_entry(self, because: str) -> NewEntry:
+    def took_over(self, controller: str) -> str:
+        """Return the sentence about the holder who has it now, or had it last.
+
+        Args:
+            controller: Whose lease it is.
+        """
+        if self.who() == LeaseHolder():
+            return tr("Somebody else took over {controller} meanwhile.", controller=controller)
+        return tr(
+            "{holder} took over {controller} on {since}: {purpose}.",
+            holder=describe(self.who()),
+            controller=controller,
+            since=local_label(self.taken_at),
+            purpose=self.purpose,
+        )
+
+    def taken_entry(self, because: str, insisting: LeaseHolder | None = None) -> NewEntry:
         """Return what is put on record when this lease was ended by another.
 
         Args:
             because: Why that could be done, in words.
+            insisting: The person who had it ended, whoever held it; ``None`` where nobody
+                had to insist.
         """
         if self.token == FREE:
             verdict = tr("Nobody worked on this cell; {because}.", because=because)
         else:
             holder = describe(self.who())
-            verdict = tr(
-                "{holder} was at work on this controller before: {because}.",
-                holder=holder,
-                because=because,
+            verdict = (
+                tr(
+                    "{holder} was at work on this controller before: {because}.",
+                    holder=holder,
+                    because=because,
+                )
+                if insisting is None
+                else tr(
+                    "{insisting} insisted on taking this controller over from {holder}: {because}.",
+                    insisting=describe(insisting),
+                    holder=holder,
+                    because=because,
+                )
             )
         details = {
             "epoch": self.epoch + 1,
@@ -106,6 +133,7 @@ class LeaseSighting:
             "since": self.taken_at,
             "purpose": self.purpose,
             "reason": because,
+            **({} if insisting is None else {"insisted": asdict(insisting)}),
         }
         return NewEntry(EntryKind.LEASE, verdict=verdict, details=details)
 

@@ -101,6 +101,7 @@ if TYPE_CHECKING:
     from robolink.model.record.method_names import finding_named_now as finding_named_now
     from robolink.model.record.method_names import method_name_now as method_name_now
     from robolink.model.record.method_names import with_method_name_now as with_method_name_now
+    from robolink.model.record.outcomes import ClientRun as ClientRun
     from robolink.model.record.outcomes import Marker as Marker
     from robolink.model.record.outcomes import MarkerKind as MarkerKind
     from robolink.model.record.outcomes import OutcomeLog as OutcomeLog
@@ -132,7 +133,7 @@ else:
                 "AlarmList DigitalIo PointReader Value ValueReceipt ValueT VariableTable"
             ),
             "record.method_names": "finding_named_now method_name_now with_method_name_now",
-            "record.outcomes": "Marker MarkerKind OutcomeLog new_operation",
+            "record.outcomes": "ClientRun Marker MarkerKind OutcomeLog new_operation",
             "_people": "PersonRole require_engineer",
             "_secret": "Secret",
             "record.standing_words": "describe_standing",

@@ -215,6 +215,19 @@ class Controller(Protocol):
     def motors(self, on: bool) -> None:
         """Switch the motors."""
 
+    def take_over(self, reason: str) -> None:
+        """Take the controller over from whoever works on it, because a person insists.
+
+        The record keeps who insisted and why. The next act of whoever had it is refused: its
+        lease has another epoch, and so has a PLC's mailbox. What it began stays open here.
+
+        Args:
+            reason: Why, in the person's words.
+
+        Raises:
+            ConfigError: It cannot be recorded; nothing was taken.
+        """
+
     def require_settled(self, request: str) -> None:
         """Refuse ``request`` while something earlier is unsettled.
 
@@ -257,6 +270,20 @@ class Controller(Protocol):
 
     def uninterrupted(self) -> AbstractContextManager[None]:
         """Hold Ctrl-C back for a block that must be seen through."""
+
+    def signs_of_life(self) -> AbstractContextManager[None]:
+        """Let others see within the block, once a second, that this process is at work.
+
+        The record and the controller are told, for lease and ownership alone: no command is
+        sent and no movement kept going. While a movement is unfinished on which nobody waits,
+        none is given.
+
+        Example:
+            >>> import robolink
+            >>> with robolink.connect("epson+sim://life-example") as controller:
+            ...     with controller.outcomes.hold("a look"), controller.signs_of_life():
+            ...         tools = controller.tools.read(1)
+        """
 
     def preserved(self, reason: str) -> AbstractContextManager[None]:
         """Put back, at the end of the block, the tool, power and speed in force at its start.

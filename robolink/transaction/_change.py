@@ -7,7 +7,7 @@ until :meth:`ToolChange.keep`; whatever ends it earlier puts the old values back
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import replace
 from types import TracebackType
 from typing import Self
@@ -101,6 +101,7 @@ class ToolChange:
         self._spoiled: int | None = None
         self._selected: int | None = None
         self._account: Account | None = None
+        self._signs_of_life = ExitStack()
         self.kept = False
 
     def __enter__(self) -> Self:
@@ -121,6 +122,7 @@ class ToolChange:
                 with self._controller.uninterrupted():
                     self._take_back(error)
         finally:
+            self._signs_of_life.close()
             if self._own_id:
                 self._controller.outcomes.change = ""
             self._settle_account(error)
@@ -161,6 +163,7 @@ class ToolChange:
                 details["selected"] = self._selected
             with self._controller.uninterrupted():
                 self._marker = self._controller.begin(MarkerKind.CHANGE, self.request, details)
+                self._signs_of_life.enter_context(self._controller.signs_of_life())
         for wanted, step in zip(self._wanted, steps, strict=True):
             self._receipts += (self._write(wanted, step),)
         return self._receipts
@@ -286,10 +289,19 @@ class ToolChange:
         for result in done:
             self._tell(result.sentence)
         self._select_again()
+        refusal = next((result.error for result in done if result.error is not None), None)
+        try:
+            self._record(done)
+        except LeaseLostError as lost:
+            refusal = refusal or lost
         if isinstance(error, RobolinkError):
             sentences = (result.sentence for result in done)
             error.remedy = joined(" ", filter(None, (error.remedy, *sentences)))
-        self._record(done)
+        elif refusal is not None and (error is None or isinstance(error, Exception)):
+            # Whoever leaves the block takes the old values for back.
+            others = (result.sentence for result in done if result.error is None)
+            refusal.remedy = joined(" ", filter(None, (refusal.remedy, *others)))
+            raise refusal from error
 
     def _proved_begun(self) -> Iterator[Step]:
         """Return what was begun, with what was read before each write, not what was believed."""

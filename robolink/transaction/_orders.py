@@ -167,7 +167,7 @@ def carrying_out(controller: Controller, order: str, job: Mapping[str, object]) 
     require_order_id(order)
     outcomes, purpose = controller.outcomes, tr("order {order}", order=order)
     plain = json.loads(json.dumps(job))
-    with outcomes.hold(purpose):
+    with outcomes.hold(purpose), controller.signs_of_life():
         entry = _found(outcomes, order)
         if entry is not None:
             done = _done(controller, order, plain, entry)

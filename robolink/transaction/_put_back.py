@@ -43,6 +43,7 @@ class PutBack:
         written: Whether a write was needed for that.
         sentence: The same for a person.
         entry: The same for the journal.
+        error: What kept the old value from being written back, ``None`` for nothing.
     """
 
     tool: int
@@ -50,6 +51,7 @@ class PutBack:
     written: bool
     sentence: str
     entry: NewEntry
+    error: RobolinkError | None = None
 
 
 def put_back(
@@ -134,7 +136,7 @@ def _failed(step: Step, error: RobolinkError) -> PutBack:
     )
     kind = EntryKind.CONFLICT if isinstance(error, ReadBackError) else EntryKind.UNKNOWN
     entry = _entry(kind, step, None, sentence)
-    return PutBack(step.tool, restored=False, written=False, sentence=sentence, entry=entry)
+    return PutBack(step.tool, False, False, sentence, entry, error)
 
 
 def _entry(kind: EntryKind, step: Step, now: ToolOffset | None, sentence: str) -> NewEntry:

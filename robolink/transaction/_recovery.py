@@ -69,7 +69,7 @@ def recover(
         ...     print(recover(controller).left)
         ()
     """
-    with controller.outcomes.hold(tr("recover")):
+    with controller.outcomes.hold(tr("recover")), controller.signs_of_life():
         markers = [
             marker
             for marker in _in_order(controller.outcomes.open_markers())

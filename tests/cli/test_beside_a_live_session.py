@@ -64,7 +64,10 @@ def test_it_is_told_who_is_at_work_and_never_to_recover(plc, run):
         assert "recover' puts" not in err
 
 
-@pytest.mark.parametrize("command", [["recover"], ["jog", "x+1", "--yes"]])
+@pytest.mark.parametrize(
+    "command",
+    [["recover"], ["recover", "--yes"], ["recover", "--forget", "--yes"], ["jog", "x+1", "--yes"]],
+)
 def test_what_would_interfere_is_refused_with_the_holder_s_name(plc, run, command):
     session(plc)
     code, err = run("-c", plc, *command)

@@ -5,6 +5,7 @@ import pytest
 from robolink.errors import JournalError, LeaseHeldError, LeaseLostError
 from robolink.journal._lease import BEAT_S
 from robolink.journal._sightings import LEASE_S
+from robolink.model import EntryKind, NewEntry
 from tests.unit._lease_logs import ANNA, BERT, HERE, IDENTITY, leases_in_memory, marker
 
 
@@ -117,17 +118,24 @@ def test_who_lost_the_lease_stays_out_while_what_it_began_is_open(leases):
             anna.begin(marker("c"))
         with pytest.raises(LeaseLostError):
             anna.look()
-    anna.clear("a")
+    with pytest.raises(LeaseLostError):
+        anna.clear("a")
     anna.look()
     anna.begin(marker("c"))
+    assert [known.operation for known in anna.open_markers()] == ["a", "c"]
 
 
-def test_clearing_after_the_lease_was_lost_does_not_free_the_other_s(leases):
+def test_an_end_after_the_lease_was_lost_is_not_recorded_and_frees_nothing(leases):
     anna, bert = leases.log(ANNA), leases.log(BERT)
     anna.begin(marker("a"))
     leases.clock.advance(LEASE_S)
     bert.begin(marker("b"))
-    anna.clear("a")
+    with pytest.raises(LeaseLostError) as refused:
+        anna.clear("a", NewEntry(EntryKind.DONE, tool=3))
+    assert f"Bert (bert, process {HERE.pid} on {HERE.host}) took over" in refused.value.what
+    assert "not on record" in refused.value.remedy
+    assert list(leases.journal.entries(kinds=(EntryKind.DONE,))) == []
+    assert [known.operation for known in bert.open_markers()] == ["a", "b"]
     with pytest.raises(LeaseHeldError, match="Bert"):
         anna.look()
 
@@ -187,11 +195,25 @@ def test_a_person_may_insist_and_the_other_is_told(leases):
     bert.begin(marker("b"))
     (entry,) = leases.entries()
     assert entry.details["holder"]["operator"] == "Anna"
+    assert entry.verdict.startswith("Bert (bert, process")
     assert "Anna has gone home" in entry.verdict
+    assert entry.details["insisted"]["operator"] == "Bert"
     assert entry.details["epoch"] == 2
-    with pytest.raises(LeaseLostError):
+    with pytest.raises(LeaseLostError, match=r"Bert .* took over"):
         anna.begin(marker("c"))
     assert [known.operation for known in bert.open_markers()] == ["a", "b"]
+
+
+def test_who_lost_the_lease_is_told_who_insisted_before_anything_else_was_done(leases):
+    anna, bert = leases.log(ANNA), leases.log(BERT)
+    anna.begin(marker("a"))
+    bert.take_over("Anna has gone home")
+    leases.clock.advance(BEAT_S)
+    anna.beat()
+    with pytest.raises(LeaseLostError) as refused:
+        anna.look()
+    assert "Bert (bert" in refused.value.what
+    assert "Anna has gone home" in refused.value.what
 
 
 def test_insisting_on_one_s_own_lease_changes_nothing(leases):

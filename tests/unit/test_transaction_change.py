@@ -6,6 +6,7 @@ from robolink_simulators.faults import Fault, FaultAction
 from robolink.errors import (
     ControllerFaultError,
     JournalError,
+    LeaseLostError,
     NotAllowedError,
     OutcomeUnknownError,
     ReadBackError,
@@ -191,7 +192,7 @@ def test_a_link_that_is_gone_leaves_the_change_to_recover(cell):
 
 def test_a_change_that_another_recovered_meanwhile_is_neither_kept_nor_taken_back(cell):
     with cell.connected() as controller:
-        with pytest.raises(OutcomeUnknownError, match="Somebody else has settled"):
+        with pytest.raises(LeaseLostError, match=r"Bob .* took over"):
             with ToolChange(controller, wanted(1), verify=True) as change:
                 change.write()
                 # He is silent for so long that another may do his work.

@@ -81,6 +81,7 @@ def open_controller(
             trace=trace,
             signature=signature,
             glance=unhindered,
+            tell=note,
         ) as controller,
         nullcontext() if calms else controller.latch.ending(tr("The command")),
     ):

@@ -1,5 +1,6 @@
 """An axis group of a CODESYS SoftMotion PLC behind its mailbox, and meeting one."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Final
@@ -20,7 +21,7 @@ from robolink.controllers.softmotion.motion.group import SoftMotionGroup
 from robolink.controllers.softmotion.tools.orientation_images import OrientationImages
 from robolink.controllers.softmotion.tools.resolve import SoftMotionResolver
 from robolink.controllers.softmotion.tools.table import SoftMotionToolTable
-from robolink.errors import ConfigError, ControllerFaultError
+from robolink.errors import ConfigError, ControllerFaultError, LeaseHeldError
 from robolink.messages import tr
 from robolink.model import (
     Act,
@@ -28,7 +29,9 @@ from robolink.model import (
     Controller,
     ControllerFacts,
     ControllerStatus,
+    EntryKind,
     MarkerKind,
+    NewEntry,
     OutcomeLog,
     is_custom,
 )
@@ -155,16 +158,39 @@ class SoftMotionController(ControllerCore):
         """Return what :meth:`take` would send, in words."""
         return describe(take_command(insist=insist))
 
-    def take(self, *, insist: bool = False) -> None:
+    def take(self, *, insist: bool = False, patient: bool = True) -> None:
         """Take the mailbox now, before the first command that needs it.
 
         Args:
             insist: A person who sees the cell wants it, whoever owns it now.
+            patient: Whether the ten seconds of a run that has ended are waited for.
 
         Raises:
             LeaseHeldError: Another client owns it.
         """
-        self._mailbox.commands.ownership.take(insist=insist)
+        self._mailbox.commands.ownership.take(insist=insist, patient=patient)
+
+    def take_over(self, reason: str) -> None:
+        """Take record and mailbox over because a person insists; see the model.
+
+        What the owner of the mailbox has under way is ended by the PLC in that cycle.
+        """
+        super().take_over(reason)
+        try:
+            self.take(patient=False)
+        except LeaseHeldError as held:
+            self.outcomes.append(
+                NewEntry(
+                    EntryKind.LEASE,
+                    verdict=tr(
+                        "the mailbox was taken from client {holder}: {reason}",
+                        holder=held.holder,
+                        reason=reason,
+                    ),
+                    details={"taken_from": held.holder, "reason": reason},
+                )
+            )
+            self.take(insist=True)
 
     def reset_fault(self) -> None:
         """Clear the group's error and release a held stop, because a person asked for it.
@@ -270,6 +296,7 @@ def open_softmotion_url(url: LinkUrl, terms: ConnectionTerms, /) -> Controller:
         outcomes=terms.record_of(link),
         timeout_s=terms.timeout_s,
         kinematics=kinematics,
+        tell=terms.tell,
     )
 
 
@@ -295,6 +322,7 @@ def open_softmotion(
     timeout_s: float = 3.0,
     owner: int = 0,
     kinematics: str | tuple[object, ...] = (),
+    tell: Callable[[str], None] = lambda _sentence: None,
 ) -> SoftMotionController:
     """Meet the mailbox and return the controller; the link is closed when that fails.
 
@@ -307,6 +335,7 @@ def open_softmotion(
         owner: This client's token; by default one that nobody else has.
         kinematics: The machine builder's own, as ``module:Class`` or as objects, so that a tool
             that it cannot carry is refused before it is written (docs/custom-kinematics.md).
+        tell: Told, in sentences, what is waited for.
 
     Raises:
         ConnectError: The mailbox program does not run.
@@ -327,7 +356,7 @@ def open_softmotion(
         snapshots = Snapshots(wire)
         snapshots.meet()
         device_id = read_device_id(wire)
-        mailbox = Mailbox(wire, snapshots, outcomes, device_id=device_id)
+        mailbox = Mailbox(wire, snapshots, outcomes, device_id=device_id, tell=tell)
         return SoftMotionController(mailbox, OrientationImages(kinematics))
     except BaseException:
         wire.close()

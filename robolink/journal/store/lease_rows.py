@@ -31,7 +31,9 @@ _TAKE: Final = Prepared(
     .where(*_OURS, LEASES.c.beat == bindparam("of_beat"))
     .values(epoch=LEASES.c.epoch + 1, **_CLAIM)
 )
-_END: Final = Prepared(update(LEASES).where(_OF).values(epoch=LEASES.c.epoch + 1, token=FREE))
+_END: Final = Prepared(
+    update(LEASES).where(_OF).values(epoch=LEASES.c.epoch + 1, **{**_CLAIM, "token": FREE})
+)
 _INSERT: Final = Prepared(insert(LEASES), UNLESS_THERE)
 
 
@@ -51,9 +53,9 @@ class LeaseRows:
         values = {**_own(controller, epoch, token), "now_ns": now_ns}
         return self._runner.run(_RENEW, values) == 1
 
-    def release(self, controller: str, epoch: int, token: str) -> None:
-        """Free the lease; one that was lost is left alone."""
-        self._runner.run(_RELEASE, _own(controller, epoch, token))
+    def release(self, controller: str, epoch: int, token: str) -> bool:
+        """Free the lease; return whether it was this holder's, and leave it alone if not."""
+        return self._runner.run(_RELEASE, _own(controller, epoch, token)) == 1
 
     def take(self, controller: str, seen: LeaseSighting, claim: Mapping[str, object]) -> int:
         """Take the lease if it still is as it was seen.
@@ -67,9 +69,10 @@ class LeaseRows:
         values = {**_own(controller, seen.epoch, seen.token), "of_beat": seen.beat, **claim}
         return seen.epoch + 1 if self._runner.run(_TAKE, values) else 0
 
-    def end(self, controller: str) -> None:
-        """Free the lease whoever holds it, so that he notices."""
-        self._runner.run(_END, {"of_controller": storable(controller)})
+    def end(self, controller: str, claim: Mapping[str, object]) -> None:
+        """Free the lease whoever holds it, so that he notices, and note who did that and why."""
+        values = {name: value for name, value in claim.items() if name != "token"}
+        self._runner.run(_END, {"of_controller": storable(controller), **values})
 
 
 def _own(controller: str, epoch: int, token: str) -> dict[str, object]:

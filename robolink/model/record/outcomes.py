@@ -49,6 +49,21 @@ class Marker:
     details: Mapping[str, object] = field(default_factory=dict)
 
 
+@dataclass(frozen=True, slots=True)
+class ClientRun:
+    """A run of robolink that took a controller under a token.
+
+    Attributes:
+        who: Person, process and computer, as a person is told.
+        since: When it asked, a wall-clock label.
+        lives: Whether its process still runs; ``None`` where that cannot be seen from here.
+    """
+
+    who: str
+    since: str
+    lives: bool | None
+
+
 class OutcomeLog(Protocol):
     """Keeps the markers of one controller, beyond the life of the process where it can.
 
@@ -155,6 +170,18 @@ class OutcomeLog(Protocol):
         Raises:
             ConfigError: It cannot be recorded.
         """
+
+    def note_client(self, client: str) -> None:
+        """Note, before a controller is asked for its ownership, under which token that is done.
+
+        It raises nothing: it only helps whoever meets the token later.
+        """
+
+    def forget_client(self, client: str) -> None:
+        """Forget the token again: nothing is owned under it any more."""
+
+    def run_of(self, client: str) -> ClientRun | None:
+        """Return the run that noted a token, ``None`` for a token that nobody noted."""
 
     def beat(self) -> None:
         """Let others see that this process is alive; cheap, and raises nothing."""

@@ -1,6 +1,7 @@
 """Chance, times and locks of a history: all from its seed and its virtual clock."""
 
 import random
+from collections.abc import Callable
 from typing import Final
 
 from robolink.ambient import Ambience, WaitingLock, WaitingRoom
@@ -15,6 +16,8 @@ _FIRST_DAY_S: Final = 1_767_603_600.0
 class SeededSurroundings(Ambience):
     """What a cell's computers draw and see, in place of the real world.
 
+    Time passes where it is stepped, and for everybody.
+
     Args:
         clock: The virtual time.
         turns: Decides who goes on at a lock.
@@ -25,6 +28,8 @@ class SeededSurroundings(Ambience):
         booted_ns: When the computer was switched on, in virtual time.
         rng: From which everything is drawn; replaced for each hour, whose draws are its own.
     """
+
+    steps_time = True
 
     def __init__(self, clock: ManualClock, turns: TurnTaking, rng: random.Random) -> None:
         self.rng = rng
@@ -61,6 +66,27 @@ class SeededSurroundings(Ambience):
     def reentrant_lock(self) -> WaitingLock:
         """Return one that its holder may take again."""
         return SteppedLock(self._turns, reentrant=True)
+
+    def regularly(self, every_s: float, act: Callable[[], None], name: str) -> Callable[[], None]:
+        """Have ``act`` called by a thread of the same process, in virtual time."""
+        room, ending = SteppedRoom(self._turns), [False]
+
+        def run() -> None:
+            while True:
+                with room:
+                    if ending[0] or room.wait_for(lambda: ending[0], every_s):
+                        return
+                act()
+
+        thread = self._turns.start(name, self._turns.current.owner, run, favoured=False)
+
+        def end() -> None:
+            with room:
+                ending[0] = True
+                room.notify_all()
+            self._turns.wait_until(lambda: thread.over)
+
+        return end
 
     def waiting_room(self) -> WaitingRoom:
         """Return a condition variable in virtual time."""

@@ -115,8 +115,16 @@ class TurnTaking:
         """Whether there is no other thread."""
         return len(self._threads) == 1
 
-    def start(self, name: str, owner: Mortal | None, work: Callable[[], None]) -> SteppedThread:
+    def start(
+        self, name: str, owner: Mortal | None, work: Callable[[], None], *, favoured: bool = True
+    ) -> SteppedThread:
         """Begin another thread; it runs when its turn comes.
+
+        Args:
+            name: Of the thread, in the event log.
+            owner: The process it belongs to.
+            work: What it does.
+            favoured: Whether it may be favoured, as below; not one that does something regularly.
 
         Mostly it is favoured, or whoever began it: then the other one stands still at one point
         for as long as that can go on, which a fair draw at each point never shows. At times the
@@ -138,6 +146,12 @@ class TurnTaking:
                 self._end(thread)
 
         self._threads.append(thread)
+        if favoured:
+            self._favour(thread)
+        threading.Thread(target=run, name=f"soak {name}", daemon=True).start()
+        return thread
+
+    def _favour(self, thread: SteppedThread) -> None:
         me = self.current
         self._favoured = self.rng.choice((thread, thread, thread, thread, me, None))
         self._favour_left = (
@@ -146,8 +160,6 @@ class TurnTaking:
         changes = self._favoured is thread and self.rng.random() < _CHANGES_SHARE
         self._then = me if changes else None
         self._exchanges_left = self.rng.choice(_CHANGES)
-        threading.Thread(target=run, name=f"soak {name}", daemon=True).start()
-        return thread
 
     def pass_on(self, *, exchanged: bool = False) -> None:
         """Let the seed say who goes on: this thread, or another one.

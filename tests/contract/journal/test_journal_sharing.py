@@ -48,7 +48,8 @@ def test_the_lease_goes_from_one_process_to_the_next_and_fences(location, journa
     with pytest.raises(LeaseLostError):
         first.begin(marker("c"))
     second.clear("b")
-    first.clear("a")
+    with pytest.raises(LeaseLostError):
+        first.clear("a")
     first.look()
     first.take_over("to be sure")
     first.begin(marker("c"))

@@ -52,7 +52,8 @@ from robolink_cli.views.documents import finding_payload
     "--take-over",
     metavar="REASON",
     help=(
-        "Take this controller over from whoever is on record as working on it; the reason is kept."
+        "Take this controller over from whoever works on it, a PLC's mailbox too: what moves is "
+        "halted, and the other is refused from then on. Your name and the reason are kept."
     ),
 )
 def recover(
@@ -82,7 +83,7 @@ def recover(
         at = context_at_desk(context, declared("Recover"))
         with open_controller(at, quiet=True, changes=not dry_run) as controller:
             if take_over is not None and not dry_run:
-                controller.outcomes.take_over(take_over)
+                controller.take_over(take_over)
             word = choose or (None if forget else chosen_at_desk(controller))
             guide = Guide(
                 controller,

@@ -65,7 +65,7 @@ class Guide:
             self._tell_untested()
         if not self._tests:
             return self._settled()
-        with self._controller.outcomes.hold(tr("recover")):
+        with self._controller.outcomes.hold(tr("recover")), self._controller.signs_of_life():
             tests = TurnTests(self._controller)
             done = self._settled(later=tests.operations)
             if not done.left:
@@ -112,9 +112,11 @@ class Guide:
         """Forget everything that is open on a person's word; return how much that was.
 
         Raises:
+            BusyError: Somebody else is changing this controller just now.
             DeclinedError: The answer was no.
         """
         markers = self._controller.outcomes.open_markers()
+        self._controller.outcomes.look()
         agree(
             tr(
                 "Unblock the robot WITHOUT a check? Unfinished jobs that are dropped: {count}.",
@@ -124,8 +126,9 @@ class Guide:
         )
         if not dry_run:
             settler = Settler(self._controller)
-            for marker in markers:
-                settler.forget(marker)
+            with self._controller.outcomes.hold(tr("recover")):
+                for marker in markers:
+                    settler.forget(marker)
         return len(markers)
 
     def payload(self, done: Recovery) -> dict[str, object]:

@@ -56,7 +56,7 @@ class EpsonMotion:
         Raises:
             StoppedError: A stop came, whatever the movement did.
         """
-        with self._link.latch.ending(self.statement):
+        with self._link.latch.ending(self.statement), self._link.awaited():
             return self._awaited(timeout_s)
 
     def _awaited(self, timeout_s: float) -> MotionOutcome:

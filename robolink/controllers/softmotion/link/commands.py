@@ -24,7 +24,7 @@ from robolink.controllers.softmotion.link.answers import (
     refused,
 )
 from robolink.controllers.softmotion.link.motion_tracking import has_ended
-from robolink.controllers.softmotion.link.ownership import Ownership
+from robolink.controllers.softmotion.link.ownership import Bystanders, Ownership
 from robolink.controllers.softmotion.link.snapshots import Snapshots
 from robolink.controllers.softmotion.link.wire import MailboxWire
 from robolink.errors import (
@@ -89,14 +89,21 @@ class CommandSender:
 
     Attributes:
         ownership: Of the mailbox; taken by the first command that needs it.
+
+    Args:
+        wire: The session.
+        snapshots: Reads.
+        bystanders: Who has to do with the ownership besides the PLC.
     """
 
-    def __init__(self, wire: MailboxWire, snapshots: Snapshots) -> None:
+    def __init__(
+        self, wire: MailboxWire, snapshots: Snapshots, bystanders: Bystanders | None = None
+    ) -> None:
         self._wire = wire
         self._snapshots = snapshots
         self._lock = ambient.reentrant_lock()
         self._last = 0
-        self.ownership = Ownership(wire, self._to_end)
+        self.ownership = Ownership(wire, self._to_end, bystanders or Bystanders())
 
     def carry_out(self, draft: Command) -> Response:
         """Send a command that is no movement and return the snapshot that shows its end.

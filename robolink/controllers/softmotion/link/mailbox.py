@@ -1,11 +1,14 @@
 """What every part of this driver works with: one mailbox, its commands and its markers."""
 
 import math
+from collections.abc import Callable
 
+from robolink import ambient
 from robolink.controllers.driver_link import DriverLink
 from robolink.controllers.softmotion.link.commands import CommandSender
 from robolink.controllers.softmotion.link.condition import require_permit
 from robolink.controllers.softmotion.link.device import identity_of
+from robolink.controllers.softmotion.link.ownership import Bystanders
 from robolink.controllers.softmotion.link.snapshots import Snapshots
 from robolink.controllers.softmotion.link.wire import MailboxWire
 from robolink.errors import RemoteProtocolError
@@ -20,6 +23,7 @@ from robolink.protocols.mailbox import (
     from_frame,
     to_frame,
 )
+from robolink.timing import SteppedClock
 
 TOLERANCE = 1e-9
 """Two LREALs this near are equal: user units, and elements of a rotation matrix
@@ -46,13 +50,25 @@ class Mailbox(DriverLink):
         outcomes: OutcomeLog,
         *,
         device_id: int | None,
+        tell: Callable[[str], None] = lambda _sentence: None,
     ) -> None:
         self.wire = wire
         self.device_id = device_id
         outcomes.ask(lambda: identity_of(wire, device_id))
         self.snapshots = snapshots
-        self.commands = CommandSender(wire, snapshots)
+        self.commands = CommandSender(wire, snapshots, Bystanders(outcomes, tell))
         super().__init__(wire.identity, wire.clock, wire.latch, outcomes, gate=wire.uninterrupted())
+
+    @property
+    def waited_on(self) -> bool:
+        """Whether a thread of this process waits on a movement or keeps a jog going."""
+        return self.wire.waited_on
+
+    def show_life(self) -> None:
+        """Beat for the ownership alone: nothing while a movement or jog is unfinished."""
+        # Time that only a test lets pass goes on for nobody beside it.
+        if ambient.steps_time() or not isinstance(self.clock, SteppedClock):
+            self.wire.beat_at_rest()
 
     @property
     def unit_um(self) -> float:

@@ -36,6 +36,11 @@ class Turns:
         self._inside = 0
         self._sign_s = 0.0
 
+    @property
+    def waited_on(self) -> bool:
+        """Whether somebody waits on a movement."""
+        return bool(self._waiters)
+
     @contextmanager
     def kept(self) -> Iterator[None]:
         """Have the say over who comes in, for as long as this thread waits on a movement."""

@@ -173,6 +173,20 @@ class MailboxWire:
         with self._turn():
             self._beat_if_due()
 
+    def beat_at_rest(self) -> None:
+        """Write the heartbeat alone for who owns the mailbox, if it is due and nothing moves.
+
+        For another thread than the one that works: it waits for its turn on the wire, and what
+        is unfinished is none of its business.
+        """
+        if self.epoch and not self.motions.unfinished and self.alive:
+            self.beat()
+
+    @property
+    def waited_on(self) -> bool:
+        """Whether a thread waits on what is unfinished (:meth:`attended`)."""
+        return self._turns.waited_on
+
     def ended(self, error: ErrorT) -> ErrorT:
         """End the session because of ``error``, and return it to be raised."""
         error.controller = error.controller or self.identity

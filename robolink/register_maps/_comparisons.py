@@ -131,10 +131,6 @@ def compare(register_map: RegisterMap, found: Found, value: MapValue, shown: str
         >>> found = {MapValue(1, "x"): 12.5, MapValue(1, "y"): -3.25}
         >>> str(compare(register_map, found, MapValue(1, "x"), "12.50"))
         '1.x=12.50'
-        >>> compare(register_map, found, MapValue(1, "x"), "13")
-        Traceback (most recent call last):
-            ...
-        robolink.errors.ConfigError: '13' ... 1.x: it needs 2 digits behind the point. ...
     """
     text, typed, digits = _read(value, shown)
     _require_alike(found, value, text, typed, digits)
@@ -182,10 +178,6 @@ def compare_test(
         >>> y, z = MapValue(1, "y"), MapValue(1, "z")
         >>> str(compare_test(register_map, {y: 0, z: 0}, {y: 7.3, z: 0}, y, "7.3"))
         '1.y=7.3'
-        >>> compare_test(register_map, {y: 0, z: 0}, {y: 0, z: 7.3}, y, "7.3")
-        Traceback (most recent call last):
-            ...
-        robolink.register_maps._comparisons.MapDiffersError: ... That is what 1.z reads: ...
     """
     text, typed, digits = _read(value, entered)
     _require_alike(found, value, text, typed, digits)

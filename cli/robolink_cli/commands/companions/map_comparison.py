@@ -129,11 +129,18 @@ class MapComparison:
         )
         now = MapValues(self._controller).found
         try:
-            if not self._given(answer, value):
-                return []
-            return [compare_test(self._map, values.found, now, value, answer)]
-        finally:
+            made = []
+            if self._given(answer, value):
+                made = [compare_test(self._map, values.found, now, value, answer)]
+        except MapDiffersError as error:  # where it went to, the map does not tell
+            away = tr("Put {key} back to what it was at the HMI.", key=value)
+            error.remedy = joined(" ", (error.remedy, away))
+            raise
+        except (ConfigError, DeclinedError):
             self._put_back(value, values.found.get(value), now.get(value))
+            raise
+        self._put_back(value, values.found.get(value), now.get(value))
+        return made
 
     def _given(self, answer: str, value: MapValue) -> bool:
         """Whether there is an answer; one that is left out is not asked for again.

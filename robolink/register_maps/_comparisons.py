@@ -59,7 +59,7 @@ class MapValue(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Comparison:
+class ComparedValue:
     """One value that a person compared.
 
     Attributes:
@@ -79,7 +79,7 @@ class Comparison:
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class OpenValue:
     """One value that is still to be compared.
 
     Attributes:
@@ -107,7 +107,7 @@ def values_of(register_map: RegisterMap) -> dict[MapValue, Number]:
     }
 
 
-def compare(register_map: RegisterMap, found: Found, value: MapValue, shown: str) -> Comparison:
+def compare(register_map: RegisterMap, found: Found, value: MapValue, shown: str) -> ComparedValue:
     """Hold one value against what the machine's own screen shows.
 
     The screen may round or cut off; that many digits are compared as were typed, and too few of
@@ -154,7 +154,7 @@ def compare(register_map: RegisterMap, found: Found, value: MapValue, shown: str
 
 def compare_test(
     register_map: RegisterMap, before: Found, found: Found, value: MapValue, entered: str
-) -> Comparison:
+) -> ComparedValue:
     """Hold one value against what a person has just entered at the machine's own screen.
 
     All digits of such a value are known, however few the screen shows.
@@ -196,8 +196,8 @@ def compare_test(
 
 
 def to_compare(
-    register_map: RegisterMap, found: Found, compared: Mapping[MapValue, Comparison]
-) -> list[Wanted]:
+    register_map: RegisterMap, found: Found, compared: Mapping[MapValue, ComparedValue]
+) -> list[OpenValue]:
     """Return which values show, together with those that were compared, that a map is right.
 
     Args:
@@ -224,13 +224,13 @@ def to_compare(
     return plan.wanted
 
 
-def tool_known(compared: Mapping[MapValue, Comparison], tool: int) -> bool:
+def tool_known(compared: Mapping[MapValue, ComparedValue], tool: int) -> bool:
     """Whether a comparison showed that this tool's place is not another one's."""
     return any(one.tells_tool for value, one in compared.items() if value.tool == tool)
 
 
 def component_known(
-    register_map: RegisterMap, compared: Mapping[MapValue, Comparison], value: MapValue
+    register_map: RegisterMap, compared: Mapping[MapValue, ComparedValue], value: MapValue
 ) -> bool:
     """Whether a comparison showed this component, at this tool or one that is laid out alike."""
     alike = _like(register_map, value)
@@ -241,26 +241,26 @@ class _Plan:
     """The values that are to be compared, and what will be told once they are."""
 
     def __init__(
-        self, register_map: RegisterMap, found: Found, compared: Mapping[MapValue, Comparison]
+        self, register_map: RegisterMap, found: Found, compared: Mapping[MapValue, ComparedValue]
     ) -> None:
         self._numbers = values_of(register_map)
         self._found = found
         self.told = dict(compared)
-        self.wanted: list[Wanted] = []
+        self.wanted: list[OpenValue] = []
 
     def add(
-        self, first: MapValue, tells: Callable[[Comparison], bool], choice: list[MapValue]
+        self, first: MapValue, tells: Callable[[ComparedValue], bool], choice: list[MapValue]
     ) -> None:
         """Choose a value that stands now and tells, best one that tells both; else a test value."""
         made = [one for value in choice if (one := self._as_it_stands(value)) and tells(one)]
         for one in sorted(made, key=lambda one: not (one.tells_component and one.tells_tool)):
             self.told[one.value] = one
-            self.wanted.append(Wanted(one.value))
+            self.wanted.append(OpenValue(one.value))
             return
-        self.told[first] = Comparison(first, "")
-        self.wanted.append(Wanted(first, self._why_not(first), self._test_value(first)))
+        self.told[first] = ComparedValue(first, "")
+        self.wanted.append(OpenValue(first, self._why_not(first), self._test_value(first)))
 
-    def _as_it_stands(self, value: MapValue) -> Comparison | None:
+    def _as_it_stands(self, value: MapValue) -> ComparedValue | None:
         digits = _digits_needed(self._numbers[value])
         shown = round(self._found.get(value, 0.0), digits)
         return _tells(self._found, value, "", shown, digits) if shown else None
@@ -332,7 +332,7 @@ def _require_alike(found: Found, value: MapValue, text: str, typed: float, digit
         )
 
 
-def _telling(found: Found, value: MapValue, text: str, typed: float, digits: int) -> Comparison:
+def _telling(found: Found, value: MapValue, text: str, typed: float, digits: int) -> ComparedValue:
     made = _tells(found, value, text, typed, digits)
     if made.tells_component or made.tells_tool:
         return made
@@ -347,9 +347,9 @@ def _telling(found: Found, value: MapValue, text: str, typed: float, digits: int
     )
 
 
-def _tells(found: Found, value: MapValue, text: str, shown: float, digits: int) -> Comparison:
+def _tells(found: Found, value: MapValue, text: str, shown: float, digits: int) -> ComparedValue:
     others = _reading(found, value, shown, digits)
-    return Comparison(
+    return ComparedValue(
         value,
         text,
         tells_component=not any(other.tool == value.tool for other in others),

@@ -16,7 +16,7 @@ from robolink.errors import ConfigError
 from robolink.files.durable import file_name, make_folder, state_folder, sync_folder, write_whole
 from robolink.messages import tr
 from robolink.register_maps._comparisons import (
-    Comparison,
+    ComparedValue,
     MapValue,
     component_known,
     tool_known,
@@ -40,7 +40,7 @@ class Confirmation:
 
     by: str
     at: str
-    compared: Mapping[MapValue, Comparison]
+    compared: Mapping[MapValue, ComparedValue]
 
     def knows_tool(self, tool: int) -> bool:
         """Whether a comparison showed that this tool's place is not another one's."""
@@ -79,7 +79,7 @@ def confirmation_of(identity: str, register_map: RegisterMap) -> Confirmation | 
 
 
 def confirm(
-    identity: str, register_map: RegisterMap, *, by: str, compared: Iterable[Comparison]
+    identity: str, register_map: RegisterMap, *, by: str, compared: Iterable[ComparedValue]
 ) -> Confirmation:
     """Put on record that a person found values of this map right at this PLC.
 
@@ -156,9 +156,9 @@ def _path(identity: str, register_map: RegisterMap) -> Path:
     return state_folder("plc-maps") / file_name(f"{identity} {register_map.sha256}")
 
 
-def _comparison(plain: Mapping[str, object]) -> Comparison:
+def _comparison(plain: Mapping[str, object]) -> ComparedValue:
     tool, _, component = str(plain["value"]).partition(".")
-    return Comparison(
+    return ComparedValue(
         MapValue(int(tool), component),
         str(plain["shown"]),
         tells_component=plain["tells_component"] is True,

@@ -6,7 +6,7 @@ from robolink.controllers.plc_map import PlcMapController
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Controller
-from robolink.register_maps import Comparison, Confirmation, confirm, values_of
+from robolink.register_maps import ComparedValue, Confirmation, confirm, values_of
 
 _BY: Final = "robolink.testing"
 
@@ -21,7 +21,10 @@ def confirm_whole_map(controller: Controller) -> Confirmation:
         RobolinkError: The PLC does not say who it is.
     """
     if not isinstance(controller, PlcMapController):
-        raise ConfigError(tr("{url} is not a PLC with a map.", url=controller.identity))
+        raise ConfigError(
+            tr("{url} is not a PLC with a map.", url=controller.identity),
+            remedy=tr("This is for other kinds of controllers."),
+        )
     register_map = controller.register_map
-    compared = [Comparison(value, "") for value in values_of(register_map)]
+    compared = [ComparedValue(value, "") for value in values_of(register_map)]
     return confirm(controller.who().name, register_map, by=_BY, compared=compared)

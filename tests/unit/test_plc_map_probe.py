@@ -12,7 +12,7 @@ from robolink.errors import ConfigError, RejectedError, RemoteProtocolError
 from robolink.journal import memory_journal
 from robolink.model import Act, ToolOffset
 from robolink.register_maps import (
-    Comparison,
+    ComparedValue,
     MapValue,
     confirm,
     confirmation_of,
@@ -22,7 +22,7 @@ from robolink.register_maps import (
 from tests.unit._plc_bench import COMMIT_BIT, NO_HANDSHAKE, Bench, LocalClient
 
 URL = "plc+modbus-tcp://probe:502"
-COMPARED = [Comparison(MapValue(1, "x"), "-5.44", tells_tool=False)]
+COMPARED = [ComparedValue(MapValue(1, "x"), "-5.44", tells_tool=False)]
 
 
 @pytest.fixture(autouse=True)

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 from robolink.errors import ConfigError, DeclinedError
 from robolink.messages import joined, tr
 from robolink.register_maps import (
-    Comparison,
+    ComparedValue,
     MapDiffersError,
     MapValue,
-    Wanted,
+    OpenValue,
     compare,
     compare_test,
     confirm,
@@ -73,16 +73,16 @@ class MapComparison:
                 self._keep(made)
             values = MapValues(self._controller)
 
-    def _compared(self, values: MapValues, answer: str) -> Comparison:
+    def _compared(self, values: MapValues, answer: str) -> ComparedValue:
         key, _, shown = answer.partition("=")
         return compare(self._map, values.found, MapValue.named(key, self._map), shown)
 
-    def _wanted(self, values: MapValues) -> list[Wanted]:
+    def _wanted(self, values: MapValues) -> list[OpenValue]:
         held = confirmation_of(self._name, self._map)
         wanted = to_compare(self._map, values.found, held.compared if held else {})
         return [one for one in wanted if one.value not in self._left_out]
 
-    def _require_some(self, wanted: Sequence[Wanted]) -> None:
+    def _require_some(self, wanted: Sequence[OpenValue]) -> None:
         if confirmation_of(self._name, self._map) is not None:
             return
         tests = [one for one in wanted if one.why_not]
@@ -106,7 +106,7 @@ class MapComparison:
             ),
         )
 
-    def _asked(self, wanted: Wanted, values: MapValues) -> list[Comparison]:
+    def _asked(self, wanted: OpenValue, values: MapValues) -> list[ComparedValue]:
         """Ask for one value; return what was compared, nothing where it was left out."""
         value, test = wanted.value, wanted.test_mm_or_deg
         if test is None:
@@ -186,7 +186,7 @@ class MapComparison:
             self._controller.status()
         return line.strip()
 
-    def _keep(self, made: Sequence[Comparison]) -> None:
+    def _keep(self, made: Sequence[ComparedValue]) -> None:
         person = signature_of(self._context.operator, self._context.expected, changes=True)
         by = person.operator or person.os_user
         confirm(self._name, self._map, by=by, compared=made)

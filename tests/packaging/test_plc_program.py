@@ -224,6 +224,34 @@ def test_the_xml_holds_every_unit_of_the_texts(profile):
 KINDS = ("inputVars", "outputVars", "inOutVars")
 
 
+def test_openplc_finds_every_body_as_a_paragraph():
+    """Its first stage, xml2st, looks for the child p of ST and knows the name space 0201 alone."""
+    for profile in ExportProfile:
+        xml = plc_texts(profile, 0, "Kin_Scara3_Z")["robolink_program.xml"]
+        assert xml.count("tc6_0200") == 1
+        root = ElementTree.fromstring(xml.replace("tc6_0200", "tc6_0201"))
+        space = "{http://www.plcopen.org/xml/tc6_0201}"
+        bodies = [pou.find(f"{space}body/{space}ST") for pou in root.iter(f"{space}pou")]
+        assert len(bodies) > 5
+        for body in bodies:
+            assert body is not None
+            (paragraph,) = body
+            assert paragraph.tag == "{http://www.w3.org/1999/xhtml}p"
+            assert paragraph.text
+            assert not list(paragraph)
+
+
+def test_what_is_known_of_the_error_numbers_is_in_the_program():
+    rows = list(csv.DictReader(io.StringIO(plc_texts(FULL, 0)["errors.csv"])))
+    known = {row["member"]: row["number"] for row in rows if row["number"]}
+    text = program_texts(FULL)["RL_Machine.st"]
+    assert dict(re.findall(r"(\w+) := (\d+)[,)]", text)) == known
+    root = ElementTree.fromstring(plc_texts(FULL, 0)["robolink_program.xml"])
+    values = root.iter(f"{XML}structValue")
+    told = {v.get("member"): v[0].get("value") for held in values for v in held}
+    assert told == known
+
+
 def test_the_program_looks_at_its_registers_once_a_cycle():
     """A server of another task may write between two looks: what was checked would not be done."""
     body = plain(program_texts(FULL)["robolink_program.st"]).rpartition("END_VAR")[2]

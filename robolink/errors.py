@@ -6,6 +6,7 @@
     ├── ConfigError (ValueError)           a URL, an option or a file is wrong; nothing was sent
     │   ├── LimitError                     a target or a change lies outside the stated limits
     │   ├── AmbiguousPosesError            a file of poses does not say everything (.asks)
+    │   ├── NotComparedError               nobody compared with the machine what would change
     │   └── JournalError                   the record cannot be kept or read
     ├── TransportError                     the wire
     │   ├── ConnectError (ConnectionError) no link
@@ -122,6 +123,32 @@ class AmbiguousPosesError(ConfigError):
         super().__init__(what, remedy=remedy)
         self.asks = asks
         self.reason = ",".join(asks)
+
+
+class NotComparedError(ConfigError):
+    """A write would change what nobody has compared with the machine's own screen.
+
+    Nothing was sent.
+
+    Attributes:
+        tool: Number of the tool.
+        components: Those that would change and were not compared; all of the tool where nothing
+            of it was.
+    """
+
+    def __init__(
+        self,
+        what: str,
+        *,
+        tool: int,
+        components: tuple[str, ...],
+        remedy: str = "",
+        controller: str = "",
+        request: str = "",
+    ) -> None:
+        super().__init__(what, remedy=remedy, controller=controller, request=request)
+        self.tool = tool
+        self.components = components
 
 
 class JournalError(ConfigError):

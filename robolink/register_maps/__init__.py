@@ -5,6 +5,14 @@ It is checked by pydantic, which is imported when a map is loaded and not before
 """
 
 from robolink.files.toml import Problem as Problem
+from robolink.register_maps._comparisons import ComparedValue as ComparedValue
+from robolink.register_maps._comparisons import MapDiffersError as MapDiffersError
+from robolink.register_maps._comparisons import MapValue as MapValue
+from robolink.register_maps._comparisons import OpenValue as OpenValue
+from robolink.register_maps._comparisons import compare as compare
+from robolink.register_maps._comparisons import compare_test as compare_test
+from robolink.register_maps._comparisons import to_compare as to_compare
+from robolink.register_maps._comparisons import values_of as values_of
 from robolink.register_maps._confirmations import Confirmation as Confirmation
 from robolink.register_maps._confirmations import confirm as confirm
 from robolink.register_maps._confirmations import confirmation_of as confirmation_of

@@ -1,12 +1,13 @@
 """That a person compared a map's values with what the HMI shows: kept for one map at one PLC.
 
-Without a probe in the PLC nothing else tells a right map from a shifted one, or one word
-order from the other. A file that was changed is another map. A PLC is the one that its own
+Nothing else tells a right map from one with two components exchanged. A file that was changed is
+another map. A PLC is the one that its own
 number names, where the map has that, else the one at its resolved address: by another spelling of
 its host it is the same, and with a number another one in its place is not.
 """
 
 import json
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Final
@@ -14,31 +15,52 @@ from typing import Final
 from robolink.errors import ConfigError
 from robolink.files.durable import file_name, make_folder, state_folder, sync_folder, write_whole
 from robolink.messages import tr
+from robolink.register_maps._comparisons import (
+    ComparedValue,
+    MapValue,
+    component_known,
+    tool_known,
+    values_of,
+)
 from robolink.register_maps._map import RegisterMap
 from robolink.timing import wall_label
 
-_FORMAT: Final = "robolink/plc-map-confirmation/1"
+_FORMAT: Final = "robolink/plc-map-confirmation/2"
 
 
 @dataclass(frozen=True, slots=True)
 class Confirmation:
-    """Who confirmed a map.
+    """What was compared of one map at one PLC.
 
     Attributes:
-        by: Name or badge.
-        at: Wall-clock label, ISO 8601 UTC.
-        compared: What was compared, in words.
+        by: Name or badge of whoever compared last.
+        at: Wall-clock label of that, ISO 8601 UTC.
+        compared: What was compared, by value.
     """
 
     by: str
     at: str
-    compared: str
+    compared: Mapping[MapValue, ComparedValue]
+
+    def knows_tool(self, tool: int) -> bool:
+        """Whether a comparison showed that this tool's place is not another one's."""
+        return tool_known(self.compared, tool)
+
+    def missing(self, register_map: RegisterMap) -> list[MapValue]:
+        """Return the values that may not be changed yet."""
+        return [
+            value
+            for value in values_of(register_map)
+            if not self.knows_tool(value.tool)
+            or not component_known(register_map, self.compared, value)
+        ]
 
 
 def confirmation_of(identity: str, register_map: RegisterMap) -> Confirmation | None:
-    """Return who confirmed this very map at this PLC, ``None`` when nobody did.
+    """Return what was compared of this very map at this PLC, ``None`` when nothing was.
 
-    A record that cannot be read confirms nothing.
+    A record that cannot be read confirms nothing, and neither does one of the first format, in
+    which one value stood for all.
 
     Args:
         identity: The PLC's name, never a URL: see :class:`robolink.model.Identity`.
@@ -48,40 +70,55 @@ def confirmation_of(identity: str, register_map: RegisterMap) -> Confirmation | 
         document = json.loads(_path(identity, register_map).read_bytes())
         if (document["schema"], document["controller"]) != (_FORMAT, identity):
             return None
-        return Confirmation(document["by"], document["at"], document["compared"])
+        compared = [_comparison(one) for one in document["compared"]]
+        if not compared or any(one.value not in values_of(register_map) for one in compared):
+            return None
+        return Confirmation(document["by"], document["at"], {one.value: one for one in compared})
     except (OSError, ValueError, KeyError, RecursionError, TypeError):
         return None
 
 
-def confirm(identity: str, register_map: RegisterMap, *, by: str, compared: str) -> Confirmation:
-    """Put on record that a person found this map right at this PLC.
+def confirm(
+    identity: str, register_map: RegisterMap, *, by: str, compared: Iterable[ComparedValue]
+) -> Confirmation:
+    """Put on record that a person found values of this map right at this PLC.
+
+    What was on record before stays.
 
     Args:
         identity: The PLC's name, never a URL: see :class:`robolink.model.Identity`.
         register_map: The map.
         by: Name or badge of the person.
-        compared: What was compared, in words.
+        compared: What was compared: :func:`compare` and :func:`compare_test` make it.
 
     Raises:
         ConfigError: It cannot be stored.
 
     Example:
-        >>> from robolink.register_maps import confirm, confirmation_of, load_map
+        >>> from robolink.register_maps import (
+        ...     MapValue, compare, confirm, confirmation_of, load_map
+        ... )
         >>> from robolink_simulators.testkit.recipes import written_map
         >>> from pathlib import Path
-        >>> register_map = load_map(written_map(Path.cwd()))
-        >>> made = confirm("plc-7", register_map, by="K. Sato", compared="tool 1 with the HMI")
-        >>> confirmation_of("plc-7", register_map).by
-        'K. Sato'
+        >>> register_map, x = load_map(written_map(Path.cwd())), MapValue(1, "x")
+        >>> made = compare(register_map, {x: 12.5}, x, "12.50")
+        >>> made = confirm("plc-7", register_map, by="K. Sato", compared=[made])
+        >>> held = confirmation_of("plc-7", register_map)
+        >>> held.by, MapValue(1, "y") in held.missing(register_map)
+        ('K. Sato', True)
     """
-    made = Confirmation(by, wall_label(), compared)
+    held = confirmation_of(identity, register_map)
+    together = {**(held.compared if held else {}), **{one.value: one for one in compared}}
+    made = Confirmation(by, wall_label(), together)
     path = _path(identity, register_map)
     document = {
         "schema": _FORMAT,
         "controller": identity,
         "map": register_map.name,
         "map_sha256": register_map.sha256,
-        **asdict(made),
+        "by": made.by,
+        "at": made.at,
+        "compared": [{**asdict(one), "value": str(one.value)} for one in together.values()],
     }
     try:
         make_folder(path.parent)
@@ -117,3 +154,13 @@ def revoke(identity: str, register_map: RegisterMap) -> Confirmation | None:
 
 def _path(identity: str, register_map: RegisterMap) -> Path:
     return state_folder("plc-maps") / file_name(f"{identity} {register_map.sha256}")
+
+
+def _comparison(plain: Mapping[str, object]) -> ComparedValue:
+    tool, _, component = str(plain["value"]).partition(".")
+    return ComparedValue(
+        MapValue(int(tool), component),
+        str(plain["shown"]),
+        tells_component=plain["tells_component"] is True,
+        tells_tool=plain["tells_tool"] is True,
+    )

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from robolink.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
+    from robolink.testing.compared_map import confirm_whole_map as confirm_whole_map
     from robolink.testing.memory_controller import MemoryController as MemoryController
     from robolink.testing.memory_controller import MemoryMachine as MemoryMachine
     from robolink.testing.motion_checks import MOVING_CHECKS as MOVING_CHECKS
@@ -26,6 +27,7 @@ else:
     __getattr__ = lazy_exports(
         __name__,
         {
+            "compared_map": "confirm_whole_map",
             "memory_controller": "MemoryController MemoryMachine",
             "motion_checks": "MOVING_CHECKS",
             "on_site": "kept_on_site",

@@ -34,6 +34,8 @@ def an_error(kind):
         return kind("The guard is open.", reason=reason, remedy="Close it.")
     if kind is errors.AmbiguousPosesError:
         return kind("It went wrong.", asks=("length",), remedy="Do it right.")
+    if kind is errors.NotComparedError:
+        return kind("It went wrong.", tool=1, components=("y",), remedy="Do it right.")
     return kind("It went wrong.", remedy="Do it right.")
 
 
@@ -41,6 +43,7 @@ CODES = {
     "ConfigError": 2,
     "AmbiguousPosesError": 2,
     "LimitError": 2,
+    "NotComparedError": 2,
     "JournalError": 2,
     "TransportError": 3,
     "ConnectError": 3,

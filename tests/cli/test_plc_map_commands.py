@@ -10,7 +10,9 @@ import pytest
 from robolink_cli import main
 from robolink_simulators.plc import PlcSimulator, serve_plc
 
+import robolink
 from robolink.register_maps import load_map
+from robolink.testing import confirm_whole_map
 
 MAPS = Path("examples/plc-maps").absolute()
 
@@ -78,10 +80,37 @@ def test_a_register_list_becomes_the_beginning_of_a_map(shown, tmp_path):
     assert document(out, "plc-map-draft")["left"] == ["Commit"]
 
 
-def test_a_probe_that_fits_needs_no_person(shown, serve):
-    url, _ = serve("commit-bit")
-    code, out, _ = shown("-c", url, "plc", "check-map")
-    assert (code, "The probe reads 12.3456: the map fits." in out) == (0, True)
+EACH = ("1.x", "1.y", "1.z", "1.u", "2.x")
+
+
+def shows(found, *keys):
+    """Options that say what a screen shows that agrees with the map."""
+    return [it for key in keys for it in ("--shows", f"{key}={found['values'][key]:.3f}")]
+
+
+def test_a_probe_that_fits_does_not_stand_for_the_components(shown, serve):
+    url, plc = serve("commit-bit")
+    check = ["-c", url, "--json", "plc", "check-map"]
+    write = ["-c", url, "tool", "set", "1", "--y", "2.5", "--dry-run"]
+    code, out, err = shown(*check)
+    assert (code, "--shows 1.y=" in out + err) == (9, True)
+    values = {
+        f"{t}.{n}": v
+        for t, o in plc.truth()["stored"].items()
+        for n, v in zip("xyzu", o.values(), strict=False)
+    }
+    code, out, _ = shown(*check, *shows({"values": values}, "1.x", "1.z"))
+    found = document(out, "plc-map-values")
+    assert (code, found["probe"]) == (0, "fits")
+    assert found["not_compared"] == ["1.y", "1.u", "2.x", "2.y", "2.z", "2.u"]
+    code, _, err = shown(*write)
+    assert (code, "Nobody has compared 1.y" in err, "check-map" in err) == (2, True, True)
+    code, out, _ = shown("-c", url, "plc", "check-map", *shows(found, "1.y", "1.u", "2.x"))
+    assert (code, "The probe reads 12.3456" in out, "Not compared" in out) == (0, True, False)
+    assert shown(*write)[0] == 0
+    code, out, _ = shown(*check)
+    assert (code, document(out, "plc-map-values")["not_compared"]) == (0, [])
+    assert plc.writes == []
 
 
 def test_a_map_in_the_wrong_order_is_shown_and_diagnosed(shown, serve, tmp_path):
@@ -98,7 +127,7 @@ def test_without_a_probe_nothing_is_written_until_a_person_has_compared(shown, s
     url, plc = serve("no-handshake")
     write = ["-c", url, "tool", "set", "1", "--x", "2.5", "--dry-run"]
     code, _, err = shown(*write)
-    assert (code, "nobody has confirmed it" in err) == (2, True)
+    assert (code, "Nobody has compared" in err) == (2, True)
     code, _, err = shown("-c", url, "plc", "check-map")
     assert (code, "--shows 1.x=" in err) == (9, True)
     code, _, err = shown("-c", url, "plc", "check-map", "--shows", "1.x=-54.4")
@@ -134,35 +163,99 @@ def test_a_comparison_that_fails_takes_the_confirmation_back(shown, serve):
     assert plc.writes == []
 
 
-def test_on_a_terminal_the_person_is_asked_and_may_leave(shown, serve, monkeypatch):
-    url, _ = serve("level-handshake")
-    asked = []
+class Person:
+    """Who stands at the machine: answers a question, after having typed at its own screen."""
 
-    class Person:
-        def __init__(self, *answers):
-            self.answers = list(answers)
+    def __init__(self, plc, *answers):
+        self.plc, self.answers, self.asked = plc, list(answers), []
 
-        def ask(self, question, kind):
-            asked.append(question)
+    def ask(self, question, kind):
+        self.asked.append(question)
 
-        def poll(self, wait_s):
-            return self.answers.pop(0)
-
-    monkeypatch.setattr("robolink_cli.prompts.questions.on_terminal", lambda: True)
-    for answers, code in (([None, "-5.44", "q"], 9), (["-5.44", None, "-75.07\n"], 0)):
-        person = Person(*answers)
-        monkeypatch.setattr("robolink_cli.prompts.operator.terminal", lambda person=person: person)
-        assert shown("-c", url, "plc", "check-map")[0] == code
-        assert person.answers == []
-    assert asked[-2:] == ["What does the HMI show for 1.x?", "What does the HMI show for 1.u?"]
+    def poll(self, wait_s):
+        answer = self.answers.pop(0)
+        if isinstance(answer, tuple):
+            entered, answer = answer
+            self.plc.program.set_tool(1, entered)
+        return answer
 
 
-def test_each_form_in_which_numbers_stand_is_compared(shown, serve):
-    url, _ = serve("level-handshake")
-    code, _, err = shown("-c", url, "plc", "check-map", "--shows", "1.x=-5.44")
-    assert (code, "--shows 1.u=... as well" in err) == (2, True)
-    given = ["--shows", "1.x=-5.44", "--shows", "1.u=-75.1"]
-    assert shown("-c", url, "plc", "check-map", *given)[0] == 0
+@pytest.fixture
+def person(monkeypatch):
+    """Let somebody answer the questions of a terminal."""
+
+    def sits(plc, *answers):
+        person = Person(plc, *answers)
+        monkeypatch.setattr("robolink_cli.prompts.questions.on_terminal", lambda: True)
+        monkeypatch.setattr(
+            "robolink_cli.commands.companions.map_comparison.on_terminal", lambda: True
+        )
+        monkeypatch.setattr("robolink_cli.prompts.operator.terminal", lambda: person)
+        return person
+
+    return sits
+
+
+STAND = {"x": -5.44, "y": 3.21, "z": -70.5, "u": -75.07}
+
+
+def test_on_a_terminal_the_person_is_asked_and_may_leave(shown, serve, person):
+    url, plc = serve("level-handshake")
+    plc.program.set_tool(1, STAND)
+    plc.program.set_tool(2, {**STAND, "x": 4.0})
+    check = ["-c", url, "plc", "check-map"]
+    asks = person(plc, None, "-5", "-5.44", "q")
+    code, _, err = shown(*check)
+    assert (code, "needs 2 digits" in err, "stays on record" in err) == (9, True, True)
+    asks = person(plc, "3.21", None, "", "-75.07\n", "4.000")
+    code, out, _ = shown(*check)
+    assert (code, asks.answers) == (0, [])
+    assert [question.split(" for ")[1][:3] for question in asks.asked] == [
+        "1.y",
+        "1.z",
+        "1.u",
+        "2.x",
+    ]
+    assert "not changed by any command: 1.z, 2.z" in out
+
+
+def test_a_component_that_is_zero_everywhere_is_compared_by_a_test_value(shown, serve, person):
+    url, plc = serve("level-handshake")
+    zero = {**STAND, "y": 0.0}
+    for tool in (1, 2):
+        plc.program.set_tool(tool, {**zero, "x": 1.25 * tool})
+    stand = {**zero, "x": 1.25}
+    check = ["-c", url, "plc", "check-map"]
+    known = ["--shows", "1.x=1.25", "--shows", "1.z=-70.50", "--shows", "1.u=-75.07"]
+    assert shown(*check, *known, "--shows", "2.x=2.50")[0] == 0
+    code, _, err = shown("-c", url, "tool", "set", "1", "--y", "1", "--dry-run")
+    assert (code, "Nobody has compared 1.y" in err) == (2, True)
+    asks = person(plc, ({**stand, "y": 7.3}, "7.3"), (stand, ""))
+    code, out, err = shown(*check)
+    assert (code, asks.answers, "still reads" in err) == (0, [], False)
+    assert asks.asked[0].startswith("Enter 7.3 for 1.y at the HMI")
+    assert asks.asked[1] == "Put 1.y back to 0.0 at the HMI, then press Enter."
+    assert "Not compared" not in out
+    assert shown("-c", url, "tool", "set", "1", "--y", "1", "--dry-run")[0] == 0
+    assert plc.writes == []
+
+
+def test_a_test_value_that_another_component_shows_takes_everything_back(shown, serve, person):
+    """The map has Y and Z exchanged: what is entered for Y appears in Z."""
+    url, plc = serve("level-handshake")
+    zero = {**STAND, "y": 0.0, "z": 0.0}
+    plc.program.set_tool(1, zero)
+    plc.program.set_tool(2, {**zero, "x": 4.0})
+    check = ["-c", url, "plc", "check-map"]
+    assert shown(*check, "--shows", "1.x=-5.44")[0] == 0
+    asks = person(plc, ({**zero, "z": 7.3}, "7.3"))
+    code, _, err = shown(*check)
+    assert (code, asks.answers) == (2, [])
+    assert "That is what 1.z reads" in err
+    assert "taken back" in err
+    assert "Put 1.y back to what it was" in err
+    code, _, err = shown("-c", url, "tool", "set", "1", "--x", "1", "--dry-run")
+    assert (code, "Nobody has compared 1.x" in err) == (2, True)
 
 
 def test_a_zero_proves_nothing(shown, serve):
@@ -193,6 +286,8 @@ def test_status_and_dry_run_read_only(shown, serve):
     code, out, _ = shown("-c", url, "--json", "status")
     found = document(out, "status")
     assert (code, found["state"], found["selected_tool"]) == (0, "ready", 1)
+    with robolink.connect(url) as controller:
+        confirm_whole_map(controller)
     code, out, _ = shown("-c", url, "--json", "tool", "set", "1", "--x", "2.5", "--dry-run")
     assert code == 0
     assert document(out, "dry-run")["requests"][0].startswith(
@@ -216,7 +311,7 @@ def test_the_simulator_is_served_by_its_command_on_both_buses(state_folder):
             assert list(served["urls"]) == ["modbus-tcp", "modbus-rtu"]
             assert served["url"] == served["urls"]["modbus-tcp"]
             for url in served["urls"].values():
-                assert main.run(["-c", url, "plc", "check-map"]) == 0
+                assert main.run(["-c", url, "status"]) == 0
         finally:
             process.terminate()
     assert process.returncode == 0

@@ -56,7 +56,7 @@ def test_another_spelling_of_the_host_keeps_the_confirmation(shown, state_folder
         assert shown(*write(host.url.replace("127.0.0.1", "localhost")))[0] == 0
         # Without a number of its own it might be another one.
         code, err = shown(*write(second.url))
-        assert (code, "nobody has confirmed it" in err) == (2, True)
+        assert (code, "Nobody has compared" in err) == (2, True)
 
 
 def test_a_plc_with_a_number_keeps_it_at_each_of_its_addresses(shown, machine):
@@ -78,7 +78,7 @@ def test_another_plc_at_the_same_address_does_not_inherit_it(shown, machine):
         assert shown(*compare(host.url))[0] == 0
         number(plc, 4712)
         code, err = shown(*write(host.url))
-        assert (code, "nobody has confirmed it" in err) == (2, True)
+        assert (code, "Nobody has compared" in err) == (2, True)
         number(plc, 0)  # a program that has not started yet
         code, err = shown(*write(host.url))
         assert (code, "reads zero" in err) == (5, True)

@@ -20,7 +20,9 @@ from robolink_simulators.control.client import ControlClient
 
 import robolink
 from robolink import ToolOffset
+from robolink.controllers.plc_map import PlcMapController
 from robolink.errors import ConfigError
+from robolink.testing import confirm_whole_map
 
 MAP = Path(__file__).parents[2] / "examples/plc-maps/commit-bit.toml"
 HEAD = 'schema = "robolink/sim-cells/1"\n'
@@ -265,6 +267,8 @@ def test_all_kinds_are_served_by_one_process_until_it_is_told_to_end(file, tmp_p
             monkeypatch.setenv("ROBOLINK_STATE_DIR", cell["state_dir"])
             for url in cell["urls"].values():
                 with robolink.connect(url, timeout_s=5.0) as controller:
+                    if isinstance(controller, PlcMapController):
+                        confirm_whole_map(controller)
                     wanted = ToolOffset(number, len(url), -30.0)
                     controller.tools.write(2, wanted, expected=robolink.ANY)
             with ControlClient(cell["control"]) as control:

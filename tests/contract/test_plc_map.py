@@ -30,8 +30,9 @@ from robolink.errors import (
 from robolink.methods import PointsSource
 from robolink.model import Verdict
 from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
-from robolink.register_maps import confirm, load_map
+from robolink.register_maps import load_map
 from robolink.runner import Question
+from robolink.testing import confirm_whole_map
 from robolink.transaction import recover
 
 MAPS = Path("examples/plc-maps")
@@ -60,7 +61,7 @@ class Served:
         self.host = self.serve(self.plc, self.path, clock=ScaledClock(10.0))
         self.url = self.host.url
         with self.connect() as controller:
-            confirm(controller.who().name, self.map, by="test", compared="1.x")
+            confirm_whole_map(controller)
         return self
 
     def __exit__(self, *_details):

@@ -20,6 +20,7 @@ import robolink
 from robolink import ToolOffset
 from robolink.errors import ConfigError, RobolinkError
 from robolink.register_maps import load_map
+from robolink.testing import confirm_whole_map
 
 MAP = Path(__file__).parents[2] / "examples/plc-maps/commit-bit.toml"
 
@@ -61,6 +62,8 @@ def served(request, tmp_path, monkeypatch):
 
 def write(served, z_mm):
     with robolink.connect(served.url) as controller:
+        if served.kind == "plc":
+            confirm_whole_map(controller)
         tool = 2
         controller.tools.write(tool, ToolOffset(1, 2, z_mm), expected=robolink.ANY)
         return controller.outcomes.identity

@@ -23,6 +23,7 @@ from robolink.errors import (
 )
 from robolink.journal import EntryKind, forget_memory, memory_journal
 from robolink.protocols.mailbox import program_texts
+from robolink.testing import confirm_whole_map
 from robolink.transaction import Wanted, change_tools
 from robolink.transport import parse_url
 
@@ -68,6 +69,8 @@ def test_the_cable_of_a_plc_is_pulled_where_a_connection_ends_with_it(softmotion
 
 @pytest.mark.parametrize("plc_sim", ["modbus-tcp", "modbus-rtu"], indirect=True)
 def test_a_plc_with_a_map_is_served_on_both_buses(plc_sim):
+    with robolink.connect(plc_sim.url) as controller:
+        confirm_whole_map(controller)
     write(plc_sim)
     assert plc_sim.truth()["stored"]["2"]["z_mm"] == WANTED.z_mm
     plc_sim.do("withdraw_permit")

@@ -30,7 +30,8 @@ from robolink.errors import (
 from robolink.model import ANY, Controller, MotionProfile, ToolOffset, WorkBox
 from robolink.model import Path as Way
 from robolink.protocols.mailbox import to_frame
-from robolink.register_maps import confirm, load_map
+from robolink.register_maps import load_map
+from robolink.testing import confirm_whole_map
 from tests.contract._softmotion_cell import SLOW, above, served
 
 STORED = ToolOffset(12.0, -3.5, -20.0)
@@ -132,7 +133,7 @@ def each_kind() -> Iterator[list[Controller]]:
         robolink.connect(three.url) as third,
     ):
         assert isinstance(third, PlcMapController)
-        confirm(third.who().name, register_map, by="test", compared="1.x")
+        confirm_whole_map(third)
         yield [first, second, third]
 
 

@@ -8,6 +8,7 @@ import pytest
 import robolink
 from robolink import ToolOffset
 from robolink.errors import OutcomeUnknownError, ToolChangedError
+from robolink.testing import confirm_whole_map
 
 NEEDLE = ToolOffset(10.0, 0.5, -50.0)
 
@@ -34,6 +35,8 @@ def test_a_plc_gets_the_needle_on_every_bus(softmotion_sim):
 
 
 def test_our_own_plc_gets_the_needle_in_its_registers(plc_sim):
+    with robolink.connect(plc_sim.url) as controller:
+        confirm_whole_map(controller)
     fit_needle(plc_sim.url)
     assert plc_sim.truth()["stored"]["2"]["x_mm"] == 10.0
 

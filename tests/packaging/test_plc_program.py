@@ -3,6 +3,7 @@
 import csv
 import io
 import re
+import struct
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
@@ -208,7 +209,7 @@ def test_the_xml_holds_every_unit_of_the_texts(profile):
     assert len(list(root.iter(f"{XML}dataType"))) == types
     core = pous["RL_MailboxCore"]
     kinds = {section: len(core.findall(f"{XML}interface/{XML}{section}/*")) for section in KINDS}
-    assert kinds == {"inputVars": 12, "outputVars": 2, "inOutVars": 8}
+    assert kinds == {"inputVars": 10, "outputVars": 2, "inOutVars": 8}
     (inside,) = core.findall(f"{XML}body")
     body = "".join(inside.itertext())
     assert body.strip() in texts["robolink_core.st"]
@@ -221,6 +222,68 @@ def test_the_xml_holds_every_unit_of_the_texts(profile):
 
 
 KINDS = ("inputVars", "outputVars", "inOutVars")
+
+
+def test_openplc_finds_every_body_as_a_paragraph():
+    """Its first stage, xml2st, looks for the child p of ST and knows the name space 0201 alone."""
+    for profile in ExportProfile:
+        xml = plc_texts(profile, 0, "Kin_Scara3_Z")["robolink_program.xml"]
+        assert xml.count("tc6_0200") == 1
+        root = ElementTree.fromstring(xml.replace("tc6_0200", "tc6_0201"))
+        space = "{http://www.plcopen.org/xml/tc6_0201}"
+        bodies = [pou.find(f"{space}body/{space}ST") for pou in root.iter(f"{space}pou")]
+        assert len(bodies) > 5
+        for body in bodies:
+            assert body is not None
+            (paragraph,) = body
+            assert paragraph.tag == "{http://www.w3.org/1999/xhtml}p"
+            assert paragraph.text
+            assert not list(paragraph)
+
+
+def test_what_is_known_of_the_error_numbers_is_in_the_program():
+    rows = list(csv.DictReader(io.StringIO(plc_texts(FULL, 0)["errors.csv"])))
+    known = {row["member"]: row["number"] for row in rows if row["number"]}
+    text = program_texts(FULL)["RL_Machine.st"]
+    assert dict(re.findall(r"(\w+) := (\d+)[,)]", text)) == known
+    root = ElementTree.fromstring(plc_texts(FULL, 0)["robolink_program.xml"])
+    values = root.iter(f"{XML}structValue")
+    told = {v.get("member"): v[0].get("value") for held in values for v in held}
+    assert told == known
+
+
+def test_the_program_looks_at_its_registers_once_a_cycle():
+    """A server of another task may write between two looks: what was checked would not be done."""
+    body = plain(program_texts(FULL)["robolink_program.st"]).rpartition("END_VAR")[2]
+    assert re.findall(r"\b\w*box := \w+[,;]", body) == [
+        "inbox := command,",
+        "outbox := response,",
+        "outbox := response;",
+    ]
+    assert re.findall(r"\w+ := (?:in|out)box\b", body) == ["command := inbox"]
+    assert body.index("command := inbox") < body.index("core(") < body.index("outbox := response;")
+
+
+def test_the_name_of_the_axis_group_is_replaced_without_a_pin():
+    """Replacing MyAxisGroup everywhere is right, in the texts and in the XML."""
+    for profile in ExportProfile:
+        texts = plc_texts(profile, 0)
+        found = {name: text.count("MyAxisGroup") for name, text in texts.items()}
+        assert found.pop("robolink_program.st") == 3  # one in the comment on the first lines
+        assert found.pop("robolink_program.xml") == 2
+        assert not any(found.values())
+        renamed = texts["robolink_program.xml"].replace("MyAxisGroup", "Robot")
+        assert renamed.count("AxisGroup := Robot") == 2
+
+
+@pytest.mark.parametrize("unit_um", [1000.0, 1.0, 25400.0, 25.4, 0.3, 1e6, 123456.789, 1e-30])
+def test_the_unit_is_told_as_a_real(unit_um):
+    core = SourceText(CORE, program_texts(FULL)[CORE])
+    made = StructuredProgram([core], "RL_LrealToReal")
+    made.put("number", unit_um)
+    made.cycle(0)
+    words = struct.unpack("<HH", struct.pack("<f", unit_um))
+    assert (made.value("low"), made.value("high")) == words
 
 
 @pytest.mark.parametrize("name", LISTS)

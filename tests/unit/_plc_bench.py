@@ -9,7 +9,8 @@ from robolink_simulators.plc.memory import OutsideError
 from robolink.controllers.plc_map import PlcMapController
 from robolink.errors import RejectedError, TransportTimeoutError
 from robolink.journal import memory_journal
-from robolink.register_maps import RegisterTable, confirm, load_map
+from robolink.register_maps import RegisterTable, load_map
+from robolink.testing import confirm_whole_map
 
 EXAMPLES = Path("examples/plc-maps")
 COMMIT_BIT = EXAMPLES / "commit-bit.toml"
@@ -87,7 +88,7 @@ class Bench:
         self.program = self.plc.program
         if confirmed:
             with self.connect() as controller:
-                confirm(controller.who().name, self.map, by="test", compared="1.x")
+                confirm_whole_map(controller)
 
     def connect(self):
         """Return a driver; ``client`` of the bench is what it speaks through."""

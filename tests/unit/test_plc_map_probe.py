@@ -1,5 +1,6 @@
 """A wrong probe says what the map should say; a map without one is confirmed by a person."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,10 +11,18 @@ from robolink.controllers.plc_map import PlcMapController
 from robolink.errors import ConfigError, RejectedError, RemoteProtocolError
 from robolink.journal import memory_journal
 from robolink.model import Act, ToolOffset
-from robolink.register_maps import confirm, confirmation_of, draft_from_csv, load_map
+from robolink.register_maps import (
+    ComparedValue,
+    MapValue,
+    confirm,
+    confirmation_of,
+    draft_from_csv,
+    load_map,
+)
 from tests.unit._plc_bench import COMMIT_BIT, NO_HANDSHAKE, Bench, LocalClient
 
 URL = "plc+modbus-tcp://probe:502"
+COMPARED = [ComparedValue(MapValue(1, "x"), "-5.44", tells_tool=False)]
 
 
 @pytest.fixture(autouse=True)
@@ -59,16 +68,27 @@ def test_the_right_probe_passes():
 def test_a_confirmation_holds_for_one_file_at_one_plc():
     found = load_map(NO_HANDSHAKE)
     assert confirmation_of(URL, found) is None
-    made = confirm(URL, found, by="Kim", compared="1.x=-5.44")
+    made = confirm(URL, found, by="Kim", compared=COMPARED)
     assert confirmation_of(URL, found) == made
-    assert (made.by, made.compared) == ("Kim", "1.x=-5.44")
+    assert (made.by, list(made.compared.values())) == ("Kim", COMPARED)
     assert confirmation_of("plc+modbus-tcp://other:502", found) is None
     assert confirmation_of(URL, replace(found, sha256="0" * 64)) is None
 
 
+def test_a_confirmation_of_the_first_format_stood_for_values_that_nobody_compared(tmp_path):
+    found = load_map(NO_HANDSHAKE)
+    confirm(URL, found, by="Kim", compared=COMPARED)
+    (path,) = (tmp_path / "state" / "plc-maps").iterdir()
+    document = json.loads(path.read_bytes())
+    before = {**document, "schema": "robolink/plc-map-confirmation/1", "compared": "1.x=-5.44"}
+    for damaged in (before, {**document, "compared": "1.x=-5.44"}, {**document, "compared": []}):
+        path.write_text(json.dumps(damaged), encoding="ascii")
+        assert confirmation_of(URL, found) is None
+
+
 def test_a_damaged_confirmation_confirms_nothing(tmp_path):
     found = load_map(NO_HANDSHAKE)
-    confirm(URL, found, by="Kim", compared="1.x=-5.44")
+    confirm(URL, found, by="Kim", compared=COMPARED)
     (path,) = (tmp_path / "state" / "plc-maps").iterdir()
     path.write_text("{", encoding="ascii")
     assert confirmation_of(URL, found) is None
@@ -79,7 +99,7 @@ def test_a_confirmation_that_cannot_be_stored_is_refused(tmp_path, monkeypatch):
     blocked.write_text("")
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(blocked))
     with pytest.raises(ConfigError, match="stays unconfirmed"):
-        confirm(URL, load_map(NO_HANDSHAKE), by="Kim", compared="1.x=-5.44")
+        confirm(URL, load_map(NO_HANDSHAKE), by="Kim", compared=COMPARED)
 
 
 def test_what_a_map_offers_besides_tools():

@@ -1,12 +1,14 @@
 """What every part of this driver works with: registers, the map of them, and when both count."""
 
+from typing import NoReturn
+
 from robolink.controllers.driver_link import DriverLink
 from robolink.controllers.plc_map.probe import MapIdentityReader, require_probe
 from robolink.controllers.plc_map.registers import RegisterClient, Registers
-from robolink.errors import ConfigError, NotReadyError, NotReadyReason, RejectedError
+from robolink.errors import NotComparedError, NotReadyError, NotReadyReason, RejectedError
 from robolink.messages import tr
 from robolink.model import Identity, OutcomeLog
-from robolink.register_maps import RegisterMap, confirmation_of
+from robolink.register_maps import Confirmation, MapValue, RegisterMap, confirmation_of
 
 
 class MappedPlc(DriverLink):
@@ -76,9 +78,9 @@ class MappedPlc(DriverLink):
         """
         require_probe(self.registers, self.register_map.probe)
 
-    def require_ready(self, request: str) -> None:
+    def require_ready(self, tool: int, request: str) -> None:
         """Refuse a write where the map is not known to be right, or the machine says no."""
-        self.require_confirmed(request)
+        self.require_known_place(tool, request)
         self.require_probe()
         permit = self.register_map.permit
         if permit is not None and not self.registers.is_on(permit):
@@ -90,22 +92,51 @@ class MappedPlc(DriverLink):
                 request=request,
             )
 
-    def require_confirmed(self, request: str) -> None:
-        """Refuse a change by a map without a probe that nobody has compared; writes nothing."""
-        if self.register_map.probe is None and not confirmation_of(
-            self.who().name, self.register_map
-        ):
-            raise ConfigError(
-                tr(
-                    "The map {name!r} has no probe, and nobody has confirmed it at {identity} yet.",
-                    name=self.register_map.name,
-                    identity=self.identity,
-                ),
-                remedy=tr(
-                    "Nothing was written. Run 'robolink expert plc check-map' with "
-                    "the same -c and compare with the HMI. A changed map has to be "
-                    "confirmed again."
-                ),
-                controller=self.identity,
-                request=request,
-            )
+    def require_known_place(self, tool: int, request: str) -> None:
+        """Refuse a change of a tool of which nobody has compared anything; writes nothing.
+
+        Raises:
+            NotComparedError: Nobody has, with this map at this PLC.
+        """
+        confirmation = self._confirmation()
+        if confirmation is None or not confirmation.knows_tool(tool):
+            self._refuse(tool, tuple(self.register_map.slots[tool].components), request)
+
+    def require_compared(self, tool: int, components: tuple[str, ...], request: str) -> None:
+        """Refuse a change of components that nobody has compared; writes nothing.
+
+        Args:
+            tool: Number of the tool.
+            components: Those that would change.
+            request: What would be written, for a person.
+
+        Raises:
+            NotComparedError: One was not, with this map at this PLC.
+        """
+        confirmation = self._confirmation()
+        missing = confirmation.missing(self.register_map) if confirmation is not None else []
+        lacking = tuple(name for name in components if MapValue(tool, name) in missing)
+        if lacking or confirmation is None:
+            self._refuse(tool, lacking or components, request)
+
+    def _confirmation(self) -> Confirmation | None:
+        return confirmation_of(self.who().name, self.register_map)
+
+    def _refuse(self, tool: int, components: tuple[str, ...], request: str) -> NoReturn:
+        raise NotComparedError(
+            tr(
+                "Nobody has compared {values} of the map {name!r} with the screen of the machine "
+                "at {identity} yet.",
+                values=", ".join(f"{tool}.{name}" for name in components),
+                name=self.register_map.name,
+                identity=self.identity,
+            ),
+            tool=tool,
+            components=components,
+            remedy=tr(
+                "Nothing was written. Run 'robolink expert plc check-map' with the same -c at "
+                "the machine. A changed map has to be compared again."
+            ),
+            controller=self.identity,
+            request=request,
+        )

@@ -26,9 +26,10 @@ class RegisterResolver(MarkerResolver):
         """Do what ``finding.action`` says and forget the marker."""
         marker = finding.marker
         if finding.verdict is Verdict.NOT_FINISHED:
-            self._plc.require_ready(marker.request)
+            tool = int(str(marker.details["tool"]))
+            self._plc.require_ready(tool, marker.request)
             before = read_offset(marker.details.get("before"))
-            self._registers.take_over(int(str(marker.details["tool"])), before, marker.request)
+            self._registers.take_over(tool, before, marker.request)
         super().settle(finding)
 
     def _examine_more(self, marker: Marker) -> Finding | None:

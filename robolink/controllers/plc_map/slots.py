@@ -69,6 +69,12 @@ class Slots:
             controller=self._registers.identity,
         )
 
+    def changed(self, slot: MapSlot, content: SlotContent) -> tuple[str, ...]:
+        """Return which components other registers than now would stand for."""
+        if not content.words:
+            return ()
+        return self.values.changed(slot, self._words(slot), content.words)
+
     def requests(self, slot: MapSlot, content: SlotContent) -> tuple[str, ...]:
         """Return all that :meth:`bring_into_force` writes, in words and in this order."""
         requests = [

@@ -53,12 +53,12 @@ class RegisterToolTable(ToolTableCore):
         """Refuse a tool number that cannot be written; sends nothing.
 
         Raises:
-            ConfigError: The map has no probe, and nobody has confirmed it.
             ReservedToolError, ToolIndexError: As :meth:`write` would.
+            NotComparedError: Nobody has compared a value of this tool with the machine's screen.
             ToolError: The PLC's offsets can only be read.
         """
-        self._plc.require_confirmed(tr("tool {tool}", tool=tool))
         super().require_writable(tool)
+        self._plc.require_known_place(tool, tr("tool {tool}", tool=tool))
         if not self._map.slots[tool].table.writable:
             raise ToolError(
                 tr("Tool {tool} is in input registers, which nobody can write.", tool=tool),
@@ -100,10 +100,25 @@ class RegisterToolTable(ToolTableCore):
     def _set(self, tool: int, requested: ToolOffset | None, expected: Expected) -> ToolReceipt:
         request = self._request(tool, requested)
         with self._plc.lock.held(request):
-            self._plc.require_ready(request)
+            self._plc.require_ready(tool, request)
             if not self.same(self.read(tool), requested):
                 self._slots.handshake.make_ready(request)
             return _RegisterWrite(self, self._plc, tool, requested, self._slots).change(expected)
+
+    def preview_clear(self, tool: int, *, then_select: int | None = None) -> tuple[str, ...]:
+        """Return what :meth:`clear` would send besides its reads; raises what it would."""
+        requests = super().preview_clear(tool, then_select=then_select)
+        if requests:
+            self._require_compared(tool, None, "; ".join(requests))
+        return requests
+
+    def _require_possible(self, tool: int, offset: ToolOffset) -> None:
+        self._require_compared(tool, offset, self._request(tool, offset))
+
+    def _require_compared(self, tool: int, offset: ToolOffset | None, request: str) -> None:
+        slot = self._map.slots[tool]
+        changed = self._slots.changed(slot, self._slots.content(slot, offset))
+        self._plc.require_compared(tool, changed, request)
 
     def _request(self, tool: int, requested: ToolOffset | None) -> str:
         return "; ".join(self._requests(tool, requested))
@@ -157,7 +172,7 @@ class _RegisterWrite(ToolWrite):
         content = slots.content(slot, requested)
         request = "; ".join(slots.requests(slot, content))
         super().__init__(plc, tool, requested, request, same=table.same)
-        self._slot, self._content = slot, content
+        self._plc, self._slot, self._content = plc, slot, content
         self._slots = slots
 
     def read_before(self, expected: Expected) -> ToolOffset | None:  # noqa: ARG002 - one way only
@@ -165,7 +180,12 @@ class _RegisterWrite(ToolWrite):
 
         It was read before the PLC was made ready, too: that may have meant to wait for another
         request of the machine, which may have stored another value.
+
+        Raises:
+            NotComparedError: The write would change what nobody has compared.
         """
+        changed = self._slots.changed(self._slot, self._content)
+        self._plc.require_compared(self.tool, changed, self.request)
         return self._slots.read(self._slot)
 
     def send(self) -> None:

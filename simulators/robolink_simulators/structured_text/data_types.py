@@ -6,6 +6,7 @@ same thing is meant, so that VAR_IN_OUT is a reference.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import partial
@@ -121,7 +122,7 @@ class TextVariable:
     def initial(self) -> Value:
         """Return what it holds at first."""
         if isinstance(self.first, list):
-            return list(self.first)
+            return deepcopy(self.first)
         return self.type.initial() if self.first is None else self.first
 
 

@@ -176,6 +176,10 @@ class Declarations:
     ) -> TextVariable:
         variable = TextVariable(name, of, slot)
         if first is not None:
+            if first.data == "initial_members" and dialect is TextDialect.COMMON:
+                raise refused(
+                    TextPlace.of(file, first), tr("members begin with values in the glue only")
+                )
             translator = ExpressionTranslator(self.scope(file, dialect, {}))
             variable.first = initial_value(first, of, translator)
         return variable

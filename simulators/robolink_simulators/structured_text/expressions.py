@@ -16,6 +16,7 @@ from robolink_simulators.structured_text.data_types import (
     DataType,
     Family,
     ScalarType,
+    StructType,
     Value,
 )
 from robolink_simulators.structured_text.functions import function
@@ -134,12 +135,29 @@ def initial_value(tree: Node, of: DataType, translator: ExpressionTranslator) ->
         StructuredTextError: It is no literal, or does not fit the type.
     """
     place = translator.place(tree)
+    if tree.data == "initial_members":
+        return _initial_members(tree, of, translator)
     values = [translator.expression(child) for child in tree.children]
     if tree.data == "initial_list":
         if not isinstance(of, ArrayType) or len(values) != of.size:
             raise refused(place, tr("the list does not fit the array"))
         return [_literal_value(value, of.element, place) for value in values]
     return _literal_value(values[0], of, place)
+
+
+def _initial_members(tree: Node, of: DataType, translator: ExpressionTranslator) -> Value:
+    """Return a structure in which some members begin with a literal of their own."""
+    if not isinstance(of, StructType):
+        raise refused(translator.place(tree), tr("only a structure begins with members"))
+    frame = of.initial()
+    for given in tree.children:
+        name, value = given.children
+        place = translator.place(given)
+        member = of.members.get(str(name).lower())
+        if member is None:
+            raise refused(place, tr("{type} has no member {name}", type=of.name, name=name))
+        frame[member.slot] = _literal_value(translator.expression(value), member.type, place)
+    return frame
 
 
 def _literal_value(value: Typed, of: DataType, place: TextPlace) -> Value:

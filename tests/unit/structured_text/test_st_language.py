@@ -183,3 +183,57 @@ def test_the_glue_may_hold_what_the_common_subset_does_not():
     assert made.value("delays")[1][2] is True
     with pytest.raises(StructuredTextError, match="glue only"):
         StructuredProgram([SourceText("Main.st", main)], "Main")
+
+
+NUMBERS = """
+TYPE Numbers : STRUCT
+  first : DINT;
+  rest : ARRAY [0..1] OF DINT;
+  second : DINT := 7;
+END_STRUCT;
+END_TYPE
+"""
+
+
+def begun(list_text, dialect=TextDialect.CODESYS):
+    main = "PROGRAM Main\n VAR n : DINT; END_VAR\n n := Kept.numbers.first;\nEND_PROGRAM\n"
+    sources = [
+        SourceText("Types.st", NUMBERS, TextDialect.CODESYS),
+        SourceText("Kept.st", f"VAR_GLOBAL\n {list_text};\nEND_VAR\n", dialect),
+        SourceText("Main.st", main, TextDialect.CODESYS),
+    ]
+    made = StructuredProgram(sources, "Main")
+    made.cycle(0)
+    return made
+
+
+def test_members_of_a_structure_may_begin_with_values_in_the_glue():
+    made = begun("numbers : Numbers := (first := -3)")
+    assert made.value("n") == -3
+    assert made.value("Kept.numbers") == [-3, [0, 0], 7]
+    assert begun("numbers : Numbers").value("Kept.numbers") == [0, [0, 0], 7]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("numbers : Numbers := (third := 1)", "no member third"),
+        ("numbers : Numbers := (first := 2.5)", "Kept.st"),
+        ("numbers : Numbers := (first := 1 + other)", "Kept.st"),
+        ("other : DINT := (first := 1)", "only a structure"),
+    ],
+)
+def test_first_values_that_fit_no_member_are_refused(text, words):
+    with pytest.raises(StructuredTextError, match=words):
+        begun(text)
+
+
+def test_members_do_not_begin_with_values_in_the_common_subset():
+    text = f"""{NUMBERS}
+    FUNCTION_BLOCK Main
+      VAR numbers : Numbers := (first := 1); END_VAR
+      numbers.second := 1;
+    END_FUNCTION_BLOCK
+    """
+    with pytest.raises(StructuredTextError, match="glue only"):
+        StructuredProgram([SourceText("main.st", text)], "Main")

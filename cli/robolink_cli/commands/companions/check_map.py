@@ -5,16 +5,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from robolink.errors import ConfigError, DeclinedError
-from robolink.messages import joined, tr
+from robolink.errors import ConfigError
+from robolink.messages import tr
 from robolink.timing import local_label
 from robolink_cli.console.render import note, say, table
 from robolink_cli.session.context import CliContext, controller_options
-from robolink_cli.session.operator_identity import signature_of
 
 if TYPE_CHECKING:
     from robolink.controllers.plc_map import PlcMapController
-    from robolink_cli.commands.companions.map_values import MapValues
 
 
 @click.command("check-map", short_help="Check the map of a PLC's registers.")
@@ -30,7 +28,7 @@ if TYPE_CHECKING:
     "--shows",
     multiple=True,
     metavar="TOOL.AXIS=VALUE",
-    help="What the HMI shows, for example 1.x=12.35: confirms the map. May be repeated.",
+    help="What the HMI shows, for example 1.x=12.35: confirms that value. May be repeated.",
 )
 @controller_options
 def check_map(
@@ -38,7 +36,8 @@ def check_map(
 ) -> None:
     """Check the map of a PLC's registers: the file, or with -c its values against the HMI.
 
-    Without a probe in the PLC nothing is written before a person has compared the values here.
+    What nobody has compared here is not changed by any command. The first value of a tool tells its
+    place, one of each component the rest; a component that is 0 needs a test value.
     """
     if register_list is not None:
         _start(context, register_list)
@@ -92,7 +91,8 @@ def _check_file(context: CliContext, file: Path) -> None:
 
 
 def _check_values(context: CliContext, shows: tuple[str, ...]) -> None:
-    from robolink.register_maps import confirm, confirmation_of
+    from robolink.register_maps import confirmation_of
+    from robolink_cli.commands.companions.map_comparison import MapComparison
     from robolink_cli.commands.companions.map_values import MapValues
 
     with _opened(context) as controller:
@@ -101,57 +101,41 @@ def _check_values(context: CliContext, shows: tuple[str, ...]) -> None:
         if not context.json:
             values.show()
         controller.require_probe()
-        name = controller.who().name
-        confirmed = confirmation_of(name, register_map)
-        if shows or (register_map.probe is None and confirmed is None):
-            compared = _compared(controller, values, shows)
-            person = signature_of(context.operator, context.expected, changes=True)
-            by = person.operator or person.os_user
-            confirmed = confirm(name, register_map, by=by, compared=compared)
+        comparison = MapComparison(context, controller)
+        if shows:
+            comparison.of_answers(values, shows)
+        else:
+            comparison.of_what_is_missing(values)
+        confirmed = confirmation_of(controller.who().name, register_map)
+    missing = confirmed.missing(register_map) if confirmed else []
     payload = values.payload()
     payload["probe"] = None if register_map.probe is None else "fits"
     payload["confirmed_by"] = confirmed.by if confirmed else None
     payload["confirmed_at"] = confirmed.at if confirmed else None
+    payload["compared"] = [str(one) for one in confirmed.compared.values()] if confirmed else []
+    payload["not_compared"] = [str(value) for value in missing]
 
     def show() -> None:
         if register_map.probe is not None:
-            say(tr("The probe reads {value:g}: the map fits.", value=register_map.probe.value))
+            say(tr("The probe reads {value:g}, as it should.", value=register_map.probe.value))
         if confirmed:
             say(
                 tr(
                     "Confirmed by {by} at {at}: {compared}",
                     by=confirmed.by,
                     at=local_label(confirmed.at),
-                    compared=confirmed.compared,
+                    compared=", ".join(map(str, confirmed.compared.values())),
+                )
+            )
+        if missing:
+            say(
+                tr(
+                    "Not compared yet, so not changed by any command: {values}.",
+                    values=", ".join(map(str, missing)),
                 )
             )
 
     context.emit("plc-map-values", payload, show)
-
-
-def _compared(controller: "PlcMapController", values: "MapValues", shows: tuple[str, ...]) -> str:
-    """Return what was compared; a difference takes an earlier confirmation back."""
-    from robolink.register_maps import revoke
-    from robolink_cli.commands.companions.map_values import MapDiffersError
-
-    answers = shows or _asked(controller, values)
-    try:
-        return values.compared(answers)
-    except MapDiffersError as error:
-        held = revoke(controller.who().name, controller.register_map)
-        if held is not None:
-            error.remedy = joined(
-                " ",
-                (
-                    tr(
-                        "The confirmation by {by} of {at} is taken back.",
-                        by=held.by,
-                        at=local_label(held.at),
-                    ),
-                    error.remedy,
-                ),
-            )
-        raise
 
 
 def _opened(context: CliContext) -> "PlcMapController":
@@ -172,35 +156,3 @@ def _opened(context: CliContext) -> "PlcMapController":
         timeout_s=context.timeout_s,
         compare_probe=False,
     )
-
-
-def _asked(controller: "PlcMapController", values: "MapValues") -> list[str]:
-    """Ask what the HMI shows for one value of each form; the PLC's watchdog is kept quiet.
-
-    Raises:
-        DeclinedError: Nobody can be asked, or the person does not answer.
-    """
-    from robolink.runner import POLL_S, Question
-    from robolink_cli.prompts.operator import terminal
-    from robolink_cli.prompts.questions import on_terminal
-
-    wanted = values.to_compare()
-    if not on_terminal():
-        raise DeclinedError(
-            tr("Nobody has compared this map with the HMI, but there is nobody to ask."),
-            remedy=tr(
-                "Run it on a terminal, or give what the HMI shows: {options}.",
-                options=" ".join(f"--shows {key}=..." for key in wanted),
-            ),
-        )
-    answers = []
-    for key in wanted:
-        terminal().ask(tr("What does the HMI show for {key}?", key=key), Question.TEXT)
-        while (line := terminal().poll(POLL_S)) is None:
-            controller.status()
-        if line.strip().lower() == "q":
-            raise DeclinedError(
-                tr("The map is not confirmed."), remedy=tr("Nothing was written; run it again.")
-            )
-        answers.append(f"{key}={line.strip()}")
-    return answers

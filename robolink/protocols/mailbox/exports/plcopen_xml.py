@@ -108,7 +108,7 @@ def _block(unit: DeclaredBlock) -> str:
     added = _data("interfaceasplaintext", plain) + _object_id(unit.name)
     return (
         f'      <pou name="{unit.name}" pouType="{kind}"><interface>{interface}</interface>'
-        f"<body><ST>{_xhtml(unit.body)}</ST></body><addData>{added}</addData></pou>"
+        f"<body><ST>{_paragraph(unit.body)}</ST></body><addData>{added}</addData></pou>"
     )
 
 
@@ -139,6 +139,13 @@ def _variable(variable: DeclaredVariable) -> str:
 
 
 def _initial(variable: DeclaredVariable) -> str:
+    if variable.first.startswith("("):
+        members = (it.split(":=") for it in variable.first.strip("()").split(","))
+        held = (
+            f'<value member="{name.strip()}"><simpleValue value={quoteattr(of.strip())} /></value>'
+            for name, of in members
+        )
+        return f"<structValue>{''.join(held)}</structValue>"
     if not variable.first.startswith("["):
         return f"<simpleValue value={quoteattr(variable.first)} />"
     values: Iterable[str] = variable.first.strip("[]").split(",")
@@ -157,6 +164,12 @@ def _type_of(text: str) -> str:
 
 def _xhtml(text: str) -> str:
     return f'<xhtml xmlns="http://www.w3.org/1999/xhtml">{escape(text)}</xhtml>'
+
+
+def _paragraph(text: str) -> str:
+    """Return a body as Beremiz and OpenPLC read it (docs/reference/structured_text.md 3)."""
+    space = "http://www.w3.org/1999/xhtml"
+    return f'<xhtml:p xmlns:xhtml="{space}">{escape(text)}</xhtml:p>'
 
 
 def _object_id(name: str) -> str:

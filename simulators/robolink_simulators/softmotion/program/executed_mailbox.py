@@ -1,7 +1,6 @@
 """A mailbox program that is executed from its text, on the simulated axis group."""
 
 import re
-import struct
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
@@ -243,15 +242,11 @@ class ExecutedMailbox:
     def _wire(self) -> None:
         """Give the program what an integrator writes into RL_Machine."""
         program, kinds = self.structured, self._group.kinematics.kinds
-        unit = self._units.unit_um
-        low, high = _real_words(unit)
         given: Mapping[str, object] = {
             "xSimulated": True,
             "kinematics": self._kinematics,
             "axisCount": len(kinds),
-            "unitMm": unit / 1000.0,
-            "unitLow": low,
-            "unitHigh": high,
+            "unitMm": self._units.unit_um / 1000.0,
         }
         for name, value in given.items():
             program.put(f"RL_Machine.{name}", value)
@@ -265,7 +260,14 @@ class ExecutedMailbox:
         types |= blocks.blocks(list(own.values())[-1])
         types |= reading_blocks(self._units, self._numbers)
         symbols = {**SYMBOLS, READ_MODE: _read_modes(sources)}
-        return ForeignParts(types, symbols, {"AxisGroup": (AXIS_GROUP, self._group)})
+        groups = dict.fromkeys(_group_names(sources), (AXIS_GROUP, self._group))
+        return ForeignParts(types, symbols, groups)
+
+
+def _group_names(sources: Sequence[SourceText]) -> Sequence[str]:
+    """Return what a program calls its axis group: the integrator writes the name of his own."""
+    given = (re.findall(r"\bAxisGroup\s*:=\s*(\w+)", source.text) for source in sources)
+    return [name for names in given for name in names]
 
 
 def _read_modes(sources: Sequence[SourceText]) -> Sequence[str]:
@@ -276,8 +278,3 @@ def _read_modes(sources: Sequence[SourceText]) -> Sequence[str]:
     """
     named = (re.findall(r"SMC_READ_TOOL_MODE\.(\w+)", source.text) for source in sources)
     return [name for names in named for name in names]
-
-
-def _real_words(number: float) -> tuple[int, int]:
-    low, high = struct.unpack("<HH", struct.pack("<f", number))
-    return low, high

@@ -16,7 +16,16 @@ from robolink.errors import ConfigError
 from robolink.journal._opening import open_log
 from robolink.journal._places import default_location, place_of
 from robolink.journal._traces import traces_of
-from robolink.model import NO_HISTORY, EntryKind, Marker, NewEntry, OutcomeLog, Recorded, Signature, Who
+from robolink.model import (
+    NO_HISTORY,
+    EntryKind,
+    Marker,
+    NewEntry,
+    OutcomeLog,
+    Recorded,
+    Signature,
+    Who,
+)
 
 _QUESTION: Final = """
     SELECT

@@ -26,7 +26,7 @@ from robolink.model import (
 )
 from robolink.protocols.mailbox import Kinematics
 from robolink.testing import MemoryController, MemoryMachine, Subject
-from robolink.testing.tool_checks import another_offset
+from robolink.testing.subject import another_offset
 from robolink.transport import parse_url
 from tests.contract.third_kind import BenchServer, open_bench
 from tests.unit._plc_bench import COMMIT_BIT, Bench, LocalClient

@@ -54,7 +54,6 @@ class PolledGroup(MotionGroupCore):
         link, markers = self._driver, self._driver.markers
         request = "; ".join(self.requests_for(target, profile))
         with link.lock.held(request):
-            markers.require_settled(request)
             self.require_able(request)
             selected = self._tools.selected()
             with link.uninterrupted():

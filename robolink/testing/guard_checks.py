@@ -50,7 +50,28 @@ def a_stop_holds_writes_back(subject: Subject) -> None:
                 controller.stop()
             require(controller.latch.closed, "stop() closes the latch, whatever becomes of it")
             _refuses_acts(controller, subject.tool, StoppedError, "after a stop")
+            begins = "no procedure begins after a stop"
+            with refused(StoppedError, begins), controller.preserved("a check"):
+                pass
+            with refused(StoppedError, "no change begins after a stop"):
+                controller.finish(controller.begin(MarkerKind.CHANGE, "a check", {"tools": {}}))
         tools.write(subject.tool, another_offset(before), expected=before)
+
+
+def a_stop_in_the_last_instant_holds_a_write_back(subject: Subject) -> None:
+    """Between the marker and the request nothing fits but a stop, and the stop comes first."""
+    with subject.kept() as controller:
+        tools, before = controller.tools, defined(controller, subject.tool)
+        for name, act in forbidden_acts(controller, subject.tool).items():
+            promise = f"{name} is refused where a stop came before it left"
+            with (
+                subject.releasing_stop(controller),
+                stopped_when_marked(controller),
+                refused(StoppedError, promise),
+            ):
+                act()
+            require(tools.same(tools.read(subject.tool), before), f"{name} has changed nothing")
+            require(not controller.outcomes.open_markers(), f"{name} was not sent: nothing is open")
 
 
 def a_stop_lets_the_tool_be_put_back(subject: Subject) -> None:
@@ -66,8 +87,10 @@ def a_stop_lets_the_tool_be_put_back(subject: Subject) -> None:
                     tools.select(0 if before else subject.tool)
                 controller.stop()
             left = controller.outcomes.open_markers()
-            kept = tools.selected() == before or any(m.details.get("tool") == before for m in left)
-            require(kept, "after a stop the tool of before is selected, or its marker names it")
+            named = any(marker.details.get("tool") == before for marker in left)
+            # A PLC that holds the stop takes no selection until it is reset.
+            kept = tools.selected() == before or (named and controller.status().paused)
+            require(kept, "after a stop the tool of before is selected")
         for marker in left:
             controller.resolver.settle(controller.resolver.examine(marker))
         require(tools.selected() == before, "the tool of before is selected again")
@@ -188,6 +211,27 @@ def _is_open(controller: Controller, marker: Marker) -> bool:
 
 
 @contextmanager
+def stopped_when_marked(controller: Controller) -> Iterator[None]:
+    """Let a stop come in a block as soon as a marker is stored.
+
+    Args:
+        controller: Whose markers.
+    """
+    store = controller.outcomes.begin
+
+    def store_and_stop(marker: Marker) -> None:
+        store(marker)
+        controller.latch.close()
+
+    record = vars(controller.outcomes)
+    record["begin"] = store_and_stop
+    try:
+        yield
+    finally:
+        del record["begin"]
+
+
+@contextmanager
 def full_record(controller: Controller) -> Iterator[None]:
     """Let no marker be stored in a block, as on a disk that is full.
 
@@ -210,6 +254,7 @@ GUARD_CHECKS: Final[tuple[Check, ...]] = (
     what_is_unsettled_blocks,
     nothing_is_sent_that_cannot_be_recorded,
     a_stop_holds_writes_back,
+    a_stop_in_the_last_instant_holds_a_write_back,
     a_stop_lets_the_tool_be_put_back,
     values_of_no_tool_are_refused,
     text_is_no_value,

@@ -22,7 +22,13 @@ from robolink.model import (
     ToolOffset,
     WorkBox,
 )
-from robolink.testing.guard_checks import defined, forbidden_acts, full_record, left_unsettled
+from robolink.testing.guard_checks import (
+    defined,
+    forbidden_acts,
+    full_record,
+    left_unsettled,
+    stopped_when_marked,
+)
 from robolink.testing.subject import Check, Subject, refused, require
 
 _SLACK_MM: Final = 0.1
@@ -113,6 +119,15 @@ def nothing_moves_that_cannot_be_recorded(subject: Subject) -> None:
         _refuses_to_move(controller, subject, JournalError, promise)
 
 
+def a_stop_in_the_last_instant_holds_a_movement_back(subject: Subject) -> None:
+    """Between the marker and the request nothing fits but a stop, and the stop comes first."""
+    with subject.movable() as controller:
+        with subject.releasing_stop(controller), stopped_when_marked(controller):
+            promise = "nothing moves where a stop came before it left"
+            _refuses_to_move(controller, subject, StoppedError, promise)
+        require(not controller.outcomes.open_markers(), "it was not sent: nothing is open")
+
+
 def nothing_is_written_while_it_moves(subject: Subject) -> None:
     """The movement would end somewhere else than its target says."""
     with subject.kept() as controller:
@@ -174,6 +189,7 @@ MOVING_CHECKS: Final[tuple[Check, ...]] = (
     a_stop_ends_a_movement,
     what_is_unsettled_holds_movements_back,
     nothing_moves_that_cannot_be_recorded,
+    a_stop_in_the_last_instant_holds_a_movement_back,
 )
 """They move the robot, a step up and down again."""
 

@@ -27,6 +27,8 @@ from robolink.stop_latch import StopLatch
 from robolink.timing import local_label, wall_label
 
 _PROCEDURES: Final = frozenset({MarkerKind.SELECTION, MarkerKind.CHANGE})
+_OF_A_TOOL: Final = frozenset({"tool", "select"})
+"""Details of what writes, clears or selects a tool."""
 
 
 class ProcedureLock:
@@ -91,8 +93,7 @@ class MarkerStore:
         self.outcomes = outcomes
         self.ledger = Ledger()
         self._procedures: dict[MarkerKind, Marker] = {}
-        self._under_way: set[str] = set()
-        self._moves: set[str] = set()
+        self._under_way: dict[str, MarkerKind] = {}
 
     def look(self) -> None:
         """Note the state of the lease before a value is read that a write will rely on.
@@ -109,7 +110,7 @@ class MarkerStore:
     @property
     def moving(self) -> bool:
         """Whether a movement was begun here whose end is not proved."""
-        return bool(self._moves)
+        return MarkerKind.MOVE in self._under_way.values()
 
     def begin(
         self,
@@ -122,8 +123,9 @@ class MarkerStore:
         """Store a marker durably: a new one, or one of before whose work is taken up again.
 
         Whatever writes, moves or begins a procedure passes here, in a driver of anybody's. So this
-        is where it is refused while something earlier is unsettled (docs/reference/rules.md 1);
-        only what puts back an earlier state goes on, and the work of a marker of before.
+        is where it is refused after a stop, while something earlier is unsettled, and, of a tool,
+        while the robot moves (docs/reference/rules.md 1, 2, 5). Only what puts back an earlier
+        state goes on, and the work of a marker of before.
 
         Args:
             kind: What it stands for.
@@ -133,21 +135,24 @@ class MarkerStore:
 
         Raises:
             ConfigError: That is impossible.
-            BusyError: Another process has the controller.
+            BusyError: Another process has the controller, or a movement is under way here.
+            StoppedError: A stop is in force.
             OutcomeUnknownError: Something earlier is unsettled; nothing may be sent.
             LeaseLostError: Somebody else was at it and has just ended.
         """
-        if not operation and not self._latch.restores and self._unsettled(self._under_way):
-            self._refuse_unsettled(request, besides=self._under_way)
-            raise self._overtaken(request)
+        if not operation and not self._latch.restores:
+            self._latch.require_open(request)
+            if kind is MarkerKind.SET and not _OF_A_TOOL.isdisjoint(details):
+                self._refuse_while_moving(request)
+            if self._unsettled(self._under_way):
+                self._refuse_unsettled(request, besides=self._under_way)
+                raise self._overtaken(request)
         name = operation or new_operation()
         marker = Marker(name, kind, request, wall_label(), dict(details))
         if not self._recorded(lambda: self.outcomes.begin(marker)):
             self._unstored.add(name)
         self.ledger.begin(marker)
-        self._under_way.add(name)
-        if kind is MarkerKind.MOVE:
-            self._moves.add(name)
+        self._under_way[name] = kind
         if kind in _PROCEDURES:
             self._procedures[kind] = marker
         return marker
@@ -161,8 +166,7 @@ class MarkerStore:
             OutcomeUnknownError: The same of something that was sent: what it left may be changed.
         """
         self.ledger.ended(marker)
-        self._under_way.discard(marker.operation)
-        self._moves.discard(marker.operation)
+        self._under_way.pop(marker.operation, None)
         cleared = True
         if marker.kind in _PROCEDURES:
             self.outcomes.clear(marker.operation, *entries)
@@ -188,7 +192,7 @@ class MarkerStore:
         Args:
             marker: It.
         """
-        self._under_way.discard(marker.operation)
+        self._under_way.pop(marker.operation, None)
 
     @contextmanager
     def unless_stopped(self, marker: Marker) -> Iterator[None]:
@@ -228,6 +232,18 @@ class MarkerStore:
             LeaseHeldError: Somebody else is at it.
         """
         self._refuse_unsettled(request, besides=())
+
+    def _refuse_while_moving(self, request: str) -> None:
+        if MarkerKind.MOVE in self._under_way.values():
+            raise BusyError(
+                tr(
+                    "{request} has to wait: the end of a movement has not been seen.",
+                    request=request,
+                ),
+                remedy=tr("Wait for the movement, or stop it."),
+                controller=self._identity,
+                request=request,
+            )
 
     def _refuse_unsettled(self, request: str, *, besides: Collection[str]) -> None:
         unsettled = self._unsettled(besides)

@@ -114,8 +114,18 @@ class MotionGroupCore(ABC):
     def abort_unfinished(self) -> None:
         """End the movements that were begun here and not seen to their end."""
 
-    def _marked(self, target: Pose, request: str) -> Marker:
-        """Store the marker of a movement that is about to be sent."""
+    def _marked(self, target: Pose, request: str, *, selected: int | None) -> Marker:
+        """Store the marker of a movement that is about to be sent to where its own tool stands.
+
+        Args:
+            target: Where it goes.
+            request: What is sent, as a person may read it.
+            selected: The tool that was read as the one in force.
+
+        Raises:
+            NotReadyError: The target is meant for another tool; nothing may be sent.
+        """
+        self._require_tool(target, selected, request)
         details = {"target": list(target.coordinates())}
         return self._driver.markers.begin(MarkerKind.MOVE, request, details)
 

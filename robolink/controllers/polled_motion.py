@@ -54,11 +54,10 @@ class PolledGroup(MotionGroupCore):
         link, markers = self._driver, self._driver.markers
         request = "; ".join(self.requests_for(target, profile))
         with link.lock.held(request):
-            markers.require_settled(request)
             self.require_able(request)
-            self._require_tool(target, self._tools.selected(), request)
+            selected = self._tools.selected()
             with link.uninterrupted():
-                marker = self._marked(target, request)
+                marker = self._marked(target, request, selected=selected)
                 with markers.doubt(request):
                     try:
                         self._send_move(target, profile)

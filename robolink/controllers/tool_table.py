@@ -29,8 +29,15 @@ from robolink.errors import (
     ToolIndexError,
     UndefinedToolError,
 )
-from robolink.messages import tr
-from robolink.model import ANY, Expected, ToolOffset, ToolReceipt
+from robolink.messages import joined, tr
+from robolink.model import (
+    ANY,
+    Expected,
+    ToolOffset,
+    ToolReceipt,
+    describe_offset,
+    put_right,
+)
 from robolink.ways import Way, way
 
 
@@ -168,6 +175,7 @@ class ToolTableCore(ABC):
         self.require_writable(tool)
         _require_offset(offset)
         _require_expected(expected)
+        self._require_values_of_a_tool(tool, offset)
         return self._set(tool, self._storable(tool, offset), expected)
 
     def clear(
@@ -189,6 +197,7 @@ class ToolTableCore(ABC):
         """
         self.require_writable(tool)
         _require_offset(offset)
+        self._require_values_of_a_tool(tool, offset)
         self._require_readable(tool)
         requested = self._storable(tool, offset)
         requests = self._requests(tool, requested)
@@ -241,6 +250,7 @@ class ToolTableCore(ABC):
                     request=request,
                 )
             offset = self._require_defined(tool)
+            self._require_values_of_a_tool(tool, offset)
             self._prepare_selection(tool, request)
             selection = _Selection(
                 request,
@@ -298,6 +308,23 @@ class ToolTableCore(ABC):
                 request=self._select_request(tool),
             )
         return offset
+
+    def _require_values_of_a_tool(self, tool: int, offset: ToolOffset) -> None:
+        """Refuse values of no tool, unless they are put back.
+
+        They may be read and replaced, never worked with or written: an EPSON controller goes into
+        error over such a statement, which leaves its outcome in doubt.
+        """
+        if offset.of_no_tool and not self._driver.latch.restores:
+            raise ToolError(
+                tr(
+                    "Tool {tool} was neither written nor selected: these are {values}.",
+                    tool=tool,
+                    values=describe_offset(offset),
+                ),
+                remedy=joined(" ", filter(None, (tr("Nothing was sent."), put_right(offset)))),
+                controller=self._driver.identity,
+            )
 
     def _require_known(self, tool: int, *, lowest: int = 0) -> None:
         if not isinstance(tool, int) or isinstance(tool, bool):

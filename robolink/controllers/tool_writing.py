@@ -91,7 +91,17 @@ class ToolWrite(MarkedCommand[ToolOffset | None]):
         return self.read_back()
 
     def change(self, expected: Expected) -> ToolReceipt:
-        """Write and read back; see :meth:`robolink.model.ToolTable.write`."""
+        """Write and read back, while no other procedure runs; see the model.
+
+        Raises:
+            BusyError: Another thread is at work on this controller.
+            StoppedError: A stop is in force, or came meanwhile.
+            RobolinkError: As :meth:`robolink.model.ToolTable.write`.
+        """
+        with self._link.lock.held(self.request):
+            return self._changed(expected)
+
+    def _changed(self, expected: Expected) -> ToolReceipt:
         markers, self._unconditional = self._link.markers, expected is ANY
         if self._unconditional:
             purpose = tr("write tool {tool} blindly", tool=self.tool)

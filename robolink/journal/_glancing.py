@@ -6,6 +6,7 @@ controller, and has this address been met before? No and yes are believed; all e
 trouble with the file, opens the journal as for everybody.
 """
 
+import json
 import sqlite3
 from collections.abc import Collection, Iterator
 from contextlib import AbstractContextManager, closing
@@ -16,7 +17,9 @@ from robolink.journal._opening import open_log
 from robolink.journal._places import default_location, place_of
 from robolink.journal._processes import this_process
 from robolink.journal._runs import forget_client, note_client, run_of
+from robolink.journal._traces import traces_of
 from robolink.model import (
+    NO_HISTORY,
     ClientRun,
     EntryKind,
     Marker,
@@ -30,7 +33,7 @@ from robolink.model import (
 _QUESTION: Final = """
     SELECT
         EXISTS (SELECT 1 FROM markers) OR EXISTS (SELECT 1 FROM leases WHERE token <> ''),
-        EXISTS (SELECT 1 FROM addresses WHERE address = ?)
+        (SELECT controller FROM addresses WHERE address = ?)
 """
 _NAMES: Final = """
     SELECT DISTINCT tool, station FROM entries
@@ -40,6 +43,12 @@ _NAMES: Final = """
             JOIN addresses ON addresses.controller = robots.controller WHERE address = ?
         UNION VALUES (?)
     )
+"""
+_HISTORY: Final = """
+    SELECT 1 FROM entries WHERE controller IN (
+        SELECT ? UNION SELECT name FROM robots WHERE controller = ?
+        UNION SELECT name FROM former_names WHERE controller = ?
+    ) AND kind NOT IN (SELECT value FROM json_each(?)) LIMIT 1
 """
 _WAIT_S: Final = 1.0
 """Longest wait for another process that writes; after it the journal says what is the matter."""
@@ -227,13 +236,23 @@ def nothing_is_open(address: str) -> bool:
 
     Args:
         address: How the controller is reached. One that was not met there before is asked who
-            it is, and what follows from that is said.
+            it is, and what follows from that is said. So is one that was changed from here, where
+            this journal might not be its record.
 
     Returns:
         False also where that cannot be told; a server is not asked.
     """
-    rows = _asked(_QUESTION, (address,))
-    return any(known and not unfinished for unfinished, known in rows)
+    ((unfinished, known),) = _asked(_QUESTION, (address,)) or [(True, None)]
+    return bool(known) and not unfinished and _is_its_record(str(known))
+
+
+def _is_its_record(name: str) -> bool:
+    """Whether nothing shows that what was done to a controller is on record elsewhere, or lost."""
+    traces = traces_of((name,))
+    if traces is None:
+        return True
+    kept_here = traces.journal in ("", place_of(default_location()).location)
+    return kept_here and bool(_asked(_HISTORY, (name, name, name, json.dumps(NO_HISTORY))))
 
 
 def _asked(question: str, values: tuple[str, ...]) -> list[tuple[Any, ...]]:

@@ -11,7 +11,7 @@ from robolink.journal._lease import Lease
 from robolink.journal._naming import Names, Naming
 from robolink.journal._processes import BootClock, LeaseHolder, this_process
 from robolink.journal._runs import forget_client, note_client, run_of
-from robolink.journal._traces import leave_trace, traces_of
+from robolink.journal._traces import LOST, Traces, leave_trace, traces_of
 from robolink.messages import tr
 from robolink.model import (
     NO_HISTORY,
@@ -85,8 +85,8 @@ class JournalOutcomeLog:
         self._told = 0
         self._holds = 0
         self._sound = False
-        self._has_history = False
-        self._traced = False
+        self._whole = False
+        self._traced = not store.durable  # what dies with this process needs no trace
 
     @property
     def identity(self) -> str:
@@ -129,8 +129,12 @@ class JournalOutcomeLog:
     def begin(self, marker: Marker) -> None:
         """Store ``marker`` in one durable transaction that also proves or takes the lease.
 
+        The first one of a controller is put on record whatever it stands for, so that a record
+        which was lost later is told from a new one.
+
         Raises:
             JournalError: It is not stored. The command must not be sent.
+            OutcomeUnknownError: The record of what was done before is missing; so too.
             LeaseHeldError: Somebody else is changing this controller.
             LeaseLostError: Somebody else was, since :meth:`look` or since the lease was taken.
         """
@@ -138,18 +142,26 @@ class JournalOutcomeLog:
             names = self._named()
             name = names.identity
             self._require_sound()
+            if not self._begun:  # else it was asked then, and what is put back may not fail now
+                self._refuse_lost()
             self._lease.prepare()
+            newest: tuple[int, str] | None = None
             with self._writing(_untouched()) as tables:
                 grip = self._lease.secure(tables.leases, marker.request, self.signature.operator)
                 first = tables.markers.put(name, _of_robot(marker, names.robot))
                 told = _beginning(marker, first=first)
+                if not (told or self._traced) and not tables.entries.history(names.all):
+                    told = (_act(EntryKind.INTENT, marker),)
                 self._put(tables, names.record, (*grip.entries, *told))
+                if not self._traced:
+                    newest = tables.entries.head()
             self._begun.add(marker.operation)
             self._lease.settle(grip)
-            if told and self.durable and not self._traced:
+            if not self._traced:
                 # Only beside what is on record: a trace without a record means a lost one.
-                leave_trace(name, self._journal.location)
-                self._traced = True
+                with suppress(OSError):  # a state folder that is full is no matter
+                    leave_trace(name, self._journal.location, newest)
+                self._traced = self._whole = True
 
     def clear(self, operation: str, *entries: NewEntry) -> None:
         """Forget a marker and record how it ended, in one durable transaction.
@@ -160,6 +172,7 @@ class JournalOutcomeLog:
                 what was true here need not be true any more.
             OutcomeUnknownError: Another has settled it meanwhile; nothing is recorded either.
         """
+        newest: tuple[int, str] | None = None
         with self._lock:
             names = self._named()
             last = not self._holds and not self._begun - {operation}
@@ -172,9 +185,13 @@ class JournalOutcomeLog:
                 if operation in self._begun and not known:
                     raise self._settled_by_another()
                 self._put(tables, names.record, entries)
+                if operation == LOST:
+                    newest = tables.entries.head()
             self._begun.discard(operation)
             if last:
                 self._lease.forget()
+            if operation == LOST:
+                self._begin_anew(names.identity, newest)
 
     def _proved(self, tables: "Tables", operation: str, *, last: bool) -> None:
         """Prove that what was begun here still is this log's to end."""
@@ -209,23 +226,47 @@ class JournalOutcomeLog:
     def open_markers(self) -> tuple[Marker, ...]:
         """Return what is unsettled on this controller, oldest first, whoever began it.
 
-        A journal that knows nothing of a controller which was changed from here before has lost
-        what was unfinished: that is unsettled too.
+        A journal that knows nothing of a controller which was changed from here before, or not
+        what was noted of it last, has lost what was unfinished: that is unsettled too.
 
         Raises:
             JournalError: It cannot be read.
         """
         names = self._named().all
-        traces = traces_of(names) if self.durable and not self._has_history else None
+        traces = traces_of(names) if self.durable and not self._whole else None
         with self._store.read() as tables:
             found = tables.markers.of(*names)
             if traces is None or found:
                 return found
-            self._has_history = tables.entries.history(names)
-        return () if self._has_history else (traces.marker(self._journal.location),)
+            self._whole = tables.entries.history(names) and self._goes_on(traces, tables)
+        return () if self._whole else (traces.marker(self._journal.location),)
+
+    def _goes_on(self, traces: Traces, tables: "Tables") -> bool:
+        """Whether the record of a controller is this one, wherever it was moved to meanwhile."""
+        if traces.newest is None or traces.journal == self._journal.location:
+            return True
+        return tables.entries.holds(*traces.newest)
+
+    def _begin_anew(self, name: str, newest: tuple[int, str] | None) -> None:
+        """Note that the record of a controller is kept here, because a person said so.
+
+        Raises:
+            JournalError: That cannot be noted, so the record counts as missing still.
+        """
+        try:
+            leave_trace(name, self._journal.location, newest)
+        except OSError as error:
+            raise JournalError(
+                tr("Where this controller's record is kept cannot be noted: {cause}", cause=error),
+                remedy=tr(
+                    "Make the state folder writable, or name another one with "
+                    "ROBOLINK_STATE_DIR. Then run 'robolink recover' again."
+                ),
+                controller=name,
+            ) from error
 
     def _refuse_lost(self) -> None:
-        if self._has_history or not self.durable:
+        if self._whole or not self.durable:
             return
         if any(marker.kind is MarkerKind.HISTORY for marker in self.open_markers()):
             raise OutcomeUnknownError(
@@ -421,13 +462,17 @@ def _beginning(marker: Marker, *, first: bool) -> tuple[NewEntry, ...]:
     writes = marker.kind is MarkerKind.SET
     if kind is None or (writes and tool is None) or not (writes or first):
         return ()
-    return (
-        NewEntry(
-            kind,
-            operation=marker.operation,
-            tool=tool if isinstance(tool, int) else None,
-            details={**marker.details, "request": marker.request},
-        ),
+    return (_act(kind, marker),)
+
+
+def _act(kind: EntryKind, marker: Marker) -> NewEntry:
+    """Return what is put on record about what ``marker`` stands for."""
+    tool = marker.details.get("tool")
+    return NewEntry(
+        kind,
+        operation=marker.operation,
+        tool=tool if isinstance(tool, int) else None,
+        details={**marker.details, "request": marker.request},
     )
 
 

@@ -1,14 +1,14 @@
 """What outlives a journal: signs that a controller was changed from here before.
 
 A journal that was emptied, deleted or replaced knows nothing of what is unfinished, and looks
-as a new one does. So the first change of each controller leaves a small file in the state
-folder, and its first backup stands there too; a journal without history beside them is not one
-in which nothing is unsettled.
+as a new one does; so does an older one that is named again. So the first change of each controller
+leaves a small file in the state folder, which says where its record is kept and which entry was the
+newest then, and its first backup stands there too. A journal without history beside them, or one
+without that entry, is not one in which nothing is unsettled.
 """
 
 import json
-from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -18,7 +18,9 @@ from robolink.model import Marker, MarkerKind
 from robolink.timing import wall_label
 
 _SCHEMA: Final = "robolink/known-controller/1"
-_OPERATION: Final = "history"
+
+LOST: Final = "history"
+"""The operation of the marker that stands for a record which is missing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,12 +29,15 @@ class Traces:
 
     Attributes:
         since: When it was changed first, as a label; empty where only the backup tells.
-        journal: Where its record was then.
+        journal: Where its record is kept; empty where only the backup tells.
+        newest: Number and hash of the newest entry there when that was noted, ``None`` where it was
+            not.
         backup: Its first backup, ``None`` where there is none.
     """
 
     since: str
     journal: str
+    newest: tuple[int, str] | None
     backup: Path | None
 
     def marker(self, journal: str) -> Marker:
@@ -45,31 +50,54 @@ class Traces:
         if self.backup is not None:
             details["backup"] = str(self.backup)
         request = tr("the record of this controller is missing")
-        return Marker(_OPERATION, MarkerKind.HISTORY, request, self.since, details)
+        return Marker(LOST, MarkerKind.HISTORY, request, self.since, details)
 
 
-def leave_trace(identity: str, journal: str) -> None:
-    """Note that a controller is changed from here; a state folder that is full is no matter."""
+def leave_trace(identity: str, journal: str, newest: tuple[int, str] | None) -> None:
+    """Note that a controller is changed from here, and where that is on record.
+
+    Args:
+        identity: Which controller.
+        journal: Where its record is kept from now on.
+        newest: Number and hash of the newest entry there.
+
+    Raises:
+        OSError: It cannot be noted.
+    """
     path = _path(identity)
-    if _is_there(path):
+    before = _noted(identity)
+    if before is not None and before.journal == journal:
         return
-    known = {"schema": _SCHEMA, "controller": identity, "journal": journal, "since": wall_label()}
-    with suppress(OSError):
-        make_folder(path.parent)
-        write_whole(path, json.dumps(known).encode())
+    known = {
+        "schema": _SCHEMA,
+        "controller": identity,
+        "journal": journal,
+        "since": before.since if before is not None else wall_label(),
+        "newest": newest,
+    }
+    make_folder(path.parent)
+    write_whole(path, json.dumps(known).encode())
 
 
 def traces_of(names: tuple[str, ...]) -> Traces | None:
     """Return the signs of a controller under any of its names, ``None`` for none."""
     backups = (state_folder("backups") / file_name(name) for name in names)
     backup = next((path for path in backups if _is_there(path)), None)
-    for name in names:
-        try:
-            known = json.loads(_path(name).read_bytes())
-            return Traces(str(known["since"]), str(known["journal"]), backup)
-        except (OSError, ValueError, KeyError, TypeError, RecursionError):
-            continue
-    return None if backup is None else Traces("", "", backup)
+    noted = next(filter(None, map(_noted, names)), None)
+    if noted is not None:
+        return replace(noted, backup=backup)
+    return None if backup is None else Traces("", "", None, backup)
+
+
+def _noted(name: str) -> Traces | None:
+    """Return what was noted of a controller under one name; what cannot be read says nothing."""
+    try:
+        known = json.loads(_path(name).read_bytes())
+        newest = known.get("newest")
+        entry = None if newest is None else (int(newest[0]), str(newest[1]))
+        return Traces(str(known["since"]), str(known["journal"]), entry, None)
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
+        return None
 
 
 def _is_there(path: Path) -> bool:

@@ -354,6 +354,8 @@ class CallbackConversation:
             log.append(entry)
         except ConfigError:
             code = "journal"
+        except OutcomeUnknownError:
+            pass  # the record itself is missing, which is why it was refused
         if self._in_work():
             return CallbackWord.BACK, (code,)
         self._run = None

@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     from robolink.testing.memory_controller import MemoryController as MemoryController
     from robolink.testing.memory_controller import MemoryMachine as MemoryMachine
     from robolink.testing.motion_checks import MOVING_CHECKS as MOVING_CHECKS
+    from robolink.testing.motion_checks import (
+        WRITING_WHILE_MOVING_CHECKS as WRITING_WHILE_MOVING_CHECKS,
+    )
     from robolink.testing.on_site import kept_on_site as kept_on_site
     from robolink.testing.paper_cell import PaperCell as PaperCell
     from robolink.testing.reading_checks import READING_CHECKS as READING_CHECKS
@@ -29,7 +32,7 @@ else:
         {
             "compared_map": "confirm_whole_map",
             "memory_controller": "MemoryController MemoryMachine",
-            "motion_checks": "MOVING_CHECKS",
+            "motion_checks": "MOVING_CHECKS WRITING_WHILE_MOVING_CHECKS",
             "on_site": "kept_on_site",
             "paper_cell": "PaperCell",
             "reading_checks": "READING_CHECKS",

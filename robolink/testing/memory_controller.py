@@ -234,10 +234,8 @@ class _MemoryTools(ToolTableCore):
 
     def _set(self, tool: int, requested: ToolOffset | None, expected: Expected) -> ToolReceipt:
         request = self._request(tool, requested)
-        with self._link.lock.held(request):
-            return _MemoryWrite(self._link, tool, requested, request, same=self.same).change(
-                expected
-            )
+        write = _MemoryWrite(self._link, tool, requested, request, same=self.same)
+        return write.change(expected)
 
     def _request(self, tool: int, requested: ToolOffset | None) -> str:
         return f"tool {tool} = {requested}"

@@ -3,7 +3,15 @@
 from dataclasses import replace
 from typing import Final
 
-from robolink.errors import LimitError, NotReadyError, StoppedError
+from robolink.errors import (
+    BusyError,
+    JournalError,
+    LimitError,
+    NotReadyError,
+    OutcomeUnknownError,
+    RobolinkError,
+    StoppedError,
+)
 from robolink.model import (
     Controller,
     Jump,
@@ -13,6 +21,13 @@ from robolink.model import (
     Pose,
     ToolOffset,
     WorkBox,
+)
+from robolink.testing.guard_checks import (
+    defined,
+    forbidden_acts,
+    full_record,
+    left_unsettled,
+    stopped_when_marked,
 )
 from robolink.testing.subject import Check, Subject, refused, require
 
@@ -88,6 +103,63 @@ def a_stop_ends_a_movement(subject: Subject) -> None:
             _is_at(controller, rest, "what was stopped stands still")
 
 
+def what_is_unsettled_holds_movements_back(subject: Subject) -> None:
+    """Nobody knows how long the tool in force is then, nor where the robot was to go."""
+    with left_unsettled(subject) as second:
+        if second is not None:
+            subject.prepare(second)
+            promise = "nothing moves while something is unsettled"
+            _refuses_to_move(second, subject, OutcomeUnknownError, promise)
+
+
+def nothing_moves_that_cannot_be_recorded(subject: Subject) -> None:
+    """A process that is killed in a movement without a marker leaves nothing that would block."""
+    with subject.movable() as controller, full_record(controller):
+        promise = "nothing moves that cannot be recorded"
+        _refuses_to_move(controller, subject, JournalError, promise)
+
+
+def a_stop_in_the_last_instant_holds_a_movement_back(subject: Subject) -> None:
+    """Between the marker and the request nothing fits but a stop, and the stop comes first."""
+    with subject.movable() as controller:
+        with subject.releasing_stop(controller), stopped_when_marked(controller):
+            promise = "nothing moves where a stop came before it left"
+            _refuses_to_move(controller, subject, StoppedError, promise)
+        require(not controller.outcomes.open_markers(), "it was not sent: nothing is open")
+
+
+def nothing_is_written_while_it_moves(subject: Subject) -> None:
+    """The movement would end somewhere else than its target says."""
+    with subject.kept() as controller:
+        subject.prepare(controller)
+        tools, group = controller.tools, controller.groups[0]
+        before, selected = defined(controller, subject.tool), tools.selected()
+        acts = forbidden_acts(controller, subject.tool)
+        start = group.pose()
+        box = _around(start, subject)
+        motion = group.move_to(_raised(start, subject.step_mm), _PROFILE, box=box)
+        try:
+            for name, act in acts.items():
+                with refused((BusyError, NotReadyError), f"{name} is refused while it moves"):
+                    act()
+        finally:
+            motion.wait(timeout_s=_TIMEOUT_S)
+        require(tools.same(tools.read(subject.tool), before), "the old value is still there")
+        require(tools.selected() == selected, "no tool was selected meanwhile")
+        group.move_to(start, _PROFILE, box=box).wait(timeout_s=_TIMEOUT_S)
+
+
+def _refuses_to_move(
+    controller: Controller, subject: Subject, kind: type[RobolinkError], promise: str
+) -> None:
+    group = controller.groups[0]
+    start = group.pose()
+    with refused(kind, promise):
+        target, box = _raised(start, subject.step_mm), _around(start, subject)
+        group.move_to(target, _PROFILE, box=box).wait(timeout_s=_TIMEOUT_S)
+    _stands(controller, start)
+
+
 def _raised(pose: Pose, by_mm: float) -> Pose:
     return replace(pose, z_mm=pose.z_mm + by_mm)
 
@@ -115,5 +187,11 @@ MOVING_CHECKS: Final[tuple[Check, ...]] = (
     a_target_counts_for_its_own_tool,
     a_preview_of_a_movement_moves_nothing,
     a_stop_ends_a_movement,
+    what_is_unsettled_holds_movements_back,
+    nothing_moves_that_cannot_be_recorded,
+    a_stop_in_the_last_instant_holds_a_movement_back,
 )
 """They move the robot, a step up and down again."""
+
+WRITING_WHILE_MOVING_CHECKS: Final[tuple[Check, ...]] = (nothing_is_written_while_it_moves,)
+"""They do both, so a tool has to be named that may be written."""

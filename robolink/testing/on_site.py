@@ -34,7 +34,7 @@ from robolink.model import (
     plain_offset,
 )
 from robolink.standing import Standing, note_standing
-from robolink.testing.tool_checks import another_offset
+from robolink.testing.subject import another_offset
 from robolink.timing import Deadline, SystemClock
 
 _REST_S: Final = 10.0

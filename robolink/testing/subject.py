@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from robolink.errors import OutcomeUnknownError, ProtocolError, RobolinkError, TransportError
 from robolink.model import Controller, ToolOffset
@@ -120,9 +120,16 @@ def require(kept: object, promise: str) -> None:
         raise ContractBrokenError(promise)
 
 
+def another_offset(value: ToolOffset | None) -> ToolOffset:
+    """Return an offset that no controller takes for the same."""
+    return ToolOffset(10.0, 20.0, 30.0) if value is None else replace(value, x_mm=value.x_mm + 0.5)
+
+
 @contextmanager
-def refused(kind: type[RobolinkError], promise: str) -> Iterator[None]:
-    """Surround what has to be refused by an error of one kind.
+def refused(
+    kinds: type[RobolinkError] | tuple[type[RobolinkError], ...], promise: str
+) -> Iterator[None]:
+    """Surround what has to be refused by an error of one kind, or of one of several.
 
     Raises:
         ContractBrokenError: It was not, or by another error.
@@ -130,10 +137,11 @@ def refused(kind: type[RobolinkError], promise: str) -> Iterator[None]:
     """
     try:
         yield
-    except kind:
+    except kinds:
         return
     except (TransportError, ProtocolError, OutcomeUnknownError):
         raise
     except RobolinkError as error:
         raise ContractBrokenError(f"{promise}: {type(error).__name__} instead: {error}") from error
-    raise ContractBrokenError(f"{promise}: {kind.__name__} was not raised")
+    names = (kind.__name__ for kind in (kinds if isinstance(kinds, tuple) else (kinds,)))
+    raise ContractBrokenError(f"{promise}: {' or '.join(names)} was not raised")

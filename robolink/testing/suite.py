@@ -6,7 +6,7 @@ from pathlib import Path
 from traceback import extract_tb
 
 from robolink.errors import RobolinkError
-from robolink.testing.motion_checks import MOVING_CHECKS
+from robolink.testing.motion_checks import MOVING_CHECKS, WRITING_WHILE_MOVING_CHECKS
 from robolink.testing.reading_checks import READING_CHECKS
 from robolink.testing.subject import Check, ContractBrokenError, Subject
 from robolink.testing.tool_checks import WRITING_CHECKS
@@ -100,6 +100,7 @@ def check_controller(subject: Subject, *, writes: bool = True, moves: bool = Tru
         checks += WRITING_CHECKS
     if moves and able.motion:
         checks += MOVING_CHECKS
+        checks += WRITING_WHILE_MOVING_CHECKS if writes and able.tool_write else ()
     broken = [f"{it.name}: {it.broken}" for it in outcomes(subject, checks) if it.broken]
     if broken:
         raise ContractBrokenError("\n".join(broken))

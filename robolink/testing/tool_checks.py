@@ -8,18 +8,17 @@ from typing import Final
 
 from robolink.errors import (
     BusyError,
-    OutcomeUnknownError,
     RejectedError,
     ReservedToolError,
     RobolinkError,
     SelectedToolError,
-    StoppedError,
     ToolChangedError,
     ToolError,
     UndefinedToolError,
 )
-from robolink.model import ANY, Controller, Jump, Marker, MarkerKind, ToolOffset
-from robolink.testing.subject import Check, Subject, refused, require
+from robolink.model import ANY, Controller, Jump, ToolOffset
+from robolink.testing.guard_checks import GUARD_CHECKS
+from robolink.testing.subject import Check, Subject, another_offset, refused, require
 
 _COMPONENTS: Final = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
 _WHOLE: Final = dict(zip(_COMPONENTS, (10.125, -20.375, 30.625, 15.5, -2.25, 1.75), strict=True))
@@ -222,48 +221,6 @@ def one_procedure_at_a_time(subject: Subject) -> None:
         require(isinstance(told[0], BusyError), "a second procedure is refused with BusyError")
 
 
-def what_is_unsettled_blocks(subject: Subject) -> None:
-    """A killed process raised no exception: its marker stops the next one."""
-    marker: Marker | None = None
-    try:
-        with subject.connect() as first:
-            marker = first.begin(MarkerKind.CHANGE, "a check", {"tools": {}, "change": "a check"})
-        with subject.connect() as second:
-            if _is_open(second, marker):  # else the record is kept with the connection only
-                with refused(OutcomeUnknownError, "what is unsettled blocks"):
-                    second.require_settled("the next command")
-                tools, stored = second.tools, second.tools.read(subject.tool)
-                with refused(OutcomeUnknownError, "nothing is written over what is unsettled"):
-                    tools.write(subject.tool, another_offset(stored), expected=stored)
-                require(tools.same(tools.read(subject.tool), stored), "the old value is there")
-    finally:
-        # Ctrl-C in between must not leave it to block whatever comes next.
-        with subject.connect() as third:
-            if marker is not None and _is_open(third, marker):
-                third.finish(marker)
-                third.require_settled("the next command")
-
-
-def a_stop_holds_writes_back(subject: Subject) -> None:
-    """Stopped means stopped, until a person says otherwise."""
-    with subject.kept() as controller:
-        tools, before = controller.tools, controller.tools.read(subject.tool)
-        wanted = another_offset(before)
-        with subject.releasing_stop(controller):
-            with suppress(RobolinkError):  # a machine that cannot be stopped from here says so
-                controller.stop()
-            require(controller.latch.closed, "stop() closes the latch, whatever becomes of it")
-            with refused(StoppedError, "after a stop nothing is written"):
-                tools.write(subject.tool, wanted, expected=before)
-            require(tools.same(tools.read(subject.tool), before), "the old value is still there")
-        tools.write(subject.tool, wanted, expected=before)
-
-
-def another_offset(value: ToolOffset | None) -> ToolOffset:
-    """Return an offset that no controller takes for the same."""
-    return ToolOffset(10.0, 20.0, 30.0) if value is None else replace(value, x_mm=value.x_mm + 0.5)
-
-
 def _written_whole(controller: Controller, tool: int) -> tuple[ToolOffset, tuple[str, ...]]:
     """Write a value with as many components as this kind holds; return it, and their names.
 
@@ -282,10 +239,6 @@ def _written_whole(controller: Controller, tool: int) -> tuple[ToolOffset, tuple
         else:
             return wanted, held
     raise AssertionError(held)
-
-
-def _is_open(controller: Controller, marker: Marker) -> bool:
-    return marker.operation in {one.operation for one in controller.outcomes.open_markers()}
 
 
 def _same_but_one(
@@ -329,7 +282,6 @@ WRITING_CHECKS: Final[tuple[Check, ...]] = (
     a_selection_is_read_back,
     what_was_selected_is_put_back,
     one_procedure_at_a_time,
-    what_is_unsettled_blocks,
-    a_stop_holds_writes_back,
+    *GUARD_CHECKS,
 )
 """They write one tool, and put it back."""

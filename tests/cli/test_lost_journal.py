@@ -3,6 +3,10 @@
 import sqlite3
 
 import pytest
+from robolink_cli import main
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.hosting.in_process import epson, softmotion
+from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
 import robolink.transaction
@@ -215,3 +219,67 @@ def test_a_program_is_refused_too_where_the_record_is_kept_elsewhere_now(
             with pytest.raises(OutcomeUnknownError):
                 controller.tools.write(1, ToolOffset(1, 2, 3), expected=ANY)
         forget_connections()
+
+
+BLOCKED = (
+    ("tool", "set", "1", "--x", "14", "--yes"),
+    ("tool", "clear", "2", "--yes"),
+    ("tool", "select", "2"),
+    ("tool", "restore", "backup.json", "--yes"),
+    ("robot", "jog", "z+1", "--yes"),
+    ("robot", "io", "set", "3", "on"),
+    ("calibrate", "two-pose", "--tool", "1", "--yes"),
+)
+OPEN = (
+    ("status",),
+    ("stop",),
+    ("robot", "where"),
+    ("robot", "release"),
+    ("robot", "reset", "--yes"),
+    ("robot", "motors", "on", "--yes"),
+    ("tool", "list"),
+    ("tool", "backup", "again.json"),
+    ("journal", "list"),
+)
+PLANTS = {"epson": (EpsonSimulator, epson), "softmotion": (SoftMotionSimulator, softmotion)}
+
+
+@pytest.mark.parametrize("kind", PLANTS)
+def test_each_command_that_writes_or_moves_is_blocked_and_no_other(
+    kind, state_folder, tmp_path, capsys
+):
+    """A program's first write was enough; nobody ever gave a command before."""
+    made, plant = PLANTS[kind]
+    simulator = made(seed=4, state_path=tmp_path / "retained.json")
+    plant.register("lost", simulator)
+
+    def run(*arguments):
+        forget_connections()
+        code = main.run(["-c", f"{kind}+sim://lost", *arguments])
+        return code, capsys.readouterr().err
+
+    def tools():
+        with robolink.connect(f"{kind}+sim://lost") as controller:
+            return controller.tools.read_all(), controller.tools.selected()
+
+    try:
+        assert run("tool", "backup", "backup.json")[0] == 0
+        with robolink.connect(f"{kind}+sim://lost") as controller:
+            controller.motors(True)
+            controller.tools.write(2, ToolOffset(1, 2, -30), expected=ANY)
+        forget_connections()
+        delete(state_folder / "journal.db")
+        before = tools()
+        for command in BLOCKED:
+            code, said = run(*command)
+            assert code == 6, (command, said)
+            assert "record" in said or "journal" in said, command
+        for look in OPEN:
+            assert run(*look)[0] == 0, look
+        assert run("recover")[0] == 6
+        assert tools() == before
+        assert run("recover", "--yes")[0] == 0
+        assert run("tool", "set", "1", "--x", "14", "--yes")[0] == 0
+        assert "knows nothing" not in run("status")[1]
+    finally:
+        plant.unregister("lost")

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 import pytest
+from robolink_simulators.cell.clock import ManualClock
 
 from robolink import ToolOffset
 from robolink.controllers.markers import ProcedureLock
@@ -99,6 +100,22 @@ class GoesOnAfterAStop(MemoryMachine):
 
     def halt(self):
         self.told = True
+
+
+class NeverRests(MemoryMachine):
+    def moving(self):
+        return True
+
+
+def test_a_machine_that_does_not_rest_was_not_stopped():
+    """It takes the stop; five seconds later nobody knows what it does."""
+    machine, clock = NeverRests(), ManualClock()
+    with MemoryController(machine, identity="memory+object://restless", clock=clock) as controller:
+        with pytest.raises(OutcomeUnknownError, match="did not come to rest") as unconfirmed:
+            controller.stop()
+        assert "press the emergency stop" in unconfirmed.value.remedy
+        assert controller.latch.closed
+        machine.moving = lambda: False  # type: ignore[method-assign]
 
 
 EVERY = (*READING_CHECKS, *WRITING_CHECKS, *MOVING_CHECKS)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 import robolink
-from robolink.errors import ConfigError, ControllerError, RobolinkError
+from robolink.errors import ConfigError, ControllerError, OutcomeUnknownError, RobolinkError
 from robolink.interrupts import EndedBy, ended_by
 from robolink.messages import joined, tr
 from robolink.standing import UNTOUCHED, Standing, note_standing, standing_after
@@ -161,7 +161,8 @@ def _record_for_nobody(controller: "Controller") -> None:
         return
     details = {"ended_by": str(by)}
     entry = NewEntry(EntryKind.DECISION, verdict=describe_standing(standing), details=details)
-    with suppress(ConfigError):  # what cannot be recorded is said, and is no other end
+    # What cannot be recorded is said, and is no other end.
+    with suppress(ConfigError, OutcomeUnknownError):
         controller.outcomes.append(entry)
 
 

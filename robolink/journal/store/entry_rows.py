@@ -93,6 +93,11 @@ class EntryRows:
         values = {f"{_NAME}{place}": storable(name) for place, name in enumerate(names)}
         return bool(values) and bool(self._runner.rows(_history(tuple(values)), values))
 
+    def holds(self, number: int, its_hash: str) -> bool:
+        """Whether an entry of this number and hash is there."""
+        found = self.page(Filter(), after=number - 1, before=number + 1, limit=1)
+        return any(row["hash"] == its_hash for row in found)
+
     def count(self) -> int:
         """Return how many there are."""
         return int(self._runner.rows(_COUNT)[0][0])

@@ -71,9 +71,7 @@ class BenchTools(ToolTableCore):
 
     def _set(self, tool: int, requested: ToolOffset | None, expected: Expected) -> ToolReceipt:
         request = self._request(tool, requested)
-        with self._link.lock.held(request):
-            write = BenchWrite(self._link, tool, requested, request, same=self.same)
-            return write.change(expected)
+        return BenchWrite(self._link, tool, requested, request, same=self.same).change(expected)
 
     def _request(self, tool: int, requested: ToolOffset | None) -> str:
         if requested is None:

@@ -1,6 +1,7 @@
 """Commands to a PLC mailbox: whose answer counts, and when a block is written again."""
 
 from dataclasses import replace
+from itertools import count
 
 import pytest
 
@@ -256,6 +257,22 @@ def test_stopping_needs_no_ownership(cell, plc):
 def test_a_stop_that_is_refused_because_one_holds_already_is_a_stop(plc, controller):
     plc.refusals[Opcode.STOP] = ErrorClass.STOPPING
     controller.stop()
+
+
+def test_a_group_whose_axes_go_on_after_its_stop_was_not_stopped(cell, plc, controller):
+    """The PLC says that a stop holds already, and five seconds later the axes still turn."""
+    plc.refusals[Opcode.STOP] = ErrorClass.STOPPING
+    read, turned_deg = cell.link.read_response, count()
+
+    def turning():
+        first, *others = plc.now.axes
+        plc.now = replace(plc.now, axes=(first + next(turned_deg), *others))
+        return read()
+
+    cell.link.read_response = turning
+    with pytest.raises(OutcomeUnknownError, match="at rest") as unconfirmed:
+        controller.stop()
+    assert "press the emergency stop" in unconfirmed.value.remedy
 
 
 def test_a_stop_that_is_not_confirmed_names_the_emergency_stop(plc, controller):

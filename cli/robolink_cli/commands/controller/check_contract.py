@@ -201,13 +201,20 @@ def _looked_at(connect: "Callable[[], Controller]", asked: _Asked, report: "Cont
 
 def _checks(asked: _Asked) -> "Sequence[Check]":
     """Return the checks that were asked for."""
-    from robolink.testing import MOVING_CHECKS, READING_CHECKS, WRITING_CHECKS
+    from robolink.testing import (
+        MOVING_CHECKS,
+        READING_CHECKS,
+        WRITING_CHECKS,
+        WRITING_WHILE_MOVING_CHECKS,
+    )
 
     checks = READING_CHECKS
     if asked.tool is not None:
         checks = (*checks, *WRITING_CHECKS)
     if asked.step_mm is not None:
         checks = (*checks, *MOVING_CHECKS)
+    if asked.tool is not None and asked.step_mm is not None:
+        checks = (*checks, *WRITING_WHILE_MOVING_CHECKS)
     return checks
 
 

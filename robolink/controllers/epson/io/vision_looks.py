@@ -75,7 +75,6 @@ class EpsonLooks:
         request = Request("Start", (str(program),))
         shown = as_sent(request)
         with self._link.lock.held(shown):
-            self._link.markers.require_settled(shown)
             self._link.window.require_ready(shown)
             before = self._whole(_END)
             failure, places = self._link.carry_out(_Look(self, request, before))

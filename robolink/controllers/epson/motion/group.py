@@ -208,16 +208,16 @@ class EpsonGroup(MotionGroupCore):
                 self.settings.slow_down(profile)
                 last_look()
                 with link.uninterrupted():
-                    self._current = self._started(target, statement)
+                    self._current = self._started(target, statement, found)
                 return self._current
         except (KeyboardInterrupt, StoppedError):
             # Nobody will be given this motion to wait on.
             self.abort_unfinished()
             raise
 
-    def _started(self, target: Pose, statement: spel.Statement) -> EpsonMotion:
+    def _started(self, target: Pose, statement: spel.Statement, selected: int) -> EpsonMotion:
         session, markers = self._link.session, self._link.markers
-        marker = self._marked(target, statement)
+        marker = self._marked(target, statement, selected=selected)
         if session.interrupted:
             # Ctrl-C came while the marker was stored: nothing begins to move after it.
             markers.clear(marker)

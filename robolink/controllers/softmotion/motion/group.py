@@ -200,10 +200,9 @@ class SoftMotionGroup(MotionGroupCore):
             with mailbox.lock.held(request):
                 mailbox.wire.motions.require_room(request, controller=mailbox.identity)
                 now = self._require_startable(draft, request)
-                self._require_tool(target, now.tool_slot, request)
                 require_tool_known(now, controller=mailbox.identity, request=request)
                 with mailbox.uninterrupted():
-                    motion = self._started(target, draft, request)
+                    motion = self._started(target, draft, now.tool_slot)
                     self._current = [*(m for m in self._current if not m.settled), motion]
                 return motion
         except (KeyboardInterrupt, StoppedError):
@@ -211,9 +210,9 @@ class SoftMotionGroup(MotionGroupCore):
             self.abort_unfinished()
             raise
 
-    def _started(self, target: Pose, draft: Command, request: str) -> SoftMotionMotion:
-        mailbox = self._mailbox
-        marker = self._marked(target, request)
+    def _started(self, target: Pose, draft: Command, selected: int) -> SoftMotionMotion:
+        mailbox, request = self._mailbox, describe(draft)
+        marker = self._marked(target, request, selected=selected)
         with mailbox.markers.doubt(request):
             try:
                 command = mailbox.commands.start(draft)

@@ -20,9 +20,8 @@ from robolink.controllers.softmotion.tools.group_tool import GroupTool
 from robolink.controllers.softmotion.tools.orientation_images import OrientationImages
 from robolink.controllers.softmotion.tools.slot_write import SlotWrite
 from robolink.controllers.tool_table import ToolTableCore, require_replacement
-from robolink.errors import ToolError
 from robolink.messages import tr
-from robolink.model import Expected, ToolOffset, ToolReceipt, describe_offset, put_right
+from robolink.model import Expected, ToolOffset, ToolReceipt
 from robolink.protocols.mailbox import SLOTS, Command, Opcode, ReadMode, Response, Slot
 
 
@@ -131,12 +130,10 @@ class SoftMotionToolTable(ToolTableCore):
         require_measurable(self._images, now, components, controller=mailbox.identity)
 
     def _require_carried(self, offset: ToolOffset | None, now: Response, request: str) -> None:
-        """Refuse what is no tool or the kinematics cannot carry, unless it is put back."""
+        """Refuse what the kinematics cannot carry, unless it is put back."""
         mailbox = self._mailbox
         if offset is not None and not mailbox.latch.restores:
-            identity = mailbox.identity
-            _require_a_tool(offset, identity, request)
-            require_fit(self._images, now, offset, controller=identity, request=request)
+            require_fit(self._images, now, offset, controller=mailbox.identity, request=request)
 
     def _prove_selected(self, offset: ToolOffset, request: str) -> None:
         self._group_tool.require(offset, request)
@@ -151,21 +148,6 @@ class SoftMotionToolTable(ToolTableCore):
         if requested is None:
             require_replacement(tool, None)
         require_enabled(now, controller=self._mailbox.identity, request=request)
-
-
-def _require_a_tool(offset: ToolOffset, identity: str, request: str) -> None:
-    """Refuse values of no tool: they may be read and replaced, never worked with or written."""
-    if offset.of_no_tool:
-        raise ToolError(
-            tr(
-                "{request!r} is held back: these are {values}.",
-                request=request,
-                values=describe_offset(offset),
-            ),
-            remedy=put_right(offset),
-            controller=identity,
-            request=request,
-        )
 
 
 def _name(tool: int, slot: Slot) -> str:

@@ -1,0 +1,211 @@
+"""Every kind of controller, and what can be told to each from Python."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.hosting.in_process import epson as in_process
+from robolink_simulators.hosting.in_process import softmotion as plc_in_process
+from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
+
+import robolink
+from robolink.controllers import ConnectionTerms
+from robolink.controllers.plc_map import PlcMapController
+from robolink.controllers.softmotion.motion.jog import Jog
+from robolink.journal import memory_journal, signature_here
+from robolink.model import (
+    ANY,
+    Controller,
+    MarkerKind,
+    MotionProfile,
+    OutcomeLog,
+    Path,
+    ToolOffset,
+    WorkBox,
+)
+from robolink.protocols.mailbox import Kinematics
+from robolink.testing import MemoryController, MemoryMachine, Subject
+from robolink.testing.subject import another_offset
+from robolink.transport import parse_url
+from tests.contract.third_kind import BenchServer, open_bench
+from tests.unit._plc_bench import COMMIT_BIT, Bench, LocalClient
+
+Act = Callable[[Controller, int], object]
+_PROFILE = MotionProfile(Path.STRAIGHT, speed_mm_s=10.0)
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One controller to be tried.
+
+    Attributes:
+        opened: Connects; with a record of the test's own, where one is given.
+        tool: A tool that may be written and cleared.
+        prepare: Brings a fresh connection to where it may move.
+        more: What this kind takes besides.
+        without: Acts that it lacks.
+    """
+
+    opened: Callable[[OutcomeLog | None], Controller]
+    tool: int = 1
+    prepare: Callable[[Controller], None] = lambda _controller: None
+    more: Mapping[str, Act] = field(default_factory=dict)
+    without: Sequence[str] = ()
+
+    @property
+    def subject(self) -> Subject:
+        """What the contract checks take."""
+        return Subject(lambda: self.opened(None), tool=self.tool, prepare=self.prepare)
+
+    @property
+    def acts(self) -> dict[str, Act]:
+        """All that writes or moves, by name; at the end the tool is not defined."""
+        acts: dict[str, Act] = {
+            "write": write,
+            "blind write": write_blindly,
+            "change": begin_change,
+            "preserve": preserve,
+            "move": move,
+            **self.more,
+            "select": select,
+            "clear": clear,
+        }
+        return {name: act for name, act in acts.items() if name not in self.without}
+
+
+def write(controller: Controller, tool: int) -> object:
+    """Write another value than the one that is there."""
+    before = controller.tools.read(tool)
+    return controller.tools.write(tool, another_offset(before), expected=before)
+
+
+def write_blindly(controller: Controller, tool: int) -> object:
+    """Write without a look at what is there."""
+    there = controller.tools.read(tool)
+    return controller.tools.write(tool, another_offset(there), expected=ANY)
+
+
+def clear(controller: Controller, tool: int) -> object:
+    """Take the definition of the tool away."""
+    return controller.tools.clear(tool, expected=ANY, then_select=0)
+
+
+def select(controller: Controller, tool: int) -> None:
+    """Put another tool in force."""
+    controller.tools.select(0 if controller.tools.selected() else tool)
+
+
+def move(controller: Controller, _tool: int) -> object:
+    """Go up a millimetre."""
+    group = controller.groups[0]
+    start = group.pose()
+    box = WorkBox.around(start, xy_mm=5, below_mm=5, above_mm=5)
+    target = replace(start, z_mm=start.z_mm + 1)
+    return group.move_to(target, _PROFILE, box=box).wait(timeout_s=30)
+
+
+def preserve(controller: Controller, _tool: int) -> object:
+    """Begin and end a procedure."""
+    with controller.preserved("a procedure"):
+        return None
+
+
+def begin_change(controller: Controller, tool: int) -> object:
+    """Begin a tool change of several steps."""
+    return controller.begin(MarkerKind.CHANGE, "a change", {"tools": {}, "tool": tool})
+
+
+def _jog(controller: Controller, _tool: int) -> object:
+    group = controller.groups[0]
+    box = WorkBox.around(group.pose(), xy_mm=50, below_mm=50, above_mm=50)
+    return group.jog(Jog(forward=frozenset({2})), duration_s=0.1, box=box)  # type: ignore[attr-defined]
+
+
+def _kinematics(controller: Controller, _tool: int) -> object:
+    return controller.set_kinematics(Kinematics.SCARA3_Z)  # type: ignore[attr-defined]
+
+
+def _output(controller: Controller, _tool: int) -> object:
+    io = controller.io
+    assert io is not None
+    return io.set_output(3, True)
+
+
+def _epson_output(controller: Controller, _tool: int) -> object:
+    io = controller.io
+    assert io is not None
+    return io.set_output(3, not io.read_output(3))  # type: ignore[attr-defined]
+
+
+def _raw(controller: Controller, _tool: int) -> object:
+    return controller.execute_raw("Off 3")  # type: ignore[attr-defined]
+
+
+def _switch_on(controller: Controller) -> None:
+    controller.motors(True)
+
+
+@contextmanager
+def memory() -> Iterator[Kind]:
+    """The controller in memory that ``robolink.testing`` ships."""
+    machine = MemoryMachine(tools={1: ToolOffset(12.0, -3.5, -20.0)})
+    yield Kind(lambda outcomes: MemoryController(machine, outcomes=outcomes))
+
+
+@contextmanager
+def epson() -> Iterator[Kind]:
+    """A simulated EPSON controller."""
+    in_process.register("contract", EpsonSimulator(seed=3))
+    try:
+        yield Kind(
+            lambda outcomes: robolink.connect("epson+sim://contract", outcomes=outcomes),
+            prepare=_switch_on,
+            more={"output": _epson_output, "raw": _raw},
+        )
+    finally:
+        in_process.unregister("contract")
+
+
+@contextmanager
+def softmotion() -> Iterator[Kind]:
+    """A simulated PLC with a mailbox."""
+    plc_in_process.register("contract", SoftMotionSimulator(seed=3))
+    try:
+        yield Kind(
+            lambda outcomes: robolink.connect("softmotion+sim://contract", outcomes=outcomes),
+            prepare=_switch_on,
+            more={"output": _output, "jog": _jog, "kinematics": _kinematics},
+        )
+    finally:
+        plc_in_process.unregister("contract")
+
+
+@contextmanager
+def plc_map() -> Iterator[Kind]:
+    """A PLC that is reached by a map; nothing moves it."""
+    bench = Bench(COMMIT_BIT, identity="plc+modbus-tcp://contract")
+
+    def opened(outcomes: OutcomeLog | None) -> Controller:
+        client = LocalClient(bench.plc, bench.identity)
+        client.clock.advance(bench.plc.now_ns / 1e9)
+        log = outcomes or memory_journal(bench.identity).log(bench.identity)
+        return PlcMapController(client, bench.map, log)
+
+    yield Kind(opened, tool=min(bench.map.slots), without=("move", "select", "clear"))
+
+
+@contextmanager
+def third_kind() -> Iterator[Kind]:
+    """A kind that another package brings."""
+    with BenchServer() as server:
+        url = parse_url(server.url)
+
+        def opened(outcomes: OutcomeLog | None) -> Controller:
+            return open_bench(url, ConnectionTerms(signature_here("test"), outcomes=outcomes))
+
+        yield Kind(opened)
+
+
+KINDS = {kind.__name__: kind for kind in (memory, epson, softmotion, plc_map, third_kind)}
+IMMOBILE = ("plc_map",)

@@ -1,0 +1,189 @@
+"""The places of docs/reference/rules.md, each with what is left of it when its guard is taken out.
+
+What shows that a check can fail. As a plugin (``-p tests.contract._without_guards``) it takes out
+the place that ROBOLINK_WITHOUT names before the tests are collected.
+"""
+
+import os
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, nullcontext
+from functools import reduce
+from importlib import import_module
+from typing import Any, Final
+
+import pytest
+
+from robolink.model import MarkerKind, ToolOffset, ToolReceipt
+from robolink.timing import wall_label
+
+StandIn = Callable[..., Any]
+
+
+def found(place: str) -> tuple[Any, str]:
+    """Return the owner of a place and its name there.
+
+    Raises:
+        AttributeError, ImportError: There is no such place.
+    """
+    parts = place.split(".")
+    for length in range(len(parts) - 1, 0, -1):
+        try:
+            module = import_module(".".join(parts[:length]))
+        except ModuleNotFoundError:
+            continue
+        owner = reduce(getattr, parts[length:-1], module)
+        getattr(owner, parts[-1])
+        return owner, parts[-1]
+    raise ImportError(place)
+
+
+@contextmanager
+def without(place: str) -> Iterator[None]:
+    """Take the guard of a place out for a block, wherever its name was imported to."""
+    with pytest.MonkeyPatch.context() as patch:
+        take_out(place, patch.setattr)
+        yield
+
+
+def take_out(place: str, put: Callable[[Any, str, Any], None]) -> None:
+    """Take the guard of a place out.
+
+    Args:
+        place: As the page names it.
+        put: Puts an attribute in the place of another.
+    """
+    for at, stand_in in LEFT[place].items():
+        owner, name = found(at)
+        put(owner, name, stand_in)
+
+
+def pytest_configure() -> None:
+    """Take out the place that the environment names."""
+    place = os.environ.get("ROBOLINK_WITHOUT")
+    if place:
+        take_out(place, setattr)
+
+
+def _nothing(*_given: object, **_named: object) -> None:
+    return None
+
+
+def _open(*_given: object, **_named: object) -> Any:
+    return nullcontext()
+
+
+def _carried_out(link: Any, command: Any) -> Any:
+    command.send()
+    command.acknowledged = True
+    return command.read()
+
+
+def _moved_unmarked(group: Any, target: Any, request: str, *, selected: int | None) -> Any:
+    from robolink.model import Marker
+
+    group._require_tool(target, selected, request)
+    return Marker("unmarked", MarkerKind.MOVE, request, wall_label())
+
+
+def _begun(
+    store: Any, kind: Any, request: str, details: Mapping[str, object], *, operation: str = ""
+) -> Any:
+    from robolink.model import Marker, new_operation
+
+    marker = Marker(operation or new_operation(), kind, request, wall_label(), dict(details))
+    store._recorded(lambda: store.outcomes.begin(marker))
+    store.ledger.begin(marker)
+    store._under_way[marker.operation] = kind
+    if kind in (MarkerKind.SELECTION, MarkerKind.CHANGE):
+        store._procedures[kind] = marker
+    return marker
+
+
+def _changed(write: Any, _expected: object) -> ToolReceipt:
+    """Write whatever is there, and believe the answer."""
+    write.before = write.read_back()
+    write._link.carry_out(write)
+    return ToolReceipt(write.tool, None, write.requested, None)
+
+
+def _ended(_wire: object, error: Any) -> Any:
+    return error
+
+
+def _to_the_last_bit(_table: object, a: object, b: object) -> bool:
+    return a == b
+
+
+def _as_given(_table: object, _tool: int, offset: ToolOffset) -> ToolOffset:
+    return offset
+
+
+def _preserved(preserver: Any, _reason: str) -> Any:
+    return nullcontext()
+
+
+def _previewed(table: Any, tool: int, offset: ToolOffset) -> tuple[str, ...]:
+    table.write(tool, offset, expected=table.read(tool))
+    return ("written",)
+
+
+def _unguarded(_statement: object, text: str) -> str:
+    """Run a statement as it was typed, and tell nobody."""
+    reply: Any = _statement
+    return str(reply._link.session.execute(text).text or "")
+
+
+def _sent_in_part(transport: Any, data: bytes, **_named: object) -> None:
+    transport._socket.send(data[:1])
+
+
+LEFT: Final[Mapping[str, Mapping[str, StandIn]]] = {
+    place: stand_in if isinstance(stand_in, Mapping) else {place: stand_in}
+    for place, stand_in in {
+        "robolink.controllers.DriverLink.carry_out": _carried_out,
+        "robolink.controllers.MotionGroupCore._marked": _moved_unmarked,
+        "robolink.controllers.markers.MarkerStore.begin": _begun,
+        "robolink.journal._outcome_log.JournalOutcomeLog._refuse_lost": _nothing,
+        "robolink.controllers.markers.MarkerStore.doubt": _open,
+        "robolink.controllers.epson.link.session.EpsonSession._end": _nothing,
+        "robolink.controllers.softmotion.link.wire.MailboxWire.ended": _ended,
+        "robolink.controllers.ToolWrite.change": _changed,
+        "robolink.controllers.ToolTableCore.require_writable": _nothing,
+        "robolink.controllers.ToolTableCore._require_values_of_a_tool": _nothing,
+        "robolink.controllers.tool_table.require_replacement": lambda _tool, _other: 0,
+        "robolink_cli.prompts.jumps.accept_jump": {
+            "robolink_cli.prompts.jumps.accept_jump": _nothing,
+            "robolink_cli.commands.controller.tool.accept_jump": _nothing,
+        },
+        "robolink.controllers.ToolTableCore.same": {
+            "robolink.controllers.epson.tools.table.EpsonToolTable.same": _to_the_last_bit,
+            "robolink.controllers.epson.tools.table.EpsonToolTable._storable": _as_given,
+        },
+        "robolink.controllers.Preserver.preserved": _preserved,
+        "robolink.controllers.MotionGroupCore._require_tool": _nothing,
+        "robolink.stop_latch.StopLatch.require_open": _nothing,
+        "robolink.stop_latch.StopLatch.admit": _nothing,
+        "robolink.stop_latch.StopLatch.restoring": _open,
+        "robolink.controllers.epson.link.stopping.bring_to_rest": {
+            "robolink.controllers.epson.motion.group.bring_to_rest": _nothing
+        },
+        "robolink.controllers.softmotion.link.stopping.bring_group_to_rest": {
+            "robolink.controllers.softmotion.motion.group.bring_group_to_rest": _nothing
+        },
+        "robolink.controllers.PolledGroup.halt": lambda group: group._send_stop(),
+        "robolink.transaction.ToolChange._take_back": _nothing,
+        "robolink.controllers.markers.ProcedureLock.held": _open,
+        "robolink_cli.session.motion_consent.agree_to_motion": _nothing,
+        "robolink.controllers.ToolTableCore.preview_write": _previewed,
+        "robolink.controllers.ToolTableCore._require_known": _nothing,
+        "robolink.model.ToolOffset.__post_init__": _nothing,
+        "robolink.controllers.epson.io.raw_statements.RawStatements.execute": _unguarded,
+        "robolink.controllers.epson.link.answers.require_ready": {
+            "robolink.controllers.epson.link.window.require_ready": _nothing,
+            "robolink.controllers.epson.motion.acts.require_ready": _nothing,
+        },
+        "robolink.controllers.ControllerCore.close": _nothing,
+        "robolink.transport.stream.tcp.TcpTransport.send": _sent_in_part,
+    }.items()
+}
+"""What stands in for each place: itself, or what was imported from it."""

@@ -3,7 +3,7 @@
 The PLC gives the mailbox to whoever asks when nobody owns it, when its owner has been silent
 for 10 s with nothing moving, or when a person insists; each time under a new epoch, so that a
 client that slept through it is refused (docs/mailbox.md, "Owners"; docs/reference/faults.md F46,
-F47).
+F47). So is a block that was sent before and arrives late: to own the mailbox is to fence it off.
 """
 
 from collections.abc import Callable
@@ -17,7 +17,13 @@ from robolink.protocols.mailbox import Command, CommandState, ErrorClass, Opcode
 from robolink.timing import Deadline
 
 _LONGEST_STOP_S: Final = 1.0
+_LONGEST_COMMAND_S: Final = 10.0
 _AGAIN_S: Final = 0.05
+_SILENT_S: Final = 10.5
+"""An owner without a sign for 10 s is gone; the rest is for the two clocks."""
+
+_LOOK_S: Final = 0.5
+"""From one look at a link to the next while nothing is asked of it."""
 
 
 def take_command(*, insist: bool) -> Command:
@@ -40,7 +46,7 @@ class Ownership:
     def __init__(self, wire: MailboxWire, send: Callable[[Command], Ended]) -> None:
         self._wire = wire
         self._send = send
-        self._lost = False
+        self._lost = self._fenced = False
 
     def require(self, request: str) -> None:
         """Take the mailbox unless it is ours already.
@@ -76,7 +82,38 @@ class Ownership:
             if end.state != CommandState.DONE or answer.holder != self._wire.owner:
                 raise self._held_by(answer.holder)
             self._wire.epoch = answer.epoch
-            self._lost = False
+            self._lost, self._fenced = False, True
+
+    def fence(self) -> None:
+        """Make sure that no block of an earlier session is carried out from here on.
+
+        A block may arrive long after its client has given it up. The PLC refuses it once the
+        mailbox was taken since, by this session or, after this session, by another one: its epoch
+        is old (docs/mailbox.md, "Owners"). A process that died keeps the mailbox for ten seconds;
+        they are waited out, in which nothing is sent that could stand in another client's way.
+
+        Raises:
+            LeaseHeldError: Another client owns it, and is alive.
+            RejectedError: The PLC has been at work on a command of before for ten seconds.
+        """
+        if self._fenced:
+            return
+        deadline = Deadline.after(self._wire.clock, _LONGEST_COMMAND_S)
+        waited = False
+        while True:
+            try:
+                self.take()
+            except LeaseHeldError:
+                if waited:
+                    raise
+                self._wait_for_silence()
+                waited = True
+            except RejectedError as error:
+                if error.code != ErrorClass.BUSY or deadline.expired:
+                    raise
+                self._wire.clock.sleep(_AGAIN_S)
+            else:
+                return
 
     def lose(self) -> None:
         """Note that the PLC says it is not ours any more."""
@@ -111,6 +148,12 @@ class Ownership:
         )
         error.holder = f"{holder:08X}"
         return error
+
+    def _wait_for_silence(self) -> None:
+        deadline = Deadline.after(self._wire.clock, _SILENT_S)
+        while not deadline.expired:
+            self._wire.clock.sleep(_LOOK_S)
+            self._wire.read_head()  # the end of a link is noticed meanwhile
 
     def _give_back(self) -> None:
         """Release the ownership, after the stop of another client that may be in work yet."""

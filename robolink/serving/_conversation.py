@@ -354,6 +354,10 @@ class CallbackConversation:
             log.append(entry)
         except ConfigError:
             code = "journal"
+        except (
+            OutcomeUnknownError
+        ):  # the record is missing: nothing goes on it until a person looks
+            code = "unsettled"
         if self._in_work():
             return CallbackWord.BACK, (code,)
         self._run = None

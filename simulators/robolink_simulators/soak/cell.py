@@ -1,5 +1,6 @@
 """One cell through its history: people at work, what gets in the way, and the rules."""
 
+import gc
 import os
 import random
 from collections.abc import Callable, Iterator, Mapping
@@ -282,6 +283,9 @@ class VirtualCell:
             self._note(f"!! {disturbance}")
             self.story.met[disturbance.kind] += 1
             self._books.close()
+            # A connection that a killed process dropped is closed when it is collected; until then
+            # it holds a lock, and whoever opens what is left of the file waits for it in real time.
+            gc.collect()
             share = (disturbance.at % 97) / 97
             if disturbance.what == "bent":
                 self._computer.bend(share)

@@ -31,8 +31,12 @@ test: check ## Install everything, check the sources and run the tests.
 # What takes many minutes or asks a package index; docs/contributing.md says what stands for it
 # in `make test`.
 # Seeds of the adversary, and virtual hours a seed. What was run with the same sources is passed
-# over, so a range can be gone on with; build/soak/results.jsonl keeps a line a seed.
+# over, so a range can be gone on with; build/soak/results.jsonl keeps a line a seed. SEEDS=fresh
+# draws COUNT seeds from the commit that were never run before, and adds them to
+# tests/soak/seeds_run.txt. SHARE=1/2 and SHARE=2/2 run side by side.
 SEEDS :=
+COUNT := 1000
+SHARE := 1/1
 HOURS := 20
 
 .PHONY: soak
@@ -42,7 +46,8 @@ ifeq ($(SEEDS),)
 	$(BIN)/python -m tests.certificate.table
 	$(BIN)/python -m tests.soak.mutant_table
 else
-	$(BIN)/python -m robolink_simulators.soak --seeds $(SEEDS) --hours $(HOURS)
+	$(BIN)/python -m robolink_simulators.soak --seeds $(SEEDS) --count $(COUNT) --share $(SHARE) \
+		--hours $(HOURS)
 endif
 
 # ROWS="F01 F25" takes some of them.

@@ -234,7 +234,7 @@ class MarkerStore:
         self._refuse_unsettled(request, besides=())
 
     def _refuse_while_moving(self, request: str) -> None:
-        if MarkerKind.MOVE in self._under_way.values():
+        if self.moving:
             raise BusyError(
                 tr(
                     "{request} has to wait: the end of a movement has not been seen.",

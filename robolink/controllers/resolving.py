@@ -120,6 +120,13 @@ class MarkerResolver:
         self._tools = tools
         self._preserver = preserver
 
+    def fence(self) -> None:
+        """See :meth:`robolink.model.Resolver.fence`.
+
+        Nothing here: on one connection, requests are served in their order, and what a device
+        still has of one that is closed it drops.
+        """
+
     def examine(self, marker: Marker) -> Finding:
         """Read what is needed to judge ``marker``; see :class:`robolink.model.Resolver`."""
         if marker.kind is MarkerKind.MOVE:
@@ -145,6 +152,7 @@ class MarkerResolver:
     def settle(self, finding: Finding) -> None:
         """Do what ``finding.action`` says and forget the marker."""
         if finding.verdict is Verdict.NOT_RESTORED:
+            self.fence()  # what is selected is read anew behind it
             self._preserver.restore(finding.marker)
         else:
             self._link.markers.clear(finding.marker, *finding.entries)

@@ -11,7 +11,7 @@ place; that one is selected, and read back, before anything is cleared.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from typing import ClassVar
 
@@ -108,6 +108,10 @@ class ToolTableCore(ABC):
     def _storable(self, tool: int, offset: ToolOffset) -> ToolOffset:
         """Return what the controller can hold of an offset."""
         return offset
+
+    def doubts(self, tools: Collection[int]) -> tuple[str, ...]:
+        """Return nothing: what is stored is what the machine works with."""
+        return ()
 
     def _require_possible(self, tool: int, offset: ToolOffset) -> None:
         """Refuse, in a preview, an offset that the machine cannot work with."""

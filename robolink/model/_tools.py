@@ -1,7 +1,7 @@
 """Tool offsets and the table that holds them: the centre of the product."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from numbers import Real
@@ -224,6 +224,13 @@ class ToolTable(Protocol):
 
         Raises:
             ToolIndexError: There is no such tool.
+        """
+
+    def doubts(self, tools: Collection[int]) -> tuple[str, ...]:
+        """Return, in sentences, why the values that are read may not be those in force.
+
+        Args:
+            tools: Those that are about to be changed.
         """
 
     def write(self, tool: int, offset: ToolOffset, *, expected: Expected) -> ToolReceipt:

@@ -355,7 +355,7 @@ class CallbackConversation:
         except ConfigError:
             code = "journal"
         except OutcomeUnknownError:
-            pass  # the record itself is missing, which is why it was refused
+            code = "unsettled"  # the record is missing: nothing goes on it until a person looks
         if self._in_work():
             return CallbackWord.BACK, (code,)
         self._run = None

@@ -143,6 +143,8 @@ class ToolChange:
         self._controller.latch.require_open(self.request)
         self._controller.require_settled(self.request)
         steps = self._believed() or self._compare()
+        for doubt in self._controller.tools.doubts([step.tool for step in steps]):
+            self._tell(doubt)
         self._selected = self._selected_before(steps)
         if self._several_steps and any(self._differs(step) for step in steps):
             tools = {

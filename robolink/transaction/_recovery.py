@@ -47,7 +47,9 @@ def recover(
 ) -> Recovery:
     """Settle what an earlier process left open: by reading, and with a person's word.
 
-    Nothing that moved or was written is sent again.
+    Nothing that moved or was written is sent again. What was sent and not answered is fenced off
+    first, so that nothing arrives behind the look that settles it; on a PLC that takes the
+    mailbox, and may take the ten seconds for which a dead process keeps it.
 
     Args:
         controller: The controller, connected.
@@ -60,6 +62,7 @@ def recover(
 
     Raises:
         BusyError: Somebody else is changing this controller just now.
+        LeaseHeldError: Another program commands the PLC; nothing is settled.
         RobolinkError: A step failed; the rest stays open.
 
     Example:
@@ -103,7 +106,7 @@ def look(
         ...     look(controller)
         ()
     """
-    settler = Settler(controller, keep=keep)
+    settler = Settler(controller, keep=keep, only_looks=True)
     markers = _in_order(controller.outcomes.open_markers())
     findings = tuple(_examined(settler, marker) for marker in markers)
     for finding in findings:

@@ -27,22 +27,32 @@ from robolink.ways import Way, way
 class Settler:
     """Examines and settles what was left open on one controller.
 
+    What is settled was read behind a fence: no request of before can change it afterwards
+    (docs/reference/rules.md 1).
+
     Args:
         controller: The controller, connected.
         keep: Whether new values that nobody verified stay, because a person says so.
+        only_looks: Whether nothing is to be settled, so that nothing is sent but questions.
     """
 
-    def __init__(self, controller: Controller, *, keep: bool = False) -> None:
+    def __init__(
+        self, controller: Controller, *, keep: bool = False, only_looks: bool = False
+    ) -> None:
         self._controller = controller
         self._keep = keep
+        self._only_looks = only_looks
 
     def examine(self, marker: Marker) -> Finding:
-        """Read what is needed to judge ``marker``; changes nothing.
+        """Read what is needed to judge ``marker``; changes no tool.
 
         Raises:
             ConfigError: The marker was written by something else.
             NotReadyError: It is about a robot that is not in force.
+            LeaseHeldError: Another client has the controller, so nothing may be settled.
         """
+        if not self._only_looks:
+            self._controller.resolver.fence()
         if marker.kind is MarkerKind.HISTORY:
             return self._without_record(marker)
         self._require_robot(marker)
@@ -101,7 +111,12 @@ class Settler:
             outcomes.change = outcomes.order = ""
 
     def forget(self, marker: Marker) -> None:
-        """Forget a marker on a person's word alone."""
+        """Forget a marker on a person's word alone.
+
+        Raises:
+            LeaseHeldError: Another client has the controller.
+        """
+        self._controller.resolver.fence()
         self._controller.finish(
             marker,
             NewEntry(

@@ -3,8 +3,12 @@
 Both ends are the real ones: companions/epson/recal.prg in the simulated controller, and the server.
 """
 
+from contextlib import closing
+
 import pytest
 
+from robolink.journal import open_journal
+from robolink.journal._traces import leave_trace
 from robolink.model import EntryKind, ToolOffset
 from robolink.protocols.spel_callback import CallbackLine, CallbackWord, encode_line
 from robolink.serving import CallbackConversation, CallbackLimits
@@ -236,3 +240,20 @@ def test_a_program_that_claims_to_have_kept_what_nobody_proved_is_not_believed(c
     assert (answer.word, answer.fields) == (CallbackWord.REFUSE, ("conflict",))
     assert len(cell.open_markers()) == 1
     assert encode_line(answer)
+
+
+def test_a_program_whose_record_is_missing_is_told_that_something_is_unsettled(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path))
+    leave_trace("epson:SIM00001", "journal.db")
+    tool = ("1", "11425", "-4085", "-20000", "0", "0", "0")
+    with closing(open_journal(str(tmp_path / "journal.db"))) as journal:
+        talk = CallbackConversation(journal, CallbackLimits(), peer="here")
+        hello = talk.answer(
+            CallbackLine(1, CallbackWord.HELLO, ("SIM00001", "1", "0", "-", "1", *tool))
+        )
+        begun = talk.answer(CallbackLine(2, CallbackWord.BEGIN, ("1", "n-angle", *tool)))
+        talk.close()
+    assert hello.word == CallbackWord.WELCOME
+    assert (begun.word, begun.fields) == (CallbackWord.REFUSE, ("unsettled",))

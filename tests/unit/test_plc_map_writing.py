@@ -1,6 +1,7 @@
 """Writing through a map: the three handshakes, refusals, and answers that are lost."""
 
 from itertools import count
+from struct import pack, unpack
 
 import pytest
 
@@ -442,3 +443,61 @@ def test_registers_that_change_between_two_looks_are_looked_at_again(commit_bit)
         commit_bit.client.read_holding = lambda address, n: (next(turns) % 7,) * n
         with pytest.raises(RemoteProtocolError, match="are different at every reading"):
             controller.tools.read(1)
+
+
+def test_a_recovery_waits_as_long_as_a_request_may_be_under_way(commit_bit):
+    with commit_bit.connect() as controller:
+        old = controller.tools.read(1)
+        commit_bit.client.lose = {0}
+        with pytest.raises(OutcomeUnknownError):
+            controller.tools.write(1, NEW, expected=old)
+    program = commit_bit.program
+    program.set_tool(1, dict(zip("xyzu", old.components(), strict=False)))  # as if it had not come
+    with commit_bit.connect() as controller:
+        clock, sleep, slept = commit_bit.client.clock, commit_bit.client.clock.sleep, []
+
+        def until_it_comes(seconds):
+            slept.append(seconds)
+            sleep(seconds)
+            if len(slept) == 1:  # the registers of the lost write, late
+                commit_bit.client.write_registers(*_of(NEW))
+
+        clock.sleep = until_it_comes
+        (finding,) = recover(controller).settled
+    assert slept[0] == commit_bit.map.commit.timeout_s
+    assert finding.verdict is Verdict.NOT_FINISHED
+    assert program.in_force[1] == {"x": 1.5, "y": -2.25, "z": 3.0, "u": 45.0}
+
+
+def test_registers_that_are_not_on_record_are_told_before_a_change(commit_bit):
+    told = []
+    with commit_bit.connect() as controller:
+        change_tools(controller, [Wanted(1, NEW, controller.tools.read(1))], tell=told.append)
+        assert ["on record is nothing" in one for one in told] == [True]
+        told.clear()
+        again = ToolOffset(1.6, -2.25, 3.0, 45.0)
+        change_tools(controller, [Wanted(1, again, NEW)], tell=told.append)
+        assert told == []
+        commit_bit.client.write_registers(*_of(NEW))  # and the PLC is never asked to take them
+        change_tools(controller, [Wanted(1, again, NEW)], tell=told.append)
+    (doubt,) = told
+    assert "registers of tool 1 hold X 1.500" in doubt
+    assert "on record is X 1.600" in doubt
+    assert "HMI" in doubt
+
+
+def test_a_request_that_names_its_tool_brings_no_other_into_force(level):
+    told = []
+    with level.connect() as controller:
+        controller.tools.write(2, NEW, expected=ANY)
+        other = ToolOffset(1.6, -2.25, 3.0, 45.0)
+        level.program.set_tool(2, dict(zip("xyzu", other.components(), strict=False)))
+        change_tools(controller, [Wanted(1, NEW, controller.tools.read(1))], tell=told.append)
+    assert ["tool 1" in one for one in told] == [True]
+
+
+def _of(offset):
+    """Return address and words of tool 1 in the map with a commit bit."""
+    values = offset.components()[:4]
+    words = [word for value in values for word in reversed(unpack(">HH", pack(">f", value)))]
+    return 100, words

@@ -54,6 +54,14 @@ class Handshake:
                 raise hindrance
             self._registers.clock.sleep(_POLL_S)
 
+    def wait_out(self) -> None:
+        """Wait as long as a request of before may be under way, as far as the map tells.
+
+        Registers have no numbers and no owner: a value that arrives late cannot be told from one
+        of now, and what arrives later than this nothing here can keep out (docs/plc-maps.md).
+        """
+        self._registers.clock.sleep(self._commit.timeout_s)
+
     def carry_out(self, tool: int, request: str) -> None:
         """Have the PLC take over what stands in the registers.
 

@@ -21,6 +21,16 @@ class RegisterResolver(MarkerResolver):
         super().__init__(plc, tools, preserver)
         self._plc = plc
         self._registers = tools
+        self._waited = False
+
+    def fence(self) -> None:
+        """Wait until what was sent earlier has arrived, once in a session.
+
+        A request that stands then is switched off before the PLC is asked for anything.
+        """
+        if not self._waited:
+            self._registers.handshake.wait_out()
+            self._waited = True
 
     def settle(self, finding: Finding) -> None:
         """Do what ``finding.action`` says and forget the marker."""

@@ -1,6 +1,6 @@
 """The tool table of a PLC that keeps offsets in registers of its own."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import ClassVar
 
 from robolink.controllers.plc_map.handshake import Handshake
@@ -10,7 +10,14 @@ from robolink.controllers.tool_table import ToolTableCore
 from robolink.controllers.tool_writing import ToolWrite
 from robolink.errors import RejectedError, ToolError
 from robolink.messages import tr
-from robolink.model import Expected, ToolOffset, ToolReceipt
+from robolink.model import (
+    PROOFS,
+    Expected,
+    ToolOffset,
+    ToolReceipt,
+    describe_offset,
+    read_offset,
+)
 
 
 class RegisterToolTable(ToolTableCore):
@@ -80,6 +87,39 @@ class RegisterToolTable(ToolTableCore):
         self._require_known(tool)
         if self.selected() != tool:
             self._send_selection(tool)
+
+    def doubts(self, tools: Collection[int]) -> tuple[str, ...]:
+        """Tell of registers that hold another value than the one on record.
+
+        Somebody changed it at the HMI, or a write ended before the PLC was asked to take it over
+        and this PC has lost the record of that. The next request then brings it into force: with
+        its own tool, and where the PLC is not told a number, with every other one.
+
+        Args:
+            tools: Those that are about to be changed.
+        """
+        if not self.handshake.answers:
+            return ()
+        alone = self._map.commit.tool_number is not None
+        asked = sorted(tools) if alone else self.indices()
+        return tuple(filter(None, (self._doubt(tool, tool in tools) for tool in asked)))
+
+    def _doubt(self, tool: int, changed: bool) -> str:
+        proofs = self._plc.markers.outcomes.recorded(tool=tool, kinds=PROOFS)
+        entry = next(iter(proofs), None)
+        if entry is None and not changed:
+            return ""
+        known = None if entry is None else read_offset(entry.details.get("value"))
+        now = self.read(tool)
+        if entry is not None and self.same(now, known):
+            return ""
+        return tr(
+            "The registers of tool {tool} hold {now}; on record is {known}. Only the HMI tells "
+            "whether the machine works with that: the PLC may not have taken it over yet.",
+            tool=tool,
+            now=describe_offset(now),
+            known=tr("nothing") if entry is None else describe_offset(known),
+        )
 
     def take_over(self, tool: int, before: ToolOffset | None, request: str) -> None:
         """Ask the PLC once to take over what stands in the registers.

@@ -46,6 +46,18 @@ class Finding:
 class Resolver(Protocol):
     """Examines and settles what was begun on a controller and not proved finished."""
 
+    def fence(self) -> None:
+        """Make sure that nothing sent earlier, and not answered, takes effect from here on.
+
+        What is read before may be overtaken by a request that arrives late; so whoever settles
+        something calls this first. It changes nothing that a person would notice, and does
+        nothing where a link cannot deliver late, or was fenced off in this session already.
+
+        Raises:
+            LeaseHeldError: Another client has the controller.
+            RobolinkError: It cannot be done now; nothing may be settled.
+        """
+
     def examine(self, marker: Marker) -> Finding:
         """Read what is needed to judge ``marker``; changes nothing.
 

@@ -103,7 +103,7 @@ def open_turn_tests(controller: Controller) -> dict[str, tuple[OpenTurnTest, ...
     Raises:
         RobolinkError: It cannot be read.
     """
-    settler = Settler(controller, keep=True)
+    settler = Settler(controller, keep=True, only_looks=True)
     found = {}
     for marker in controller.outcomes.open_markers():
         tests = tests_of(marker)

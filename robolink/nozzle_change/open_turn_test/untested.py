@@ -17,7 +17,7 @@ def untested_sentences(controller: Controller) -> list[str]:
     Raises:
         RobolinkError: It cannot be read.
     """
-    settler = Settler(controller, keep=True)
+    settler = Settler(controller, keep=True, only_looks=True)
     told = list[str]()
     for marker in controller.outcomes.open_markers():
         if marker.kind is not MarkerKind.CHANGE or tests_of(marker):

@@ -107,6 +107,11 @@ class FaultyDisk:
         """Let something go wrong, once so many more writes have succeeded."""
         self._faults[fault] = self.writes + after
 
+    @property
+    def lies(self) -> bool:
+        """Whether what it says that it has stored may be lost."""
+        return self._is_on(DiskFault.SYNC_LIES)
+
     def end(self, fault: DiskFault) -> None:
         """Let it go well again."""
         self._faults.pop(fault, None)

@@ -54,6 +54,10 @@ class PlcProgram:
         self.memory.switch(slot.defined, True)
         self.in_force[tool] = self._stored(slot)
 
+    def shown(self) -> dict[int, Components]:
+        """Return what the registers show, whether it was taken over or not."""
+        return {slot.tool: self._stored(slot) for slot in self._map.slots.values()}
+
     def select(self, tool: int) -> None:
         """Let the machine put a tool in force."""
         if self._map.selected is not None:
@@ -147,7 +151,7 @@ class PlcProgram:
 
     def _take_over(self) -> None:
         self.taken += 1
-        self.in_force = {slot.tool: self._stored(slot) for slot in self._map.slots.values()}
+        self.in_force = self.shown()
 
     def _tell_error(self, code: int) -> None:
         word = self._map.commit.error_code

@@ -9,6 +9,7 @@ byte for byte, in every process; :attr:`Story.hash` is over all of it.
 ::
 
     python -m robolink_simulators.soak --seeds 0-499            # run a range, or go on with it
+    python -m robolink_simulators.soak --seeds fresh            # seeds that were never run
     python -m robolink_simulators.soak --seed 7 --replay        # tell one, event by event
     python -m robolink_simulators.soak --seed 7 --shrink --write-test tests/soak/test_found_7.py
     python -m robolink_simulators.soak                          # the sums so far
@@ -23,7 +24,7 @@ Where things stand: :mod:`.history` draws what happens, :mod:`.running` and :mod
 :mod:`.people` act, :mod:`.rules` judge, reading past the driver from :mod:`.plant` and
 :mod:`.books`; :mod:`.threads` and :mod:`.surroundings` are the time, the chance and the locks,
 :mod:`.computer` the PC and its disk; :mod:`.story` tells,
-``shrinking`` shortens, ``results`` sums up.
+``shrinking`` shortens, ``results`` sums up, ``seed_list`` knows what was ever run.
 """
 
 from collections.abc import Mapping

@@ -2,20 +2,27 @@
 
 import sys
 import time
+from collections.abc import Collection
 from pathlib import Path
+from typing import Final
 
 import click
 
+from robolink.errors import ConfigError
 from robolink.timing import wall_label
 from robolink_simulators.soak.drawing.hours import drawn_history
 from robolink_simulators.soak.history import CellKind, History
-from robolink_simulators.soak.results import ResultsFile, SeedResult, summed_up
+from robolink_simulators.soak.results import ResultsFile, SeedResult, source_digest, summed_up
 from robolink_simulators.soak.running import live_through
+from robolink_simulators.soak.seed_list import SeedList, committed
 from robolink_simulators.soak.shrinking import as_test, shrink
+
+FRESH: Final = range(0)
+"""Stands for seeds that are drawn from the commit."""
 
 
 class SeedRange(click.ParamType[range]):
-    """``A-B``, both included, or one number."""
+    """``A-B``, both included, one number, or ``fresh``."""
 
     name = "seeds"
 
@@ -23,14 +30,37 @@ class SeedRange(click.ParamType[range]):
         self, value: object, param: click.Parameter | None, ctx: click.Context | None
     ) -> range:
         """Return the seeds."""
+        if value == "fresh":
+            return FRESH
         first, dash, last = str(value).partition("-")
         if not (first.isdigit() and (last.isdigit() or not dash)):
-            self.fail(f"{value!r} is not like 0-499", param, ctx)
+            self.fail(f"{value!r} is not like 0-499, and not fresh", param, ctx)
         return range(int(first), int(last or first) + 1)
 
 
+class Share(click.ParamType[slice]):
+    """``1/2``: the first of two parts that are run side by side."""
+
+    name = "share"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> slice:
+        """Return which seeds of a range that are."""
+        part, _, parts = str(value).partition("/")
+        if not (part.isdigit() and parts.isdigit() and 0 < int(part) <= int(parts)):
+            self.fail(f"{value!r} is not like 1/2", param, ctx)
+        return slice(int(part) - 1, None, int(parts))
+
+
 @click.command()
-@click.option("--seeds", type=SeedRange(), help="Run these: 0-499. What was run is passed over.")
+@click.option(
+    "--seeds",
+    type=SeedRange(),
+    help="Run these: 0-499, or fresh ones, drawn from the commit. What was run is passed over.",
+)
+@click.option("--count", type=click.IntRange(1), default=1000, show_default=True, help="Of fresh.")
+@click.option("--share", type=Share(), default="1/1", help="Of the seeds: 2/2 is every second.")
 @click.option("--seed", type=int, help="This one, for --replay, --shrink and --write-test.")
 @click.option("--hours", type=click.IntRange(1), default=20, show_default=True, help="A seed.")
 @click.option("--kind", type=click.Choice([kind.value for kind in CellKind]), help="Of the cell.")
@@ -44,8 +74,18 @@ class SeedRange(click.ParamType[range]):
     show_default=True,
     help="Where a line for each seed is kept.",
 )
+@click.option(
+    "--list",
+    "listed",
+    type=click.Path(path_type=Path),
+    default=Path("tests/soak/seeds_run.txt"),
+    show_default=True,
+    help="Which seeds were ever run.",
+)
 def main(
     seeds: range | None,
+    count: int,
+    share: slice,
     seed: int | None,
     hours: int,
     kind: str | None,
@@ -53,6 +93,7 @@ def main(
     shrinks: bool,
     write_test: Path | None,
     results: Path,
+    listed: Path,
 ) -> None:
     """Run whole simulated cells against seeded disturbances, and check the rules all the time."""
     own = None if kind is None else CellKind(kind)
@@ -61,7 +102,30 @@ def main(
     if seeds is None:
         click.echo("\n".join(summed_up(ResultsFile(results).results())) or "nothing was run yet")
         return
-    sys.exit(_range(seeds, hours, own, ResultsFile(results)))
+    file = ResultsFile(results)
+    try:
+        chosen = _noted(SeedList(listed), seeds, count, file.done(hours))
+    except ConfigError as error:
+        raise click.ClickException(str(error)) from error
+    sys.exit(_range(chosen[share], hours, own, file))
+
+
+def _noted(known: SeedList, seeds: range, count: int, done: Collection[int]) -> range:
+    """Return the seeds to run, which stand on the list before the first is.
+
+    A fresh range that was not run to its end on the same sources is gone on with.
+    """
+    sources = source_digest()
+    if seeds is not FRESH:
+        if known.exists:
+            known.note(seeds, "named", sources)
+        return seeds
+    commit = committed(Path.cwd())
+    begun = known.of_sources(sources)
+    fresh = begun if begun is not None and set(begun) - set(done) else known.drawn(commit, count)
+    known.note(fresh, commit[:12], sources)
+    click.echo(f"fresh seeds {fresh.start}-{fresh.stop - 1}, sources {sources}")
+    return fresh
 
 
 def _one(history: History, replay: bool, shrinks: bool, write_test: Path | None) -> int:

@@ -1,5 +1,6 @@
 """One cell through its history: people at work, what gets in the way, and the rules."""
 
+import gc
 import os
 import random
 from collections.abc import Callable, Iterator, Mapping
@@ -177,7 +178,7 @@ class VirtualCell:
             case Hindrance.KILL:
                 self._kill(process)
             case Hindrance.POWER_CUT:
-                self._cut_power(process, disturbance)
+                self._cut_power(process)
             case Hindrance.SECOND_PERSON:
                 other = self._computer.start("carl")
                 self._others.append(other)
@@ -190,9 +191,9 @@ class VirtualCell:
                 if self._turns.current.name == "main":
                     output_closed()
 
-    def _cut_power(self, process: VirtualProcess, disturbance: Disturbance) -> None:
+    def _cut_power(self, process: VirtualProcess) -> None:
         self._books.close()
-        if disturbance.what:
+        if self._disk.lies:
             # The disk said that it had kept what it may not have: nobody can rely on the rest.
             self._books.trusted = False
         process.alive = False
@@ -225,7 +226,8 @@ class VirtualCell:
                 held = controller.tools.read(OTHERS_TOOL)
                 offset = ToolOffset(7.0, 7.0, -float(1 + process.number % 40))
                 self._rules.others_write(OTHERS_TOOL, offset)
-                change_tools(controller, [Wanted(OTHERS_TOOL, offset, held)])
+                wanted = [Wanted(OTHERS_TOOL, offset, held)]
+                change_tools(controller, wanted, tell=self._note_said)
                 self._note("carl: done")
         except (RobolinkError, KeyboardInterrupt) as error:
             self._note(f"carl: {describe(error)}")
@@ -281,6 +283,9 @@ class VirtualCell:
             self._note(f"!! {disturbance}")
             self.story.met[disturbance.kind] += 1
             self._books.close()
+            # A connection that a killed process dropped is closed when it is collected; until then
+            # it holds a lock, and whoever opens what is left of the file waits for it in real time.
+            gc.collect()
             share = (disturbance.at % 97) / 97
             if disturbance.what == "bent":
                 self._computer.bend(share)
@@ -333,6 +338,7 @@ class VirtualCell:
 
     def _note_said(self, text: str) -> None:
         self._note(f"   {text}")
+        self._rules.said(text)
 
     @contextmanager
     def _connected(self, process: VirtualProcess) -> Iterator[Any]:

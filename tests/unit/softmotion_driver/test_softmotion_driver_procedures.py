@@ -8,14 +8,14 @@ from robolink.controllers.softmotion import controller as softmotion
 from robolink.errors import (
     ConfigError,
     ConnectError,
+    LeaseHeldError,
     OutcomeUnknownError,
     RejectedError,
-    RobolinkError,
 )
-from robolink.model import MotionProfile, Path, ToolOffset, WorkBox
+from robolink.model import MotionProfile, Path, ToolOffset, Verdict, WorkBox
 from robolink.protocols.mailbox import ErrorClass, Opcode
 from robolink.runner import Question, Runner, RunSettings
-from robolink.transaction import ToolChange, Wanted, change_tools, recover
+from robolink.transaction import ToolChange, Wanted, change_tools, look, recover
 
 OLD = ToolOffset(1.5, -2.0, 40.0, 10.0)
 NEW = ToolOffset(1.7, -2.1, 40.3, 20.0)
@@ -72,14 +72,72 @@ def test_a_change_cut_off_in_the_middle_is_recovered(cell, controller):
     with pytest.raises(OutcomeUnknownError):
         change_tools(controller, [Wanted(3, NEW, OLD), Wanted(4, NEW, None)])
     controller.close()
-    with pytest.raises(RobolinkError, match="commands the PLC"), cell.connect() as soon:
-        recover(soon)
-    cell.plc.clock.sleep(10.0)
     later = cell.connect()
     recover(later)
     assert later.tools.same(later.tools.read(3), OLD)
     assert later.tools.read(4) is None
     assert cell.open_requests() == []
+
+
+def held_up(cell, controller):
+    """Let a write of tool 3 be given up; what is returned lets it arrive."""
+    held = []
+
+    def mishap(deliver):
+        held.append(deliver)
+        raise cell.link.silence()
+
+    cell.link.plan("write_command", mishap)
+    with pytest.raises(OutcomeUnknownError):
+        controller.tools.write(3, NEW, expected=OLD)
+    return held[0]
+
+
+def test_a_write_that_arrives_behind_its_recovery_is_not_carried_out(cell, controller):
+    arrive = held_up(cell, controller)
+    later = cell.connect()
+    recover(later)
+    assert cell.open_requests() == []
+    arrive()
+    assert later.tools.same(later.tools.read(3), OLD)
+    assert cell.plc.now.error_class == ErrorClass.NOT_OWNER
+
+
+def test_a_look_at_what_is_open_sends_no_command(cell, controller):
+    held_up(cell, controller)
+    (finding,) = look(cell.connect())
+    assert finding.verdict is Verdict.NOT_APPLIED
+    assert cell.link.sent == []
+
+
+def test_nothing_is_settled_while_another_client_has_the_mailbox(cell, controller):
+    held_up(cell, controller)
+    later, clock = cell.connect(), cell.plc.clock
+    cell.plc.owner, cell.plc.refusals[Opcode.OWNERSHIP] = 0xCAFE0001, ErrorClass.NOT_OWNER
+    began_ns = clock.now_ns()
+    with pytest.raises(LeaseHeldError, match="CAFE0001"):
+        recover(later)
+    assert 10 < (clock.now_ns() - began_ns) / 1e9 < 15
+    assert len(cell.open_requests()) == 1
+    assert len(cell.link.sent) == 2  # it asks twice, and does not stand in that client's way
+
+
+def test_a_recovery_waits_for_what_the_plc_is_at_work_on(cell, controller, monkeypatch):
+    held_up(cell, controller)
+    cell.plc.clock.sleep(11.0)
+    later = cell.connect()
+    ownership, at_work = later._mailbox.commands.ownership, [1, 2, 3]
+    take = ownership.take
+
+    def take_when_free():
+        if at_work:
+            raise RejectedError(f"busy {at_work.pop()}", code=ErrorClass.BUSY)
+        take()
+
+    monkeypatch.setattr(ownership, "take", take_when_free)
+    recover(later)
+    assert cell.open_requests() == []
+    assert at_work == []
 
 
 def test_a_runner_moves_and_jogs_the_group(controller):

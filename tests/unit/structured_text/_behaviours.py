@@ -314,6 +314,18 @@ def block_of_before(bench):
     assert client.now().ack_head < 10
 
 
+def block_of_an_epoch_of_before(bench):
+    """Not one of the sixteen: docs/mailbox.md, "Owners"."""
+    client = bench.client
+    for refusal, takes in ((107, client.take), (106, lambda: taken_over(bench))):
+        late = client.command(Opcode.WRITE_TOOL, 3, pose=(1.0, 2.0, 3.0, 0.0, 0.0, 0.0))
+        takes()
+        client.write(replace(late, sequence=late.sequence + 9))  # ahead of all that were sent
+        bench.note()
+        assert bench.taken[-1][2:4] == [CommandState.ERROR, refusal]
+    assert client.slot(3).counter == 0
+
+
 STRANGER = 0xBADCAFE
 AT_SPEED = (100.0, 1000.0, 1000.0, 10000.0)
 BRAKING_MM = AT_SPEED[0] ** 2 / (2 * AT_SPEED[2])
@@ -482,6 +494,7 @@ RUNS = [
     (b14_an_axis_alone, "Kin_Scara3_Z"),
     (b15_jog_about_x, "Kin_ArticulatedRobot_6DOF"),
     (block_of_before, "Kin_Scara3_Z"),
+    (block_of_an_epoch_of_before, "Kin_Scara3_Z"),
     (reads_of_no_movement, "Kin_Scara3_Z"),
     (read_of_what_was_interrupted, "Kin_Scara3_Z"),
     (refused_kinematics, "Kin_Gantry3+Kin_CAxis"),

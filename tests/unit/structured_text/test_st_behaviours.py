@@ -14,6 +14,7 @@ SAMPLE = {
     b.b13_a_stop_is_held,
     b.b15_jog_about_x,
     b.block_of_before,
+    b.block_of_an_epoch_of_before,
     b.jog_of_an_owner_who_lost_it,
     b.movements_of_an_owner_who_lost_it,
 }

@@ -3,7 +3,7 @@
 The PLC gives the mailbox to whoever asks when nobody owns it, when its owner has been silent
 for 10 s with nothing moving, or when a person insists; each time under a new epoch, so that a
 client that slept through it is refused (docs/mailbox.md, "Owners"; docs/reference/faults.md F46,
-F47).
+F47). So is a block that was sent before and arrives late: to own the mailbox is to fence it off.
 """
 
 from collections.abc import Callable
@@ -29,8 +29,11 @@ _ASK_S: Final = 0.5
 """Between two requests for a mailbox that becomes free by itself."""
 
 _LONGEST_STOP_S: Final = 1.0
+_LONGEST_COMMAND_S: Final = 10.0
 _AGAIN_S: Final = 0.05
 _GIVE_BACK: Final = Command(0, Opcode.OWNERSHIP)
+_LOOK_S: Final = 0.5
+"""From one look at a link to the next while nothing is asked of it."""
 
 
 def take_command(*, insist: bool) -> Command:
@@ -70,7 +73,7 @@ class Ownership:
         self._wire = wire
         self._send = send
         self._outcomes, self._tell = bystanders.outcomes, bystanders.tell
-        self._lost = False
+        self._lost = self._fenced = False
 
     def require(self, request: str) -> None:
         """Take the mailbox unless it is ours already.
@@ -149,7 +152,39 @@ class Ownership:
                 self._forget()
                 raise self._held_by(answer.holder)
             self._wire.epoch = answer.epoch
-            self._lost = False
+            self._lost, self._fenced = False, True
+
+    def fence(self) -> None:
+        """Make sure that no block of an earlier session is carried out from here on.
+
+        A block may arrive long after its client has given it up. The PLC refuses it once the
+        mailbox was taken since, by this session or, after this session, by another one: its epoch
+        is old (docs/mailbox.md, "Owners"). A process that died keeps the mailbox for ten seconds;
+        they are waited out, in which nothing is sent that could stand in another client's way.
+
+        Raises:
+            LeaseHeldError: Another client owns it, and is alive.
+            RejectedError: The PLC has been at work on a command of before for ten seconds.
+        """
+        if self._fenced:
+            return
+        deadline = Deadline.after(self._wire.clock, _LONGEST_COMMAND_S)
+        waited = False
+        while True:
+            try:
+                self.take()
+            except LeaseHeldError as held:
+                run = self._run_of(held)
+                if waited or (run is not None and run.lives is not None):
+                    raise  # it lives, or its silence has been waited out
+                self._wait_for_silence(held)
+                waited = True
+            except RejectedError as error:
+                if error.code != ErrorClass.BUSY or deadline.expired:
+                    raise
+                self._wire.clock.sleep(_AGAIN_S)
+            else:
+                return
 
     def lose(self) -> None:
         """Note that the PLC says it is not ours any more."""
@@ -222,6 +257,20 @@ class Ownership:
             )
         error.remedy = joined(" ", (error.remedy, insist))
         return error
+
+    def _wait_for_silence(self, held: LeaseHeldError) -> None:
+        self._tell(
+            tr(
+                "Client {holder} has the mailbox of the PLC. If it has ended, the mailbox is free in "
+                "{seconds:.0f} s at most; waiting for that.",
+                holder=held.holder,
+                seconds=_LONGEST_SILENCE_S,
+            )
+        )
+        deadline = Deadline.after(self._wire.clock, _LONGEST_SILENCE_S)
+        while not deadline.expired:
+            self._wire.clock.sleep(_LOOK_S)
+            self._wire.read_head()  # the end of a link is noticed meanwhile
 
     def _give_back(self) -> None:
         """Release the ownership, after the stop of another client that may be in work yet."""

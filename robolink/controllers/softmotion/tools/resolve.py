@@ -16,6 +16,10 @@ class SoftMotionResolver(MarkerResolver):
         super().__init__(mailbox, tools, preserver)
         self._mailbox = mailbox
 
+    def fence(self) -> None:
+        """Take the mailbox: a block that is under way belongs to an epoch of before then."""
+        self._mailbox.commands.ownership.fence()
+
     def _require_rest(self) -> None:
         now = self._mailbox.snapshots.take()
         require_still(now, controller=self._mailbox.identity, request=tr("recover"))

@@ -13,7 +13,7 @@ from robolink_simulators.soak.calling_back.program import CONTACT, Production
 from robolink_simulators.soak.calling_back.service import ProgramService
 from robolink_simulators.soak.computer import VirtualProcess
 from robolink_simulators.soak.history import Disturbance, Habit, Hindrance, Hour
-from robolink_simulators.soak.people import Tell
+from robolink_simulators.soak.people import Tell, put_right
 from robolink_simulators.soak.plant.epson import EpsonPlant
 from robolink_simulators.soak.plant.machine import WireTap
 from robolink_simulators.soak.threads import TurnTaking
@@ -41,7 +41,10 @@ class ProgramPlant(EpsonPlant):
     def __init__(self, clock: ManualClock, tap: WireTap, seed: int, turns: TurnTaking) -> None:
         super().__init__(clock, tap, seed)
         self._rng = random.Random(f"needles {seed}")
-        self._service = ProgramService(clock, turns, tap.passed)
+        # What a PC finds that recovers, as docs/spel-callback.md has the service told.
+        serial = f"SOAK{seed:06d}"
+        on_record = f"epson:C-{serial}/{serial}"
+        self._service = ProgramService(clock, turns, tap.passed, on_record=on_record)
         self._service.on_value = self._given
         self._production = Production(self.simulator, clock, self._service, self._rng)
         self._nominal_pin = self.simulator.world.pin_mm
@@ -71,17 +74,29 @@ class ProgramPlant(EpsonPlant):
 
     def put_right(self, controller: Controller, habit: Habit, tell: Tell) -> bool:
         """Let the program put its tool back, and measure once more, undisturbed."""
-        del habit
         world = self.simulator.world
         world.pin_mm = self._nominal_pin
         self._production.teach()
         self._production.restore()
         printed = self._production.run()
         tell(f"the program prints {printed}")
+        if self._service.lacks_record():
+            self._recover(habit, tell)
         left = cast(_Served, controller).outcomes.open_markers()
         if printed != "kept":
             raise NotReadyError(f"the program prints {printed!r}", reason=NotReadyReason.NOT_REMOTE)
         return not left
+
+    def _recover(self, habit: Habit, tell: Tell) -> None:
+        """Make the PC the control device and recover, as docs/spel-callback.md tells a person."""
+        process = self._service.process
+        assert process is not None  # noqa: S101 - for the type: it has just answered
+        outcomes = process.log_of(self.address, self.clock)
+        try:
+            with super().connect(process, outcomes) as controller:
+                put_right(controller, habit, tell)
+        finally:
+            super().hang_up(process)
 
     def hang_up(self, process: VirtualProcess) -> None:
         """The line of a service that died is closed by the system."""

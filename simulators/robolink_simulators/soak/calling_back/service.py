@@ -6,7 +6,7 @@ from typing import Final, cast
 
 from robolink.errors import LocalProtocolError, RemoteProtocolError, RobolinkError
 from robolink.journal import Journal, JournalOutcomeLog
-from robolink.model import Signature, ToolOffset
+from robolink.model import MarkerKind, Signature, ToolOffset
 from robolink.protocols.spel_callback import NEED_DATA, CallbackCodec, CallbackWord, encode_line
 from robolink.serving import CallbackConversation, CallbackLimits
 from robolink.timing import NS_PER_S
@@ -28,6 +28,7 @@ class ProgramService:
         clock: The virtual time.
         turns: Knows whose process runs.
         note: Told what passes.
+        on_record: Name under which the controller is on record.
 
     Attributes:
         acts: What is planned to happen to an exchange.
@@ -37,8 +38,14 @@ class ProgramService:
     """
 
     def __init__(
-        self, clock: ManualClock, turns: TurnTaking, note: Callable[[VirtualProcess, str], None]
+        self,
+        clock: ManualClock,
+        turns: TurnTaking,
+        note: Callable[[VirtualProcess, str], None],
+        *,
+        on_record: str,
     ) -> None:
+        self._on_record = on_record
         self.acts = CountedActs()
         self.process: VirtualProcess | None = None
         self.on_question: Callable[[str], None] = lambda _text: None
@@ -72,12 +79,18 @@ class ProgramService:
 
     def conversation(self) -> CallbackConversation:
         """Begin to talk with a program, with the journal of the process."""
-        return CallbackConversation(cast(Journal, _OpenJournal(self)), LIMITS, peer=_PEER)
+        journal = cast(Journal, _OpenJournal(self))
+        return CallbackConversation(journal, LIMITS, peer=_PEER, controllers=(self._on_record,))
 
     def log(self, controller: str) -> JournalOutcomeLog:
         """Return the record of a controller, kept by the process that serves."""
         assert self.process is not None  # noqa: S101 - for the type: who talks is served
         return self.process.log_of(controller, self._clock)
+
+    def lacks_record(self) -> bool:
+        """Whether the record of the controller is missing, until a person has looked."""
+        open_markers = self.log(self._on_record).open_markers()
+        return any(marker.kind is MarkerKind.HISTORY for marker in open_markers)
 
     def within(self, work: Callable[[], bytes]) -> bytes | None:
         """Do something in the process that serves; ``None`` where it died of it."""

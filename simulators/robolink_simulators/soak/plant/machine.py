@@ -167,6 +167,10 @@ class PlantMachine(ABC):
     def state(self) -> MachineState:
         """Return what it keeps now."""
 
+    def staged(self) -> Mapping[int, ToolOffset]:
+        """Return values that stand where robolink reads them, and are not in force yet."""
+        return {}
+
     @property
     @abstractmethod
     def moving(self) -> bool:

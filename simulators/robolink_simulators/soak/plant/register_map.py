@@ -1,7 +1,7 @@
 """A PLC with registers of the machine builder's own in a virtual cell, and the line to it."""
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Final
@@ -149,11 +149,13 @@ class RegisterMapPlant(PlantMachine):
     def state(self) -> MachineState:
         """Return what the machine works with."""
         self.advance()
-        tools = {
-            tool: ToolOffset(held["x"], held["y"], held["z"], held["u"])
-            for tool, held in self._simulator.program.in_force.items()
-        }
-        return MachineState(tools, 1)
+        return MachineState(_offsets(self._simulator.program.in_force), 1)
+
+    def staged(self) -> Mapping[int, ToolOffset]:
+        """Return what its registers show and it does not work with."""
+        program = self._simulator.program
+        shown = _offsets(program.shown())
+        return {n: one for n, one in shown.items() if one != _offsets(program.in_force)[n]}
 
     @property
     def moving(self) -> bool:
@@ -224,6 +226,10 @@ class RegisterMapPlant(PlantMachine):
                 program.refuse_with = _REFUSED
             case _:
                 program.start_anew()
+
+
+def _offsets(tools: Mapping[int, Mapping[str, float]]) -> dict[int, ToolOffset]:
+    return {n: ToolOffset(one["x"], one["y"], one["z"], one["u"]) for n, one in tools.items()}
 
 
 class TappedRegisters:

@@ -9,6 +9,7 @@ from robolink.protocols.mailbox import (
     COMMAND,
     RESPONSE,
     BlockError,
+    CommandState,
     Opcode,
     Words,
     decode_command,
@@ -20,6 +21,9 @@ _CRC: Final = COMMAND["crc"].word
 _BOOT: Final = RESPONSE["boot_id"].word
 _ACK: Final = RESPONSE["ack_head"].word
 _TAKEN_OVER: Final = 0x00A5_0000
+_ENDED: Final = (CommandState.DONE, CommandState.ABORTED, CommandState.ERROR)
+_FOLLOWED: Final = (Opcode.MOVE_DIRECT, Opcode.MOVE_LINEAR, Opcode.MOVE_UNTIL_INPUT, Opcode.JOG)
+"""Their ends stand elsewhere than behind the acknowledgement."""
 
 
 class SeenSession:
@@ -38,6 +42,7 @@ class SeenSession:
         self._boot_id = 0
         self._over: dict[int, str] = {}
         self._written: tuple[int, ...] = ()
+        self._proved = False
         self._rejected = 0
         self.overtaken = False
 
@@ -50,7 +55,7 @@ class SeenSession:
         """
         block = tuple(words[: _CRC + 1])
         again = block == self._written and rejected == self._rejected
-        self._written, self._rejected = block, rejected
+        self._written, self._rejected, self._proved = block, rejected, False
         if again:
             return "it was written before, and nothing was damaged"
         return self._over.get(threading.get_ident(), "")
@@ -68,9 +73,12 @@ class SeenSession:
         if self._boot_id and now.boot_id != self._boot_id:
             self._over[threading.get_ident()] = "the PLC has restarted since"
         self._boot_id = self._boot_id or now.boot_id
-        if not acknowledged:
+        if not acknowledged or self._proved:
             return
         ours = decode_command((*self._written, 0, self._written[0]))
+        # What comes after the answer to it, under the same number, takes nobody's place.
+        ended = now.state in _ENDED or ours.opcode in _FOLLOWED
+        self._proved = now.ack_owner == ours.owner and ended
         # A take may have succeeded although somebody else was answered since; it names the holder.
         took = ours.opcode == Opcode.OWNERSHIP and now.answer.holder == ours.owner
         self.overtaken = now.ack_owner != ours.owner and not took

@@ -1,6 +1,7 @@
 """What is left behind: before anybody acts, and when the people have put it right."""
 
 import math
+import re
 from collections.abc import Sequence
 from typing import Final
 
@@ -13,6 +14,9 @@ from robolink_simulators.soak.rules.so_far import SURELY_MM, TOLERANCE_MM, Groun
 _PROOFS: Final = ("verified", "proved, and kept by the program")
 """What the record says of a value that was proved: by robolink, and by a program's touches."""
 
+_DOUBT: Final = re.compile(r"The registers of tool (\d+) hold ")
+"""The beginning of a sentence of robolink's (docs/plc-maps.md)."""
+
 
 class RestRules:
     """Looks at machine and journal while nothing is under way.
@@ -24,6 +28,12 @@ class RestRules:
     def __init__(self, grounds: Grounds) -> None:
         self._on = grounds
         self._by_others: dict[int, ToolOffset | None] = {}
+        self._staged: dict[int, ToolOffset] = {}
+        self._told: set[int] = set()
+
+    def said(self, text: str) -> None:
+        """Note what a person was told: of which tools the registers are not on record."""
+        self._told |= {int(tool) for tool in _DOUBT.findall(text)}
 
     def left(self, state: MachineState) -> None:
         """Check what a deed left behind, however it ended, killed or not, before anybody acts."""
@@ -69,12 +79,26 @@ class RestRules:
         for tool in {*self._on.now.first.tools, *state.tools}:
             if tool in self._on.plant.touched or not self._on.books.trusted:
                 self._by_others[tool] = state.tools.get(tool)
+        if not self._on.books.trusted:
+            self._staged |= self._on.plant.staged()
+
+    def _came_from_a_lost_write(self, tool: int, holds: ToolOffset | None) -> bool:
+        """Tell whether a request brought into force what nobody could know to wait for one.
+
+        A write had ended between its registers and its request, and the disk lost the record of
+        it. A person has to have been told, where the record could show it.
+        """
+        staged = self._staged.get(tool)
+        known, _ = self._on.books.value_of(tool)
+        if staged is None or not self._on.plant.same(staged, holds):
+            return False
+        return tool in self._told or not known
 
     def _agrees(self, tool: int, holds: ToolOffset | None, named: Sequence[BookedMarker]) -> None:
         known, value = self._on.books.value_of(tool)
         if tool in self._by_others and self._on.plant.same(self._by_others[tool], holds):
             return
-        if tool in self._on.plant.touched or named:
+        if tool in self._on.plant.touched or named or self._came_from_a_lost_write(tool, holds):
             return
         self._on.hold(
             "BooksAgree",
@@ -109,6 +133,8 @@ class RestRules:
             holds, before = state.tools.get(tool), self._on.now.first.tools.get(tool)
             self._agrees(tool, holds, ())
             if tool in self._on.plant.touched or self._on.plant.same(holds, before):
+                continue
+            if self._came_from_a_lost_write(tool, holds):
                 continue
             self._on.hold("KeptOnProof", self._proved(tool, holds), f"tool {tool} keeps {holds}")
             if self._on.plant.calls_back and holds is not None:

@@ -79,6 +79,10 @@ class Rulebook(Grounds):
         self.now.old_markers = frozenset(m.operation for m in self.books.markers())
         self.now.report = None
 
+    def said(self, text: str) -> None:
+        """Note what a person is told."""
+        self._at_rest.said(text)
+
     def others_write(self, tool: int, offset: ToolOffset) -> None:
         """Note that a second person writes a tool."""
         self.now.crowded = True

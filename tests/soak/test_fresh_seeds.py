@@ -1,0 +1,176 @@
+"""Histories of fresh seeds that broke a rule, cut to what it took: each rule holds in them now.
+
+docs/reliability.md says of each what was wrong, in which of the two, and what holds now.
+"""
+
+import pytest
+from robolink_simulators.soak import drawn_history, live_through
+from robolink_simulators.soak.history import (
+    CellKind,
+    Deed,
+    Disturbance,
+    Habit,
+    Hindrance,
+    History,
+    Hour,
+)
+
+HISTORIES = (
+    History(
+        5034,
+        CellKind.MODBUS_RTU,
+        (
+            Hour(
+                4,
+                Deed.CHANGE_NOZZLE,
+                Habit(),
+                (
+                    Disturbance(Hindrance.PRODUCTION, "", "WRITE_TOOL", 0, 3.0, None),
+                    Disturbance(Hindrance.WIRE, "REORDER_WRITE", "WRITE_TOOL", 0, 5.0, 0),
+                ),
+            ),
+        ),
+    ),
+    History(
+        7171,
+        CellKind.SOFTMOTION,
+        (
+            Hour(
+                4,
+                Deed.CHANGE_NOZZLE,
+                Habit(),
+                (
+                    Disturbance(Hindrance.ANOTHER_CLIENT, "", "WRITE_TOOL", 0, 5.0, None),
+                    Disturbance(Hindrance.WIRE, "REORDER_WRITE", "WRITE_TOOL", 0, 0.05, 3),
+                ),
+            ),
+        ),
+    ),
+    History(
+        7187,
+        CellKind.CANOPEN,
+        (
+            Hour(
+                6,
+                Deed.SET_TWO,
+                Habit(),
+                (
+                    Disturbance(Hindrance.WIRE, "REORDER_WRITE", "WRITE_TOOL", 0, 20.0, 10),
+                    Disturbance(Hindrance.WIRE, "DROP_REPLY", "WRITE_TOOL", 0, 0.0, None),
+                ),
+            ),
+            Hour(
+                7,
+                Deed.CHANGE_NOZZLE,
+                Habit(),
+                (),
+            ),
+        ),
+    ),
+    History(
+        5031,
+        CellKind.SOFTMOTION,
+        (
+            Hour(
+                11,
+                Deed.SET_TOOL,
+                Habit(),
+                (),
+            ),
+            Hour(
+                18,
+                Deed.SET_TOOL,
+                Habit(),
+                (Disturbance(Hindrance.SECOND_PERSON, "", "procedure", 0, 0.0, None),),
+            ),
+        ),
+    ),
+    History(
+        6056,
+        CellKind.REGISTER_MAP,
+        (
+            Hour(
+                16,
+                Deed.SET_TWO,
+                Habit(),
+                (Disturbance(Hindrance.POWER_CUT, "SYNC_LIES", "wire sent", 0, 0.0, None),),
+            ),
+            Hour(
+                18,
+                Deed.SET_TWO,
+                Habit(),
+                (Disturbance(Hindrance.STOP, "", "procedure", 0, 0.0, None),),
+            ),
+        ),
+    ),
+    History(
+        7028,
+        CellKind.REGISTER_MAP,
+        (
+            Hour(
+                11,
+                Deed.SET_TOOL,
+                Habit(),
+                (),
+            ),
+            Hour(
+                12,
+                Deed.UNDO,
+                Habit(),
+                (Disturbance(Hindrance.POWER_CUT, "SYNC_LIES", "fc16", 0, 0.0, None),),
+            ),
+            Hour(
+                13,
+                Deed.SET_TOOL,
+                Habit(),
+                (Disturbance(Hindrance.STOP, "", "fc16", 0, 0.0, None),),
+            ),
+        ),
+    ),
+    History(
+        7176,
+        CellKind.REGISTER_MAP,
+        (
+            Hour(
+                15,
+                Deed.SET_TWO,
+                Habit(),
+                (Disturbance(Hindrance.POWER_CUT, "SYNC_LIES", "fc16", 1, 0.0, None),),
+            ),
+            Hour(
+                16,
+                Deed.SET_TWO,
+                Habit(),
+                (Disturbance(Hindrance.KILL, "", "commit after", 2, 0.0, None),),
+            ),
+        ),
+    ),
+    History(
+        7112,
+        CellKind.MODBUS_TCP,
+        (
+            Hour(
+                0,
+                Deed.CHANGE_NOZZLE,
+                Habit(),
+                (
+                    Disturbance(Hindrance.POWER_CUT, "", "MOVE_LINEAR", 48, 0.0, None),
+                    Disturbance(Hindrance.POWER_CUT, "SYNC_LIES", "lock 5205", 0, 0.0, None),
+                ),
+            ),
+        ),
+    ),
+)
+LOST_RECORD = drawn_history(177058577, 20).without_hours(
+    [hour for hour in range(20) if hour not in (8, 9)]
+)
+"""A program that calls back, and a journal that somebody has deleted."""
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize(
+    "history", [*HISTORIES, LOST_RECORD], ids=lambda history: str(history.seed)
+)
+def test_every_rule_holds_in_what_broke_one(history):
+    story = live_through(history)
+    assert story.broken == [], story.told()

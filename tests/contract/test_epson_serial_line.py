@@ -182,8 +182,8 @@ def test_what_a_line_cannot_tell_hides_no_flag(letters):
 
 def test_a_single_variable_is_read_over_a_line_and_an_array_is_refused_by_name():
     with line() as (_, url), robolink.connect(url) as controller:
+        assert isinstance(controller, EpsonController)
         variables = controller.variables
-        assert variables is not None
         assert variables.read("g_Byte", "Byte") == 0
         with pytest.raises(RejectedError, match="several values"):
             variables.read_array("g_Long_table", (0, 0), "Long", count=3)

@@ -20,7 +20,7 @@ MOST: Final = 9999
 _FAR: Final = 1_000_000
 LONGEST_TEXT: Final = 200
 
-Form = Literal["whole", "number", "flag", "text", "any"]
+Form = Literal["whole", "number", "flag", "text"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,12 +29,13 @@ class Taken:
 
     Attributes:
         name: Its name, with the unit in it.
-        form: A whole number, a number, true or false, a text, or any of these.
+        form: A whole number, a number, true or false (1 and 0 will do), or a text.
         needed: Whether it must be given.
         choices: The texts that there are, where not any will do.
         most: The highest number.
         least: The lowest number; of ``whole`` never below 0.
         default: What it is where it is not given; ``None`` for not given.
+        or_none: Whether null is one, too.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Taken:
     most: float = _FAR
     least: float = -_FAR
     default: object = None
+    or_none: bool = False
 
     @property
     def whole_limits(self) -> tuple[int, int]:
@@ -56,6 +58,8 @@ class Taken:
         Raises:
             ConfigError: It is something else.
         """
+        if value is None and self.or_none:
+            return None
         match self.form:
             case "whole":
                 lowest, highest = self.whole_limits
@@ -66,13 +70,9 @@ class Taken:
                 fits = number and self.least <= value <= self.most  # type: ignore[operator]
             case "flag":
                 fits = isinstance(value, bool) or (type(value) is int and value in (0, 1))
-            case "text":
+            case _:
                 short = isinstance(value, str) and len(value) <= LONGEST_TEXT
                 fits = short and (not self.choices or value in self.choices)
-            case _:
-                fits = (
-                    isinstance(value, (bool, int, float, str)) and len(str(value)) <= LONGEST_TEXT
-                )
         if not fits:
             raise ConfigError(self._needs(act), remedy=self._example())
         return float(value) if self.form == "number" else value  # type: ignore[arg-type]

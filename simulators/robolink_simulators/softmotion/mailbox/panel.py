@@ -112,13 +112,13 @@ class PlcPanel:
         """Switch an input by hand.
 
         Raises:
-            ConfigError: There is no such input.
+            NotNowError: There is no such input.
         """
         with self._acting():
             try:
                 self._plc.group.inputs.switch(number, on)
             except BlockRefused as refused:
-                raise ConfigError(
+                raise NotNowError(
                     tr("There is no input {number}.", number=number),
                     remedy=tr("Inputs are 0 to {last}.", last=SIGNALS - 1),
                 ) from refused

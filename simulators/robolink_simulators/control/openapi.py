@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from robolink_simulators.control.acts.answers import CellAbout, CellsAbout
-from robolink_simulators.control.acts.declared import LONGEST_TEXT, ControlAct, Taken
+from robolink_simulators.control.acts.declared import LONGEST_TEXT, PRINTABLE, ControlAct, Taken
 from robolink_simulators.control.acts.registry import ACTS
 from robolink_simulators.control.answer_schemas import AnswerSchemas
 
@@ -81,7 +81,7 @@ def _path(act: ControlAct, kinds: list[str], answers: AnswerSchemas) -> dict[str
         "operationId": act.name,
         "summary": act.says,
         "description": f"At {of}.",
-        "requestBody": {"content": {"application/json": {"schema": _object(act)}}},
+        "requestBody": _body(act),
         "responses": _responses(None if act.gives is None else answers.of(act.gives)),
     }
     path: dict[str, Any] = {"parameters": [_CELL], "post": operation}
@@ -101,7 +101,7 @@ def _looked_at(summary: str, gives: Mapping[str, Any], *, with_cell: bool = True
     return {"parameters": [_CELL], **path} if with_cell else path
 
 
-def _object(act: ControlAct) -> dict[str, Any]:
+def _body(act: ControlAct) -> dict[str, Any]:
     needed = [it.name for it in act.takes if it.needed and it.default is None]
     schema: dict[str, Any] = {
         "type": "object",
@@ -110,7 +110,7 @@ def _object(act: ControlAct) -> dict[str, Any]:
     }
     if needed:
         schema["required"] = needed
-    return schema
+    return {"required": bool(needed), "content": {"application/json": {"schema": schema}}}
 
 
 def _schema(taken: Taken) -> Mapping[str, Any]:
@@ -126,7 +126,8 @@ def _schema(taken: Taken) -> Mapping[str, Any]:
         case _ if taken.choices:
             return {"type": "string", "enum": list(taken.choices)}
         case _:
-            return {"type": "string", "maxLength": LONGEST_TEXT}
+            text = {"type": "string", "maxLength": LONGEST_TEXT}
+            return {**text, "pattern": f"^{PRINTABLE}$"} if taken.ascii else text
 
 
 def _responses(gives: Mapping[str, Any] | None) -> dict[str, Any]:

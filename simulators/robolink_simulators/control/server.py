@@ -25,9 +25,9 @@ from robolink_simulators.control.acts.registry import (
     ACTS,
     MACHINE_REFUSALS,
     UnknownActError,
-    act_named,
     defect,
     machine_refusal,
+    methods_of,
     perform,
 )
 from robolink_simulators.control.cell import ControlledCell
@@ -157,8 +157,7 @@ class ControlServer(ClosedAtExit):
                 return _LOOKED_AT, _only(lambda: _ok(self._about(name)))
             case [version, "cells", name, act] if version == VERSION and name in self.cells:
                 cell = self.cells[name]
-                methods = ("GET", "POST") if act_named(cell, act).reads else ("POST",)
-                return methods, lambda given: _ok(perform(cell, act, given))
+                return methods_of(cell, act), lambda given: _ok(perform(cell, act, given))
             case _:
                 raise UnknownActError(
                     tr("There is no such address."),
@@ -208,7 +207,7 @@ def _given(method: str, query: str, body: bytes) -> dict[str, Any]:
             remedy=tr("Give them there as a JSON object."),
         )
     try:
-        given = json.loads(body, object_pairs_hook=_each_once) if body.strip() else {}
+        given = json.loads(body, object_pairs_hook=_each_once) if body else {}
     except ConfigError:  # which is a ValueError too
         raise
     except (ValueError, RecursionError):

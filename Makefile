@@ -13,6 +13,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PEER := $(VENV)/bench-peer
 JUDGES := $(VENV)/judges
+API_JUDGE := $(VENV)/schemathesis
 WHEELHOUSE := wheelhouse
 POT := robolink/locale/robolink.pot
 
@@ -58,7 +59,7 @@ faults: $(VENV)/.installed-dev ## Run the fault catalogue, F01 to F80, and print
 
 # Their files are called judge_*.py: a plain pytest, which takes test_*.py, leaves them out.
 .PHONY: peers
-peers: $(VENV)/.installed-dev $(JUDGES) ## Let foreign programs judge the field buses and the PLC program.
+peers: $(VENV)/.installed-dev $(JUDGES) $(API_JUDGE) ## Let foreign programs judge buses, PLC program and control API.
 	@{ command -v mbpoll && command -v tshark && command -v node && command -v cc && pkg-config --exists libmodbus; } \
 		>/dev/null || { \
 		echo "Not all judges are here. On Debian and Ubuntu:" \
@@ -69,6 +70,18 @@ peers: $(VENV)/.installed-dev $(JUDGES) ## Let foreign programs judge the field 
 # It needs pyserial and nothing else. Without it its judge is left out, and says so.
 $(JUDGES): $(VENV)/.installed-dev
 	$(BIN)/python -m pip install --quiet --no-deps --target $@ minimalmodbus==2.1.1 || true
+
+# It needs other versions of pytest and hypothesis, so it has its own environment.
+$(API_JUDGE): $(VENV)/.installed-dev
+	$(BIN)/python -m venv $@
+	$@/bin/python -m pip install --quiet schemathesis==4.32.5 || true
+
+# NIGHT= hours; PARTS="docs peers" runs some. The parts and their shares: tools/nightly.py.
+NIGHT := 8
+PARTS :=
+.PHONY: nightly
+nightly: $(VENV)/.installed-dev ## Run all that make test leaves out, and print one table of how it ended.
+	@NIGHT=$(NIGHT) $(BIN)/python tools/nightly.py $(PARTS)
 
 .PHONY: windows
 windows: $(VENV)/.installed-dev ## Run the wheel on a Windows CPython under wine, as far as that goes.

@@ -1,15 +1,37 @@
-"""Where a journal is."""
+"""Where a journal is, and where none can be: on a network share, as far as it can be told.
+
+A database in WAL mode keeps an index in memory that all its users have to share, so they have to
+be on one computer (https://www.sqlite.org/wal.html); and locks and fsync of a share are not those
+of a disk. Linux names the file system of each mount (proc(5), mountinfo), Windows the kind of each
+drive. Other systems tell neither here, and a share is not recognized there.
+"""
 
 import os
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from typing import Final
 
 from robolink.errors import JournalError
 from robolink.messages import tr
 
 _SQLITE: Final = "sqlite:///"
+
+MOUNT_TABLE: Final = Path("/proc/self/mountinfo")
+
+_SHARES: Final = r"""
+    9p | acfs | afs | beegfs | ceph | cifs | coda | davfs | gfs2 | glusterfs | gpfs | lustre
+    | ncpfs | nfs4? | ocfs2 | orangefs | prl_fs | pvfs2 | smb2 | smb3 | smbfs | vboxsf | vmhgfs
+    | fuse\.(ceph(-fuse)? | cifs | davfs2? | glusterfs | gvfsd-fuse | nfs | rclone | s3fs
+    | smbnetfs | sshfs | vmhgfs-fuse)
+    """
+"""File systems that more than one running system may write to, by their names in Linux."""
+
+_REMOTE: Final = 4
+"""What GetDriveType of Windows answers for a drive of the network: DRIVE_REMOTE."""
+
+_ESCAPED: Final = re.compile(r"\\([0-7]{3})")
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,13 +81,14 @@ def place_of(location: str) -> JournalPlace:
 
     Raises:
         JournalError: It is neither a file nor a PostgreSQL database; a pipe, for which SQLite
-            would wait for ever, is no file.
+            would wait for ever, is no file. Or it is a file on a network share.
     """
     if "://" not in location:
         location = _file_location(Path(location))
     if location.startswith(_SQLITE) and location != _SQLITE:
         path = Path(location.removeprefix(_SQLITE)).absolute()
         _require_regular(path)
+        _require_local(path)
         return JournalPlace(_file_location(path), str(path), path=path)
     scheme, _, rest = location.partition("://")
     if scheme in ("postgresql", "postgresql+psycopg") and rest:
@@ -87,6 +110,67 @@ def memory_place(identity: str) -> JournalPlace:
     return JournalPlace("sqlite://", name)
 
 
+def share_of(path: Path) -> str | None:
+    """Return what kind of network share a file lies on, or would.
+
+    Args:
+        path: The file, which need not exist; links in its path are followed.
+
+    Returns:
+        The file system's name, ``UNC`` or a drive; ``None`` for a disk of this computer, and where
+        that cannot be told.
+    """
+    real = os.path.realpath(path)
+    if os.name == "nt":
+        return share_of_windows(real, _drive_type)
+    try:
+        table = MOUNT_TABLE.read_bytes()
+    except OSError:
+        return None
+    return share_in(os.fsdecode(table), real)
+
+
+def share_in(table: str, path: str) -> str | None:
+    """Return what kind of share holds a path, by the text of a table of mounts (proc(5)).
+
+    What is mounted at ``/`` is this computer's own: a diskless PC, a container.
+    """
+    longest, found = "/", ""
+    for line in table.split("\n"):
+        mount, _, source = line.partition(" - ")
+        fields, kind = mount.split(" "), source.partition(" ")[0]
+        if len(fields) < 5 or not kind:
+            continue
+        point = _ESCAPED.sub(lambda code: chr(int(code[1], 8)), fields[4])
+        # One that was mounted later covers an earlier one of the same place.
+        if len(point) >= len(longest) and (path + "/").startswith(point.rstrip("/") + "/"):
+            longest, found = point, kind
+    return found if longest != "/" and re.fullmatch(_SHARES, found, re.VERBOSE) else None
+
+
+def share_of_windows(path: str, drive_type: Callable[[str], int]) -> str | None:
+    """Return what a path of Windows says of a share: a UNC path, or a drive of the network.
+
+    Args:
+        path: The whole path.
+        drive_type: Asks GetDriveType for the root of a drive.
+    """
+    drive = PureWindowsPath(path).drive
+    if drive.startswith("\\\\"):
+        device = drive[4:] if drive[2:4] in ("?\\", ".\\") else "UNC"
+        if device.upper().startswith("UNC"):
+            return "UNC"
+        drive = device
+    return drive if drive_type(f"{drive}\\") == _REMOTE else None
+
+
+def _drive_type(root: str) -> int:
+    import ctypes
+
+    kernel = ctypes.windll.kernel32  # type: ignore[attr-defined,unused-ignore]
+    return int(kernel.GetDriveTypeW(ctypes.c_wchar_p(root)))
+
+
 def _require_regular(path: Path) -> None:
     try:
         special = path.exists() and not path.is_file()
@@ -96,6 +180,24 @@ def _require_regular(path: Path) -> None:
         raise JournalError(
             tr("The journal {path} is not a regular file.", path=path),
             remedy=tr("Name a file, or a PostgreSQL database, in ROBOLINK_JOURNAL."),
+        )
+
+
+def _require_local(path: Path) -> None:
+    kind = share_of(path)
+    if kind is not None:
+        raise JournalError(
+            tr(
+                "The journal {path} would lie on a network share ({kind}), where its database "
+                "cannot keep two computers apart and may be damaged.",
+                path=path,
+                kind=kind,
+            ),
+            remedy=tr(
+                "Name a file on a disk of this computer, or a PostgreSQL database for several "
+                "computers, in ROBOLINK_JOURNAL. If the journal has entries, first copy it there, "
+                "with its -wal file, while no program uses it."
+            ),
         )
 
 

@@ -9,7 +9,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 
 _TRUTH: Final = {"1": True, "true": True, "yes": True, "0": False, "false": False, "no": False}
-_MOST: Final = 1e12
+MOST_OF_AN_OPTION: Final = 1e12
 """More than any length, time, share or device number; less than what overflows in a product."""
 
 
@@ -77,7 +77,7 @@ def _value(name: str, text: str, hint: Any) -> object:  # noqa: ANN401 - a type 
         value = hint(text)
     except ValueError:
         value = -1
-    if not 0 <= value <= _MOST:
+    if not 0 <= value <= MOST_OF_AN_OPTION:
         raise _refused(name, text, tr("a number, 0 or more"))
     return value
 

@@ -1,11 +1,16 @@
 """Looking while production runs, and the companion program that makes tools visible then."""
 
 import json
+import os
 
 import pytest
+from robolink_cli import main
 from robolink_cli.commands.companions import companion_files
+from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.epson.condition import Task
 from robolink_simulators.hosting.in_process.epson import clock_of
+from robolink_simulators.hosting.streams.epson_serial import serve_serial
 
 from robolink.model import ToolOffset
 
@@ -38,6 +43,22 @@ def test_status_shows_the_published_tool_where_execute_is_not_available(run, sim
     assert "selected tool, as published: 1" in out
     document = json.loads(run("status", "--json")[1])
     assert (document["selected_tool"], document["published_selected_tool"]) == (None, 1)
+
+
+@pytest.mark.skipif(not hasattr(os, "openpty"), reason="needs a pseudo terminal")
+def test_a_status_over_rs232_shows_the_flags_and_names_what_was_not_read(capsys):
+    simulator = EpsonSimulator(seed=3)
+    simulator.panel.start_production()
+    with serve_serial(simulator, clock=ScaledClock(40.0)) as host:
+        assert main.run(["-c", host.url, "status"]) == 0
+        shown = capsys.readouterr().out
+        assert main.run(["-c", host.url, "status", "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert "flags: remote, running" in shown
+    assert "not read: alarms, preferences, selected tool, motors, power" in shown
+    assert (document["state"], document["running"]) == ("running", True)
+    for name in ("alarms", "preferences", "selected_tool", "published_selected_tool", "power"):
+        assert document[name] is None
 
 
 def test_published_tools_are_listed_and_compared_while_production_runs(run, simulator, golden):

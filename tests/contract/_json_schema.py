@@ -35,6 +35,7 @@ class Schemas:
         """Return what describes the answer of an operation."""
         responses = self._document["paths"][path][method]["responses"]
         told = responses.get(str(status), responses["default"])
+        told = self._referred(told) if "$ref" in told else told
         schema: dict[str, Any] = told["content"]["application/json"]["schema"]
         return schema
 
@@ -94,6 +95,7 @@ class Schemas:
         return {*schema.get("properties", ())}.union(*map(self._names, parts))
 
     def _referred(self, schema: dict[str, Any]) -> dict[str, Any]:
-        name = schema["$ref"].removeprefix("#/components/schemas/")
-        found: dict[str, Any] = self._document["components"]["schemas"][name]
+        found: dict[str, Any] = self._document
+        for step in schema["$ref"].removeprefix("#/").split("/"):
+            found = found[step]
         return found

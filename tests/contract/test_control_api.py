@@ -401,6 +401,112 @@ def test_who_does_not_show_the_token_learns_nothing(cells):
     assert "the-token" not in repr(cells.answered("GET", "/", b""))
 
 
+DOCUMENT = openapi()
+
+
+@pytest.mark.parametrize("method", ["GET", "HEAD", "POST", "PUT", "DELETE", "PATCH", "OPTIONS"])
+def test_each_address_answers_the_methods_of_the_document_and_names_them_to_others(cells, method):
+    base = urlsplit(cells.url).path
+    kinds = {name: ACTS[cell.simulator.kind] for name, cell in cells.cells.items()}
+    addresses = [("/", ""), ("/cells/{cell}", "/cells/a")]
+    addresses += [
+        (f"/cells/{{cell}}/{act}", f"/cells/{name}/{act}")
+        for name, acts in kinds.items()
+        for act in acts
+    ]
+    for path, address in addresses:
+        operations = DOCUMENT["paths"][path].keys() - {"parameters"}
+        allowed = ", ".join(it for it in ("GET", "POST") if it.lower() in operations)
+        if method in allowed:
+            continue
+        # The method is refused before what is given is looked at.
+        sent = (
+            f"{method} {base}{address} HTTP/1.1\r\nHost: localhost\r\nContent-Length: 2\r\n\r\n[]"
+        )
+        reply, told = exchanged(cells, sent.encode())
+        assert (reply.status, reply.headers["Allow"]) == (405, allowed), (method, address)
+        if method != "HEAD":
+            assert (told["ok"], allowed in told["remedy"]) == (False, True)
+    refused, _ = exchanged(cells, f"{method} /x/v1 HTTP/1.1\r\n\r\n".encode())
+    assert (refused.status, refused.headers["Allow"]) == (403, None)
+
+
+@pytest.mark.parametrize(
+    ("head", "status"),
+    [
+        ([], 200),
+        ([("Host", "127.0.0.1:{port}")], 200),
+        ([("Host", "LOCALHOST")], 200),
+        ([("Host", "cell.localhost.:80")], 200),
+        ([("Host", "[::1]:{port}")], 200),
+        ([("Host", "192.0.2.7:9000")], 200),  # forwarded to this port
+        ([("Host", "evil.example:{port}")], 403),
+        ([("Host", "127.0.0.1.evil.example")], 403),
+        ([("Host", "localhost.evil.example")], 403),
+        ([("Host", "evillocalhost")], 403),
+        ([("Host", "")], 403),
+        ([("Host", "[x")], 403),
+        ([("Host", "localhost"), ("Host", "evil.example")], 403),
+        ([("Host", "127.0.0.1:{port}"), ("Origin", "http://evil.example")], 403),
+        ([("Host", "127.0.0.1:{port}"), ("Origin", "http://127.0.0.1:{port}")], 403),
+        ([("Host", "127.0.0.1:{port}"), ("Origin", "null")], 403),
+    ],
+)
+def test_what_a_page_in_a_browser_asks_is_refused(cells, at, head, status):
+    _, simulator = at("a")
+    base, port = urlsplit(cells.url).path, urlsplit(cells.url).port
+    lines = [f"{name}: {value.format(port=port)}" for name, value in head]
+    for asked in ("POST {}/cells/a/set_input", "GET {}/cells/a/truth"):
+        body = '{"number": 3}' if "POST" in asked else ""
+        first = [f"{asked.format(base)} HTTP/1.1", *lines, f"Content-Length: {len(body)}"]
+        reply, told = exchanged(cells, "\r\n".join([*first, "", body]).encode())
+        assert (reply.status, told["ok"]) == (status, status == 200)
+        assert "Access-Control-Allow-Origin" not in reply.headers
+    assert simulator.machine.inputs.get(3) is (status == 200)
+
+
+def test_a_port_for_other_machines_is_called_as_they_like_but_not_by_a_page():
+    cell = ControlledCell(EpsonSimulator(seed=3), ManualClock())
+    with ControlServer({"a": cell}, ("127.0.0.1", 0), allow_remote=True) as server:
+        head = f"GET {urlsplit(server.url).path} HTTP/1.1\r\nHost: simulators.plant.example\r\n"
+        assert exchanged(server, f"{head}\r\n".encode())[0].status == 200
+        assert exchanged(server, f"{head}Origin: null\r\n\r\n".encode())[0].status == 403
+
+
+@pytest.mark.parametrize(
+    ("name", "act", "given"),
+    [
+        ("a", "set_input", {"number": 9000}),
+        ("b", "set_input", {"number": 32}),
+        ("a", "restore", {"name": "nothing"}),
+        ("a", "add_fault", {"action": "echo"}),
+        ("b", "set_world", {"contact_input": 32}),
+    ],
+)
+def test_what_this_machine_has_not_is_told_apart_from_what_is_none(cells, name, act, given):
+    address = f"{urlsplit(cells.url).path}/cells/{name}/{act}"
+    assert raw(cells, "POST", address, json.dumps(given).encode())[0] == 409
+
+
+@pytest.mark.parametrize(
+    ("given", "status"),
+    [
+        ({"camera_mirrored": 1, "board_held": False}, 200),
+        ({"contact_input": None, "person_bias_frame": "tool"}, 200),
+        ({"contact_input": "none"}, 400),
+        ({"lean_deg": "1"}, 400),
+        ({"lean_deg": True}, 400),
+        ({"camera_still_share": 2}, 400),
+        ({"camera_um_per_px_x": 0}, 400),
+        ({"person_bias_frame": False}, 400),
+    ],
+)
+def test_a_parameter_of_the_world_is_what_the_document_says(cells, at, given, status):
+    at("a")
+    address = f"{urlsplit(cells.url).path}/cells/a/set_world"
+    assert raw(cells, "POST", address, json.dumps(given).encode())[0] == status
+
+
 def counters_of(url):
     try:
         with ControlClient(url) as client:

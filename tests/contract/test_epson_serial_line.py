@@ -12,6 +12,7 @@ from robolink_simulators.hosting.streams.epson_serial import serve_serial
 from robolink_simulators.hosting.streams.serial_cable import SerialCable
 
 import robolink
+from robolink.controllers.epson import EpsonController
 from robolink.errors import (
     ConfigError,
     ConnectError,
@@ -157,6 +158,36 @@ def _relay(cable, url, find, put):
         thread.join()
         for descriptor in (port, near, over, end):
             os.close(descriptor)
+
+
+@pytest.mark.parametrize("letters", ["documented", "guessed"])
+def test_what_a_line_cannot_tell_hides_no_flag(letters):
+    with line(rs232_letters=letters) as (simulator, url), robolink.connect(url) as controller:
+        assert isinstance(controller, EpsonController)
+        assert controller.condition()["selected_tool"] == 1
+        simulator.panel.start_production()
+        found = controller.condition()
+        assert controller.status().running
+        with pytest.raises(RejectedError) as caught:
+            controller.published_tools()
+        assert caught.value.code == 11
+        assert "Remote Ethernet" in caught.value.remedy
+        simulator.panel.press_estop()
+        assert controller.condition()["text"] == ""
+        assert controller.status().emergency_stop
+    assert found["alarms"] is None
+    assert found["selected_tool"] is found["published_selected_tool"] is None
+    assert found["motors_on"] is found["power"] is found["preferences"] is None
+
+
+def test_a_single_variable_is_read_over_a_line_and_an_array_is_refused_by_name():
+    with line() as (_, url), robolink.connect(url) as controller:
+        assert isinstance(controller, EpsonController)
+        variables = controller.variables
+        assert variables.read("g_Byte", "Byte") == 0
+        with pytest.raises(RejectedError, match="several values"):
+            variables.read_array("g_Long_table", (0, 0), "Long", count=3)
+        assert variables.read("g_Byte", "Byte") == 0
 
 
 def test_a_cable_at_whose_far_end_nobody_reads_loses_it_and_can_be_unplugged():

@@ -10,7 +10,11 @@ from robolink_cli.commands.simulate.serving import world_from
 from robolink_simulators.assist.acts import perform
 from robolink_simulators.cell.camera import CameraOptics, CameraTruth
 from robolink_simulators.cell.tip_switches import LightBeam, TouchPlate
-from robolink_simulators.cell.world_parameters import WorldParameters, parameter_names
+from robolink_simulators.cell.world_parameters import (
+    WorldParameters,
+    parameter_names,
+    parameters_from_text,
+)
 from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.epson.arm.kinematics import inverse
 from robolink_simulators.hosting.in_process import epson as in_process
@@ -244,10 +248,13 @@ def test_the_assist_port_furnishes_and_spoils_a_cell(make):
     ("request_", "said"),
     [
         ({"do": "set_world", "wind": 1}, "no parameter 'wind'"),
-        ({"do": "set_world", "camera_turn_deg": "round"}, "cannot be 'round'"),
-        ({"do": "set_world", "camera_um_per_px_x": 0}, "0 long"),
+        ({"do": "set_world", "camera_turn_deg": "round"}, "needs camera_turn_deg, a number"),
+        ({"do": "set_world", "camera_um_per_px_x": 0}, "from 1e-06"),
         ({"do": "mount_plate", "number": 7}, "needs z_mm"),
-        ({"do": "mount_plate", "number": 7, "z_mm": 1, "noise_mm": -1}, "negative"),
+        (
+            {"do": "mount_plate", "number": 7, "z_mm": 1, "noise_mm": -1},
+            "noise_mm, a number from 0",
+        ),
         ({"do": "mount_beam", "number": 7, "x_mm": 1, "y_mm": 1, "z_mm": True}, "needs z_mm"),
     ],
 )
@@ -361,4 +368,15 @@ def test_what_a_camera_sees_beside_the_tip_turns_with_it(make):
 
 def test_a_share_of_still_spots_is_a_share():
     with pytest.raises(ConfigError, match="above 1"):
+        parameters_from_text({"camera_still_share": "1.5"})
+    with pytest.raises(ConfigError, match="a number from 0 to 1"):
         perform(EpsonSimulator(seed=2), {"do": "set_world", "camera_still_share": 1.5})
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [("camera_turn_deg", "round", "cannot be 'round'"), ("camera_um_per_px_x", "0", "0 long")],
+)
+def test_an_option_that_makes_no_world_is_refused(name, text, said):
+    with pytest.raises(ConfigError, match=said):
+        parameters_from_text({name: text})

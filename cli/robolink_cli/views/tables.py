@@ -46,6 +46,23 @@ def _show_epson(payload: Mapping[str, object]) -> None:
         )
     elif payload["published_selected_tool"] is not None:
         say(tr("  selected tool, as published: {tool}", tool=payload["published_selected_tool"]))
+    if missing := _unread(payload):
+        say(tr("  not read: {what}", what=", ".join(missing)))
+
+
+def _unread(payload: Mapping[str, object]) -> list[str]:
+    """Return what the controller, or its line, did not tell in its present state."""
+    known = dict(payload)
+    if known["selected_tool"] is None:
+        known["selected_tool"] = known["published_selected_tool"]
+    words = {
+        "alarms": tr("alarms"),
+        "preferences": tr("preferences"),
+        "selected_tool": tr("selected tool"),
+        "motors_on": tr("motors"),
+        "power": tr("power"),
+    }
+    return [word for name, word in words.items() if known[name] is None]
 
 
 def _show_preferences(told: object) -> None:

@@ -35,7 +35,7 @@ class ConditionReader:
         self._group = group
 
     def read(self, *, published: Callable[[], PublishedTools | None]) -> dict[str, object]:
-        """Return plain JSON; what needs Execute is ``None`` where Execute is not available.
+        """Return plain JSON; what this line, firmware or state does not tell is ``None``.
 
         While production runs only the flags and the alarms are read (docs/reference/epson.md 1.2,
         1.3).

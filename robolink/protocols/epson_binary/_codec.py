@@ -19,6 +19,7 @@ from robolink.protocols.epson_binary._dialect import Dialect, Letters
 from robolink.protocols.epson_binary._frames import EOT, FrameBuffer
 from robolink.protocols.epson_binary._letters import letter_of
 from robolink.protocols.epson_binary._messages import (
+    is_array,
     read_answer,
     read_request,
     write_answer,
@@ -55,11 +56,16 @@ class EpsonBinaryCodec(EpsonCodec):
         """What it takes the manuals to mean."""
         return self._dialect
 
-    def carries(self, name: str) -> bool:
-        """Whether a command has a letter that may be sent."""
+    def carries(self, name: str, *parameters: str) -> bool:
+        """Whether a command has a letter that may be sent, and is no read of an array.
+
+        How an array is asked for, no manual says clearly enough (docs/reference/epson.md 2.2).
+        """
         letter = letter_of(name)
         guessed = self._dialect.letters is Letters.GUESSED
-        return letter is not None and (letter.documented or guessed)
+        if letter is None or not (letter.documented or guessed):
+            return False
+        return not (letter.name == "GetVariable" and is_array(parameters))
 
     def send(self, event: Event) -> bytes:
         """Return the bytes of one message.

@@ -1,6 +1,7 @@
 """What stands in a frame, as the events of Remote Ethernet, and back."""
 
 import re
+from collections.abc import Sequence
 from typing import Final
 
 from robolink.errors import LocalProtocolError, RemoteProtocolError
@@ -138,12 +139,17 @@ def _sendable(name: str, dialect: Dialect) -> Letter:
     return letter
 
 
+def is_array(parameters: Sequence[str]) -> bool:
+    """Whether a GetVariable asks for elements of an array: name, type and count."""
+    return len(parameters) > 2
+
+
 def _scalar(parameters: tuple[str, ...]) -> tuple[str, ...]:
     """A single variable needs its name alone (docs/reference/epson.md 1.2, note 4).
 
     How elements of an array and their count are written together is not said clearly enough.
     """
-    if len(parameters) > 2 or not parameters or not _VARIABLE.fullmatch(parameters[0]):
+    if is_array(parameters) or not parameters or not _VARIABLE.fullmatch(parameters[0]):
         raise _refused("GetVariable", tr("only a single variable can be read there, not an array"))
     return parameters[:1]
 

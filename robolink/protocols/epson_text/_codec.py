@@ -124,8 +124,8 @@ class EpsonCodec(ABC):
             raise
 
     @abstractmethod
-    def carries(self, name: str) -> bool:
-        """Whether a command of this name can be sent."""
+    def carries(self, name: str, *parameters: str) -> bool:
+        """Whether a command can be sent, with these parameters where any are given."""
 
     @abstractmethod
     def send(self, event: Event) -> bytes:
@@ -240,8 +240,8 @@ class EpsonTextCodec(EpsonCodec):
         super().__init__(role, self._buffer)
         self._blank_allowed = False
 
-    def carries(self, name: str) -> bool:
-        """Whether a command of this name can be sent: here all, known or not to the firmware."""
+    def carries(self, name: str, *parameters: str) -> bool:  # noqa: ARG002 - here all alike
+        """Whether a command can be sent: here all, known or not to the firmware."""
         return bool(name)
 
     def send(self, event: Event) -> bytes:

@@ -10,7 +10,6 @@ from collections.abc import Hashable, Mapping
 from dataclasses import asdict, replace
 from typing import Any, ClassVar, Final, Protocol
 
-from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import TIP, Pose, ToolOffset
 from robolink_simulators.cell.camera import CameraTruth
@@ -31,6 +30,7 @@ from robolink_simulators.cell.tip_switches import (
 )
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.device.late_random import late_random
+from robolink_simulators.not_now import NotNowError
 
 MOUNTED_TOOL: Final = 1
 """The tool number of the nozzle on the arm."""
@@ -113,7 +113,7 @@ class Workplace(ABC):
         """Give the cell other imperfections; tips, pin and camera stay where they are.
 
         Raises:
-            ConfigError: The contact is to switch an input that the controller does not have.
+            NotNowError: The contact is to switch an input that the controller does not have.
         """
         self._wire_contact(parameters)
         if parameters.tool_turn != self.parameters.tool_turn:
@@ -181,7 +181,7 @@ class Workplace(ABC):
     def _wire_contact(self, parameters: WorldParameters) -> None:
         number = parameters.contact_input
         if number is not None and number >= self.inputs:
-            raise ConfigError(
+            raise NotNowError(
                 tr("The simulated controller has no input {number}.", number=number),
                 remedy=tr("Give one from 0 to {last}.", last=self.inputs - 1),
             )

@@ -5,6 +5,11 @@ At most :data:`MOST_CLIENTS` are connected at a time, and each request is at mos
 minute, or whose client takes no answer for so long. Where all places are taken, who has asked
 nothing yet makes way for a newcomer: so nobody who is silent, or sends a byte now and then, keeps
 others out.
+
+A browser on this machine asks what any page tells it to. Such a request names the page in its
+``Origin``, and is refused; one that a page of another name sends here after that name was made to
+lead here (DNS rebinding) has that name in its ``Host``. Where other machines are served, too, these
+call this one as they like, so only ``Origin`` is looked at.
 """
 
 import io
@@ -18,9 +23,10 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from math import inf
 from socket import AF_INET, AF_INET6, SHUT_RDWR, SO_REUSEADDR, SOL_SOCKET, socket
 from time import monotonic
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from robolink.messages import tr
+from robolink_simulators.hosting.addresses import is_this_machine, require_loopback
 
 SCHEMA: Final = "robolink/control/1"
 """Of each answer, but for the API's own description."""
@@ -36,7 +42,19 @@ _TURNED_AWAY_S: Final = 5.0
 _BEFORE_ASKING_S: Final = 5.0
 """Who has asked nothing for so long has no claim to a place where there is none left."""
 
-Reply = tuple[HTTPStatus, dict[str, Any]]
+
+class Reply(NamedTuple):
+    """What a request is answered with.
+
+    Attributes:
+        status: How it went.
+        document: What is told.
+        allow: Where it was the method that is refused, those that are not.
+    """
+
+    status: HTTPStatus
+    document: dict[str, Any]
+    allow: tuple[str, ...] = ()
 
 
 def error_document(what: str, remedy: str = "") -> dict[str, Any]:
@@ -58,8 +76,10 @@ class HttpPort(ThreadingHTTPServer):
     Args:
         address: Host and port to bind to.
         answered: Returns what a request is answered with, given its method, target and body.
+        allow_remote: Whether other machines may ask.
 
     Raises:
+        ConfigError: The address is not loopback and ``allow_remote`` is off.
         OSError: The port is taken, or the address is not this machine's.
         OverflowError: There is no such port.
     """
@@ -69,8 +89,14 @@ class HttpPort(ThreadingHTTPServer):
     request_queue_size = 512  # whoever finds no room tries again only a second later
 
     def __init__(
-        self, address: tuple[str, int], answered: Callable[[str, str, bytes], Reply]
+        self,
+        address: tuple[str, int],
+        answered: Callable[[str, str, bytes], Reply],
+        *,
+        allow_remote: bool = False,
     ) -> None:
+        require_loopback(address[0], allow_remote=allow_remote)
+        self.allow_remote = allow_remote
         self.address_family = AF_INET6 if ":" in address[0] else AF_INET
         self.answered = answered
         self._served = dict[socket, float]()  # since when each has asked nothing
@@ -201,21 +227,16 @@ class _Served(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         """Look."""
-        body = self._body()
-        if body:
-            self._refuse(
-                HTTPStatus.BAD_REQUEST,
-                tr("A GET has its values behind the question mark, not in a body."),
-                tr("Give them there, or send it by POST."),
-            )
-        elif body is not None:
-            self._answer("GET", b"")
+        self._asked()
 
     def do_POST(self) -> None:
         """Act."""
+        self._asked()
+
+    def _asked(self) -> None:
         body = self._body()
         if body is not None:
-            self._answer("POST", body)
+            self._answer(self.command, body)
 
     def _body(self) -> bytes | None:
         """Return what came with the request; ``None`` where it was refused for that."""
@@ -255,32 +276,55 @@ class _Served(BaseHTTPRequestHandler):
         """Answer what is no request, or one of another method, in JSON as everything else."""
         self.request_version = self.protocol_version  # or it would get no head
         if code == HTTPStatus.NOT_IMPLEMENTED:
-            code = HTTPStatus.METHOD_NOT_ALLOWED
-        self._refuse(HTTPStatus(code), *no_request(HTTPStatus(code)))
+            self.close_connection = True
+            self._asked()
+        else:
+            self._refuse(HTTPStatus(code), *no_request(HTTPStatus(code)))
 
     def log_message(self, *_: object) -> None:
         """Print nothing: the URL holds the token."""
 
     def _refuse(self, status: HTTPStatus, what: str, remedy: str) -> None:
         self.close_connection = True  # what follows is not read
-        self._send(status, error_document(what, remedy))
+        self._send(Reply(status, error_document(what, remedy)))
 
     def _answer(self, method: str, body: bytes) -> None:
         self.server.has_asked(self.connection)
-        status, document = self.server.answered(method, self.path, body)
-        if status == HTTPStatus.FORBIDDEN:
+        reply = self._of_a_page() or self.server.answered(method, self.path, body)
+        if reply.status == HTTPStatus.FORBIDDEN:
             self.close_connection = True  # who does not show the token keeps no place
-        self._send(status, document)
+        self._send(reply)
 
-    def _send(self, status: HTTPStatus, document: dict[str, Any]) -> None:
-        data = json.dumps(document).encode()
+    def _of_a_page(self) -> Reply | None:
+        """Return what is answered to a browser that asks for a page which is not ours."""
+        if "Origin" in self.headers:
+            return Reply(
+                HTTPStatus.FORBIDDEN,
+                error_document(
+                    tr("A web page asks here (Origin), and pages are not answered."),
+                    tr("Ask from a program of your own, and send no Origin."),
+                ),
+            )
+        names = self.headers.get_all("Host", [])
+        if len(names) > 1 or not (self.server.allow_remote or all(map(is_this_machine, names))):
+            return Reply(
+                HTTPStatus.FORBIDDEN,
+                error_document(
+                    tr("The request is for another machine by its Host."),
+                    tr("Name this one as localhost or by its address."),
+                ),
+            )
+        return None
+
+    def _send(self, reply: Reply) -> None:
+        data = json.dumps(reply.document).encode()
         self.connection.settimeout(self.timeout)  # of all of it
-        self.send_response(status)
+        self.send_response(reply.status)
         self.send_header("Content-Type", "application/json")
         self.send_header("Content-Length", str(len(data)))
         self.send_header("Cache-Control", "no-store")
-        if status == HTTPStatus.METHOD_NOT_ALLOWED:
-            self.send_header("Allow", "GET, POST")
+        if reply.allow:
+            self.send_header("Allow", ", ".join(reply.allow))
         if self.close_connection:
             self.send_header("Connection", "close")
         self.end_headers()

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from robolink_simulators.control.acts.answers import CellAbout, CellsAbout
-from robolink_simulators.control.acts.declared import LONGEST_TEXT, ControlAct, Taken
+from robolink_simulators.control.acts.declared import LONGEST_TEXT, PRINTABLE, ControlAct, Taken
 from robolink_simulators.control.acts.registry import ACTS
 from robolink_simulators.control.answer_schemas import AnswerSchemas
 
@@ -18,6 +18,17 @@ _KINDS: Final = {
     "softmotion": "a PLC with a mailbox",
     "plc": "a PLC with a register map",
 }
+_REFUSALS: Final = {
+    "400": ("Wrong", "A value is missing, wrong or unknown."),
+    "403": ("Forbidden", "The token is another one, or a web page asks."),
+    "404": ("Unknown", "There is no such cell or act."),
+    "405": ("NotAllowed", "This method is not answered here."),
+    "409": ("NotNow", "The simulated robot cannot do it, or not as it is now."),
+    "503": ("Full", "Too many clients are connected."),
+    "default": ("Refused", "Refused for another reason, such as the length."),
+}
+"""What may be refused, by status: a name, and why."""
+
 _CELL: Final = {"name": "cell", "in": "path", "required": True, "schema": {"type": "string"}}
 
 
@@ -57,7 +68,10 @@ def openapi() -> dict[str, Any]:
             }
         ],
         "paths": paths,
-        "components": {"schemas": {**_schemas(), **answers.named}},
+        "components": {
+            "schemas": {**_schemas(), **answers.named},
+            "responses": _refusals(),
+        },
     }
 
 
@@ -67,7 +81,7 @@ def _path(act: ControlAct, kinds: list[str], answers: AnswerSchemas) -> dict[str
         "operationId": act.name,
         "summary": act.says,
         "description": f"At {of}.",
-        "requestBody": {"content": {"application/json": {"schema": _object(act)}}},
+        "requestBody": _body(act),
         "responses": _responses(None if act.gives is None else answers.of(act.gives)),
     }
     path: dict[str, Any] = {"parameters": [_CELL], "post": operation}
@@ -87,7 +101,7 @@ def _looked_at(summary: str, gives: Mapping[str, Any], *, with_cell: bool = True
     return {"parameters": [_CELL], **path} if with_cell else path
 
 
-def _object(act: ControlAct) -> dict[str, Any]:
+def _body(act: ControlAct) -> dict[str, Any]:
     needed = [it.name for it in act.takes if it.needed and it.default is None]
     schema: dict[str, Any] = {
         "type": "object",
@@ -96,46 +110,49 @@ def _object(act: ControlAct) -> dict[str, Any]:
     }
     if needed:
         schema["required"] = needed
-    return schema
+    return {"required": bool(needed), "content": {"application/json": {"schema": schema}}}
 
 
 def _schema(taken: Taken) -> Mapping[str, Any]:
     match taken.form:
         case "whole":
             lowest, highest = taken.whole_limits
-            return {"type": "integer", "minimum": lowest, "maximum": highest}
+            kinds = ["integer", "null"] if taken.or_none else "integer"
+            return {"type": kinds, "minimum": lowest, "maximum": highest}
         case "number":
             return {"type": "number", "minimum": taken.least, "maximum": taken.most}
         case "flag":
-            return {"type": "boolean"}
-        case "text" if taken.choices:
+            return {"type": ["boolean", "integer"], "minimum": 0, "maximum": 1}
+        case _ if taken.choices:
             return {"type": "string", "enum": list(taken.choices)}
-        case "text":
-            return {"type": "string", "maxLength": LONGEST_TEXT}
         case _:
-            return {"type": ["string", "number", "boolean"]}
+            text = {"type": "string", "maxLength": LONGEST_TEXT}
+            return {**text, "pattern": f"^{PRINTABLE}$"} if taken.ascii else text
 
 
 def _responses(gives: Mapping[str, Any] | None) -> dict[str, Any]:
     """Return what may be answered; ``gives`` is what stands beside ``ok``, if anything."""
-
-    def told(description: str, schema: Mapping[str, Any]) -> dict[str, Any]:
-        return {
-            "description": description,
-            "content": {"application/json": {"schema": schema}},
-        }
-
-    refusal = {"$ref": "#/components/schemas/Refusal"}
     answer: Mapping[str, Any] = {"$ref": "#/components/schemas/Answer"}
-    return {
-        "200": told("Done.", answer if gives is None else {"allOf": [answer, gives]}),
-        "400": told("A value is missing, wrong or unknown.", refusal),
-        "403": told("The token is another one.", refusal),
-        "404": told("There is no such cell or act.", refusal),
-        "409": told("The simulated robot cannot do it.", refusal),
-        "503": told("Too many clients are connected.", refusal),
-        "default": told("Refused for another reason: the method, the length.", refusal),
+    done = _told("Done.", answer if gives is None else {"allOf": [answer, gives]})
+    refused = {
+        status: {"$ref": f"#/components/responses/{name}"}
+        for status, (name, _) in _REFUSALS.items()
     }
+    return {"200": done, **refused}
+
+
+def _refusals() -> dict[str, Any]:
+    """Return each refusal by its name."""
+    refusal = {"$ref": "#/components/schemas/Refusal"}
+    told = {name: _told(why, refusal) for name, why in _REFUSALS.values()}
+    told["NotAllowed"]["headers"] = {
+        "Allow": {"description": "The methods that are.", "schema": {"type": "string"}}
+    }
+    return told
+
+
+def _told(description: str, schema: Mapping[str, Any]) -> dict[str, Any]:
+    return {"description": description, "content": {"application/json": {"schema": schema}}}
 
 
 def _schemas() -> dict[str, Any]:

@@ -11,7 +11,7 @@ browser does not know it. How many may be connected, and how long a request may 
 
 import json
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from http import HTTPStatus
 from importlib import metadata
 from importlib.resources import files
@@ -25,9 +25,9 @@ from robolink_simulators.control.acts.registry import (
     ACTS,
     MACHINE_REFUSALS,
     UnknownActError,
-    act_named,
     defect,
     machine_refusal,
+    methods_of,
     perform,
 )
 from robolink_simulators.control.cell import ControlledCell
@@ -39,11 +39,15 @@ from robolink_simulators.control.http_port import (
     no_request,
 )
 from robolink_simulators.control.tokens import drawn_token, is_token
-from robolink_simulators.hosting.addresses import cannot_listen, require_loopback
+from robolink_simulators.hosting.addresses import cannot_listen
 from robolink_simulators.not_now import NotNowError
 
 VERSION: Final = "v1"
 _MOST_ASKED: Final = 50
+_LOOKED_AT: Final = ("GET",)
+
+_Address = tuple[tuple[str, ...], Callable[[dict[str, Any]], dict[str, Any]]]
+"""The methods of an address, and what returns its answer for what is given."""
 
 
 class ControlServer(ClosedAtExit):
@@ -72,13 +76,12 @@ class ControlServer(ClosedAtExit):
         allow_remote: bool = False,
         token: str | None = None,
     ) -> None:
-        require_loopback(address[0], allow_remote=allow_remote)
         self.cells = dict(cells)
         self.requests = 0
         self._token = drawn_token() if token is None else token
         self._host = address[0]
         try:
-            self._http = HttpPort(address, self.answered)
+            self._http = HttpPort(address, self.answered, allow_remote=allow_remote)
         except (OSError, OverflowError) as error:
             raise cannot_listen(*address, error) from error
         self._closed = False
@@ -112,56 +115,56 @@ class ControlServer(ClosedAtExit):
         try:
             parts = urlsplit(target)
         except ValueError:  # half an address of IPv6
-            return HTTPStatus.BAD_REQUEST, error_document(*no_request(HTTPStatus.BAD_REQUEST))
+            return _refused(HTTPStatus.BAD_REQUEST, *no_request(HTTPStatus.BAD_REQUEST))
         token, *path = parts.path.strip("/").split("/")
         if not is_token(token, self._token):
-            return HTTPStatus.FORBIDDEN, error_document(
+            return _refused(
+                HTTPStatus.FORBIDDEN,
                 tr("That is not the token of this simulator."),
                 tr("Take the whole URL that 'robolink sim' prints; each start has its own."),
             )
         try:
-            return self._found(method, path, _given(method, parts.query, body))
+            methods, answer = self._found(path)
+            if method not in methods:
+                return _not_allowed(method, methods)
+            return Reply(HTTPStatus.OK, answer(_given(method, parts.query, body)))
         except UnknownActError as error:
-            return HTTPStatus.NOT_FOUND, error_document(error.what, error.remedy)
+            return _refused(HTTPStatus.NOT_FOUND, error.what, error.remedy)
         except NotNowError as error:
-            return HTTPStatus.CONFLICT, error_document(error.what, error.remedy)
+            return _refused(HTTPStatus.CONFLICT, error.what, error.remedy)
         except RobolinkError as error:
-            return HTTPStatus.BAD_REQUEST, error_document(error.what, error.remedy)
+            return _refused(HTTPStatus.BAD_REQUEST, error.what, error.remedy)
         except MACHINE_REFUSALS as refused:
-            return HTTPStatus.CONFLICT, error_document(*machine_refusal(refused))
+            return _refused(HTTPStatus.CONFLICT, *machine_refusal(refused))
         except Exception as error:
             # Whoever asked is told, else its client waits for an answer that never comes.
-            return HTTPStatus.INTERNAL_SERVER_ERROR, error_document(*defect(error))
+            return _refused(HTTPStatus.INTERNAL_SERVER_ERROR, *defect(error))
 
-    def _found(self, method: str, path: list[str], given: dict[str, Any]) -> Reply:
+    def _found(self, path: list[str]) -> _Address:
+        """Return what is at an address: the methods it answers, and how.
+
+        Raises:
+            UnknownActError: Nothing is there.
+        """
         match path:
             case [version, "openapi.json"] if version == VERSION:
-                _require_nothing(given)
-                return HTTPStatus.OK, json.loads(
-                    files("robolink_simulators.control").joinpath("openapi.json").read_bytes()
-                )
+                return _LOOKED_AT, _only(_described)
             case [version] if version == VERSION:
-                _require_nothing(given)
-                return HTTPStatus.OK, _ok({"cells": {it: self._about(it) for it in self.cells}})
+                return _LOOKED_AT, _only(
+                    lambda: _ok({"cells": {it: self._about(it) for it in self.cells}})
+                )
             case [version, "cells", name] if version == VERSION and name in self.cells:
-                _require_nothing(given)
-                return HTTPStatus.OK, _ok(self._about(name))
+                return _LOOKED_AT, _only(lambda: _ok(self._about(name)))
             case [version, "cells", name, act] if version == VERSION and name in self.cells:
-                return self._acted(method, self.cells[name], act, given)
+                cell = self.cells[name]
+                return methods_of(cell, act), lambda given: _ok(perform(cell, act, given))
             case _:
-                return HTTPStatus.NOT_FOUND, error_document(
+                raise UnknownActError(
                     tr("There is no such address."),
-                    tr(
+                    remedy=tr(
                         "These are known: {known}.", known=", ".join(map(self._path_of, self.cells))
                     ),
                 )
-
-    def _acted(self, method: str, cell: ControlledCell, act: str, given: dict[str, Any]) -> Reply:
-        if method == "GET" and not act_named(cell, act).reads:
-            return HTTPStatus.METHOD_NOT_ALLOWED, error_document(
-                tr("{act} changes something.", act=act), tr("Send it by POST.")
-            )
-        return HTTPStatus.OK, _ok(perform(cell, act, given))
 
     def _about(self, name: str) -> dict[str, Any]:
         cell = self.cells[name]
@@ -185,6 +188,11 @@ def _given(method: str, query: str, body: bytes) -> dict[str, Any]:
         ConfigError: It is neither, or stands where it would not be looked for.
     """
     if method == "GET":
+        if body:
+            raise ConfigError(
+                tr("A GET has its values behind the question mark, not in a body."),
+                remedy=tr("Give them there, or send it by POST."),
+            )
         try:
             asked = parse_qsl(query, keep_blank_values=True, max_num_fields=_MOST_ASKED)
         except ValueError as error:
@@ -199,7 +207,7 @@ def _given(method: str, query: str, body: bytes) -> dict[str, Any]:
             remedy=tr("Give them there as a JSON object."),
         )
     try:
-        given = json.loads(body, object_pairs_hook=_each_once) if body.strip() else {}
+        given = json.loads(body, object_pairs_hook=_each_once) if body else {}
     except ConfigError:  # which is a ValueError too
         raise
     except (ValueError, RecursionError):
@@ -212,12 +220,34 @@ def _given(method: str, query: str, body: bytes) -> dict[str, Any]:
     return given
 
 
-def _require_nothing(given: dict[str, Any]) -> None:
-    for name in given:
-        raise ConfigError(
-            tr("Nothing is known here by the name {name!r}.", name=name[:80]),
-            remedy=tr("Only an act takes values."),
-        )
+def _only(answer: Callable[[], dict[str, Any]]) -> Callable[[dict[str, Any]], dict[str, Any]]:
+    """Return what answers where nothing is taken."""
+
+    def answered(given: dict[str, Any]) -> dict[str, Any]:
+        for name in given:
+            raise ConfigError(
+                tr("Nothing is known here by the name {name!r}.", name=name[:80]),
+                remedy=tr("Only an act takes values."),
+            )
+        return answer()
+
+    return answered
+
+
+def _described() -> dict[str, Any]:
+    page = files("robolink_simulators.control").joinpath("openapi.json").read_bytes()
+    described: dict[str, Any] = json.loads(page)
+    return described
+
+
+def _refused(status: HTTPStatus, what: str, remedy: str) -> Reply:
+    return Reply(status, error_document(what, remedy))
+
+
+def _not_allowed(method: str, methods: tuple[str, ...]) -> Reply:
+    what = tr("{method} is not answered at this address.", method=method[:80])
+    remedy = tr("Send it by {methods}.", methods=", ".join(methods))
+    return Reply(HTTPStatus.METHOD_NOT_ALLOWED, error_document(what, remedy), methods)
 
 
 def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

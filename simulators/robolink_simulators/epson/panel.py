@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 
-from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_simulators.epson.condition import Condition, Mode, Task
 from robolink_simulators.epson.machine import Machine
@@ -13,6 +12,7 @@ from robolink_simulators.epson.refusals import SpelRefusal
 from robolink_simulators.epson.remote.client_slot import ClientSlot
 from robolink_simulators.epson.remote.command_window import SpelWindow
 from robolink_simulators.epson.remote.queries import Alarms
+from robolink_simulators.not_now import NotNowError
 
 
 class EpsonPanel:
@@ -103,13 +103,13 @@ class EpsonPanel:
         """Switch an input by hand; whatever waits for it goes on.
 
         Raises:
-            ConfigError: There is no such input.
+            NotNowError: There is no such input.
         """
         with self._acting():
             try:
                 self._machine.inputs.set(number, on)
             except SpelRefusal as refused:
-                raise ConfigError(
+                raise NotNowError(
                     tr("There is no input {number}.", number=number),
                     remedy=tr("Inputs are 0 to {last}.", last=IO_BITS - 1),
                 ) from refused

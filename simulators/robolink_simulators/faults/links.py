@@ -4,10 +4,10 @@ from collections.abc import Collection
 from enum import StrEnum
 from typing import Final
 
-from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_simulators.faults.fieldbus import PlcFaultAction
 from robolink_simulators.faults.stream import FaultAction
+from robolink_simulators.not_now import NotNowError
 
 AnyAction = FaultAction | PlcFaultAction
 
@@ -26,7 +26,7 @@ class LinkKind(StrEnum):
     MAILBOX_SIM = "softmotion+sim"
 
 
-class FaultNotPossibleError(ConfigError):
+class FaultNotPossibleError(NotNowError):
     """A fault was planned for a link on which there is no such thing.
 
     Attributes:

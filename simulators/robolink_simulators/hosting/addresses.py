@@ -1,6 +1,7 @@
 """Addresses to listen on: who could reach one, and why one cannot be had."""
 
 import ipaddress
+from urllib.parse import urlsplit
 
 from robolink.errors import ConfigError, ConnectError
 from robolink.messages import tr
@@ -17,6 +18,22 @@ def require_loopback(host: str, *, allow_remote: bool) -> None:
             tr("The simulator does not serve {host}: other machines could reach it.", host=host),
             remedy=tr("Use 127.0.0.1, or allow it with --allow-remote."),
         )
+
+
+def is_this_machine(named: str) -> bool:
+    """Whether the Host of a request names a machine as no name of somebody else's can.
+
+    An address does, any: where a page comes from cannot be one and lead elsewhere. So do
+    ``localhost`` and what ends in it (RFC 6761).
+
+    Args:
+        named: As in the head of the request, with or without a port.
+    """
+    try:
+        host = (urlsplit(f"//{named}").hostname or "").rstrip(".")
+        return f".{host}".endswith(".localhost") or bool(ipaddress.ip_address(host))
+    except ValueError:
+        return False
 
 
 def cannot_listen(host: str, port: int, error: OSError | OverflowError) -> ConnectError:

@@ -154,10 +154,10 @@ def check_journal() -> Iterator[Remark]:
     """List what was begun on any controller and is not proved finished."""
     from robolink.journal import default_location, may_exist, open_journal
 
-    if not may_exist(default_location()):
-        yield Remark("journal", Level.OK, tr("nothing was recorded yet."))
-        return
     try:
+        if not may_exist(default_location()):
+            yield Remark("journal", Level.OK, tr("nothing was recorded yet."))
+            return
         journal = open_journal(read_only=True)
         unsettled = journal.open_markers()
     except ConfigError as error:

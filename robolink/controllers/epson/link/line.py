@@ -27,8 +27,8 @@ class LineCodec(Protocol):
     def bytes_held(self) -> bytes:
         """What has arrived and is part of no event yet."""
 
-    def carries(self, name: str) -> bool:
-        """Whether a command of this name can be sent."""
+    def carries(self, name: str, *parameters: str) -> bool:
+        """Whether a command can be sent, with these parameters where any are given."""
 
     def send(self, event: Event) -> bytes:
         """Return the bytes of one message."""
@@ -54,16 +54,20 @@ class EpsonLine:
     codec: LineCodec
     outlives_sessions: bool = False
 
-    def require_carried(self, name: str) -> None:
-        """Refuse a command that this line has no frame for, as older firmware would.
+    def require_carried(self, name: str, *parameters: str) -> None:
+        """Refuse a request that this line has no frame for, as older firmware would.
 
         Raises:
             RejectedError: With code 11, unknown command. Nothing was sent.
         """
-        if self.codec.carries(name):
+        if self.codec.carries(name, *parameters):
             return
+        if self.codec.carries(name):
+            what = tr("{name} cannot read several values over Remote RS232.", name=name)
+        else:
+            what = tr("Remote RS232 has no {name}, or no manual prints its letter.", name=name)
         raise RejectedError(
-            tr("Remote RS232 has no {name}, or no manual prints its letter.", name=name),
+            what,
             code=ErrorCode.UNKNOWN_COMMAND,
             remedy=tr("Nothing was sent. Use Remote Ethernet for it (docs/remote-rs232.md)."),
             controller=self.transport.identity,

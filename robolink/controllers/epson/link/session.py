@@ -232,8 +232,8 @@ class EpsonSession:
     def _announced(self, request: Request) -> str:
         """Return a request that this line can carry as a person may read it, before the lock."""
         what = _shown(request)
-        if not self._codec.carries(request.name):
-            self._line.require_carried(request.name)
+        if not self._codec.carries(request.name, *request.parameters):
+            self._line.require_carried(request.name, *request.parameters)
         checkpoint(Checkpoint.LOCK, what)
         return what
 

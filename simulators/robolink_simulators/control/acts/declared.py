@@ -1,5 +1,6 @@
 """An act is declared once: its name, what it takes, and what it does."""
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Literal
@@ -19,8 +20,10 @@ Given = Mapping[str, Any]
 MOST: Final = 9999
 _FAR: Final = 1_000_000
 LONGEST_TEXT: Final = 200
+PRINTABLE: Final = "[ -~]*"
+"""Printable ASCII, as a regular expression that Python and JSON Schema read alike."""
 
-Form = Literal["whole", "number", "flag", "text", "any"]
+Form = Literal["whole", "number", "flag", "text"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,21 +32,25 @@ class Taken:
 
     Attributes:
         name: Its name, with the unit in it.
-        form: A whole number, a number, true or false, a text, or any of these.
+        form: A whole number, a number, true or false (1 and 0 will do), or a text.
         needed: Whether it must be given.
         choices: The texts that there are, where not any will do.
+        ascii: Whether it is a text of printable ASCII only.
         most: The highest number.
         least: The lowest number; of ``whole`` never below 0.
         default: What it is where it is not given; ``None`` for not given.
+        or_none: Whether null is one, too.
     """
 
     name: str
     form: Form = "number"
     needed: bool = True
     choices: tuple[str, ...] = ()
+    ascii: bool = False
     most: float = _FAR
     least: float = -_FAR
     default: object = None
+    or_none: bool = False
 
     @property
     def whole_limits(self) -> tuple[int, int]:
@@ -56,6 +63,10 @@ class Taken:
         Raises:
             ConfigError: It is something else.
         """
+        if value is None and self.or_none:
+            return None
+        if isinstance(value, float) and value.is_integer() and self.form in ("whole", "flag"):
+            value = int(value)  # JSON has one kind of numbers: 3.0 is a whole one
         match self.form:
             case "whole":
                 lowest, highest = self.whole_limits
@@ -66,16 +77,18 @@ class Taken:
                 fits = number and self.least <= value <= self.most  # type: ignore[operator]
             case "flag":
                 fits = isinstance(value, bool) or (type(value) is int and value in (0, 1))
-            case "text":
-                short = isinstance(value, str) and len(value) <= LONGEST_TEXT
-                fits = short and (not self.choices or value in self.choices)
             case _:
-                fits = (
-                    isinstance(value, (bool, int, float, str)) and len(str(value)) <= LONGEST_TEXT
-                )
+                fits = isinstance(value, str) and self._is_one(value)
         if not fits:
             raise ConfigError(self._needs(act), remedy=self._example())
         return float(value) if self.form == "number" else value  # type: ignore[arg-type]
+
+    def _is_one(self, text: str) -> bool:
+        """Whether a text is one of those that it takes."""
+        if self.choices:
+            return text in self.choices
+        fits = len(text) <= LONGEST_TEXT
+        return fits and (not self.ascii or re.fullmatch(PRINTABLE, text) is not None)
 
     def _needs(self, act: str) -> str:
         match self.form:
@@ -98,6 +111,12 @@ class Taken:
                 )
             case "flag":
                 return tr("{act} needs {name}, true or false.", act=act, name=self.name)
+            case "text" if self.ascii:
+                return tr(
+                    "{act} needs {name}, a text of printable ASCII without a line end.",
+                    act=act,
+                    name=self.name,
+                )
             case _:
                 return tr("{act} needs {name}, a text.", act=act, name=self.name)
 

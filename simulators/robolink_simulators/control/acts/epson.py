@@ -2,8 +2,6 @@
 
 from typing import Final
 
-from robolink.errors import ConfigError
-from robolink.messages import tr
 from robolink_simulators.control.acts.answers import FlangeTold
 from robolink_simulators.control.acts.declared import (
     NUMBER,
@@ -28,12 +26,7 @@ def _teach_point(cell: ControlledCell, given: Given) -> Answer:
 
 def _push(cell: ControlledCell, given: Given) -> Answer:
     """Send every client a line that nobody asked for."""
-    text = given["text"]
-    if not (text.isascii() and text.isprintable()):
-        raise ConfigError(
-            tr("What is sent is printable ASCII."), remedy=tr("Leave the line end out.")
-        )
-    _epson(cell).push(text.encode("ascii") + b"\r\n")
+    _epson(cell).push(given["text"].encode("ascii") + b"\r\n")
     return {}
 
 
@@ -50,7 +43,7 @@ EPSON_ACTS: Final = (
         (NUMBER, Taken("u_deg", least=-360, most=360)),
         gives=FlangeTold,
     ),
-    ControlAct("push", _push, (Taken("text", "text"),)),
+    ControlAct("push", _push, (Taken("text", "text", ascii=True),)),
     panel_act(EpsonPanel, "set_input", NUMBER, ON, method="switch_input"),
     panel_act(EpsonPanel, "teach"),
     panel_act(EpsonPanel, "auto"),

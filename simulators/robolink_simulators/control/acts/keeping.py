@@ -2,7 +2,6 @@
 
 from typing import Final
 
-from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.timing import NS_PER_S
 from robolink_simulators.cell.clock import ManualClock, SteeredClock
@@ -58,7 +57,7 @@ def _restore(cell: ControlledCell, given: Given) -> Answer:
     """Be again what was kept under a name, at rest, with nobody connected."""
     moment = cell.moments.get(given["name"])
     if moment is None:
-        raise ConfigError(
+        raise NotNowError(
             tr("There is no snapshot {name!r}.", name=given["name"]),
             remedy=tr("Take one first."),
         )

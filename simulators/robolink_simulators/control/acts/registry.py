@@ -71,6 +71,18 @@ def act_named(cell: ControlledCell, name: object) -> ControlAct:
     return act
 
 
+def methods_of(cell: ControlledCell, name: str) -> tuple[str, ...]:
+    """Return how an act is asked for: by GET, too, where it changes nothing.
+
+    Raises:
+        UnknownActError: No kind of controller has it.
+    """
+    # An act of another kind is refused by what it is, not by its method, which is the same there.
+    known = [of_kind[name] for of_kind in ACTS.values() if name in of_kind]
+    act = known[0] if known else act_named(cell, name)
+    return ("GET", "POST") if act.reads else ("POST",)
+
+
 def perform(cell: ControlledCell, name: object, given: Given) -> Answer:
     """Do what an act says, at the present time, and return what it gives.
 

@@ -1,8 +1,9 @@
 """What is seen and done on the wire: its log, motions that were commanded, faults."""
 
 from dataclasses import asdict
-from typing import Any, Final
+from typing import Any, Final, get_args
 
+from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_simulators.control.acts.answers import FaultsTold, LinesTold, MotionsTold
 from robolink_simulators.control.acts.declared import Answer, ControlAct, Given, Taken
@@ -15,6 +16,7 @@ from robolink_simulators.faults import (
     faults_of_table,
 )
 from robolink_simulators.faults.counted import MOST_FIRED
+from robolink_simulators.faults.fieldbus import Order
 from robolink_simulators.faults.links import LinkKind
 from robolink_simulators.not_now import NotNowError
 
@@ -71,12 +73,16 @@ def _add_fault(cell: ControlledCell, given: Given) -> Answer:
 
 def _possible(tables: list[dict[str, Any]], links: tuple[LinkKind, ...]) -> tuple[Any, ...]:
     """Return the faults for the first of the links on which they can happen."""
-    for link in links[:-1]:
-        try:
-            return faults_of_table(tables, link)
-        except FaultNotPossibleError:
-            continue
-    return faults_of_table(tables, links[-1])
+    try:
+        for link in links[:-1]:
+            try:
+                return faults_of_table(tables, link)
+            except FaultNotPossibleError:
+                continue
+        return faults_of_table(tables, links[-1])
+    except ConfigError as error:
+        # Values that some fault has, but none on this link: a bit of a word where bytes travel.
+        raise NotNowError(error.what, remedy=error.remedy) from error
 
 
 def _clear_faults(cell: ControlledCell, _given: Given) -> Answer:
@@ -101,7 +107,7 @@ WIRE_ACTS: Final = (
             Taken("position", "whole", needed=False),
             Taken("bit", "whole", needed=False, most=15),
             Taken("code", "whole", needed=False),
-            Taken("order", "text", needed=False),
+            Taken("order", "text", needed=False, choices=get_args(Order)),
         ),
         gives=FaultsTold,
     ),

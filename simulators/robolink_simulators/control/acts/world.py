@@ -1,14 +1,19 @@
 """What is done to the world around any robot: see it, furnish it, spoil it, touch it."""
 
+from collections.abc import Iterator
 from dataclasses import asdict, replace
-from typing import Final
+from typing import Final, Literal, get_args, get_origin, get_type_hints
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_simulators.cell.habits import PersonManner
 from robolink_simulators.cell.person import PersonLook
 from robolink_simulators.cell.tip_switches import LightBeam, TouchPlate
-from robolink_simulators.cell.world_parameters import parameter_names, parameters_from_text
+from robolink_simulators.cell.world_parameters import (
+    WorldParameters,
+    parameter_names,
+    parameters_from_text,
+)
 from robolink_simulators.control.acts.answers import (
     FlangeTold,
     MarksSeen,
@@ -27,10 +32,19 @@ from robolink_simulators.control.acts.declared import (
 )
 from robolink_simulators.control.cell import ControlledCell
 from robolink_simulators.epson.world import World
+from robolink_simulators.option_values import MOST_OF_AN_OPTION
 from robolink_simulators.plc import PlcSimulator
 from robolink_simulators.softmotion.world import SoftMotionWorld
 
-_SCATTER: Final = Taken("noise_mm", needed=False)
+_LIMITS: Final = {
+    "camera_um_per_px_x": (1e-6, MOST_OF_AN_OPTION),
+    "camera_um_per_px_y": (1e-6, MOST_OF_AN_OPTION),
+    "person_stays_share": (0, 1),
+    "camera_still_share": (0, 1),
+}
+"""What of the world's numbers is not anything from 0 on."""
+
+_SCATTER: Final = Taken("noise_mm", needed=False, least=0)
 
 
 def world_of(cell: ControlledCell) -> World | SoftMotionWorld:
@@ -104,34 +118,44 @@ def _mount_beam(cell: ControlledCell, given: Given) -> Answer:
     names = ("nozzle_radius_mm", "radius_mm", "tilt_deg")
     shape = {name: given[name] for name in names if name in given}
     beam = LightBeam(place, given["heading_deg"], **shape)
-    world_of(cell).connect(given["number"], beam, noise_mm=_scatter(given))
+    world_of(cell).connect(given["number"], beam, noise_mm=given.get("noise_mm", 0.0))
     return {}
 
 
 def _mount_plate(cell: ControlledCell, given: Given) -> Answer:
     """Mount a plate that switches an input when the nozzle touches it."""
     plate = TouchPlate(given["z_mm"])
-    world_of(cell).connect(given["number"], plate, noise_mm=_scatter(given))
+    world_of(cell).connect(given["number"], plate, noise_mm=given.get("noise_mm", 0.0))
     return {}
 
 
-def _scatter(given: Given) -> float:
-    noise_mm: float = given.get("noise_mm", 0.0)
-    if noise_mm < 0:
-        raise ConfigError(
-            tr("A scatter cannot be negative."), remedy=tr("Give noise_mm of 0 or more.")
-        )
-    return noise_mm
-
-
 class _AnyOfTheWorld(ControlAct):
-    """Takes the parameters of the world, whose names and limits stand there."""
+    """Takes the parameters of the world, whose names stand there."""
 
     __slots__ = ()
 
     def checked(self, given: Given) -> dict[str, object]:
-        """Leave it to the world to refuse what it does not know."""
-        return dict(given)
+        """Check values; leave it to the world to refuse a name that it does not know."""
+        known = {taken.name for taken in self.takes}
+        unknown = {name: value for name, value in given.items() if name not in known}
+        checked = super().checked({name: value for name, value in given.items() if name in known})
+        return unknown | checked
+
+
+def _parameters() -> Iterator[Taken]:
+    """Yield each parameter of the world, with its limits."""
+    hints = get_type_hints(WorldParameters)
+    for name in parameter_names():
+        choices = get_args(hints[name]) if get_origin(hints[name]) is Literal else ()
+        if choices:
+            yield Taken(name, "text", needed=False, choices=choices)
+        elif hints[name] is bool:
+            yield Taken(name, "flag", needed=False)
+        elif hints[name] is float:
+            least, most = _LIMITS.get(name, (0, MOST_OF_AN_OPTION))
+            yield Taken(name, needed=False, least=least, most=most)
+        else:
+            yield Taken(name, "whole", needed=False, or_none=hints[name] is not int)
 
 
 _PLACE: Final = tuple(Taken(name) for name in ("x_mm", "y_mm", "z_mm"))
@@ -160,7 +184,7 @@ WORLD_ACTS: Final = (
     _AnyOfTheWorld(
         "set_world",
         _set_world,
-        tuple(Taken(name, "any", needed=False) for name in parameter_names()),
+        tuple(_parameters()),
         gives=WorldTold,
     ),
     ControlAct(

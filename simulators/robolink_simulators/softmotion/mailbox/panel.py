@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 
-from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.protocols.mailbox import WordOrder
 from robolink_simulators.faults.fieldbus import Order
@@ -73,7 +72,7 @@ class PlcPanel:
         """Let a drive fail.
 
         Raises:
-            ConfigError: There is no such axis.
+            NotNowError: There is no such axis.
         """
         with self._acting():
             self._require_axis(number)
@@ -83,7 +82,7 @@ class PlcPanel:
         """Let the machine's own program move one axis by itself; degrees or mm.
 
         Raises:
-            ConfigError: There is no such axis, or its drive refuses.
+            NotNowError: There is no such axis, or its drive refuses.
         """
         with self._acting():
             self._require_axis(number)
@@ -98,7 +97,7 @@ class PlcPanel:
         """Let the machine's own program set a tool, which the mailbox then does not know.
 
         Raises:
-            ConfigError: The group refuses it.
+            NotNowError: The group refuses it.
         """
         with self._acting():
             error = self._plc.group.set_tool(tool).outputs.error
@@ -112,13 +111,13 @@ class PlcPanel:
         """Switch an input by hand.
 
         Raises:
-            ConfigError: There is no such input.
+            NotNowError: There is no such input.
         """
         with self._acting():
             try:
                 self._plc.group.inputs.switch(number, on)
             except BlockRefused as refused:
-                raise ConfigError(
+                raise NotNowError(
                     tr("There is no input {number}.", number=number),
                     remedy=tr("Inputs are 0 to {last}.", last=SIGNALS - 1),
                 ) from refused
@@ -171,7 +170,7 @@ class PlcPanel:
     def _require_axis(self, number: int) -> None:
         count = len(self._plc.group.axes)
         if not 0 <= number < count:
-            raise ConfigError(
+            raise NotNowError(
                 tr("There is no axis {number}.", number=number),
                 remedy=tr("Axes are 0 to {last}.", last=count - 1),
             )

@@ -14,7 +14,7 @@ from robolink.errors import JournalError, RobolinkError
 from robolink.interrupts import EndedBy, Interrupted, one_ending, output_closed
 from robolink.model import ToolOffset
 from robolink.timing import NS_PER_S
-from robolink.transaction import Wanted, change_tools
+from robolink.transaction import Wanted, change_tools, recover
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.faults import DiskFault, FaultyDisk
 from robolink_simulators.soak.books import Books
@@ -23,6 +23,7 @@ from robolink_simulators.soak.computer import VirtualComputer, VirtualProcess
 from robolink_simulators.soak.history import CellKind, Disturbance, Hindrance, History, Hour
 from robolink_simulators.soak.people import (
     OTHERS_TOOL,
+    TOOL,
     describe,
     habits_in,
     wish_of,
@@ -30,7 +31,12 @@ from robolink_simulators.soak.people import (
 from robolink_simulators.soak.plant.canopen import CanopenPlant
 from robolink_simulators.soak.plant.epson import PASSWORD, EpsonPlant
 from robolink_simulators.soak.plant.epson_serial import EpsonSerialPlant
-from robolink_simulators.soak.plant.machine import PlantMachine, SentRequest, WireTap
+from robolink_simulators.soak.plant.machine import (
+    HANDS_VALUES,
+    PlantMachine,
+    SentRequest,
+    WireTap,
+)
 from robolink_simulators.soak.plant.modbus import ModbusRtuPlant, ModbusTcpPlant
 from robolink_simulators.soak.plant.register_map import RegisterMapPlant
 from robolink_simulators.soak.plant.softmotion import SoftMotionPlant
@@ -50,6 +56,9 @@ _PLANTS: Final[Mapping[CellKind, Callable[[ManualClock, WireTap, int], PlantMach
 }
 _TRIES: Final = 8
 """How often people try to get a cell going again; each time they look longer."""
+
+_TRIES_TO_TAKE_OVER_S: Final = (75.0, 30.0)
+"""How long somebody waits until a process that stands still has lost its login and its lease."""
 
 _PAST_THE_SYSTEM: Final = ("bent", "truncated", "lost")
 """What happens to the journal's file while nobody has it open."""
@@ -186,6 +195,10 @@ class VirtualCell:
                 self._disk.begin(DiskFault[disturbance.what])
             case Hindrance.CLOCK:
                 self._surroundings.wall_jump_s += disturbance.seconds
+            case Hindrance.HAND:
+                self._act_by_hand(disturbance)
+            case Hindrance.FREEZE:
+                self._freeze()
             case Hindrance.INTERRUPT:
                 if self._turns.current.name == "main":
                     output_closed()
@@ -217,6 +230,51 @@ class VirtualCell:
         if process.alive:
             process.stopped_ns = self._clock.now_ns()
             self._rules.stopped()
+
+    def _act_by_hand(self, disturbance: Disturbance) -> None:
+        """Let somebody do something at the pendant, while robolink asks and nothing moves."""
+        state = self._plant.state()
+        if disturbance.what == "select":
+            others = sorted({*state.tools} - {state.selected})
+            if others:
+                tool = others[(disturbance.position or 0) % len(others)]
+                self._plant.select_by_hand(tool)
+                self._rules.hand_chose(tool)
+            return
+        assert self._hour is not None  # noqa: S101 - for the type: an hour runs
+        tool = next((tool for tool, _ in wish_of(self._hour).typed), TOOL)
+        held = state.tools.get(tool)
+        value = next(one for one in HANDS_VALUES if not self._plant.same(one, held))
+        self._plant.write_by_hand(tool, value)
+        self._rules.hand_typed(tool, self._plant.state().tools[tool])
+
+    def _freeze(self) -> None:
+        """Let a process stand still, as one that is suspended, until another has been at work."""
+        if self._turns.current.name != "main":
+            return
+        other = self._computer.start("dora")
+        self._others.append(other)
+        thread = self._turns.start("dora", other, lambda: self._take_over(other))
+        self._turns.wait_until(lambda: thread.over)
+
+    def _take_over(self, process: VirtualProcess) -> None:
+        """Somebody else waits, settles what the process that stands still left, types a tool."""
+        assert self._hour is not None  # noqa: S101 - for the type: an hour runs
+        tool = next((tool for tool, _ in wish_of(self._hour).typed), TOOL)
+        for wait_s in _TRIES_TO_TAKE_OVER_S:
+            self._surroundings.sleep(wait_s)
+            try:
+                with self._connected(process) as controller:
+                    recover(controller, keep=False, confirm=lambda _finding: True)
+                    held = controller.tools.read(tool)
+                    offset = ToolOffset(8.0, -8.0, -float(1 + process.number % 40))
+                    self._rules.others_write(tool, offset)
+                    change_tools(controller, [Wanted(tool, offset, held)])
+                self._note("dora: done")
+                break
+            except (RobolinkError, KeyboardInterrupt) as error:
+                self._note(f"dora: {describe(error)}")
+        process.end()
 
     def _second_person(self, process: VirtualProcess) -> None:
         """Somebody else at another terminal changes another tool."""
@@ -318,6 +376,7 @@ class VirtualCell:
             raise error  # a real one: whoever runs this wants it to end
         if not process.alive:
             self._end(hour, "killed")
+            self._rules.killed()
             self._turns.join()
             process.end()
             return

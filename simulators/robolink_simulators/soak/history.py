@@ -32,6 +32,8 @@ class Deed(StrEnum):
     SELECT_TOOL = "select a tool"
     UNDO = "undo the last change"
     PRODUCE = "let production measure and change its needle"
+    SET_THEN_UNDO = "type an offset twice, and take the last one back"
+    MOVE_AND_LEAVE = "begin a movement and leave"
 
 
 class Hindrance(StrEnum):
@@ -50,6 +52,8 @@ class Hindrance(StrEnum):
     CLOCK = "clock"
     INTERRUPT = "interrupt"
     ANOTHER_CLIENT = "another client"
+    HAND = "hand"
+    FREEZE = "freeze"
 
 
 @dataclass(frozen=True, slots=True)

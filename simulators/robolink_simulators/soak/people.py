@@ -1,14 +1,25 @@
 """What people at a virtual cell do: their deeds, and how they put things right afterwards."""
 
+import random
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from robolink_cli.prompts.operator import AssistedOperator
 
+from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.errors import NotReadyError, RobolinkError
-from robolink.model import Controller, Finding, ToolOffset, Verdict, read_offset
+from robolink.model import (
+    Controller,
+    Finding,
+    MotionProfile,
+    Path,
+    ToolOffset,
+    Verdict,
+    WorkBox,
+    read_offset,
+)
 from robolink.nozzle_change import ChangePlan, ChangeReport, NozzleChange, ToolPlan
 from robolink.runner import Question
 from robolink.timing import Clock
@@ -26,6 +37,8 @@ TOOL: Final = 1
 OTHERS_TOOL: Final = 4
 """What a second person writes."""
 
+_LIFT_MM: Final = 8.0
+
 
 @dataclass(frozen=True, slots=True)
 class Wish:
@@ -35,31 +48,51 @@ class Wish:
         typed: Offsets that they typed, by tool.
         selects: The tool that they select, ``None`` for none.
         measures: Whether a tip is measured, and written on their yes.
+        undoes: Whether the last change is taken back.
+        meanwhile: Offsets that they typed on the way, and took back.
+        moves: Whether a movement is begun, and left alone.
     """
 
     typed: tuple[tuple[int, ToolOffset], ...] = ()
     selects: int | None = None
     measures: bool = False
     undoes: bool = False
+    meanwhile: tuple[tuple[int, ToolOffset], ...] = ()
+    moves: bool = False
+
+    @property
+    def asked(self) -> tuple[tuple[int, ToolOffset], ...]:
+        """All offsets that they typed, by tool."""
+        return (*self.meanwhile, *self.typed)
 
 
 def wish_of(hour: Hour) -> Wish:
     """Return what the person of an hour means to be true at its end."""
-    by_mm = 0.001 * (hour.number % 500)
+    first, second = _typed(hour.number, 0), _typed(hour.number, 1)
     match hour.deed:
         case Deed.CHANGE_NOZZLE:
             return Wish(measures=True)
         case Deed.SET_TOOL:
-            return Wish(typed=((2, ToolOffset(5.0 + by_mm, -1.0, -10.0)),))
+            return Wish(typed=((2, first),))
         case Deed.SET_TWO:
-            first = ToolOffset(5.5 + by_mm, -1.5, -11.0)
-            return Wish(typed=((2, first), (3, ToolOffset(6.0 + by_mm, -2.0, -12.0))))
+            return Wish(typed=((2, first), (3, second)))
+        case Deed.SET_THEN_UNDO:
+            return Wish(typed=((2, first),), meanwhile=((2, second),))
         case Deed.SELECT_TOOL:
-            return Wish(selects=TOOL)
+            return Wish(selects=2 if hour.number % 2 else TOOL)
+        case Deed.MOVE_AND_LEAVE:
+            return Wish(moves=True)
         case Deed.UNDO:
             return Wish(undoes=True)
         case Deed.PRODUCE:
             return Wish()
+
+
+def _typed(number: int, which: int) -> ToolOffset:
+    """Return an offset with as many digits as a calculator shows."""
+    rng = random.Random(f"typed {number} {which}")
+    x_mm, y_mm, z_mm = rng.uniform(3.0, 9.0), rng.uniform(-3.0, 3.0), rng.uniform(-14.0, -8.0)
+    return ToolOffset(round(x_mm, 9), round(y_mm, 9), round(z_mm, 9))
 
 
 def habits_in(habit: Habit) -> WorldParameters:
@@ -91,17 +124,52 @@ def carry_out(
     """
     wish = wish_of(hour)
     if wish.measures and eyes is not None:
-        controller.motors(True)
+        if not controller.capabilities.low_power:  # else production has them on
+            controller.motors(True)
         person = _PersonWithHabits.at(eyes, tell, controller.clock, hour.habit)
         return NozzleChange(controller, ChangePlan((ToolPlan(TOOL),)), operator=person).run()
-    if wish.typed:
-        wanted = [Wanted(n, offset, controller.tools.read(n)) for n, offset in wish.typed]
-        change_tools(controller, wanted, tell=tell)
+    if wish.meanwhile:
+        _type(controller, wish.typed, tell)
+        _type(controller, wish.meanwhile, tell)
+        plan = plan_undo(controller)
+        _is_asked()
+        undo(controller, plan, then_select=TOOL, tell=tell)
+    elif wish.typed:
+        _type(controller, wish.typed, tell)
     elif wish.selects is not None:
+        controller.tools.selected()
+        _is_asked()
         controller.tools.select(wish.selects)
+    elif wish.moves:
+        _begin_a_movement(controller)
     else:
-        undo(controller, plan_undo(controller), then_select=TOOL, tell=tell)
+        plan = plan_undo(controller)
+        _is_asked()
+        undo(controller, plan, then_select=TOOL, tell=tell)
     return None
+
+
+def _type(controller: Controller, typed: tuple[tuple[int, ToolOffset], ...], tell: Tell) -> None:
+    """Write offsets as a command does: what is there is read, shown, and agreed to be replaced."""
+    wanted = [Wanted(n, offset, controller.tools.read(n)) for n, offset in typed]
+    _is_asked()
+    change_tools(controller, wanted, tell=tell)
+
+
+def _is_asked() -> None:
+    """Be asked for a yes; meanwhile others at the machine do what they like."""
+    checkpoint(Checkpoint.QUESTION, "agree")
+
+
+def _begin_a_movement(controller: Controller) -> None:
+    """Begin to raise the tip, and see to something else, as a script may that waits on nothing."""
+    group = controller.groups[0]
+    with controller.preserved("a lift"):
+        start = group.pose()
+        _is_asked()
+        box = WorkBox.around(start, xy_mm=1.0, below_mm=1.0, above_mm=2 * _LIFT_MM)
+        raised = replace(start, z_mm=start.z_mm + _LIFT_MM)
+        group.move_to(raised, MotionProfile(Path.STRAIGHT, speed_mm_s=5.0), box=box)
 
 
 def put_right(

@@ -48,13 +48,15 @@ _TURNS: Final = (
 _ANOTHER_SHARE: Final = 0.6
 _MOST: Final = 4
 _SHARES: Final = {
-    Deed.CHANGE_NOZZLE: 0.6,
-    Deed.SET_TOOL: 0.14,
+    Deed.CHANGE_NOZZLE: 0.5,
+    Deed.SET_TOOL: 0.12,
     Deed.SET_TWO: 0.1,
-    Deed.SELECT_TOOL: 0.06,
-    Deed.UNDO: 0.1,
+    Deed.SELECT_TOOL: 0.07,
+    Deed.UNDO: 0.09,
+    Deed.SET_THEN_UNDO: 0.06,
+    Deed.MOVE_AND_LEAVE: 0.06,
 }
-_OF_REGISTERS: Final = (Deed.SET_TOOL, Deed.SET_TWO, Deed.UNDO)
+_OF_REGISTERS: Final = (Deed.SET_TOOL, Deed.SET_TWO, Deed.UNDO, Deed.SET_THEN_UNDO)
 _HINDRANCES: Final = {
     Hindrance.WIRE: 0.3,
     Hindrance.MACHINE: 0.14,
@@ -66,6 +68,8 @@ _HINDRANCES: Final = {
     Hindrance.DISK: 0.06,
     Hindrance.CLOCK: 0.03,
     Hindrance.INTERRUPT: 0.06,
+    Hindrance.HAND: 0.08,
+    Hindrance.FREEZE: 0.04,
 }
 _FAMILIES: Final[Mapping[CellKind, str]] = {
     CellKind.EPSON: CellKind.EPSON.value,
@@ -77,9 +81,23 @@ _FAMILIES: Final[Mapping[CellKind, str]] = {
 _LINE_SHARE: Final = 0.2
 _PRODUCTION_SHARE: Final = 0.1
 _NO_ROBOLINK: Final = frozenset(
-    {Hindrance.STOP, Hindrance.PENDANT, Hindrance.SECOND_PERSON, Hindrance.INTERRUPT}
+    {
+        Hindrance.STOP,
+        Hindrance.PENDANT,
+        Hindrance.SECOND_PERSON,
+        Hindrance.INTERRUPT,
+        Hindrance.HAND,
+        Hindrance.FREEZE,
+    }
 )
 """What a program that calls back does not have: nobody is at robolink's keyboard."""
+
+_JUMPS_S: Final = (-86400.0, -5.0, 3600.0, 40 * 86400.0)
+"""By how much a clock is set wrong."""
+
+_WHILE_ASKED: Final = frozenset({Hindrance.HAND, Hindrance.FREEZE})
+_QUESTION: Final = "question"
+"""What comes only while robolink asks something, and where that is."""
 
 _DISK_FAULTS: Final = ("FULL", "UNWRITABLE", "SYNC_FAILS", "bent", "truncated", "lost")
 _BY_REQUESTS: Final = frozenset(
@@ -137,8 +155,10 @@ def deeds_of(kind: CellKind) -> Mapping[Deed, float]:
     return _SHARES
 
 
-def _hindrances(kind: CellKind) -> Mapping[Hindrance, float]:
+def _hindrances(kind: CellKind, *, asks: bool) -> Mapping[Hindrance, float]:
     shares = dict(_HINDRANCES)
+    if not asks:
+        shares = {one: share for one, share in shares.items() if one not in _WHILE_ASKED}
     if kind in LINE_KINDS:
         shares[Hindrance.LINE] = _LINE_SHARE
     if kind in MAILBOX_KINDS:
@@ -179,7 +199,12 @@ def _told_instant(rng: random.Random, kind: CellKind, deed: Deed) -> Disturbance
     instant, at = found
     if instant.kind == Hindrance.WIRE and instant.what not in WIRE_FAULTS[kind]:
         return None
-    seconds = rng.choice((0.0, 0.01, 5.0, 20.0))
+    if instant.kind == Hindrance.MACHINE and instant.what not in MACHINE_FAULTS[kind]:
+        return None
+    if instant.kind == Hindrance.CLOCK:
+        seconds = rng.choice(_JUMPS_S)
+    else:
+        seconds = rng.choice((0.0, 0.01, 5.0, 20.0))
     return Disturbance(Hindrance(instant.kind), instant.what, instant.match, at, seconds)
 
 
@@ -187,7 +212,7 @@ def _disturbance(rng: random.Random, kind: CellKind, deed: Deed) -> Disturbance:
     if (told := _told_instant(rng, kind, deed)) is not None:
         return told
     length = length_of(kind, deed)
-    shares = _hindrances(kind)
+    shares = _hindrances(kind, asks=_QUESTION in dict(length.points))
     hindrance = rng.choices(list(shares), list(shares.values()))[0]
     places = length.requests if hindrance in _BY_REQUESTS else length.points
     match, count = rng.choice(places)
@@ -212,6 +237,11 @@ def _disturbance(rng: random.Random, kind: CellKind, deed: Deed) -> Disturbance:
             match, at = "commit before", rng.randrange(max(1, length.commits))
         case Hindrance.POWER_CUT:
             what = rng.choice(("", "SYNC_LIES"))
+        case Hindrance.HAND | Hindrance.FREEZE:
+            match, at = _QUESTION, rng.randrange(dict(length.points)[_QUESTION])
+            if hindrance is Hindrance.HAND:
+                chooses = kind is not CellKind.REGISTER_MAP and rng.random() < 0.5
+                what, position = ("select", rng.randrange(4)) if chooses else ("type", None)
         case Hindrance.CLOCK:
-            seconds = rng.choice((-86400.0, -5.0, 3600.0, 40 * 86400.0))
+            seconds = rng.choice(_JUMPS_S)
     return Disturbance(hindrance, what, match, at, seconds, position)

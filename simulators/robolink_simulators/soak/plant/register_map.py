@@ -196,6 +196,14 @@ class RegisterMapPlant(PlantMachine):
         self._simulator.program.set_tool(tool, {"x": x, "y": y, "z": z, "u": u})
         self.note_hand(tool, offset)
 
+    def select_by_hand(self, tool: int) -> None:
+        """Let a person at the HMI choose a tool."""
+        self._simulator.program.select(tool)
+
+    def finest(self, value: float) -> float:
+        """See :meth:`PlantMachine.finest`: one unit in the last place of a REAL."""
+        return max(1e-7, abs(value) * 2e-7)
+
     def repair(self) -> None:
         """Permit, let the program answer again, show at the HMI what the machine works with."""
         program = self._simulator.program

@@ -34,6 +34,7 @@ class RestRules:
                 "SameToolSelected",
                 bool(self._on.open_selection())
                 or state.selected == self._on.now.wish.selects
+                or state.selected in self._on.now.chosen_by_hand
                 or not self._on.books.readable(),  # the people are told that, and asked
                 f"tool {state.selected} is selected in place of "
                 f"{self._on.now.before.selected}, and nothing on record says so",
@@ -55,7 +56,8 @@ class RestRules:
     def _all_or_none(self, state: MachineState, markers: Sequence[BookedMarker]) -> None:
         """Check that of several tools all hold what was typed, or none: or something is open."""
         typed = self._on.now.wish.typed
-        if len(typed) < 2 or markers or any(tool in self._on.plant.touched for tool, _ in typed):
+        others = self._on.plant.touched | {tool for tool, _ in self._on.now.typed_by_others}
+        if len(typed) < 2 or markers or any(tool in others for tool, _ in typed):
             return
         new = [self._on.plant.same(state.tools.get(tool), offset) for tool, offset in typed]
         held = {tool: state.tools.get(tool) for tool, _ in typed}
@@ -129,7 +131,7 @@ class RestRules:
 
     def _proved(self, tool: int, holds: ToolOffset | None) -> bool:
         """Tell whether a new value rests on a proof, or on a person's word."""
-        typed = (*self._on.now.wish.typed, *self._on.now.typed_by_others)
+        typed = (*self._on.now.wish.asked, *self._on.now.typed_by_others)
         if any(n == tool and self._on.plant.same(offset, holds) for n, offset in typed):
             return True
         if self._on.now.wish.undoes or self._on.now.hour.habit.keeps:

@@ -35,6 +35,12 @@ NAMES: Final = (
     "UsableAgain",
     "NoPasswordShown",
     "NothingGrows",
+    "AsBefore",
+    "AskedValue",
+    "ByHandStays",
+    "MovesInItsTool",
+    "NothingMovesOn",
+    "NothingOutlives",
 )
 """Every rule, in the order in which they are listed."""
 
@@ -63,6 +69,7 @@ class HourSoFar:
         last_move: The last movement that has left.
         crowded: Whether a second person was at work.
         typed_by_others: What they typed, by tool.
+        chosen_by_hand: Tools that somebody put in force at the machine.
     """
 
     hour: Hour
@@ -78,6 +85,7 @@ class HourSoFar:
     last_move: str = ""
     crowded: bool = False
     typed_by_others: list[tuple[int, ToolOffset]] = field(default_factory=list)
+    chosen_by_hand: list[int] = field(default_factory=list)
 
 
 class Grounds:

@@ -294,7 +294,7 @@ _clear = MarkerStore.clear
 
 def selection_stays_open(store: Any, marker: Marker, *entries: NewEntry) -> None:
     """Forget that a procedure ran, but for its marker in the journal."""
-    if marker.kind is not MarkerKind.SELECTION:
+    if marker.kind is not MarkerKind.SELECTION or marker.operation not in store._under_way:
         _clear(store, marker, *entries)
         return
     store.ledger.ended(marker)

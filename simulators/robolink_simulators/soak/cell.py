@@ -44,6 +44,7 @@ from robolink_simulators.soak.rules import Rulebook
 from robolink_simulators.soak.story import Story
 from robolink_simulators.soak.surroundings import SeededSurroundings
 from robolink_simulators.soak.threads import Killed, TurnTaking
+from robolink_simulators.soak.watching import watched
 
 _PLANTS: Final[Mapping[CellKind, Callable[[ManualClock, WireTap, int], PlantMachine]]] = {
     CellKind.EPSON: EpsonPlant,
@@ -114,6 +115,8 @@ class VirtualCell:
             stack.callback(self._books.close)
             self._plant = self._built()
             self._rules = Rulebook(self.story, self._plant, self._books)
+            calls = watched(self._rules.contract, lambda: self._turns.current.owner)
+            stack.enter_context(calls)
             for hour in self._history.hours:
                 self._live_through(hour)
             self._look_for_the_password()
@@ -145,6 +148,7 @@ class VirtualCell:
             raise Killed
         if text.startswith("wire received"):
             self._note(f"p{process.number} < {text}")
+        self._rules.contract.passed()
         self._pass_point(process, text)
 
     def _at_checkpoint(self, point: Checkpoint, what: str) -> None:

@@ -20,8 +20,8 @@ from robolink_simulators.soak.history import Disturbance, Hindrance
 from robolink_simulators.soak.plant.counted_acts import CountedActs
 from robolink_simulators.soak.plant.lines.bent_line import BentTransport
 from robolink_simulators.soak.plant.machine import (
-    MachineState,
     USUAL_TOOL,
+    MachineState,
     PlantWithWorld,
     SentKind,
     SentRequest,

@@ -129,6 +129,11 @@ class PlantMachine(ABC):
         """The simulated controller."""
 
     @property
+    def bent(self) -> bool:
+        """Whether something on the wire has gone wrong in this deed, so that answers may lie."""
+        return bool(self.simulator.faults.fired)
+
+    @property
     def eyes(self) -> InProcessEyes | None:
         """What the person at the machine sees with; ``None`` where robolink moves nothing."""
         return None
@@ -227,7 +232,7 @@ class PlantMachine(ABC):
         return all(abs(a - b) <= self.finest(a) for a, b in pairs)
 
     def finest(self, value: float) -> float:  # noqa: ARG002 - the form of those that round
-        """Return by how much a number may differ from the one asked for: it prints three decimals."""
+        """Return how far a number may be from the one asked for; here three decimals are printed."""
         return 0.00051
 
 

@@ -190,6 +190,11 @@ class RegisterMapPlant(PlantMachine):
         faults.fired.clear()
         return met
 
+    @property
+    def bent(self) -> bool:
+        """See :meth:`PlantMachine.bent`; the line may have bent something, too."""
+        return super().bent or bool(self._line.acts.met)
+
     def write_by_hand(self, tool: int, offset: ToolOffset) -> None:
         """Let a person at the HMI give a tool other values."""
         x, y, z, u, *_ = offset.components()

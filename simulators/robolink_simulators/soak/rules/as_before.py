@@ -2,6 +2,8 @@
 
 from typing import Final
 
+from robolink_cli.console.exit_codes import UNKNOWN, exit_code
+
 from robolink_simulators.soak.computer import VirtualProcess
 from robolink_simulators.soak.plant.machine import MachineState, SentKind, SentRequest
 from robolink_simulators.soak.rules.so_far import Grounds
@@ -36,8 +38,11 @@ class BeforeRules:
         """Check a deed that ended by itself, with a link that answered to its end."""
         if process.cut_off or self._on.plant.calls_back:
             return
+        told = error is not None and exit_code(error) == UNKNOWN  # the person looks at the robot
         self._on.hold(
-            "NothingMovesOn", not self._on.plant.moving, "nobody is connected, and the arm moves"
+            "NothingMovesOn",
+            told or not self._on.plant.moving,
+            "nobody is connected, and the arm moves",
         )
         if error is None and self._on.books.trusted and not self._on.now.crowded:
             left = [

@@ -9,7 +9,7 @@ from robolink_simulators.soak.rules.so_far import Grounds
 
 
 class HandRules:
-    """Looks at what becomes of what was typed and chosen by hand.
+    """Looks at what becomes of what was typed by hand.
 
     Args:
         grounds: What the rules rest on.
@@ -18,25 +18,14 @@ class HandRules:
     def __init__(self, grounds: Grounds) -> None:
         self._on = grounds
         self._typed: dict[int, ToolOffset] = {}
-        self._selected: int | None = None
 
     def begin(self) -> None:
         """Begin a deed: whoever sets out to it sees what is there."""
         self._typed.clear()
-        self._selected = None
-
-    @property
-    def selected(self) -> int | None:
-        """The tool that was put in force by hand in this deed, ``None`` for none."""
-        return self._selected
 
     def typed(self, tool: int, offset: ToolOffset) -> None:
         """Note what was typed."""
         self._typed[tool] = offset
-
-    def chose(self, tool: int) -> None:
-        """Note which tool was put in force."""
-        self._selected = tool
 
     def leaving(self, sent: SentRequest, state: MachineState) -> None:
         """Check a request that is about to leave."""
@@ -47,14 +36,6 @@ class HandRules:
                 not self._on.plant.same(by_hand, holds),
                 f"{sent.text} leaves, and tool {sent.tool} holds {by_hand}, typed by hand",
             )
-        if sent.kind is SentKind.MOVE and self._selected is not None:
-            self._on.hold(
-                "MovesInItsTool",
-                state.selected != self._selected,
-                f"{sent.text} leaves, and tool {self._selected} was selected by hand",
-            )
-        if sent.kind is SentKind.SELECT:
-            self._selected = None
 
     def at_rest(self, state: MachineState) -> None:
         """Check that what was typed by hand is there still, when the people have recovered."""

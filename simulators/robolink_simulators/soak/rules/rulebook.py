@@ -16,6 +16,7 @@ from robolink_simulators.soak.rules.as_before import BeforeRules
 from robolink_simulators.soak.rules.at_end import EndRules
 from robolink_simulators.soak.rules.at_rest import RestRules
 from robolink_simulators.soak.rules.by_hand import HandRules
+from robolink_simulators.soak.rules.contract import ContractRules
 from robolink_simulators.soak.rules.on_wire import WireRules
 from robolink_simulators.soak.rules.so_far import Grounds, HourSoFar
 from robolink_simulators.soak.story import Story
@@ -28,6 +29,9 @@ class Rulebook(Grounds):
         story: Where a broken rule is noted.
         plant: The machine.
         books: The journal on the disk.
+
+    Attributes:
+        contract: What every call has to keep.
 
     Example:
         >>> from pathlib import Path
@@ -66,6 +70,7 @@ class Rulebook(Grounds):
             HandRules(self),
             BeforeRules(self),
         )
+        self.contract = ContractRules(self)
 
     def begin(self, hour: Hour, wish: Wish) -> None:
         """Begin an hour."""
@@ -87,6 +92,7 @@ class Rulebook(Grounds):
         self.plant.moved_itself = self.plant.settings_reset = False
         self._asked.begin()
         self._by_hand.begin()
+        self.contract.begin(state)
 
     def begin_again(self) -> None:
         """Begin another try in the same hour; what is open by now is of before."""
@@ -102,7 +108,6 @@ class Rulebook(Grounds):
 
     def hand_chose(self, tool: int) -> None:
         """Note which tool somebody puts in force at the machine meanwhile."""
-        self._by_hand.chose(tool)
         self.now.chosen_by_hand.append(tool)
 
     def others_write(self, tool: int, offset: ToolOffset) -> None:
@@ -114,6 +119,7 @@ class Rulebook(Grounds):
     def leaving(self, process: VirtualProcess, sent: SentRequest) -> None:
         """Check a request that is about to leave a process."""
         self._on_wire.leaving(process, sent)
+        self.contract.leaving(process, sent)
         if sent.kind not in (SentKind.OTHER, SentKind.STOP):
             self._before.leaving(process, sent)
             self._by_hand.leaving(sent, self.plant.state())

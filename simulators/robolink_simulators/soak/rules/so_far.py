@@ -35,6 +35,7 @@ NAMES: Final = (
     "UsableAgain",
     "NoPasswordShown",
     "NothingGrows",
+    "ContractHolds",
     "AsBefore",
     "AskedValue",
     "ByHandStays",

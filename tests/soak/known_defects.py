@@ -56,6 +56,7 @@ _THREAD: Final = "stops from a second thread"
 _RECALIBRATION: Final = "stops in a whole recalibration"
 _PROXY: Final = "disturbed runs"
 _REAL_DRIVERS: Final = "kinds of defects that real drivers had"
+_MOVEMENT: Final = "robolink.controllers.epson.motion.movement"
 _EPSON_TOOLS: Final = "robolink.controllers.epson.tools.table.EpsonToolTable"
 
 DEFECTS: Final = (
@@ -299,7 +300,10 @@ DEFECTS: Final = (
     ),
     KnownDefect(
         "a controller that gives up waiting counts as one that refused",
-        {"robolink.controllers.epson.motion.movement.ErrorCode": stand_ins.GIVING_UP_IS_A_REFUSAL},
+        {
+            f"{_MOVEMENT}.ErrorCode": stand_ins.GIVING_UP_IS_A_REFUSAL,
+            f"{_MOVEMENT}.EpsonMotion._runs_on": stand_ins.nothing,
+        },
         CellKind.EPSON,
         found_by=_REAL_DRIVERS,
     ),

@@ -3,7 +3,7 @@
 import os
 import random
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import Any, Final
 from unittest import mock
@@ -12,15 +12,23 @@ from robolink.ambient import replaced
 from robolink.checkpoints import Checkpoint, observed
 from robolink.errors import JournalError, RobolinkError
 from robolink.interrupts import EndedBy, Interrupted, one_ending, output_closed
-from robolink.model import ToolOffset
+from robolink.model import Controller, ToolOffset
 from robolink.timing import NS_PER_S
 from robolink.transaction import Wanted, change_tools, recover
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.faults import DiskFault, FaultyDisk
 from robolink_simulators.soak.books import Books
 from robolink_simulators.soak.calling_back.plant import ProgramPlant
+from robolink_simulators.soak.commanding import run_line
 from robolink_simulators.soak.computer import VirtualComputer, VirtualProcess
-from robolink_simulators.soak.history import CellKind, Disturbance, Hindrance, History, Hour
+from robolink_simulators.soak.history import (
+    CellKind,
+    Deed,
+    Disturbance,
+    Hindrance,
+    History,
+    Hour,
+)
 from robolink_simulators.soak.people import (
     OTHERS_TOOL,
     TOOL,
@@ -105,7 +113,10 @@ class VirtualCell:
     def run(self) -> Story:
         """Run the whole history."""
         with ExitStack() as stack:
-            environment = {"ROBOLINK_STATE_DIR": str(self._folder / "state")}
+            environment = {
+                "ROBOLINK_STATE_DIR": str(self._folder / "state"),
+                "ROBOLINK_JOURNAL": str(self._folder / "journal.db"),
+            }
             stack.enter_context(mock.patch.dict(os.environ, environment))
             stack.enter_context(replaced(self._surroundings))
             stack.enter_context(self._disk)
@@ -304,7 +315,7 @@ class VirtualCell:
         self._note(f"hour {hour.number}: {hour.habit.person} sets out to {hour.deed}")
         self._plant.prepare(habits_in(hour.habit))
         self._harm_the_journal(hour)
-        self._rules.begin(hour, wish_of(hour))
+        self._rules.begin(hour, wish_of(hour, self._plant.state().tools))
         self._arm(hour)
         self._do(hour)
         for fault in DiskFault:
@@ -360,11 +371,18 @@ class VirtualCell:
         me.owner = process
         error: BaseException | None = None
         try:
-            with one_ending(), self._connected(process) as controller:
+            commanded = hour.deed is Deed.COMMAND
+            with (
+                one_ending(),
+                nullcontext() if commanded else self._connected(process) as controller,
+            ):
                 try:
-                    self._rules.now.report = self._plant.carry_out(
-                        controller, hour, self._note_said
-                    )
+                    if commanded:
+                        self._type_line(process, hour)
+                    else:
+                        self._rules.now.report = self._plant.carry_out(
+                            controller, hour, self._note_said
+                        )
                 except BaseException as raised:
                     error = raised
                     raise
@@ -390,6 +408,17 @@ class VirtualCell:
         self._end(hour, "done" if error is None else type(error).__name__)
         self._note("done" if error is None else describe(error))
         process.end()
+
+    def _type_line(self, process: VirtualProcess, hour: Hour) -> None:
+        """Let a command connect, as often as it does."""
+
+        def connect() -> Controller:
+            outcomes = process.log(self._plant.address, self._clock)
+            process.controller = self._plant.connect(process, outcomes)
+            return process.controller
+
+        self._note("types " + " ".join(hour.line))
+        run_line(hour.line, self._plant, connect, str(self._folder), self._note_said)
 
     def _end(self, hour: Hour, how: str) -> None:
         self.story.endings[f"{hour.deed}: {how}"] += 1

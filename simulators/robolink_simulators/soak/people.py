@@ -1,7 +1,7 @@
 """What people at a virtual cell do: their deeds, and how they put things right afterwards."""
 
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Final
@@ -27,6 +27,7 @@ from robolink.transaction import Wanted, change_tools, plan_undo, recover, undo
 from robolink_simulators.assist.port import InProcessEyes
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.soak.history import Deed, Habit, Hour
+from robolink_simulators.soak.typed_lines import cleared, offset_of, typed_components
 
 Tell = Callable[[str], None]
 """Told what a person is shown, and does."""
@@ -36,6 +37,9 @@ TOOL: Final = 1
 
 OTHERS_TOOL: Final = 4
 """What a second person writes."""
+
+_NOMINAL: Final = ToolOffset(12.0, -3.5, -20.0)
+"""Of the drawing of the nozzle; typed where a command has taken the cell's own tool away."""
 
 _LIFT_MM: Final = 8.0
 
@@ -51,23 +55,31 @@ class Wish:
         undoes: Whether the last change is taken back.
         meanwhile: Offsets that they typed on the way, and took back.
         moves: Whether a movement is begun, and left alone.
+        free: Whether it is a command of any kind, which may keep and select what it says.
     """
 
-    typed: tuple[tuple[int, ToolOffset], ...] = ()
+    typed: tuple[tuple[int, ToolOffset | None], ...] = ()
     selects: int | None = None
     measures: bool = False
     undoes: bool = False
-    meanwhile: tuple[tuple[int, ToolOffset], ...] = ()
+    meanwhile: tuple[tuple[int, ToolOffset | None], ...] = ()
     moves: bool = False
+    free: bool = False
 
     @property
-    def asked(self) -> tuple[tuple[int, ToolOffset], ...]:
+    def asked(self) -> tuple[tuple[int, ToolOffset | None], ...]:
         """All offsets that they typed, by tool."""
         return (*self.meanwhile, *self.typed)
 
 
-def wish_of(hour: Hour) -> Wish:
-    """Return what the person of an hour means to be true at its end."""
+def wish_of(hour: Hour, held: Mapping[int, ToolOffset] | None = None) -> Wish:
+    """Return what the person of an hour means to be true at its end.
+
+    Args:
+        hour: The hour.
+        held: What the tools hold at its beginning: of a line that names some components of an
+            offset, the others stay.
+    """
     first, second = _typed(hour.number, 0), _typed(hour.number, 1)
     match hour.deed:
         case Deed.CHANGE_NOZZLE:
@@ -82,10 +94,24 @@ def wish_of(hour: Hour) -> Wish:
             return Wish(selects=2 if hour.number % 2 else TOOL)
         case Deed.MOVE_AND_LEAVE:
             return Wish(moves=True)
+        case Deed.COMMAND:
+            return _wish_of_line(hour.line, held or {})
         case Deed.UNDO:
             return Wish(undoes=True)
         case Deed.PRODUCE:
             return Wish()
+
+
+def _wish_of_line(line: tuple[str, ...], held: Mapping[int, ToolOffset]) -> Wish:
+    typed: tuple[tuple[int, ToolOffset | None], ...] = ()
+    written, gone = typed_components(line), cleared(line)
+    if written is not None:
+        tool, named = written
+        typed = ((tool, offset_of(held.get(tool), named)),)
+    elif gone is not None:
+        typed = ((gone, None),)
+    chosen = line[:2] == ("tool", "select") and "--dry-run" not in line
+    return Wish(typed=typed, selects=int(line[2]) if chosen else None, free=True)
 
 
 def _typed(number: int, which: int) -> ToolOffset:
@@ -149,7 +175,9 @@ def carry_out(
     return None
 
 
-def _type(controller: Controller, typed: tuple[tuple[int, ToolOffset], ...], tell: Tell) -> None:
+def _type(
+    controller: Controller, typed: tuple[tuple[int, ToolOffset | None], ...], tell: Tell
+) -> None:
     """Write offsets as a command does: what is there is read, shown, and agreed to be replaced."""
     wanted = [Wanted(n, offset, controller.tools.read(n)) for n, offset in typed]
     _is_asked()
@@ -203,6 +231,8 @@ def put_right(
     for finding in done.settled:
         tell(f"settled: {finding.verdict} {finding.marker.request}")
         _replace_what_is_no_tool(controller, finding, tell)
+    if controller.tools.read(TOOL) is None:
+        change_tools(controller, [Wanted(TOOL, _NOMINAL, None)], tell=tell)
     if moved_by_robolink and controller.tools.selected() != TOOL:
         controller.tools.select(TOOL)
     return not done.left and not controller.outcomes.open_markers()

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Final
 
 from robolink_simulators.faults.instants import drawn_instant, drawn_rarity
+from robolink_simulators.soak.drawing.commands import drawn_line
 from robolink_simulators.soak.drawing.faults import (
     LINE_KINDS,
     MACHINE_FAULTS,
@@ -48,15 +49,22 @@ _TURNS: Final = (
 _ANOTHER_SHARE: Final = 0.6
 _MOST: Final = 4
 _SHARES: Final = {
-    Deed.CHANGE_NOZZLE: 0.5,
+    Deed.CHANGE_NOZZLE: 0.46,
     Deed.SET_TOOL: 0.12,
     Deed.SET_TWO: 0.1,
     Deed.SELECT_TOOL: 0.07,
     Deed.UNDO: 0.09,
     Deed.SET_THEN_UNDO: 0.06,
     Deed.MOVE_AND_LEAVE: 0.06,
+    Deed.COMMAND: 0.24,
 }
-_OF_REGISTERS: Final = (Deed.SET_TOOL, Deed.SET_TWO, Deed.UNDO, Deed.SET_THEN_UNDO)
+_OF_REGISTERS: Final = (
+    Deed.SET_TOOL,
+    Deed.SET_TWO,
+    Deed.UNDO,
+    Deed.SET_THEN_UNDO,
+    Deed.COMMAND,
+)
 _HINDRANCES: Final = {
     Hindrance.WIRE: 0.3,
     Hindrance.MACHINE: 0.14,
@@ -143,7 +151,10 @@ def _hour(seed: int, number: int, kind: CellKind) -> Hour:
     rare = drawn_rarity(rarely, _FAMILIES.get(kind, ""), deed.value)
     if rare is not None:
         drawn.append(Disturbance(Hindrance(rare.kind), rare.what, rare.match))
-    return Hour(number, deed, _habit(rng), tuple(drawn))
+    line: tuple[str, ...] = ()
+    if deed is Deed.COMMAND:
+        line = drawn_line(random.Random(f"line {number} of {seed}"))
+    return Hour(number, deed, _habit(rng), tuple(drawn), line)
 
 
 def deeds_of(kind: CellKind) -> Mapping[Deed, float]:

@@ -64,7 +64,13 @@ class AskedRules:
     def at_rest(self, state: MachineState) -> None:
         """Note what the hour has changed, for an undo that comes later."""
         now, plant = self._on.now, self._on.plant
-        if not self._sure or plant.touched or now.crowded or not self._on.books.trusted:
+        if (
+            not self._sure
+            or now.wish.free
+            or plant.touched
+            or now.crowded
+            or not self._on.books.trusted
+        ):
             self._before.clear()
             return
         typed = {

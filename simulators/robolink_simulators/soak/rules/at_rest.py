@@ -9,6 +9,7 @@ from robolink_simulators.soak.books import BookedMarker
 from robolink_simulators.soak.people import TOOL
 from robolink_simulators.soak.plant.machine import MachineState
 from robolink_simulators.soak.rules.so_far import SURELY_MM, TOLERANCE_MM, Grounds
+from robolink_simulators.soak.typed_lines import selects
 
 _PROOFS: Final = ("verified", "proved, and kept by the program")
 """What the record says of a value that was proved: by robolink, and by a program's touches."""
@@ -35,6 +36,7 @@ class RestRules:
                 bool(self._on.open_selection())
                 or state.selected == self._on.now.wish.selects
                 or state.selected in self._on.now.chosen_by_hand
+                or selects(self._on.now.hour.line)
                 or not self._on.books.readable(),  # the people are told that, and asked
                 f"tool {state.selected} is selected in place of "
                 f"{self._on.now.before.selected}, and nothing on record says so",
@@ -134,7 +136,8 @@ class RestRules:
         typed = (*self._on.now.wish.asked, *self._on.now.typed_by_others)
         if any(n == tool and self._on.plant.same(offset, holds) for n, offset in typed):
             return True
-        if self._on.now.wish.undoes or self._on.now.hour.habit.keeps:
+        wish = self._on.now.wish
+        if wish.undoes or wish.free or self._on.now.hour.habit.keeps:
             return True
         verdicts = self._on.books.verdicts(self._on.now.entries, tool)
         return any(kind == "done" and verdict in _PROOFS for kind, verdict in verdicts)

@@ -354,6 +354,9 @@ class CallbackConversation:
             log.append(entry)
         except ConfigError:
             code = "journal"
+        except OutcomeUnknownError as unsettled:
+            # The record of before was lost meanwhile; the program is answered all the same.
+            code = _code(unsettled)
         if self._in_work():
             return CallbackWord.BACK, (code,)
         self._run = None

@@ -379,7 +379,7 @@ class VirtualCell:
                 try:
                     if commanded:
                         self._type_line(process, hour)
-                    else:
+                    elif controller is not None:
                         self._rules.now.report = self._plant.carry_out(
                             controller, hour, self._note_said
                         )

@@ -52,14 +52,14 @@ def run_line(
         stack.enter_context(mock.patch.object(sys, "stdin", io.StringIO()))
         stack.enter_context(mock.patch("robolink.connect", _connecting(connect)))
         # A socket of this computer, with a thread of its own, is no part of a cell.
-        unheard = mock.patch(
-            "robolink_cli.session.opening.listening_for_stop", lambda *_, **__: nullcontext()
-        )
-        stack.enter_context(unheard)
+        unheard = "robolink_cli.session.opening.listening_for_stop"
+        stack.enter_context(mock.patch(unheard, return_value=nullcontext()))
         stack.enter_context(speaking(SHELL_WAYS))
         stack.callback(close_files)
         stack.callback(lambda: tell(" / ".join(shown.getvalue().splitlines()[-2:])))
-        code = main._invoke(("-c", plant.address, *words))
+        code = main._invoke(  # noqa: SLF001 - what run() does, but for the signals of this process
+            ("-c", plant.address, *words)
+        )
     if code == UNKNOWN:
         raise OutcomeUnknownError("the command says that something is left open")
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Final
 
 from robolink.model import ToolOffset
@@ -20,11 +21,7 @@ def typed_components(line: Sequence[str]) -> tuple[int, dict[str, float]] | None
     """Return which tool a line writes, and the components that it names; ``None`` for none."""
     if tuple(line[:2]) != ("tool", "set") or "--dry-run" in line or not line[2].isdigit():
         return None
-    named = {
-        _UNITS[one]: float(value)
-        for one, value in zip(line, line[1:], strict=False)
-        if one in _UNITS
-    }
+    named = {_UNITS[one]: float(value) for one, value in pairwise(line) if one in _UNITS}
     return int(line[2]), named
 
 

@@ -1,11 +1,13 @@
 """An EPSON controller whose own program measures and changes a needle, and asks for a verdict."""
 
 import random
+from contextlib import suppress
 from typing import Final, cast
 
 from robolink.errors import NotReadyError, NotReadyReason
-from robolink.model import Controller, OutcomeLog, ToolOffset
+from robolink.model import Controller, MarkerKind, OutcomeLog, ToolOffset
 from robolink.nozzle_change import ChangeReport
+from robolink.transaction import recover
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.cell.workplace import exchanged
 from robolink_simulators.cell.world_parameters import WorldParameters
@@ -43,6 +45,7 @@ class ProgramPlant(EpsonPlant):
         self._rng = random.Random(f"needles {seed}")
         self._service = ProgramService(clock, turns, tap.passed)
         self._service.on_value = self._given
+        self._service.on_record = (f"epson:C-SOAK{seed:06d}/SOAK{seed:06d}",)
         self._production = Production(self.simulator, clock, self._service, self._rng)
         self._nominal_pin = self.simulator.world.pin_mm
 
@@ -72,16 +75,31 @@ class ProgramPlant(EpsonPlant):
     def put_right(self, controller: Controller, habit: Habit, tell: Tell) -> bool:
         """Let the program put its tool back, and measure once more, undisturbed."""
         del habit
+        served = cast(_Served, controller)
+        self._recover(served, tell)
         world = self.simulator.world
         world.pin_mm = self._nominal_pin
         self._production.teach()
         self._production.restore()
         printed = self._production.run()
         tell(f"the program prints {printed}")
-        left = cast(_Served, controller).outcomes.open_markers()
+        left = served.outcomes.open_markers()
         if printed != "kept":
             raise NotReadyError(f"the program prints {printed!r}", reason=NotReadyReason.NOT_REMOTE)
         return not left
+
+    def _recover(self, served: "_Served", tell: Tell) -> None:
+        """Make the PC the control device, and look, where the record of before is missing."""
+        process = self._service.process
+        if process is None:
+            return
+        with super().connect(process, served.outcomes) as controller:
+            markers = controller.outcomes.open_markers()
+            if any(one.kind is MarkerKind.HISTORY for one in markers):
+                with suppress(NotReadyError):
+                    controller.reset_fault()
+                done = recover(controller, confirm=lambda _finding: True)
+                tell(f"settled: {[finding.marker.request for finding in done.settled]}")
 
     def hang_up(self, process: VirtualProcess) -> None:
         """The line of a service that died is closed by the system."""

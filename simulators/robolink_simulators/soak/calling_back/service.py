@@ -32,6 +32,8 @@ class ProgramService:
     Attributes:
         acts: What is planned to happen to an exchange.
         process: Who serves; ``None`` for nobody.
+        on_record: The name that the controller has on record where a PC asks it, as a person gives
+            it to ``robolink expert serve``.
         on_question: Told of each question of the program.
         on_value: Told of each value that the program is given.
     """
@@ -41,6 +43,7 @@ class ProgramService:
     ) -> None:
         self.acts = CountedActs()
         self.process: VirtualProcess | None = None
+        self.on_record: tuple[str, ...] = ()
         self.on_question: Callable[[str], None] = lambda _text: None
         self.on_value: Callable[[ToolOffset], None] = lambda _value: None
         self._clock = clock
@@ -72,7 +75,9 @@ class ProgramService:
 
     def conversation(self) -> CallbackConversation:
         """Begin to talk with a program, with the journal of the process."""
-        return CallbackConversation(cast(Journal, _OpenJournal(self)), LIMITS, peer=_PEER)
+        return CallbackConversation(
+            cast(Journal, _OpenJournal(self)), LIMITS, peer=_PEER, controllers=self.on_record
+        )
 
     def log(self, controller: str) -> JournalOutcomeLog:
         """Return the record of a controller, kept by the process that serves."""

@@ -103,6 +103,11 @@ _NO_ROBOLINK: Final = frozenset(
 _JUMPS_S: Final = (-86400.0, -5.0, 3600.0, 40 * 86400.0)
 """By how much a clock is set wrong."""
 
+_CLOCK_SHARE: Final = 0.7
+_TAKEN_BACK_SHARE: Final = 0.06
+_FREEZE_SHARE: Final = 0.04
+"""How often what tells in one deed alone comes in it."""
+
 _WHILE_ASKED: Final = frozenset({Hindrance.HAND, Hindrance.FREEZE})
 _QUESTION: Final = "question"
 """What comes only while robolink asks something, and where that is."""
@@ -151,10 +156,30 @@ def _hour(seed: int, number: int, kind: CellKind) -> Hour:
     rare = drawn_rarity(rarely, _FAMILIES.get(kind, ""), deed.value)
     if rare is not None:
         drawn.append(Disturbance(Hindrance(rare.kind), rare.what, rare.match))
+    drawn += _of_the_deed(random.Random(f"deed {number} of {seed}"), kind, deed)
     line: tuple[str, ...] = ()
     if deed is Deed.COMMAND:
         line = drawn_line(random.Random(f"line {number} of {seed}"))
     return Hour(number, deed, _habit(rng), tuple(drawn), line)
+
+
+def _of_the_deed(rng: random.Random, kind: CellKind, deed: Deed) -> list[Disturbance]:
+    """Return what tells in one deed alone, and would hardly ever come together by chance."""
+    chance, at = rng.random(), rng.randrange(5)
+    if deed is Deed.SET_THEN_UNDO and chance < _CLOCK_SHARE:
+        jump_s = rng.choice(_JUMPS_S)
+        return [Disturbance(Hindrance.CLOCK, match=_QUESTION, at=1, seconds=jump_s)]
+    if deed is not Deed.CHANGE_NOZZLE:
+        return []
+    if chance < _TAKEN_BACK_SHARE:  # a hand while the new value is proved, and then a stop
+        last = dict(length_of(kind, deed).points)[_QUESTION] - 1
+        return [
+            Disturbance(Hindrance.HAND, "type", _QUESTION, last - at),
+            Disturbance(Hindrance.INTERRUPT, match=_QUESTION, at=last),
+        ]
+    if chance < _TAKEN_BACK_SHARE + _FREEZE_SHARE:
+        return [Disturbance(Hindrance.FREEZE, match=_QUESTION, at=at)]
+    return []
 
 
 def deeds_of(kind: CellKind) -> Mapping[Deed, float]:

@@ -174,6 +174,10 @@ class PlantMachine(ABC):
             RobolinkError: That fails.
         """
 
+    def shown(self, tool: int) -> ToolOffset | None:
+        """Return what it shows of a tool, which may be written already and not be in force."""
+        return self.state().tools.get(tool)
+
     @abstractmethod
     def hang_up(self, process: VirtualProcess) -> None:
         """Close what a process that died had open."""
@@ -232,7 +236,7 @@ class PlantMachine(ABC):
         return all(abs(a - b) <= self.finest(a) for a, b in pairs)
 
     def finest(self, value: float) -> float:  # noqa: ARG002 - the form of those that round
-        """Return how far a number may be from the one asked for; here three decimals are printed."""
+        """Return how far a number may be from the one asked for; three decimals are printed."""
         return 0.00051
 
 

@@ -19,6 +19,7 @@ from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.faults import Fault, FaultAction
 from robolink_simulators.hosting.in_process.line_port import LinePort
 from robolink_simulators.plc.device import PlcSimulator
+from robolink_simulators.plc.frames import decode
 from robolink_simulators.plc.serving import PlcOnLine
 from robolink_simulators.soak.computer import VirtualProcess
 from robolink_simulators.soak.history import Disturbance, Hindrance
@@ -154,6 +155,15 @@ class RegisterMapPlant(PlantMachine):
             for tool, held in self._simulator.program.in_force.items()
         }
         return MachineState(tools, 1)
+
+    def shown(self, tool: int) -> ToolOffset | None:
+        """Return what stands in the registers, whether the machine works with it or not."""
+        numbers, memory = _register_map().slots[tool].components, self._simulator.program.memory
+        x, y, z, u = (
+            decode(numbers[name], memory.read(numbers[name].table, numbers[name].registers))
+            for name in ("x", "y", "z", "u")
+        )
+        return ToolOffset(x, y, z, u)
 
     @property
     def moving(self) -> bool:

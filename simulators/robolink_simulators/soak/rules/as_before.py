@@ -2,11 +2,10 @@
 
 from typing import Final
 
-from robolink_cli.console.exit_codes import UNKNOWN, exit_code
-
+from robolink.errors import OutcomeUnknownError
 from robolink_simulators.soak.computer import VirtualProcess
 from robolink_simulators.soak.plant.machine import MachineState, SentKind, SentRequest
-from robolink_simulators.soak.rules.so_far import Grounds
+from robolink_simulators.soak.rules.so_far import Grounds, chain
 
 _AFTER_A_RESET: Final = (
     (0.0, 5.0, 5.0, 5.0, 50.0, 50.0, 50.0),
@@ -38,7 +37,8 @@ class BeforeRules:
         """Check a deed that ended by itself, with a link that answered to its end."""
         if process.cut_off or self._on.plant.calls_back:
             return
-        told = error is not None and exit_code(error) == UNKNOWN  # the person looks at the robot
+        # Whoever is told that nobody knows what a movement did looks at the robot.
+        told = any(isinstance(one, OutcomeUnknownError) for one in chain(error))
         self._on.hold(
             "NothingMovesOn",
             told or not self._on.plant.moving,

@@ -1,7 +1,6 @@
 """How a deed ends: what it says, against what is so."""
 
 import math
-from collections.abc import Iterator
 from typing import Final
 
 from robolink_cli.console.exit_codes import BUG, UNKNOWN, exit_code
@@ -20,7 +19,7 @@ from robolink_simulators.soak.computer import VirtualProcess
 from robolink_simulators.soak.history import Hindrance
 from robolink_simulators.soak.people import OTHERS_TOOL, TOOL
 from robolink_simulators.soak.plant.machine import MachineState
-from robolink_simulators.soak.rules.so_far import SURELY_MM, Grounds
+from robolink_simulators.soak.rules.so_far import SURELY_MM, Grounds, chain
 
 _HARM_THE_JOURNAL: Final = (Hindrance.DISK, Hindrance.POWER_CUT)
 _OUT_OF_REACH: Final = (
@@ -80,7 +79,7 @@ class EndRules:
         """Check that a change that failed tried to put the old values back, where it could."""
         hour = self._on.now.hour
         harmed = any(one.kind in _HARM_THE_JOURNAL for one in hour.disturbances)
-        gone = process.cut_off or any(isinstance(one, _OUT_OF_REACH) for one in _chain(error))
+        gone = process.cut_off or any(isinstance(one, _OUT_OF_REACH) for one in chain(error))
         if error is None or gone or harmed or self._on.now.crowded or not self._on.books.trusted:
             return
         for marker in self._on.books.markers():
@@ -190,12 +189,3 @@ class EndRules:
                 state.selected == self._on.now.before.selected or bool(self._on.open_selection()),
                 f"unchanged is told, but tool {state.selected} is selected",
             )
-
-
-def _chain(error: BaseException | None) -> Iterator[BaseException]:
-    """Yield an error and what led to it."""
-    seen: list[BaseException] = []
-    while error is not None and not any(error is one for one in seen):  # it may be its own cause
-        seen.append(error)
-        error = error.__cause__ or error.__context__
-    yield from seen

@@ -94,6 +94,7 @@ class ContractRules:
             self._promise(offset == ToolOffset(), "tool 0 reads as zeros")
             return
         held = [state.tools.get(tool) for state in self._since(process)]
+        held.append(self._on.plant.shown(tool))
         self._promise(
             any(self._on.plant.same(one, offset) for one in held),
             f"tool {tool} was read as {offset}, it held {held}",

@@ -1,5 +1,6 @@
 """What the rules know of the hour that runs, and how they are held."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -122,3 +123,12 @@ class Grounds:
         if not self.books.trusted:
             return [BookedMarker("", "selection", "", {})]
         return [m for m in self.books.markers() if m.kind == "selection" or "select" in m.details]
+
+
+def chain(error: BaseException | None) -> Iterator[BaseException]:
+    """Yield an error and what led to it."""
+    seen: list[BaseException] = []
+    while error is not None and not any(error is one for one in seen):  # it may be its own cause
+        seen.append(error)
+        error = error.__cause__ or error.__context__
+    yield from seen

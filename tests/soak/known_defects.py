@@ -13,6 +13,7 @@ from typing import Final
 
 from robolink_simulators.soak import CellKind
 
+from robolink.controllers.epson.tools.table import EpsonToolTable
 from robolink.model import MarkerKind
 from robolink.standing import UNTOUCHED
 from tests.soak import stand_ins
@@ -54,6 +55,9 @@ _SESSION: Final = "robolink.controllers.epson.link.session.EpsonSession"
 _THREAD: Final = "stops from a second thread"
 _RECALIBRATION: Final = "stops in a whole recalibration"
 _PROXY: Final = "disturbed runs"
+_REAL_DRIVERS: Final = "kinds of defects that real drivers had"
+_MOVEMENT: Final = "robolink.controllers.epson.motion.movement"
+_EPSON_TOOLS: Final = "robolink.controllers.epson.tools.table.EpsonToolTable"
 
 DEFECTS: Final = (
     KnownDefect(
@@ -236,5 +240,71 @@ DEFECTS: Final = (
         {f"{_SESSION}._take_aside": stand_ins.shown_whole},
         CellKind.EPSON,
         found_by="users of smtpd",
+    ),
+    KnownDefect(
+        "the selected tool is remembered within a session",
+        {
+            f"{_EPSON_TOOLS}._selected": stand_ins.remembered(EpsonToolTable._selected),
+            f"{_EPSON_TOOLS}._send_selection": stand_ins.remembering(
+                EpsonToolTable._send_selection
+            ),
+        },
+        CellKind.EPSON,
+        found_by=_REAL_DRIVERS,
+    ),
+    KnownDefect(
+        "a movement does not look at the selected tool",
+        {"robolink.controllers.motion_group.MotionGroupCore._require_tool": stand_ins.nothing},
+    ),
+    KnownDefect(
+        "typed values lose digits",
+        {"robolink.controllers.tool_table.ToolTableCore.write": stand_ins.three_digits},
+        CellKind.SOFTMOTION,
+        found_by=_REAL_DRIVERS,
+    ),
+    KnownDefect(
+        "power and speed are not put back",
+        {
+            "robolink.controllers.epson.tools.preserve.EpsonPreserver._restore_more": (
+                stand_ins.nothing
+            )
+        },
+        CellKind.EPSON,
+        found_by=_REAL_DRIVERS,
+    ),
+    KnownDefect(
+        "undo sorts by the wall clock",
+        {"robolink.transaction._undo_history._newest_done": stand_ins.newest_by_the_clock},
+        found_by=_REAL_DRIVERS,
+    ),
+    KnownDefect(
+        "a marker outlives what it marks",
+        {"robolink.controllers.markers.MarkerStore.clear": stand_ins.selection_stays_open},
+        found_by=_REAL_DRIVERS,
+    ),
+    KnownDefect(
+        "a frozen holder goes on after its lease was taken",
+        {"robolink.journal._lease.Lease.secure": stand_ins.still_mine},
+        found_by=_REAL_DRIVERS,
+    ),
+    KnownDefect(
+        "a roll-back writes over what was typed by hand",
+        {"robolink.transaction._put_back._put_one_back": stand_ins.over_anything},
+        found_by=_REAL_DRIVERS,
+    ),
+    KnownDefect(
+        "a movement that nobody waits on goes on when the session ends",
+        {"robolink.controllers.epson.motion.group.EpsonGroup.abort_unfinished": stand_ins.nothing},
+        CellKind.EPSON,
+        found_by=_REAL_DRIVERS,
+    ),
+    KnownDefect(
+        "a controller that gives up waiting counts as one that refused",
+        {
+            f"{_MOVEMENT}.ErrorCode": stand_ins.GIVING_UP_IS_A_REFUSAL,
+            f"{_MOVEMENT}.EpsonMotion._runs_on": stand_ins.nothing,
+        },
+        CellKind.EPSON,
+        found_by=_REAL_DRIVERS,
     ),
 )

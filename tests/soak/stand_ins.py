@@ -7,6 +7,7 @@ import contextlib
 import sqlite3
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from types import SimpleNamespace
 from typing import Any
 
 from robolink.checkpoints import Checkpoint, checkpoint
@@ -15,14 +16,25 @@ from robolink.controllers.epson.link.requests import command_class_of
 from robolink.controllers.epson.link.session import EpsonSession
 from robolink.controllers.markers import MarkerStore
 from robolink.controllers.softmotion.link.commands import CommandSender
+from robolink.controllers.tool_table import ToolTableCore
 from robolink.errors import RobolinkError, TransportTimeoutError
-from robolink.journal._lease import Grip
+from robolink.journal._lease import Grip, Lease
 from robolink.journal.store import engines
-from robolink.model import EntryKind, Finding, Marker, MarkerKind, NewEntry, Verdict, new_operation
+from robolink.model import (
+    EntryKind,
+    Finding,
+    Marker,
+    MarkerKind,
+    NewEntry,
+    ToolOffset,
+    Verdict,
+    new_operation,
+)
 from robolink.procedures.pin.touch_plan import TouchPlan
 from robolink.stop_latch import StopLatch
 from robolink.timing import wall_label
 from robolink.transaction import _put_back as putting_back
+from robolink.transaction import _undo_history as undo_history
 from robolink.transaction._settling import Settler
 
 Function = Callable[..., Any]
@@ -235,3 +247,75 @@ _init = TouchPlan.__init__
 def nominal(plan: TouchPlan, *given: Any, **named: Any) -> None:
     """Bring the tip straight back over the pin, and judge nothing."""
     _init(plan, *given, **{**named, "nominal": True})
+
+
+# What people at the machine, the clock and a frozen process show.
+
+
+def remembered(read: Function) -> Function:
+    """Return a look at the selected tool that is made once a session."""
+
+    def selected(table: Any) -> int | None:
+        if not hasattr(table, "remembered"):
+            table.remembered = read(table)
+        found: int | None = table.remembered
+        return found
+
+    return selected
+
+
+def remembering(send: Function) -> Function:
+    """Return a selection that is remembered as it was sent."""
+
+    def selecting(table: Any, tool: int) -> None:
+        send(table, tool)
+        table.remembered = tool
+
+    return selecting
+
+
+_write = ToolTableCore.write
+
+
+def three_digits(table: Any, tool: int, offset: ToolOffset, *, expected: Any) -> Any:
+    """Write what one kind of controller prints, on every kind."""
+    return _write(table, tool, offset.rounded(3), expected=expected)
+
+
+def newest_by_the_clock(outcomes: Any, tool: int | None) -> str:
+    """Take for the newest change the one with the latest time of day."""
+    ends = outcomes.recorded(tool=tool, kinds=(EntryKind.DONE,))
+    newest = max(ends, key=lambda entry: str(entry.at), default=None)
+    return "" if newest is None else undo_history.id_of_change(newest)
+
+
+_clear = MarkerStore.clear
+
+
+def selection_stays_open(store: Any, marker: Marker, *entries: NewEntry) -> None:
+    """Forget that a procedure ran, but for its marker in the journal."""
+    if marker.kind is not MarkerKind.SELECTION or marker.operation not in store._under_way:
+        _clear(store, marker, *entries)
+        return
+    store.ledger.ended(marker)
+    store._under_way.discard(marker.operation)
+    store._procedures.pop(marker.kind, None)
+
+
+_secure = Lease.secure
+
+
+def still_mine(lease: Any, rows: Any, purpose: str, operator: str) -> Grip:
+    """Believe that what was held once is held."""
+    return Grip(lease._epoch) if lease.held else _secure(lease, rows, purpose, operator)
+
+
+_put_one_back = putting_back._put_one_back
+
+
+def over_anything(controller: Any, step: Any, *, spoiled: bool, selected: int) -> Any:
+    """Put the old value back whatever is there by now."""
+    return _put_one_back(controller, step, spoiled=True, selected=selected)
+
+
+GIVING_UP_IS_A_REFUSAL = SimpleNamespace(TIMED_OUT=-1)

@@ -51,6 +51,14 @@ INSTANTS: Final[Mapping[str, Sequence[Instant]]] = {
         # Just before a movement leaves, and at its answer.
         *(Instant("stop", "", "lock Move ", 15, _NOZZLE),) * 5,
         Instant("stop", "", "lock Go ", 3, _NOZZLE),
+        # The controller gives up waiting for a movement, and the arm goes on.
+        Instant("machine", "GIVES_UP", "Move ", 15, _NOZZLE),
+        # Somebody at the pendant, between the look and the write, and while the proof is asked for.
+        Instant("hand", "type", "question", 15, _NOZZLE),
+        Instant("hand", "select", "question", 15, _NOZZLE),
+        Instant("hand", "select", "question", 1, ("select a tool",)),
+        # The clock is set between two changes.
+        Instant("clock", "", "question", 3, ("type an offset twice, and take the last one back",)),
         # Behind the last write, before it is on record.
         Instant("stop", "", "exchange Print TLSet", 3, _TYPED),
         *(Instant("stop", "", "commit ", 8, _TYPED),) * 2,
@@ -69,6 +77,10 @@ INSTANTS: Final[Mapping[str, Sequence[Instant]]] = {
         Instant("another client", "", "MOVE_LINEAR", 18, _NOZZLE),
         Instant("another client", "", "SELECT_TOOL", 2, _NOZZLE),
         Instant("another client", "", "WRITE_TOOL", 2),
+        Instant("hand", "type", "question", 15, _NOZZLE),
+        Instant("hand", "select", "question", 15, _NOZZLE),
+        Instant("hand", "select", "question", 1, ("select a tool",)),
+        Instant("clock", "", "question", 3, ("type an offset twice, and take the last one back",)),
         # Just before a movement leaves; behind the last write; between two tools.
         *(Instant("stop", "", "lock 2103", 15, _NOZZLE),) * 5,
         Instant("stop", "", "exchange 5205", 2, _TYPED),

@@ -4,7 +4,7 @@ import gc
 import os
 import random
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import Any, Final
 from unittest import mock
@@ -13,17 +13,26 @@ from robolink.ambient import replaced
 from robolink.checkpoints import Checkpoint, observed
 from robolink.errors import JournalError, RobolinkError
 from robolink.interrupts import EndedBy, Interrupted, one_ending, output_closed
-from robolink.model import ToolOffset
+from robolink.model import Controller, ToolOffset
 from robolink.timing import NS_PER_S
-from robolink.transaction import Wanted, change_tools
+from robolink.transaction import Wanted, change_tools, recover
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.faults import DiskFault, FaultyDisk
 from robolink_simulators.soak.books import Books
 from robolink_simulators.soak.calling_back.plant import ProgramPlant
+from robolink_simulators.soak.commanding import run_line
 from robolink_simulators.soak.computer import VirtualComputer, VirtualProcess
-from robolink_simulators.soak.history import CellKind, Disturbance, Hindrance, History, Hour
+from robolink_simulators.soak.history import (
+    CellKind,
+    Deed,
+    Disturbance,
+    Hindrance,
+    History,
+    Hour,
+)
 from robolink_simulators.soak.people import (
     OTHERS_TOOL,
+    TOOL,
     describe,
     habits_in,
     wish_of,
@@ -31,7 +40,12 @@ from robolink_simulators.soak.people import (
 from robolink_simulators.soak.plant.canopen import CanopenPlant
 from robolink_simulators.soak.plant.epson import PASSWORD, EpsonPlant
 from robolink_simulators.soak.plant.epson_serial import EpsonSerialPlant
-from robolink_simulators.soak.plant.machine import PlantMachine, SentRequest, WireTap
+from robolink_simulators.soak.plant.machine import (
+    HANDS_VALUES,
+    PlantMachine,
+    SentRequest,
+    WireTap,
+)
 from robolink_simulators.soak.plant.modbus import ModbusRtuPlant, ModbusTcpPlant
 from robolink_simulators.soak.plant.register_map import RegisterMapPlant
 from robolink_simulators.soak.plant.softmotion import SoftMotionPlant
@@ -39,6 +53,7 @@ from robolink_simulators.soak.rules import Rulebook
 from robolink_simulators.soak.story import Story
 from robolink_simulators.soak.surroundings import SeededSurroundings
 from robolink_simulators.soak.threads import Killed, TurnTaking
+from robolink_simulators.soak.watching import watched
 
 _PLANTS: Final[Mapping[CellKind, Callable[[ManualClock, WireTap, int], PlantMachine]]] = {
     CellKind.EPSON: EpsonPlant,
@@ -51,6 +66,9 @@ _PLANTS: Final[Mapping[CellKind, Callable[[ManualClock, WireTap, int], PlantMach
 }
 _TRIES: Final = 8
 """How often people try to get a cell going again; each time they look longer."""
+
+_TRIES_TO_TAKE_OVER_S: Final = (75.0, 30.0)
+"""How long somebody waits until a process that stands still has lost its login and its lease."""
 
 _PAST_THE_SYSTEM: Final = ("bent", "truncated", "lost")
 """What happens to the journal's file while nobody has it open."""
@@ -96,7 +114,10 @@ class VirtualCell:
     def run(self) -> Story:
         """Run the whole history."""
         with ExitStack() as stack:
-            environment = {"ROBOLINK_STATE_DIR": str(self._folder / "state")}
+            environment = {
+                "ROBOLINK_STATE_DIR": str(self._folder / "state"),
+                "ROBOLINK_JOURNAL": str(self._folder / "journal.db"),
+            }
             stack.enter_context(mock.patch.dict(os.environ, environment))
             stack.enter_context(replaced(self._surroundings))
             stack.enter_context(self._disk)
@@ -106,6 +127,8 @@ class VirtualCell:
             stack.callback(self._books.close)
             self._plant = self._built()
             self._rules = Rulebook(self.story, self._plant, self._books)
+            calls = watched(self._rules.contract, lambda: self._turns.current.owner)
+            stack.enter_context(calls)
             for hour in self._history.hours:
                 self._live_through(hour)
             self._look_for_the_password()
@@ -137,6 +160,7 @@ class VirtualCell:
             raise Killed
         if text.startswith("wire received"):
             self._note(f"p{process.number} < {text}")
+        self._rules.contract.passed()
         self._pass_point(process, text)
 
     def _at_checkpoint(self, point: Checkpoint, what: str) -> None:
@@ -187,6 +211,10 @@ class VirtualCell:
                 self._disk.begin(DiskFault[disturbance.what])
             case Hindrance.CLOCK:
                 self._surroundings.wall_jump_s += disturbance.seconds
+            case Hindrance.HAND:
+                self._act_by_hand(disturbance)
+            case Hindrance.FREEZE:
+                self._freeze()
             case Hindrance.INTERRUPT:
                 if self._turns.current.name == "main":
                     output_closed()
@@ -219,6 +247,51 @@ class VirtualCell:
             process.stopped_ns = self._clock.now_ns()
             self._rules.stopped()
 
+    def _act_by_hand(self, disturbance: Disturbance) -> None:
+        """Let somebody do something at the pendant, while robolink asks and nothing moves."""
+        state = self._plant.state()
+        if disturbance.what == "select":
+            others = sorted({*state.tools} - {state.selected})
+            if others:
+                tool = others[(disturbance.position or 0) % len(others)]
+                self._plant.select_by_hand(tool)
+                self._rules.hand_chose(tool)
+            return
+        assert self._hour is not None  # noqa: S101 - for the type: an hour runs
+        tool = next((tool for tool, _ in wish_of(self._hour).typed), TOOL)
+        held = state.tools.get(tool)
+        value = next(one for one in HANDS_VALUES if not self._plant.same(one, held))
+        self._plant.write_by_hand(tool, value)
+        self._rules.hand_typed(tool, self._plant.state().tools[tool])
+
+    def _freeze(self) -> None:
+        """Let a process stand still, as one that is suspended, until another has been at work."""
+        if self._turns.current.name != "main":
+            return
+        other = self._computer.start("dora")
+        self._others.append(other)
+        thread = self._turns.start("dora", other, lambda: self._take_over(other))
+        self._turns.wait_until(lambda: thread.over)
+
+    def _take_over(self, process: VirtualProcess) -> None:
+        """Somebody else waits, settles what the process that stands still left, types a tool."""
+        assert self._hour is not None  # noqa: S101 - for the type: an hour runs
+        tool = next((tool for tool, _ in wish_of(self._hour).typed), TOOL)
+        for wait_s in _TRIES_TO_TAKE_OVER_S:
+            self._surroundings.sleep(wait_s)
+            try:
+                with self._connected(process) as controller:
+                    recover(controller, keep=False, confirm=lambda _finding: True)
+                    held = controller.tools.read(tool)
+                    offset = ToolOffset(8.0, -8.0, -float(1 + process.number % 40))
+                    self._rules.others_write(tool, offset)
+                    change_tools(controller, [Wanted(tool, offset, held)])
+                self._note("dora: done")
+                break
+            except (RobolinkError, KeyboardInterrupt) as error:
+                self._note(f"dora: {describe(error)}")
+        process.end()
+
     def _second_person(self, process: VirtualProcess) -> None:
         """Somebody else at another terminal changes another tool."""
         try:
@@ -244,7 +317,7 @@ class VirtualCell:
         self._note(f"hour {hour.number}: {hour.habit.person} sets out to {hour.deed}")
         self._plant.prepare(habits_in(hour.habit))
         self._harm_the_journal(hour)
-        self._rules.begin(hour, wish_of(hour))
+        self._rules.begin(hour, wish_of(hour, self._plant.state().tools))
         self._arm(hour)
         self._do(hour)
         for fault in DiskFault:
@@ -303,11 +376,18 @@ class VirtualCell:
         me.owner = process
         error: BaseException | None = None
         try:
-            with one_ending(), self._connected(process) as controller:
+            commanded = hour.deed is Deed.COMMAND
+            with (
+                one_ending(),
+                nullcontext() if commanded else self._connected(process) as controller,
+            ):
                 try:
-                    self._rules.now.report = self._plant.carry_out(
-                        controller, hour, self._note_said
-                    )
+                    if commanded:
+                        self._type_line(process, hour)
+                    elif controller is not None:
+                        self._rules.now.report = self._plant.carry_out(
+                            controller, hour, self._note_said
+                        )
                 except BaseException as raised:
                     error = raised
                     raise
@@ -323,6 +403,7 @@ class VirtualCell:
             raise error  # a real one: whoever runs this wants it to end
         if not process.alive:
             self._end(hour, "killed")
+            self._rules.killed()
             self._turns.join()
             process.end()
             return
@@ -332,6 +413,17 @@ class VirtualCell:
         self._end(hour, "done" if error is None else type(error).__name__)
         self._note("done" if error is None else describe(error))
         process.end()
+
+    def _type_line(self, process: VirtualProcess, hour: Hour) -> None:
+        """Let a command connect, as often as it does."""
+
+        def connect() -> Controller:
+            outcomes = process.log(self._plant.address, self._clock)
+            process.controller = self._plant.connect(process, outcomes)
+            return process.controller
+
+        self._note("types " + " ".join(hour.line))
+        run_line(hour.line, self._plant, connect, str(self._folder), self._note_said)
 
     def _end(self, hour: Hour, how: str) -> None:
         self.story.endings[f"{hour.deed}: {how}"] += 1

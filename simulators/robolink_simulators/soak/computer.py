@@ -51,6 +51,8 @@ class VirtualProcess:
         Raises:
             JournalError: It cannot be opened.
         """
+        if self._journal is not None:  # a command connects once more
+            return self.log_of(address, clock)
         place = place_of(str(self._path))
         store = Store(place, read_only=False)
         self._journal = Journal(store, place.location, read_only=False)

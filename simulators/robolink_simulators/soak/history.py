@@ -32,6 +32,9 @@ class Deed(StrEnum):
     SELECT_TOOL = "select a tool"
     UNDO = "undo the last change"
     PRODUCE = "let production measure and change its needle"
+    SET_THEN_UNDO = "type an offset twice, and take the last one back"
+    MOVE_AND_LEAVE = "begin a movement and leave"
+    COMMAND = "type a command"
 
 
 class Hindrance(StrEnum):
@@ -50,6 +53,8 @@ class Hindrance(StrEnum):
     CLOCK = "clock"
     INTERRUPT = "interrupt"
     ANOTHER_CLIENT = "another client"
+    HAND = "hand"
+    FREEZE = "freeze"
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,12 +122,14 @@ class Hour:
         deed: What is set out to do.
         habit: Who does it, and how.
         disturbances: What gets in the way.
+        line: What is typed where the deed is a command, without the program's name.
     """
 
     number: int
     deed: Deed
     habit: Habit
     disturbances: tuple[Disturbance, ...]
+    line: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

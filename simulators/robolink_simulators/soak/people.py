@@ -1,14 +1,25 @@
 """What people at a virtual cell do: their deeds, and how they put things right afterwards."""
 
-from collections.abc import Callable
+import random
+from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from robolink_cli.prompts.operator import AssistedOperator
 
+from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.errors import NotReadyError, RobolinkError
-from robolink.model import Controller, Finding, ToolOffset, Verdict, read_offset
+from robolink.model import (
+    Controller,
+    Finding,
+    MotionProfile,
+    Path,
+    ToolOffset,
+    Verdict,
+    WorkBox,
+    read_offset,
+)
 from robolink.nozzle_change import ChangePlan, ChangeReport, NozzleChange, ToolPlan
 from robolink.runner import Question
 from robolink.timing import Clock
@@ -16,6 +27,7 @@ from robolink.transaction import Wanted, change_tools, plan_undo, recover, undo
 from robolink_simulators.assist.port import InProcessEyes
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.soak.history import Deed, Habit, Hour
+from robolink_simulators.soak.typed_lines import cleared, offset_of, typed_components
 
 Tell = Callable[[str], None]
 """Told what a person is shown, and does."""
@@ -26,6 +38,11 @@ TOOL: Final = 1
 OTHERS_TOOL: Final = 4
 """What a second person writes."""
 
+_NOMINAL: Final = ToolOffset(12.0, -3.5, -20.0)
+"""Of the drawing of the nozzle; typed where a command has taken the cell's own tool away."""
+
+_LIFT_MM: Final = 8.0
+
 
 @dataclass(frozen=True, slots=True)
 class Wish:
@@ -35,31 +52,73 @@ class Wish:
         typed: Offsets that they typed, by tool.
         selects: The tool that they select, ``None`` for none.
         measures: Whether a tip is measured, and written on their yes.
+        undoes: Whether the last change is taken back.
+        meanwhile: Offsets that they typed on the way, and took back.
+        moves: Whether a movement is begun, and left alone.
+        free: Whether it is a command of any kind, which may keep and select what it says.
     """
 
-    typed: tuple[tuple[int, ToolOffset], ...] = ()
+    typed: tuple[tuple[int, ToolOffset | None], ...] = ()
     selects: int | None = None
     measures: bool = False
     undoes: bool = False
+    meanwhile: tuple[tuple[int, ToolOffset | None], ...] = ()
+    moves: bool = False
+    free: bool = False
+
+    @property
+    def asked(self) -> tuple[tuple[int, ToolOffset | None], ...]:
+        """All offsets that they typed, by tool."""
+        return (*self.meanwhile, *self.typed)
 
 
-def wish_of(hour: Hour) -> Wish:
-    """Return what the person of an hour means to be true at its end."""
-    by_mm = 0.001 * (hour.number % 500)
+def wish_of(hour: Hour, held: Mapping[int, ToolOffset] | None = None) -> Wish:
+    """Return what the person of an hour means to be true at its end.
+
+    Args:
+        hour: The hour.
+        held: What the tools hold at its beginning: of a line that names some components of an
+            offset, the others stay.
+    """
+    first, second = _typed(hour.number, 0), _typed(hour.number, 1)
     match hour.deed:
         case Deed.CHANGE_NOZZLE:
             return Wish(measures=True)
         case Deed.SET_TOOL:
-            return Wish(typed=((2, ToolOffset(5.0 + by_mm, -1.0, -10.0)),))
+            return Wish(typed=((2, first),))
         case Deed.SET_TWO:
-            first = ToolOffset(5.5 + by_mm, -1.5, -11.0)
-            return Wish(typed=((2, first), (3, ToolOffset(6.0 + by_mm, -2.0, -12.0))))
+            return Wish(typed=((2, first), (3, second)))
+        case Deed.SET_THEN_UNDO:
+            return Wish(typed=((2, first),), meanwhile=((2, second),))
         case Deed.SELECT_TOOL:
-            return Wish(selects=TOOL)
+            return Wish(selects=2 if hour.number % 2 else TOOL)
+        case Deed.MOVE_AND_LEAVE:
+            return Wish(moves=True)
+        case Deed.COMMAND:
+            return _wish_of_line(hour.line, held or {})
         case Deed.UNDO:
             return Wish(undoes=True)
         case Deed.PRODUCE:
             return Wish()
+
+
+def _wish_of_line(line: tuple[str, ...], held: Mapping[int, ToolOffset]) -> Wish:
+    typed: tuple[tuple[int, ToolOffset | None], ...] = ()
+    written, gone = typed_components(line), cleared(line)
+    if written is not None:
+        tool, named = written
+        typed = ((tool, offset_of(held.get(tool), named)),)
+    elif gone is not None:
+        typed = ((gone, None),)
+    chosen = line[:2] == ("tool", "select") and "--dry-run" not in line
+    return Wish(typed=typed, selects=int(line[2]) if chosen else None, free=True)
+
+
+def _typed(number: int, which: int) -> ToolOffset:
+    """Return an offset with as many digits as a calculator shows."""
+    rng = random.Random(f"typed {number} {which}")
+    x_mm, y_mm, z_mm = rng.uniform(3.0, 9.0), rng.uniform(-3.0, 3.0), rng.uniform(-14.0, -8.0)
+    return ToolOffset(round(x_mm, 9), round(y_mm, 9), round(z_mm, 9))
 
 
 def habits_in(habit: Habit) -> WorldParameters:
@@ -91,17 +150,54 @@ def carry_out(
     """
     wish = wish_of(hour)
     if wish.measures and eyes is not None:
-        controller.motors(True)
+        if not controller.capabilities.low_power:  # else production has them on
+            controller.motors(True)
         person = _PersonWithHabits.at(eyes, tell, controller.clock, hour.habit)
         return NozzleChange(controller, ChangePlan((ToolPlan(TOOL),)), operator=person).run()
-    if wish.typed:
-        wanted = [Wanted(n, offset, controller.tools.read(n)) for n, offset in wish.typed]
-        change_tools(controller, wanted, tell=tell)
+    if wish.meanwhile:
+        _type(controller, wish.typed, tell)
+        _type(controller, wish.meanwhile, tell)
+        plan = plan_undo(controller)
+        _is_asked()
+        undo(controller, plan, then_select=TOOL, tell=tell)
+    elif wish.typed:
+        _type(controller, wish.typed, tell)
     elif wish.selects is not None:
+        controller.tools.selected()
+        _is_asked()
         controller.tools.select(wish.selects)
+    elif wish.moves:
+        _begin_a_movement(controller)
     else:
-        undo(controller, plan_undo(controller), then_select=TOOL, tell=tell)
+        plan = plan_undo(controller)
+        _is_asked()
+        undo(controller, plan, then_select=TOOL, tell=tell)
     return None
+
+
+def _type(
+    controller: Controller, typed: tuple[tuple[int, ToolOffset | None], ...], tell: Tell
+) -> None:
+    """Write offsets as a command does: what is there is read, shown, and agreed to be replaced."""
+    wanted = [Wanted(n, offset, controller.tools.read(n)) for n, offset in typed]
+    _is_asked()
+    change_tools(controller, wanted, tell=tell)
+
+
+def _is_asked() -> None:
+    """Be asked for a yes; meanwhile others at the machine do what they like."""
+    checkpoint(Checkpoint.QUESTION, "agree")
+
+
+def _begin_a_movement(controller: Controller) -> None:
+    """Begin to raise the tip, and see to something else, as a script may that waits on nothing."""
+    group = controller.groups[0]
+    with controller.preserved("a lift"):
+        start = group.pose()
+        _is_asked()
+        box = WorkBox.around(start, xy_mm=1.0, below_mm=1.0, above_mm=2 * _LIFT_MM)
+        raised = replace(start, z_mm=start.z_mm + _LIFT_MM)
+        group.move_to(raised, MotionProfile(Path.STRAIGHT, speed_mm_s=5.0), box=box)
 
 
 def put_right(
@@ -135,6 +231,8 @@ def put_right(
     for finding in done.settled:
         tell(f"settled: {finding.verdict} {finding.marker.request}")
         _replace_what_is_no_tool(controller, finding, tell)
+    if controller.tools.read(TOOL) is None:
+        change_tools(controller, [Wanted(TOOL, _NOMINAL, None)], tell=tell)
     if moved_by_robolink and controller.tools.selected() != TOOL:
         controller.tools.select(TOOL)
     return not done.left and not controller.outcomes.open_markers()

@@ -106,6 +106,7 @@ def _hour(hour: Hour) -> str:
             Deed.{hour.deed.name},
             {hour.habit!r},
             ({disturbances}),
+            {hour.line!r},
         ),"""
 
 

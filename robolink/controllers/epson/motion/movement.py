@@ -124,13 +124,18 @@ class EpsonMotion:
             self._link.session.finish(self._pending)
             self._link.markers.clear(self._marker)
 
+    def _runs_on(self) -> bool:
+        """Whether something runs on the controller although the statement was refused."""
+        return not self._pending.abort_requested and self._link.window.status().running
+
     def _settle(self) -> MotionOutcome:
         pending, answer = self._pending, self._pending.answer
         assert answer is not None  # noqa: S101 - _watch returned True
         with self._link.session.uninterrupted():
             self._link.session.finish(pending)
             # A controller that only gave up waiting (docs/reference/epson.md 1.6) may be moving
-            # still; so may one whose flags cannot be asked any more. The marker stays then.
+            # still; so may one that refuses while it runs, because the answer was to something
+            # else, and one whose flags cannot be asked any more. The marker stays then.
             gave_up = isinstance(answer, Refusal) and answer.code == ErrorCode.TIMED_OUT
             failed: RobolinkError | None = None
             with self._link.markers.doubt(self.statement):
@@ -141,6 +146,8 @@ class EpsonMotion:
                         raise self._link.markers.unproved(self.statement, error) from error
                     failed = error
                 except (RejectedError, ControllerFaultError) as error:
+                    if isinstance(error, RejectedError) and self._runs_on():
+                        raise self._link.markers.unproved(self.statement, error) from error
                     failed = error
             self._link.markers.clear(self._marker)
         # How an aborted statement is answered is not documented (docs/reference/epson.md 1.6).

@@ -261,8 +261,8 @@ class Ownership:
     def _wait_for_silence(self, held: LeaseHeldError) -> None:
         self._tell(
             tr(
-                "Client {holder} has the mailbox of the PLC. If it has ended, the mailbox is free in "
-                "{seconds:.0f} s at most; waiting for that.",
+                "Client {holder} has the mailbox of the PLC. If it has ended, the mailbox is free "
+                "in {seconds:.0f} s at most; waiting for that.",
                 holder=held.holder,
                 seconds=_LONGEST_SILENCE_S,
             )

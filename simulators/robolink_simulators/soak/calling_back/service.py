@@ -33,6 +33,8 @@ class ProgramService:
     Attributes:
         acts: What is planned to happen to an exchange.
         process: Who serves; ``None`` for nobody.
+        on_record: The name that the controller has on record where a PC asks it, as a person gives
+            it to ``robolink expert serve``.
         on_question: Told of each question of the program.
         on_value: Told of each value that the program is given.
     """

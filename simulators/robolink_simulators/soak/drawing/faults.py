@@ -46,7 +46,9 @@ _OF_MACHINES: Final = frozenset((*_OF_EPSON, *_OF_MAILBOX))
 
 def _machine_faults(kind: CellKind) -> tuple[str, ...]:
     match kind:
-        case CellKind.EPSON | CellKind.EPSON_SERIAL:
+        case CellKind.EPSON:
+            return (*(action.name for action in _OF_EPSON), "GIVES_UP")
+        case CellKind.EPSON_SERIAL:
             return tuple(action.name for action in _OF_EPSON)
         case CellKind.REGISTER_MAP:
             return ("WITHDRAW_PERMIT", "SILENT", "REFUSE", "RESTART")

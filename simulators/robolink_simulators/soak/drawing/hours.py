@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Final
 
 from robolink_simulators.faults.instants import drawn_instant, drawn_rarity
+from robolink_simulators.soak.drawing.commands import drawn_line
 from robolink_simulators.soak.drawing.faults import (
     LINE_KINDS,
     MACHINE_FAULTS,
@@ -48,13 +49,22 @@ _TURNS: Final = (
 _ANOTHER_SHARE: Final = 0.6
 _MOST: Final = 4
 _SHARES: Final = {
-    Deed.CHANGE_NOZZLE: 0.6,
-    Deed.SET_TOOL: 0.14,
+    Deed.CHANGE_NOZZLE: 0.46,
+    Deed.SET_TOOL: 0.12,
     Deed.SET_TWO: 0.1,
-    Deed.SELECT_TOOL: 0.06,
-    Deed.UNDO: 0.1,
+    Deed.SELECT_TOOL: 0.07,
+    Deed.UNDO: 0.09,
+    Deed.SET_THEN_UNDO: 0.06,
+    Deed.MOVE_AND_LEAVE: 0.06,
+    Deed.COMMAND: 0.24,
 }
-_OF_REGISTERS: Final = (Deed.SET_TOOL, Deed.SET_TWO, Deed.UNDO)
+_OF_REGISTERS: Final = (
+    Deed.SET_TOOL,
+    Deed.SET_TWO,
+    Deed.UNDO,
+    Deed.SET_THEN_UNDO,
+    Deed.COMMAND,
+)
 _HINDRANCES: Final = {
     Hindrance.WIRE: 0.3,
     Hindrance.MACHINE: 0.14,
@@ -66,6 +76,8 @@ _HINDRANCES: Final = {
     Hindrance.DISK: 0.06,
     Hindrance.CLOCK: 0.03,
     Hindrance.INTERRUPT: 0.06,
+    Hindrance.HAND: 0.08,
+    Hindrance.FREEZE: 0.04,
 }
 _FAMILIES: Final[Mapping[CellKind, str]] = {
     CellKind.EPSON: CellKind.EPSON.value,
@@ -77,9 +89,28 @@ _FAMILIES: Final[Mapping[CellKind, str]] = {
 _LINE_SHARE: Final = 0.2
 _PRODUCTION_SHARE: Final = 0.1
 _NO_ROBOLINK: Final = frozenset(
-    {Hindrance.STOP, Hindrance.PENDANT, Hindrance.SECOND_PERSON, Hindrance.INTERRUPT}
+    {
+        Hindrance.STOP,
+        Hindrance.PENDANT,
+        Hindrance.SECOND_PERSON,
+        Hindrance.INTERRUPT,
+        Hindrance.HAND,
+        Hindrance.FREEZE,
+    }
 )
 """What a program that calls back does not have: nobody is at robolink's keyboard."""
+
+_JUMPS_S: Final = (-86400.0, -5.0, 3600.0, 40 * 86400.0)
+"""By how much a clock is set wrong."""
+
+_CLOCK_SHARE: Final = 0.7
+_TAKEN_BACK_SHARE: Final = 0.06
+_FREEZE_SHARE: Final = 0.04
+"""How often what tells in one deed alone comes in it."""
+
+_WHILE_ASKED: Final = frozenset({Hindrance.HAND, Hindrance.FREEZE})
+_QUESTION: Final = "question"
+"""What comes only while robolink asks something, and where that is."""
 
 _DISK_FAULTS: Final = ("FULL", "UNWRITABLE", "SYNC_FAILS", "bent", "truncated", "lost")
 _BY_REQUESTS: Final = frozenset(
@@ -125,7 +156,30 @@ def _hour(seed: int, number: int, kind: CellKind) -> Hour:
     rare = drawn_rarity(rarely, _FAMILIES.get(kind, ""), deed.value)
     if rare is not None:
         drawn.append(Disturbance(Hindrance(rare.kind), rare.what, rare.match))
-    return Hour(number, deed, _habit(rng), tuple(drawn))
+    drawn += _of_the_deed(random.Random(f"deed {number} of {seed}"), kind, deed)
+    line: tuple[str, ...] = ()
+    if deed is Deed.COMMAND:
+        line = drawn_line(random.Random(f"line {number} of {seed}"))
+    return Hour(number, deed, _habit(rng), tuple(drawn), line)
+
+
+def _of_the_deed(rng: random.Random, kind: CellKind, deed: Deed) -> list[Disturbance]:
+    """Return what tells in one deed alone, and would hardly ever come together by chance."""
+    chance, at = rng.random(), rng.randrange(5)
+    if deed is Deed.SET_THEN_UNDO and chance < _CLOCK_SHARE:
+        jump_s = rng.choice(_JUMPS_S)
+        return [Disturbance(Hindrance.CLOCK, match=_QUESTION, at=1, seconds=jump_s)]
+    if deed is not Deed.CHANGE_NOZZLE:
+        return []
+    if chance < _TAKEN_BACK_SHARE:  # a hand while the new value is proved, and then a stop
+        last = dict(length_of(kind, deed).points)[_QUESTION] - 1
+        return [
+            Disturbance(Hindrance.HAND, "type", _QUESTION, last - at),
+            Disturbance(Hindrance.INTERRUPT, match=_QUESTION, at=last),
+        ]
+    if chance < _TAKEN_BACK_SHARE + _FREEZE_SHARE:
+        return [Disturbance(Hindrance.FREEZE, match=_QUESTION, at=at)]
+    return []
 
 
 def deeds_of(kind: CellKind) -> Mapping[Deed, float]:
@@ -137,8 +191,10 @@ def deeds_of(kind: CellKind) -> Mapping[Deed, float]:
     return _SHARES
 
 
-def _hindrances(kind: CellKind) -> Mapping[Hindrance, float]:
+def _hindrances(kind: CellKind, *, asks: bool) -> Mapping[Hindrance, float]:
     shares = dict(_HINDRANCES)
+    if not asks:
+        shares = {one: share for one, share in shares.items() if one not in _WHILE_ASKED}
     if kind in LINE_KINDS:
         shares[Hindrance.LINE] = _LINE_SHARE
     if kind in MAILBOX_KINDS:
@@ -179,7 +235,12 @@ def _told_instant(rng: random.Random, kind: CellKind, deed: Deed) -> Disturbance
     instant, at = found
     if instant.kind == Hindrance.WIRE and instant.what not in WIRE_FAULTS[kind]:
         return None
-    seconds = rng.choice((0.0, 0.01, 5.0, 20.0))
+    if instant.kind == Hindrance.MACHINE and instant.what not in MACHINE_FAULTS[kind]:
+        return None
+    if instant.kind == Hindrance.CLOCK:
+        seconds = rng.choice(_JUMPS_S)
+    else:
+        seconds = rng.choice((0.0, 0.01, 5.0, 20.0))
     return Disturbance(Hindrance(instant.kind), instant.what, instant.match, at, seconds)
 
 
@@ -187,7 +248,7 @@ def _disturbance(rng: random.Random, kind: CellKind, deed: Deed) -> Disturbance:
     if (told := _told_instant(rng, kind, deed)) is not None:
         return told
     length = length_of(kind, deed)
-    shares = _hindrances(kind)
+    shares = _hindrances(kind, asks=_QUESTION in dict(length.points))
     hindrance = rng.choices(list(shares), list(shares.values()))[0]
     places = length.requests if hindrance in _BY_REQUESTS else length.points
     match, count = rng.choice(places)
@@ -212,6 +273,11 @@ def _disturbance(rng: random.Random, kind: CellKind, deed: Deed) -> Disturbance:
             match, at = "commit before", rng.randrange(max(1, length.commits))
         case Hindrance.POWER_CUT:
             what = rng.choice(("", "SYNC_LIES"))
+        case Hindrance.HAND | Hindrance.FREEZE:
+            match, at = _QUESTION, rng.randrange(dict(length.points)[_QUESTION])
+            if hindrance is Hindrance.HAND:
+                chooses = kind is not CellKind.REGISTER_MAP and rng.random() < 0.5
+                what, position = ("select", rng.randrange(4)) if chooses else ("type", None)
         case Hindrance.CLOCK:
-            seconds = rng.choice((-86400.0, -5.0, 3600.0, 40 * 86400.0))
+            seconds = rng.choice(_JUMPS_S)
     return Disturbance(hindrance, what, match, at, seconds, position)

@@ -17,8 +17,10 @@ from robolink_simulators.faults import Fault, FaultAction
 from robolink_simulators.hosting.seam import WireDevice
 from robolink_simulators.soak.computer import VirtualProcess
 from robolink_simulators.soak.history import Disturbance, Hindrance
+from robolink_simulators.soak.plant.counted_acts import CountedActs
 from robolink_simulators.soak.plant.lines.bent_line import BentTransport
 from robolink_simulators.soak.plant.machine import (
+    USUAL_TOOL,
     MachineState,
     PlantWithWorld,
     SentKind,
@@ -34,6 +36,10 @@ _WRITES: Final = re.compile(r'\$Execute,"(?:TLSet (\d+), |TLClr (\d+))')
 _SELECTS: Final = re.compile(r'\$Execute,"Tool (\d+)"')
 _STOPS: Final = re.compile(r"\$(?:Abort|Stop)")
 _SOME_ERROR: Final = 2000
+GIVES_UP: Final = "GIVES_UP"
+"""The controller gives up waiting for a movement: error 19, and the arm goes on."""
+
+_EXECUTED: Final = re.compile(rb"[#!]Execute[^\r\n]*\r?\n")
 
 
 class EpsonPlant(PlantWithWorld):
@@ -58,10 +64,13 @@ class EpsonPlant(PlantWithWorld):
             serial=f"SOAK{seed:06d}",
             world=self.world,
         )
+        self._simulator.machine.tools.set(2, USUAL_TOOL)
         self._simulator.present_ns = clock.now_ns
         self._simulator.on_request = self._requested
         self._links: dict[int, TappedTransport] = {}
         self._moves = 0
+        self._parameters = self._simulator.machine.parameters
+        self.impatience = CountedActs()
 
     @property
     def simulator(self) -> EpsonSimulator:
@@ -73,6 +82,7 @@ class EpsonPlant(PlantWithWorld):
         link = TappedTransport(
             self._simulator, self._simulator, self.clock, process, self.tap, self.address
         )
+        link.impatience = self.impatience
         self._links[process.number] = link
         return open_epson(text_line(link), outcomes=outcomes, password=Secret(PASSWORD))
 
@@ -84,8 +94,22 @@ class EpsonPlant(PlantWithWorld):
 
     def state(self) -> MachineState:
         """Return its tools and the selected one."""
-        memory = self._simulator.machine.tools
-        return MachineState(dict(memory.defined()), memory.selected)
+        machine = self._simulator.machine
+        parameters = machine.parameters
+        if parameters is not self._parameters:  # Motor On, Reset and the like make new ones
+            self._parameters, self.settings_reset = parameters, True
+        settings = (float(machine.power_high), *parameters.speed, *parameters.speed_s)
+        return MachineState(dict(machine.tools.defined()), machine.tools.selected, settings)
+
+    def prepare(self, person: WorldParameters) -> None:
+        """See :meth:`PlantMachine.prepare`; power and speed are those of production."""
+        super().prepare(person)
+        machine = self._simulator.machine
+        if not machine.motors_on and not self._simulator.condition.serious:
+            machine.robot.switch_motors(True)
+        machine.power_high = True
+        machine.parameters.speed = (30, 40, 50)
+        machine.parameters.speed_s = (220.0, 230.0, 240.0)
 
     @property
     def moving(self) -> bool:
@@ -101,6 +125,9 @@ class EpsonPlant(PlantWithWorld):
         """Plan a fault of the wire, or what somebody does at the controller."""
         if disturbance.kind is Hindrance.PENDANT:
             self.acts.plan(disturbance)
+            return
+        if disturbance.what == GIVES_UP:
+            self.impatience.plan(disturbance)
             return
         self._simulator.faults.add(
             Fault(
@@ -119,7 +146,11 @@ class EpsonPlant(PlantWithWorld):
         met = len(faults.fired)
         faults.clear()
         faults.fired.clear()
-        return met + self.acts.clear()
+        return met + self.acts.clear() + self.impatience.clear()
+
+    def select_by_hand(self, tool: int) -> None:
+        """Put a tool in force at the pendant."""
+        self._simulator.machine.tools.select(tool)
 
     def write_by_hand(self, tool: int, offset: ToolOffset) -> None:
         """Write a tool at the pendant."""
@@ -157,9 +188,11 @@ class TappedTransport(BentTransport):
 
     Attributes:
         ends_with_silence: Whether nothing may leave any more once an answer was given up.
+        impatience: Movements for which the controller gives up waiting.
     """
 
     ends_with_silence = True
+    impatience: CountedActs | None = None
 
     def __init__(
         self,
@@ -173,6 +206,7 @@ class TappedTransport(BentTransport):
         self._process = process
         self._tap = tap
         self._given_up = self._last = ""
+        self._early = self._swallows = False
         super().__init__(parse_url(address), device, clock, simulator.lock, durable=True)
 
     def told(self, data: bytes, *, secret: bool) -> str:
@@ -187,6 +221,8 @@ class TappedTransport(BentTransport):
         forbidden = self._given_up if self.ends_with_silence else ""
         self._tap.leaving(self._process, replace(_classified(text), forbidden=forbidden))
         self._last = text
+        if self.impatience is not None and self.impatience.due(text) and _MOVES.match(text):
+            self._early = True
         try:
             super().send(data, deadline=deadline, secret=secret)
         except TransportError:
@@ -208,6 +244,22 @@ class TappedTransport(BentTransport):
         shown = repr(data).replace(PASSWORD, "***")
         self._tap.passed(self._process, f"wire received {shown}")
         return data
+
+    def wait_readable(self, *, deadline: Deadline) -> bool:
+        """See :meth:`robolink.transport.Transport.wait_readable`."""
+        return self._early or super().wait_readable(deadline=deadline)
+
+    def _taken(self) -> bytes | None:
+        """Return what has arrived; the end of a movement that was given up arrives no more."""
+        if self._early:
+            self._early, self._swallows = False, True
+            return b"!Execute,19\r\n"
+        data = super()._taken()
+        if not data or not self._swallows:
+            return data
+        left, count = _EXECUTED.subn(b"", data, count=1)
+        self._swallows = not count
+        return left or None
 
 
 def _classified(text: str) -> SentRequest:

@@ -52,6 +52,11 @@ class EpsonSerialPlant(EpsonPlant):
         """See :meth:`EpsonPlant.disarm`."""
         return super().disarm() + self._line.acts.clear()
 
+    @property
+    def bent(self) -> bool:
+        """See :meth:`PlantMachine.bent`; the line may have bent something, too."""
+        return super().bent or bool(self._line.acts.met)
+
 
 class TappedLine(TappedTransport):
     """A process's time at the line, on which the adversary reads the frames."""

@@ -22,6 +22,12 @@ from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 _ALIKE: Final = 0.0006
 """Half of the last of three decimals, and room for rounding: mm and degrees."""
 
+USUAL_TOOL: Final = ToolOffset(4.5, -0.75, -9.25)
+"""What tool 2 holds when nobody has typed anything yet."""
+
+HANDS_VALUES: Final = (ToolOffset(13.257, -4.125, -21.503), ToolOffset(11.406, -2.871, -19.642))
+"""What somebody types at the machine's own panel; the one that is not there yet."""
+
 
 class SentKind(StrEnum):
     """What a request on the wire does to the machine."""
@@ -57,10 +63,12 @@ class MachineState:
     Attributes:
         tools: Every tool that is defined.
         selected: The tool in force, 0 for none.
+        settings: Power and speeds that a procedure has to leave as they were, where it has any.
     """
 
     tools: Mapping[int, ToolOffset]
     selected: int
+    settings: tuple[float, ...] = ()
 
 
 class WireTap(Protocol):
@@ -96,6 +104,7 @@ class PlantMachine(ABC):
         moved_itself: Whether the tool in force was changed past this computer since then.
         acts: What is planned to happen past the wire, counted by requests.
         values: Values that its own program was given since the last look.
+        settings_reset: Whether the machine has put power and speeds to its own since then.
     """
 
     kind: str
@@ -112,11 +121,17 @@ class PlantMachine(ABC):
         self.moved_itself = False
         self.acts = CountedActs()
         self.values: list[ToolOffset] = []
+        self.settings_reset = False
 
     @property
     @abstractmethod
     def simulator(self) -> EpsonSimulator | SoftMotionSimulator | PlcSimulator:
         """The simulated controller."""
+
+    @property
+    def bent(self) -> bool:
+        """Whether something on the wire has gone wrong in this deed, so that answers may lie."""
+        return bool(self.simulator.faults.fired)
 
     @property
     def eyes(self) -> InProcessEyes | None:
@@ -159,6 +174,10 @@ class PlantMachine(ABC):
             RobolinkError: That fails.
         """
 
+    def shown(self, tool: int) -> ToolOffset | None:
+        """Return what it shows of a tool, which may be written already and not be in force."""
+        return self.state().tools.get(tool)
+
     @abstractmethod
     def hang_up(self, process: VirtualProcess) -> None:
         """Close what a process that died had open."""
@@ -199,6 +218,10 @@ class PlantMachine(ABC):
         """Let somebody write a tool at the machine's own panel."""
 
     @abstractmethod
+    def select_by_hand(self, tool: int) -> None:
+        """Let somebody put a tool in force at the machine's own panel."""
+
+    @abstractmethod
     def repair(self) -> None:
         """Let a person at the machine do what is to be done there: buttons, doors, switches."""
 
@@ -208,6 +231,17 @@ class PlantMachine(ABC):
             return one is other
         pairs = zip(one.components(), other.components(), strict=True)
         return all(abs(a - b) <= _ALIKE for a, b in pairs)
+
+    def holds(self, asked: ToolOffset | None, held: ToolOffset | None) -> bool:
+        """Whether it holds what was asked for, with every digit that it can hold."""
+        if asked is None or held is None:
+            return asked is held
+        pairs = zip(asked.components(), held.components(), strict=True)
+        return all(abs(a - b) <= self.finest(a) for a, b in pairs)
+
+    def finest(self, value: float) -> float:  # noqa: ARG002 - the form of those that round
+        """Return how far a number may be from the one asked for; three decimals are printed."""
+        return 0.00051
 
 
 class PlantWithWorld(PlantMachine):

@@ -115,3 +115,8 @@ class ModbusRtuPlant(ModbusTcpPlant):
     def disarm(self) -> int:
         """See :meth:`SoftMotionPlant.disarm`."""
         return super().disarm() + self._line.acts.clear()
+
+    @property
+    def bent(self) -> bool:
+        """See :meth:`PlantMachine.bent`; the line may have bent something, too."""
+        return super().bent or bool(self._line.acts.met)

@@ -19,6 +19,7 @@ from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.faults import Fault, FaultAction
 from robolink_simulators.hosting.in_process.line_port import LinePort
 from robolink_simulators.plc.device import PlcSimulator
+from robolink_simulators.plc.frames import decode
 from robolink_simulators.plc.serving import PlcOnLine
 from robolink_simulators.soak.computer import VirtualProcess
 from robolink_simulators.soak.history import Disturbance, Hindrance
@@ -157,6 +158,15 @@ class RegisterMapPlant(PlantMachine):
         shown = _offsets(program.shown())
         return {n: one for n, one in shown.items() if one != _offsets(program.in_force)[n]}
 
+    def shown(self, tool: int) -> ToolOffset | None:
+        """Return what stands in the registers, whether the machine works with it or not."""
+        numbers, memory = _register_map().slots[tool].components, self._simulator.program.memory
+        x, y, z, u = (
+            decode(numbers[name], memory.read(numbers[name].table, numbers[name].registers))
+            for name in ("x", "y", "z", "u")
+        )
+        return ToolOffset(x, y, z, u)
+
     @property
     def moving(self) -> bool:
         """It moves without robolink, and while nobody looks."""
@@ -192,11 +202,24 @@ class RegisterMapPlant(PlantMachine):
         faults.fired.clear()
         return met
 
+    @property
+    def bent(self) -> bool:
+        """See :meth:`PlantMachine.bent`; the line may have bent something, too."""
+        return super().bent or bool(self._line.acts.met)
+
     def write_by_hand(self, tool: int, offset: ToolOffset) -> None:
         """Let a person at the HMI give a tool other values."""
         x, y, z, u, *_ = offset.components()
         self._simulator.program.set_tool(tool, {"x": x, "y": y, "z": z, "u": u})
         self.note_hand(tool, offset)
+
+    def select_by_hand(self, tool: int) -> None:
+        """Let a person at the HMI choose a tool."""
+        self._simulator.program.select(tool)
+
+    def finest(self, value: float) -> float:
+        """See :meth:`PlantMachine.finest`: one unit in the last place of a REAL."""
+        return max(1e-7, abs(value) * 2e-7)
 
     def repair(self) -> None:
         """Permit, let the program answer again, show at the HMI what the machine works with."""

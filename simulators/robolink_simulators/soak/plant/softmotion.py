@@ -15,7 +15,12 @@ from robolink_simulators.hosting.in_process.mailbox_link import InProcessMailbox
 from robolink_simulators.soak.computer import VirtualProcess
 from robolink_simulators.soak.history import Disturbance, Hindrance
 from robolink_simulators.soak.plant.counted_acts import CountedActs
-from robolink_simulators.soak.plant.machine import MachineState, PlantWithWorld, WireTap
+from robolink_simulators.soak.plant.machine import (
+    USUAL_TOOL,
+    MachineState,
+    PlantWithWorld,
+    WireTap,
+)
 from robolink_simulators.soak.plant.mailbox_tap import TappedMailboxLink
 from robolink_simulators.soak.plant.production import MailboxProduction
 from robolink_simulators.soak.plant.seen_session import another_clients
@@ -53,6 +58,8 @@ class SoftMotionPlant(PlantWithWorld):
         self._simulator = SoftMotionSimulator(
             "Kin_Scara3_Z", seed=seed, options=options, world=WorldParameters()
         )
+        x, y, z, a, b, c = USUAL_TOOL.components()
+        self._simulator.plc.memory.define(2, (x, y, z, a, b, c), "second")
         self._simulator.present_ns = clock.now_ns
         self._simulator.durable = True
         self._simulator.on_request = self._requested
@@ -147,6 +154,15 @@ class SoftMotionPlant(PlantWithWorld):
         values = (offset.x_mm, offset.y_mm, offset.z_mm, a, b, c)
         self._simulator.plc.memory.define(tool, values, "by hand")
         self.note_hand(tool, offset)
+
+    def select_by_hand(self, tool: int) -> None:
+        """Let the machine's own program put a slot in force."""
+        self._simulator.advance(self.clock.now_ns())
+        self._simulator.plc.tools.preselect(tool)
+
+    def finest(self, value: float) -> float:  # noqa: ARG002 - as the base has it
+        """See :meth:`PlantMachine.finest`: an LREAL, in the units of the mailbox."""
+        return 2e-9
 
     def advance(self) -> None:
         """Let time pass; the machine's own program goes on, too."""

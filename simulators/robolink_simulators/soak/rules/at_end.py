@@ -1,7 +1,6 @@
 """How a deed ends: what it says, against what is so."""
 
 import math
-from collections.abc import Iterator
 from typing import Final
 
 from robolink_cli.console.exit_codes import BUG, UNKNOWN, exit_code
@@ -20,7 +19,7 @@ from robolink_simulators.soak.computer import VirtualProcess
 from robolink_simulators.soak.history import Hindrance
 from robolink_simulators.soak.people import OTHERS_TOOL, TOOL
 from robolink_simulators.soak.plant.machine import MachineState
-from robolink_simulators.soak.rules.so_far import SURELY_MM, Grounds
+from robolink_simulators.soak.rules.so_far import SURELY_MM, Grounds, chain
 
 _HARM_THE_JOURNAL: Final = (Hindrance.DISK, Hindrance.POWER_CUT)
 _OUT_OF_REACH: Final = (
@@ -80,7 +79,7 @@ class EndRules:
         """Check that a change that failed tried to put the old values back, where it could."""
         hour = self._on.now.hour
         harmed = any(one.kind in _HARM_THE_JOURNAL for one in hour.disturbances)
-        gone = process.cut_off or any(isinstance(one, _OUT_OF_REACH) for one in _chain(error))
+        gone = process.cut_off or any(isinstance(one, _OUT_OF_REACH) for one in chain(error))
         if error is None or gone or harmed or self._on.now.crowded or not self._on.books.trusted:
             return
         for marker in self._on.books.markers():
@@ -97,17 +96,28 @@ class EndRules:
                     f"tool {tool} keeps {holds}, and nobody tried to put {before} back",
                 )
 
+    def _foreign(self) -> set[int]:
+        """Return the tools that somebody else may have written since."""
+        others = {tool for tool, _ in self._on.now.typed_by_others}
+        return self._on.plant.touched | others | ({OTHERS_TOOL} if self._on.now.crowded else set())
+
     def _succeeded(self, process: VirtualProcess, state: MachineState) -> None:
         self._on.hold(
             "NoSuccessAfterStop",
             process.stopped_ns is None,
             "it ends well although a stop was acknowledged",
         )
-        for tool, offset in self._on.now.wish.typed:
+        wish, mine = self._on.now.wish, not self._on.plant.moved_itself
+        if wish.selects is not None and mine and not self._on.now.crowded:
             self._on.hold(
                 "StateIsTold",
-                tool in self._on.plant.touched
-                or self._on.plant.same(state.tools.get(tool), offset),
+                state.selected == wish.selects,
+                f"tool {wish.selects} was to be selected, it is {state.selected}",
+            )
+        for tool, offset in wish.typed:
+            self._on.hold(
+                "StateIsTold",
+                tool in self._foreign() or self._on.plant.same(state.tools.get(tool), offset),
                 f"tool {tool} was to hold {offset}, it holds {state.tools.get(tool)}",
             )
         report = self._on.now.report
@@ -121,7 +131,7 @@ class EndRules:
         error_mm = math.hypot(found.x_mm - truth.x_mm, found.y_mm - truth.y_mm)
         self._on.hold(
             "StateIsTold",
-            TOOL in self._on.plant.touched or self._on.plant.same(state.tools.get(TOOL), found),
+            TOOL in self._foreign() or self._on.plant.same(state.tools.get(TOOL), found),
             f"tool {TOOL} was proved as {found}, it holds {state.tools.get(TOOL)}",
         )
         habit = self._on.now.hour.habit
@@ -144,7 +154,7 @@ class EndRules:
         if error is None:
             return
         standing = standing_after(error)
-        foreign = self._on.plant.touched | ({OTHERS_TOOL} if self._on.now.crowded else set())
+        foreign = self._foreign()
         for tool, stands in standing.tools.items():
             if not stands.known or tool in foreign:
                 continue
@@ -166,24 +176,16 @@ class EndRules:
                 f"tool {tool} has changed, which {type(error).__name__} does not say",
             )
         selected = standing.selected
-        if standing.selection_known and selected is not None and not self._on.plant.moved_itself:
+        moved = self._on.plant.moved_itself or bool(self._on.now.chosen_by_hand)
+        if standing.selection_known and selected is not None and not moved:
             self._on.hold(
                 "StateIsTold",
                 selected == state.selected,
                 f"tool {selected} is told to be selected, it is {state.selected}",
             )
-        if standing.effect is Effect.UNCHANGED and not self._on.plant.moved_itself:
+        if standing.effect is Effect.UNCHANGED and not moved:
             self._on.hold(
                 "StateIsTold",
                 state.selected == self._on.now.before.selected or bool(self._on.open_selection()),
                 f"unchanged is told, but tool {state.selected} is selected",
             )
-
-
-def _chain(error: BaseException | None) -> Iterator[BaseException]:
-    """Yield an error and what led to it."""
-    seen: list[BaseException] = []
-    while error is not None and not any(error is one for one in seen):  # it may be its own cause
-        seen.append(error)
-        error = error.__cause__ or error.__context__
-    yield from seen

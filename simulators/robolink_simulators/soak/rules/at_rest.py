@@ -10,6 +10,7 @@ from robolink_simulators.soak.books import BookedMarker
 from robolink_simulators.soak.people import TOOL
 from robolink_simulators.soak.plant.machine import MachineState
 from robolink_simulators.soak.rules.so_far import SURELY_MM, TOLERANCE_MM, Grounds
+from robolink_simulators.soak.typed_lines import selects
 
 _PROOFS: Final = ("verified", "proved, and kept by the program")
 """What the record says of a value that was proved: by robolink, and by a program's touches."""
@@ -44,6 +45,8 @@ class RestRules:
                 "SameToolSelected",
                 bool(self._on.open_selection())
                 or state.selected == self._on.now.wish.selects
+                or state.selected in self._on.now.chosen_by_hand
+                or selects(self._on.now.hour.line)
                 or not self._on.books.readable(),  # the people are told that, and asked
                 f"tool {state.selected} is selected in place of "
                 f"{self._on.now.before.selected}, and nothing on record says so",
@@ -65,7 +68,8 @@ class RestRules:
     def _all_or_none(self, state: MachineState, markers: Sequence[BookedMarker]) -> None:
         """Check that of several tools all hold what was typed, or none: or something is open."""
         typed = self._on.now.wish.typed
-        if len(typed) < 2 or markers or any(tool in self._on.plant.touched for tool, _ in typed):
+        others = self._on.plant.touched | {tool for tool, _ in self._on.now.typed_by_others}
+        if len(typed) < 2 or markers or any(tool in others for tool, _ in typed):
             return
         new = [self._on.plant.same(state.tools.get(tool), offset) for tool, offset in typed]
         held = {tool: state.tools.get(tool) for tool, _ in typed}
@@ -155,10 +159,11 @@ class RestRules:
 
     def _proved(self, tool: int, holds: ToolOffset | None) -> bool:
         """Tell whether a new value rests on a proof, or on a person's word."""
-        typed = (*self._on.now.wish.typed, *self._on.now.typed_by_others)
+        typed = (*self._on.now.wish.asked, *self._on.now.typed_by_others)
         if any(n == tool and self._on.plant.same(offset, holds) for n, offset in typed):
             return True
-        if self._on.now.wish.undoes or self._on.now.hour.habit.keeps:
+        wish = self._on.now.wish
+        if wish.undoes or wish.free or self._on.now.hour.habit.keeps:
             return True
         verdicts = self._on.books.verdicts(self._on.now.entries, tool)
         return any(kind == "done" and verdict in _PROOFS for kind, verdict in verdicts)

@@ -5,9 +5,18 @@ from robolink_simulators.soak.books import Books
 from robolink_simulators.soak.computer import VirtualProcess
 from robolink_simulators.soak.history import Hour
 from robolink_simulators.soak.people import Wish
-from robolink_simulators.soak.plant.machine import MachineState, PlantMachine, SentRequest
+from robolink_simulators.soak.plant.machine import (
+    MachineState,
+    PlantMachine,
+    SentKind,
+    SentRequest,
+)
+from robolink_simulators.soak.rules.as_asked import AskedRules
+from robolink_simulators.soak.rules.as_before import BeforeRules
 from robolink_simulators.soak.rules.at_end import EndRules
 from robolink_simulators.soak.rules.at_rest import RestRules
+from robolink_simulators.soak.rules.by_hand import HandRules
+from robolink_simulators.soak.rules.contract import ContractRules
 from robolink_simulators.soak.rules.on_wire import WireRules
 from robolink_simulators.soak.rules.so_far import Grounds, HourSoFar
 from robolink_simulators.soak.story import Story
@@ -20,6 +29,9 @@ class Rulebook(Grounds):
         story: Where a broken rule is noted.
         plant: The machine.
         books: The journal on the disk.
+
+    Attributes:
+        contract: What every call has to keep.
 
     Example:
         >>> from pathlib import Path
@@ -53,6 +65,12 @@ class Rulebook(Grounds):
             EndRules(self),
             RestRules(self),
         )
+        self._asked, self._by_hand, self._before = (
+            AskedRules(self),
+            HandRules(self),
+            BeforeRules(self),
+        )
+        self.contract = ContractRules(self)
 
     def begin(self, hour: Hour, wish: Wish) -> None:
         """Begin an hour."""
@@ -71,13 +89,26 @@ class Rulebook(Grounds):
         self.plant.touched.clear()
         self.plant.by_hand.clear()
         self.plant.values.clear()
-        self.plant.moved_itself = False
+        self.plant.moved_itself = self.plant.settings_reset = False
+        self._asked.begin()
+        self._by_hand.begin()
+        self.contract.begin(state)
 
     def begin_again(self) -> None:
         """Begin another try in the same hour; what is open by now is of before."""
         self.now.before = self.plant.state()
         self.now.old_markers = frozenset(m.operation for m in self.books.markers())
         self.now.report = None
+        self._asked.doubt()
+        self._by_hand.begin()
+
+    def hand_typed(self, tool: int, offset: ToolOffset) -> None:
+        """Note what somebody types at the machine while robolink asks a question."""
+        self._by_hand.typed(tool, offset)
+
+    def hand_chose(self, tool: int) -> None:
+        """Note which tool somebody puts in force at the machine meanwhile."""
+        self.now.chosen_by_hand.append(tool)
 
     def said(self, text: str) -> None:
         """Note what a person is told."""
@@ -92,6 +123,10 @@ class Rulebook(Grounds):
     def leaving(self, process: VirtualProcess, sent: SentRequest) -> None:
         """Check a request that is about to leave a process."""
         self._on_wire.leaving(process, sent)
+        self.contract.leaving(process, sent)
+        if sent.kind not in (SentKind.OTHER, SentKind.STOP):
+            self._before.leaving(process, sent)
+            self._by_hand.leaving(sent, self.plant.state())
 
     def given(self, tool: int, value: ToolOffset) -> None:
         """Check a value before the machine's own program is given it."""
@@ -134,10 +169,21 @@ class Rulebook(Grounds):
             'StateIsTold'
         """
         self._at_end.ended(process, error, state)
+        self._before.ended(process, error)
+        if error is None:
+            self._asked.succeeded(self.now.wish, state)
+        else:
+            self._asked.doubt()
+
+    def killed(self) -> None:
+        """Note that a deed did not end by itself."""
+        self._asked.doubt()
 
     def left(self, state: MachineState) -> None:
         """Check what a deed left behind, before anybody acts."""
         self._at_rest.left(state)
+        self._before.left(state)
+        self._asked.left(state)
 
     def at_rest(self, state: MachineState, *, usable: bool, why: str) -> None:
         """Check the cell after its people have put it right.
@@ -167,3 +213,9 @@ class Rulebook(Grounds):
             'UsableAgain'
         """
         self._at_rest.at_rest(state, usable=usable, why=why)
+        if usable:
+            self._before.at_rest(state)
+            self._by_hand.at_rest(state)
+        else:
+            self._asked.doubt()
+        self._asked.at_rest(state)

@@ -1,5 +1,6 @@
 """What the rules know of the hour that runs, and how they are held."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -35,6 +36,13 @@ NAMES: Final = (
     "UsableAgain",
     "NoPasswordShown",
     "NothingGrows",
+    "ContractHolds",
+    "AsBefore",
+    "AskedValue",
+    "ByHandStays",
+    "MovesInItsTool",
+    "NothingMovesOn",
+    "NothingOutlives",
 )
 """Every rule, in the order in which they are listed."""
 
@@ -63,6 +71,7 @@ class HourSoFar:
         last_move: The last movement that has left.
         crowded: Whether a second person was at work.
         typed_by_others: What they typed, by tool.
+        chosen_by_hand: Tools that somebody put in force at the machine.
     """
 
     hour: Hour
@@ -78,6 +87,7 @@ class HourSoFar:
     last_move: str = ""
     crowded: bool = False
     typed_by_others: list[tuple[int, ToolOffset]] = field(default_factory=list)
+    chosen_by_hand: list[int] = field(default_factory=list)
 
 
 class Grounds:
@@ -113,3 +123,12 @@ class Grounds:
         if not self.books.trusted:
             return [BookedMarker("", "selection", "", {})]
         return [m for m in self.books.markers() if m.kind == "selection" or "select" in m.details]
+
+
+def chain(error: BaseException | None) -> Iterator[BaseException]:
+    """Yield an error and what led to it."""
+    seen: list[BaseException] = []
+    while error is not None and not any(error is one for one in seen):  # it may be its own cause
+        seen.append(error)
+        error = error.__cause__ or error.__context__
+    yield from seen

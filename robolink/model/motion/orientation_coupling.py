@@ -7,6 +7,7 @@ turns that follow each other, and it reproduces every row of the vendor's table.
 
 from dataclasses import dataclass
 from enum import Enum
+from functools import lru_cache
 from typing import Final
 
 from robolink.model.motion.orientation_space import (
@@ -80,6 +81,8 @@ def combined_space(
     return space
 
 
+# A simulated movement asks for the same few in every cycle.
+@lru_cache(maxsize=64)
 def _one_behind_the_other(base: OrientationSpace, turns: OrientationSpace) -> OrientationSpace:
     """Return the products ``B T`` of all B of one space and all T of another."""
     if OrientationDof.THREE in (base.dof, turns.dof):

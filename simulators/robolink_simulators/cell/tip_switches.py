@@ -70,7 +70,12 @@ class TipSwitch(Protocol):
 
 
 def meets(
-    switch: TipSwitch, tip_mm: XyzMm, shaft: Direction, *, bent_up_to_mm: float, upright: Direction
+    switch: TipSwitch,
+    tip_mm: XyzMm,
+    shaft: Direction,
+    *,
+    bent_up_to_mm: float,
+    upright: Callable[[], Direction],
 ) -> bool:
     """Tell whether a nozzle switches it on whose shaft leans, all the way or up to a height.
 
@@ -79,15 +84,16 @@ def meets(
         tip_mm: Where its tip is.
         shaft: Which way its shaft goes from there, in base axes.
         bent_up_to_mm: How far up it does; 0 for all the way.
-        upright: Which way it goes from there on, of the same height per length as ``shaft``.
+        upright: Tells which way it goes from there on, of the same height per length as ``shaft``.
     """
     if not bent_up_to_mm or not isinstance(switch, LightBeam):
         return switch.trips(tip_mm, shaft)
-    up_to = bent_up_to_mm / math.sqrt(dot(upright, upright))
+    straight = upright()
+    up_to = bent_up_to_mm / math.sqrt(dot(straight, straight))
     if switch.trips(tip_mm, shaft) and switch.passes_at(tip_mm, shaft) <= up_to:
         return True
     x, y, z = (at + up_to * way for at, way in zip(tip_mm, shaft, strict=True))
-    return switch.trips((x, y, z), upright)
+    return switch.trips((x, y, z), straight)
 
 
 @dataclass(frozen=True, slots=True)

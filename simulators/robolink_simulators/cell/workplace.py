@@ -32,6 +32,8 @@ from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.device.late_random import late_random
 from robolink_simulators.not_now import NotNowError
 
+_STRAIGHT: Final = Shaft()
+
 MOUNTED_TOOL: Final = 1
 """The tool number of the nozzle on the arm."""
 
@@ -214,7 +216,8 @@ class Workplace(ABC):
     def shaft_of(self, tool: int) -> Shaft:
         """Return the shaft of a nozzle, in the flange's axes."""
         bent_up_to_mm = self.parameters.lean_up_to_mm if tool == MOUNTED_TOOL else 0.0
-        return Shaft(self.lean_of(tool), bent_up_to_mm)
+        lean = self.lean_of(tool)
+        return Shaft(lean, bent_up_to_mm) if bent_up_to_mm or lean != UPRIGHT else _STRAIGHT
 
     def beside(self, switch: TipSwitch, tip_mm: XyzMm) -> XyzMm:
         """Return where a switch meets a tip, seen from where it was mounted: beams may be moved."""

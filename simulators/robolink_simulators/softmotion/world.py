@@ -8,7 +8,6 @@ from typing import Final
 from robolink.messages import tr
 from robolink.model import AxisKind, OrientationSpace, Pose, ToolOffset
 from robolink_simulators.cell.frames import (
-    ORIGIN,
     Z_AXIS,
     Frame,
     about,
@@ -16,12 +15,11 @@ from robolink_simulators.cell.frames import (
     product,
     subtract,
     turned,
-    zyx,
     zyx_angles,
 )
 from robolink_simulators.cell.person import SimulatedOperator
 from robolink_simulators.cell.places import Direction
-from robolink_simulators.cell.tip_switches import UPRIGHT, Lean, Shake, TipSwitch, meets
+from robolink_simulators.cell.tip_switches import STANDING, UPRIGHT, Lean, Shake, TipSwitch, meets
 from robolink_simulators.cell.workplace import (
     MOUNTED_TOOL,
     Workplace,
@@ -33,7 +31,7 @@ from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.not_now import NotNowError
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
 from robolink_simulators.softmotion.group.condition import SmcGroupState
-from robolink_simulators.softmotion.kinematics.kinematics import AxisValues
+from robolink_simulators.softmotion.kinematics.kinematics import AxisValues, KinematicsModel
 from robolink_simulators.softmotion.signals import SIGNALS
 from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
@@ -84,6 +82,7 @@ class SoftMotionWorld(Workplace):
         parameters: WorldParameters | None = None,
     ) -> None:
         self.group = group  # its inputs are wired by what follows
+        self._seen: tuple[KinematicsModel, AxisValues, Frame] | None = None
         super().__init__(
             _HandledGroup(group),
             tips,
@@ -143,20 +142,26 @@ class SoftMotionWorld(Workplace):
         group, shake = self.group, Shake(noise_mm, random.Random(f"input {number} {self._seed}"))
 
         def sense(axes: AxisValues) -> bool:
-            true_axes = trailing(group, axes)
-            place = add(
-                _tip_at(group, true_axes, self.tips.get(tool)), shake.of(group.movements_started)
-            )
+            flange = self._flange_at(trailing(group, axes))
+            tip_mm = flange.point(_shift(self.tips.get(tool)))
+            place = add(tip_mm, shake.of(group.movements_started))
             shaft = self.shaft_of(tool)
             return meets(
                 switch,
                 self.beside(switch, place),
-                _way_at(group, true_axes, shaft.lean),
+                _way_at(flange, shaft.lean),
                 bent_up_to_mm=shaft.bent_up_to_mm,
-                upright=_way_at(group, true_axes, UPRIGHT),
+                upright=lambda: _way_at(flange, UPRIGHT),
             )
 
         group.inputs.connect(number, sense)
+
+    def _flange_at(self, true_axes: AxisValues) -> Frame:
+        """Return where the flange is; a search asks in each cycle, once for each beam."""
+        kinematics = self.group.kinematics
+        if self._seen is None or self._seen[0] is not kinematics or self._seen[1] != true_axes:
+            self._seen = (kinematics, true_axes, kinematics.flange(true_axes))
+        return self._seen[2]
 
     def disconnect(self, number: int) -> None:
         """Take off what an input is connected to; it is off then."""
@@ -211,7 +216,7 @@ class _HandledGroup:
         configuration = kinematics.configuration(axes)
         for _ in range(_MOST_TRIES):
             flange = kinematics.flange(axes)
-            arm = turned(flange.rotation, _frame(tip).shift_mm)
+            arm = turned(flange.rotation, _shift(tip))
             wanted = Frame(subtract(target, arm), flange.rotation)
             axes = kinematics.axes_for(wanted, configuration, axes)
             missed = subtract(target, _tip_at(group, axes, tip))
@@ -232,7 +237,7 @@ def _fitting(tip: ToolOffset, image: OrientationSpace) -> ToolOffset:
 
 
 def _tip_at(group: AxisGroup, axes: AxisValues, tip: ToolOffset | None) -> XyzMm:
-    return (group.kinematics.flange(axes) @ _frame(tip)).shift_mm
+    return group.kinematics.flange(axes).point(_shift(tip))
 
 
 def trailing(group: AxisGroup, axes: AxisValues) -> AxisValues:
@@ -240,9 +245,11 @@ def trailing(group: AxisGroup, axes: AxisValues) -> AxisValues:
     return tuple(axis.trailing(value) for axis, value in zip(group.axes, axes, strict=True))
 
 
-def _way_at(group: AxisGroup, axes: AxisValues, lean: Lean) -> Direction:
+def _way_at(flange: Frame, lean: Lean) -> Direction:
     """Return which way a shaft goes that leans, in base axes."""
-    x, y, _ = _turned_at(group, axes, (*lean, 0.0))
+    if lean == UPRIGHT:
+        return STANDING
+    x, y, _ = turned(flange.rotation, (*lean, 0.0))
     return x, y, 1.0
 
 
@@ -250,8 +257,5 @@ def _turned_at(group: AxisGroup, axes: AxisValues, direction: Direction) -> Dire
     return turned(group.kinematics.flange(axes).rotation, direction)
 
 
-def _frame(tip: ToolOffset | None) -> Frame:
-    if tip is None:
-        return ORIGIN
-    x_mm, y_mm, z_mm, u_deg, v_deg, w_deg = tip.components()
-    return Frame((x_mm, y_mm, z_mm), zyx(u_deg, v_deg, w_deg))
+def _shift(tip: ToolOffset | None) -> XyzMm:
+    return (0.0, 0.0, 0.0) if tip is None else (tip.x_mm, tip.y_mm, tip.z_mm)

@@ -110,6 +110,15 @@ class InputBits(BitBank):
         finally:
             self._instant_ns = None
 
+    def show(self, asked: InputsAsked, instant_ns: int) -> bool:
+        """Tell whether inputs show at an instant of the motion under way what they showed."""
+        # Without a block, of which a search would enter one for each millisecond.
+        before_ns, self._instant_ns = self._instant_ns, instant_ns
+        try:
+            return all(self.get(number) is on for number, on in asked.items())
+        finally:
+            self._instant_ns = before_ns
+
     @contextmanager
     def noting(self) -> Iterator[InputsAsked]:
         """Note which inputs are read inside the block, and what they showed."""

@@ -8,7 +8,15 @@ from robolink.model import Pose, ToolOffset, rotate_xy
 from robolink.timing import NS_PER_S
 from robolink_simulators.cell.frames import turned
 from robolink_simulators.cell.places import Direction, XyzMm, axis_of
-from robolink_simulators.cell.tip_switches import UPRIGHT, Lean, Shaft, Shake, TipSwitch, meets
+from robolink_simulators.cell.tip_switches import (
+    STANDING,
+    UPRIGHT,
+    Lean,
+    Shaft,
+    Shake,
+    TipSwitch,
+    meets,
+)
 from robolink_simulators.epson.arm.arm import Arm
 from robolink_simulators.epson.arm.kinematics import frame_of, tip_place
 from robolink_simulators.epson.arm.robots import RobotModel
@@ -75,7 +83,7 @@ class TipInput:
             place,
             _way(arm.model, flange, nozzle.tip, shaft.lean),
             bent_up_to_mm=shaft.bent_up_to_mm,
-            upright=_way(arm.model, flange, nozzle.tip, UPRIGHT),
+            upright=lambda: _way(arm.model, flange, nozzle.tip, UPRIGHT),
         )
 
 
@@ -86,6 +94,8 @@ def _way(model: RobotModel, flange: Pose, tip: ToolOffset | None, lean: Lean) ->
     look out of the flange, and the shaft comes back along the tool's own Z.
     """
     if not model.six_axes:
+        if lean == UPRIGHT:
+            return STANDING
         return (*rotate_xy(*lean, flange.u_deg), 1.0)
     x, y, z = axis_of(tip or ToolOffset(), "z")
     lean_x, lean_y = lean

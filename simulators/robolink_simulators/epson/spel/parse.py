@@ -10,9 +10,11 @@ from lark import Lark, Token
 from lark.exceptions import LarkError
 
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+from robolink_simulators.epson.spel.expressions.values import number_value
 from robolink_simulators.epson.spel.line_build import ProgramBuilder
 from robolink_simulators.epson.spel.line_tree import LineNode
-from robolink_simulators.epson.spel.tree import Statement
+from robolink_simulators.epson.spel.shapes import Filler, filler, marked
+from robolink_simulators.epson.spel.tree import Literal, Statement
 
 _PROGRAM_WORDS = """
     if elseif else endif select case default send for next do loop while until goto gosub return
@@ -141,6 +143,23 @@ def parse(text: str) -> tuple[Statement, ...]:
     Raises:
         Refusal: The line is not SPEL+, or holds a statement that only programs may use.
     """
+    shape, numbers = marked(text)
+    fill = _shape(shape, len(numbers)) if numbers else None
+    if fill is None:
+        return _read(text)
+    statements: tuple[Statement, ...] = fill([Literal(number_value(number)) for number in numbers])
+    return statements
+
+
+@lru_cache(maxsize=256)
+def _shape(shape: str, count: int) -> Filler | None:
+    try:
+        return filler(_read(shape), count)
+    except SpelRefusal:
+        return None  # the line itself says what is wrong with it
+
+
+def _read(text: str) -> tuple[Statement, ...]:
     try:
         statements: Sequence[Statement] = _parser().parse(text, start="start")  # type: ignore[assignment]
     except LarkError as error:

@@ -5,6 +5,7 @@ Geometry as in docs/reference/softmotion.md 3.3; the evidence of each stands at 
 
 import math
 from dataclasses import dataclass
+from typing import Final
 
 from robolink.model import AxisKind, OrientationDof, OrientationSpace
 from robolink_simulators.cell.frames import NO_TURN, Frame, Matrix
@@ -19,6 +20,10 @@ from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 _ROUNDING = 1e-9
 _IN_PLANE_MM = 1e-6
+
+# A simulated movement asks for these in every cycle.
+_TURNS_ABOUT_Z: Final = OrientationSpace(OrientationDof.ONE)
+_NEVER_TURNS: Final = OrientationSpace.known(NO_TURN)
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +74,7 @@ class Scara2Z:
 
     def orientation_image(self, wanted: Matrix) -> OrientationSpace | None:  # noqa: ARG002
         """Return that only the flange's Z is known (documented by its row of the table)."""
-        return OrientationSpace(OrientationDof.ONE)
+        return _TURNS_ABOUT_Z
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +125,7 @@ class Polar:
 
     def orientation_image(self, wanted: Matrix) -> OrientationSpace | None:  # noqa: ARG002
         """Return that only the flange's Z is known (documented by its row of the table)."""
-        return OrientationSpace(OrientationDof.ONE)
+        return _TURNS_ABOUT_Z
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,7 +178,7 @@ class Gantry:
 
     def orientation_image(self, wanted: Matrix) -> OrientationSpace | None:  # noqa: ARG002
         """Return that the flange never turns."""
-        return OrientationSpace.known(NO_TURN)
+        return _NEVER_TURNS
 
 
 def height(z_mm: float, lift: bool) -> tuple[float, ...]:

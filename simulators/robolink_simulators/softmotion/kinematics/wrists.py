@@ -41,6 +41,14 @@ from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 _STRAIGHT: Final = 1e-9
 _NO_SHIFT: Final[Vector] = (0.0, 0.0, 0.0)
 
+# A simulated movement asks for these in every cycle.
+_DRIVEN_ABOUT_Z: Final = OrientationImage(
+    CsTool.FLANGE, OrientationSpace(OrientationDof.ONE), b_active=True
+)
+_NOT_TURNED: Final = OrientationImage(
+    CsTool.FLANGE, OrientationSpace.known(NO_TURN), b_active=False
+)
+
 
 @dataclass(frozen=True, slots=True)
 class CAxis:
@@ -87,8 +95,7 @@ class CAxis:
 
     def image(self, wanted: Matrix, base: OrientationSpace) -> OrientationImage:  # noqa: ARG002
         """Return that Z stays and the turn about it is driven."""
-        space = OrientationSpace(OrientationDof.ONE)
-        return OrientationImage(CsTool.FLANGE, space, b_active=True)
+        return _DRIVEN_ABOUT_Z
 
     def carried_at(self, flange: Frame, base: OrientationSpace) -> Vector:  # noqa: ARG002
         """Return where the flange must be that carries it."""
@@ -127,7 +134,7 @@ class FixedTool:
 
     def image(self, wanted: Matrix, base: OrientationSpace) -> OrientationImage:  # noqa: ARG002
         """Return that nothing is turned."""
-        return OrientationImage(CsTool.FLANGE, OrientationSpace.known(NO_TURN), b_active=False)
+        return _NOT_TURNED
 
     def carried_at(self, flange: Frame, base: OrientationSpace) -> Vector:  # noqa: ARG002
         """Return where the flange must be that carries it."""

@@ -100,9 +100,7 @@ class Watch:
 
     def still(self, asked: InputsAsked, instant_ns: int) -> bool:
         """Tell whether those inputs show at an instant what they showed."""
-        inputs = self._evaluator.session.machine.inputs
-        with inputs.as_at(instant_ns):
-            return all(inputs.get(number) is on for number, on in asked.items())
+        return self._evaluator.session.machine.inputs.show(asked, instant_ns)
 
 
 class _Scan:

@@ -3,7 +3,7 @@
 import pytest
 from robolink_simulators.faults import Fault, FaultAction
 
-from robolink.errors import ConfigError, LeaseHeldError, RobolinkError
+from robolink.errors import ConfigError, LeaseHeldError, NotReadyError, RobolinkError
 from robolink.model import EntryKind, Marker, MarkerKind, Verdict, plain_offset
 from robolink.transaction import Recovery, Settler, recover
 from tests.unit._transaction_cell import NEW, OLD, OTHER, tool_cell
@@ -159,3 +159,11 @@ def test_recover_is_refused_while_somebody_else_is_at_it(cell, controller):
     with pytest.raises(LeaseHeldError, match="Bob"):
         recover(controller)
     assert cell.writes == 0
+
+
+def test_a_movement_is_not_settled_while_the_robot_moves(cell, controller):
+    marker = leave_open(cell, MarkerKind.MOVE)
+    cell.simulator.panel.start_production()
+    with pytest.raises(NotReadyError):
+        controller.resolver.examine(marker)
+    assert [left.operation for _, left in cell.journal.open_markers()] == [marker.operation]

@@ -13,7 +13,6 @@ from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
 from robolink import ANY, ToolOffset
-from robolink.controllers.plc_map.controller import PlcMapController
 from robolink.errors import (
     BusyError,
     ConfigError,
@@ -284,17 +283,10 @@ acknowledge = { table = "discrete", address = 10 }
 """
 
 
-def machine(controller):
-    """Return the name under which a confirmation is kept."""
-    assert isinstance(controller, PlcMapController)
-    return controller.who().name
-
-
 def test_a_server_that_gives_few_registers_is_read_in_parts(tmp_path):
     path = tmp_path / "far.toml"
     path.write_text(FAR_APART)
-    far = load_map(path)
-    plc = PlcSimulator(far, seed=7, most_registers=50)
+    plc = PlcSimulator(load_map(path), seed=7, most_registers=50)
     with serve_plc(plc, path, clock=ScaledClock(10.0)) as host:
         with (
             robolink.connect(host.url) as controller,
@@ -303,7 +295,7 @@ def test_a_server_that_gives_few_registers_is_read_in_parts(tmp_path):
             controller.tools.read(1)
         assert "most_registers=50" in str(caught.value.remedy)
         with robolink.connect(f"{host.url}&most_registers=50") as controller:
-            confirm(machine(controller), far, by="test", compared="1.x")
+            confirm_whole_map(controller)
             controller.tools.write(1, ToolOffset(1.5, 2.5, 3.5), expected=ANY)
             assert controller.tools.read(1) == ToolOffset(1.5, 2.5, 3.5)
 
@@ -316,7 +308,7 @@ def test_a_length_beyond_what_the_map_allows_is_told_by_the_key_that_decides(tmp
     plc = PlcSimulator(load_map(wide), seed=7)
     with serve_plc(plc, path, clock=ScaledClock(10.0)) as host:
         with robolink.connect(host.url.replace("far.toml", "wide.toml")) as controller:
-            confirm(machine(controller), load_map(wide), by="test", compared="1.x")
+            confirm_whole_map(controller)
             controller.tools.write(1, ToolOffset(1.5, 2.5, 120), expected=ANY)
         with (
             robolink.connect(host.url) as controller,

@@ -246,7 +246,7 @@ def test_a_program_whose_record_is_missing_is_told_that_something_is_unsettled(
     tmp_path, monkeypatch
 ):
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path))
-    leave_trace("epson:SIM00001", "journal.db")
+    leave_trace("epson:SIM00001", "journal.db", None)
     tool = ("1", "11425", "-4085", "-20000", "0", "0", "0")
     with closing(open_journal(str(tmp_path / "journal.db"))) as journal:
         talk = CallbackConversation(journal, CallbackLimits(), peer="here")

@@ -15,7 +15,7 @@ from robolink.controllers.epson.motion.movement import EpsonMotion
 from robolink.controllers.motion_group import MotionGroupCore
 from robolink.controllers.softmotion.motion.movement import SoftMotionMotion
 from robolink.controllers.tool_table import ToolTableCore
-from robolink.model import MotionOutcome, Pose, ToolOffset, ToolReceipt
+from robolink.model import Marker, MotionOutcome, Pose, ToolOffset, ToolReceipt
 from robolink_simulators.soak.computer import VirtualProcess
 from robolink_simulators.soak.plant.machine import MachineState
 
@@ -68,11 +68,13 @@ def watched(judge: Promises, process_of_this_thread: Callable[[], object]) -> It
 
         return calling
 
-    def marked(group: MotionGroupCore, target: Pose, request: str) -> Any:
+    def marked(
+        group: MotionGroupCore, target: Pose, request: str, *, selected: int | None
+    ) -> Marker:
         process = process_of_this_thread()
         if isinstance(process, VirtualProcess):
             judge.aims(process, target.tool)
-        return mark(group, target, request)
+        return mark(group, target, request, selected=selected)
 
     def arrived(process: VirtualProcess, outcome: MotionOutcome, _given: tuple[Any, ...]) -> None:
         if outcome is MotionOutcome.ARRIVED:

@@ -1,13 +1,11 @@
 """An EPSON controller whose own program measures and changes a needle, and asks for a verdict."""
 
 import random
-from contextlib import suppress
 from typing import Final, cast
 
 from robolink.errors import NotReadyError, NotReadyReason
-from robolink.model import Controller, MarkerKind, OutcomeLog, ToolOffset
+from robolink.model import Controller, OutcomeLog, ToolOffset
 from robolink.nozzle_change import ChangeReport
-from robolink.transaction import recover
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.cell.workplace import exchanged
 from robolink_simulators.cell.world_parameters import WorldParameters

@@ -276,14 +276,13 @@ def test_the_name_of_the_axis_group_is_replaced_without_a_pin():
         assert renamed.count("AxisGroup := Robot") == 2
 
 
-@pytest.mark.parametrize("unit_um", [1000.0, 1.0, 25400.0, 25.4, 0.3, 1e6, 123456.789, 1e-30])
-def test_the_unit_is_told_as_a_real(unit_um):
-    core = SourceText(CORE, program_texts(FULL)[CORE])
-    made = StructuredProgram([core], "RL_LrealToReal")
-    made.put("number", unit_um)
-    made.cycle(0)
-    words = struct.unpack("<HH", struct.pack("<f", unit_um))
-    assert (made.value("low"), made.value("high")) == words
+def test_the_unit_is_told_as_a_real():
+    made = StructuredProgram([SourceText(CORE, program_texts(FULL)[CORE])], "RL_LrealToReal")
+    for unit_um in (1000.0, 1.0, 25400.0, 25.4, 0.3, 1e6, 123456.789, 1e-30):
+        made.put("number", unit_um)
+        made.cycle(0)
+        words = struct.unpack("<HH", struct.pack("<f", unit_um))
+        assert (made.value("low"), made.value("high")) == words
 
 
 @pytest.mark.parametrize("name", LISTS)

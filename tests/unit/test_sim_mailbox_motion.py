@@ -100,6 +100,26 @@ def test_an_interrupted_movement_waits_and_goes_on():
     assert client.now().tcp == pytest.approx(target, abs=1e-6)
 
 
+@pytest.mark.parametrize("opcode", [Opcode.MOVE_LINEAR, Opcode.MOVE_UNTIL_INPUT])
+def test_an_interrupted_movement_stays_the_active_one_whatever_is_begun(opcode):
+    client, _ = owning()
+    signal = 3 if opcode is Opcode.MOVE_UNTIL_INPUT else 0
+    target = shifted(client.now().tcp, z=-20.0)
+    operands = (signal, 0, CoordinateSystem.MCS, 0)
+    sequence = client.tell(opcode, *operands, pose=target, dynamics=LINE).ack_head
+    client.wait(0.1)
+    client.done(Opcode.INTERRUPT)
+    client.wait(0.1)
+    buffered = client.move(z=10.0, mode=1)
+    assert (buffered.error_class == ErrorClass.MOVING) == bool(signal)
+    begun = client.move(z=10.0).ack_head
+    client.wait(0.05)
+    now = client.now()
+    assert now.active_movement == sequence != begun
+    assert now.bits & Bits.INTERRUPTED
+    assert now.queue_length == 2  # one that was buffered has been aborted
+
+
 def test_the_state_of_an_interrupted_movement_is_shown_while_it_is_the_last_command():
     client, simulator = owning()
     client.move(z=-20.0)

@@ -128,8 +128,6 @@ def drawn_owners(seed: int, acts: int):
     """Return a behaviour: three clients who take the mailbox from each other while things move.
 
     Each act is mostly one of the owner, and else of a client drawn; whoever owns it then beats.
-    Nothing new is begun while a movement is interrupted: which of the two is then the active one
-    is shown differently (docs/structured-text.md), and is not what is compared.
     """
 
     def behaviour(bench):
@@ -145,7 +143,7 @@ def drawn_owners(seed: int, acts: int):
             if now.group_state == GroupState.STOPPING and draw.random() < 0.7:
                 act = "release"  # nothing else has an effect
             if now.bits & Bits.INTERRUPTED:
-                act = draw.choice(("take", "continue", "end", "halt", "leave"))
+                act = draw.choice(("take", "continue", "end", "halt", "leave", "move", "until"))
             by_owner = owning and act != "take" and draw.random() < 0.8
             client = draw.choice(owning if by_owner else clients)
             client.sequence = max(one.sequence for one in clients)

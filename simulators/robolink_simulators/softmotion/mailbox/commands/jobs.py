@@ -138,9 +138,13 @@ class Jobs:
 
     @property
     def active_movement(self) -> int:
-        """Sequence of the movement that runs or is interrupted, 0 for none."""
+        """Sequence of the movement that runs or is interrupted, 0 for none.
+
+        An interrupted one stays until it goes on or ends, whatever runs meanwhile
+        (docs/mailbox.md, "Movements").
+        """
         status = self._group.status()
-        number = status.active_movement or status.interrupted_movement
+        number = status.interrupted_movement or status.active_movement
         found = (job for job in self.movements if job.execution.movement_number == number)
         return next((job.command.sequence for job in found), 0)
 

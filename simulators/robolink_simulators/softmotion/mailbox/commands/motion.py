@@ -123,8 +123,16 @@ class MotionDesk:
         require_finite(command.pose)
         if len(self._jobs.movements) >= MOST_MOVEMENTS:
             raise Rejected(ErrorClass.QUEUE_FULL)
+        if mode and any(map(_ends_anywhere, self._jobs.movements)):
+            raise Rejected(ErrorClass.MOVING)
         if system == CoordSystem.ACS:
             position = self._units.axes(command.pose, self._group.kinematics.kinds)
         else:
             position = self._units.pose(command.pose)
         return Target(position, CoordSystem(system)), SmcBufferMode(mode)
+
+
+def _ends_anywhere(job: Job) -> bool:
+    """Whether a movement stops at an edge, be it interrupted: where is not known before."""
+    _, runs_on, *_ = job.command.operands
+    return job.command.opcode == Opcode.MOVE_UNTIL_INPUT and not runs_on

@@ -63,6 +63,11 @@ class Ambience:
 
         Returns:
             What ends it; ``act`` is not under way any more when that returns.
+
+        Example:
+            >>> from robolink.ambient import Ambience
+            >>> end = Ambience().regularly(60.0, lambda: None, "once a minute")
+            >>> end()
         """
         return in_a_thread(every_s, act, name)
 

@@ -11,6 +11,7 @@ from robolink_cli import main
 from robolink_cli.access.warnings import marker_notice, note_unsettled
 from robolink_cli.command_map import SECTIONS
 from robolink_cli.commands.groups import cell, expert, robot
+from robolink_cli.console.render import note
 from robolink_cli.session.opening import open_controller
 
 import robolink
@@ -211,6 +212,7 @@ def test_what_was_left_unfinished_is_said_on_connecting(command, capsys, monkeyp
         "remote_timeout_s": 60.0,
         "trace": None,
         "glance": False,
+        "tell": note,
     }
     shown = capsys.readouterr()
     assert shown.out == ""

@@ -90,6 +90,7 @@ def changed(controller, offset=NEW, before=OLD):
     return ToolChange(controller, [Wanted(1, offset, before)], verify=True)
 
 
+@pytest.mark.parametrize("plc", ["sim", "modbus-tcp", "can-multicast"], indirect=True)
 def test_a_quiet_change_is_not_taken_back_by_a_second_pc(plc):
     with plc.connect(ANN) as first, changed(first) as change:
         change.write()
@@ -166,6 +167,11 @@ def test_its_recover_of_what_it_left_itself_is_refused_too(in_process, tmp_path,
         change.keep("parts were good")
 
 
+@pytest.mark.parametrize(
+    "plc",
+    ["sim", "modbus-tcp", pytest.param("can-multicast", marks=pytest.mark.soak)],
+    indirect=True,
+)
 def test_a_person_insists_and_the_old_holder_is_refused_from_then_on(plc):
     before = plc.epoch
     with plc.connect(ANN) as first:

@@ -165,7 +165,8 @@ LEFT: Final[Mapping[str, Mapping[str, StandIn]]] = {
         "robolink.stop_latch.StopLatch.admit": _nothing,
         "robolink.stop_latch.StopLatch.restoring": _open,
         "robolink.controllers.epson.link.stopping.bring_to_rest": {
-            "robolink.controllers.epson.motion.group.bring_to_rest": _nothing
+            "robolink.controllers.epson.link.stopping.bring_to_rest": _nothing,
+            "robolink.controllers.epson.motion.group.bring_to_rest": _nothing,
         },
         "robolink.controllers.softmotion.link.stopping.bring_group_to_rest": {
             "robolink.controllers.softmotion.motion.group.bring_group_to_rest": _nothing

@@ -1,16 +1,25 @@
 """A driver or a method whose author knows none of the rules: refused by the bases, or found out."""
 
 from contextlib import contextmanager
+from dataclasses import replace
+from typing import cast
 
 import pytest
 
+from robolink.errors import LimitError, OutcomeUnknownError, StoppedError
 from robolink.model import (
+    Controller,
     Expected,
+    MarkerKind,
     MotionOutcome,
+    Path,
     Pose,
     ToolOffset,
     ToolReceipt,
 )
+from robolink.nozzle_change import Limits
+from robolink.procedures import MeasurementContext
+from robolink.runner import Move, Operator
 from robolink.stop_latch import CommandClass
 from robolink.testing import (
     ContractBrokenError,
@@ -20,6 +29,7 @@ from robolink.testing import (
     check_controller,
 )
 from robolink.testing.memory_controller import MemoryLink, _MemoryGroup, _MemoryTools
+from tests.contract._kinds import KINDS
 
 TOOL = 2
 
@@ -124,7 +134,7 @@ def test_a_driver_that_does_as_it_is_told_is_found_out_in_each_promise():
         "what_is_unsettled_blocks": "a write is refused while that is unsettled",
         "nothing_is_sent_that_cannot_be_recorded": "a write is refused that cannot be recorded",
         "a_stop_holds_writes_back": "a write is refused after a stop: StoppedError was not raised",
-        "a_stop_in_the_last_instant_holds_a_write_back": "a write does nothing where a stop came before it left",
+        "a_stop_in_the_last_instant_holds_a_write_back": "a write does nothing where a stop came",
         "an_unexpected_value_is_left_alone": "another value than expected is not overwritten",
         "what_is_there_already_is_not_written_again": "an equal value is skipped",
         "the_flange_is_never_written": "tool 0 is not written",
@@ -161,3 +171,55 @@ def test_a_driver_that_forgets_all_but_its_wire_is_refused_by_the_bases(monkeypa
         "a_stop_in_the_last_instant_holds_a_movement_back",
     }
     assert all("where a stop came before it left" in words for words in told.values())
+
+
+class Nobody:
+    """Is told, and never asked."""
+
+    def tell(self, text: str) -> None: ...
+
+
+def measuring(controller: Controller, procedure):
+    """Run a procedure of a method as every source does."""
+    start = controller.groups[0].pose()
+    settings = Limits(speed_mm_s=10).settings
+    nobody = cast(Operator, Nobody())
+    context = MeasurementContext(controller, nobody, start=start, settings=settings)
+    return context.measure(procedure)
+
+
+def far_away(here: Pose):
+    """Go where no box reaches."""
+    yield Move(replace(here, z_mm=here.z_mm + 5000), Path.STRAIGHT, "far away")
+
+
+def by_itself(controller: Controller):
+    """Write in the middle of a measurement, as if the method were the driver."""
+
+    def procedure(_here: Pose):
+        before = controller.tools.read(TOOL)
+        controller.tools.write(TOOL, ToolOffset(1.0, 2.0, 3.0), expected=before)
+        yield from ()
+
+    return procedure
+
+
+@pytest.mark.parametrize("name", ["memory", "epson", "softmotion", "third_kind"])
+def test_a_method_meets_the_same_guards_whatever_it_does_with_the_controller(name):
+    with KINDS[name]() as kind:
+        with kind.opened(None) as first:
+            kind.prepare(first)
+            with pytest.raises(LimitError):
+                measuring(first, far_away)
+            left = first.begin(MarkerKind.CHANGE, "a change that is killed", {"tools": {}})
+        with kind.opened(None) as second:
+            kind.prepare(second)
+            before = second.tools.read(TOOL)
+            with pytest.raises(OutcomeUnknownError):
+                measuring(second, by_itself(second))
+            second.finish(left)
+            second.stop()
+            with pytest.raises(StoppedError):
+                measuring(second, by_itself(second))
+            second.release_stop()
+            assert second.tools.same(second.tools.read(TOOL), before)

@@ -53,18 +53,23 @@ class PolledGroup(MotionGroupCore):
         box.check(target)
         link, markers = self._driver, self._driver.markers
         request = "; ".join(self.requests_for(target, profile))
-        with link.lock.held(request):
-            self.require_able(request)
-            selected = self._tools.selected()
-            with link.uninterrupted():
-                marker = self._marked(target, request, selected=selected)
-                with markers.doubt(request):
-                    try:
-                        self._send_move(target, profile)
-                    except (ControllerError, StoppedError):
-                        markers.clear(marker)  # it was refused, or never sent
-                        raise
-                self._current = PolledMotion(self, link, target, marker)
+        try:
+            with link.lock.held(request):
+                self.require_able(request)
+                selected = self._tools.selected()
+                with link.uninterrupted():
+                    marker = self._marked(target, request, selected=selected)
+                    with markers.doubt(request):
+                        try:
+                            self._send_move(target, profile)
+                        except (ControllerError, StoppedError):
+                            markers.clear(marker)  # it was refused, or never sent
+                            raise
+                    self._current = PolledMotion(self, link, target, marker)
+        except (KeyboardInterrupt, StoppedError):
+            # Nobody will be given this motion to wait on.
+            self.abort_unfinished()
+            raise
         return self._current
 
     def stop(self) -> None:

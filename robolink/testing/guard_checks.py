@@ -63,15 +63,15 @@ def a_stop_in_the_last_instant_holds_a_write_back(subject: Subject) -> None:
     with subject.kept() as controller:
         tools, before = controller.tools, defined(controller, subject.tool)
         for name, act in forbidden_acts(controller, subject.tool).items():
-            promise = f"{name} is refused where a stop came before it left"
+            promise = f"{name} does nothing where a stop came before it left"
             with (
                 subject.releasing_stop(controller),
                 stopped_when_marked(controller),
                 refused(StoppedError, promise),
             ):
                 act()
-            require(tools.same(tools.read(subject.tool), before), f"{name} has changed nothing")
-            require(not controller.outcomes.open_markers(), f"{name} was not sent: nothing is open")
+            require(tools.same(tools.read(subject.tool), before), promise)
+            require(not controller.outcomes.open_markers(), f"{promise}, so nothing is open")
 
 
 def a_stop_lets_the_tool_be_put_back(subject: Subject) -> None:

@@ -157,7 +157,7 @@ def _refuses_to_move(
     with refused(kind, promise):
         target, box = _raised(start, subject.step_mm), _around(start, subject)
         group.move_to(target, _PROFILE, box=box).wait(timeout_s=_TIMEOUT_S)
-    _stands(controller, start)
+    _is_at(controller, start, promise)
 
 
 def _raised(pose: Pose, by_mm: float) -> Pose:

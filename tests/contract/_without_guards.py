@@ -137,53 +137,57 @@ def _sent_in_part(transport: Any, data: bytes, **_named: object) -> None:
     transport._socket.send(data[:1])
 
 
+_ITSELF: Final[Mapping[str, StandIn]] = {
+    "robolink.controllers.DriverLink.carry_out": _carried_out,
+    "robolink.controllers.MotionGroupCore._marked": _moved_unmarked,
+    "robolink.controllers.markers.MarkerStore.begin": _begun,
+    "robolink.journal._outcome_log.JournalOutcomeLog._refuse_lost": _nothing,
+    "robolink.controllers.markers.MarkerStore.doubt": _open,
+    "robolink.controllers.epson.link.session.EpsonSession._end": _nothing,
+    "robolink.controllers.softmotion.link.wire.MailboxWire.ended": _ended,
+    "robolink.controllers.ToolWrite.change": _changed,
+    "robolink.controllers.ToolTableCore.require_writable": _nothing,
+    "robolink.controllers.ToolTableCore._require_values_of_a_tool": _nothing,
+    "robolink.controllers.tool_table.require_replacement": lambda _tool, _other: 0,
+    "robolink.controllers.Preserver.preserved": _preserved,
+    "robolink.controllers.MotionGroupCore._require_tool": _nothing,
+    "robolink.stop_latch.StopLatch.require_open": _nothing,
+    "robolink.stop_latch.StopLatch.admit": _nothing,
+    "robolink.stop_latch.StopLatch.restoring": _open,
+    "robolink.controllers.PolledGroup.halt": lambda group: group._send_stop(),
+    "robolink.transaction.ToolChange._take_back": _nothing,
+    "robolink.controllers.markers.ProcedureLock.held": _open,
+    "robolink_cli.session.motion_consent.agree_to_motion": _nothing,
+    "robolink.controllers.ToolTableCore.preview_write": _previewed,
+    "robolink.controllers.ToolTableCore._require_known": _nothing,
+    "robolink.model.ToolOffset.__post_init__": _nothing,
+    "robolink.controllers.epson.io.raw_statements.RawStatements.execute": _unguarded,
+    "robolink.controllers.ControllerCore.close": _nothing,
+    "robolink.transport.stream.tcp.TcpTransport.send": _sent_in_part,
+}
+_AS_IMPORTED: Final[Mapping[str, Mapping[str, StandIn]]] = {
+    "robolink_cli.prompts.jumps.accept_jump": {
+        "robolink_cli.prompts.jumps.accept_jump": _nothing,
+        "robolink_cli.commands.controller.tool.accept_jump": _nothing,
+    },
+    "robolink.controllers.ToolTableCore.same": {
+        "robolink.controllers.epson.tools.table.EpsonToolTable.same": _to_the_last_bit,
+        "robolink.controllers.epson.tools.table.EpsonToolTable._storable": _as_given,
+    },
+    "robolink.controllers.epson.link.stopping.bring_to_rest": {
+        "robolink.controllers.epson.link.stopping.bring_to_rest": _nothing,
+        "robolink.controllers.epson.motion.group.bring_to_rest": _nothing,
+    },
+    "robolink.controllers.softmotion.link.stopping.bring_group_to_rest": {
+        "robolink.controllers.softmotion.motion.group.bring_group_to_rest": _nothing
+    },
+    "robolink.controllers.epson.link.answers.require_ready": {
+        "robolink.controllers.epson.link.window.require_ready": _nothing,
+        "robolink.controllers.epson.motion.acts.require_ready": _nothing,
+    },
+}
 LEFT: Final[Mapping[str, Mapping[str, StandIn]]] = {
-    place: stand_in if isinstance(stand_in, Mapping) else {place: stand_in}
-    for place, stand_in in {
-        "robolink.controllers.DriverLink.carry_out": _carried_out,
-        "robolink.controllers.MotionGroupCore._marked": _moved_unmarked,
-        "robolink.controllers.markers.MarkerStore.begin": _begun,
-        "robolink.journal._outcome_log.JournalOutcomeLog._refuse_lost": _nothing,
-        "robolink.controllers.markers.MarkerStore.doubt": _open,
-        "robolink.controllers.epson.link.session.EpsonSession._end": _nothing,
-        "robolink.controllers.softmotion.link.wire.MailboxWire.ended": _ended,
-        "robolink.controllers.ToolWrite.change": _changed,
-        "robolink.controllers.ToolTableCore.require_writable": _nothing,
-        "robolink.controllers.ToolTableCore._require_values_of_a_tool": _nothing,
-        "robolink.controllers.tool_table.require_replacement": lambda _tool, _other: 0,
-        "robolink_cli.prompts.jumps.accept_jump": {
-            "robolink_cli.prompts.jumps.accept_jump": _nothing,
-            "robolink_cli.commands.controller.tool.accept_jump": _nothing,
-        },
-        "robolink.controllers.ToolTableCore.same": {
-            "robolink.controllers.epson.tools.table.EpsonToolTable.same": _to_the_last_bit,
-            "robolink.controllers.epson.tools.table.EpsonToolTable._storable": _as_given,
-        },
-        "robolink.controllers.Preserver.preserved": _preserved,
-        "robolink.controllers.MotionGroupCore._require_tool": _nothing,
-        "robolink.stop_latch.StopLatch.require_open": _nothing,
-        "robolink.stop_latch.StopLatch.admit": _nothing,
-        "robolink.stop_latch.StopLatch.restoring": _open,
-        "robolink.controllers.epson.link.stopping.bring_to_rest": {
-            "robolink.controllers.epson.motion.group.bring_to_rest": _nothing
-        },
-        "robolink.controllers.softmotion.link.stopping.bring_group_to_rest": {
-            "robolink.controllers.softmotion.motion.group.bring_group_to_rest": _nothing
-        },
-        "robolink.controllers.PolledGroup.halt": lambda group: group._send_stop(),
-        "robolink.transaction.ToolChange._take_back": _nothing,
-        "robolink.controllers.markers.ProcedureLock.held": _open,
-        "robolink_cli.session.motion_consent.agree_to_motion": _nothing,
-        "robolink.controllers.ToolTableCore.preview_write": _previewed,
-        "robolink.controllers.ToolTableCore._require_known": _nothing,
-        "robolink.model.ToolOffset.__post_init__": _nothing,
-        "robolink.controllers.epson.io.raw_statements.RawStatements.execute": _unguarded,
-        "robolink.controllers.epson.link.answers.require_ready": {
-            "robolink.controllers.epson.link.window.require_ready": _nothing,
-            "robolink.controllers.epson.motion.acts.require_ready": _nothing,
-        },
-        "robolink.controllers.ControllerCore.close": _nothing,
-        "robolink.transport.stream.tcp.TcpTransport.send": _sent_in_part,
-    }.items()
+    **{place: {place: stand_in} for place, stand_in in _ITSELF.items()},
+    **_AS_IMPORTED,
 }
 """What stands in for each place: itself, or what was imported from it."""

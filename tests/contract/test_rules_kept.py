@@ -1,6 +1,9 @@
 """Each promise of docs/reference/rules.md has its place, and a check that fails without it."""
 
+import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -45,6 +48,7 @@ EACH = [
     for tried in tries
 ]
 
+PLUGIN = "tests.contract._without_guards"
 UNTRIED = {"robolink.files.durable.sync_folder"}
 """What a platform lacks cannot be taken out: the test takes it away from all of robolink."""
 
@@ -91,3 +95,21 @@ def test_a_check_fails_where_its_guard_is_taken_out(place, tried):
         assert broken.broken, f"{tried} does not look at {place}"
         (kept,) = outcomes(kind.subject, [CHECKS[tried]])
         assert not kept.broken
+
+
+BY_TESTS = [
+    pytest.param(place, tried, id=f"{place.rpartition('.')[2]}-{tried.rpartition('::')[2]}")
+    for _, place, tried in EACH
+    if "::" in tried and place not in UNTRIED
+]
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(300)
+@pytest.mark.parametrize(("place", "tried"), BY_TESTS)
+def test_a_test_fails_where_its_guard_is_taken_out(place, tried):
+    """In a process of its own, before anything has imported the guard."""
+    line = [sys.executable, "-m", "pytest", "-n", "0", "-q", "-x", "-p", PLUGIN, tried]
+    environment = {**os.environ, "ROBOLINK_WITHOUT": place}
+    done = subprocess.run(line, env=environment, capture_output=True, text=True, check=False)
+    assert "1 failed" in done.stdout, done.stdout[-2000:]

@@ -16,6 +16,7 @@ from robolink.errors import (
     RobolinkError,
     TransportClosedError,
     TransportError,
+    TransportTimeoutError,
     UnclearAnswerError,
 )
 from robolink.model import MotionOutcome, MotionProfile, Path, Verdict, WorkBox
@@ -97,6 +98,22 @@ def test_f25_a_lost_answer_to_a_move_is_unknown_and_the_move_is_never_sent_twice
             assert finding.verdict is Verdict.LOOK
             controller.resolver.settle(finding)
             lift(controller).wait(timeout_s=60)
+
+
+def test_a_time_out_ends_the_link_and_not_only_the_request():
+    """A late answer could be taken for that of the next question."""
+    simulator = simulator_with(FaultAction.DROP_REPLY, "GetStatus")
+    register("lost-one", simulator)
+    try:
+        with robolink.connect("epson+sim://lost-one", timeout_s=0.3) as controller:
+            with pytest.raises(TransportTimeoutError):
+                controller.status()
+            asked = controller.exchanges
+            with pytest.raises(TransportClosedError):
+                controller.status()
+            assert controller.exchanges == asked
+    finally:
+        unregister("lost-one")
 
 
 @pytest.mark.fault("F26")

@@ -10,7 +10,7 @@ from unittest import mock
 
 from robolink.ambient import replaced
 from robolink.checkpoints import Checkpoint, observed
-from robolink.errors import JournalError, RobolinkError
+from robolink.errors import JournalError, NotReadyError, RobolinkError
 from robolink.interrupts import EndedBy, Interrupted, one_ending, output_closed
 from robolink.model import Controller, ToolOffset
 from robolink.timing import NS_PER_S
@@ -280,6 +280,8 @@ class VirtualCell:
             self._surroundings.sleep(wait_s)
             try:
                 with self._connected(process) as controller:
+                    with suppress(NotReadyError):
+                        controller.reset_fault()
                     recover(controller, keep=False, confirm=lambda _finding: True)
                     held = controller.tools.read(tool)
                     offset = ToolOffset(8.0, -8.0, -float(1 + process.number % 40))

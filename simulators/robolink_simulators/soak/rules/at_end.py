@@ -177,9 +177,7 @@ class EndRules:
             )
         selected = standing.selected
         moved = (
-            self._on.plant.moved_itself
-            or self._on.now.crowded
-            or bool(self._on.now.chosen_by_hand)
+            self._on.plant.moved_itself or self._on.now.crowded or bool(self._on.now.chosen_by_hand)
         )
         if standing.selection_known and selected is not None and not moved:
             self._on.hold(

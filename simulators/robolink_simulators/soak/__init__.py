@@ -23,7 +23,8 @@ Where things stand: :mod:`.history` draws what happens, :mod:`.running` and :mod
 :mod:`.people` act, :mod:`.rules` judge, reading past the driver from :mod:`.plant` and
 :mod:`.books`; :mod:`.threads` and :mod:`.surroundings` are the time, the chance and the locks,
 :mod:`.computer` the PC and its disk; :mod:`.story` tells,
-``shrinking`` shortens, ``results`` sums up.
+``shrinking`` shortens, ``results`` sums up. :mod:`.commanding` runs the lines that
+:mod:`.drawing.commands` draws, :mod:`.watching` holds each call to the machine.
 """
 
 from collections.abc import Mapping

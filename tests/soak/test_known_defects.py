@@ -4,12 +4,13 @@ from functools import cache
 
 import pytest
 from robolink_simulators.soak import CellKind, live_through
-from robolink_simulators.soak.history import Deed, Habit, History, Hour
+from robolink_simulators.soak.history import Deed, Disturbance, Habit, Hindrance, History, Hour
 
 from tests.soak.known_defects import DEFECTS
 from tests.soak.mutant_table import Search, table
 
-ONE_CHANGE = History(0, CellKind.EPSON, (Hour(0, Deed.CHANGE_NOZZLE, Habit(), ()),))
+INTERRUPT = Disturbance(Hindrance.INTERRUPT, match="question", at=5)
+ONE_CHANGE = History(0, CellKind.EPSON, (Hour(0, Deed.CHANGE_NOZZLE, Habit(), (INTERRUPT,)),))
 
 
 @cache

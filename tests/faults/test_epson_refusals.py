@@ -23,6 +23,7 @@ from robolink.errors import (
 )
 from robolink.journal import memory_journal
 from robolink.model import MotionOutcome, MotionProfile, Path, Verdict, WorkBox
+from robolink.protocols.epson_text import Refusal
 from robolink.transaction import recover
 from tests.faults._bending_relay import BendingRelay
 
@@ -185,6 +186,18 @@ def test_f19_a_movement_that_the_controller_timed_out_is_unproved_and_blocks_the
             profile = MotionProfile(Path.STRAIGHT, 5, 20.0)
             assert lift(controller, 5.0, profile).wait(timeout_s=60) is MotionOutcome.ARRIVED
     assert simulator.machine.arm.moves_started == 2
+
+
+def test_a_movement_that_is_refused_while_the_arm_moves_is_unproved(make):
+    """The refusal answered something else, such as a request that came twice."""
+    simulator, url = make()
+    with robolink.connect(url) as controller:
+        motion = lift(controller)
+        motion._pending.answer = Refusal("Execute", 21)
+        assert simulator.machine.arm.moving
+        with pytest.raises(OutcomeUnknownError, match="may or may not have run"):
+            motion.wait(timeout_s=60)
+        assert len(controller.outcomes.open_markers()) == 1
 
 
 @pytest.mark.fault("F20")

@@ -83,7 +83,8 @@ class _Counting:
 
 def rows(kind: CellKind) -> Iterator[str]:
     """Yield what was measured of a kind of cell."""
-    deeds = list(deeds_of(kind)) * RUNS
+    measured = [deed for deed in deeds_of(kind) if deed is not Deed.COMMAND]
+    deeds = measured * RUNS
     hours = tuple(Hour(number, deed, Habit(), ()) for number, deed in enumerate(deeds))
     counting = _Counting()
     patches = list(counting.patches())
@@ -95,7 +96,7 @@ def rows(kind: CellKind) -> Iterator[str]:
         for patch in patches:
             patch.stop()
     assert not story.broken, story.told()
-    for deed in deeds_of(kind):
+    for deed in measured:
         numbers = [number for number, one in enumerate(deeds) if one is deed]
         yield _row(kind, deed, "requests", REQUESTS, [counting.requests[n] for n in numbers])
         yield _row(kind, deed, "points", POINTS, [counting.points[n] for n in numbers])

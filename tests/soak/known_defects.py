@@ -284,7 +284,11 @@ DEFECTS: Final = (
     ),
     KnownDefect(
         "a frozen holder goes on after its lease was taken",
-        {"robolink.journal._lease.Lease.secure": stand_ins.still_mine},
+        {
+            "robolink.journal._lease.Lease.secure": stand_ins.still_mine,
+            "robolink.journal._lease.Lease._lose": stand_ins.nothing,
+        },
+        CellKind.SOFTMOTION,
         found_by=_REAL_DRIVERS,
     ),
     KnownDefect(

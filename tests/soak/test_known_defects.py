@@ -3,15 +3,19 @@
 from functools import cache
 
 import pytest
-from robolink_simulators.soak import run
+from robolink_simulators.soak import CellKind, live_through
+from robolink_simulators.soak.history import Deed, Disturbance, Habit, Hindrance, History, Hour
 
 from tests.soak.known_defects import DEFECTS
 from tests.soak.mutant_table import Search, table
 
+INTERRUPT = Disturbance(Hindrance.INTERRUPT, match="question", at=5)
+ONE_CHANGE = History(0, CellKind.EPSON, (Hour(0, Deed.CHANGE_NOZZLE, Habit(), (INTERRUPT,)),))
+
 
 @cache
 def undisturbed_by_defects():
-    return run(0, 1)
+    return live_through(ONE_CHANGE)
 
 
 BY_NAME = {defect.name: defect for defect in DEFECTS}
@@ -25,7 +29,7 @@ BY_NAME = {defect.name: defect for defect in DEFECTS}
     ],
 )
 def test_a_defect_that_is_put_back_is_found_by_its_rule_and_only_with_it(name, rule):
-    story = run(0, 1, replacements=BY_NAME[name].replacements)
+    story = live_through(ONE_CHANGE, BY_NAME[name].replacements)
     assert rule in {one.rule for one in story.broken}, story.told()
     assert undisturbed_by_defects().broken == []
 

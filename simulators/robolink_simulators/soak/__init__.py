@@ -25,6 +25,8 @@ Where things stand: :mod:`.history` draws what happens, :mod:`.running` and :mod
 :mod:`.books`; :mod:`.threads` and :mod:`.surroundings` are the time, the chance and the locks,
 :mod:`.computer` the PC and its disk; :mod:`.story` tells,
 ``shrinking`` shortens, ``results`` sums up, ``seed_list`` knows what was ever run.
+:mod:`.commanding` runs the lines that :mod:`.drawing.commands` draws, :mod:`.watching` holds each
+call to the machine.
 """
 
 from collections.abc import Mapping

@@ -11,9 +11,11 @@ from unittest import mock
 
 from robolink.ambient import replaced
 from robolink.checkpoints import Checkpoint, observed
-from robolink.errors import JournalError, RobolinkError
+from robolink.errors import JournalError, NotReadyError, RobolinkError
 from robolink.interrupts import EndedBy, Interrupted, one_ending, output_closed
 from robolink.model import Controller, ToolOffset
+from robolink.testing import READING_CHECKS, Subject
+from robolink.testing import outcomes as outcomes_of
 from robolink.timing import NS_PER_S
 from robolink.transaction import Wanted, change_tools, recover
 from robolink_simulators.cell.clock import ManualClock
@@ -40,12 +42,7 @@ from robolink_simulators.soak.people import (
 from robolink_simulators.soak.plant.canopen import CanopenPlant
 from robolink_simulators.soak.plant.epson import PASSWORD, EpsonPlant
 from robolink_simulators.soak.plant.epson_serial import EpsonSerialPlant
-from robolink_simulators.soak.plant.machine import (
-    HANDS_VALUES,
-    PlantMachine,
-    SentRequest,
-    WireTap,
-)
+from robolink_simulators.soak.plant.machine import PlantMachine, SentRequest, WireTap
 from robolink_simulators.soak.plant.modbus import ModbusRtuPlant, ModbusTcpPlant
 from robolink_simulators.soak.plant.register_map import RegisterMapPlant
 from robolink_simulators.soak.plant.softmotion import SoftMotionPlant
@@ -249,20 +246,14 @@ class VirtualCell:
 
     def _act_by_hand(self, disturbance: Disturbance) -> None:
         """Let somebody do something at the pendant, while robolink asks and nothing moves."""
-        state = self._plant.state()
-        if disturbance.what == "select":
-            others = sorted({*state.tools} - {state.selected})
-            if others:
-                tool = others[(disturbance.position or 0) % len(others)]
-                self._plant.select_by_hand(tool)
-                self._rules.hand_chose(tool)
-            return
         assert self._hour is not None  # noqa: S101 - for the type: an hour runs
+        if disturbance.what == "select":
+            chosen = self._plant.choose_by_hand(disturbance.position or 0)
+            if chosen is not None:
+                self._rules.hand_chose(chosen)
+            return
         tool = next((tool for tool, _ in wish_of(self._hour).typed), TOOL)
-        held = state.tools.get(tool)
-        value = next(one for one in HANDS_VALUES if not self._plant.same(one, held))
-        self._plant.write_by_hand(tool, value)
-        self._rules.hand_typed(tool, self._plant.state().tools[tool])
+        self._rules.hand_typed(tool, self._plant.type_by_hand(tool))
 
     def _freeze(self) -> None:
         """Let a process stand still, as one that is suspended, until another has been at work."""
@@ -281,6 +272,8 @@ class VirtualCell:
             self._surroundings.sleep(wait_s)
             try:
                 with self._connected(process) as controller:
+                    with suppress(NotReadyError):
+                        controller.reset_fault()
                     recover(controller, keep=False, confirm=lambda _finding: True)
                     held = controller.tools.read(tool)
                     offset = ToolOffset(8.0, -8.0, -float(1 + process.number % 40))
@@ -336,6 +329,8 @@ class VirtualCell:
         self._books.lost = False  # the people are told to look, and give their word
         usable, why = self._put_right(hour)
         self._rules.at_rest(self._plant.state(), usable=usable, why=why)
+        if usable and not self._plant.calls_back:
+            self._hold_to_contract(hour)
         self._note(f"journal {self._books.digest()}")
         self._surroundings.wall_jump_s = 0.0
         self._books.trusted = True
@@ -480,6 +475,22 @@ class VirtualCell:
             self._clock.advance(30.0 * 2**attempt)
             self._plant.advance()
         return False, why
+
+    def _hold_to_contract(self, hour: Hour) -> None:
+        """Hold the cell at rest to one of the shipped checks that only read, in turn."""
+        process = self._turns.current.owner = self._computer.start(hour.habit.person)
+
+        def connect() -> Controller:
+            outcomes = process.log(self._plant.address, self._clock)
+            return self._plant.connect(process, outcomes)
+
+        check = READING_CHECKS[hour.number % len(READING_CHECKS)]
+        try:
+            (found,) = outcomes_of(Subject(connect, tool=2), (check,))
+            self._rules.hold("ContractHolds", not found.broken, f"{found.name}: {found.broken}")
+        finally:
+            self._turns.current.owner = None
+            process.end()
 
     def _look_for_the_password(self) -> None:
         lines = "\n".join(self.story.lines())

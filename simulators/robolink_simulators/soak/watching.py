@@ -20,6 +20,7 @@ from robolink_simulators.soak.computer import VirtualProcess
 from robolink_simulators.soak.plant.machine import MachineState
 
 Call = Callable[..., Any]
+Tell = Callable[[VirtualProcess, Any, tuple[Any, ...]], None]
 
 
 class Promises(Protocol):
@@ -56,8 +57,8 @@ def watched(judge: Promises, process_of_this_thread: Callable[[], object]) -> It
         process_of_this_thread: Returns whose call it is; what is no process is not judged.
     """
 
-    def judged(call: Call, tell: Callable[[VirtualProcess, Any, tuple[Any, ...]], None]) -> Call:
-        def calling(this: Any, *given: Any, **named: Any) -> Any:
+    def judged(call: Call, tell: Tell) -> Call:
+        def calling(this: object, *given: object, **named: object) -> object:
             process = process_of_this_thread()
             if not isinstance(process, VirtualProcess):
                 return call(this, *given, **named)
@@ -80,8 +81,8 @@ def watched(judge: Promises, process_of_this_thread: Callable[[], object]) -> It
         if outcome is MotionOutcome.ARRIVED:
             judge.has_arrived(process)
 
-    mark = MotionGroupCore._marked
-    calls: tuple[tuple[type, str, Callable[[VirtualProcess, Any, tuple[Any, ...]], None]], ...] = (
+    mark = MotionGroupCore._marked  # noqa: SLF001 - every movement passes it, of whatever kind
+    calls: tuple[tuple[type, str, Tell], ...] = (
         (ToolTableCore, "read", lambda p, found, given: judge.has_read(p, given[0], found)),
         (ToolTableCore, "selected", lambda p, found, _: judge.has_read_selection(p, found)),
         (ToolTableCore, "write", lambda p, found, _: judge.has_written(p, found)),

@@ -135,10 +135,10 @@ def drawn_history(seed: int, hours: int, kind: CellKind | None = None) -> Histor
 
     Example:
         >>> from robolink_simulators.soak import CellKind, drawn_history
-        >>> history = drawn_history(7, 2, CellKind.EPSON)
+        >>> history = drawn_history(23, 2, CellKind.EPSON)
         >>> [str(hour.deed) for hour in history.hours]
         ['change the nozzle', 'type a tool offset']
-        >>> history == drawn_history(7, 3, CellKind.EPSON).without_hours([2])
+        >>> history == drawn_history(23, 3, CellKind.EPSON).without_hours([2])
         True
     """
     own = kind or _TURNS[seed % len(_TURNS)]

@@ -217,6 +217,22 @@ class PlantMachine(ABC):
     def write_by_hand(self, tool: int, offset: ToolOffset) -> None:
         """Let somebody write a tool at the machine's own panel."""
 
+    def type_by_hand(self, tool: int) -> ToolOffset:
+        """Let somebody type another value there; return what the machine holds then."""
+        held = self.state().tools.get(tool)
+        self.write_by_hand(tool, next(one for one in HANDS_VALUES if not self.same(one, held)))
+        return self.state().tools[tool]
+
+    def choose_by_hand(self, which: int) -> int | None:
+        """Let somebody put another tool in force there; return which, ``None`` without another."""
+        state = self.state()
+        others = sorted({*state.tools} - {state.selected})
+        if not others:
+            return None
+        tool = others[which % len(others)]
+        self.select_by_hand(tool)
+        return tool
+
     @abstractmethod
     def select_by_hand(self, tool: int) -> None:
         """Let somebody put a tool in force at the machine's own panel."""

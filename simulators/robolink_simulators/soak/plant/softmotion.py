@@ -201,5 +201,5 @@ class SoftMotionPlant(PlantWithWorld):
 
 
 def _offset(tool: Sequence[float]) -> ToolOffset:
-    x_mm, y_mm, z_mm, *_ = tool
-    return ToolOffset(x_mm, y_mm, z_mm)
+    x_mm, y_mm, z_mm, a_deg, b_deg, c_deg = tool
+    return ToolOffset(x_mm, y_mm, z_mm, a_deg, b_deg, c_deg)

@@ -176,7 +176,9 @@ class EndRules:
                 f"tool {tool} has changed, which {type(error).__name__} does not say",
             )
         selected = standing.selected
-        moved = self._on.plant.moved_itself or bool(self._on.now.chosen_by_hand)
+        moved = (
+            self._on.plant.moved_itself or self._on.now.crowded or bool(self._on.now.chosen_by_hand)
+        )
         if standing.selection_known and selected is not None and not moved:
             self._on.hold(
                 "StateIsTold",

@@ -43,10 +43,10 @@ class Rulebook(Grounds):
         >>> from robolink_simulators.soak.people import wish_of
         >>> from robolink_simulators.soak.plant.epson import EpsonPlant
         >>> from robolink_simulators.soak.rules import Rulebook
-        >>> history, books = drawn_history(7, hours=2), Books(Path("journal.db"))
+        >>> history, books = drawn_history(23, hours=2), Books(Path("journal.db"))
         >>> typing = history.hours[1]  # somebody types an offset of tool 2
         >>> cell = VirtualCell(history, Path("disk"))
-        >>> plant = EpsonPlant(ManualClock(), cell, seed=7)
+        >>> plant = EpsonPlant(ManualClock(), cell, seed=23)
         >>> rules = Rulebook(cell.story, plant, books)
         >>> rules.begin(typing, wish_of(typing))
         >>> rules.left(plant.state())  # nothing was written, and nothing is on record
@@ -157,10 +157,10 @@ class Rulebook(Grounds):
             >>> from robolink_simulators.soak.people import wish_of
             >>> from robolink_simulators.soak.plant.epson import EpsonPlant
             >>> from robolink_simulators.soak.rules import Rulebook
-            >>> history, books = drawn_history(7, hours=2), Books(Path("journal.db"))
+            >>> history, books = drawn_history(23, hours=2), Books(Path("journal.db"))
             >>> typing = history.hours[1]  # somebody types an offset of tool 2
             >>> cell = VirtualCell(history, Path("disk"))
-            >>> plant = EpsonPlant(ManualClock(), cell, seed=7)
+            >>> plant = EpsonPlant(ManualClock(), cell, seed=23)
             >>> rules = Rulebook(cell.story, plant, books)
             >>> rules.begin(typing, wish_of(typing))
             >>> process = VirtualProcess(101, "anna", LeaseHolder(), Path("journal.db"))
@@ -202,10 +202,10 @@ class Rulebook(Grounds):
             >>> from robolink_simulators.soak.people import wish_of
             >>> from robolink_simulators.soak.plant.epson import EpsonPlant
             >>> from robolink_simulators.soak.rules import Rulebook
-            >>> history, books = drawn_history(7, hours=2), Books(Path("journal.db"))
+            >>> history, books = drawn_history(23, hours=2), Books(Path("journal.db"))
             >>> typing = history.hours[1]  # somebody types an offset of tool 2
             >>> cell = VirtualCell(history, Path("disk"))
-            >>> plant = EpsonPlant(ManualClock(), cell, seed=7)
+            >>> plant = EpsonPlant(ManualClock(), cell, seed=23)
             >>> rules = Rulebook(cell.story, plant, books)
             >>> rules.begin(typing, wish_of(typing))
             >>> rules.at_rest(plant.state(), usable=False, why="the guard is open")

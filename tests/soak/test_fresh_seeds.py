@@ -160,6 +160,36 @@ HISTORIES = (
             ),
         ),
     ),
+    History(
+        730434096,
+        CellKind.REGISTER_MAP,
+        (
+            Hour(
+                10,
+                Deed.SET_TWO,
+                Habit(),
+                (),
+            ),
+            Hour(
+                17,
+                Deed.UNDO,
+                Habit(
+                    person="anna",
+                    stays_share=1.0,
+                    types_ahead=False,
+                    bias_mm=0.0,
+                    tires_mm=0.0,
+                    declines=False,
+                    keeps=False,
+                    impatient=True,
+                ),
+                (
+                    Disturbance(Hindrance.LINE, "ADD_ANSWERED", "fc5", 0, 0.0, 32),
+                    Disturbance(Hindrance.WIRE, "STALL", "fc5", 0, 2.0, 10),
+                ),
+            ),
+        ),
+    ),
 )
 LOST_RECORD = drawn_history(177058577, 20).without_hours(
     [hour for hour in range(20) if hour not in (8, 9)]

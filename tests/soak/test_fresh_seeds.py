@@ -190,6 +190,27 @@ HISTORIES = (
             ),
         ),
     ),
+    History(
+        619593150,
+        CellKind.EPSON,
+        (
+            Hour(
+                5,
+                Deed.CHANGE_NOZZLE,
+                Habit(),
+                (),
+            ),
+            Hour(
+                6,
+                Deed.SET_TWO,
+                Habit(),
+                (
+                    Disturbance(Hindrance.DISK, "UNWRITABLE", "commit before", 4, 0.0, None),
+                    Disturbance(Hindrance.STOP, "", "exchange Print TLSet", 1, 0.01, None),
+                ),
+            ),
+        ),
+    ),
 )
 LOST_RECORD = drawn_history(177058577, 20).without_hours(
     [hour for hour in range(20) if hour not in (8, 9)]

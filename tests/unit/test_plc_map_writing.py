@@ -470,7 +470,7 @@ def test_a_recovery_waits_as_long_as_a_request_may_be_under_way(commit_bit):
 
 
 def test_registers_that_are_not_on_record_are_told_before_a_change(commit_bit):
-    told = []
+    told: list[str] = []
     with commit_bit.connect() as controller:
         change_tools(controller, [Wanted(1, NEW, controller.tools.read(1))], tell=told.append)
         assert ["on record is nothing" in one for one in told] == [True]
@@ -487,7 +487,7 @@ def test_registers_that_are_not_on_record_are_told_before_a_change(commit_bit):
 
 
 def test_a_request_that_names_its_tool_brings_no_other_into_force(level):
-    told = []
+    told: list[str] = []
     with level.connect() as controller:
         controller.tools.write(2, NEW, expected=ANY)
         other = ToolOffset(1.6, -2.25, 3.0, 45.0)

@@ -123,8 +123,8 @@ class MarkerResolver:
     def fence(self) -> None:
         """See :meth:`robolink.model.Resolver.fence`.
 
-        Nothing here: on one connection, requests are served in their order, and what a device
-        still has of one that is closed it drops.
+        Nothing here: a controller that serves one client at a time, in the order in which it is
+        asked, has served what came before when it answers the next one.
         """
 
     def examine(self, marker: Marker) -> Finding:

@@ -34,6 +34,17 @@ class Settler:
         controller: The controller, connected.
         keep: Whether new values that nobody verified stay, because a person says so.
         only_looks: Whether nothing is to be settled, so that nothing is sent but questions.
+
+    Example:
+        >>> import robolink
+        >>> from robolink.model import MarkerKind
+        >>> from robolink.transaction import Settler
+        >>> with robolink.connect("epson+sim://settler-example") as controller:
+        ...     marker = controller.begin(MarkerKind.SET, "TLSet 2", {"tool": 2})
+        ...     settler = Settler(controller)
+        ...     settler.settle(settler.examine(marker))
+        ...     controller.outcomes.open_markers()
+        ()
     """
 
     def __init__(

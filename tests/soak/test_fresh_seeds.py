@@ -160,6 +160,57 @@ HISTORIES = (
             ),
         ),
     ),
+    History(
+        730434096,
+        CellKind.REGISTER_MAP,
+        (
+            Hour(
+                10,
+                Deed.SET_TWO,
+                Habit(),
+                (),
+            ),
+            Hour(
+                17,
+                Deed.UNDO,
+                Habit(
+                    person="anna",
+                    stays_share=1.0,
+                    types_ahead=False,
+                    bias_mm=0.0,
+                    tires_mm=0.0,
+                    declines=False,
+                    keeps=False,
+                    impatient=True,
+                ),
+                (
+                    Disturbance(Hindrance.LINE, "ADD_ANSWERED", "fc5", 0, 0.0, 32),
+                    Disturbance(Hindrance.WIRE, "STALL", "fc5", 0, 2.0, 10),
+                ),
+            ),
+        ),
+    ),
+    History(
+        619593150,
+        CellKind.EPSON,
+        (
+            Hour(
+                5,
+                Deed.CHANGE_NOZZLE,
+                Habit(),
+                (),
+            ),
+            Hour(
+                6,
+                Deed.SET_TWO,
+                Habit(),
+                (
+                    Disturbance(Hindrance.DISK, "UNWRITABLE", "commit before", 4, 0.0, None),
+                    Disturbance(Hindrance.STOP, "", "exchange Print TLSet", 1, 0.01, None),
+                ),
+            ),
+        ),
+    ),
 )
 LOST_RECORD = drawn_history(177058577, 20).without_hours(
     [hour for hour in range(20) if hour not in (8, 9)]

@@ -12,6 +12,7 @@ from pymodbus.pdu.register_message import (
     WriteMultipleRegistersRequest,
     WriteSingleRegisterRequest,
 )
+from robolink_simulators.faults import Fault, FaultAction
 from robolink_simulators.plc import PlcSimulator, device
 from robolink_simulators.plc.frames import LineFrames
 
@@ -171,3 +172,17 @@ def test_on_a_serial_line_silence_ends_half_a_request(plc):
     link.receive(on_line(ReadHoldingRegistersRequest(address=100, count=1)), 60_000_000)
     assert link.outgoing()[:3] == bytes.fromhex("01 03 02")
     assert plc.writes == []
+
+
+def test_a_request_that_is_held_up_takes_effect_at_its_time_within_a_long_step(plc):
+    """Not when somebody next looks: its answer is due a moment after it is served."""
+    plc.faults.add(Fault(FaultAction.STALL, 0, "fc5", seconds=2.0))
+    link = plc.connect(0)
+    ask(link, WriteMultipleRegistersRequest(address=100, registers=[1, 2, 3]))
+    framer = FramerSocket(DecodePDU(is_server=False))
+    pdu = WriteSingleCoilRequest(address=2000, bits=[True])
+    link.receive(framer.encode(bytes([pdu.function_code]) + pdu.encode(), 1, 7), 0)
+    plc.advance(1_900_000_000)
+    assert plc.program.takeovers == 0
+    plc.advance(90_000_000_000)
+    assert plc.program.takeovers == 1

@@ -123,16 +123,24 @@ class PlcSimulator(HostedDevice):
         return link
 
     def advance(self, now_ns: int) -> None:
-        """Let simulated time reach ``now_ns``."""
-        self.now_ns = max(self.now_ns, now_ns)
-        self.program.advance(self.now_ns)
-        for link in self._links:
-            link.catch_up()
+        """Let simulated time reach ``now_ns``, stopping wherever something changes."""
+        while True:
+            before_ns = self.now_ns
+            ahead = [change for change in self._changes() if before_ns < change < now_ns]
+            self.now_ns = min(ahead, default=max(before_ns, now_ns))
+            self.program.advance(self.now_ns)
+            for link in self._links:
+                link.catch_up()
+            if not ahead:
+                return
 
     def next_change(self) -> int | None:
         """Return when :meth:`advance` will next do something by itself, if ever."""
-        changes = [self.program.next_change(), *(link.next_change() for link in self._links)]
-        return min((change for change in changes if change is not None), default=None)
+        return min(self._changes(), default=None)
+
+    def _changes(self) -> list[int]:
+        changes = (self.program.next_change(), *(link.next_change() for link in self._links))
+        return [change for change in changes if change is not None]
 
     def serve(
         self, request: PlcRequest, frames: Frames, link: PlcLink, *, counted: bool = False

@@ -77,7 +77,9 @@ class WireRules:
         self, process: VirtualProcess, sent: SentRequest, markers: Sequence[BookedMarker]
     ) -> None:
         tool = sent.tool
-        ours = [m for m in markers if m.kind == "set" and m.details.get("tool") == tool]
+        ours = _of_tool(tool, markers)
+        for marker in ours:
+            self._on.now.writes.setdefault(marker.operation, sent.text)
         whole = [m for m in markers if m.kind == "change" and str(tool) in m.details["tools"]]
         self._on.hold(
             "NothingWithoutRecord",
@@ -116,7 +118,7 @@ class WireRules:
             allowed = bool(named) or not self._on.books.trusted
         elif sent.kind is SentKind.WRITE and sent.tool and sent.tool not in process.put_back:
             process.put_back.add(sent.tool)
-            allowed = self._puts_back(sent.tool, markers)
+            allowed = self._puts_back(sent, markers)
         self._on.hold(
             "StillAfterStop", allowed, f"{sent.text} leaves after the stop was acknowledged"
         )
@@ -125,11 +127,14 @@ class WireRules:
         """Check the machine at the moment in which a stop is acknowledged."""
         self._on.hold("AtRestWhenStopped", not self._on.plant.moving, "it still moves")
 
-    def _puts_back(self, tool: int, markers: Sequence[BookedMarker]) -> bool:
+    def _puts_back(self, sent: SentRequest, markers: Sequence[BookedMarker]) -> bool:
         """Tell whether the write that is marked brings back what was there before."""
         if not self._on.books.trusted:
             return True
-        ours = [m for m in markers if m.kind == "set" and m.details.get("tool") == tool]
+        tool = sent.tool or 0
+        # The mark under which an earlier write left stays where nothing can be stored any more.
+        left = self._on.now.writes
+        ours = [m for m in _of_tool(tool, markers) if left.get(m.operation, sent.text) == sent.text]
         wanted = read_offset(ours[-1].details.get("requested")) if ours else None
         before: list[ToolOffset | None] = [
             self._on.now.first.tools.get(tool),
@@ -138,3 +143,8 @@ class WireRules:
         ]
         # A marker that could not be stored any more: the change around it says what it was.
         return not ours or any(self._on.plant.same(one, wanted) for one in before)
+
+
+def _of_tool(tool: int | None, markers: Sequence[BookedMarker]) -> list[BookedMarker]:
+    """Return the marks of writes of a tool."""
+    return [m for m in markers if m.kind == "set" and m.details.get("tool") == tool]

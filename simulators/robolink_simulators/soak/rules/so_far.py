@@ -69,6 +69,7 @@ class HourSoFar:
         wanted: What each tool may hold.
         report: Of a tip that was measured and proved.
         last_move: The last movement that has left.
+        writes: The first write that has left under each marker, by operation.
         crowded: Whether a second person was at work.
         typed_by_others: What they typed, by tool.
         chosen_by_hand: Tools that somebody put in force at the machine.
@@ -85,6 +86,7 @@ class HourSoFar:
     wanted: dict[int, list[ToolOffset | None]] = field(default_factory=dict)
     report: ChangeReport | None = None
     last_move: str = ""
+    writes: dict[str, str] = field(default_factory=dict)
     crowded: bool = False
     typed_by_others: list[tuple[int, ToolOffset]] = field(default_factory=list)
     chosen_by_hand: list[int] = field(default_factory=list)

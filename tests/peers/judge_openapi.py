@@ -53,7 +53,7 @@ def judged(tmp_path):
                 cwd=tmp_path,
                 capture_output=True,
                 text=True,
-                timeout=280,
+                timeout=900,
                 check=False,
             )
             return done.returncode, done.stdout + done.stderr
@@ -61,7 +61,7 @@ def judged(tmp_path):
         yield judge
 
 
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(1000)
 @pytest.mark.parametrize("kind", MAKES)
 def test_each_kind_answers_what_the_document_says(judged, kind):
     code, said = judged(kind, DOCUMENT)

@@ -77,7 +77,7 @@ $(API_JUDGE): $(VENV)/.installed-dev
 	$@/bin/python -m pip install --quiet schemathesis==4.32.5 || true
 
 # NIGHT= hours; PARTS="docs peers" runs some. The parts and their shares: tools/nightly.py.
-NIGHT := 8
+NIGHT ?= 8
 PARTS :=
 .PHONY: nightly
 nightly: $(VENV)/.installed-dev ## Run all that make test leaves out, and print one table of how it ended.

@@ -32,9 +32,12 @@ MAKES: dict[str, Callable[[], AnySimulator]] = {
     "plc": lambda: PlcSimulator(load_map(MAP)),
 }
 
-pytestmark = pytest.mark.skipif(
-    JUDGE is None, reason="schemathesis could not be installed from the package index"
-)
+pytestmark = [
+    pytest.mark.timeout(1000),
+    pytest.mark.skipif(
+        JUDGE is None, reason="schemathesis could not be installed from the package index"
+    ),
+]
 
 
 @pytest.fixture
@@ -53,7 +56,7 @@ def judged(tmp_path):
                 cwd=tmp_path,
                 capture_output=True,
                 text=True,
-                timeout=280,
+                timeout=900,
                 check=False,
             )
             return done.returncode, done.stdout + done.stderr
@@ -61,7 +64,6 @@ def judged(tmp_path):
         yield judge
 
 
-@pytest.mark.timeout(300)
 @pytest.mark.parametrize("kind", MAKES)
 def test_each_kind_answers_what_the_document_says(judged, kind):
     code, said = judged(kind, DOCUMENT)
@@ -70,16 +72,25 @@ def test_each_kind_answers_what_the_document_says(judged, kind):
     assert "Coverage" in said
 
 
+def _number(path):
+    """Return the schema of the number of an input."""
+    return path["post"]["requestBody"]["content"]["application/json"]["schema"]["properties"][
+        "number"
+    ]
+
+
 @pytest.mark.parametrize(
     ("damage", "code"),
     [
-        (lambda post: post["requestBody"]["content"]["application/json"].pop("schema"), "ST202"),
-        (lambda post: post["responses"].pop("200"), "200"),
+        (lambda path: _number(path).update(maximum=10**6), "ST202"),
+        (lambda path: path.update(put=path.pop("post")), "ST202"),
+        (lambda path: path["post"]["responses"].pop("200"), "ST"),
     ],
 )
 def test_the_judge_sees_a_document_that_is_wrong(judged, damage, code):
+    path = "/cells/{cell}/set_input"
     document = json.loads(DOCUMENT)
-    document["paths"] = {path: it for path, it in document["paths"].items() if "set_input" in path}
-    damage(document["paths"]["/cells/{cell}/set_input"]["post"])
-    ended, said = judged("epson", json.dumps(document))
-    assert (ended, code in said) == (1, True), said
+    document["paths"] = {path: document["paths"][path]}
+    damage(document["paths"][path])
+    ended, said = judged("epson", json.dumps(document), "--phases", "coverage")
+    assert (ended, f"\n- {code}" in said) == (1, True), said

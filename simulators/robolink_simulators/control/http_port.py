@@ -43,7 +43,7 @@ _BEFORE_ASKING_S: Final = 5.0
 """Who has asked nothing for so long has no claim to a place where there is none left."""
 
 
-class Reply(NamedTuple):
+class ApiReply(NamedTuple):
     """What a request is answered with.
 
     Attributes:
@@ -91,7 +91,7 @@ class HttpPort(ThreadingHTTPServer):
     def __init__(
         self,
         address: tuple[str, int],
-        answered: Callable[[str, str, bytes], Reply],
+        answered: Callable[[str, str, bytes], ApiReply],
         *,
         allow_remote: bool = False,
     ) -> None:
@@ -286,7 +286,7 @@ class _Served(BaseHTTPRequestHandler):
 
     def _refuse(self, status: HTTPStatus, what: str, remedy: str) -> None:
         self.close_connection = True  # what follows is not read
-        self._send(Reply(status, error_document(what, remedy)))
+        self._send(ApiReply(status, error_document(what, remedy)))
 
     def _answer(self, method: str, body: bytes) -> None:
         self.server.has_asked(self.connection)
@@ -295,10 +295,10 @@ class _Served(BaseHTTPRequestHandler):
             self.close_connection = True  # who does not show the token keeps no place
         self._send(reply)
 
-    def _of_a_page(self) -> Reply | None:
+    def _of_a_page(self) -> ApiReply | None:
         """Return what is answered to a browser that asks for a page which is not ours."""
         if "Origin" in self.headers:
-            return Reply(
+            return ApiReply(
                 HTTPStatus.FORBIDDEN,
                 error_document(
                     tr("A web page asks here (Origin), and pages are not answered."),
@@ -307,7 +307,7 @@ class _Served(BaseHTTPRequestHandler):
             )
         names = self.headers.get_all("Host", [])
         if len(names) > 1 or not (self.server.allow_remote or all(map(is_this_machine, names))):
-            return Reply(
+            return ApiReply(
                 HTTPStatus.FORBIDDEN,
                 error_document(
                     tr("The request is for another machine by its Host."),
@@ -316,7 +316,7 @@ class _Served(BaseHTTPRequestHandler):
             )
         return None
 
-    def _send(self, reply: Reply) -> None:
+    def _send(self, reply: ApiReply) -> None:
         data = json.dumps(reply.document).encode()
         self.connection.settimeout(self.timeout)  # of all of it
         self.send_response(reply.status)

@@ -9,7 +9,13 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from robolink_simulators.control.acts.answers import CellAbout, CellsAbout
-from robolink_simulators.control.acts.declared import LONGEST_TEXT, PRINTABLE, ControlAct, Taken
+from robolink_simulators.control.acts.declared import (
+    LONGEST_TEXT,
+    NONE,
+    PRINTABLE,
+    ControlAct,
+    Taken,
+)
 from robolink_simulators.control.acts.registry import ACTS
 from robolink_simulators.control.answer_schemas import AnswerSchemas
 
@@ -117,8 +123,8 @@ def _schema(taken: Taken) -> Mapping[str, Any]:
     match taken.form:
         case "whole":
             lowest, highest = taken.whole_limits
-            kinds = ["integer", "null"] if taken.or_none else "integer"
-            return {"type": kinds, "minimum": lowest, "maximum": highest}
+            whole = {"type": "integer", "minimum": lowest, "maximum": highest}
+            return {"anyOf": [whole, {"enum": [None, NONE]}]} if taken.or_none else whole
         case "number":
             return {"type": "number", "minimum": taken.least, "maximum": taken.most}
         case "flag":

@@ -33,8 +33,8 @@ from robolink_simulators.control.acts.registry import (
 from robolink_simulators.control.cell import ControlledCell
 from robolink_simulators.control.http_port import (
     SCHEMA,
+    ApiReply,
     HttpPort,
-    Reply,
     error_document,
     no_request,
 )
@@ -109,7 +109,7 @@ class ControlServer(ClosedAtExit):
             self._http.server_close()
             self._thread.join()
 
-    def answered(self, method: str, target: str, body: bytes) -> Reply:
+    def answered(self, method: str, target: str, body: bytes) -> ApiReply:
         """Return what a request is answered with."""
         self.requests += 1
         try:
@@ -127,7 +127,7 @@ class ControlServer(ClosedAtExit):
             methods, answer = self._found(path)
             if method not in methods:
                 return _not_allowed(method, methods)
-            return Reply(HTTPStatus.OK, answer(_given(method, parts.query, body)))
+            return ApiReply(HTTPStatus.OK, answer(_given(method, parts.query, body)))
         except UnknownActError as error:
             return _refused(HTTPStatus.NOT_FOUND, error.what, error.remedy)
         except NotNowError as error:
@@ -240,14 +240,14 @@ def _described() -> dict[str, Any]:
     return described
 
 
-def _refused(status: HTTPStatus, what: str, remedy: str) -> Reply:
-    return Reply(status, error_document(what, remedy))
+def _refused(status: HTTPStatus, what: str, remedy: str) -> ApiReply:
+    return ApiReply(status, error_document(what, remedy))
 
 
-def _not_allowed(method: str, methods: tuple[str, ...]) -> Reply:
+def _not_allowed(method: str, methods: tuple[str, ...]) -> ApiReply:
     what = tr("{method} is not answered at this address.", method=method[:80])
     remedy = tr("Send it by {methods}.", methods=", ".join(methods))
-    return Reply(HTTPStatus.METHOD_NOT_ALLOWED, error_document(what, remedy), methods)
+    return ApiReply(HTTPStatus.METHOD_NOT_ALLOWED, error_document(what, remedy), methods)
 
 
 def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -23,6 +23,9 @@ LONGEST_TEXT: Final = 200
 PRINTABLE: Final = "[ -~]*"
 """Printable ASCII, as a regular expression that Python and JSON Schema read alike."""
 
+NONE: Final = "none"
+"""What a shell gives for null."""
+
 Form = Literal["whole", "number", "flag", "text"]
 
 
@@ -39,7 +42,7 @@ class Taken:
         most: The highest number.
         least: The lowest number; of ``whole`` never below 0.
         default: What it is where it is not given; ``None`` for not given.
-        or_none: Whether null is one, too.
+        or_none: Whether null is one, too, and the word for it.
     """
 
     name: str
@@ -63,7 +66,7 @@ class Taken:
         Raises:
             ConfigError: It is something else.
         """
-        if value is None and self.or_none:
+        if self.or_none and (value is None or value == NONE):
             return None
         if isinstance(value, float) and value.is_integer() and self.form in ("whole", "flag"):
             value = int(value)  # JSON has one kind of numbers: 3.0 is a whole one

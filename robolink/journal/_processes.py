@@ -2,6 +2,7 @@
 
 import os
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
@@ -75,15 +76,22 @@ def this_process(operator: str = "") -> LeaseHolder:
     except (OSError, KeyError, ImportError):
         os_user = ""  # a container may run under a number that has no name
     pid = os.getpid()
-    found, namespace = _state_and_start(pid), _pid_namespace()
+    process_start, boot = _start_and_boot(pid)
     return LeaseHolder(
         os_user=os_user,
         host=platform.node(),
         pid=pid,
-        process_start=f"{namespace} {found[1]}" if found and namespace else "",
-        boot=_boot_id(),
+        process_start=process_start,
+        boot=boot,
         operator=operator,
     )
+
+
+@lru_cache(maxsize=1)
+def _start_and_boot(pid: int) -> tuple[str, str]:
+    """Return what tells this process from others, which stays as it is; a fork has another pid."""
+    found, namespace = _state_and_start(pid), _pid_namespace()
+    return f"{namespace} {found[1]}" if found and namespace else "", _boot_id()
 
 
 def _boot_id() -> str:

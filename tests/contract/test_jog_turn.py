@@ -9,6 +9,7 @@ from robolink.runner import Runner
 from tests.contract._method_cell import KINDS, method_cell
 
 pytestmark = pytest.mark.simulator_only
+soak = pytest.mark.soak
 
 
 @pytest.fixture(params=KINDS)
@@ -56,7 +57,14 @@ def went(monkeypatch):
     return found
 
 
-@pytest.mark.parametrize("tool", [0, 1])
+def each_once(*rows):
+    """Rows of a kind of controller and what is tried on it; the other pairs are left to soak."""
+    (first, *one), (second, *other) = rows
+    others = (pytest.param(first, *other, marks=soak), pytest.param(second, *one, marks=soak))
+    return [*rows, *others]
+
+
+@pytest.mark.parametrize(("cell", "tool"), each_once(("epson", 1), ("plc", 0)), indirect=["cell"])
 def test_half_a_turn_is_one_command_that_ends_lifted(cell, went, tool):
     select(cell, tool)
     before = where(cell)
@@ -86,14 +94,13 @@ def test_a_plain_step_keeps_its_limit_and_names_the_command(cell):
 
 
 @pytest.mark.parametrize(
-    ("tool", "offset", "named"),
-    [
-        # The ends of a whole turn are where it began: only what lies between is too far.
-        (0, ToolOffset(30, 0, -20), "tip of tool 1"),
-        (1, ToolOffset(30, 0, -20), "flange"),
-    ],
+    ("cell", "tool", "named"),
+    each_once(("plc", 0, "tip of tool 1"), ("epson", 1, "flange")),
+    indirect=["cell"],
 )
-def test_the_way_between_is_checked_of_tip_and_flange(cell, went, tool, offset, named):
+def test_the_way_between_is_checked_of_tip_and_flange(cell, went, tool, named):
+    # The ends of a whole turn are where it began: only what lies between is too far.
+    offset = ToolOffset(30, 0, -20)
     with cell.cell.connected() as controller:
         controller.tools.write(1, offset, expected=controller.tools.read(1))
         controller.tools.select(tool)

@@ -7,7 +7,7 @@ of the processor, filling it some microseconds.
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import fields, is_dataclass
-from typing import Any, Final
+from typing import Any, Final, cast
 
 from robolink_simulators.epson.spel.expressions.values import number_value
 from robolink_simulators.epson.spel.tree import Literal
@@ -51,6 +51,10 @@ def _mark(place: int) -> str:
     return f"{place}.987654321"
 
 
+def _tuple_of(*parts: object) -> tuple[object, ...]:
+    return parts
+
+
 def _filler(node: object, marks: dict[Any, int], found: list[int]) -> Filler | None:
     """Return what fills a part of a tree, ``None`` where there is nothing to fill."""
     if isinstance(node, Literal):
@@ -59,16 +63,15 @@ def _filler(node: object, marks: dict[Any, int], found: list[int]) -> Filler | N
             return None
         found.append(place)
         return lambda numbers: numbers[place]
-    make: Callable[[list[Any]], Any] = tuple
     if isinstance(node, tuple):
-        parts = node
-    elif is_dataclass(node):
-        parts, kind = tuple(getattr(node, part.name) for part in fields(node)), type(node)
-        make = lambda filled: kind(*filled)  # noqa: E731
+        parts, make = node, _tuple_of
+    elif is_dataclass(node) and not isinstance(node, type):
+        parts = tuple(getattr(node, part.name) for part in fields(node))
+        make = cast(Callable[..., Any], type(node))
     else:
         return None
     fillers = [_filler(part, marks, found) for part in parts]
     if not any(fillers):
         return None
     both = tuple(zip(parts, fillers, strict=True))
-    return lambda numbers: make([part if fill is None else fill(numbers) for part, fill in both])
+    return lambda numbers: make(*(part if fill is None else fill(numbers) for part, fill in both))

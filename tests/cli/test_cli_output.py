@@ -31,6 +31,14 @@ def test_json_is_one_document_and_text_goes_to_stderr(command, capsys, arguments
     assert "never" not in shown.err
 
 
+def test_a_column_of_numbers_stands_to_the_right_and_one_of_versions_to_the_left(capsys):
+    render.table("seen", ["mm", "version"], [["1.5", "2.0.1"], ["*-12.25", "12.10.1"], ["1", "-"]])
+    rows = capsys.readouterr().out.rstrip().splitlines()[-3:]
+    assert [row.split() for row in rows] == [["1.5", "2.0.1"], ["*-12.25", "12.10.1"], ["1", "-"]]
+    assert rows[0].index("1.5") + 3 == rows[1].index("12.25") + 5
+    assert rows[0].index("2.0.1") == rows[1].index("12.10.1")
+
+
 def test_without_json_text_goes_to_stdout(command, capsys):
     command(lambda context: context.emit("status", {}, lambda: render.say("for people")))
     assert main.run(["status"]) == 0

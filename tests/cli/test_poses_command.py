@@ -65,6 +65,11 @@ def test_a_person_sees_a_table_and_how_it_was_read(shown):
     assert "Not used: Remark." in out
 
 
+def test_poses_without_a_number_are_numbered_from_one(shown):
+    _, out, _ = shown(XYZRPW, "--euler", "xyzrpw")
+    assert [line.split()[:3] for line in out.splitlines() if "T 1" in line] == [["1", "T", "1"]]
+
+
 @pytest.mark.parametrize(
     ("text", "option", "reason"),
     [

@@ -314,6 +314,20 @@ def test_f79_an_order_is_not_told_as_done_while_something_is_not_put_back():
 
 
 @pytest.mark.fault("F79")
+def test_f79_a_first_order_begins_nothing_while_something_is_unsettled():
+    """Its job may move before anything is written, and would find out at its end only."""
+    desk = Desk()
+    with desk.connected() as controller:
+        left = Marker("killed", MarkerKind.SELECTION, "calibrate tool 1", "then", {"tool": 1})
+        controller.outcomes.begin(left)
+        with (
+            pytest.raises(OutcomeUnknownError, match="calibrate tool 1"),
+            carrying_out(controller, ORDER, JOB),
+        ):
+            pytest.fail("it was begun")
+
+
+@pytest.mark.fault("F79")
 def test_f79_an_order_that_was_closed_without_looking_is_not_run_again():
     desk = Desk()
     with desk.connected() as controller:

@@ -22,7 +22,7 @@ MOST_CPU_S: Final = 120.0
 MOST_WALL_S: Final = 1800.0
 """Time by the clock after which a judgement is given up on a machine that does other things."""
 
-_FIRST: Final = 30
+_FIRST: Final = 12
 _NEXT: Final = 150
 """How many tests are collected at first and then: most mutants die in the first of them."""
 

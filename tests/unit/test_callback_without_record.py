@@ -1,6 +1,9 @@
 """A program that calls back is answered although the record of its robot was lost."""
 
+from typing import cast
+
 from robolink.errors import OutcomeUnknownError
+from robolink.journal import Journal
 from robolink.protocols.spel_callback import CallbackLine, CallbackWord
 from robolink.serving import CallbackConversation, CallbackLimits
 
@@ -27,8 +30,8 @@ class LosingJournal:
 
 
 def test_a_refusal_that_cannot_be_recorded_is_answered_all_the_same():
-    talk = CallbackConversation(LosingJournal(), CallbackLimits(), peer="here")
+    talk = CallbackConversation(cast(Journal, LosingJournal()), CallbackLimits(), peer="here")
     value = ("12000", "-3500", "-20000", "0", "0", "0")
     fields = ("SIM1", "1", PUT_NOTHING_BACK, "none", "1", "1", *value)
     answer = talk.answer(CallbackLine(1, CallbackWord.HELLO, fields))
-    assert (answer.word, answer.fields) == (CallbackWord.REFUSE, ("settled_by_another",))
+    assert (answer.word, answer.fields) == (CallbackWord.REFUSE, ("unsettled",))

@@ -1,11 +1,14 @@
 """What a recipe asks and switches between the phases of a change comes at its place, once."""
 
+from typing import cast
+
 import pytest
 
 from robolink.errors import DeclinedError
 from robolink.methods import PointsSource
 from robolink.model import Pose, ToolOffset
 from robolink.nozzle_change import ChangePlan, Listener, Moment, NozzleChange, ToolPlan
+from robolink.runner import Operator
 from robolink.testing import MemoryController, MemoryMachine
 
 OLD = ToolOffset(12, -3.5, -20)
@@ -28,7 +31,9 @@ def run(machine, listener, *, write=True):
     tool = ToolPlan(1, source=PointsSource(lambda: TOUCHES), verify=False)
     plan = ChangePlan((tool,), ask_before_write=False)
     with MemoryController(machine) as controller:
-        return NozzleChange(controller, plan, operator=None, listener=listener).run(write=write)
+        return NozzleChange(controller, plan, operator=cast(Operator, None), listener=listener).run(
+            write=write
+        )
 
 
 def test_each_moment_comes_once_and_the_one_before_the_write_before_it():

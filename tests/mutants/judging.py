@@ -67,6 +67,7 @@ class Copy:
         self._tree = folder
         self._work = Path(tempfile.mkdtemp(prefix="rm-"))
         self._sound: dict[tuple[str, ...], bool] = {}
+        self._unsound: set[str] = set()
         self._made = 0
         shutil.rmtree(folder, ignore_errors=True)
         for name in _files():
@@ -119,6 +120,7 @@ class Copy:
         )
 
     def _by_tests(self, mutant: Mutant, asked: list[str]) -> Judgement:
+        asked = [one for one in asked if _function(one) not in self._unsound]
         left, passed, spent_s = list(asked), 0, 0.0
         sizes = iter((_FIRST, _NEXT))
         while left and spent_s < MOST_CPU_S:
@@ -131,9 +133,10 @@ class Copy:
                 continue
             test = told.get("test", "")
             if told["how"] == "unknown" or (test and not self._is_sound(test, part)):
-                bad = {_function(one) for one in told.get("missing") or [test]}
-                left = [one for one in (*part, *left) if _function(one) not in bad]
-                asked = [one for one in asked if _function(one) not in bad]
+                self._unsound |= {_function(one) for one in told.get("missing") or [test]}
+                rest = part[part.index(test) + 1 :] if test in part else part
+                left = [one for one in (*rest, *left) if _function(one) not in self._unsound]
+                asked = [one for one in asked if _function(one) not in self._unsound]
                 continue
             if told["how"] == "given up":
                 break

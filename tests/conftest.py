@@ -28,9 +28,18 @@ for _name in ("LC_ALL", "LC_MESSAGES", "LANG"):
         os.environ[_name] = "C.UTF-8"
 os.environ.pop("LANGUAGE", None)
 
-# pytest inside of a test, as somebody else's project runs it, takes a second longer to start where
-# it finds Hypothesis, and has no use for it.
-os.environ["PYTEST_ADDOPTS"] = f"{os.environ.get('PYTEST_ADDOPTS', '')} -p no:hypothesispytest"
+
+def pytest_configure(config):
+    """Start pytest inside of a test without Hypothesis, as it has no use for it and takes longer.
+
+    The workers of xdist are not inside of a test: what starts them passes nothing on.
+    """
+    starts_workers = bool(getattr(config.option, "numprocesses", 0)) and not hasattr(
+        config, "workerinput"
+    )
+    if not starts_workers:
+        added = os.environ.get("PYTEST_ADDOPTS", "")
+        os.environ["PYTEST_ADDOPTS"] = f"{added} -p no:hypothesispytest"
 
 
 def pytest_sessionstart():

@@ -179,8 +179,9 @@ class ToolTableCore(ABC):
         self.require_writable(tool)
         _require_offset(offset)
         _require_expected(expected)
-        self._require_values_of_a_tool(tool, offset)
-        return self._set(tool, self._storable(tool, offset), expected)
+        storable = self._storable(tool, offset)
+        self._require_values_of_a_tool(tool, storable)
+        return self._set(tool, storable, expected)
 
     def clear(
         self, tool: int, *, expected: Expected, then_select: int | None = None
@@ -201,9 +202,9 @@ class ToolTableCore(ABC):
         """
         self.require_writable(tool)
         _require_offset(offset)
-        self._require_values_of_a_tool(tool, offset)
-        self._require_readable(tool)
         requested = self._storable(tool, offset)
+        self._require_values_of_a_tool(tool, requested)
+        self._require_readable(tool)
         requests = self._requests(tool, requested)
         if self.same(self._stored(tool), requested):
             return ()

@@ -99,30 +99,27 @@ class ToolWrite(MarkedCommand[ToolOffset | None]):
             RobolinkError: As :meth:`robolink.model.ToolTable.write`.
         """
         with self._link.lock.held(self.request):
-            return self._changed(expected)
-
-    def _changed(self, expected: Expected) -> ToolReceipt:
-        markers, self._unconditional = self._link.markers, expected is ANY
-        if self._unconditional:
-            purpose = tr("write tool {tool} blindly", tool=self.tool)
-            require_engineer(markers.outcomes, purpose)
-        markers.look()
-        self.before = self.read_before(expected)
-        markers.ledger.saw_tool(self.tool, self.before)
-        if self._same(self.before, self.requested):
-            return self._receipt(self.before, skipped=True)
-        if expected is not ANY and not self._same(self.before, expected):
-            raise tool_changed(
-                self.tool,
-                self.before,
-                expected,
-                controller=self._link.identity,
-                request=self.request,
-            )
-        found = self._link.carry_out(self)
-        if not self._same(found, self.requested):
-            raise self._read_back_differs(found)
-        return self._receipt(found)
+            markers, self._unconditional = self._link.markers, expected is ANY
+            if self._unconditional:
+                purpose = tr("write tool {tool} blindly", tool=self.tool)
+                require_engineer(markers.outcomes, purpose)
+            markers.look()
+            self.before = self.read_before(expected)
+            markers.ledger.saw_tool(self.tool, self.before)
+            if self._same(self.before, self.requested):
+                return self._receipt(self.before, skipped=True)
+            if expected is not ANY and not self._same(self.before, expected):
+                raise tool_changed(
+                    self.tool,
+                    self.before,
+                    expected,
+                    controller=self._link.identity,
+                    request=self.request,
+                )
+            found = self._link.carry_out(self)
+            if not self._same(found, self.requested):
+                raise self._read_back_differs(found)
+            return self._receipt(found)
 
     @property
     def details(self) -> Mapping[str, object]:

@@ -61,7 +61,9 @@ def run_of(client: str, here: LeaseHolder) -> ClientRun | None:
         return None
     if here.proves_gone(holder):
         return ClientRun(describe(holder), since, lives=False)
-    return ClientRun(describe(holder), since, lives=True if here.can_tell(holder) else None)
+    # Of this process too: whether its earlier session still goes on is not known here.
+    lives = True if here.can_tell(holder) and holder != here else None
+    return ClientRun(describe(holder), since, lives=lives)
 
 
 def _outdated(folder: Path) -> Iterator[Path]:

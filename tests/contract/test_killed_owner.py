@@ -19,6 +19,7 @@ from tests.contract._softmotion_cell import served
 OLD, NEW = ToolOffset(12.0, -3.5, -20.0), ToolOffset(12.0, -3.5, -20.5)
 HERE = replace(this_process(), os_user="ann")
 ENDED = replace(HERE, pid=2**22 + 1, operator="Bea")
+LIVES = replace(HERE, operator="Dan")
 ELSEWHERE = replace(HERE, host="pc-2", boot="another", operator="Cid")
 
 
@@ -109,7 +110,7 @@ def test_a_command_without_a_marker_leaves_its_name_too(in_process):
 
 @pytest.mark.parametrize(
     ("holder", "advice"),
-    [(ELSEWHERE, "If it has ended, try again in 10 s"), (HERE, "Wait until it has finished")],
+    [(ELSEWHERE, "If it has ended, try again in 10 s"), (LIVES, "Wait until it has finished")],
     ids=["cannot be seen from here", "lives"],
 )
 def test_where_nobody_is_known_to_have_ended_it_is_said_at_once_who_it_is(

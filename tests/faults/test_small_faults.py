@@ -20,7 +20,7 @@ _SAMPLE = {"EPSON": 6, "PLC": 1}
 _SHARES = 24
 
 DECISIVE = {
-    "EPSON": Pair('$Execute,"TLSet #, XY(#, #, #, #)"', "writing, TLSet #"),
+    "EPSON": Pair('$Execute,"TLSet #, XY(#, #, #, #)"', "writing, TLSet #,"),
     "PLC": Pair("write_command WRITE_TOOL #", "writing, # WRITE_TOOL #"),
 }
 

@@ -66,7 +66,8 @@ class Copy:
     def __init__(self, folder: Path) -> None:
         self._tree = folder
         self._work = Path(tempfile.mkdtemp(prefix="rm-"))
-        self._sound: dict[str, bool] = {}
+        self._sound: dict[tuple[str, ...], bool] = {}
+        self._unsound: set[str] = set()
         self._made = 0
         shutil.rmtree(folder, ignore_errors=True)
         for name in _files():
@@ -119,6 +120,7 @@ class Copy:
         )
 
     def _by_tests(self, mutant: Mutant, asked: list[str]) -> Judgement:
+        asked = [one for one in asked if _function(one) not in self._unsound]
         left, passed, spent_s = list(asked), 0, 0.0
         sizes = iter((_FIRST, _NEXT))
         while left and spent_s < MOST_CPU_S:
@@ -130,10 +132,11 @@ class Copy:
             if told["how"] == "passed":
                 continue
             test = told.get("test", "")
-            if told["how"] == "unknown" or (test and not self._is_sound(test)):
-                bad = {_function(one) for one in told.get("missing") or [test]}
-                left = [one for one in (*part, *left) if _function(one) not in bad]
-                asked = [one for one in asked if _function(one) not in bad]
+            if told["how"] == "unknown" or (test and not self._is_sound(test, part)):
+                self._unsound |= {_function(one) for one in told.get("missing") or [test]}
+                rest = part[part.index(test) + 1 :] if test in part else part
+                left = [one for one in (*rest, *left) if _function(one) not in self._unsound]
+                asked = [one for one in asked if _function(one) not in self._unsound]
                 continue
             if told["how"] == "given up":
                 break
@@ -148,12 +151,13 @@ class Copy:
             )
         return Judgement(by="neither", asked=len(asked), passed=passed, cpu_s=round(spent_s, 2))
 
-    def _is_sound(self, test: str) -> bool:
-        """Return whether what failed passes without the mutant, in the same copy."""
-        if test not in self._sound:
-            told = self._ask("tests", cpu_s=MOST_CPU_S, tests=[test])
-            self._sound[test] = told["how"] == "passed"
-        return self._sound[test]
+    def _is_sound(self, test: str, part: list[str]) -> bool:
+        """Return whether what failed passes without the mutant, after the same tests as then."""
+        before = tuple(part[: part.index(test) + 1] if test in part else [test])
+        if before not in self._sound:
+            told = self._ask("tests", cpu_s=MOST_CPU_S, tests=list(before))
+            self._sound[before] = told["how"] == "passed"
+        return self._sound[before]
 
     @contextmanager
     def _in_place(self, mutant: Mutant) -> Iterator[None]:

@@ -31,7 +31,8 @@ FOLDER: Final = "ROBOLINK_MUTANTS_LINES"
 
 FEW: Final = 10
 """Where fewer tests than these execute a line, those that execute its module are asked as well:
-what a process makes once, the first test alone is seen to execute."""
+what a process makes once, the first test alone is seen to execute. So they are where a function
+remembers its results."""
 
 MOST_RECORDED_S: Final = 40.0
 """Tests are taken until they cost so much CPU, coverage included. A mutant is given three times as
@@ -162,6 +163,8 @@ class Lines:
             direct = direct or {test for test, seen in executed.items() if test and seen & around}
             if not direct:
                 return []
+            if mutant.where in _remembering(mutant.file):
+                direct |= whole
             more = whole - direct if len(direct) < FEW else set()
         else:
             direct = whole | {test for test, seen in executed.items() if test and seen & around}
@@ -232,6 +235,24 @@ def _lines_of_functions(file: str) -> frozenset[int]:
     for node in ast.walk(ast.parse((ROOT / file).read_bytes())):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             found |= set(range(node.body[0].lineno, (node.end_lineno or node.lineno) + 1))
+    return frozenset(found)
+
+
+@cache
+def _remembering(file: str) -> frozenset[str]:
+    """Return the qualified names of functions that are executed once for what they are given."""
+    found: set[str] = set()
+
+    def look(node: ast.AST, scope: str) -> None:
+        for one in ast.iter_child_nodes(node):
+            inner = scope
+            if isinstance(one, ast.FunctionDef | ast.ClassDef):
+                inner = f"{scope}.{one.name}".lstrip(".")
+                if any("cache" in ast.unparse(decorator) for decorator in one.decorator_list):
+                    found.add(inner)
+            look(one, inner)
+
+    look(ast.parse((ROOT / file).read_bytes()), "")
     return frozenset(found)
 
 

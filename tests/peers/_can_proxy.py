@@ -1,4 +1,4 @@
-"""The faulty proxy for a CAN bus: two buses in memory and a thread that carries between them."""
+"""The faulty proxy for a CAN bus: two buses in memory and threads that carry between them."""
 
 import threading
 import time
@@ -10,6 +10,7 @@ from tests.peers._faulty_proxy import LATE_S, Begins, Fault
 
 _REQUESTS: Final = 0x600
 _ANSWERS: Final = 0x580
+_LOOK_S: Final = 0.05
 
 
 class CanProxy:
@@ -35,15 +36,21 @@ class CanProxy:
         self._waiting: tuple[Begins, Fault] | None = None
         self._late: list[tuple[float, can.Message]] = []
         self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._serve, name="faulty bus", daemon=True)
+        # One a way: a thread for both would wait for the one while the other has come.
+        self._threads = [
+            threading.Thread(target=carry, name="faulty bus", daemon=True)
+            for carry in (self._carry_requests, self._carry_answers)
+        ]
 
     def __enter__(self) -> Self:
-        self._thread.start()
+        for thread in self._threads:
+            thread.start()
         return self
 
     def __exit__(self, *_: object) -> None:
         self._ended.set()
-        self._thread.join(5)
+        for thread in self._threads:
+            thread.join(5)
         self._near.shutdown()
         self._far.shutdown()
 
@@ -56,14 +63,19 @@ class CanProxy:
         """Let an old answer of the node stand on the clients' bus (F03)."""
         self._near.send(_frame(_ANSWERS + self._node, data))
 
-    def _serve(self) -> None:
+    def _carry_requests(self) -> None:
         while not self._ended.is_set():
-            asked, told = self._near.recv(0.001), self._far.recv(0.0)
-            if asked is not None:
-                if asked.arbitration_id == _REQUESTS + self._node:
-                    self._requested(bytes(asked.data))
-                if self._fault != "F11":
-                    self._far.send(_frame(asked.arbitration_id, bytes(asked.data)))
+            asked = self._near.recv(_LOOK_S)
+            if asked is None:
+                continue
+            if asked.arbitration_id == _REQUESTS + self._node:
+                self._requested(bytes(asked.data))
+            if self._fault != "F11":
+                self._far.send(_frame(asked.arbitration_id, bytes(asked.data)))
+
+    def _carry_answers(self) -> None:
+        while not self._ended.is_set():
+            told = self._far.recv(0.001 if self._late else _LOOK_S)
             if told is not None:
                 self._told(told)
             now = time.monotonic()

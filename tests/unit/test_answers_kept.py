@@ -24,7 +24,7 @@ PRIMITIVES = {
 
 NO_VALUE_RESTS_ON_IT = {
     "runner/_place_question.py",  # a place: the pose and how it was touched are in the measurement
-    "commands/companions/check_map.py",  # what an HMI shows: kept with the map that it confirms
+    "commands/companions/map_comparison.py",  # what an HMI shows: kept with its map
 }
 
 

@@ -288,6 +288,16 @@ def test_an_error_or_a_busy_plc_holds_a_write_back(commit_bit):
     assert commit_bit.plc.writes == []
 
 
+def test_a_plc_in_error_or_busy_is_not_ready(commit_bit):
+    memory, commit = commit_bit.program.memory, commit_bit.map.commit
+    with commit_bit.connect() as controller:
+        assert controller.status().ready
+        for bit in (commit.error, commit.busy):
+            memory.switch(bit, True)
+            assert not controller.status().ready
+            memory.switch(bit, False)
+
+
 def test_a_missing_permit_holds_a_write_back(commit_bit):
     commit_bit.program.permit(False)
     with commit_bit.connect() as controller:

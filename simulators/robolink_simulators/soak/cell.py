@@ -5,6 +5,7 @@ import os
 import random
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 from unittest import mock
@@ -32,13 +33,7 @@ from robolink_simulators.soak.history import (
     History,
     Hour,
 )
-from robolink_simulators.soak.people import (
-    OTHERS_TOOL,
-    TOOL,
-    describe,
-    habits_in,
-    wish_of,
-)
+from robolink_simulators.soak.people import OTHERS_TOOL, TOOL, describe, habits_in, wish_of
 from robolink_simulators.soak.plant.canopen import CanopenPlant
 from robolink_simulators.soak.plant.epson import PASSWORD, EpsonPlant
 from robolink_simulators.soak.plant.epson_serial import EpsonSerialPlant
@@ -479,14 +474,11 @@ class VirtualCell:
     def _hold_to_contract(self, hour: Hour) -> None:
         """Hold the cell at rest to one of the shipped checks that only read, in turn."""
         process = self._turns.current.owner = self._computer.start(hour.habit.person)
-
-        def connect() -> Controller:
-            outcomes = process.log(self._plant.address, self._clock)
-            return self._plant.connect(process, outcomes)
-
+        log = partial(process.log, self._plant.address, self._clock)
+        subject = Subject(lambda: self._plant.connect(process, log()), tool=2)
         check = READING_CHECKS[hour.number % len(READING_CHECKS)]
         try:
-            (found,) = outcomes_of(Subject(connect, tool=2), (check,))
+            (found,) = outcomes_of(subject, (check,))
             self._rules.hold("ContractHolds", not found.broken, f"{found.name}: {found.broken}")
         finally:
             self._turns.current.owner = None

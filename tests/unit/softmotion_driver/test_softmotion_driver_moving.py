@@ -34,6 +34,8 @@ from robolink.protocols.mailbox import (
     Finished,
     GroupState,
     Opcode,
+    decode_response,
+    encode_response,
 )
 
 ANYWHERE = WorkBox()
@@ -213,6 +215,23 @@ def test_a_stop_from_another_thread_ends_the_wait(cell, plc, controller, group):
         motion.wait(timeout_s=5)
     assert stopped
     assert plc.now.group_state == GroupState.STOPPING
+
+
+def test_a_stop_that_another_one_ended_is_told_when_the_axes_stand(cell, plc, controller):
+    """Its block is done while the group still brakes for the other one."""
+    begun_ns, rests_ns = plc.clock.now_ns(), 400_000_000
+
+    def braking(words):
+        passed_ns = plc.clock.now_ns() - begun_ns
+        if Opcode.STOP not in plc.opcodes() or passed_ns >= rests_ns:
+            return words
+        now = decode_response(words)
+        axes = (now.axes[0] + 100.0 * (passed_ns - rests_ns) / 1e9, *now.axes[1:])
+        return encode_response(replace(now, bits=now.bits | Bits.BUSY, axes=axes))
+
+    cell.link.response = braking
+    controller.stop()
+    assert plc.clock.now_ns() - begun_ns >= rests_ns
 
 
 def test_a_refused_movement_leaves_no_doubt(cell, plc, group):

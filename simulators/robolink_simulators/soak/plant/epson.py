@@ -102,7 +102,7 @@ class EpsonPlant(PlantWithWorld):
         return MachineState(dict(machine.tools.defined()), machine.tools.selected, settings)
 
     def prepare(self, person: WorldParameters) -> None:
-        """See :meth:`PlantMachine.prepare`; power and speed are those of production."""
+        """See ``PlantMachine.prepare``; power and speed are those of production."""
         super().prepare(person)
         machine = self._simulator.machine
         if not machine.motors_on and not self._simulator.condition.serious:

@@ -54,7 +54,7 @@ class EpsonSerialPlant(EpsonPlant):
 
     @property
     def bent(self) -> bool:
-        """See :meth:`PlantMachine.bent`; the line may have bent something, too."""
+        """See ``PlantMachine.bent``; the line may have bent something, too."""
         return super().bent or bool(self._line.acts.met)
 
 

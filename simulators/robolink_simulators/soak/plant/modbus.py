@@ -118,5 +118,5 @@ class ModbusRtuPlant(ModbusTcpPlant):
 
     @property
     def bent(self) -> bool:
-        """See :meth:`PlantMachine.bent`; the line may have bent something, too."""
+        """See ``PlantMachine.bent``; the line may have bent something, too."""
         return super().bent or bool(self._line.acts.met)

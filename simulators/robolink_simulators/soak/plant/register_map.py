@@ -204,7 +204,7 @@ class RegisterMapPlant(PlantMachine):
 
     @property
     def bent(self) -> bool:
-        """See :meth:`PlantMachine.bent`; the line may have bent something, too."""
+        """See ``PlantMachine.bent``; the line may have bent something, too."""
         return super().bent or bool(self._line.acts.met)
 
     def write_by_hand(self, tool: int, offset: ToolOffset) -> None:
@@ -218,7 +218,7 @@ class RegisterMapPlant(PlantMachine):
         self._simulator.program.select(tool)
 
     def finest(self, value: float) -> float:
-        """See :meth:`PlantMachine.finest`: one unit in the last place of a REAL."""
+        """See ``PlantMachine.finest``: one unit in the last place of a REAL."""
         return max(1e-7, abs(value) * 2e-7)
 
     def repair(self) -> None:

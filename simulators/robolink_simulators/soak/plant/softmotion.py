@@ -161,7 +161,7 @@ class SoftMotionPlant(PlantWithWorld):
         self._simulator.plc.tools.preselect(tool)
 
     def finest(self, value: float) -> float:  # noqa: ARG002 - as the base has it
-        """See :meth:`PlantMachine.finest`: an LREAL, in the units of the mailbox."""
+        """See ``PlantMachine.finest``: an LREAL, in the units of the mailbox."""
         return 2e-9
 
     def advance(self) -> None:

@@ -138,7 +138,7 @@ def compare(register_map: RegisterMap, found: Found, value: MapValue, shown: str
     if digits < needed:
         raise ConfigError(
             tr(
-                "{shown!r} is not enough to confirm {key}: type {count} digits after the point.",
+                "{shown!r} has too few digits to confirm {key}: type at least {count} after the point.",
                 shown=text,
                 key=value,
                 count=needed,

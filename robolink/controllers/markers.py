@@ -240,7 +240,7 @@ class MarkerStore:
                     "{request} has to wait: the end of a movement has not been seen.",
                     request=request,
                 ),
-                remedy=tr("Wait for the movement, or stop it."),
+                remedy=tr("Wait until the movement has ended, or stop it."),
                 controller=self._identity,
                 request=request,
             )

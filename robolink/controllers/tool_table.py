@@ -335,7 +335,7 @@ class ToolTableCore(ABC):
         if not isinstance(tool, int) or isinstance(tool, bool):
             raise ToolIndexError(
                 tr(
-                    "A tool is named by its number, an int, and not by {given!r} ({kind}).",
+                    "A tool is named by its number, an int, not by {given!r} ({kind}).",
                     given=tool,
                     kind=type(tool).__name__,
                 ),
@@ -358,7 +358,7 @@ def _require_offset(offset: object) -> None:
 def _require_expected(expected: object) -> None:
     if expected is not None and expected is not ANY and not isinstance(expected, ToolOffset):
         raise ConfigError(
-            tr("What is expected is a ToolOffset, None or ANY, not {given}.", given=expected),
+            tr("The expected value is a ToolOffset, None or ANY, not {given}.", given=expected),
             remedy=tr("Give what read() returned before. Nothing was sent."),
         )
 

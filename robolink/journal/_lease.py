@@ -269,8 +269,8 @@ class Lease:
         return LeaseLostError(
             self._taken.took_over(self.controller),
             remedy=tr(
-                "How this ended here is not on record: what was begun stays open, for whoever "
-                "took over. Read the tools again: 'robolink journal list' shows who did what."
+                "How this ended is not on record: what was begun stays open, for whoever took "
+                "over. Read the tools again; 'robolink journal list' shows who did what."
             )
             if sent
             else tr(

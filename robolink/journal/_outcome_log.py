@@ -257,7 +257,10 @@ class JournalOutcomeLog:
             leave_trace(name, self._journal.location, newest)
         except OSError as error:
             raise JournalError(
-                tr("Where this controller's record is kept cannot be noted: {cause}", cause=error),
+                tr(
+                    "It could not be noted where this controller's record is kept: {cause}",
+                    cause=error,
+                ),
                 remedy=tr(
                     "Make the state folder writable, or name another one with "
                     "ROBOLINK_STATE_DIR. Then run 'robolink recover' again."

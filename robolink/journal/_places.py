@@ -188,15 +188,15 @@ def _require_local(path: Path) -> None:
     if kind is not None:
         raise JournalError(
             tr(
-                "The journal {path} would lie on a network share ({kind}), where its database "
-                "cannot keep two computers apart and may be damaged.",
+                "The journal {path} would be on a network share ({kind}), where two computers can "
+                "write at once and damage its database.",
                 path=path,
                 kind=kind,
             ),
             remedy=tr(
-                "Name a file on a disk of this computer, or a PostgreSQL database for several "
-                "computers, in ROBOLINK_JOURNAL. If the journal has entries, first copy it there, "
-                "with its -wal file, while no program uses it."
+                "In ROBOLINK_JOURNAL, name a file on a disk of this computer or, for several "
+                "computers, a PostgreSQL database. If the journal has entries, first copy it "
+                "there, with its -wal file, while no program uses it."
             ),
         )
 

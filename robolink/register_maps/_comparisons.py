@@ -17,7 +17,7 @@ from robolink.register_maps._map import COMPONENTS, MapSlot, RegisterMap
 from robolink.register_maps._numbers import Number
 
 _FINEST: Final = 2
-"""Digits behind the point that a comparison needs: hundredths of a millimetre or of a degree."""
+"""Digits after the point that a comparison needs: hundredths of a millimetre or of a degree."""
 
 _SLACK: Final = 1e-6
 """What a REAL may lack of a decimal number, in units of the last digit that is shown."""
@@ -138,15 +138,14 @@ def compare(register_map: RegisterMap, found: Found, value: MapValue, shown: str
     if digits < needed:
         raise ConfigError(
             tr(
-                "{shown!r} is not enough to confirm {key}: it needs {count} digits behind the "
-                "point.",
+                "{shown!r} has too few digits to confirm {key}: type at least {count} after the point.",
                 shown=text,
                 key=value,
                 count=needed,
             ),
             remedy=tr(
-                "Type all digits, the zeros too. Where the screen has fewer, compare with a test "
-                "value: run it on a terminal."
+                "Type all digits, zeros too. If the screen shows fewer, compare a test value: run "
+                "it on a terminal."
             ),
         )
     return _telling(found, value, text, typed, digits)
@@ -187,7 +186,7 @@ def compare_test(
     if value in before and _alike(before[value], typed, digits):
         raise ConfigError(
             tr(
-                "{key} read {shown} before as well, so nothing was shown by it.",
+                "{key} read {shown} before as well, so this proves nothing.",
                 **_said(value, text),
             ),
             remedy=tr("Enter another value at the machine's own screen."),
@@ -318,7 +317,7 @@ def _require_alike(found: Found, value: MapValue, text: str, typed: float, digit
     if value not in found:
         raise ConfigError(
             tr("{key} cannot be read now.", key=value),
-            remedy=tr("Give the tool values at the machine's own screen, then compare."),
+            remedy=tr("Enter the tool's values at the machine's own screen, then compare."),
         )
     if not _alike(found[value], typed, digits):
         raise _differs(found, value, text, typed, digits)
@@ -381,7 +380,7 @@ def _said(value: MapValue, text: str) -> dict[str, object]:
 
 
 def _digits_needed(number: Number) -> int:
-    """Return how many digits behind the point show a number to hundredths, or to its own step."""
+    """Return how many digits after the point show a number to hundredths, or to its own step."""
     step = _step(number)
     return next((d for d in range(_FINEST) if step * 10**d >= 1 - _SLACK), _FINEST)
 

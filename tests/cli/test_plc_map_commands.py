@@ -206,7 +206,7 @@ def test_on_a_terminal_the_person_is_asked_and_may_leave(shown, serve, person):
     check = ["-c", url, "plc", "check-map"]
     asks = person(plc, None, "-5", "-5.44", "q")
     code, _, err = shown(*check)
-    assert (code, "needs 2 digits" in err, "stays on record" in err) == (9, True, True)
+    assert (code, "type at least 2 after the point" in err, "stays on record" in err) == (9, True, True)
     asks = person(plc, "3.21", None, "", "-75.07\n", "4.000")
     code, out, _ = shown(*check)
     assert (code, asks.answers) == (0, [])
@@ -216,7 +216,7 @@ def test_on_a_terminal_the_person_is_asked_and_may_leave(shown, serve, person):
         "1.u",
         "2.x",
     ]
-    assert "not changed by any command: 1.z, 2.z" in out
+    assert "so no command changes them: 1.z, 2.z" in out
 
 
 def test_a_component_that_is_zero_everywhere_is_compared_by_a_test_value(shown, serve, person):
@@ -234,7 +234,7 @@ def test_a_component_that_is_zero_everywhere_is_compared_by_a_test_value(shown, 
     code, out, err = shown(*check)
     assert (code, asks.answers, "still reads" in err) == (0, [], False)
     assert asks.asked[0].startswith("Enter 7.3 for 1.y at the HMI")
-    assert asks.asked[1] == "Put 1.y back to 0.0 at the HMI, then press Enter."
+    assert asks.asked[1] == "At the HMI, put 1.y back to 0.0, then press Enter."
     assert "Not compared" not in out
     assert shown("-c", url, "tool", "set", "1", "--y", "1", "--dry-run")[0] == 0
     assert plc.writes == []
@@ -253,7 +253,7 @@ def test_a_test_value_that_another_component_shows_takes_everything_back(shown, 
     assert (code, asks.answers) == (2, [])
     assert "That is what 1.z reads" in err
     assert "taken back" in err
-    assert "Put 1.y back to what it was" in err
+    assert "put 1.y back to what it was" in err
     code, _, err = shown("-c", url, "tool", "set", "1", "--x", "1", "--dry-run")
     assert (code, "Nobody has compared 1.x" in err) == (2, True)
 

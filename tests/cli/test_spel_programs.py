@@ -245,7 +245,7 @@ def test_a_project_file_stands_for_the_files_that_it_lists(ended, project):
 def test_a_project_file_is_refused_by_what_is_wrong_with_it(ended, program, project):
     both = ended("spel", "check", project, project.replace("cell.sprj", "main.prg"))
     assert both.code == 2
-    assert "stands alone" in both.err
+    assert "no other file goes with it" in both.err
     missing = program(PROJECT.replace("Main.prg", "gone.prg"), "missing.sprj")
     assert "gone.prg, which is not beside it" in ended("spel", "check", missing).err
     points = program(PROJECT.replace("other.pts", "gone.pts"), "points.sprj")
@@ -293,8 +293,8 @@ def test_a_function_says_first_what_the_project_keeps_outside(ended, program):
 
 def test_the_robot_that_nobody_named_is_named_when_a_point_is_out_of_reach(ended, program):
     path = program("Function main\n  Go XY(900, 0, 0, 0)\nFend\n")
-    assert "The robot was T6-602S" in ended("spel", "run", path).err
-    assert "The robot was" not in ended("spel", "run", path, "--robot", "T6-602S").err
+    assert "the program ran on T6-602S" in ended("spel", "run", path).err
+    assert "the program ran on" not in ended("spel", "run", path, "--robot", "T6-602S").err
 
 
 def test_a_served_controller_is_prepared_before_it_is_served(program):
@@ -303,5 +303,5 @@ def test_a_served_controller_is_prepared_before_it_is_served(program):
     path = Path(program(text))
     load_programs(simulator, [path], [], ProjectSurroundings(before="setup"))
     assert simulator.machine.tools.get(2) is not None
-    with pytest.raises(ConfigError, match="bad of --before fails"):
+    with pytest.raises(ConfigError, match="bad, named with --before, failed"):
         load_programs(simulator, [path], [], ProjectSurroundings(before="bad"))

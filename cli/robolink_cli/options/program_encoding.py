@@ -22,7 +22,9 @@ class _Encoding(click.ParamType[str]):
             codecs.lookup(value)
         except LookupError:
             self.fail(
-                tr("There is no code page {name}: gbk, cp932, cp1250 ...", name=value), param, ctx
+                tr("There is no code page {name}. Examples: gbk, cp932, cp1250.", name=value),
+                param,
+                ctx,
             )
         return value
 
@@ -33,8 +35,8 @@ def encoding_option(function: Any) -> Any:  # noqa: ANN401 - a decorator of clic
         "--encoding",
         type=_Encoding(),
         metavar="NAME",
-        help="Code page of the files: utf-8, gbk, cp932, cp1250. Without it the first of UTF-8, "
-        "cp932 and GBK that fits is taken, and told.",
+        help="Code page of the files: utf-8, gbk, cp932, cp1250. Without it, the first of UTF-8, "
+        "cp932 and GBK that fits is used, and named.",
     )(function)
 
 
@@ -45,15 +47,15 @@ def tell_encoding(taken: str | None, *, named: str | None) -> None:
     if taken is None:
         note(
             tr(
-                "No code page fits all files; letters that are not ASCII may look wrong. Name it "
-                "with --encoding."
+                "No code page fits all files, so letters that are not ASCII may look wrong. Name "
+                "the code page with --encoding."
             )
         )
         return
     note(
         tr(
-            "The files were read as {encoding}. If their text looks wrong, name another with "
-            "--encoding.",
+            "The files were read as {encoding}. If their text looks wrong, name another code page "
+            "with --encoding.",
             encoding=taken,
         )
     )

@@ -277,8 +277,8 @@ _PROJECT_OPTIONS: tuple[Callable[[Any], Any], ...] = (
     click.option(
         "--before",
         metavar="NAME",
-        help="A function that runs to its end first: what the project keeps outside its programs, "
-        "as HomeSet, TLSet, SetNet and SetCom say it.",
+        help="A function to run to its end first. It sets what the project keeps outside its "
+        "programs, with HomeSet, TLSet, SetNet and SetCom.",
     ),
     click.option(
         "--vision",

@@ -114,8 +114,8 @@ class RegisterToolTable(ToolTableCore):
         if entry is not None and self.same(now, known):
             return ""
         return tr(
-            "The registers of tool {tool} hold {now}; on record is {known}. Only the HMI tells "
-            "whether the machine works with that: the PLC may not have taken it over yet.",
+            "The registers of tool {tool} hold {now}; on record is {known}. Only the HMI shows "
+            "which of the two the machine uses: the PLC may not have accepted its registers yet.",
             tool=tool,
             now=describe_offset(now),
             known=tr("nothing") if entry is None else describe_offset(known),

@@ -171,8 +171,9 @@ class OffsetValues:
                     limit=limit,
                 ),
                 remedy=tr(
-                    "If the tool is so long, state a larger largest_mm in the map; else compare "
-                    "address, type, scale and word_order with the PLC's register list."
+                    "If the tool really is that long, state a larger largest_mm in the map; "
+                    "otherwise compare address, type, scale and word_order with the PLC's register "
+                    "list."
                 ),
                 controller=self._identity,
             )

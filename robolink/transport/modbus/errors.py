@@ -121,9 +121,9 @@ def _noise(raw: bytes) -> str:
     if raw[:1] != b"\0":
         return ""
     return tr(
-        "The 00 before the answer is noise of an RS-485 line that nobody drives: fit its bias "
-        "resistors and terminators, or let the adapter switch over later. Else check the baud "
-        "rate and the parity."
+        "The 00 before the answer is noise of an RS-485 line that nobody drives: fit bias "
+        "resistors and terminators, or let the adapter switch later. Otherwise check the baud rate "
+        "and the parity."
     )
 
 
@@ -228,8 +228,8 @@ def _remedy(code: int, unit: int) -> str:
             "sizes of the areas in the PLC's Modbus device."
         ),
         3: tr(
-            "The PLC's Modbus device may give fewer registers at once: let it allow more, or say "
-            "how many in the URL (most_registers=50)."
+            "The PLC's Modbus device may allow fewer registers at once: raise its limit, or state "
+            "the limit in the URL (most_registers=50)."
         ),
         6: tr("Wait until the PLC has finished what it does, then try again."),
         _GATEWAY_NO_PATH: tr(

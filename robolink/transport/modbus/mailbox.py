@@ -79,15 +79,15 @@ def open_modbus_link(
         client.close()
         raise ConfigError(
             tr(
-                "A mailbox is read whole, {read} registers, for its checksum; {identity} gives "
-                "{most} in one read.",
+                "A mailbox of {read} registers is read at once, for its checksum; {identity} "
+                "allows {most} in one read.",
                 read=RESPONSE_WORDS,
                 most=client.most_registers,
                 identity=client.identity,
             ),
             remedy=tr(
-                "Let the PLC's Modbus device allow {read} registers in one read and {written} in "
-                "one write, or use a map of registers.",
+                "Set the PLC's Modbus device to allow {read} registers in one read and {written} "
+                "in one write, or use a register map.",
                 read=RESPONSE_WORDS,
                 written=COMMAND_WORDS,
             ),

@@ -301,8 +301,11 @@ class _Served(BaseHTTPRequestHandler):
             return ApiReply(
                 HTTPStatus.FORBIDDEN,
                 error_document(
-                    tr("A web page asks here (Origin), and pages are not answered."),
-                    tr("Ask from a program of your own, and send no Origin."),
+                    tr(
+                        "This request comes from a web page (Origin), and web pages are not "
+                        "answered."
+                    ),
+                    tr("Ask from a program of your own, without an Origin header."),
                 ),
             )
         names = self.headers.get_all("Host", [])
@@ -310,8 +313,8 @@ class _Served(BaseHTTPRequestHandler):
             return ApiReply(
                 HTTPStatus.FORBIDDEN,
                 error_document(
-                    tr("The request is for another machine by its Host."),
-                    tr("Name this one as localhost or by its address."),
+                    tr("The Host of this request names another machine."),
+                    tr("Use localhost, or the address of this machine."),
                 ),
             )
         return None

@@ -57,10 +57,15 @@ class Share(click.ParamType[slice]):
 @click.option(
     "--seeds",
     type=SeedRange(),
-    help="Run these: 0-499, or fresh ones, drawn from the commit. What was run is passed over.",
+    help="Run these: 0-499, or fresh, which are drawn from the commit. Those that were run are "
+    "skipped.",
 )
-@click.option("--count", type=click.IntRange(1), default=1000, show_default=True, help="Of fresh.")
-@click.option("--share", type=Share(), default="1/1", help="Of the seeds: 2/2 is every second.")
+@click.option(
+    "--count", type=click.IntRange(1), default=1000, show_default=True, help="How many fresh seeds."
+)
+@click.option(
+    "--share", type=Share(), default="1/1", help="Which part of the seeds: 2/2 is every second one."
+)
 @click.option("--seed", type=int, help="This one, for --replay, --shrink and --write-test.")
 @click.option("--hours", type=click.IntRange(1), default=20, show_default=True, help="A seed.")
 @click.option("--kind", type=click.Choice([kind.value for kind in CellKind]), help="Of the cell.")
@@ -80,7 +85,7 @@ class Share(click.ParamType[slice]):
     type=click.Path(path_type=Path),
     default=Path("tests/soak/seeds_run.txt"),
     show_default=True,
-    help="Which seeds were ever run.",
+    help="Where the list of all seeds ever run is kept.",
 )
 def main(
     seeds: range | None,

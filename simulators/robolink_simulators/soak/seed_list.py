@@ -118,12 +118,12 @@ def committed(folder: Path) -> str:
     except (OSError, subprocess.CalledProcessError) as error:
         raise ConfigError(
             tr("Fresh seeds are drawn from a commit, and there is none here."),
-            remedy=tr("Run this in a clone, or name a range of seeds."),
+            remedy=tr("Run this in a git clone, or name a range of seeds."),
         ) from error
     if changed:
         raise ConfigError(
             tr("The sources differ from the commit from which fresh seeds are drawn."),
-            remedy=tr("Commit them first."),
+            remedy=tr("Commit the changes first."),
         )
     return commit
 

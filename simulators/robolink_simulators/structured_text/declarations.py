@@ -178,7 +178,8 @@ class Declarations:
         if first is not None:
             if first.data == "initial_members" and dialect is TextDialect.COMMON:
                 raise refused(
-                    TextPlace.of(file, first), tr("members begin with values in the glue only")
+                    TextPlace.of(file, first),
+                    tr("initial values of members appear in the glue only"),
                 )
             translator = ExpressionTranslator(self.scope(file, dialect, {}))
             variable.first = initial_value(first, of, translator)

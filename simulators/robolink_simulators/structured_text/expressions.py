@@ -148,7 +148,9 @@ def initial_value(tree: Node, of: DataType, translator: ExpressionTranslator) ->
 def _initial_members(tree: Node, of: DataType, translator: ExpressionTranslator) -> Value:
     """Return a structure in which some members begin with a literal of their own."""
     if not isinstance(of, StructType):
-        raise refused(translator.place(tree), tr("only a structure begins with members"))
+        raise refused(
+            translator.place(tree), tr("only a structure may list members as its initial value")
+        )
     frame = of.initial()
     for given in tree.children:
         name, value = given.children

@@ -36,8 +36,8 @@ def check_map(
 ) -> None:
     """Check the map of a PLC's registers: the file, or with -c its values against the HMI.
 
-    What nobody has compared here is not changed by any command. The first value of a tool tells its
-    place, one of each component the rest; a component that is 0 needs a test value.
+    No command changes a value that nobody has compared here. One value of each component and one
+    of each tool are enough; a component that is 0 needs a test value.
     """
     if register_list is not None:
         _start(context, register_list)
@@ -130,7 +130,7 @@ def _check_values(context: CliContext, shows: tuple[str, ...]) -> None:
         if missing:
             say(
                 tr(
-                    "Not compared yet, so not changed by any command: {values}.",
+                    "Not compared yet, so no command changes them: {values}.",
                     values=", ".join(map(str, missing)),
                 )
             )

@@ -88,7 +88,8 @@ class MapComparison:
         tests = [one for one in wanted if one.why_not]
         entering = [
             tr(
-                "First enter a test value at the HMI for {values}, and put the old one back after.",
+                "First enter a test value at the HMI for {values}, and put the old one back "
+                "afterwards.",
                 values=", ".join(str(one.value) for one in tests),
             )
         ]
@@ -111,7 +112,7 @@ class MapComparison:
         value, test = wanted.value, wanted.test_mm_or_deg
         if test is None:
             answer = self._answer(
-                tr("What does the HMI show for {key}? (Enter leaves it out, q ends)", key=value)
+                tr("What does the HMI show for {key}? (Enter skips it, q ends)", key=value)
             )
             return (
                 [compare(self._map, values.found, value, answer)]
@@ -121,8 +122,8 @@ class MapComparison:
         note(wanted.why_not)
         answer = self._answer(
             tr(
-                "Enter {test:g} for {key} at the HMI, let the machine take it over, then type here "
-                "what you entered. (Enter leaves it out, q ends)",
+                "Enter {test:g} for {key} at the HMI, let the machine accept it, then type here "
+                "what you entered. (Enter skips it, q ends)",
                 key=value,
                 test=test,
             )
@@ -133,7 +134,7 @@ class MapComparison:
             if self._given(answer, value):
                 made = [compare_test(self._map, values.found, now, value, answer)]
         except MapDiffersError as error:  # where it went to, the map does not tell
-            away = tr("Put {key} back to what it was at the HMI.", key=value)
+            away = tr("At the HMI, put {key} back to what it was.", key=value)
             error.remedy = joined(" ", (error.remedy, away))
             raise
         except (ConfigError, DeclinedError):
@@ -151,7 +152,10 @@ class MapComparison:
         if answer.lower() == "q":
             raise DeclinedError(
                 tr("Not everything was compared."),
-                remedy=tr("What was stays on record, the rest is not changed; run it again."),
+                remedy=tr(
+                    "What was compared stays on record, and no command changes the rest. Run "
+                    "it again to go on."
+                ),
             )
         if not answer:
             self._left_out.add(value)
@@ -162,9 +166,13 @@ class MapComparison:
         if now == before:
             return
         self._answer(
-            tr("Put {key} back to {before} at the HMI, then press Enter.", key=value, before=before)
+            tr(
+                "At the HMI, put {key} back to {before}, then press Enter.",
+                key=value,
+                before=before,
+            )
             if before is not None
-            else tr("Take {key} away again at the HMI, then press Enter.", key=value)
+            else tr("At the HMI, clear {key} again, then press Enter.", key=value)
         )
         left = MapValues(self._controller).found.get(value)
         if left != before:

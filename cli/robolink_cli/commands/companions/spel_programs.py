@@ -40,16 +40,16 @@ def programs_argument(function: Any) -> Any:  # noqa: ANN401 - a decorator of cl
     return click.argument("files", metavar="FILE...", nargs=-1, required=True, type=_FILE)(function)
 
 
-@click.command("check", short_help="Build SPEL+ programs and tell every fault.")
+@click.command("check", short_help="Build SPEL+ programs and show every fault.")
 @programs_argument
 @encoding_option
 @json_option
 def check(files: tuple[Path, ...], points: tuple[Path, ...], encoding: str | None) -> int:
-    """Build SPEL+ programs and tell every fault with its file, line and column.
+    """Build SPEL+ programs and show every fault with its file, line and column.
 
-    All files together are one project; a .sprj file stands for those that it lists. Point files,
-    IOLabels.dat and UserErrors.dat that lie beside them are read for the names in them. Nothing
-    runs and no controller is asked.
+    All files together are one project; a .sprj file stands for the files that it lists. Point
+    files, IOLabels.dat and UserErrors.dat that lie beside them are read for the names in them.
+    Nothing runs and no controller is asked.
     """
     from robolink_simulators.epson.spel.programs.loading import check_project
     from robolink_simulators.epson.spel.source.faults import ProgramRefused
@@ -67,7 +67,7 @@ def check(files: tuple[Path, ...], points: tuple[Path, ...], encoding: str | Non
     if checked.data.missing_points:
         note(
             tr(
-                "Not beside the project file: {names}. Names that nobody declares were taken for "
+                "Not beside the project file: {names}. Undeclared names were taken for point "
                 "labels.",
                 names=", ".join(checked.data.missing_points),
             )
@@ -221,8 +221,8 @@ def _failed(failure: "TaskFailure", default_robot: str | None) -> ControllerFaul
     remedy = tr("Mend that line, or let OnErr deal with the error.")
     if default_robot is not None:
         remedy = tr(
-            "The robot was {robot}, taken because none was named. Name the program's own with "
-            "--robot, or mend that line.",
+            "No robot was named, so the program ran on {robot}. Name its own robot with --robot, "
+            "or mend that line.",
             robot=default_robot,
         )
     return ControllerFaultError(

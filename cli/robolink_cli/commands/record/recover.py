@@ -52,8 +52,9 @@ from robolink_cli.views.documents import finding_payload
     "--take-over",
     metavar="REASON",
     help=(
-        "Take this controller over from whoever works on it, a PLC's mailbox too: what moves is "
-        "halted, and the other is refused from then on. Your name and the reason are kept."
+        "Take this controller over from the program that works on it, a PLC's mailbox too, where "
+        "what moves is halted. That program is refused from then on. Your name and the reason are "
+        "recorded."
     ),
 )
 def recover(

@@ -48,7 +48,7 @@ from robolink_cli.options.simulation import (
     metavar="N",
     default=125,
     show_default=True,
-    help="Registers that one read gives; some servers give 61 or 50.",
+    help="How many registers one read may ask for; some servers allow 61 or 50.",
 )
 @seed_option
 @pace_options

@@ -262,7 +262,7 @@ class EpsonSession:
                         "{name} has to wait: a statement is still running on the controller.",
                         name=request.name,
                     ),
-                    remedy=tr("Wait for the motion, or stop it."),
+                    remedy=tr("Wait until the movement has ended, or stop it."),
                     controller=self.identity,
                     request=request.name,
                 )

@@ -120,7 +120,7 @@ class Ownership:
                 seconds=_LONGEST_SILENCE_S,
             )
         )
-        latch, request = self._wire.latch, tr("the take of the mailbox")
+        latch, request = self._wire.latch, tr("taking the mailbox")
         stopped = latch.closed
         deadline = Deadline.after(self._wire.clock, _LONGEST_SILENCE_S)
         while not deadline.expired:
@@ -250,8 +250,7 @@ class Ownership:
                 tr("Wait until it has finished, or end it.")
                 if run.lives
                 else tr(
-                    "If it has ended, try again in {seconds:.0f} s: so long after its last sign "
-                    "the mailbox is free.",
+                    "If it has ended, try again in {seconds:.0f} s; then the mailbox is free.",
                     seconds=SILENCE_S,
                 )
             )
@@ -261,8 +260,8 @@ class Ownership:
     def _wait_for_silence(self, held: LeaseHeldError) -> None:
         self._tell(
             tr(
-                "Client {holder} has the mailbox of the PLC. If it has ended, the mailbox is free "
-                "in {seconds:.0f} s at most; waiting for that.",
+                "Client {holder} holds the mailbox of the PLC. If it has ended, the mailbox is "
+                "free within {seconds:.0f} s. Waiting until then.",
                 holder=held.holder,
                 seconds=_LONGEST_SILENCE_S,
             )

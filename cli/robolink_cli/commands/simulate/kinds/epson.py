@@ -209,8 +209,8 @@ def run_first(simulator: EpsonSimulator, runner: ProgramRunner, function: str) -
     if runner.failure is not None or not ended:
         why = str(runner.failure) if runner.failure is not None else tr("it does not end")
         raise ConfigError(
-            tr("{function} of --before fails: {why}.", function=function, why=why),
-            remedy=tr("Keep to settings in it: HomeSet, TLSet, SetNet, SetCom, MemOn."),
+            tr("{function}, named with --before, failed: {why}.", function=function, why=why),
+            remedy=tr("Use only settings in it: HomeSet, TLSet, SetNet, SetCom, MemOn."),
         )
 
 

@@ -332,7 +332,7 @@ def _here(session: Session, _: Arguments) -> Point:
 
 def _old_here(session: Session, arguments: Arguments) -> Point:
     if session.options.old_here == "refused":
-        raise SpelRefusal(RefusalKind.SYNTAX, "P* is of older versions: write Here")
+        raise SpelRefusal(RefusalKind.SYNTAX, "P* belongs to older versions: write Here")
     return _here(session, arguments)
 
 

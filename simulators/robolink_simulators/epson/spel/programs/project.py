@@ -125,7 +125,7 @@ class ProjectBuilder:
         label = label_of(line)
         nodes: tuple[LineNode, ...] = () if label is not None else parsed(line)
         if self._options.old_here == "refused" and "*" in line.text and OLD_HERE in names_in(nodes):
-            raise ProgramFault(line.place, tr("P* is of older versions: write Here"))
+            raise ProgramFault(line.place, tr("P* belongs to older versions: write Here"))
         if nodes and isinstance(nodes[0], FunctionHeader):
             if current is not None:
                 self._faults.append(

@@ -41,7 +41,7 @@ def project_files(programs: Sequence[Path], points: Sequence[Path] = ()) -> Proj
         return ProjectFiles(tuple(programs), tuple(points))
     if len(programs) > 1:
         raise ConfigError(
-            tr("A project file names its programs itself: it stands alone."),
+            tr("A project file lists its own programs: no other file goes with it."),
             remedy=tr("Give the .sprj file, or the .prg files."),
         )
     (project,) = programs
@@ -53,7 +53,7 @@ def project_files(programs: Sequence[Path], points: Sequence[Path] = ()) -> Proj
             if path is None:
                 raise ConfigError(
                     tr("{path} lists {name}, which is not beside it.", path=project, name=name),
-                    remedy=tr("Copy the whole folder of the project."),
+                    remedy=tr("Copy the whole project folder."),
                 )
             listed.append(path)
         elif names == ("PointFile",) and name:

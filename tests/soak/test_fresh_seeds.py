@@ -275,6 +275,9 @@ HISTORIES = (
         ),
     ),
 )
+HALF_A_FILE = drawn_history(919893192, 20)
+"""A PLC over Modbus TCP, and a journal whose rows came back empty."""
+
 LOST_RECORD = drawn_history(177058577, 20).without_hours(
     [hour for hour in range(20) if hour not in (8, 9)]
 )
@@ -283,7 +286,7 @@ LOST_RECORD = drawn_history(177058577, 20).without_hours(
 
 @pytest.mark.soak
 @pytest.mark.parametrize(
-    "history", [*HISTORIES, LOST_RECORD], ids=lambda history: str(history.seed)
+    "history", [*HISTORIES, HALF_A_FILE, LOST_RECORD], ids=lambda history: str(history.seed)
 )
 def test_every_rule_holds_in_what_broke_one(history):
     story = live_through(history)

@@ -121,7 +121,13 @@ class Rulebook(Grounds):
         return True
 
     def others_write(self, process: VirtualProcess, tool: int, offset: ToolOffset) -> None:
-        """Note that a second person has read a tool, and writes it."""
+        """Note that a second person has read a tool, and writes it.
+
+        Args:
+            process: That person's.
+            tool: Which.
+            offset: What is written.
+        """
         self._by_hand.replaces(process, tool, offset)
         self.now.crowded = True
         self.now.typed_by_others.append((tool, offset))

@@ -33,6 +33,7 @@ from robolink_simulators.soak.history import (
     Hour,
 )
 from robolink_simulators.soak.people import (
+    AGREE,
     OTHERS_TOOL,
     TOOL,
     describe,
@@ -167,6 +168,8 @@ class VirtualCell:
         if not process.alive:
             raise Killed
         self._pass_point(process, f"{point} {what}")
+        if what == AGREE and process is self._at_work:
+            self._rules.agreed()
 
     def _pass_point(self, process: VirtualProcess, text: str) -> None:
         if process is self._at_work and self._waiting:

@@ -83,6 +83,7 @@ class Rulebook(Grounds):
             self.books.last_number(),
             frozenset(marker.operation for marker in self.books.markers()),
             self.plant.movements,
+            state,
         )
         for tool, offset in state.tools.items():
             self.now.wanted[tool] = [offset]
@@ -109,6 +110,10 @@ class Rulebook(Grounds):
     def hand_chose(self, tool: int) -> None:
         """Note which tool somebody puts in force at the machine meanwhile."""
         self.now.chosen_by_hand.append(tool)
+
+    def agreed(self) -> None:
+        """Note what the machine keeps while a person agrees to a change of it."""
+        self.now.agreed = self.plant.state()
 
     def said(self, text: str) -> None:
         """Note what a person is told."""

@@ -156,7 +156,7 @@ DEFECTS: Final = (
     ),
     KnownDefect(
         "an exit code says what broke last, not what stands unproved",
-        {"robolink_cli.console.exit_codes.standing_after": lambda _error: UNTOUCHED},
+        {"robolink.standing.standing_after": lambda _error: UNTOUCHED},
         found_by=_PROXY,
     ),
     KnownDefect(

@@ -138,7 +138,8 @@ def compare(register_map: RegisterMap, found: Found, value: MapValue, shown: str
     if digits < needed:
         raise ConfigError(
             tr(
-                "{shown!r} has too few digits to confirm {key}: type at least {count} after the point.",
+                "{shown!r} has too few digits to confirm {key}: type at least {count} after the "
+                "point.",
                 shown=text,
                 key=value,
                 count=needed,

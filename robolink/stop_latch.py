@@ -27,7 +27,10 @@ class CommandClass(Enum):
     """It reads, logs in or out, or shows that this side is alive."""
 
     CALM = auto()
-    """It stops, ends, resets or switches off."""
+    """It stops, ends or switches off."""
+
+    RESET = auto()
+    """It clears an error, or releases the hold of a stop."""
 
     RESTORE = auto()
     """It selects a tool, or sets power or speed."""
@@ -49,6 +52,7 @@ class StopLatch:
     def __init__(self, controller: str) -> None:
         self._controller = controller
         self._closed = False
+        self._closings = 0
         self._stops = ambient.waiting_room()
         self._under_way = 0
         self._permits = threading.local()
@@ -66,6 +70,7 @@ class StopLatch:
 
     def close(self) -> None:
         """Hold everything back from now on; never waits."""
+        self._closings += 1
         self._closed = True
 
     @contextmanager
@@ -98,6 +103,8 @@ class StopLatch:
             StoppedError: It was not sent.
         """
         if not self._closed or kind in (CommandClass.LOOK, CommandClass.CALM):
+            return
+        if kind is CommandClass.RESET and self._permits.__dict__.get("calms") == self._closings:
             return
         if kind is CommandClass.RESTORE and self.restores:
             return
@@ -151,6 +158,29 @@ class StopLatch:
             self.require_open(request)
             raise
         self.require_open(request)
+
+    @contextmanager
+    def calming(self, request: str) -> Iterator[None]:
+        """Surround what may begin under a stop: a reset, or switching off.
+
+        A stop that comes meanwhile ends it as it ends everything else, and no reset of before is
+        sent after it: it would release what this stop holds.
+
+        Raises:
+            StoppedError: A stop came meanwhile.
+        """
+        permits, began, closed = self._permits.__dict__, self._closings, self._closed
+        before, permits["calms"] = permits.get("calms"), began
+        try:
+            if closed:
+                yield
+            else:
+                with self.ending(request):
+                    yield
+            if self._closings != began:
+                self.require_open(request)
+        finally:
+            permits["calms"] = before
 
     @contextmanager
     def restoring(self) -> Iterator[None]:

@@ -5,7 +5,7 @@ What keeps two procedures of this process apart stands here too.
 
 import threading
 from collections.abc import Callable, Collection, Iterator, Mapping
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Final
 
@@ -56,6 +56,15 @@ class ProcedureLock:
             BusyError: Another thread holds it.
             StoppedError: A stop is in force, or came meanwhile.
         """
+        if calming:
+            with self._latch.calming(request), self._locked(request):
+                yield
+        else:
+            with self._locked(request), self._latch.watching(request):
+                yield
+
+    @contextmanager
+    def _locked(self, request: str) -> Iterator[None]:
         checkpoint(Checkpoint.PROCEDURE, request)
         if not self._lock.acquire(blocking=False):
             raise BusyError(
@@ -65,8 +74,7 @@ class ProcedureLock:
                 request=request,
             )
         try:
-            with nullcontext() if calming else self._latch.watching(request):
-                yield
+            yield
         finally:
             self._lock.release()
 

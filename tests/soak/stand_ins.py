@@ -298,7 +298,7 @@ def selection_stays_open(store: Any, marker: Marker, *entries: NewEntry) -> None
         _clear(store, marker, *entries)
         return
     store.ledger.ended(marker)
-    store._under_way.discard(marker.operation)
+    store._under_way.pop(marker.operation, None)
     store._procedures.pop(marker.kind, None)
 
 

@@ -211,7 +211,73 @@ HISTORIES = (
             ),
         ),
     ),
+    History(
+        919892864,
+        CellKind.EPSON_SERIAL,
+        (
+            Hour(
+                0,
+                Deed.CHANGE_NOZZLE,
+                Habit(),
+                (
+                    Disturbance(Hindrance.HAND, "type", "question", 5, 0.0, None),
+                    Disturbance(Hindrance.PENDANT, "", "Tool ", 1, 0.0, None),
+                ),
+            ),
+        ),
+    ),
+    History(
+        919892924,
+        CellKind.EPSON_SERIAL,
+        (
+            Hour(
+                10,
+                Deed.CHANGE_NOZZLE,
+                Habit(),
+                (
+                    Disturbance(Hindrance.HAND, "type", "question", 2, 0.0, None),
+                    Disturbance(Hindrance.PENDANT, "", "Go ", 0, 0.0, None),
+                ),
+            ),
+        ),
+    ),
+    History(
+        919892870,
+        CellKind.EPSON,
+        (
+            Hour(2, Deed.CHANGE_NOZZLE, Habit(), ()),
+            Hour(
+                5,
+                Deed.SELECT_TOOL,
+                Habit(),
+                (
+                    Disturbance(Hindrance.FREEZE, "", "question", 0, 0.0, None),
+                    Disturbance(Hindrance.DISK, "lost", "", 0, 0.0, None),
+                ),
+            ),
+        ),
+    ),
+    History(
+        919892798,
+        CellKind.EPSON,
+        (
+            Hour(8, Deed.CHANGE_NOZZLE, Habit(), ()),
+            Hour(
+                9,
+                Deed.SET_TWO,
+                Habit(),
+                (
+                    Disturbance(Hindrance.HAND, "type", "question", 0, 0.0, None),
+                    Disturbance(Hindrance.FREEZE, "", "question", 0, 0.0, None),
+                    Disturbance(Hindrance.DISK, "lost", "", 0, 0.0, None),
+                ),
+            ),
+        ),
+    ),
 )
+HALF_A_FILE = drawn_history(919893192, 20)
+"""A PLC over Modbus TCP, and a journal whose rows came back empty."""
+
 LOST_RECORD = drawn_history(177058577, 20).without_hours(
     [hour for hour in range(20) if hour not in (8, 9)]
 )
@@ -220,7 +286,7 @@ LOST_RECORD = drawn_history(177058577, 20).without_hours(
 
 @pytest.mark.soak
 @pytest.mark.parametrize(
-    "history", [*HISTORIES, LOST_RECORD], ids=lambda history: str(history.seed)
+    "history", [*HISTORIES, HALF_A_FILE, LOST_RECORD], ids=lambda history: str(history.seed)
 )
 def test_every_rule_holds_in_what_broke_one(history):
     story = live_through(history)

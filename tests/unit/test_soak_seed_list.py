@@ -91,5 +91,5 @@ def test_sources_that_differ_from_the_commit_draw_nothing(tmp_path):
     (tmp_path / "seeds_run.txt").write_text("0-9 a\n")
     assert len(committed(tmp_path)) == 40
     (tmp_path / "robolink" / "a.py").write_text("2\n")
-    with pytest.raises(ConfigError, match="Commit the changes"):
+    with pytest.raises(ConfigError, match="Commit the changes first"):
         committed(tmp_path)

@@ -12,7 +12,7 @@ from robolink.protocols.epson_text import COMMANDS, Request
 from robolink.protocols.mailbox import Command, Opcode
 from robolink.stop_latch import CommandClass, StopLatch
 
-LOOK, CALM, RESTORE, WRITE, ACT = CommandClass
+LOOK, CALM, RESET, RESTORE, WRITE, ACT = CommandClass
 HELD_BACK = (RESTORE, WRITE, ACT)
 
 
@@ -94,6 +94,22 @@ def test_under_a_stop_nothing_begins_and_nothing_ends_well(latch):
         raise AssertionError("it began")
 
 
+def test_a_reset_that_a_person_asks_for_under_a_stop_is_let_through(latch):
+    latch.close()
+    with latch.calming("reset"):
+        assert admitted(latch) == {LOOK, CALM, RESET}
+    assert admitted(latch) == {LOOK, CALM}
+
+
+@pytest.mark.parametrize("stopped_before", [False, True])
+def test_a_reset_of_before_a_stop_is_not_sent_after_it_and_does_not_end_well(latch, stopped_before):
+    if stopped_before:
+        latch.close()
+    with pytest.raises(StoppedError, match="reset: ended by a stop"), latch.calming("reset"):
+        latch.close()
+        assert admitted(latch) == {LOOK, CALM}
+
+
 def test_what_the_controller_says_under_a_stop_is_the_stop_and_doubt_stays_doubt(latch):
     held = NotReadyError("held", reason=NotReadyReason.PAUSED)
     with pytest.raises(NotReadyError), latch.watching("jog"):
@@ -163,7 +179,8 @@ def test_every_request_that_is_not_known_to_look_or_calm_acts():
     looking = {c.name for c in COMMANDS if command_class_of(Request(c.name)) is LOOK}
     calming = {c.name for c in COMMANDS if command_class_of(Request(c.name)) is CALM}
     assert all(name.startswith("Get") or name in ("Login", "Logout") for name in looking)
-    assert calming == {"Stop", "Abort", "Pause", "Reset", "SetMotorsOff", "ResetAlm"}
+    assert calming == {"Stop", "Abort", "Pause", "SetMotorsOff", "ResetAlm"}
+    assert command_class_of(Request("Reset")) is RESET
     assert command_class_of(Request("Start", ("0",))) is ACT
     assert command_class_of(Request("SetIO", ("1", "1"))) is ACT
     assert command_class_of(Request("Unheard")) is ACT
@@ -178,6 +195,9 @@ def test_what_moves_a_plc_is_held_back_and_what_ends_it_is_not():
         *(Opcode.SET_KINEMATICS, Opcode.WRITE_OUTPUT, Opcode.MOVE_UNTIL_INPUT),
     }
     assert class_of_command(Command(0, Opcode.JOG)) is CALM  # both masks 0: its end
+    assert class_of_command(Command(0, Opcode.STOP)) is CALM
+    assert class_of_command(Command(0, Opcode.STOP, operands=(1, 0, 0, 0))) is RESET  # its release
+    assert class_of_command(Command(0, Opcode.RESET)) is RESET
 
 
 def test_checkpoints_are_seen_while_somebody_looks_and_cost_nothing_else():

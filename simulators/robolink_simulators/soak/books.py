@@ -2,8 +2,8 @@
 
 import json
 import sqlite3
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
@@ -56,17 +56,20 @@ class Books:
     def markers(self) -> list[BookedMarker]:
         """Return what is open, oldest first; nothing where it cannot be read."""
         rows = self._rows("SELECT operation, kind, request, details FROM markers ORDER BY id")
-        return [
-            BookedMarker(operation, kind, request, json.loads(details))
-            for operation, kind, request, details in rows
-        ]
+        with self._noticing_damage():
+            return [
+                BookedMarker(operation, kind, request, json.loads(details))
+                for operation, kind, request, details in rows
+            ]
+        return []
 
     def holder(self) -> Mapping[str, Any] | None:
         """Return who holds the lease, ``None`` for nobody."""
         for token, holder in self._rows("SELECT token, holder FROM leases"):
             if token:
-                found: Mapping[str, Any] = json.loads(holder)
-                return found
+                with self._noticing_damage():
+                    found: Mapping[str, Any] = json.loads(holder)
+                    return found
         return None
 
     def last_number(self) -> int:
@@ -95,7 +98,8 @@ class Books:
             "SELECT details FROM entries WHERE proved_tool = ? ORDER BY number DESC LIMIT 1", tool
         )
         for (text,) in rows:
-            return True, read_offset(json.loads(text).get("value"))
+            with self._noticing_damage():
+                return True, read_offset(json.loads(text).get("value"))
         return False, None
 
     def verdicts(self, after: int, tool: int) -> list[tuple[str, str]]:
@@ -105,6 +109,19 @@ class Books:
             after,
             tool,
         )
+
+    @contextmanager
+    def _noticing_damage(self) -> Iterator[None]:
+        """Trust a file no more whose rows are not what was written.
+
+        SQLite reads such rows from a file of which a disk that lied has kept one page and lost
+        the next, and raises nothing.
+        """
+        try:
+            yield
+        except (TypeError, ValueError):
+            self.trusted = False
+            self.close()
 
     def _rows(self, statement: str, *values: object) -> list[Any]:
         if not self._path.exists():

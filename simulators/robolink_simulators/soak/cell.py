@@ -269,10 +269,10 @@ class VirtualCell:
                 with self._connected(process) as controller:
                     with suppress(NotReadyError):
                         controller.reset_fault()
-                    recover(controller, keep=False, confirm=lambda _finding: True)
+                    recover(controller, keep=False, confirm=self._rules.word_on)
                     held = controller.tools.read(tool)
                     offset = ToolOffset(8.0, -8.0, -float(1 + process.number % 40))
-                    self._rules.others_write(tool, offset)
+                    self._rules.others_write(process, tool, offset)
                     change_tools(controller, [Wanted(tool, offset, held)])
                 self._note("dora: done")
                 break
@@ -286,7 +286,7 @@ class VirtualCell:
             with self._connected(process) as controller:
                 held = controller.tools.read(OTHERS_TOOL)
                 offset = ToolOffset(7.0, 7.0, -float(1 + process.number % 40))
-                self._rules.others_write(OTHERS_TOOL, offset)
+                self._rules.others_write(process, OTHERS_TOOL, offset)
                 wanted = [Wanted(OTHERS_TOOL, offset, held)]
                 change_tools(controller, wanted, tell=self._note_said)
                 self._note("carl: done")

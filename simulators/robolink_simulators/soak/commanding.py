@@ -47,6 +47,7 @@ def run_line(
         words = [
             word.replace(ASSIST, assist).replace(FOLDER, folder) for word in (line or ("status",))
         ]
+        stack.enter_context(contextlib.chdir(folder))  # a report is written where it is asked for
         stack.enter_context(contextlib.redirect_stdout(out))
         stack.enter_context(contextlib.redirect_stderr(shown))
         stack.enter_context(mock.patch.object(sys, "stdin", io.StringIO()))

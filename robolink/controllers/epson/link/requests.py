@@ -12,7 +12,7 @@ from robolink.protocols.epson_text import EpsonTextCodec, Request, Role
 from robolink.protocols.spel import Statement
 from robolink.stop_latch import CommandClass
 
-_CALM: Final = frozenset({"stop", "abort", "pause", "reset", "resetalm", "setmotorsoff"})
+_CALM: Final = frozenset({"stop", "abort", "pause", "resetalm", "setmotorsoff"})
 _SESSION: Final = frozenset({"login", "logout"})
 
 _LOOKS: Final = re.compile(r"(Print .*|Where|TLSet|Base|Here|RealPos)", re.ASCII)
@@ -29,6 +29,8 @@ def command_class_of(request: Request) -> CommandClass:
     name = request.name.lower()
     if name.startswith("get") or name in _SESSION:
         return CommandClass.LOOK
+    if name == "reset":
+        return CommandClass.RESET
     if name in _CALM:
         return CommandClass.CALM
     if name == "execute" and request.parameters:

@@ -60,17 +60,22 @@ _CLASSES: Final = {
     Opcode.STOP: CommandClass.CALM,
     Opcode.HALT: CommandClass.CALM,
     Opcode.INTERRUPT: CommandClass.CALM,
-    Opcode.RESET: CommandClass.CALM,
+    Opcode.RESET: CommandClass.RESET,
     Opcode.DISABLE: CommandClass.CALM,
     Opcode.SELECT_TOOL: CommandClass.RESTORE,
     Opcode.WRITE_TOOL: CommandClass.WRITE,
     Opcode.CLEAR_TOOL: CommandClass.WRITE,
 }
-"""Every other opcode acts. To release a held stop (2003 with i0 = 1) moves nothing by itself."""
+"""Every other opcode acts."""
 
 
 def command_class_of(command: Command) -> CommandClass:
-    """Return what ``command`` does; an end of a jog, both masks 0, calms."""
+    """Return what ``command`` does.
+
+    An end of a jog, both masks 0, calms. To release a held stop, 2003 with i0 = 1, is to reset it.
+    """
+    if command.opcode == Opcode.STOP and command.operands[0]:
+        return CommandClass.RESET
     if command.opcode == Opcode.JOG and not any(command.operands[:2]):
         return CommandClass.CALM
     return _CLASSES.get(Opcode(command.opcode), CommandClass.ACT)

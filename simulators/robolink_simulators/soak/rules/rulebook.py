@@ -1,6 +1,6 @@
 """All rules of one cell."""
 
-from robolink.model import ToolOffset
+from robolink.model import Finding, MarkerKind, ToolOffset
 from robolink_simulators.soak.books import Books
 from robolink_simulators.soak.computer import VirtualProcess
 from robolink_simulators.soak.history import Hour
@@ -114,8 +114,21 @@ class Rulebook(Grounds):
         """Note what a person is told."""
         self._at_rest.said(text)
 
-    def others_write(self, tool: int, offset: ToolOffset) -> None:
-        """Note that a second person writes a tool."""
+    def word_on(self, finding: Finding) -> bool:
+        """Note that somebody was shown a finding and has looked; return their word."""
+        if finding.marker.kind is MarkerKind.HISTORY:
+            self.books.lost = False
+        return True
+
+    def others_write(self, process: VirtualProcess, tool: int, offset: ToolOffset) -> None:
+        """Note that a second person has read a tool, and writes it.
+
+        Args:
+            process: That person's.
+            tool: Which.
+            offset: What is written.
+        """
+        self._by_hand.replaces(process, tool, offset)
         self.now.crowded = True
         self.now.typed_by_others.append((tool, offset))
         self.now.wanted.setdefault(tool, [None]).append(offset)
@@ -126,7 +139,7 @@ class Rulebook(Grounds):
         self.contract.leaving(process, sent)
         if sent.kind not in (SentKind.OTHER, SentKind.STOP):
             self._before.leaving(process, sent)
-            self._by_hand.leaving(sent, self.plant.state())
+            self._by_hand.leaving(process, sent, self.plant.state())
 
     def given(self, tool: int, value: ToolOffset) -> None:
         """Check a value before the machine's own program is given it."""

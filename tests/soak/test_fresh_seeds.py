@@ -161,6 +161,55 @@ HISTORIES = (
         ),
     ),
     History(
+        919892694,
+        CellKind.MODBUS_RTU,
+        (
+            Hour(
+                0,
+                Deed.SET_TOOL,
+                Habit(),
+                (Disturbance(Hindrance.DISK, "SYNC_FAILS", "commit before", 1, 0.0, None),),
+            ),
+        ),
+    ),
+    History(
+        919892595,
+        CellKind.SOFTMOTION,
+        (
+            Hour(
+                4,
+                Deed.SET_THEN_UNDO,
+                Habit(),
+                (Disturbance(Hindrance.MACHINE, "WORD_ORDER", "WRITE_TOOL", 2, 0.0, 2),),
+            ),
+        ),
+    ),
+    History(
+        919892851,
+        CellKind.SOFTMOTION,
+        (
+            Hour(
+                4,
+                Deed.SET_THEN_UNDO,
+                Habit(),
+                (Disturbance(Hindrance.STOP, "", "wire sent", 2, 0.0, None),),
+            ),
+        ),
+    ),
+    History(
+        919893174,
+        CellKind.MODBUS_RTU,
+        (
+            Hour(
+                10,
+                Deed.COMMAND,
+                Habit(),
+                (Disturbance(Hindrance.STOP, "", "procedure", 0, 0.0, None),),
+                ("robot", "reset", "--yes"),
+            ),
+        ),
+    ),
+    History(
         730434096,
         CellKind.REGISTER_MAP,
         (
@@ -282,11 +331,17 @@ LOST_RECORD = drawn_history(177058577, 20).without_hours(
     [hour for hour in range(20) if hour not in (8, 9)]
 )
 """A program that calls back, and a journal that somebody has deleted."""
+FROZEN_PROGRAM = drawn_history(919892947, 20).without_hours(
+    [hour for hour in range(20) if hour not in (1, 2, 4)]
+)
+"""A hand cannot select a tool while the PLC's program stands still."""
 
 
 @pytest.mark.soak
 @pytest.mark.parametrize(
-    "history", [*HISTORIES, HALF_A_FILE, LOST_RECORD], ids=lambda history: str(history.seed)
+    "history",
+    [*HISTORIES, HALF_A_FILE, LOST_RECORD, FROZEN_PROGRAM],
+    ids=lambda history: str(history.seed),
 )
 def test_every_rule_holds_in_what_broke_one(history):
     story = live_through(history)

@@ -33,7 +33,7 @@ from robolink_simulators.soak.history import (
     History,
     Hour,
 )
-from robolink_simulators.soak.people import OTHERS_TOOL, TOOL, describe, habits_in, wish_of
+from robolink_simulators.soak.people import AGREE, OTHERS_TOOL, TOOL, describe, habits_in, wish_of
 from robolink_simulators.soak.plant.canopen import CanopenPlant
 from robolink_simulators.soak.plant.epson import PASSWORD, EpsonPlant
 from robolink_simulators.soak.plant.epson_serial import EpsonSerialPlant
@@ -162,6 +162,8 @@ class VirtualCell:
         if not process.alive:
             raise Killed
         self._pass_point(process, f"{point} {what}")
+        if what == AGREE and process is self._at_work:
+            self._rules.agreed()
 
     def _pass_point(self, process: VirtualProcess, text: str) -> None:
         if process is self._at_work and self._waiting:
@@ -272,7 +274,7 @@ class VirtualCell:
                     recover(controller, keep=False, confirm=self._rules.word_on)
                     held = controller.tools.read(tool)
                     offset = ToolOffset(8.0, -8.0, -float(1 + process.number % 40))
-                    self._rules.others_write(process, tool, offset)
+                    self._rules.others_write(process, (tool, offset))
                     change_tools(controller, [Wanted(tool, offset, held)])
                 self._note("dora: done")
                 break
@@ -286,7 +288,7 @@ class VirtualCell:
             with self._connected(process) as controller:
                 held = controller.tools.read(OTHERS_TOOL)
                 offset = ToolOffset(7.0, 7.0, -float(1 + process.number % 40))
-                self._rules.others_write(process, OTHERS_TOOL, offset)
+                self._rules.others_write(process, (OTHERS_TOOL, offset))
                 wanted = [Wanted(OTHERS_TOOL, offset, held)]
                 change_tools(controller, wanted, tell=self._note_said)
                 self._note("carl: done")

@@ -38,6 +38,9 @@ TOOL: Final = 1
 OTHERS_TOOL: Final = 4
 """What a second person writes."""
 
+AGREE: Final = "agree"
+"""What a person is asked for before a value is written."""
+
 _NOMINAL: Final = ToolOffset(12.0, -3.5, -20.0)
 """Of the drawing of the nozzle; typed where a command has taken the cell's own tool away."""
 
@@ -186,7 +189,7 @@ def _type(
 
 def _is_asked() -> None:
     """Be asked for a yes; meanwhile others at the machine do what they like."""
-    checkpoint(Checkpoint.QUESTION, "agree")
+    checkpoint(Checkpoint.QUESTION, AGREE)
 
 
 def _begin_a_movement(controller: Controller) -> None:

@@ -186,6 +186,10 @@ class PlantMachine(ABC):
     def state(self) -> MachineState:
         """Return what it keeps now."""
 
+    def mistook(self, asked: ToolOffset, held: ToolOffset) -> bool:  # noqa: ARG002 - as above
+        """Return whether it took an offset for the one that it holds."""
+        return False
+
     def staged(self) -> Mapping[int, ToolOffset]:
         """Return values that stand where robolink reads them, and are not in force yet."""
         return {}

@@ -1,11 +1,12 @@
 """A SoftMotion PLC in a virtual cell, and the mailbox link that leads to it."""
 
+import struct
 from collections.abc import Sequence
 from typing import Final
 
 from robolink.controllers.softmotion import open_softmotion
 from robolink.model import Controller, OutcomeLog, ToolOffset
-from robolink.protocols.mailbox import Words
+from robolink.protocols.mailbox import WordOrder, Words
 from robolink.transport import MailboxLink
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.cell.world_parameters import WorldParameters
@@ -69,6 +70,7 @@ class SoftMotionPlant(PlantWithWorld):
         self._taken_over: Words = ()
         self._starts = self._simulator.plc.memory.boot_id
         self._strange = False
+        self._laid: set[WordOrder] = set()
 
     @property
     def simulator(self) -> SoftMotionSimulator:
@@ -102,6 +104,11 @@ class SoftMotionPlant(PlantWithWorld):
         if plc.memory.boot_id != self._starts:
             self._starts, self.moved_itself = plc.memory.boot_id, True
         return MachineState(tools, plc.tools.selected)
+
+    def mistook(self, asked: ToolOffset, held: ToolOffset) -> bool:
+        """Tell whether it read an offset in an order of words that a fault let it take on."""
+        pairs = list(zip(asked.components(), held.components(), strict=True))
+        return any(all(b in _readings(a, order) for a, b in pairs) for order in self._laid)
 
     @property
     def moving(self) -> bool:
@@ -137,6 +144,11 @@ class SoftMotionPlant(PlantWithWorld):
         """Forget what was planned; return how much was met."""
         faults = self._simulator.faults
         met = len(faults.fired)
+        self._laid |= {
+            WordOrder[fault.order.upper()]
+            for fault in faults.fired
+            if fault.action is PlcFaultAction.WORD_ORDER
+        }
         self._strange |= any(fault.action in _NEEDS_RESTART for fault in faults.fired)
         faults.clear()
         faults.fired.clear()
@@ -154,6 +166,10 @@ class SoftMotionPlant(PlantWithWorld):
         values = (offset.x_mm, offset.y_mm, offset.z_mm, a, b, c)
         self._simulator.plc.memory.define(tool, values, "by hand")
         self.note_hand(tool, offset)
+
+    def choose_by_hand(self, which: int) -> int | None:
+        """Let somebody put another slot in force, unless the program stands that would do it."""
+        return None if self._simulator.plc.frozen else super().choose_by_hand(which)
 
     def select_by_hand(self, tool: int) -> None:
         """Let the machine's own program put a slot in force."""
@@ -198,6 +214,13 @@ class SoftMotionPlant(PlantWithWorld):
             if slot.defined:
                 old = _offset(slot.tool)
                 self.write_by_hand(1, ToolOffset(old.x_mm, old.y_mm, old.z_mm + 0.5))
+
+
+def _readings(value: float, order: WordOrder) -> list[float]:
+    """Return how a value reads in another order of its words; a zero may have either sign."""
+    meant = (value,) if value else (0.0, -0.0)
+    words = [struct.unpack("<4H", struct.pack("<d", one)) for one in meant]
+    return [struct.unpack("<d", struct.pack("<4H", *order.arrange(one)))[0] for one in words]
 
 
 def _offset(tool: Sequence[float]) -> ToolOffset:

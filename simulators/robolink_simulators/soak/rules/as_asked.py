@@ -4,7 +4,7 @@ The markers and the entries of the driver say what it believed that it was asked
 loses a digit before it stores its marker is right by its own record; not by this one.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from robolink.model import ToolOffset
 from robolink_simulators.soak.people import TOOL, Wish
@@ -57,9 +57,23 @@ class AskedRules:
                 "AskedValue",
                 plant.same(first, holds)
                 or tool in plant.touched
-                or any(plant.holds(one, holds) for one in asked),
+                or any(plant.holds(one, holds) for one in asked)
+                or self._mistaken(tool, asked, holds),
                 f"tool {tool} holds {holds}; asked for were {asked}",
             )
+
+    def _mistaken(
+        self, tool: int, asked: Sequence[ToolOffset | None], holds: ToolOffset | None
+    ) -> bool:
+        """Tell whether the machine took an offset for another one, and the record is open."""
+        books = self._on.books
+        told = not books.trusted or any(
+            m.details.get("tool") == tool or str(tool) in m.details.get("tools", {})
+            for m in books.markers()
+        )
+        return told and any(
+            self._on.plant.mistook(one, holds) for one in asked if one is not None and holds
+        )
 
     def at_rest(self, state: MachineState) -> None:
         """Note what the hour has changed, for an undo that comes later."""

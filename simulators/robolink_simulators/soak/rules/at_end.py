@@ -15,6 +15,7 @@ from robolink.errors import (
 from robolink.model import ToolOffset
 from robolink.nozzle_change import ChangeReport
 from robolink.standing import Effect, standing_after
+from robolink_simulators.soak.books import BookedMarker
 from robolink_simulators.soak.computer import VirtualProcess
 from robolink_simulators.soak.history import Hindrance
 from robolink_simulators.soak.people import OTHERS_TOOL, TOOL
@@ -60,18 +61,31 @@ class EndRules:
             code == UNKNOWN or not process.overtaken,
             f"it ends with {code}, and another client was answered in place of it",
         )
+        unsure = any(one.what == "SYNC_FAILS" for one in self._on.now.hour.disturbances)
         # A program that calls back tells what it left open when it calls again.
         if self._on.books.trusted and code != UNKNOWN and not self._on.plant.calls_back:
             begun = [
                 m.request
                 for m in self._on.books.markers()
-                if m.operation not in self._on.now.old_markers and m.kind != "selection"
+                if m.operation not in self._on.now.old_markers
+                and m.kind != "selection"
+                and not (unsure and self._unsent(m))
             ]
             self._on.hold(
                 "ExitCodeIsTrue",
                 not begun or self._on.now.crowded,
                 f"it ends with {code}, and {begun} is open",
             )
+
+    def _unsent(self, marker: BookedMarker) -> bool:
+        """Tell whether nothing has left under a marker.
+
+        Where its sync failed it counted as not stored, and the disk may have it nevertheless.
+        """
+        now = self._on.now
+        if marker.kind == "change":
+            return not now.writes
+        return marker.operation not in now.writes and marker.operation not in now.moves
 
     def _taken_back(
         self, process: VirtualProcess, error: BaseException | None, state: MachineState

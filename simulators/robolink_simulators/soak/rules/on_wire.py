@@ -139,6 +139,7 @@ class WireRules:
         before: list[ToolOffset | None] = [
             self._on.now.first.tools.get(tool),
             self._on.now.before.tools.get(tool),
+            self._on.now.agreed.tools.get(tool),  # a deed's second change begins with its first
             self._on.plant.by_hand.get(tool),  # it was there before the change, if not at first
         ]
         # A marker that could not be stored any more: the change around it says what it was.

@@ -21,6 +21,9 @@ from robolink_simulators.soak.rules.on_wire import WireRules
 from robolink_simulators.soak.rules.so_far import Grounds, HourSoFar
 from robolink_simulators.soak.story import Story
 
+Typed = tuple[int, ToolOffset]
+"""A tool, and the offset that was typed for it."""
+
 
 class Rulebook(Grounds):
     """Checks the rules of one cell.
@@ -83,6 +86,7 @@ class Rulebook(Grounds):
             self.books.last_number(),
             frozenset(marker.operation for marker in self.books.markers()),
             self.plant.movements,
+            state,
         )
         for tool, offset in state.tools.items():
             self.now.wanted[tool] = [offset]
@@ -110,6 +114,10 @@ class Rulebook(Grounds):
         """Note which tool somebody puts in force at the machine meanwhile."""
         self.now.chosen_by_hand.append(tool)
 
+    def agreed(self) -> None:
+        """Note what the machine keeps while a person agrees to a change of it."""
+        self.now.agreed = self.plant.state()
+
     def said(self, text: str) -> None:
         """Note what a person is told."""
         self._at_rest.said(text)
@@ -120,14 +128,9 @@ class Rulebook(Grounds):
             self.books.lost = False
         return True
 
-    def others_write(self, process: VirtualProcess, tool: int, offset: ToolOffset) -> None:
-        """Note that a second person has read a tool, and writes it.
-
-        Args:
-            process: That person's.
-            tool: Which.
-            offset: What is written.
-        """
+    def others_write(self, process: VirtualProcess, typed: Typed) -> None:
+        """Note that a second person has read a tool, and writes it."""
+        tool, offset = typed
         self._by_hand.replaces(process, tool, offset)
         self.now.crowded = True
         self.now.typed_by_others.append((tool, offset))

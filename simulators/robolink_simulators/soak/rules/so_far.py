@@ -62,6 +62,7 @@ class HourSoFar:
         wish: What its person means to be true at its end.
         first: What the machine kept at its beginning.
         before: What it kept at the beginning of the last try.
+        agreed: What it kept when its person last agreed to a change: one deed may make several.
         entries: The newest entry at its beginning.
         old_markers: What was open before the last try, by operation.
         moves: Operations under which a movement has left, with how often.
@@ -82,6 +83,7 @@ class HourSoFar:
     entries: int
     old_markers: frozenset[str]
     movements: int
+    agreed: MachineState
     moves: dict[str, int] = field(default_factory=dict)
     wanted: dict[int, list[ToolOffset | None]] = field(default_factory=dict)
     report: ChangeReport | None = None

@@ -49,10 +49,8 @@ def record(folder: Path) -> None:
         folder: Where the record is. Each run adds a folder to it.
     """
     product = sources(ROOT)
-    now = {
-        path.relative_to(ROOT).as_posix(): _hash(path) for path in ROOT.rglob("tests/**/test_*.py")
-    }
-    now = {file: value for file, value in now.items() if not file.startswith("tests/integrator/")}
+    files = [path.relative_to(ROOT).as_posix() for path in (ROOT / "tests").rglob("test_*.py")]
+    now = {file: _hash(ROOT / file) for file in files if not file.startswith("tests/integrator/")}
     known: dict[str, str] = {}
     for batch in _batches(folder):
         told = json.loads((batch / "tests.json").read_text())
@@ -68,7 +66,7 @@ def record(folder: Path) -> None:
     changed = sorted(file for file in now if known.get(file) != now[file])
     if not changed:
         return
-    batch = folder / f"{len(list(folder.glob('*'))):04d}"
+    batch = folder / f"{1 + max((int(one.name) for one in _batches(folder)), default=0):04d}"
     shutil.rmtree(batch, ignore_errors=True)
     batch.mkdir(parents=True)
     asked = changed if known else ["tests"]

@@ -323,6 +323,19 @@ HISTORIES = (
             ),
         ),
     ),
+    History(
+        919892670,
+        CellKind.EPSON,
+        (
+            Hour(
+                14,
+                Deed.COMMAND,
+                Habit(),
+                (Disturbance(Hindrance.STOP, "", "procedure", 0, 0.0, None),),
+                ("robot", "motors", "off", "--yes"),
+            ),
+        ),
+    ),
 )
 HALF_A_FILE = drawn_history(919893192, 20)
 """A PLC over Modbus TCP, and a journal whose rows came back empty."""

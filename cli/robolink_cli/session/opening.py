@@ -1,7 +1,7 @@
 """One controller for one command: connected, what others left said, closed in order."""
 
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -83,7 +83,7 @@ def open_controller(
             glance=unhindered,
             tell=note,
         ) as controller,
-        nullcontext() if calms else controller.latch.ending(tr("The command")),
+        controller.latch.ending(tr("The command")),
     ):
         click.get_current_context().meta.update(
             {WATCHED: controller, REACHED: url, CELL: context.expected}
@@ -97,7 +97,7 @@ def open_controller(
             ),
         ):
             yield controller
-    if not unhindered:
+    if not looks:
         # A stop that came while the connection was closed: nobody may take this for a success.
         with controller.ledger.telling():
             controller.latch.require_open(tr("The command"))

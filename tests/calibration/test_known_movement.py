@@ -8,6 +8,7 @@ import pytest
 
 from robolink.calibration import (
     CameraChangeRows,
+    CameraModel,
     MovementVerdict,
     SeenMovement,
     camera_changed,
@@ -15,6 +16,10 @@ from robolink.calibration import (
     spot_changed,
     tip_did_not_move,
 )
+from robolink.model import Pose, Spot, SpotUnit
+from robolink.procedures.camera.watch import SpotWatch
+from robolink.runner import SeenAt
+from robolink.stations import CameraStation
 
 ROWS = CameraChangeRows()
 KNOWN = (1.0, 1.0)
@@ -115,3 +120,16 @@ def test_each_refusal_says_what_was_seen_and_what_to_look_after():
         "tip_did_not_move",
         "spot_changed",
     }
+
+
+@pytest.mark.parametrize("mm_per_px", [0.02, 0.5])
+def test_a_tenth_of_a_pixel_is_as_long_as_the_camera_says(mm_per_px):
+    model = CameraModel(((mm_per_px, 0.0), (0.0, -mm_per_px)), (0.0, 0.0))
+    watch = SpotWatch(CameraStation(300.0, 80.0, -30.0, model), calibrated=True)
+    before, after = (
+        SeenAt.of(Pose(x_mm, 80.0, -30.0, 0.0), Spot(x_mm / mm_per_px, 0.0), SpotUnit.PIXEL)
+        for x_mm in (300.0, 301.0)
+    )
+    movement = watch.movement(before, after)
+    assert movement.seen == pytest.approx((1.0, 0.0))
+    assert movement.noise == pytest.approx(math.hypot(math.sqrt(2) * 0.1 * mm_per_px, 0.005))

@@ -8,6 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from robolink.calibration import rotation_of, solve_six_point, solve_tool_axis, uvw_deg, zyz_deg
+from robolink.errors import ConfigError
 from robolink.model import Pose, ToolOffset
 from tests.calibration._simulated import (
     assert_honest,
@@ -115,6 +116,9 @@ def test_two_touches_along_an_axis_show_its_direction():
     assert solve_tool_axis(start, moved(start, (0, 0, 80))).sigma_deg is None
     with refused("short_axis"):
         solve_tool_axis(start, start)
+    for sigma_mm in (0.0, -0.04, math.inf):
+        with pytest.raises(ConfigError, match="sigma_mm"):
+            solve_tool_axis(start, moved(start, (0, 0, 80)), sigma_mm=sigma_mm)
 
 
 CASES = [ANGLES, (0, 0, 0), (170, -89, 20), (-100, 45, 179), (30, 90, 0), (30, -90, 0), (180, 0, 0)]

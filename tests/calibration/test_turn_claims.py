@@ -462,6 +462,30 @@ def test_what_a_board_says_of_a_turned_camera_counts_where_its_fiducials_are():
     assert claim.offset_u_mm == pytest.approx(20 * math.radians(0.5) / math.sqrt(3), rel=0.02)
 
 
+def test_the_middle_of_a_board_scatters_as_the_mean_of_all_looks():
+    drawing = [(20.0, 0.0), (-20.0, 0.0), (0.0, 15.0)]
+    measure = board_cell((0.0, 90.0, 180.0, -90.0), drawing)
+    claim = claim_of(measure(np.random.default_rng(23))[0])
+    assert claim.offset_sigma_mm == pytest.approx(claim.look_sigma_mm / math.sqrt(12))
+
+
+def test_a_test_of_a_tilted_tip_has_the_leverage_of_the_fit_of_tip_and_pin():
+    result = solve_pivot(
+        [pivoting((TIP.real, TIP.imag, -20.0), one) for one in TILTS], sigma_mm=SIGMA_MM
+    )
+    found = claim_of(result).tilted_leverage
+    touched = [rotation(*one) for one in TILTS]
+    design = np.vstack([np.hstack([one, -np.eye(3)]) for one in touched])
+    covariance = np.linalg.inv(design.T @ design)
+    tests = [
+        np.hstack([rotation(turn, 0, 0) @ one, -np.eye(3)])
+        for turn in range(0, 360, 15)
+        for one in touched
+    ]
+    worst = max(np.linalg.eigvalsh(test @ covariance @ test.T)[-1] for test in tests)
+    assert found == pytest.approx(worst, rel=1e-6)
+
+
 def test_rough_looks_say_so_themselves():
     """Four looks that scatter five times as much as a tenth of a pixel, and no stated scatter."""
     random = np.random.default_rng(25)

@@ -197,6 +197,15 @@ def test_what_was_measured_counts_and_not_the_difference_that_was_written():
     assert change.tip_mm == {"x": 12.0, "y": -4.0}
 
 
+def test_the_place_of_a_pin_counts_where_the_method_finds_it():
+    place = {"method": "pivot", "reference_point_mm": [300.0, 80.0, -40.0]}
+    entries = [entry(1, EntryKind.CALIBRATION, 1, **place), entry(2, EntryKind.DONE, 1)]
+    (change,) = measured_changes(entries, lambda method: method == "pivot")
+    assert change.pin_mm == {"x": 300.0, "y": 80.0}
+    (change,) = measured_changes(entries, lambda _: False)
+    assert change.pin_mm is None
+
+
 def test_the_course_of_one_tool_is_of_that_tool_alone():
     tip = plain_offset(ToolOffset(12.0, -4.0, -20.0))
     entries = [

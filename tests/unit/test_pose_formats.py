@@ -201,6 +201,12 @@ def test_a_target_to_which_another_tool_is_moved_is_no_place_of_the_flange(read)
     assert len(read(f"{constant}MoveJ p1, v100, z10, tool0\\WObj:=wobj0;\n").poses) == 1
 
 
+@pytest.mark.parametrize("line", ["X=1 Y=2 Z=ab U=4", "X=1 Y=2 U=4 Z=ab"])
+def test_a_value_that_is_no_number_is_named_and_not_its_neighbour(read, line):
+    with pytest.raises(ConfigError, match="Z is 'ab', which is no number"):
+        read(f"{line}\n")
+
+
 def test_no_point_of_a_list_is_passed_over(read):
     points = "P1 = XY(1, 2, 3, 4) /R /0\n{} = XY(11, 12, 13, 14) /R /0\n"
     labelled = read(points.format("P2(pin1)"))

@@ -125,3 +125,11 @@ def test_no_pose_can_turn_into_another_statement(pose):
     text = spel.go(pose, six_axes=True)
     assert set(text) <= set("Go XY(0123456789.,-) /RL")
     assert text.count("(") == text.count(")") == 1
+
+
+@pytest.mark.parametrize("query", [spel.print_output, spel.print_input])
+def test_two_bytes_carry_the_number_of_a_bit(query):
+    assert "65535" in query(65535)
+    for bit in (-1, 65536):
+        with pytest.raises(LocalProtocolError):
+            query(bit)

@@ -14,6 +14,7 @@ import pyte
 import pytest
 from prompt_toolkit.data_structures import Size
 from prompt_toolkit.input import create_pipe_input
+from prompt_toolkit.input.typeahead import get_typeahead, store_typeahead
 from prompt_toolkit.key_binding import KeyPress
 from prompt_toolkit.keys import Keys
 from prompt_toolkit.output.vt100 import Vt100_Output
@@ -145,6 +146,15 @@ def test_two_keys_of_a_hand_count_though_the_screen_was_drawn_for_longer():
         for key, at_s, quiet_s in (("+", hand.now, hand.now), ("6", hand.now + 1, hand.now + 0.9)):
             face._press(key, TimedPress(KeyPress(key), at_s, quiet_s))
         assert face._state.jogging.size == hand.state.jogging.size + 1
+
+
+def test_a_key_that_is_still_held_down_answers_nothing_afterwards():
+    """Those that were read and not taken wait for the next question of this process."""
+    with create_pipe_input() as source:
+        face = FullFace(source, Vt100_Output(StringIO(), lambda: Size(24, 80), term="xterm"))
+        store_typeahead(face._input, [KeyPress("y")])
+        face._forget_keys()
+        assert get_typeahead(face._input) == []
 
 
 @pytest.mark.parametrize("keys", ["1*", "1*\r", "*"], ids=repr)

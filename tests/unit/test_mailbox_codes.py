@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from robolink.protocols.mailbox import (
     OPCODES,
     Bits,
+    BufferMode,
     Capability,
     Command,
     CommandState,
@@ -168,3 +169,16 @@ def test_the_probe_is_found_where_a_wrong_base_has_moved_it():
     assert find_probe((*words[1:], 0)) == (83, WordOrder.LOW_FIRST)
     assert find_probe(words[::-1]) == (24, WordOrder.HIGH_FIRST)
     assert find_probe((0,) * 112) is None
+
+
+def test_the_modes_of_a_movement_have_the_numbers_of_the_page():
+    """Operand i3 of opcodes 2102 and 2103 (docs/mailbox.md)."""
+    numbered = {mode.name: mode.value for mode in BufferMode}
+    assert numbered == {
+        "ABORTING": 0,
+        "BUFFERED": 1,
+        "BLENDING_LOW": 2,
+        "BLENDING_PREVIOUS": 3,
+        "BLENDING_NEXT": 4,
+        "BLENDING_HIGH": 5,
+    }

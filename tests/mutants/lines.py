@@ -165,8 +165,9 @@ class Lines:
                 direct |= whole
             more = whole - direct if len(direct) < FEW else set()
         else:
+            # What a module holds shows where it is used, also in modules that import it.
             direct = whole | {test for test, seen in executed.items() if test and seen & around}
-            more = set() if len(direct) >= FEW else self._of_importers(mutant.file) - direct
+            direct, more = direct | self._of_importers(mutant.file), set()
         return self._ordered(direct, mutant) + self._ordered(more, mutant)
 
     def _of_importers(self, file: str) -> set[str]:
@@ -256,15 +257,28 @@ def _remembering(file: str) -> frozenset[str]:
 
 @cache
 def _importers() -> dict[str, set[str]]:
-    """Return for each module those that import something from it."""
-    by_name = {}
+    """Return for each module those that import something of it, also by way of its package."""
+    files, trees = {}, {}
     for path in modules(ROOT):
         file = path.relative_to(ROOT).as_posix()
         parts = file.removesuffix(".py").removeprefix("cli/").split("/")
-        by_name[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = file
+        files[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = file
+        trees[file] = [
+            node
+            for node in ast.walk(ast.parse(path.read_bytes()))
+            if isinstance(node, ast.ImportFrom)
+        ]
+
+    def origin(module: str, name: str) -> str:
+        """Return the module that a name comes from."""
+        for node in trees[files[module]] if files[module].endswith("__init__.py") else ():
+            if node.module in files and name in {one.asname or one.name for one in node.names}:
+                return origin(node.module, name)
+        return module
+
     found: dict[str, set[str]] = defaultdict(set)
-    for path in modules(ROOT):
-        for node in ast.walk(ast.parse(path.read_bytes())):
-            if isinstance(node, ast.ImportFrom) and node.module in by_name:
-                found[by_name[node.module]].add(path.relative_to(ROOT).as_posix())
+    for file, nodes in trees.items():
+        for node in nodes:
+            for one in node.names if node.module in files else ():
+                found[files[origin(str(node.module), one.name)]].add(file)
     return found

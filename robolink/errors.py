@@ -391,4 +391,4 @@ class DeclinedError(RobolinkError):
 
 
 class NotAllowedError(DeclinedError):
-    """The person's role in the cell file does not cover it. Nothing was sent."""
+    """It takes an engineer, by the people or the limits of the cell file. Nothing was sent."""

@@ -16,6 +16,7 @@ class Way:
     Plain texts and no enumeration, because a stop loads them before its first frame.
     """
 
+    ACCEPT_CHANGE: Final = "change_guard.accepting(tool, jump)"
     ACCEPT_JUMP: Final = "accepted_change_mm"
     ANSWER: Final = "Answers(texts={{{number}: TEXT}})"
     AXES_HELD: Final = "axes_held=True"

@@ -11,6 +11,7 @@ from robolink.files.toml import Problem as Problem
 from robolink.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
+    from robolink.config._cells import USUAL_CHANGE_MM as USUAL_CHANGE_MM
     from robolink.config._cells import Cell as Cell
     from robolink.config._cells import CellGlimpse as CellGlimpse
     from robolink.config._cells import cell_names as cell_names
@@ -33,8 +34,8 @@ else:
     __getattr__ = lazy_exports(
         __name__,
         {
-            "_cells": "Cell CellGlimpse cell_names check_file find_cell glimpse_of_cell load_cells "
-            "settings_of_file",
+            "_cells": "Cell CellGlimpse USUAL_CHANGE_MM cell_names check_file find_cell "
+            "glimpse_of_cell load_cells settings_of_file",
             "_files": "ConfigFile Source config_files",
             "_reach": "Expected Reach glance_at_cell proof_of_files reach_cell remember_reach",
             "_settings": "CellSettings",

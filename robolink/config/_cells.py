@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from robolink.config._files import CELL_FILE, config_files, read_document
 from robolink.config._problems import dotted, problems_of
@@ -12,6 +12,7 @@ from robolink.config._reach import Expected
 from robolink.errors import ConfigError
 from robolink.files.toml import Problem
 from robolink.messages import tr
+from robolink.model import ChangeLimits
 
 if TYPE_CHECKING:
     from robolink.config._settings import CellSettings
@@ -20,6 +21,10 @@ _Said = dict[str, tuple[Path, object]]
 """What files say about a cell: each value with the file that said it."""
 
 _CELL_NAME = re.compile(r"[^\s+:/\\]+")
+
+
+USUAL_CHANGE_MM: Final = 2.0
+"""Where a cell names no limit of its own: more than a change of nozzles explains."""
 
 
 class CellGlimpse(NamedTuple):
@@ -60,6 +65,16 @@ class Cell:
             robot_file=str(self.origins.get("robot", "")),
             people=self.settings.people,
         )
+
+    def limits(self, *, usual_mm: float = USUAL_CHANGE_MM) -> ChangeLimits:
+        """Return how far a write may take a tip; more takes an engineer.
+
+        Args:
+            usual_mm: What holds where the cell names no limit of its own.
+        """
+        settings = self.settings
+        length_mm = usual_mm if settings.max_change_mm is None else settings.max_change_mm
+        return ChangeLimits(length_mm, settings.max_change_deg)
 
 
 def find_cell(name: str) -> Cell:

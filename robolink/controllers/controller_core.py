@@ -44,6 +44,7 @@ class ControllerCore(ABC):
         identity: How it is reached: the URL, with those options only that tell far ends apart.
         clock: The clock on which its time passes.
         latch: What holds everything back from :meth:`stop` until :meth:`release_stop`.
+        change_guard: What holds back writes that take a tip farther than the cell allows.
         outcomes: The doubtful outcomes and the unfinished procedures of this controller.
         ledger: What was done to it since connecting, and how much of that is proved.
         capabilities: What can be asked for.
@@ -88,6 +89,7 @@ class ControllerCore(ABC):
         self.identity = link.identity
         self.clock = link.clock
         self.latch = link.latch
+        self.change_guard = link.change_guard
         self.outcomes = link.markers.outcomes
         self.ledger = link.markers.ledger
         self.capabilities = capabilities

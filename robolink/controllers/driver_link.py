@@ -31,7 +31,7 @@ from robolink.errors import (
     UnclearAnswerError,
 )
 from robolink.messages import joined, tr
-from robolink.model import EntryKind, Marker, MarkerKind, NewEntry, OutcomeLog
+from robolink.model import ChangeGuard, EntryKind, Marker, MarkerKind, NewEntry, OutcomeLog
 from robolink.stop_latch import StopLatch
 from robolink.timing import Clock
 
@@ -97,6 +97,7 @@ class DriverLink:
         clock: The clock on which its time passes.
         latch: What holds requests back while a stop is in force.
         markers: The durable markers of what was begun.
+        change_guard: What holds back writes that take a tip farther than the cell allows.
         lock: One procedure at a time.
 
     Args:
@@ -132,6 +133,7 @@ class DriverLink:
         self.clock = clock
         self.latch = latch
         self.markers = MarkerStore(identity, outcomes, latch)
+        self.change_guard = ChangeGuard(outcomes, latch)
         self.lock = ProcedureLock(identity, latch)
         self._gate = gate
         self._waiting: list[None] = []

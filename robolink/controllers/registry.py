@@ -14,7 +14,7 @@ from typing import Final, Protocol, cast
 from robolink.errors import ConfigError, RobolinkError
 from robolink.journal import GlancingLog, open_log, signature_here
 from robolink.messages import tr
-from robolink.model import Controller, OutcomeLog, Secret, Signature
+from robolink.model import ChangeLimits, Controller, OutcomeLog, Secret, Signature
 from robolink.plug_ins import PlugInError, find_plug_in
 from robolink.timing import Clock
 from robolink.transport import LinkUrl, TraceSink, parse_url
@@ -164,6 +164,7 @@ def connect(
     trace: TraceSink | None = None,
     outcomes: OutcomeLog | None = None,
     signature: Signature | None = None,
+    limits: ChangeLimits | None = None,
     glance: bool = False,
     tell: Callable[[str], None] = lambda _sentence: None,
 ) -> Controller:
@@ -186,6 +187,8 @@ def connect(
             nobody from looking and stopping: ``outcomes.trouble`` says what is wrong with it,
             and what would change something raises it.
         signature: Who works here, and with what; by default the user of this computer.
+        limits: How far a write may take a tip, as the cell file says (``Cell.limits()``). A URL
+            alone says nothing, so without them there is no limit.
         glance: Whether this is for a look, so that a journal in which nothing is unfinished is
             not opened before something has to be recorded. The controller is not asked for its
             identity then.
@@ -226,4 +229,7 @@ def connect(
         glance=glance,
         tell=tell,
     )
-    return find_opener(link)(link, terms)
+    controller = find_opener(link)(link, terms)
+    if limits is not None:
+        controller.change_guard.limits = limits
+    return controller

@@ -37,6 +37,7 @@ from robolink.model import (
     ToolReceipt,
     describe_offset,
     put_right,
+    refuse_operator,
 )
 from robolink.ways import Way, way
 
@@ -189,6 +190,7 @@ class ToolTableCore(ABC):
         """Clear and read back; see :class:`robolink.model.ToolTable`."""
         self.require_writable(tool)
         _require_expected(expected)
+        self._refuse_operator(tool)
         with self._driver.lock.held(self._clear_request(tool)):
             self._require_clearable(tool)
             if not self._would_lose_selection(tool, expected, then_select):
@@ -214,6 +216,7 @@ class ToolTableCore(ABC):
     def preview_clear(self, tool: int, *, then_select: int | None = None) -> tuple[str, ...]:
         """Return what :meth:`clear` would send besides its reads; raises what it would."""
         self.require_writable(tool)
+        self._refuse_operator(tool)
         requests = self._requests(tool, None)
         if self.read(tool) is None:
             return ()
@@ -278,6 +281,11 @@ class ToolTableCore(ABC):
                     request=request,
                 )
             self._prove_selected(offset, request)
+
+    def _refuse_operator(self, tool: int) -> None:
+        """Refuse a clear to an operator before another tool is selected for it."""
+        if not self._driver.latch.restores:
+            refuse_operator(self._driver.markers.outcomes, tr("clear tool {tool}", tool=tool))
 
     def _would_lose_selection(self, tool: int, expected: Expected, then_select: int | None) -> bool:
         """Whether a clear, if it is not to be skipped or refused, takes the tool in force away."""

@@ -3,9 +3,9 @@
 Source: docs/reference/rules.md 2.
 
 Read; equal to what is wanted: nothing is written, because a write wears the controller's
-memory; not what was expected: nothing is written either; else a durable intent, one write,
-and a read-back of all six components. What became of it goes on record together with the
-end of the intent.
+memory; not what was expected, or farther than the cell allows: nothing is written either; else a
+durable intent, one write, and a read-back of all six components. What became of it goes on record
+together with the end of the intent.
 """
 
 from abc import abstractmethod
@@ -116,10 +116,17 @@ class ToolWrite(MarkedCommand[ToolOffset | None]):
                     controller=self._link.identity,
                     request=self.request,
                 )
+            self._link.change_guard.require(self.tool, self.before, self.requested)
+            self._require_clearer()
             found = self._link.carry_out(self)
             if not self._same(found, self.requested):
                 raise self._read_back_differs(found)
             return self._receipt(found)
+
+    def _require_clearer(self) -> None:
+        """Let nobody but an engineer clear a tool, unless that puts it back."""
+        if self.requested is None and not self._link.latch.restores:
+            require_engineer(self._link.markers.outcomes, tr("clear tool {tool}", tool=self.tool))
 
     @property
     def details(self) -> Mapping[str, object]:

@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING
 from robolink.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
+    from robolink.model._change_limits import ChangeGuard as ChangeGuard
+    from robolink.model._change_limits import ChangeLimits as ChangeLimits
     from robolink.model._controller import Act as Act
     from robolink.model._controller import Capabilities as Capabilities
     from robolink.model._controller import Controller as Controller
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
     from robolink.model._optional_parts import ValueT as ValueT
     from robolink.model._optional_parts import VariableTable as VariableTable
     from robolink.model._people import PersonRole as PersonRole
+    from robolink.model._people import refuse_operator as refuse_operator
     from robolink.model._people import require_engineer as require_engineer
     from robolink.model._secret import Secret as Secret
     from robolink.model._tools import ANY as ANY
@@ -111,6 +114,7 @@ else:
     __getattr__ = lazy_exports(
         __name__,
         {
+            "_change_limits": "ChangeGuard ChangeLimits",
             "_controller": "Act Capabilities Controller ControllerState ControllerStatus",
             "_controller_cameras": "ControllerSensor LookingController",
             "record.findings": "Finding Resolver Verdict",
@@ -134,7 +138,7 @@ else:
             ),
             "record.method_names": "finding_named_now method_name_now with_method_name_now",
             "record.outcomes": "ClientRun Marker MarkerKind OutcomeLog new_operation",
-            "_people": "PersonRole require_engineer",
+            "_people": "PersonRole refuse_operator require_engineer",
             "_secret": "Secret",
             "record.standing_words": "describe_standing",
             "motion.orientation_coupling": "CsTool OrientationImage combined_space",

@@ -7,6 +7,7 @@ from enum import StrEnum
 from types import TracebackType
 from typing import Protocol, Self
 
+from robolink.model._change_limits import ChangeGuard
 from robolink.model._identity import ControllerFacts
 from robolink.model._optional_parts import AlarmList, DigitalIo, PointReader, VariableTable
 from robolink.model._tools import ToolTable
@@ -189,6 +190,10 @@ class Controller(Protocol):
 
     def facts(self) -> ControllerFacts:
         """Read which controller and robots these are."""
+
+    @property
+    def change_guard(self) -> ChangeGuard:
+        """What holds back writes that take a tip farther than the cell allows."""
 
     @property
     def latch(self) -> StopLatch:

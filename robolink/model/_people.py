@@ -40,6 +40,27 @@ def require_engineer(outcomes: OutcomeLog, act: str, **details: object) -> None:
         >>> with robolink.connect("epson+sim://engineer-example") as controller:
         ...     require_engineer(controller.outcomes, "accept a jump", tool=1)  # nobody is named
     """
+    refuse_operator(outcomes, act)
+    said = {**details, "engineer": True}
+    outcomes.append(NewEntry(EntryKind.DECISION, verdict=act, details=said))
+
+
+def refuse_operator(outcomes: OutcomeLog, act: str) -> None:
+    """Refuse ``act`` to an operator; nothing is put on record.
+
+    Args:
+        outcomes: Knows who works here.
+        act: What it takes an engineer for.
+
+    Raises:
+        NotAllowedError: The person is an operator.
+
+    Example:
+        >>> import robolink
+        >>> from robolink.model import refuse_operator
+        >>> with robolink.connect("epson+sim://operator-example") as controller:
+        ...     refuse_operator(controller.outcomes, "accept a jump")  # nobody is named
+    """
     signature = outcomes.signature
     if signature.role == PersonRole.OPERATOR:
         person = signature.operator or tr("somebody who gave no name")
@@ -51,5 +72,3 @@ def require_engineer(outcomes: OutcomeLog, act: str, **details: object) -> None:
                 operator=way(Way.OPERATOR),
             ),
         )
-    said = {**details, "engineer": True}
-    outcomes.append(NewEntry(EntryKind.DECISION, verdict=act, details=said))

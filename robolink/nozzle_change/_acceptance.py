@@ -1,7 +1,7 @@
 """What a measurement must be like to be believed, and the verdict in words."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from robolink.calibration import (
     ACCURACY_ROWS,
@@ -15,6 +15,7 @@ from robolink.calibration import (
 )
 from robolink.errors import CalibrationError, VerifyError
 from robolink.messages import joined, tr
+from robolink.model import ChangeLimits
 from robolink.nozzle_change._proposal import LimitVerdict, Proposal
 from robolink.stations import StationKind
 
@@ -52,6 +53,12 @@ class AcceptanceCriteria:
     def limit_mm(self) -> float:
         """The largest change that is believed this time."""
         return max(self.max_change_mm, self.accepted_change_mm or 0.0)
+
+    def within(self, limits: ChangeLimits) -> "AcceptanceCriteria":
+        """Return these with no larger change than a cell allows without an engineer."""
+        if limits.length_mm is None or limits.length_mm >= self.max_change_mm:
+            return self
+        return replace(self, max_change_mm=limits.length_mm)
 
     def judge_fit(self, result: CalibrationResult) -> None:
         """Refuse a measurement that does not agree with itself.

@@ -7,7 +7,7 @@ written. Whatever happens, the tool, power mode and speed of before are put back
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import replace
 
 from robolink.calibration import VerifyResult
@@ -19,7 +19,6 @@ from robolink.model import (
     ToolReceipt,
     answer_entry,
     new_operation,
-    require_engineer,
 )
 from robolink.nozzle_change._acceptance import AcceptanceCriteria
 from robolink.nozzle_change._length import settle_lengths
@@ -106,12 +105,15 @@ class NozzleChange:
         describe: DescribeReport | None = None,
     ) -> None:
         self._controller = controller
-        self._plan = plan
+        limits = controller.change_guard.limits
+        tools = (replace(one, criteria=one.criteria.within(limits)) for one in plan.tools)
+        self._plan = replace(plan, tools=tuple(tools))
         self._operator = operator
         self._listener = Listener() if listener is None else listener
         self._earlier = earlier
         self._order, self._describe = order, describe
         self._written: ToolChange | None = None
+        self._accepted = ExitStack()
         self._began_ns = 0
 
     def run(self, *, write: bool = True) -> ChangeReport:
@@ -152,6 +154,7 @@ class NozzleChange:
                 self._tell(tr("Tool {tool} keeps the new value.", tool=numbers))
             raise
         finally:
+            self._accepted.close()
             controller.outcomes.change = ""
 
     def _carry_out(self, *, write: bool) -> ChangeReport:
@@ -239,15 +242,11 @@ class NozzleChange:
             except BaseException as error:
                 self._controller.outcomes.append(refusal_entry(plan.tool, plan.criteria, error))
                 raise
-            if plan.criteria.jumps(proposal):
-                require_engineer(
-                    self._controller.outcomes,
-                    tr(
-                        "let tool {tool} jump by {change:.3f} mm",
-                        tool=plan.tool,
-                        change=proposal.change_mm,
-                    ),
-                )
+            jump, guard = proposal.jump, self._controller.change_guard
+            if jump is not None and (
+                plan.criteria.jumps(proposal) or guard.limits.exceeded_by(jump)
+            ):
+                self._accepted.enter_context(guard.accepting(plan.tool, jump))
 
     def _require_accurate(
         self, context: MeasurementContext, plan: ToolPlan, proposal: Proposal

@@ -8,7 +8,7 @@ from typing import Literal
 
 from robolink.calibration import CalibrationResult, LengthChange, TurnClaim, VerifyResult
 from robolink.errors import CalibrationError
-from robolink.model import ToolOffset, ToolReceipt
+from robolink.model import Jump, ToolOffset, ToolReceipt
 from robolink.nozzle_change._seating import Seating
 from robolink.procedures import MeasurementContext
 from robolink.runner import StepDone
@@ -86,6 +86,11 @@ class Proposal:
     def tip(self) -> ToolOffset:
         """Where the tip was found, whatever is to be written."""
         return self.result.offset if self.measured is None else self.measured
+
+    @property
+    def jump(self) -> Jump | None:
+        """How far the write takes the tip, typed lengths counted; ``None`` as for the change."""
+        return None if self.before is None else Jump.between(self.before, self.offset)
 
     @property
     def change_mm(self) -> float | None:

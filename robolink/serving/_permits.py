@@ -191,7 +191,7 @@ class PermitCall:
         found = self._touches.solve(before)
         recall = self._controller.outcomes.recorded
         facts = facts_for_program(recall, self._cell, found, self._touches)
-        result = believed(found, before, self._limits, facts)
+        result = believed(found, before, self._limits_here, facts)
         wanted = Wanted(plan.tool, result.offset, before, details=self._details(result))
         marked = {MACHINE_WAITS: True}
         with ToolChange(self._controller, (wanted,), verify=True, marked=marked) as change:
@@ -202,6 +202,14 @@ class PermitCall:
             proved(self._touches, result, written, facts)
             change.keep(tr("proved by what the program touched after the write"))
         return written
+
+    @property
+    def _limits_here(self) -> CallbackLimits:
+        """The limits, with no larger change than the cell allows: nobody is there to accept one."""
+        allowed_mm = self._controller.change_guard.limits.length_mm
+        if allowed_mm is None or allowed_mm >= self._limits.max_change_mm:
+            return self._limits
+        return replace(self._limits, max_change_mm=allowed_mm)
 
     def _take(self, pose: Pose, held: ToolOffset, *, proof: bool) -> None:
         from robolink.calibration import flange_poses

@@ -11,13 +11,14 @@ from typing import Final, cast
 from robolink.errors import (
     ConfigError,
     JournalError,
+    NotAllowedError,
     OutcomeUnknownError,
     RejectedError,
     RobolinkError,
     StoppedError,
     ToolError,
 )
-from robolink.model import ANY, Controller, Marker, MarkerKind, ToolOffset
+from robolink.model import ANY, ChangeLimits, Controller, Jump, Marker, MarkerKind, ToolOffset
 from robolink.testing.subject import Check, Subject, another_offset, refused, require
 
 _OF_NO_TOOL_MM: Final = 2e9
@@ -107,6 +108,33 @@ def values_of_no_tool_are_refused(subject: Subject) -> None:
         require(tools.same(tools.read(subject.tool), before), "the old value is still there")
         require(not controller.status().fault, "the controller is not in error over it")
         require(not controller.outcomes.open_markers(), "nothing is left open")
+
+
+def a_jump_beyond_the_cell_is_refused(subject: Subject) -> None:
+    """A sign or a unit that went wrong is refused whoever writes; an engineer may accept it."""
+    with subject.kept() as controller:
+        tools, guard, tool = controller.tools, controller.change_guard, subject.tool
+        stated, before = guard.limits, another_offset(tools.read(tool))
+        tools.write(tool, before, expected=ANY)
+        far = another_offset(before)
+        jump = Jump.between(before, far)
+        guard.limits = ChangeLimits(length_mm=jump.length_mm / 2)
+        try:
+            for expected in (before, ANY):
+                with refused(NotAllowedError, "a tip is taken no farther than the cell allows"):
+                    tools.write(tool, far, expected=expected)
+            require(tools.same(tools.read(tool), before), "the old value is still there")
+            require(not controller.outcomes.open_markers(), "nothing is left open")
+            with guard.accepting(tool, jump):
+                tools.write(tool, far, expected=before)
+            require(tools.same(tools.read(tool), far), "what an engineer accepts is written")
+            with refused(NotAllowedError, "it is accepted once"):
+                tools.write(tool, before, expected=far)
+            with controller.latch.putting_back(tool):
+                tools.write(tool, before, expected=far)
+            require(tools.same(tools.read(tool), before), "the value of before may be put back")
+        finally:
+            guard.limits = stated
 
 
 def text_is_no_value(subject: Subject) -> None:
@@ -257,6 +285,7 @@ GUARD_CHECKS: Final[tuple[Check, ...]] = (
     a_stop_in_the_last_instant_holds_a_write_back,
     a_stop_lets_the_tool_be_put_back,
     values_of_no_tool_are_refused,
+    a_jump_beyond_the_cell_is_refused,
     text_is_no_value,
     what_is_asked_for_is_compared_as_it_is_sent,
 )

@@ -16,6 +16,7 @@ from robolink.errors import (
     BusyError,
     ConfigError,
     LeaseLostError,
+    NotAllowedError,
     NotReadyError,
     OutcomeUnknownError,
     ReadBackError,
@@ -132,6 +133,8 @@ class ToolChange:
 
         Raises:
             ToolChangedError: A tool does not hold what was expected; nothing was written.
+            NotAllowedError: A tip would be taken farther than the cell allows, which nobody has
+                accepted; nothing was written.
             SelectedToolError: A tool in force is to be cleared, and none is named to be selected
                 in its place; nothing was written.
             OutcomeUnknownError: Something earlier is unsettled, or a write was not answered.
@@ -147,6 +150,8 @@ class ToolChange:
             self._tell(doubt)
         self._selected = self._selected_before(steps)
         if self._several_steps and any(self._differs(step) for step in steps):
+            for step in steps:  # what a write would be refused for, before the first of them
+                self._controller.change_guard.require(step.tool, step.before, step.requested)
             tools = {
                 str(step.tool): {
                     "before": plain_offset(step.before),
@@ -278,8 +283,8 @@ class ToolChange:
         except ReadBackError:
             self._spoiled = wanted.tool
             raise
-        except (NotReadyError, BusyError, ToolError):
-            self._begun.pop()  # these three say that nothing was sent
+        except (NotReadyError, BusyError, NotAllowedError, ToolError):
+            self._begun.pop()  # these four say that nothing was sent
             raise
 
     def _take_back(self, error: BaseException | None) -> None:

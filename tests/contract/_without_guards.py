@@ -166,6 +166,7 @@ _ITSELF: Final[Mapping[str, StandIn]] = {
     "robolink.controllers.softmotion.link.wire.MailboxWire.ended": _ended,
     "robolink.controllers.ToolWrite.change": _changed,
     "robolink.controllers.ToolTableCore.require_writable": _nothing,
+    "robolink.model.ChangeGuard.require": _nothing,
     "robolink.controllers.ToolTableCore._require_values_of_a_tool": _nothing,
     "robolink.controllers.tool_table.require_replacement": lambda _tool, _other: 0,
     "robolink.controllers.Preserver.preserved": _preserved,
@@ -186,10 +187,6 @@ _ITSELF: Final[Mapping[str, StandIn]] = {
     "robolink.transport.stream.tcp.TcpTransport.send": _sent_in_part,
 }
 _AS_IMPORTED: Final[Mapping[str, Mapping[str, StandIn]]] = {
-    "robolink_cli.prompts.jumps.accept_jump": {
-        "robolink_cli.prompts.jumps.accept_jump": _nothing,
-        "robolink_cli.commands.controller.tool.accept_jump": _nothing,
-    },
     "robolink.controllers.ToolTableCore.same": {
         "robolink.controllers.epson.tools.table.EpsonToolTable.same": _to_the_last_bit,
         "robolink.controllers.epson.tools.table.EpsonToolTable._storable": _as_given,

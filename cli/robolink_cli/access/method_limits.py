@@ -3,12 +3,12 @@
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from robolink.config import USUAL_CHANGE_MM
 from robolink.files.toml import Problem
 from robolink.messages import tr
 from robolink.methods import AnyMethod, Check, all_methods, parameter_problems
 from robolink.nozzle_change import clearance_too_small
 from robolink.stations import StationKind
-from robolink_cli.prompts.jumps import USUAL_CHANGE_MM
 
 if TYPE_CHECKING:
     from robolink.config import CellSettings

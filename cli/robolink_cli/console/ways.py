@@ -5,6 +5,7 @@ from typing import Final
 from robolink.ways import Way
 
 SHELL_WAYS: Final = {
+    Way.ACCEPT_CHANGE: "--accept-jump MM and --accept-turn DEG",
     Way.ACCEPT_JUMP: "--accept-jump",
     Way.ANSWER: "--answer {number}=TEXT",
     Way.AXES_HELD: "--axes-held; in a recipe axes_held = true",

@@ -26,7 +26,7 @@ from robolink_cli.session.stop_listening import listening_for_stop, remember_add
 
 if TYPE_CHECKING:
     from robolink.config import Expected
-    from robolink.model import Controller, Marker, Secret
+    from robolink.model import ChangeLimits, Controller, Marker, Secret
 
 
 @contextmanager
@@ -38,6 +38,7 @@ def open_controller(
     calms: bool = False,
     changes: bool = False,
     leaves: bool = False,
+    usual_change_mm: float | None = None,
 ) -> "Iterator[Controller]":
     """Connect to the controller and, unless ``quiet``, say what was left unfinished there.
 
@@ -51,6 +52,8 @@ def open_controller(
             names people.
         leaves: Whether what it begins is settled by a later connection of the same command, so
             that nothing is said about it where all went well.
+        usual_change_mm: How far a write may take a tip where the cell file does not say it; by
+            default what is usual.
 
     Raises:
         ConfigError: No controller is named, the URL or password file is wrong, or the robot is
@@ -80,6 +83,7 @@ def open_controller(
             remote_timeout_s=context.remote_timeout_s,
             trace=trace,
             signature=signature,
+            limits=_limits_of(context, usual_change_mm),
             glance=unhindered,
             tell=note,
         ) as controller,
@@ -101,6 +105,15 @@ def open_controller(
         # A stop that came while the connection was closed: nobody may take this for a success.
         with controller.ledger.telling():
             controller.latch.require_open(tr("The command"))
+
+
+def _limits_of(context: CliContext, usual_change_mm: float | None) -> "ChangeLimits | None":
+    """Return how far a write may take a tip, by the cell file; a URL alone says nothing."""
+    if context.cell is None:
+        return None
+    if usual_change_mm is None:
+        return context.cell.limits()
+    return context.cell.limits(usual_mm=usual_change_mm)
 
 
 @contextmanager

@@ -30,7 +30,9 @@ def serve_plc(context: CliContext, plan: "PermitPlan", limits: "CallbackLimits")
         _tell("listening", tr("The program of {where} may call. Ctrl-C ends it.", where=where))
         while not termination.came:
             try:
-                with open_controller(context, changes=True) as controller:
+                with open_controller(
+                    context, changes=True, usual_change_mm=limits.max_change_mm
+                ) as controller:
                     call = PermitCall(
                         controller,
                         plan,

@@ -8,6 +8,7 @@ from robolink.messages import tr
 from robolink_cli.console.exit_codes import DIFFERENT
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.options.consent import dry_run_option, published_option, yes_option
+from robolink_cli.prompts.jumps import accept_jump_options
 from robolink_cli.prompts.questions import agree
 from robolink_cli.session.completing import complete_tool
 from robolink_cli.session.context import CliContext, controller_options
@@ -112,6 +113,7 @@ def compare(
     is_flag=True,
     help="The backup is of another controller and is still meant for this one.",
 )
+@accept_jump_options
 @controller_options
 @dry_run_option
 @yes_option
@@ -122,12 +124,15 @@ def restore(
     tools: tuple[int, ...],
     selected: bool,
     other_controller: bool,
+    accepted_mm: float | None,
+    accepted_deg: float | None,
     dry_run: bool,
     yes: bool,
 ) -> None:
     """Write the tools of a backup that differ, each only if nobody changed it meanwhile.
 
-    A tool that is undefined in the backup is cleared. Nothing else is changed.
+    A tool that is undefined in the backup is cleared. Nothing else is changed. A change beyond
+    the cell's max_change_mm or max_change_deg is asked about, even with --yes.
     """
     from robolink.backup import load, plan_restore, read_tools, require_same_controller
     from robolink_cli.commands.controller.restoration import Restoration
@@ -150,5 +155,5 @@ def restore(
                 yes=yes,
                 asks=not context.json,
             )
-        payload = restoration.run()
+        payload = restoration.run(accepted_mm=accepted_mm, accepted_deg=accepted_deg)
     context.emit("restore", {"file": str(file), **payload}, restoration.show_end)

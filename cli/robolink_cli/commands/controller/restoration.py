@@ -1,10 +1,13 @@
 """A restore on a terminal: what is shown, sent and reported."""
 
+from contextlib import ExitStack
+
 from robolink.backup import RestorePlan, keep_first_backup
 from robolink.backup import restore as restore_tools
 from robolink.messages import tr
 from robolink.model import Controller, ToolReceipt, require_engineer
 from robolink_cli.console.render import note, say
+from robolink_cli.prompts.jumps import accepted_jump
 from robolink_cli.views.documents import offset_payload, receipt_payload
 from robolink_cli.views.tables import show_change
 
@@ -48,13 +51,30 @@ class Restoration:
         if self._plan.select is not None:
             say(tr("tool {tool} will be selected", tool=self._plan.select))
 
-    def run(self) -> dict[str, object]:
-        """Carry it out and return the document; nothing is sent when nothing differs."""
+    def run(self, *, accepted_mm: float | None, accepted_deg: float | None) -> dict[str, object]:
+        """Carry it out and return the document; nothing is sent when nothing differs.
+
+        Args:
+            accepted_mm: The length of a jump that was accepted beforehand.
+            accepted_deg: The angle of a jump that was accepted beforehand.
+        """
         receipts: tuple[ToolReceipt, ...] = ()
         if not self._plan.empty:
             require_engineer(self._controller.outcomes, tr("restore tools from a backup"))
-            keep_first_backup(self._controller, tell=note)
-            receipts = restore_tools(self._controller.tools, self._plan, tell=note)
+            with ExitStack() as accepted:
+                for change in self._plan.changes:
+                    accepted.enter_context(
+                        accepted_jump(
+                            self._controller,
+                            change.tool,
+                            change.now,
+                            change.wanted,
+                            accepted_mm=accepted_mm,
+                            accepted_deg=accepted_deg,
+                        )
+                    )
+                keep_first_backup(self._controller, tell=note)
+                receipts = restore_tools(self._controller.tools, self._plan, tell=note)
         return {
             "restored": [receipt_payload(receipt) for receipt in receipts],
             "selected_tool": self._controller.tools.selected(),

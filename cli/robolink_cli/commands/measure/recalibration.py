@@ -76,7 +76,11 @@ class Recalibration:
         progress = Progress(self._events)
         answers, loaded = self._answers, self._loaded
         with (
-            open_controller(self._context, changes=not dry_run) as controller,
+            open_controller(
+                self._context,
+                changes=not dry_run,
+                usual_change_mm=loaded.recipe.tolerances.jump_mm,
+            ) as controller,
             ordered(
                 controller,
                 self._order,

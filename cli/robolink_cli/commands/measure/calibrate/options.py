@@ -6,6 +6,7 @@ from typing import Any, Final
 
 import click
 
+from robolink.config import USUAL_CHANGE_MM
 from robolink.messages import declared
 from robolink_cli.access.cell import with_cell_limits
 from robolink_cli.commands.measure.calibrate.request import request_from
@@ -14,7 +15,6 @@ from robolink_cli.options.consent import dry_run_option, plain_option, yes_optio
 from robolink_cli.options.impact import impact_options
 from robolink_cli.options.motion import motion_option
 from robolink_cli.options.report import report_options
-from robolink_cli.prompts.jumps import USUAL_CHANGE_MM
 from robolink_cli.session.completing import complete_tool
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.operator_identity import nozzle_options

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 import click
 from click.core import ParameterSource
 
+from robolink.config import USUAL_CHANGE_MM
 from robolink.errors import ConfigError, ReservedToolError, ToolIndexError
 from robolink.messages import tr
 from robolink_cli.options.impact import ImpactRequest, impact_request
 from robolink_cli.options.report import ReportRequest, report_request
-from robolink_cli.prompts.jumps import jump_limit_mm
 from robolink_cli.session.context import CliContext
 from robolink_cli.session.ordering import require_no_dry_run
 
@@ -169,7 +169,8 @@ def request_from(
 ) -> CalibrationRequest:
     """Return the frame that the options of a command describe.
 
-    A larger ``max_change_mm`` than the cell's own takes an engineer.
+    A larger ``max_change_mm`` than the cell's own takes an engineer: the nozzle change heeds the
+    limits of its controller.
 
     Raises:
         ReservedToolError, ToolIndexError: There is no such tool to calibrate.
@@ -180,7 +181,7 @@ def request_from(
     _require_tool(tool)
     require_no_dry_run(order, dry_run=dry_run)
     criteria = AcceptanceCriteria(
-        max_change_mm=min(max_change_mm, jump_limit_mm(context.cell)),
+        max_change_mm=max_change_mm if context.cell else min(max_change_mm, USUAL_CHANGE_MM),
         accepted_change_mm=max_change_mm,
         accepted_with="--max-change",
         rms_mm=rms_mm,

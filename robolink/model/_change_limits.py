@@ -1,0 +1,156 @@
+"""How far a write may take the tip of a tool at one cell, and what is accepted beyond that."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Final
+
+from robolink.errors import NotAllowedError
+from robolink.messages import joined, tr
+from robolink.model._people import require_engineer
+from robolink.model._tools import Jump, ToolOffset
+from robolink.model.record.outcomes import OutcomeLog
+from robolink.stop_latch import StopLatch
+from robolink.ways import Way, way
+
+_ROUNDING: Final = 0.002
+"""In mm and degrees: what is accepted is compared as it is sent, in three decimals a component."""
+
+
+@dataclass(frozen=True, slots=True)
+class ChangeLimits:
+    """How far one write may take the tip of a tool.
+
+    Attributes:
+        length_mm: Largest change of its place, ``None`` where nothing is said.
+        angle_deg: Largest change of its orientation, ``None`` where nothing is said.
+    """
+
+    length_mm: float | None = None
+    angle_deg: float | None = None
+
+    def exceeded_by(self, jump: Jump) -> bool:
+        """Tell whether a jump is larger."""
+        return jump.exceeds(self.length_mm, self.angle_deg)
+
+    def figure(self, tool: int, jump: Jump) -> str:
+        """Return by how much a jump is larger, in sentences."""
+        sentences = []
+        if self.length_mm is not None and jump.length_mm > self.length_mm:
+            sentences.append(
+                tr(
+                    "The tip of tool {tool} would move {change:.3f} mm; this cell allows "
+                    "{limit:.3f} mm.",
+                    tool=tool,
+                    change=jump.length_mm,
+                    limit=self.length_mm,
+                )
+            )
+        if self.angle_deg is not None and jump.angle_deg > self.angle_deg:
+            sentences.append(
+                tr(
+                    "Tool {tool} would turn by {turn:.3f} degrees; this cell allows {limit:.3f}.",
+                    tool=tool,
+                    turn=jump.angle_deg,
+                    limit=self.angle_deg,
+                )
+            )
+        return joined(" ", sentences)
+
+
+class ChangeGuard:
+    """Refuses every write that takes a tip farther than the cell allows.
+
+    Whoever writes a tool passes it, typed or measured, from Python or by a command; what is put
+    back does not (docs/reference/rules.md 2). A tool that is undefined has no place from which its
+    tip could jump.
+
+    Attributes:
+        limits: Those of the cell. Where only a URL is known there are none.
+
+    Args:
+        outcomes: Where it goes on record what an engineer accepts.
+        latch: Knows whether a thread puts back what was there before.
+
+    Example:
+        >>> import robolink
+        >>> from robolink.errors import NotAllowedError
+        >>> from robolink.model import ChangeLimits, Jump, ToolOffset
+        >>> limits = ChangeLimits(length_mm=2)
+        >>> with robolink.connect("epson+sim://guard-example", limits=limits) as controller:
+        ...     before = controller.tools.read(1)
+        ...     far = ToolOffset(before.x_mm + 5, before.y_mm, before.z_mm)
+        ...     try:
+        ...         controller.tools.write(1, far, expected=before)
+        ...     except NotAllowedError as error:
+        ...         print(error.what)
+        ...     with controller.change_guard.accepting(1, Jump.between(before, far)):
+        ...         receipt = controller.tools.write(1, far, expected=before)
+        The tip of tool 1 would move 5.000 mm; this cell allows 2.000 mm.
+    """
+
+    def __init__(self, outcomes: OutcomeLog, latch: StopLatch) -> None:
+        self.limits = ChangeLimits()
+        self._outcomes = outcomes
+        self._latch = latch
+        self._accepted: dict[int, Jump] = {}
+
+    def beyond(self, before: ToolOffset | None, after: ToolOffset | None) -> Jump | None:
+        """Return how far a tip would be taken, if that is farther than the cell allows."""
+        if before is None or after is None:
+            return None
+        jump = Jump.between(before, after)
+        return jump if self.limits.exceeded_by(jump) else None
+
+    def require(self, tool: int, before: ToolOffset | None, after: ToolOffset | None) -> None:
+        """Refuse a change beyond the limits that is neither accepted nor puts something back.
+
+        Raises:
+            NotAllowedError: Names the figure; nothing was sent.
+        """
+        jump, accepted = self.beyond(before, after), self._accepted.get(tool)
+        if jump is None or self._latch.restores:
+            return
+        if accepted is not None and not jump.exceeds(
+            accepted.length_mm + _ROUNDING, accepted.angle_deg + _ROUNDING
+        ):
+            return
+        raise NotAllowedError(
+            self.limits.figure(tool, jump),
+            remedy=tr(
+                "Nothing was written. Check sign and unit. If the change is real, an engineer "
+                "may accept it: {accept_change}.",
+                accept_change=way(Way.ACCEPT_CHANGE),
+            ),
+        )
+
+    @contextmanager
+    def accepting(self, tool: int, jump: Jump) -> Iterator[None]:
+        """Let the tip of a tool be taken as far as this within the block; it goes on record.
+
+        Args:
+            tool: Number of the tool.
+            jump: How far; what an engineer was shown.
+
+        Raises:
+            NotAllowedError: The person is an operator.
+            ConfigError: It cannot be recorded.
+        """
+        require_engineer(
+            self._outcomes,
+            tr(
+                "let tool {tool} jump by {change:.3f} mm and {turn:.3f} degrees",
+                tool=tool,
+                change=jump.length_mm,
+                turn=jump.angle_deg,
+            ),
+        )
+        before = self._accepted.get(tool)
+        self._accepted[tool] = jump
+        try:
+            yield
+        finally:
+            if before is None:
+                self._accepted.pop(tool, None)
+            else:
+                self._accepted[tool] = before

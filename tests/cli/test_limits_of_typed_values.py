@@ -1,4 +1,4 @@
-"""tool set and tool clear obey the cell: how far a tip may be taken, and by whom."""
+"""Whatever writes or clears a tool obeys the cell: how far a tip may be taken, and by whom."""
 
 import json
 
@@ -8,8 +8,14 @@ from robolink_cli.prompts import jumps
 from robolink_cli.prompts import operator as _operator
 from robolink_cli.prompts import questions as consent
 
-from robolink.model import ToolOffset
-from robolink.transaction import Jump
+import robolink
+from robolink.config import find_cell
+from robolink.errors import CalibrationError, NotAllowedError
+from robolink.methods import PointsSource
+from robolink.model import ChangeLimits, PersonRole, Pose, Signature, ToolOffset
+from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
+from robolink.testing import MemoryController, MemoryMachine
+from robolink.transaction import Jump, Wanted, change_tools
 
 CELL = """
 [cells.a]
@@ -129,6 +135,70 @@ def test_what_the_cell_allows_anybody_writes(cell, tools):
 
 def test_a_url_alone_has_no_limits(run, tools):
     assert run(*SIGN_ERROR)[0] == 0
+
+
+def test_a_program_that_knows_the_cell_is_held_to_it(cell, simulator, tools):
+    assert cell("eva", "status")[0] == 0  # writes the cell file
+    far = ToolOffset(-12.0, -3.5, -20.0)
+    with robolink.connect(simulator.url, limits=find_cell("a").limits()) as controller:
+        with pytest.raises(NotAllowedError, match="would move 24.000 mm; this cell allows 1.500"):
+            controller.tools.write(1, far, expected=STORED)
+        near = Wanted(1, ToolOffset(12.5, -3.5, -20.0), STORED)
+        with pytest.raises(NotAllowedError):  # of several tools none is written
+            change_tools(controller, [near, Wanted(2, far, STORED)])
+    assert (tools.get(1), tools.get(2)) == (STORED, STORED)
+
+
+def test_a_measured_change_is_held_to_it_whatever_its_own_limit():
+    class Nobody:
+        def tell(self, text):
+            pass
+
+    touches = [Pose(298, 99, -60, 0), Pose(322, 91, -60, 180)]
+    plan = ToolPlan(1, source=PointsSource(lambda: touches), verify=False)  # by itself 2 mm
+    machine = MemoryMachine({1: ToolOffset(12, -3.5, -20)})
+    with MemoryController(machine) as controller:
+        controller.change_guard.limits = ChangeLimits(length_mm=0.4)
+        change = NozzleChange(
+            controller, ChangePlan((plan,), ask_before_write=False), operator=Nobody()
+        )
+        with pytest.raises(CalibrationError, match="0.400 mm is allowed"):
+            change.run()
+    assert machine.read(1) == ToolOffset(12, -3.5, -20)
+
+
+def test_a_restore_is_asked_about_and_an_undo_is_not(cell, tools, tmp_path):
+    file = str(tmp_path / "tools.json")
+    assert cell("eva", "backup", file)[0] == 0
+    assert cell("eva", *SIGN_ERROR, "--accept-jump", "24.1")[0] == 0
+    code, _, err = cell("eva", "restore", file, "--yes")
+    assert code == 9
+    assert "The tip of tool 1 would move 24.000 mm; this cell allows 1.500 mm." in err
+    assert tools.get(1).x_mm == -12.0
+    # What was there before was proved, and the engineer who undoes has it on record.
+    assert cell("eva", "undo", "--yes")[0] == 0
+    assert tools.get(1) == STORED
+    assert "let tool 1 jump by 24.000 mm" in cell("eva", "journal", "list")[1]
+    assert cell("eva", "undo", "--yes")[0] == 0
+    assert cell("eva", "restore", file, "--yes", "--accept-jump", "24.1")[0] == 0
+    assert tools.get(1) == STORED
+
+
+def test_a_preview_says_by_how_much(cell, tools):
+    code, _, err = cell("eva", *SIGN_ERROR, "--dry-run")
+    assert code == 0
+    assert "would move 24.000 mm; this cell allows 1.500 mm" in err
+    assert tools.get(1) == STORED
+
+
+def test_an_operator_clears_nothing_from_a_program_either(simulator, tools):
+    simulator.machine.tools.select(1)
+    anna = Signature(operator="anna", role=PersonRole.OPERATOR)
+    with robolink.connect(simulator.url, signature=anna) as controller:
+        for then_select in (None, 2):
+            with pytest.raises(NotAllowedError, match="anna may not clear tool 1"):
+                controller.tools.clear(1, expected=STORED, then_select=then_select)
+    assert (tools.get(1), tools.selected) == (STORED, 1)
 
 
 def test_a_clear_takes_an_engineer(cell, tools):

@@ -65,6 +65,7 @@ class Preserver:
         markers = self._link.markers
         with self._link.lock.held(reason), markers.ledger.block():
             markers.look()
+            # Before a person measures for what would be refused, whether or not a tool is told.
             markers.require_settled(reason)
             details = self._in_force(reason)
             if details is None:

@@ -143,7 +143,6 @@ class NozzleChange:
             self._plan, tools=tuple(one.as_recorded(controller) for one in self._plan.tools)
         )
         try:
-            controller.require_settled(reason)
             with (
                 controller.latch.watching(reason),
                 controller.preserved(reason) if self._plan.moves else nullcontext(),

@@ -144,6 +144,7 @@ class ToolChange:
             StoppedError: A stop came; what was written is put back.
         """
         self._controller.latch.require_open(self.request)
+        # What is there already needs no write that would be refused, and is told as done.
         self._controller.require_settled(self.request)
         steps = self._believed() or self._compare()
         for doubt in self._controller.tools.doubts([step.tool for step in steps]):

@@ -168,15 +168,13 @@ def carrying_out(controller: Controller, order: str, job: Mapping[str, object]) 
     outcomes, purpose = controller.outcomes, tr("order {order}", order=order)
     plain = json.loads(json.dumps(job))
     with outcomes.hold(purpose), controller.signs_of_life():
+        # Whoever is told that it is done starts production: with the tool in force, at the speed
+        # and in the power that a killed run has perhaps not put back.
+        controller.require_settled(purpose)
         entry = _found(outcomes, order)
         if entry is not None:
-            done = _done(controller, order, plain, entry)
-            # Whoever is told that it is done starts production: with the tool in force, at the
-            # speed and in the power that a killed run has perhaps not put back.
-            controller.require_settled(purpose)
-            yield Order(order, plain, done)
+            yield Order(order, plain, _done(controller, order, plain, entry))
             return
-        controller.require_settled(purpose)
         outcomes.order = order
         try:
             yield Order(order, plain)

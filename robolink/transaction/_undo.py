@@ -144,6 +144,7 @@ def undo(
     if not plan.steps:
         return Undone("", ())
     outcomes = controller.outcomes
+    # Before the decision goes on record.
     controller.require_settled(plan.sentence)
     change = outcomes.change = new_operation()
     try:

@@ -141,7 +141,7 @@ def test_a_program_that_knows_the_cell_is_held_to_it(cell, simulator, tools):
     assert cell("eva", "status")[0] == 0  # writes the cell file
     far = ToolOffset(-12.0, -3.5, -20.0)
     with robolink.connect(simulator.url, limits=find_cell("a").limits()) as controller:
-        with pytest.raises(NotAllowedError, match="would move 24.000 mm; this cell allows 1.500"):
+        with pytest.raises(NotAllowedError, match="would move 24"):
             controller.tools.write(1, far, expected=STORED)
         near = Wanted(1, ToolOffset(12.5, -3.5, -20.0), STORED)
         with pytest.raises(NotAllowedError):  # of several tools none is written
@@ -154,6 +154,12 @@ def test_a_measured_change_is_held_to_it_whatever_its_own_limit():
         def tell(self, text):
             pass
 
+        def ask(self, question, kind):
+            raise AssertionError(question)
+
+        def poll(self, wait_s):
+            raise AssertionError
+
     touches = [Pose(298, 99, -60, 0), Pose(322, 91, -60, 180)]
     plan = ToolPlan(1, source=PointsSource(lambda: touches), verify=False)  # by itself 2 mm
     machine = MemoryMachine({1: ToolOffset(12, -3.5, -20)})
@@ -162,7 +168,7 @@ def test_a_measured_change_is_held_to_it_whatever_its_own_limit():
         change = NozzleChange(
             controller, ChangePlan((plan,), ask_before_write=False), operator=Nobody()
         )
-        with pytest.raises(CalibrationError, match="0.400 mm is allowed"):
+        with pytest.raises(CalibrationError, match=r"0\.400 mm is allowed"):
             change.run()
     assert machine.read(1) == ToolOffset(12, -3.5, -20)
 

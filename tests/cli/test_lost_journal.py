@@ -226,6 +226,7 @@ BLOCKED = (
     ("tool", "clear", "2", "--yes"),
     ("tool", "select", "2"),
     ("tool", "restore", "backup.json", "--yes"),
+    ("undo", "--yes"),
     ("robot", "jog", "z+1", "--yes"),
     ("robot", "io", "set", "3", "on"),
     ("calibrate", "two-pose", "--tool", "1", "--yes"),

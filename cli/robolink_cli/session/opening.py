@@ -39,6 +39,7 @@ def open_controller(
     changes: bool = False,
     leaves: bool = False,
     usual_change_mm: float | None = None,
+    job: str = "",
 ) -> "Iterator[Controller]":
     """Connect to the controller and, unless ``quiet``, say what was left unfinished there.
 
@@ -54,12 +55,15 @@ def open_controller(
             that nothing is said about it where all went well.
         usual_change_mm: How far a write may take a tip where the cell file does not say it; by
             default what is usual.
+        job: What is to be done, where a person would look, measure or answer for it before
+            anything is sent: refused at once while something earlier is unsettled.
 
     Raises:
         ConfigError: No controller is named, the URL or password file is wrong, or the robot is
             not the cell's.
         ConnectError: It is not reached.
         LoginRefusedError: Wrong or missing password.
+        OutcomeUnknownError: Something earlier is unsettled, and there is a ``job``.
         StoppedError: A stop came, at the end or before.
     """
     url = context.require_url()
@@ -100,6 +104,8 @@ def open_controller(
                 controller, context, quiet=quiet, looks=looks, calms=calms, leaves=leaves
             ),
         ):
+            if job:
+                controller.require_settled(job)
             yield controller
     if not looks:
         # A stop that came while the connection was closed: nobody may take this for a success.

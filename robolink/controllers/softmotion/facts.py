@@ -75,7 +75,7 @@ def set_kinematics(mailbox: Mailbox, position: Kinematics, orientation: Kinemati
     draft = Command(0, Opcode.SET_KINEMATICS, operands=(position, orientation, 0, 0))
     request, wanted = describe(draft), kinematics_word(position, orientation)
     with mailbox.lock.held(request):
-        mailbox.markers.require_settled(request)
+        mailbox.markers.require_settled(request)  # before the mailbox is taken
         now = mailbox.prepare(draft, request)
         require_still(now, controller=mailbox.identity, request=request)
         mailbox.markers.note_selection(0)

@@ -76,8 +76,8 @@ def measure_row(context: CliContext, row: str, asked: Asked, *, yes: bool) -> No
         NotAllowedError: The person is an operator.
     """
     known_mm = _checked(row, asked)
-    with open_controller(context, changes=True) as controller:
-        controller.require_settled(tr("record a row of the budget"))
+    job = tr("record a row of the budget")
+    with open_controller(context, changes=True, job=job) as controller:
         if row == "tip_image_px":
             found = _tip_image(controller, context, asked)
         elif asked.study is not None:
@@ -89,7 +89,7 @@ def measure_row(context: CliContext, row: str, asked: Asked, *, yes: bool) -> No
         agree(tr("Use this from now on?"), yes=yes)
         require_engineer(
             controller.outcomes,
-            tr("record a row of the budget"),
+            job,
             row=found.row,
             half_width=found.half_width,
         )

@@ -59,7 +59,9 @@ def learn(
         DeclinedError: A person said no, or nobody could be asked.
         UndefinedToolError: The tool has no offset.
     """
-    with open_controller(context._replace(station=name), changes=not dry_run) as controller:
+    job = "" if dry_run else tr("learn station {name}", name=name)
+    there = context._replace(station=name)
+    with open_controller(there, changes=not dry_run, job=job) as controller:
         known = _known(context, controller, name)
         tip = _tip(controller, tool)
         if touch.contact is not None:
@@ -76,7 +78,6 @@ def learn(
             context.emit("dry-run", payload, lambda: show_plan(payload))
             return
         require_inside(controller, steps)
-        controller.require_settled(tr("learn station {name}", name=name))
         require_contact_input(controller, touch)
         purpose = tr("to find station {name} with tool {tool}", name=name, tool=tool)
         question = motion_question(

@@ -55,7 +55,8 @@ def undo(
             tr("Give CHANGE or --to, not both."),
             remedy=tr("Name a change to undo, or an entry whose value is to come back."),
         )
-    with open_controller(context, changes=not dry_run) as controller:
+    job = "" if dry_run else tr("undo a change of a tool")
+    with open_controller(context, changes=not dry_run, job=job) as controller:
         chosen = change_named(controller.outcomes.recorded(), change) if change else ""
         plan = plan_undo(controller, tool=tool, change=chosen, to=to)
         undoing = Undoing(controller, plan, then_select=then_select)

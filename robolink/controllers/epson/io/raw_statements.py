@@ -24,6 +24,7 @@ class RawStatements:
         """See :meth:`robolink.controllers.epson.EpsonController.execute_raw`."""
         statement = _checked(text)
         with self._link.lock.held(statement):
+            # Before an engineer's word for it goes on record.
             self._link.markers.require_settled(statement)
             self._link.window.require_ready(statement)
             if command_class_of(Request("Execute", (statement,))) is CommandClass.ACT:

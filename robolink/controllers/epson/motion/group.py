@@ -195,6 +195,7 @@ class EpsonGroup(MotionGroupCore):
         link, window = self._link, self._link.window
         try:
             with link.lock.held(statement):
+                # Before power and speed are set for it.
                 link.markers.require_settled(statement)
                 self._require_supervision(statement)
                 window.require_ready(statement)

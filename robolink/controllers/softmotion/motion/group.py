@@ -241,7 +241,7 @@ class SoftMotionGroup(MotionGroupCore):
         return now
 
     def _require_settled(self, request: str) -> None:
-        """Hold ``request`` back while something earlier is unsettled."""
+        """Hold ``request`` back, before the mailbox is taken, while something is unsettled."""
         # The markers of our own movements under way do not count; what was open before the
         # first of them would have held that one back.
         if not self._mailbox.wire.motions.unread:

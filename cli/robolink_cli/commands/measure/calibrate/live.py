@@ -86,10 +86,8 @@ class LiveCalibration:
         Raises:
             CalibrationError: A camera is not there, or means nothing.
             ConfigError: The backup before the first write cannot be stored.
-            OutcomeUnknownError: Something earlier is unsettled.
             NotReadyError: The state forbids it.
         """
-        self._controller.require_settled(tr("calibrate tool {tool}", tool=self.tool))
         require_ready(self._controller, self._plan)
         note_change(self._controller, self.tool, self._controller.tools.read(self.tool))
         keep_first_backup(self._controller, tell=note)
@@ -169,8 +167,9 @@ def calibrate_live(frame: CalibrationRequest, source: Callable[[Controller], Tip
 
 def _calibrate(frame: CalibrationRequest, source: Callable[[Controller], TipSource]) -> None:
     context = frame.context
+    job = "" if frame.dry_run else tr("calibrate tool {tool}", tool=frame.tool)
     with (
-        open_controller(context, changes=not frame.dry_run) as controller,
+        open_controller(context, changes=not frame.dry_run, job=job) as controller,
         ordered(controller, frame.order, f"calibrate {frame.method}") as order,
     ):
         if order is not None and order.done is not None:

@@ -27,13 +27,14 @@ if TYPE_CHECKING:
     from robolink.runner._jog_steps import parse_steps as parse_steps
     from robolink.runner._jog_steps import refuse_decimal_comma as refuse_decimal_comma
     from robolink.runner._jog_steps import way_in_words as way_in_words
+    from robolink.runner._operator import POLL_S as POLL_S
     from robolink.runner._operator import Operator as Operator
     from robolink.runner._operator import Question as Question
+    from robolink.runner._operator import awaited_line as awaited_line
     from robolink.runner._place_question import AGAIN as AGAIN
     from robolink.runner._place_question import MOST_REFUSED as MOST_REFUSED
     from robolink.runner._place_question import TakenAgainError as TakenAgainError
     from robolink.runner._place_question import inputs_of as inputs_of
-    from robolink.runner._runner import POLL_S as POLL_S
     from robolink.runner._runner import Runner as Runner
     from robolink.runner._runner import ask_for_pose as ask_for_pose
     from robolink.runner._settings import RunSettings as RunSettings
@@ -74,9 +75,9 @@ __getattr__ = lazy_exports(
         "_endings": "EndingWatch",
         "_foreseeing": "ForeseenStep considered first_clear foreseen_steps nothing_in_the_way",
         "_jog_steps": "jog_target parse_decimal parse_steps refuse_decimal_comma way_in_words",
-        "_operator": "Operator Question",
+        "_operator": "Operator POLL_S Question awaited_line",
         "_place_question": "AGAIN MOST_REFUSED TakenAgainError inputs_of",
-        "_runner": "POLL_S Runner ask_for_pose",
+        "_runner": "Runner ask_for_pose",
         "_settings": "RunSettings",
         "_steps": "Ask Confirm Consider Look Move Notify Procedure Seek SeenAt Step TakenStep "
         "StepDone TeachPrompt TouchedAt",

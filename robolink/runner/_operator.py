@@ -1,7 +1,11 @@
 """The person at the cell, as whoever runs a procedure asks them."""
 
+from collections.abc import Callable
 from enum import Enum
-from typing import Protocol
+from typing import Final, Protocol
+
+POLL_S: Final = 1.0
+"""Longest time between two status reads while a person is asked."""
 
 
 class Question(Enum):
@@ -36,3 +40,30 @@ class Operator(Protocol):
 
     def poll(self, wait_s: float) -> str | None:
         """Return the next line of the answer, ``None`` if none came within ``wait_s``."""
+
+
+def awaited_line(operator: Operator, look: Callable[[], object], *, wait_s: float = POLL_S) -> str:
+    """Return the next line that a person types, looking at the controller while there is none.
+
+    Whoever asks a person fetches the answer here: an idle client is cut off after the remote
+    time-out (docs/reference/epson.md 1.1), and a person may take longer than that to look into the
+    cell (docs/reference/rules.md 7).
+
+    Args:
+        operator: Who was asked.
+        look: Reads the status; what it raises ends the question.
+        wait_s: Longest time between two looks.
+
+    Example:
+        >>> from robolink.runner import awaited_line
+        >>> class Person:  # implements robolink.Operator
+        ...     lines = iter([None, "y"])
+        ...     def poll(self, wait_s):
+        ...         return next(self.lines)
+        >>> awaited_line(Person(), lambda: print("a look"))
+        a look
+        'y'
+    """
+    while (line := operator.poll(wait_s)) is None:
+        look()
+    return line

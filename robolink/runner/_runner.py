@@ -29,7 +29,7 @@ from robolink.model import (
 from robolink.runner._endings import EndingWatch, as_measurement
 from robolink.runner._foreseeing import considered
 from robolink.runner._jog_steps import jog_target, parse_steps, typed_pose, way_in_words
-from robolink.runner._operator import Operator
+from robolink.runner._operator import POLL_S, Operator, awaited_line
 from robolink.runner._place_question import PlaceQuestion
 from robolink.runner._settings import RunSettings
 from robolink.runner._steps import (
@@ -49,9 +49,6 @@ from robolink.runner._subjects import GuidedOperator, JogRange, JogSubject, Move
 from robolink.runner._yes_no import Asking
 from robolink.sensing import median_spot, scatter_of, seen_in
 from robolink.ways import Way, way
-
-POLL_S = 1.0
-"""Longest time between two status reads while a person is asked (design: at most 5 s)."""
 
 CONTACT_POLL_S: Final = 0.2
 """The same while an input is watched that shows contact."""
@@ -357,14 +354,17 @@ class Runner:
         Args:
             between: Called as often as the input is looked at, which is then more often.
         """
-        while True:
-            line = self._operator.poll(POLL_S if between is None else CONTACT_POLL_S)
-            checkpoint(Checkpoint.QUESTION, line or "")
+
+        def look(line: str = "") -> None:
+            checkpoint(Checkpoint.QUESTION, line)
             self._watch()
             if between is not None:
                 between()
-            if line is not None:
-                return line
+
+        wait_s = POLL_S if between is None else CONTACT_POLL_S
+        line = awaited_line(self._operator, look, wait_s=wait_s)
+        look(line)
+        return line
 
     def _require_going(self) -> None:
         self._controller.latch.require_open(tr("The procedure"))

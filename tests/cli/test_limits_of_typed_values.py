@@ -116,6 +116,17 @@ def test_a_no_writes_nothing_and_an_operator_is_not_even_asked(cell, tools, pers
     assert tools.get(1) == STORED
 
 
+@pytest.mark.parametrize("person", ["n"], indirect=True)
+@pytest.mark.parametrize(
+    "words", [("set", "1", "--x", "12.5"), ("clear", "2"), ("select", "2")], ids=lambda it: it[0]
+)
+def test_a_no_sets_clears_and_selects_nothing(run, tools, person, words):
+    selected = tools.selected
+    assert run("tool", *words)[0] == 9
+    assert len(person.questions) == 1
+    assert (tools.get(1), tools.get(2), tools.selected) == (STORED, STORED, selected)
+
+
 def test_a_turn_has_a_limit_of_its_own(cell, tools):
     code, _, err = cell("eva", "tool", "set", "1", "--u", "6")
     assert code == 9

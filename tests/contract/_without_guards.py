@@ -13,6 +13,7 @@ from typing import Any, Final
 
 import pytest
 
+from robolink.errors import RobolinkError
 from robolink.model import MarkerKind, ToolOffset, ToolReceipt
 from robolink.timing import wall_label
 
@@ -152,6 +153,28 @@ def _unguarded(_statement: object, text: str) -> str:
     return str(reply._link.session.execute(text).text or "")
 
 
+def _settled_unread(_settler: object, marker: Any) -> Any:
+    """Take whatever was begun for done."""
+    from robolink.model import Finding, Verdict
+
+    return Finding(marker, Verdict.DONE, "")
+
+
+def _line_without_a_look(operator: Any, _look: object, *, wait_s: float = 1.0) -> str:
+    while (line := operator.poll(wait_s)) is None:
+        pass
+    return str(line)
+
+
+def _knocking(connect: Callable[[], Any], **_named: object) -> Any:
+    """Try again at once, for ever."""
+    while True:
+        try:
+            return connect()
+        except RobolinkError:
+            continue
+
+
 def _sent_in_part(transport: Any, data: bytes, **_named: object) -> None:
     transport._socket.send(data[:1])
 
@@ -175,6 +198,9 @@ _ITSELF: Final[Mapping[str, StandIn]] = {
     "robolink.stop_latch.StopLatch.admit": _nothing,
     "robolink.stop_latch.StopLatch.restoring": _open,
     "robolink.stop_latch.StopLatch.calming": _calmed,
+    "robolink.controllers.epson.tools.preserve.EpsonPreserver._restore_more": _nothing,
+    "robolink.controllers.connect_when_reachable": _knocking,
+    "robolink.transaction.Settler.examine": _settled_unread,
     "robolink.controllers.PolledGroup.halt": lambda group: group._send_stop(),
     "robolink.transaction.ToolChange._take_back": _nothing,
     "robolink.controllers.markers.ProcedureLock.held": _open,
@@ -187,6 +213,14 @@ _ITSELF: Final[Mapping[str, StandIn]] = {
     "robolink.transport.stream.tcp.TcpTransport.send": _sent_in_part,
 }
 _AS_IMPORTED: Final[Mapping[str, Mapping[str, StandIn]]] = {
+    "robolink_cli.prompts.questions.agree": {
+        "robolink_cli.prompts.questions.agree": _nothing,
+        "robolink_cli.commands.controller.tool.agree": _nothing,
+    },
+    "robolink.runner.awaited_line": {
+        "robolink.runner.awaited_line": _line_without_a_look,
+        "robolink.runner._runner.awaited_line": _line_without_a_look,
+    },
     "robolink.controllers.ToolTableCore.same": {
         "robolink.controllers.epson.tools.table.EpsonToolTable.same": _to_the_last_bit,
         "robolink.controllers.epson.tools.table.EpsonToolTable._storable": _as_given,

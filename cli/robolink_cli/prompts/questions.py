@@ -99,20 +99,12 @@ def asked_for_text(question: str) -> str:
 
 
 def _answer() -> str:
-    """Return the next line, reading the status between polls of the prompt.
-
-    An idle client is cut off after the remote time-out (docs/reference/epson.md 1.1), and a person
-    may take longer than that to look into the cell.
-    """
-    from robolink.runner import POLL_S
+    """Return the next line; the controller's status is read meanwhile, where one is connected."""
+    from robolink.runner import awaited_line
     from robolink_cli.prompts.operator import terminal
 
     controller = click.get_current_context().meta.get(WATCHED)
-    operator = terminal()
-    while (line := operator.poll(POLL_S)) is None:
-        if controller is not None:
-            controller.status()
-    return line
+    return awaited_line(terminal(), (lambda: None) if controller is None else controller.status)
 
 
 def require_yes(question: str) -> None:

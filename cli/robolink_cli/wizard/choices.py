@@ -7,7 +7,7 @@ from typing import Final
 from robolink.errors import DeclinedError
 from robolink.messages import tr
 from robolink.model import AnsweredBy
-from robolink.runner import POLL_S, Question
+from robolink.runner import Question, awaited_line
 from robolink_cli.console.language import other_language, speak_from_now
 from robolink_cli.prompts.present import AskingDesk
 from robolink_cli.prompts.questions import keep_answer
@@ -89,9 +89,7 @@ def _answered(
 ) -> str:
     desk.regard(subject)
     desk.ask(question, Question.TEXT)
-    while (answer := desk.poll(POLL_S)) is None:
-        watch()
-    return answer
+    return awaited_line(desk, watch)
 
 
 def _index(answer: str, subject: ChoiceSubject) -> int:

@@ -24,6 +24,7 @@ from robolink.protocols.mailbox import (
     ErrorClass,
     ExportProfile,
     Kinematics,
+    PlcopenSchema,
     program_texts,
 )
 
@@ -227,9 +228,14 @@ KINDS = ("inputVars", "outputVars", "inOutVars")
 def test_openplc_finds_every_body_as_a_paragraph():
     """Its first stage, xml2st, looks for the child p of ST and knows the name space 0201 alone."""
     for profile in ExportProfile:
-        xml = plc_texts(profile, 0, "Kin_Scara3_Z")["robolink_program.xml"]
-        assert xml.count("tc6_0200") == 1
-        root = ElementTree.fromstring(xml.replace("tc6_0200", "tc6_0201"))
+        usual, other = (
+            plc_texts(profile, 0, "Kin_Scara3_Z", schema=schema) for schema in PlcopenSchema
+        )
+        assert [name for name in usual if usual[name] != other[name]] == ["robolink_program.xml"]
+        xml = other["robolink_program.xml"]
+        assert xml.count("tc6_0201") == 1
+        assert xml.replace("tc6_0201", "tc6_0200") == usual["robolink_program.xml"]
+        root = ElementTree.fromstring(xml)
         space = "{http://www.plcopen.org/xml/tc6_0201}"
         bodies = [pou.find(f"{space}body/{space}ST") for pou in root.iter(f"{space}pou")]
         assert len(bodies) > 5

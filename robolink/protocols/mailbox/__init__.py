@@ -78,6 +78,7 @@ if TYPE_CHECKING:
     from robolink.protocols.mailbox.exports.error_table import error_table_csv as error_table_csv
     from robolink.protocols.mailbox.exports.plc_program import PROGRAM_FILES as PROGRAM_FILES
     from robolink.protocols.mailbox.exports.plc_program import program_texts as program_texts
+    from robolink.protocols.mailbox.exports.plcopen_xml import PlcopenSchema as PlcopenSchema
     from robolink.protocols.mailbox.exports.plcopen_xml import plcopen_xml as plcopen_xml
     from robolink.protocols.mailbox.exports.register_map import register_map_csv as register_map_csv
     from robolink.protocols.mailbox.exports.register_map import (
@@ -101,7 +102,7 @@ else:
             "exports.eds": "electronic_data_sheet",
             "exports.error_table": "error_table_csv",
             "exports.plc_program": "PROGRAM_FILES program_texts",
-            "exports.plcopen_xml": "plcopen_xml",
+            "exports.plcopen_xml": "PlcopenSchema plcopen_xml",
             "_frames": "frames_match from_frame to_frame",
             "_kinematics": "Kinematics find_kinematics find_kinematics_word kinematics_word",
             "blocks.register_layouts": (

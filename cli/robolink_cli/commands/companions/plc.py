@@ -59,20 +59,35 @@ def _symbols(given: tuple[str, str, str] | None) -> tuple[str, ...]:
     callback=lambda _, __, given: _symbols(given),
     help="Symbols of SMC_READ_TOOL_MODE in your Library Manager, to read tools by the block.",
 )
+@click.option(
+    "--plcopen",
+    type=click.Choice(["0200", "0201"]),
+    default="0200",
+    show_default=True,
+    help="Schema of the PLCopen XML: 0200 as CODESYS writes it, 0201 for OpenPLC and Beremiz.",
+)
 @click.option("--force", is_flag=True, help="Overwrite files that were changed.")
 @json_option
 def export(
-    folder: Path, profile: str, base: int, kinematics: str, read_modes: tuple[str, ...], force: bool
+    folder: Path,
+    *,
+    profile: str,
+    base: int,
+    kinematics: str,
+    read_modes: tuple[str, ...],
+    plcopen: str,
+    force: bool,
 ) -> None:
     """Write the program of the mailbox, its register map and its CANopen data sheet.
 
     docs/plc-program.md says what to do with them. Their licence is 0BSD: they may be used in a
     machine without any duty.
     """
-    from robolink.protocols.mailbox import ExportProfile
+    from robolink.protocols.mailbox import ExportProfile, PlcopenSchema
     from robolink_cli.commands.companions.plc_export import export_texts, plc_texts
 
-    texts = plc_texts(ExportProfile(profile), base, kinematics, read_modes)
+    schema = PlcopenSchema(plcopen)
+    texts = plc_texts(ExportProfile(profile), base, kinematics, read_modes, schema=schema)
     written = [str(path) for path in export_texts(folder, texts, replace=force)]
     if json_is_on():
         emit_json("robolink/plc-export/1", {"files": written, "profile": profile, "base": base})

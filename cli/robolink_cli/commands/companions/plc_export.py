@@ -8,6 +8,7 @@ from robolink.files.named import holds, require_free, save_named
 from robolink.messages import tr
 from robolink.protocols.mailbox import (
     ExportProfile,
+    PlcopenSchema,
     electronic_data_sheet,
     error_table_csv,
     find_kinematics_word,
@@ -20,7 +21,12 @@ from robolink.protocols.mailbox import (
 
 
 def plc_texts(
-    profile: ExportProfile, base: int, kinematics: str = "", read_modes: Sequence[str] = ()
+    profile: ExportProfile,
+    base: int,
+    kinematics: str = "",
+    read_modes: Sequence[str] = (),
+    *,
+    schema: PlcopenSchema = PlcopenSchema.CODESYS,
 ) -> Mapping[str, str]:
     """Return the files by name.
 
@@ -30,6 +36,7 @@ def plc_texts(
         kinematics: Block name of the group's kinematics, or two with a + between them, for opcode
             30004; empty for none.
         read_modes: The three symbols of SMC_READ_TOOL_MODE, or none.
+        schema: Under which name space the PLCopen XML stands.
 
     Raises:
         ConfigError: There is no such kinematics.
@@ -42,7 +49,7 @@ def plc_texts(
     program = program_texts(profile, base=base, kinematics=kinematics, read_modes=read_modes)
     return {
         **program,
-        "robolink_program.xml": plcopen_xml(program),
+        "robolink_program.xml": plcopen_xml(program, schema),
         "errors.csv": error_table_csv(),
         "register_map.csv": register_map_csv(base),
         "register_map.md": register_map_markdown(profile, base),

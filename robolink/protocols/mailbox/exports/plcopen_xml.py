@@ -6,6 +6,7 @@ Source: docs/reference/structured_text.md 3. The import into a real CODESYS is u
 import re
 import uuid
 from collections.abc import Iterable, Mapping, Sequence
+from enum import StrEnum
 from typing import Final
 from xml.sax.saxutils import escape, quoteattr
 
@@ -35,7 +36,7 @@ _ARRAY: Final = re.compile(r"ARRAY \[(-?\d+)\.\.(-?\d+)\] OF (.+)", re.DOTALL)
 _FRAME: Final = """\
 <?xml version="1.0" encoding="utf-8"?>
 <!-- SPDX-License-Identifier: 0BSD. Made by robolink expert plc export; not to be edited. -->
-<project xmlns="http://www.plcopen.org/xml/tc6_0200">
+<project xmlns="http://www.plcopen.org/xml/tc6_{schema}">
   <fileHeader companyName="" productName="robolink" productVersion="1" \
 creationDateTime="2026-01-01T00:00:00" />
   <contentHeader name="robolink_mailbox" modificationDateTime="2026-01-01T00:00:00">
@@ -63,20 +64,35 @@ creationDateTime="2026-01-01T00:00:00" />
 """
 
 
-def plcopen_xml(texts: Mapping[str, str]) -> str:
-    """Return the program as PLCopen XML 2.0.
+class PlcopenSchema(StrEnum):
+    """Under which name space the file stands; nothing else of it differs.
+
+    Source: docs/reference/structured_text.md 3.
+    """
+
+    CODESYS = "0200"
+    """What CODESYS itself writes."""
+
+    OPENPLC = "0201"
+    """The only one that OpenPLC, Beremiz and IronPLC read."""
+
+
+def plcopen_xml(texts: Mapping[str, str], schema: PlcopenSchema = PlcopenSchema.CODESYS) -> str:
+    """Return the program as PLCopen XML.
 
     Types, both lists, function blocks and the program are in it; a task and libraries are not,
     because they are those of the project.
 
     Args:
         texts: The sources, by file name.
+        schema: Under which name space it stands.
     """
     types = [made for text in texts.values() for made in types_in(text)]
     blocks = [made for text in texts.values() for made in blocks_in(text)]
     names = [made.name for made in types] + [made.name for made in blocks]
     names += [name.partition(".")[0] for name in _LISTS]
     return _FRAME.format(
+        schema=schema,
         information=_data("projectinformation", "<ProjectInformation />"),
         types="\n".join(map(_type, types)),
         blocks="\n".join(map(_block, blocks)),

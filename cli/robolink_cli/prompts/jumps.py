@@ -17,7 +17,7 @@ from robolink_cli.console.render import json_is_on
 from robolink_cli.prompts.questions import asked, on_terminal
 
 if TYPE_CHECKING:
-    from robolink.model import Controller, ToolOffset
+    from robolink.model import Controller, Jump
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -54,26 +54,21 @@ def accept_jump_options(function: F) -> F:
 def accepted_jump(
     controller: "Controller",
     tool: int,
-    before: "ToolOffset | None",
-    after: "ToolOffset | None",
+    jump: "Jump",
     *,
     accepted_mm: float | None,
     accepted_deg: float | None,
-) -> Iterator[bool]:
-    """Have a jump accepted, for the block, by who may accept it; nobody is asked where it is none.
+) -> Iterator[None]:
+    """Have a jump beyond the limits of the cell accepted, for the block, by who may accept it.
 
     ``--yes`` does not answer this question: it was typed before the figure was known.
 
     Args:
         controller: The controller, connected.
         tool: Number of the tool.
-        before: What it holds.
-        after: What it is to hold.
+        jump: How far its tip would be taken.
         accepted_mm: The length that was accepted beforehand.
         accepted_deg: The angle that was accepted beforehand.
-
-    Yields:
-        Whether it takes somebody's consent, and has it.
 
     Raises:
         NotAllowedError: It takes an engineer; nobody was asked.
@@ -82,17 +77,14 @@ def accepted_jump(
     from robolink.model import PersonRole
 
     guard = controller.change_guard
-    jump, allowed = guard.beyond(before, after), guard.limits
-    if jump is None:
-        yield False
-        return
+    allowed = guard.limits
     # Who may not is refused, not asked.
     if controller.outcomes.signature.role != PersonRole.OPERATOR and jump.exceeds(
         accepted_mm or allowed.length_mm, accepted_deg or allowed.angle_deg
     ):
         _ask(allowed.figure(tool, jump))
     with guard.accepting(tool, jump):
-        yield True
+        yield
 
 
 def _ask(figure: str) -> None:

@@ -63,16 +63,17 @@ class Restoration:
             require_engineer(self._controller.outcomes, tr("restore tools from a backup"))
             with ExitStack() as accepted:
                 for change in self._plan.changes:
-                    accepted.enter_context(
-                        accepted_jump(
-                            self._controller,
-                            change.tool,
-                            change.now,
-                            change.wanted,
-                            accepted_mm=accepted_mm,
-                            accepted_deg=accepted_deg,
+                    jump = self._controller.change_guard.beyond(change.now, change.wanted)
+                    if jump is not None:
+                        accepted.enter_context(
+                            accepted_jump(
+                                self._controller,
+                                change.tool,
+                                jump,
+                                accepted_mm=accepted_mm,
+                                accepted_deg=accepted_deg,
+                            )
                         )
-                    )
                 keep_first_backup(self._controller, tell=note)
                 receipts = restore_tools(self._controller.tools, self._plan, tell=note)
         return {

@@ -1,7 +1,7 @@
 """tool list, get, set, clear, select: the tool table."""
 
 from collections.abc import Mapping, Sequence
-from contextlib import nullcontext
+from contextlib import ExitStack, nullcontext
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -171,34 +171,38 @@ def set_tool(
     with (
         open_controller(context, changes=not dry_run) as controller,
         nullcontext() if order is None else ordered(controller, order, "tool set") as found,
+        ExitStack() as agreed,
     ):
         if found is not None and found.done is not None:
             payload = found.done.result
         else:
             before, wanted = setting.look_up(controller)
+            guard = controller.change_guard
+            jump = guard.beyond(before, wanted)
             if dry_run:
-                guard = controller.change_guard
-                if jump := guard.beyond(before, wanted):
+                if jump is not None:
                     note(guard.limits.figure(number, jump))
                 context.show_requests(controller.tools.preview_write(number, wanted))
                 return
             setting.show_change(controller, before, wanted)
-            with accepted_jump(
-                controller,
-                number,
-                before,
-                wanted,
-                accepted_mm=accepted_mm,
-                accepted_deg=accepted_deg,
-            ) as agreed:
-                setting.ask(controller, agreed=agreed, yes=yes)
-                receipts = change_tools(
-                    controller,
-                    [Wanted(number, wanted, before)],
-                    tell=note,
-                    order=found,
-                    describe=setting.document,
+            if jump is not None:
+                agreed.enter_context(
+                    accepted_jump(
+                        controller,
+                        number,
+                        jump,
+                        accepted_mm=accepted_mm,
+                        accepted_deg=accepted_deg,
+                    )
                 )
+            setting.ask(controller, agreed=jump is not None, yes=yes)
+            receipts = change_tools(
+                controller,
+                [Wanted(number, wanted, before)],
+                tell=note,
+                order=found,
+                describe=setting.document,
+            )
             payload = setting.document(receipts)
     setting.show(payload, found)
 

@@ -164,13 +164,15 @@ class StopLatch:
         """Surround what may begin under a stop: a reset, or switching off.
 
         A stop that comes meanwhile ends it as it ends everything else, and no reset of before is
-        sent after it: it would release what this stop holds.
+        sent after it: it would release what this stop holds. Where a person is asked about it
+        first, a block around question and reset lets it count from the question.
 
         Raises:
             StoppedError: A stop came meanwhile.
         """
-        permits, began, closed = self._permits.__dict__, self._closings, self._closed
-        before, permits["calms"] = permits.get("calms"), began
+        permits, closed = self._permits.__dict__, self._closed
+        before = permits.get("calms")
+        began = permits["calms"] = self._closings if before is None else before
         try:
             if closed:
                 yield

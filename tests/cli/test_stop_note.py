@@ -34,8 +34,9 @@ def stopped_in(monkeypatch):
 
 
 def test_a_reset_does_not_release_the_stop_that_came_in_the_middle_of_it(stopped_in, capsys):
-    stopped_in("reset_fault")
+    simulator = stopped_in("reset_fault")
     assert main.run(["-c", URL, "reset", "--yes"]) == 10
+    assert "$Reset" not in [text for _, _, text in simulator.log]  # it was asked for before
     assert "stop" in capsys.readouterr().err
     assert find_note(far_end_of(URL)) is not None
     assert main.run(["-c", URL, "jog", "z+1", "--yes"]) == 10

@@ -157,6 +157,17 @@ class Person:
         return self._answer
 
 
+def test_a_stop_while_a_person_is_asked_about_a_reset_is_not_released_by_the_yes(stopped):
+    controller, before = stopped.controller, stopped.requests()
+    with pytest.raises(StoppedError), controller.latch.calming("the question and the reset"):
+        controller.stop()  # another one, from the next terminal
+        asked = stopped.requests()
+        controller.reset_fault()
+    assert stopped.requests() == asked != before
+    with controller.latch.calming("a new question"):
+        controller.reset_fault()
+
+
 @pytest.mark.parametrize("backend", BACKENDS)
 @pytest.mark.parametrize("asked", ["place", "yes or no", "text"])
 def test_an_answer_that_a_stop_overtakes_counts_no_more(backend, asked):

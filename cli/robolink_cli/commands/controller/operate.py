@@ -119,8 +119,9 @@ def reset(context: CliContext, dry_run: bool, yes: bool) -> None:
         effect, told = _effect_of_reset(controller)
         if told and (yes or not on_terminal()):
             note(effect)  # nobody is asked, so it is said before it is sent
-        agree(tr("{effect} Reset now?", effect=effect), yes=yes)
-        controller.reset_fault()
+        with controller.latch.calming(str(Act.RESET)):
+            agree(tr("{effect} Reset now?", effect=effect), yes=yes)
+            controller.reset_fault()
         state = controller.status().state
         name = own_name_of(controller)
     forget_stop(context.require_url(), name)

@@ -105,8 +105,20 @@ class ChangeGuard:
     def require(self, tool: int, before: ToolOffset | None, after: ToolOffset | None) -> None:
         """Refuse a change beyond the limits that is neither accepted nor puts something back.
 
+        Args:
+            tool: Number of the tool.
+            before: What it holds, ``None`` for undefined.
+            after: What it is to hold, ``None`` to be cleared.
+
         Raises:
             NotAllowedError: Names the figure; nothing was sent.
+
+        Example:
+            >>> from robolink.model import ChangeLimits, ToolOffset
+            >>> from robolink.testing import MemoryController
+            >>> guard = MemoryController().change_guard
+            >>> guard.limits = ChangeLimits(length_mm=2)
+            >>> guard.require(1, ToolOffset(x_mm=12), ToolOffset(x_mm=13.5))
         """
         jump, accepted = self.beyond(before, after), self._accepted.get(tool)
         if jump is None or self._latch.restores:

@@ -4,6 +4,7 @@ import json
 
 import pytest
 from robolink_cli import main
+from robolink_cli.commands.companions import serve
 from robolink_cli.prompts import jumps
 from robolink_cli.prompts import operator as _operator
 from robolink_cli.prompts import questions as consent
@@ -199,6 +200,16 @@ def test_a_restore_is_asked_about_and_an_undo_is_not(cell, tools, tmp_path):
     assert cell("eva", "undo", "--yes")[0] == 0
     assert cell("eva", "restore", file, "--yes", "--accept-jump", "24.1")[0] == 0
     assert tools.get(1) == STORED
+
+
+@pytest.mark.parametrize(("said", "held_mm"), [("1", 1.0), ("3", 1.5)])
+def test_a_program_that_calls_back_is_held_to_it(cell, monkeypatch, said, held_mm):
+    held = []
+    monkeypatch.setattr(
+        serve, "_serve_programs", lambda _cell, _at, limits, **_: held.append(limits)
+    )
+    assert cell("eva", "serve", "--spel", "127.0.0.1:0", "--max-change-mm", said)[0] == 0
+    assert [limits.max_change_mm for limits in held] == [held_mm]
 
 
 def test_a_preview_says_by_how_much(cell, tools):

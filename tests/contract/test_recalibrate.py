@@ -264,6 +264,26 @@ def test_z_is_typed_for_each_tool(cell, recipe):
     assert assisted(cell, recipe(TOUCH), "--z", "1=-20").code == 2
 
 
+def test_a_typed_z_beyond_the_cell_takes_an_engineer(cell, recipe, tmp_path, monkeypatch):
+    """What a person types is not judged by the recipe, and held back by the write all the same."""
+    file, before = tmp_path / "robolink.toml", cell.tool_1
+    people = '[cells.a.people]\nanna = "engineer"\nben = "operator"\n'
+    file.write_text(
+        f'[cells.a]\nurl = "{cell.url}"\nremote_timeout_s = 5\n'
+        f'remote_timeout_confirmed_by = "anna"\nmax_change_mm = 3\n{people}'
+    )
+    monkeypatch.setenv("ROBOLINK_CONFIG", str(file))
+    assist = ("--assist", cell.assist_url, "--yes", "--z", "1=-25")
+    line = ("-c", "a", "recalibrate", recipe(TOUCH, z="typed"), *assist)
+    refused = cell.run(*line, "--operator", "ben")
+    assert refused.code == 9
+    assert "ben may not let tool 1 jump by 5" in refused.err
+    assert cell.tool_1 == before
+    done = cell.run(*line, "--operator", "anna")
+    assert done.code == 0, done.err
+    assert cell.tool_1.z_mm == -25.0
+
+
 def test_z_is_measured_on_a_pin_of_known_height(cell, recipe):
     station = f"z_mm = {cell.simulator.world.pin_mm[2]}"
     done = assisted(cell, recipe(TOUCH, z="measured", station=station))

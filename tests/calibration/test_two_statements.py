@@ -116,6 +116,34 @@ def test_touches_that_agree_by_luck_do_not_make_an_aim_sure():
         assert told.accurate_to_mm == pytest.approx(told.repeatable_to_mm)
 
 
+def test_of_a_tool_whose_axes_were_shown_the_angles_stay_as_sure_as_they_are():
+    measured = ("x_mm", "y_mm", "z_mm", "u_deg")
+    sure = [0.001**2] * 3 + [0.02**2]
+    bare = CalibrationResult(
+        "six-point", ToolOffset(1, 2, 3, 4), measured, (), (), 0.8, (), TOUCHES,
+        covariance=tuple(tuple(s if i == j else 0.0 for j in range(4)) for i, s in enumerate(sure)),
+        half_width95=(0.002, 0.002, 0.002, 0.05),
+        region95_radius_mm=0.003,
+        interval_from="residuals",
+        dof=12,
+        sources=(ErrorSource.of_lengths("touch_mm", 3),),
+    )  # fmt: skip
+    found = judged(bare, AccuracyFacts(by_contact=True))
+
+    assert found.accurate_to_mm == pytest.approx(2.795 * 0.03 * 0.8, rel=0.001)
+    assert found.accuracy.half_width95[3] == pytest.approx(0.05)
+
+
+def test_what_no_person_aimed_is_not_held_to_their_aim():
+    """A case by hand may say of a camera that an input showed each touch: nobody aimed it."""
+    seen = replace(
+        two_pose(sigma_mm=None), half_width95=(0.01, 0.01), region95_radius_mm=0.0125,
+        covariance=((0.0051**2, 0.0), (0.0, 0.0051**2)), dof=6, interval_from="residuals",
+        sources=(ErrorSource.of_lengths("tip_image_px", 2, gain=0.0),),
+    )  # fmt: skip
+    assert judged(seen, AccuracyFacts(by_contact=True)).accurate_to_mm == pytest.approx(0.0125)
+
+
 def test_an_input_tells_the_height_of_a_touch_better_than_a_person_aims_it():
     bare = one_touched(Pose(300, 100, -60, 0), Pin(312, 96.5, -80))
     rows = {"place_mm": RowFact(0.0, "stated")}

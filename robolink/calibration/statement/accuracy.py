@@ -43,9 +43,6 @@ _PROBE_MM: Final = 0.005
 _BEAMS_MM: Final = 0.003
 _CAMERA_PX: Final = 0.1
 
-ENOUGH_NU: Final = 6
-"""From so many degrees of freedom on an estimated scatter may be used in place of a usual one."""
-
 _PLANE: Final = 2
 """Lengths that are measured in the plane."""
 
@@ -79,7 +76,9 @@ def usual_look_sigma_mm(
 
 def _aimed(result: CalibrationResult, facts: AccuracyFacts) -> bool:
     """Tell whether a person aimed at a pin, though an input showed the contact."""
-    return facts.by_contact and not facts.by_program and not result.by_surface
+    if not facts.by_contact or facts.by_program or result.by_surface:
+        return False
+    return any(source.row == "touch_mm" for source in result.sources or ())
 
 
 def assessed(result: ResultT, facts: AccuracyFacts) -> ResultT:
@@ -117,7 +116,7 @@ def assessed(result: ResultT, facts: AccuracyFacts) -> ResultT:
         # Nothing usual is known of angles.
         sources = tuple(one.of_first(len(lengths)) for one in sources)
         basis = "default" if facts.look_sigma_mm is None else "record"
-    elif _too_sure_of_its_aim(result, facts):
+    elif _too_sure_of_its_aim(result, facts, len(lengths)):
         scattered, basis = _scattering(result, _PERSON_MM, len(lengths)), "default"
     parts = list(_parts(sources, facts))
     whole = with_station(scattered, *(one.part for one in parts))
@@ -291,17 +290,16 @@ def row_covariance(source: ErrorSource, half_width: float) -> "Floats":
     return covariance
 
 
-def _too_sure_of_its_aim(result: CalibrationResult, facts: AccuracyFacts) -> bool:
-    """Tell whether few touches agree better than a person can be relied on to aim.
+def _too_sure_of_its_aim(result: CalibrationResult, facts: AccuracyFacts, lengths: int) -> bool:
+    """Tell whether touches agree better than a person can be relied on to aim.
 
-    With a contact input no row holds what the person sees, so what is usual of them counts until
-    the cell states its scatter, the record tells it, or there are residuals enough.
+    With a contact input no row holds what the person sees, and that the touches of one run agree
+    says nothing of it. So what is usual of a person counts until the cell states its scatter or the
+    record tells it.
     """
     if not _aimed(result, facts) or result.sigma_stated or facts.look_sigma_mm is not None:
         return False
-    if (result.dof or 0) >= ENOUGH_NU or not all(map(_is_length, result.measured)):
-        return False
-    usual_mm = _scattering(result, _PERSON_MM, len(result.measured)).repeatable_to_mm
+    usual_mm = _scattering(result, _PERSON_MM, lengths).repeatable_to_mm
     own_mm = result.repeatable_to_mm
     return usual_mm is not None and own_mm is not None and usual_mm > own_mm
 
@@ -313,17 +311,22 @@ def _is_length(name: str) -> bool:
 def _scattering(
     result: ResultT, sigma_mm: float, lengths: int, *, height_mm: float | None = None
 ) -> ResultT:
-    """Return a result as if ``sigma_mm`` had been stated, and of an upright tool its height."""
+    """Return a result as if ``sigma_mm`` had been stated, and of an upright tool its height.
+
+    Angles that were measured, after the lengths, stay as sure as they are.
+    """
     variance = (sigma_mm * result.sigma_gain) ** 2
-    axes = range(lengths)
     variances = [variance] * lengths
     upright = not any(map(leans, result.inputs))
     if height_mm is not None and upright and result.measured[-1] == "z_mm":
         variances[-1] = (height_mm * result.sigma_gain) ** 2
+    halves = (*(NORMAL_95 * math.sqrt(one) for one in variances), *result.half_width95[lengths:])
+    variances += [row[i] for i, row in enumerate(result.covariance) if i >= lengths]
+    axes = range(len(variances))
     return replace(
         result,
         covariance=tuple(tuple(variances[i] if i == j else 0.0 for j in axes) for i in axes),
-        half_width95=tuple(NORMAL_95 * math.sqrt(one) for one in variances),
+        half_width95=halves,
         sigma_stated=True,
         interval_from="stated",
         region95_radius_mm=math.sqrt(chi_square_quantile(0.95, lengths) * variance),

@@ -28,11 +28,14 @@ from robolink.calibration.core.turn_claim import (
     TurnClaim,
     TurnJudgement,
 )
-from robolink.calibration.statement.accuracy import ENOUGH_NU, row_covariance, usual_look_sigma_mm
+from robolink.calibration.statement.accuracy import row_covariance, usual_look_sigma_mm
 from robolink.model import angle_difference_deg
 
 _FALSE_ALARMS: Final = 0.001
 """So often may a right result be contradicted, all drifts of one test together."""
+
+_ENOUGH_NU: Final = 6
+"""From so many degrees of freedom on an estimated scatter may be used in place of a usual one."""
 
 LEAST_TURN_DEG: Final = 90.0
 """A tool that is turned by less from where it was measured is not called tested."""
@@ -199,7 +202,7 @@ def _look_scatter(
         usual_mm = max(usual_mm, step_mm / math.sqrt(12) / of_look)
     own_mm = None if result.sigma_mm is None else result.sigma_mm / of_look
     from_residuals, dof = result.interval_from == "residuals", result.dof or 0
-    if own_mm is not None and from_residuals and dof >= ENOUGH_NU:
+    if own_mm is not None and from_residuals and dof >= _ENOUGH_NU:
         return own_mm, float(dof)
     if own_mm is not None and result.sigma_stated:
         # Few residuals make the interval wider, by the factor of Student's t, even where they are
@@ -209,14 +212,14 @@ def _look_scatter(
         if from_residuals and "sigma_contradicted" in result.warnings:
             return _together(own_mm, dof, stated_mm)
         return stated_mm, None
-    recorded = facts.look_sigma_mm is not None and facts.look_nu >= ENOUGH_NU
+    recorded = facts.look_sigma_mm is not None and facts.look_nu >= _ENOUGH_NU
     least_mm = facts.look_sigma_mm if recorded else usual_mm
     # Looks that are rougher than is usual, beyond doubt, say so themselves, however few they are.
     if own_mm is not None and least_mm and from_residuals and dof:
         squares = dof * (own_mm / least_mm) ** 2
         if squares > chi_square_quantile(_ROUGHER, dof):
             return _together(own_mm, dof, least_mm)
-    if facts.look_sigma_mm is not None and facts.look_nu >= ENOUGH_NU:
+    if facts.look_sigma_mm is not None and facts.look_nu >= _ENOUGH_NU:
         return facts.look_sigma_mm, facts.look_nu
     if usual_mm is not None:
         return usual_mm, None
@@ -230,8 +233,8 @@ def _together(own_mm: float, dof: int, expected_mm: float) -> tuple[float, float
     five times as large at four degrees of freedom as at ten. So what was expected counts as much as
     the residuals that it takes to do without it (docs/reference/evidence.md 20).
     """
-    nu = ENOUGH_NU + dof
-    return math.sqrt((ENOUGH_NU * expected_mm**2 + dof * own_mm**2) / nu), float(nu)
+    nu = _ENOUGH_NU + dof
+    return math.sqrt((_ENOUGH_NU * expected_mm**2 + dof * own_mm**2) / nu), float(nu)
 
 
 def held_to_claim(claim: TurnClaim, proof: VerifyResult) -> TurnJudgement:

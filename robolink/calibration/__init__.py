@@ -80,7 +80,6 @@ if TYPE_CHECKING:
     from robolink.calibration.core.result import GUARD_FACTOR as GUARD_FACTOR
     from robolink.calibration.core.result import LEAST_HALF_WIDTH as LEAST_HALF_WIDTH
     from robolink.calibration.core.result import PERSON_U_DRIFT_MM as PERSON_U_DRIFT_MM
-    from robolink.calibration.core.result import PROBE_U_DRIFT_MM as PROBE_U_DRIFT_MM
     from robolink.calibration.core.result import CalibrationResult as CalibrationResult
     from robolink.calibration.core.result import Drift as Drift
     from robolink.calibration.core.result import DriftVerdict as DriftVerdict
@@ -101,6 +100,8 @@ if TYPE_CHECKING:
     from robolink.calibration.core.statistics import chi_square_quantile as chi_square_quantile
     from robolink.calibration.core.statistics import f_quantile as f_quantile
     from robolink.calibration.core.statistics import normal_quantile as normal_quantile
+    from robolink.calibration.core.statistics import shifted_half95 as shifted_half95
+    from robolink.calibration.core.statistics import shifted_region95 as shifted_region95
     from robolink.calibration.core.statistics import student_t as student_t
     from robolink.calibration.core.statistics import (
         studentized_range_0999 as studentized_range_0999,
@@ -297,15 +298,14 @@ __getattr__ = lazy_exports(
         "core.pose_suggestion": "PoseLimits PosePlan precise_enough select_poses sigma_gain "
         "suggest_poses",
         "core.result": "CalibrationResult Drift DriftVerdict GUARD_FACTOR LEAST_HALF_WIDTH "
-        "PERSON_U_DRIFT_MM "
-        "PROBE_U_DRIFT_MM ResidualVectors VerifyResult judge_drift offset_sigma_mm worst_of",
+        "PERSON_U_DRIFT_MM ResidualVectors VerifyResult judge_drift offset_sigma_mm worst_of",
         "core.least_squares": "linear_fit",
         "core.robust": "Floats Robust",
         "core.rotations": "pose_arrays quaternion_rotations rotation_of rotations uvw_deg zyz_deg",
         "core.turn_claim": "CONTRADICTS_ACCURACY CONTRADICTS_REPEATABILITY DriftLimits "
         "SMALL_ANGLE TurnClaim TurnJudgement",
-        "core.statistics": "NORMAL_95 chi_square_quantile f_quantile normal_quantile student_t "
-        "studentized_range_0999",
+        "core.statistics": "NORMAL_95 chi_square_quantile f_quantile normal_quantile "
+        "shifted_half95 shifted_region95 student_t studentized_range_0999",
         "crossed_beams": (
             "BeamsResult crossing_sigma_gain moved_beams solve_crossed_beams where_they_cross"
         ),

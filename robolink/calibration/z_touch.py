@@ -18,7 +18,7 @@ from robolink.calibration.core.accuracy import ErrorSource
 from robolink.calibration.core.budget import DIVISORS, BudgetRow, UncertaintyBudget
 from robolink.calibration.core.pose_checks import keep_unmeasured, require_finite, require_poses
 from robolink.calibration.core.result import CalibrationResult
-from robolink.calibration.core.statistics import NORMAL_95
+from robolink.calibration.core.statistics import NORMAL_95, shifted_half95
 from robolink.calibration.flange_plane import FlangePlane, TipHeight, solvable_planes
 from robolink.calibration.quality.fit_quality import judged
 from robolink.calibration.quality.tolerances import Tolerance
@@ -33,11 +33,6 @@ RECOMMENDED_TOUCHES = 3
 
 USUAL_DECELERATION_MM_S2 = 300.0
 """How hard a robot brakes at least where nobody knows it; see docs/reference/evidence.md 13."""
-
-_ONE_SIDED = 0.72
-"""A shift of always the same size and side is held in 93 % by an interval in which a rectangle of
-half width ``a`` is one part, however large the scatter beside it, up to so much of ``a``
-(computed, docs/reference/evidence.md 13)."""
 
 _SPEEDS_APART = 1.5
 """Speeds that differ by less than this factor do not tell the latency."""
@@ -152,10 +147,8 @@ def solve_z_touch(
     if found.overshoot_upper_s2_per_mm is not None and not deceleration_told:
         overshoot_s2_per_mm = min(overshoot_s2_per_mm, found.overshoot_upper_s2_per_mm)
     half_mm = found.braking_mm2_per_s2 * overshoot_s2_per_mm / abs(plane.r33)
-    if not deceleration_told:
-        half_mm /= _ONE_SIDED  # never less than nothing, and perhaps all of it
     origin = tr("{deceleration:g} mm/s^2, not measured", deceleration=deceleration_mm_s2)
-    return _with_braking(result, half_mm / DIVISORS["rectangular"], origin)
+    return _with_braking(result, half_mm, origin)
 
 
 def _result(found: TouchFit, count: int, z_mm: float) -> ZTouchResult:
@@ -216,15 +209,19 @@ def _budget(result: ZTouchResult) -> UncertaintyBudget:
     return UncertaintyBudget.of(rows, not_assessed=(tr("height of the surface"),))
 
 
-def _with_braking(result: ZTouchResult, u_mm: float, origin: str) -> ZTouchResult:
-    """Return the result with what braking may have shifted Z by, in interval and budget."""
+def _with_braking(result: ZTouchResult, shift_mm: float, origin: str) -> ZTouchResult:
+    """Return the result with what braking may have shifted Z by, in interval and budget.
+
+    A robot that brakes is shifted by the same at every touch, and perhaps by all of it.
+    """
+    u_mm = shift_mm / DIVISORS["rectangular"]
     row = BudgetRow(tr("braking"), u_mm, origin=origin)
     result = replace(result, budget=(result.budget or UncertaintyBudget.of(())).with_row(row))
     if not result.half_width95:
         return result
     # Not by degrees of freedom of both together: few touches that agree by luck would make the
     # factor of their own scatter small as well, and 92 % of the intervals held the truth.
-    half_mm = math.hypot(result.half_width95[0], NORMAL_95 * u_mm)
+    half_mm = shifted_half95(shift_mm, result.half_width95[0] / NORMAL_95)
     return replace(
         result,
         covariance=((result.covariance[0][0] + u_mm**2,),),

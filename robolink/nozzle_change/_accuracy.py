@@ -38,7 +38,7 @@ def accuracy_facts(
     touches = [pose for pose in result.inputs if isinstance(pose, TouchedAt)]
     outcomes = controller.outcomes
     station = plan.at or plan.station or plan.pin or outcomes.signature.station
-    facts = facts_at(
+    return facts_at(
         CellRecord(outcomes.recorded),
         station=station,
         stated=plan.rows,
@@ -51,9 +51,6 @@ def accuracy_facts(
         learnt=bool(plan.station or plan.pin),
         inputs_per_look=result.inputs_per_look,
     )
-    # An input shows that a tip touches a pin, wherever on it: on which side a person still sees.
-    # Of a surface the contact is all that there is.
-    return replace(facts, by_contact=facts.by_contact and result.by_surface)
 
 
 def assessed_in_cell(

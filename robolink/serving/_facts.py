@@ -30,11 +30,13 @@ def facts_for_program(
         measure: What it measured with.
         station: The station that the program named; empty for none.
     """
+    from dataclasses import replace
+
     from robolink.accuracy import CellRecord, LooksAlike, facts_at, stated_rows
 
     record = CellRecord(recall)
     known = find_stations(cell, record.stations).get(station)
-    return facts_at(
+    facts = facts_at(
         record,
         station=station,
         stated=stated_rows(cell, known or station),
@@ -42,6 +44,7 @@ def facts_for_program(
         learnt=known is not None and known.learnt,
         inputs_per_look=result.inputs_per_look,
     )
+    return replace(facts, by_program=True)
 
 
 def statements_on_record(result: "CalibrationResult") -> dict[str, object]:

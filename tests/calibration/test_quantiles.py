@@ -4,12 +4,14 @@ import math
 
 import numpy as np
 import pytest
-from scipy.special import ndtr
+from scipy.special import chndtr, ndtr
 
 from robolink.calibration import (
     chi_square_quantile,
     f_quantile,
     normal_quantile,
+    shifted_half95,
+    shifted_region95,
     student_t,
     studentized_range_0999,
 )
@@ -58,3 +60,27 @@ def test_the_range_of_normal_values_is_the_tabled_one():
 def test_there_is_no_quantile_of_nothing(ask):
     with pytest.raises(ValueError, match=r"."):
         ask()
+
+
+@pytest.mark.parametrize("off", [0.0, 0.3, 1.4, 2.5, 4.9, 5.1, 40.0])
+def test_what_holds_the_truth_beside_a_fixed_shift_agrees_with_noncentral_chi_square(off):
+    sigma = 0.01
+    half = shifted_half95(-off * sigma, sigma) / sigma
+    assert chndtr(half**2, 1, off**2) == pytest.approx(0.95, abs=1e-6)
+    region = shifted_region95((0.6 * off * sigma, 0.8 * off * sigma), (sigma, sigma)) / sigma
+    assert chndtr(region**2, 2, off**2) == pytest.approx(0.95, abs=2e-4)
+
+
+def test_a_scatter_that_is_wide_in_one_direction_is_no_circle():
+    random = np.random.default_rng(7)
+    for shift, sigmas in (((1.0, 0.0), (0.1, 1.0)), ((0.0, 1.0), (0.1, 1.0)), ((3, 3), (0.5, 0.2))):
+        drawn = random.normal(size=(100_000, 2)) * sigmas + shift
+        held = np.hypot(*drawn.T) <= shifted_region95(shift, sigmas)
+        assert held.mean() == pytest.approx(0.95, abs=0.004)
+
+
+def test_a_shift_without_scatter_is_held_as_it_is():
+    assert shifted_half95(0.02, 0.0) == 0.02
+    assert shifted_region95((0.03, 0.04), (0.0, 0.0)) == 0.05
+    assert shifted_region95((0.0, 0.0), (0.0, 0.0), least=0.01) == 0.01
+    assert shifted_region95((0.1, 0.0), (1.0, 1.0), least=4.0) == 4.0

@@ -1,8 +1,10 @@
 """What a result is accurate to: its rows, where they come from, and which is the largest."""
 
 import math
+from dataclasses import replace
 
 import pytest
+from scipy.special import chndtr, ndtr
 
 from robolink.calibration import (
     ACCURACY_ROWS,
@@ -14,11 +16,13 @@ from robolink.calibration import (
     ErrorSource,
     Pin,
     RowFact,
+    Touch,
     assessed,
     solve_crossed_beams,
     solve_n_angle,
     solve_one_touch,
     solve_two_pose,
+    solve_z_touch,
 )
 from robolink.model import Pose, ToolOffset
 
@@ -79,6 +83,109 @@ def test_an_input_that_showed_each_touch_needs_no_eye():
     found = judged(two_pose(), AccuracyFacts(by_contact=True))
 
     assert found.accurate_to_mm == pytest.approx(found.repeatable_to_mm)
+
+
+def region_mm(sigma_mm, gain=0.5**0.5):
+    return math.sqrt(5.991) * sigma_mm * gain
+
+
+def test_a_person_aims_at_a_pin_whose_contact_an_input_shows():
+    """The input tells that there is contact and how high: sideways they err as by eye."""
+    bare = two_pose(sigma_mm=None)
+    by_person = judged(bare, AccuracyFacts(by_contact=True))
+    by_program = judged(bare, AccuracyFacts(by_contact=True, by_program=True))
+
+    assert [row.key for row in by_person.accuracy.rows] == ["scatter"]
+    assert by_person.accurate_to_mm == pytest.approx(region_mm(0.03), rel=0.001)
+    assert by_program.accurate_to_mm == pytest.approx(region_mm(0.005), rel=0.001)
+
+
+def test_touches_that_agree_by_luck_do_not_make_an_aim_sure():
+    poses = [Pose(298, 99, -60, 0), Pose(322, 91, -60, 180), Pose(306.001, 83, -60, 90)]
+    facts = AccuracyFacts(by_contact=True)
+    found = judged(solve_n_angle(poses), facts)
+
+    assert found.repeatable_to_mm < 0.01
+    assert found.accurate_to_mm == pytest.approx(region_mm(0.03, found.sigma_gain), rel=0.001)
+    assert found.accuracy.largest_default.key == "scatter"
+    for told in (
+        judged(solve_n_angle(poses, sigma_mm=0.004), facts),
+        judged(solve_n_angle(poses), AccuracyFacts(by_contact=True, look_sigma_mm=0.004)),
+        judged(solve_n_angle(poses), AccuracyFacts(by_contact=True, by_program=True)),
+    ):
+        assert told.accurate_to_mm == pytest.approx(told.repeatable_to_mm)
+
+
+def test_of_a_tool_whose_axes_were_shown_the_angles_stay_as_sure_as_they_are():
+    measured = ("x_mm", "y_mm", "z_mm", "u_deg")
+    sure = [0.001**2] * 3 + [0.02**2]
+    bare = CalibrationResult(
+        "six-point", ToolOffset(1, 2, 3, 4), measured, (), (), 0.8, (), TOUCHES,
+        covariance=tuple(tuple(s if i == j else 0.0 for j in range(4)) for i, s in enumerate(sure)),
+        half_width95=(0.002, 0.002, 0.002, 0.05),
+        region95_radius_mm=0.003,
+        interval_from="residuals",
+        dof=12,
+        sources=(ErrorSource.of_lengths("touch_mm", 3),),
+    )  # fmt: skip
+    found = judged(bare, AccuracyFacts(by_contact=True))
+
+    assert found.accurate_to_mm == pytest.approx(2.795 * 0.03 * 0.8, rel=0.001)
+    assert found.accuracy.half_width95[3] == pytest.approx(0.05)
+
+
+def test_what_no_person_aimed_is_not_held_to_their_aim():
+    """A case by hand may say of a camera that an input showed each touch: nobody aimed it."""
+    seen = replace(
+        two_pose(sigma_mm=None), half_width95=(0.01, 0.01), region95_radius_mm=0.0125,
+        covariance=((0.0051**2, 0.0), (0.0, 0.0051**2)), dof=6, interval_from="residuals",
+        sources=(ErrorSource.of_lengths("tip_image_px", 2, gain=0.0),),
+    )  # fmt: skip
+    assert judged(seen, AccuracyFacts(by_contact=True)).accurate_to_mm == pytest.approx(0.0125)
+
+
+def test_an_input_tells_the_height_of_a_touch_better_than_a_person_aims_it():
+    bare = one_touched(Pose(300, 100, -60, 0), Pin(312, 96.5, -80))
+    rows = {"place_mm": RowFact(0.0, "stated")}
+    found = judged(bare, AccuracyFacts(rows, by_contact=True))
+
+    x_mm, y_mm, z_mm = found.accuracy.half_width95
+    assert (x_mm, y_mm) == pytest.approx((1.96 * 0.03, 1.96 * 0.03), rel=0.001)
+    assert z_mm == pytest.approx(1.96 * 0.005, rel=0.001)
+
+
+def held_at(found, sigma_mm, shift_mm):
+    """Return how often the truth lies within U beside an error that is always the same."""
+    return chndtr((found.accurate_to_mm / sigma_mm) ** 2, 2, (shift_mm / sigma_mm) ** 2)
+
+
+@pytest.mark.parametrize("half_width", [0.2, 0.6, 1.0, 1.6, 3.0])
+def test_an_error_at_the_end_of_a_row_of_one_number_is_held(half_width):
+    """By a / sqrt(3) alone it was held in 93 % where it is about as large as the scatter."""
+    sigma_mm = 0.01
+    bare = replace(
+        two_pose(sigma_mm=sigma_mm * math.sqrt(2)),
+        sources=(ErrorSource("camera_scale_percent", ((0.006,), (0.008,)), "as_offset"),),
+    )
+    rows = {"camera_scale_percent": RowFact(half_width, "stated")}
+    found = judged(bare, AccuracyFacts(rows))
+
+    assert held_at(found, sigma_mm, 0.01 * half_width) > 0.9499
+    # Never wider than the error and the scatter that goes with it.
+    assert found.accurate_to_mm < 0.01 * half_width + 2.45 * sigma_mm
+    for half_mm, gain in zip(found.accuracy.half_width95, (0.006, 0.008), strict=True):
+        off = gain * half_width / sigma_mm
+        inside = ndtr(half_mm / sigma_mm - off) - ndtr(-half_mm / sigma_mm - off)
+        assert inside > 0.9499
+
+
+def test_a_height_that_is_wrong_by_all_that_is_stated_of_it_is_held():
+    seen = [Touch(-60.0, v) for v in (1.0, 2.0) * 3]
+    rows = {"plate_mm": RowFact(0.02, "stated")}
+    found = judged(solve_z_touch(seen, -80.0, sigma_mm=0.01), AccuracyFacts(rows))
+
+    assert found.accurate_to_mm > 0.02 + 1.64 * found.repeatable_to_mm / 1.96
+    assert found.accuracy.half_width95 == pytest.approx((found.accurate_to_mm,))
 
 
 def test_without_a_scatter_of_its_own_a_usual_one_counts_as_a_default():

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from robolink.calibration import solve_n_angle
+from robolink.calibration import PERSON_U_DRIFT_MM, solve_n_angle
 from robolink.errors import CalibrationError
 from robolink.methods.n_angle.procedure import _came_from_mm
 from robolink.model import InputEdge, Pose
@@ -100,9 +100,9 @@ def test_a_scatter_from_few_touches_makes_a_drift_no_surer():
     poses = [Pose(298, 99, -20, 0), Pose(306, 83, -20, 90), Pose(322, 91, -20, 180)]
     few = solve_n_angle(poses)
     assert few.sigma_mm is not None
-    assert few.sigma_mm < PLAN.u_drift_mm / 2
-    assert drift_uncertainty_mm(PLAN, few) == PLAN.u_drift_mm
-    assert drift_uncertainty_mm(PLAN, solve_n_angle(poses, sigma_mm=0.004)) == 0.004
+    assert few.sigma_mm < PERSON_U_DRIFT_MM / 2
+    assert drift_uncertainty_mm(few) == PERSON_U_DRIFT_MM
+    assert drift_uncertainty_mm(solve_n_angle(poses, sigma_mm=0.004)) == 0.004
 
 
 def test_the_side_from_which_a_touch_was_made_is_that_on_which_the_robot_stopped():

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.special import ndtr
 
 from robolink.calibration import Touch, solve_z_touch
 from robolink.errors import CalibrationError
@@ -163,7 +164,7 @@ def budget_rows(speeds):
 
 def test_what_two_speeds_cannot_see_is_a_row_of_the_budget():
     rows = {row.name: row for row in budget_rows((2.0, 20.0) * 2)}
-    assert rows["braking"].u_mm == pytest.approx(2 * 20 / 600 / 0.72 / 3**0.5)
+    assert rows["braking"].u_mm == pytest.approx(2 * 20 / 600 / 3**0.5)
     assert rows["scatter"].kind == "A"
     assert budget_rows((1.0, 2.0) * 2)[-1].u_mm < 0.003
     # Three speeds show it, or how small it must be.
@@ -181,6 +182,16 @@ def test_the_interval_holds_what_no_speed_could_show():
     off_mm = abs(given.offset.z_mm - LENGTH)
     assert off_mm > 0.2
     assert off_mm < given.half_width95[0] < 1.5
+
+
+def test_a_robot_that_always_brakes_alike_is_held_whatever_the_scatter_beside_it():
+    """At 300 mm/s^2 each reading is 0.067 mm low; a rectangle of that width held it in 84 %."""
+    for sigma_mm in (0.02, 0.05, 0.1):
+        found = solve_z_touch(touches((2.0, 20.0) * 2), SURFACE, sigma_mm=sigma_mm)
+        scatter_mm, shift_mm = sigma_mm * found.sigma_gain, 2 * 20 / 600
+        (half_mm,) = found.half_width95
+        held = ndtr((half_mm - shift_mm) / scatter_mm) - ndtr((-half_mm - shift_mm) / scatter_mm)
+        assert held == pytest.approx(0.95, abs=1e-6)
 
 
 def test_touches_that_a_latch_rounds_alike_are_not_sure_to_nothing():
@@ -224,4 +235,4 @@ def test_intervals_hold_the_truth_however_the_robot_brakes(speeds, latency_s):
                     held += 1  # refused, so nothing is stated
                     continue
                 held += abs(found.offset.z_mm - LENGTH) <= found.half_width95[0]
-            assert held / runs >= 0.925, (braking_mm_s2, sigma_mm, held)
+            assert held / runs >= 0.93, (braking_mm_s2, sigma_mm, held)

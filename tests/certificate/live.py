@@ -461,7 +461,7 @@ COURSES: Final[tuple[Course, ...]] = (
         for course in (
             Course("two-pose", kind, opened, two_pose, ("touch_mm",)),
             Course("n-angle", kind, opened, n_angle, ("touch_mm",)),
-            Course("n-angle, contact input", kind, opened, by_input, ("touch_mm",)),
+            Course("n-angle, contact input", kind, opened, by_input),
             Course("one-touch", kind, opened, one_touch, ("touch_mm", "place_mm")),
             Course("points", kind, opened, points, ("touch_mm",), proves=False),
             Course("beams", kind, opened, beams, ("place_mm", "bend_deg")),

@@ -69,13 +69,20 @@ class Run:
 
 def shares(total: int, population: str) -> Iterator[tuple[Course, int]]:
     """Yield how many of so many runs each course has in a population."""
-    courses = [one for one in COURSES if one.proves or population not in FACTORS]
+    courses = [one for one in COURSES if _belongs(one, population)]
     weights = [_COSTLY.get(one.name, 1.0) for one in courses]
     given, due = 0, 0.0
     for course, weight in zip(courses, weights, strict=True):
         due += total * weight / sum(weights)
         yield course, round(due) - given
         given = round(due)
+
+
+def _belongs(course: Course, population: str) -> bool:
+    """Tell whether a course has what a population needs: a turn test, or a row to be wrong in."""
+    if population in FACTORS:
+        return course.proves
+    return population == CLEAN or bool(course.rows)
 
 
 def run_one(population: str, course: Course, seed: int) -> Run:

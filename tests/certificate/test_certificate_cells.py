@@ -272,10 +272,10 @@ CELLS = (
         Cell("always 0.1 beside", "two-pose on PLC", WITHIN, (), beside(0.1), times=2.0),
         Cell("always 0.1 beside", "n-angle on EPSON", WITHIN, (), beside(0.1), times=2.0),
     ),
-    Cell("always 0.05 beside, contact input", BY_INPUT, WITHIN, (), beside(0.05)),
+    Cell("contact input, nothing wrong", BY_INPUT, WITHIN),
     *soak(
-        Cell("contact input, nothing wrong", BY_INPUT, WITHIN),
-        Cell("always 0.1 beside, contact input", BY_INPUT, WITHIN, (), beside(0.1), times=2.0),
+        # No row of its own; what is usual of a person's scatter holds half of it.
+        Cell("always 0.05 beside, contact input", BY_INPUT, WITHIN, (), beside(0.05), times=2.0),
     ),
     Cell(
         "always 0.1 beside, limit 0.05",

@@ -53,6 +53,11 @@ def test_the_runs_are_dealt_out_to_all_courses():
         assert sum(dealt.values()) == 100
         assert min(dealt.values()) >= 1
     assert BY_NAME.keys() == {course.name for course, _ in shares(100, CLEAN)}
+    # Nothing is in a row of a budget that has none.
+    without = {course.name for course in BY_NAME.values() if not course.rows}
+    assert without == {"n-angle, contact input on EPSON", "n-angle, contact input on PLC"}
+    for name in (IN_ROW, BEYOND):
+        assert not without & {course.name for course, _ in shares(100, name)}
 
 
 def lines(population, *shares_of_u, code="", doubts=()):

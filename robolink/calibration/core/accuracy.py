@@ -130,6 +130,7 @@ class AccuracyFacts:
         rows: What is stated or learnt, by the key of the row.
         months: How long ago the station was learnt, in months; ``None`` where nothing says it.
         by_contact: Whether an input showed each touch, so that nobody had to see it.
+        by_program: Whether a program brought the tip there, so that nobody aimed at a pin either.
         look_sigma_mm: Standard deviation of one coordinate of one look, pooled over the record of
             the station; ``None`` where too little is on record.
         look_nu: Its degrees of freedom.
@@ -138,6 +139,7 @@ class AccuracyFacts:
     rows: Mapping[str, RowFact] = field(default_factory=dict)
     months: float | None = None
     by_contact: bool = False
+    by_program: bool = False
     look_sigma_mm: float | None = None
     look_nu: float = 0.0
 

@@ -236,6 +236,11 @@ def require_upright(poses: Sequence[Pose]) -> None:
         raise some_on_their_head()
 
 
+def leans(pose: Pose) -> bool:
+    """Tell whether the tool does not stand along the base's Z, either way up."""
+    return lean_deg(_upward(pose)) >= UPRIGHT_WITHIN_DEG
+
+
 def on_its_head(pose: Pose) -> bool:
     """Tell whether the flange's Z points down (W or V is 180).
 

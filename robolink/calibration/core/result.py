@@ -245,7 +245,7 @@ GUARD_FACTOR: Final = 1.65
 """A one-sided error of 5 % on either side."""
 
 PERSON_U_DRIFT_MM: Final = 0.03
-PROBE_U_DRIFT_MM: Final = 0.01
+"""Of a person who brings a tip onto a pin, whether the eye or an input shows the contact."""
 
 
 class DriftVerdict(Enum):

@@ -25,6 +25,15 @@ _NEGLIGIBLE = 1e-15
 
 _MOST_TERMS = 100_000
 
+_NO_SCATTER = 1e-6
+"""Share of a shift below which what scatters beside it does not matter."""
+
+_FAR_OFF = 5.0
+"""Standard deviations from which on only one side of an interval is ever missed."""
+
+_STEPS = 64
+"""Of a sum over the cosine of half a turn: what is summed up ends smoothly at both sides."""
+
 
 def student_t95(dof: float) -> float:
     """Return the 97.5 % quantile of Student's t: half a 95 % interval.
@@ -49,7 +58,7 @@ def normal_quantile(p: float) -> float:
         return 0.0
     return _root(
         lambda x: 1 - p - math.erfc(x / math.sqrt(2)) / 2,
-        lambda x: math.exp(-x * x / 2) / math.sqrt(2 * math.pi),
+        _density,
         start=1.0,
         highest=40.0,
     )
@@ -136,6 +145,82 @@ def f_exceeded(f: float, d1: float, d2: float) -> float:
     return _beta_below(d2 / 2, d1 / 2, d2 / (d1 * f + d2), d1 * f / (d1 * f + d2))
 
 
+def shifted_half95(shift: float, sigma: float) -> float:
+    """Return half the interval about a value that holds the truth in 95 % beside a fixed shift.
+
+    Args:
+        shift: What the value is off by, always the same.
+        sigma: Standard deviation of what comes on top of it, of a normal distribution.
+
+    Example:
+        >>> from robolink.calibration import shifted_half95
+        >>> round(shifted_half95(0.0, 1.0), 2), round(shifted_half95(3.0, 1.0), 3)
+        (1.96, 4.645)
+    """
+    if sigma <= abs(shift) * _NO_SCATTER:
+        return abs(shift)
+    off = abs(shift) / sigma
+    if off > _FAR_OFF:
+        return abs(shift) + sigma * normal_quantile(0.95)
+    return sigma * _root(
+        lambda x: _normal(x - off) - _normal(-x - off) - 0.95,
+        lambda x: _density(x - off) + _density(x + off),
+        start=max(NORMAL_95, off + 1.645),
+    )
+
+
+def shifted_region95(
+    shift: tuple[float, float], sigmas: tuple[float, float], *, least: float = 0.0
+) -> float:
+    """Return the radius about a point that holds the truth in 95 % beside a fixed shift.
+
+    Args:
+        shift: What the point is off by, along the principal axes of the scatter.
+        sigmas: Standard deviations along these axes, of a normal distribution.
+        least: A radius that is taken anyway, if the truth does not need more.
+
+    Example:
+        >>> from robolink.calibration import shifted_region95
+        >>> round(shifted_region95((0.0, 0.0), (1.0, 1.0)), 3)  # as chi-squared has it
+        2.448
+        >>> round(shifted_region95((1.6, 0.0), (1.0, 1.0)), 2)
+        3.46
+    """
+    (along, across), (wide, narrow) = shift, sigmas
+    if wide < narrow:
+        along, across, wide, narrow = across, along, narrow, wide
+    off = math.hypot(along, across)
+    if wide <= off * _NO_SCATTER:
+        return max(off, least)
+    narrow = max(narrow, wide * _NO_SCATTER)
+
+    def missed(radius: float) -> float:
+        """Return how much of what is missed is too much; the scatter is summed up along."""
+        low, high = max(-radius, along - 8 * wide), min(radius, along + 8 * wide)
+        middle, half, total = (low + high) / 2, (high - low) / 2, 0.0
+        for cosine, sine in _midpoints():
+            x = middle + half * sine
+            reach = math.sqrt(max(radius * radius - x * x, 0.0))
+            inside = _normal((reach - across) / narrow) - _normal((-reach - across) / narrow)
+            total += cosine * _density((x - along) / wide) * inside
+        return 0.95 - total * half * math.pi / _STEPS / wide
+
+    low, high = max(off, least), off + 2.5 * wide
+    if low >= high or missed(low) <= 0:
+        return low
+    while high - low > 1e-4 * high:
+        between = (low + high) / 2
+        low, high = (between, high) if missed(between) > 0 else (low, between)
+    return high
+
+
+@lru_cache(maxsize=1)
+def _midpoints() -> tuple[tuple[float, float], ...]:
+    """Return cosine and sine of the middles of equal steps over half a turn."""
+    turns = (math.pi * ((index + 0.5) / _STEPS - 0.5) for index in range(_STEPS))
+    return tuple((math.cos(turn), math.sin(turn)) for turn in turns)
+
+
 @lru_cache(maxsize=64)
 def studentized_range_0999(count: int) -> float:
     """Return the range that ``count`` normal values of standard deviation 1 stay in, in 99.9 %.
@@ -166,6 +251,10 @@ def studentized_range_0999(count: int) -> float:
         middle = (low + high) / 2
         low, high = (middle, high) if inside(middle) < 0.999 else (low, middle)
     return (low + high) / 2
+
+
+def _density(x: float) -> float:
+    return math.exp(-x * x / 2) / math.sqrt(2 * math.pi)
 
 
 def _normal(x: float) -> float:

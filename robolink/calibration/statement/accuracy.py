@@ -3,14 +3,15 @@
     C = C_scatter + sum over the rows of (a^2 / 3) J J'
 
 a being the half width of a row and J by how much the measured components change for one unit of it;
-the region of all lengths together follows from C as for the scatter alone
+the region of all lengths together follows from C as for the scatter alone. A row of one number is
+the same in all looks of a cell, so an error at the very end of it has to be held, too
 (docs/reference/evidence.md 7, 19).
 """
 
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Final, TypeVar
+from typing import TYPE_CHECKING, Final, Self, TypeVar
 
 from robolink.calibration.core.accuracy import (
     ACCURACY_ROWS,
@@ -20,8 +21,14 @@ from robolink.calibration.core.accuracy import (
     ErrorSource,
 )
 from robolink.calibration.core.budget import BudgetRow, UncertaintyBudget
+from robolink.calibration.core.pose_checks import leans
 from robolink.calibration.core.result import CalibrationResult
-from robolink.calibration.core.statistics import NORMAL_95, chi_square_quantile
+from robolink.calibration.core.statistics import (
+    NORMAL_95,
+    chi_square_quantile,
+    shifted_half95,
+    shifted_region95,
+)
 from robolink.calibration.quality.station_part import StationPart, scatter_covariance, with_station
 from robolink.calibration.statement.sentences import SCATTER, basis_words
 from robolink.messages import spoken, tr
@@ -36,16 +43,22 @@ _PROBE_MM: Final = 0.005
 _BEAMS_MM: Final = 0.003
 _CAMERA_PX: Final = 0.1
 
+_PLANE: Final = 2
+"""Lengths that are measured in the plane."""
 
-def usual_look_sigma_mm(result: CalibrationResult, *, by_contact: bool = False) -> float | None:
+
+def usual_look_sigma_mm(
+    result: CalibrationResult, facts: AccuracyFacts | None = None
+) -> float | None:
     """Return the standard deviation of one coordinate of one look where nothing else tells it.
 
     A person 0.03 mm, a probe or an input 0.005 mm, beams 0.003 mm, a camera 0.1 pixels
-    (docs/reference/evidence.md 20).
+    (docs/reference/evidence.md 20). At a pin an input shows that there is contact, and how high; a
+    person has aimed the tip sideways, and errs as by eye.
 
     Args:
         result: What was measured; its error sources say with what.
-        by_contact: Whether an input showed each touch.
+        facts: Whether an input showed each touch, and who brought the tip there.
 
     Returns:
         ``None`` where nothing says with what it was measured.
@@ -56,8 +69,16 @@ def usual_look_sigma_mm(result: CalibrationResult, *, by_contact: bool = False) 
     if "tip_image_px" in rows:
         return _CAMERA_PX * max(map(max, rows["tip_image_px"].gain))
     if "touch_mm" in rows:
-        return _PROBE_MM if by_contact else _PERSON_MM
+        shown = facts is not None and facts.by_contact and not _aimed(result, facts)
+        return _PROBE_MM if shown else _PERSON_MM
     return _PROBE_MM if "plate_mm" in rows else _BEAMS_MM
+
+
+def _aimed(result: CalibrationResult, facts: AccuracyFacts) -> bool:
+    """Tell whether a person aimed at a pin, though an input showed the contact."""
+    if not facts.by_contact or facts.by_program or result.by_surface:
+        return False
+    return any(source.row == "touch_mm" for source in result.sources or ())
 
 
 def assessed(result: ResultT, facts: AccuracyFacts) -> ResultT:
@@ -81,22 +102,26 @@ def assessed(result: ResultT, facts: AccuracyFacts) -> ResultT:
         'touch_mm'
     """
     sources = result.sources or ()
-    lengths = [i for i, name in enumerate(result.measured) if name.endswith("_mm")]
+    lengths = [i for i, name in enumerate(result.measured) if _is_length(name)]
     if not lengths:
         return replace(result, accuracy=None)
     scattered, basis = result, ""
     if not result.half_width95:
-        usual = usual_look_sigma_mm(result, by_contact=facts.by_contact)
+        usual = usual_look_sigma_mm(result, facts)
         sigma_mm = facts.look_sigma_mm if facts.look_sigma_mm is not None else usual
         if sigma_mm is None or result.sources is None:
             return replace(result, accuracy=None)
-        scattered = _scattering(result, sigma_mm, len(lengths))
+        height_mm = _PROBE_MM if usual == sigma_mm and _aimed(result, facts) else None
+        scattered = _scattering(result, sigma_mm, len(lengths), height_mm=height_mm)
         # Nothing usual is known of angles.
         sources = tuple(one.of_first(len(lengths)) for one in sources)
         basis = "default" if facts.look_sigma_mm is None else "record"
+    elif _too_sure_of_its_aim(result, facts, len(lengths)):
+        scattered, basis = _scattering(result, _PERSON_MM, len(lengths)), "default"
     parts = list(_parts(sources, facts))
     whole = with_station(scattered, *(one.part for one in parts))
-    known = with_station(scattered, *(one.part for one in parts if one.basis != "default"))
+    held = _Held.of(scattered, parts)
+    known = _Held.of(scattered, [one for one in parts if one.basis != "default"])
     worst = max(lengths, key=whole.half_width95.__getitem__)
     scatter = math.sqrt(max(float(scatter_covariance(scattered)[worst, worst]), 0.0))
     rows = [
@@ -115,24 +140,13 @@ def assessed(result: ResultT, facts: AccuracyFacts) -> ResultT:
     return replace(
         result,
         accuracy=Accuracy(
-            within_mm=_at_least(whole, scattered),
-            half_width95=tuple(map(max, whole.half_width95, scattered.half_width95)),
+            within_mm=held.within_mm,
+            half_width95=held.half_width95,
             rows=tuple(rows),
             budget=whole.budget or _plain_budget(rows),
-            without_defaults_mm=_at_least(known, scattered) if basis != "default" else 0.0,
+            without_defaults_mm=known.within_mm if basis != "default" else 0.0,
         ),
     )
-
-
-def _at_least(whole: CalibrationResult, scattered: CalibrationResult) -> float:
-    """Return what a result is known within, never better than its scatter alone lets it be.
-
-    A row that is known well lets the effective degrees of freedom grow, and with them the factor
-    shrinks, at a few residuals by more than the row adds.
-    """
-    within_mm = [result.repeatable_to_mm for result in (whole, scattered)]
-    assert None not in within_mm  # noqa: S101 - they have half widths
-    return max(one for one in within_mm if one is not None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,6 +183,87 @@ class _Part:
         )
 
 
+@dataclass(frozen=True, slots=True)
+class _Held:
+    """What holds the truth in 95 %.
+
+    Attributes:
+        within_mm: Of all lengths together.
+        half_width95: Of each component alone.
+    """
+
+    within_mm: float
+    half_width95: tuple[float, ...]
+
+    @classmethod
+    def of(cls, scattered: CalibrationResult, parts: Sequence[_Part]) -> Self:
+        """Return it for some rows beside what scatters.
+
+        It is never less than of the scatter alone: a row that is known well lets the effective
+        degrees of freedom grow, and with them the factor shrinks, at a few residuals by more than
+        the row adds. And it holds an error that lies for good at the end of a row of one number.
+        """
+        whole = with_station(scattered, *(one.part for one in parts))
+        found = [cls._by_covariance(scattered), cls._by_covariance(whole)]
+        found += [
+            cls._at_the_end(whole, one)
+            for one in parts
+            if one.half_width > 0 and all(len(line) == 1 for line in one.source.gain)
+        ]
+        return cls(
+            max(one.within_mm for one in found),
+            tuple(map(max, *(one.half_width95 for one in found))),
+        )
+
+    @classmethod
+    def _by_covariance(cls, result: CalibrationResult) -> Self:
+        within_mm = result.repeatable_to_mm
+        assert within_mm is not None  # noqa: S101 - it has half widths
+        return cls(within_mm, result.half_width95)
+
+    @classmethod
+    def _at_the_end(cls, whole: CalibrationResult, row: _Part) -> Self:
+        """Return it for an error at the end of a row, with all others as a scatter beside it.
+
+        The factors of few degrees of freedom stay those of all rows together.
+        """
+        import numpy as np  # which the help of a command does without
+
+        halves, held = whole.half_width95, cls._by_covariance(whole)
+        shift = np.array([row.half_width * line[0] for line in row.source.gain])
+        shift = np.append(shift, np.zeros(len(halves) - len(shift)))
+        total = np.array(whole.covariance)
+        others = total - np.outer(shift, shift) / 3
+        alone = tuple(
+            shifted_half95(off, half / NORMAL_95 * math.sqrt(max(left, 0.0) / both))
+            if off
+            else half
+            for off, half, left, both in zip(
+                shift.tolist(),
+                halves,
+                others.diagonal().tolist(),
+                total.diagonal().tolist(),
+                strict=True,
+            )
+        )
+        lengths = [i for i, name in enumerate(whole.measured) if _is_length(name)]
+        if len(lengths) == 1:
+            return cls(alone[lengths[0]], alone)
+        if len(lengths) > _PLANE:
+            return cls(held.within_mm, alone)  # in space the factor holds the end as it is
+        among = np.ix_(lengths, lengths)
+        known_mm = math.sqrt(
+            chi_square_quantile(0.95, _PLANE) * float(np.linalg.eigvalsh(total[among])[-1])
+        )
+        variances, axes = np.linalg.eigh(others[among])
+        wide, narrow = np.sqrt(np.maximum(variances, 0.0)) * held.within_mm / known_mm
+        along = axes.T @ shift[lengths]
+        within_mm = shifted_region95(
+            (float(along[0]), float(along[1])), (float(wide), float(narrow)), least=held.within_mm
+        )
+        return cls(within_mm, alone)
+
+
 def _parts(sources: Sequence[ErrorSource], facts: AccuracyFacts) -> Iterator[_Part]:
     for source in sources:
         if source.row == "touch_mm" and facts.by_contact:
@@ -195,14 +290,43 @@ def row_covariance(source: ErrorSource, half_width: float) -> "Floats":
     return covariance
 
 
-def _scattering(result: ResultT, sigma_mm: float, lengths: int) -> ResultT:
-    """Return a result as if ``sigma_mm`` had been stated."""
+def _too_sure_of_its_aim(result: CalibrationResult, facts: AccuracyFacts, lengths: int) -> bool:
+    """Tell whether touches agree better than a person can be relied on to aim.
+
+    With a contact input no row holds what the person sees, and that the touches of one run agree
+    says nothing of it. So what is usual of a person counts until the cell states its scatter or the
+    record tells it.
+    """
+    if not _aimed(result, facts) or result.sigma_stated or facts.look_sigma_mm is not None:
+        return False
+    usual_mm = _scattering(result, _PERSON_MM, lengths).repeatable_to_mm
+    own_mm = result.repeatable_to_mm
+    return usual_mm is not None and own_mm is not None and usual_mm > own_mm
+
+
+def _is_length(name: str) -> bool:
+    return name.endswith("_mm")
+
+
+def _scattering(
+    result: ResultT, sigma_mm: float, lengths: int, *, height_mm: float | None = None
+) -> ResultT:
+    """Return a result as if ``sigma_mm`` had been stated, and of an upright tool its height.
+
+    Angles that were measured, after the lengths, stay as sure as they are.
+    """
     variance = (sigma_mm * result.sigma_gain) ** 2
-    axes = range(lengths)
+    variances = [variance] * lengths
+    upright = not any(map(leans, result.inputs))
+    if height_mm is not None and upright and result.measured[-1] == "z_mm":
+        variances[-1] = (height_mm * result.sigma_gain) ** 2
+    halves = (*(NORMAL_95 * math.sqrt(one) for one in variances), *result.half_width95[lengths:])
+    variances += [row[i] for i, row in enumerate(result.covariance) if i >= lengths]
+    axes = range(len(variances))
     return replace(
         result,
-        covariance=tuple(tuple(variance if i == j else 0.0 for j in axes) for i in axes),
-        half_width95=(NORMAL_95 * math.sqrt(variance),) * lengths,
+        covariance=tuple(tuple(variances[i] if i == j else 0.0 for j in axes) for i in axes),
+        half_width95=halves,
         sigma_stated=True,
         interval_from="stated",
         region95_radius_mm=math.sqrt(chi_square_quantile(0.95, lengths) * variance),

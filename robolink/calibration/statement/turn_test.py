@@ -194,7 +194,7 @@ def _look_scatter(
     result: CalibrationResult, facts: AccuracyFacts
 ) -> tuple[float, float | None] | None:
     """Return the scatter of one look and its degrees of freedom, ``None`` for known."""
-    usual_mm = usual_look_sigma_mm(result, by_contact=facts.by_contact)
+    usual_mm = usual_look_sigma_mm(result, facts)
     of_look = math.sqrt(max(result.inputs_per_look / 2, 1.0))
     step_mm = (result.evidence.grid_mm if result.evidence is not None else None) or 0.0
     if usual_mm is not None:

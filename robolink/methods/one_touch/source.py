@@ -114,7 +114,7 @@ class OneTouchSource(ProvesAgain):
             contact=contact_pose(result, tool=tool),
             angles_deg=(toward_zero(measured_deg, HALF_A_TURN_DEG),),
             tolerance_mm=tolerance_mm,
-            u_mm=drift_uncertainty_mm(self.touch, result),
+            u_mm=drift_uncertainty_mm(result),
             written=result.offset,
             tip=tip,
         )

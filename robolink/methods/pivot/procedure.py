@@ -8,6 +8,7 @@ from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 
 from robolink.calibration import (
+    PERSON_U_DRIFT_MM,
     CalibrationResult,
     VerifyResult,
     pose_arrays,
@@ -178,7 +179,7 @@ def verify_by_tilting(
     """
     tilts = yield from proving_in_reach(over, tilts, plan.lift_mm)
     swing = _Swing(plan, over, PinTouches(plan, planar=False, limit_mm=tolerance_mm))
-    proof = DriftProof(tolerance_mm, plan.u_drift_mm if u_mm is None else u_mm)
+    proof = DriftProof(tolerance_mm, PERSON_U_DRIFT_MM if u_mm is None else u_mm)
     by_place = {over.pose(tilt, 0.0).u_deg: tilt for tilt in tilts}
     for tilt in tilts:
         yield from _shown(swing, proof, tilt)

@@ -79,7 +79,7 @@ class PivotSource(PinSource):
             touch=self.touch,
             pin_mm=(x_mm, y_mm, z_mm),
             tilt_deg=self._tilt_deg,
-            u_mm=drift_uncertainty_mm(self.touch, result),
+            u_mm=drift_uncertainty_mm(result),
             upright=upright_of(result, result.offset, tool),
         )
 

@@ -85,7 +85,7 @@ class PlaneTouchSource(TouchSource):
             plane=result.plane,
             tilt_deg=self.survey.tilt_deg,
             axes=self.axes,
-            u_mm=drift_uncertainty_mm(self.touch, result),
+            u_mm=drift_uncertainty_mm(result),
             upright=upright_of(result, result.offset, tool),
         )
 

@@ -86,7 +86,7 @@ class SphereTouchSource(TouchSource):
             survey=self.survey,
             sphere=TouchedSphere((x_mm, y_mm, z_mm), result.radius_mm),
             axes=self.axes,
-            u_mm=drift_uncertainty_mm(self.touch, result),
+            u_mm=drift_uncertainty_mm(result),
             upright=upright_of(result, result.offset, tool),
         )
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import Final
 
 from robolink.calibration import (
+    PERSON_U_DRIFT_MM,
     CalibrationResult,
     Drift,
     DriftVerdict,
@@ -77,7 +78,7 @@ def verify_by_turning(
         turning.on_paper,
         offset_z(plain_pose(contact), plan.lift_mm),
     )
-    proof = DriftProof(tolerance_mm, plan.u_drift_mm if u_mm is None else u_mm)
+    proof = DriftProof(tolerance_mm, PERSON_U_DRIFT_MM if u_mm is None else u_mm)
     for angle_deg in angles_deg:
         proof.add(*(yield from turning.shown(angle_deg, proof.so_far())))
     for _ in range(MOST_MORE):
@@ -152,17 +153,17 @@ def contact_pose(result: CalibrationResult, *, tool: int) -> Pose:
     return replace(last, x_mm=x_mm, y_mm=y_mm)
 
 
-def drift_uncertainty_mm(plan: TouchPlan, result: CalibrationResult) -> float:
+def drift_uncertainty_mm(result: CalibrationResult) -> float:
     """Return the standard uncertainty of the drift that one touch shows.
 
     A scatter that was estimated from few touches is itself too uncertain to make it smaller.
     """
     sigma_mm = result.sigma_mm
     if sigma_mm is None:
-        return plan.u_drift_mm
+        return PERSON_U_DRIFT_MM
     if result.sigma_stated or (result.dof or 0) >= _ENOUGH_DOF:
         return sigma_mm
-    return max(sigma_mm, plan.u_drift_mm)
+    return max(sigma_mm, PERSON_U_DRIFT_MM)
 
 
 _ENOUGH_DOF: Final = 4

@@ -137,7 +137,7 @@ class ManualPinSource(PinSource):
             contact=contact_pose(result, tool=tool),
             angles_deg=(middles_of_gaps(angles)[0], angles[0]),
             tolerance_mm=tolerance_mm,
-            u_mm=drift_uncertainty_mm(self.touch, result),
+            u_mm=drift_uncertainty_mm(result),
             written=result.offset,
             tip=tip,
         )

@@ -4,12 +4,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from robolink import ambient
-from robolink.calibration import (
-    PERSON_SIGMA_Z_MM,
-    PERSON_U_DRIFT_MM,
-    PROBE_SIGMA_Z_MM,
-    PROBE_U_DRIFT_MM,
-)
+from robolink.calibration import PERSON_SIGMA_Z_MM, PROBE_SIGMA_Z_MM
 from robolink.model import InputEdge, Pose
 
 _SEED_BITS: Final = 48
@@ -43,11 +38,6 @@ class TouchPlan:
         """Standard deviation of a touch in height, stated or usual."""
         usual_mm = PERSON_SIGMA_Z_MM if self.contact is None else PROBE_SIGMA_Z_MM
         return self.sigma_z_mm or usual_mm
-
-    @property
-    def u_drift_mm(self) -> float:
-        """Usual standard uncertainty of a drift that one touch shows."""
-        return PERSON_U_DRIFT_MM if self.contact is None else PROBE_U_DRIFT_MM
 
 
 def fresh_seed() -> int:

@@ -216,7 +216,7 @@ DEFECTS: Final = (
         "who only presses ENTER gets a proof",
         {
             "robolink.procedures.pin.touch_plan.TouchPlan.__init__": stand_ins.nominal,
-            "robolink.nozzle_change._change.require_proved": stand_ins.nothing,
+            "robolink.nozzle_change._turn_verdict.require_proved": stand_ins.nothing,
         },
         found_by="careless people",
     ),

@@ -15,6 +15,15 @@ from robolink_simulators.soak.history import (
     Hour,
 )
 
+
+def _wire(what, match, at, position):
+    return Disturbance(Hindrance.WIRE, what, match, at, 0.0, position)
+
+
+def _machine(what, match, at, position):
+    return Disturbance(Hindrance.MACHINE, what, match, at, 0.0, position)
+
+
 HISTORIES = (
     History(
         5034,
@@ -333,6 +342,34 @@ HISTORIES = (
                 Habit(),
                 (Disturbance(Hindrance.STOP, "", "procedure", 0, 0.0, None),),
                 ("robot", "motors", "off", "--yes"),
+            ),
+        ),
+    ),
+    History(
+        919892577,
+        CellKind.PROGRAM,
+        (
+            Hour(0, Deed.PRODUCE, Habit(), (_wire("BEND_ANSWERED", "", 7, 4),)),
+            Hour(1, Deed.PRODUCE, Habit(), (_machine("RESTART", "SOLVE", 0, 0),)),
+            Hour(2, Deed.PRODUCE, Habit(), (_machine("PIN_BUMPED", "POSE", 2, 1),)),
+            Hour(
+                3,
+                Deed.PRODUCE,
+                Habit("ben", impatient=True),
+                (_wire("BEND_ANSWERED", "SOLVE", 0, 8),),
+            ),
+            Hour(4, Deed.PRODUCE, Habit(), (_wire("DROP_ASKED", "POSE", 3, 8),)),
+            Hour(5, Deed.PRODUCE, Habit("ben"), ()),
+            Hour(6, Deed.PRODUCE, Habit(), (_machine("TOUCH_BESIDE", "SOLVE", 0, 0),)),
+            Hour(
+                7,
+                Deed.PRODUCE,
+                Habit(keeps=True, impatient=True),
+                (
+                    Disturbance(Hindrance.POWER_CUT, "SYNC_LIES", "PROVE", 0, 0.0, None),
+                    Disturbance(Hindrance.POWER_CUT, "SYNC_LIES", "commit after", 1, 0.0, None),
+                    Disturbance(Hindrance.KILL, "", "VALUE", 0, 0.0, None),
+                ),
             ),
         ),
     ),

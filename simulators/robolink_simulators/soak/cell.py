@@ -5,6 +5,7 @@ import os
 import random
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -45,6 +46,7 @@ from robolink_simulators.soak.rules import Rulebook
 from robolink_simulators.soak.story import Story
 from robolink_simulators.soak.surroundings import SeededSurroundings
 from robolink_simulators.soak.threads import Killed, TurnTaking
+from robolink_simulators.soak.typed_lines import STOP, is_stop
 from robolink_simulators.soak.watching import watched
 
 _PLANTS: Final[Mapping[CellKind, Callable[[ManualClock, WireTap, int], PlantMachine]]] = {
@@ -208,7 +210,7 @@ class VirtualCell:
             case Hindrance.HAND:
                 self._act_by_hand(disturbance)
             case Hindrance.FREEZE:
-                self._freeze()
+                self._freeze(process)
             case Hindrance.INTERRUPT:
                 if self._turns.current.name == "main":
                     output_closed()
@@ -239,7 +241,6 @@ class VirtualCell:
         self._note("stop: acknowledged")
         if process.alive:
             process.stopped_ns = self._clock.now_ns()
-            self._rules.stopped()
 
     def _act_by_hand(self, disturbance: Disturbance) -> None:
         """Let somebody do something at the pendant, while robolink asks and nothing moves."""
@@ -252,14 +253,15 @@ class VirtualCell:
         tool = next((tool for tool, _ in wish_of(self._hour).typed), TOOL)
         self._rules.hand_typed(tool, self._plant.type_by_hand(tool))
 
-    def _freeze(self) -> None:
+    def _freeze(self, process: VirtualProcess) -> None:
         """Let a process stand still, as one that is suspended, until another has been at work."""
         if self._turns.current.name != "main":
             return
         other = self._computer.start("dora")
         self._others.append(other)
         thread = self._turns.start("dora", other, lambda: self._take_over(other))
-        self._turns.wait_until(lambda: thread.over)
+        with self._turns.suspended(process):
+            self._turns.wait_until(lambda: thread.over)
 
     def _take_over(self, process: VirtualProcess) -> None:
         """Somebody else waits, settles what the process that stands still left, types a tool."""
@@ -398,6 +400,7 @@ class VirtualCell:
             self._rules.killed()
             self._turns.join()
             process.end()
+            self._stop_what_goes_on(hour)
             return
         self._turns.join()
         process.stopped_ns = stopped_ns if error is None and process.controller else None
@@ -415,7 +418,27 @@ class VirtualCell:
             return process.controller
 
         self._note("types " + " ".join(hour.line))
-        run_line(hour.line, self._plant, connect, str(self._folder), self._note_said)
+        folder = str(self._folder)
+        run_line(hour.line, self._plant, process, connect, folder, self._note_said)
+        if is_stop(hour.line):
+            self._rules.stopped()
+
+    def _stop_what_goes_on(self, hour: Hour) -> None:
+        """Let whoever sees the machine move on after a process died stop it from another one."""
+        self._plant.advance()
+        if self._plant.calls_back or not self._plant.moving:
+            return
+        process = self._turns.current.owner = self._computer.start(hour.habit.person)
+        try:
+            self._type_line(process, replace(hour, line=STOP))
+            self._note("stop: acknowledged")
+        except Killed:
+            self._plant.hang_up(process)
+        except (Exception, KeyboardInterrupt) as error:
+            self._note(f"stop: {describe(error)}")
+        finally:
+            self._turns.current.owner = None
+            process.end()
 
     def _end(self, hour: Hour, how: str) -> None:
         self.story.endings[f"{hour.deed}: {how}"] += 1

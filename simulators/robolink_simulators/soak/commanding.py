@@ -2,10 +2,11 @@
 
 import contextlib
 import io
+import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, nullcontext
-from typing import Any
+from typing import Any, Final
 from unittest import mock
 
 from robolink_cli import main
@@ -17,14 +18,18 @@ from robolink.journal._opening import close_files
 from robolink.model import Controller
 from robolink.ways import speaking
 from robolink_simulators.hosting.in_process import epson, softmotion
+from robolink_simulators.soak.computer import VirtualProcess
 from robolink_simulators.soak.drawing.commands import ASSIST, FOLDER
 from robolink_simulators.soak.people import Tell
 from robolink_simulators.soak.plant.machine import PlantMachine
+
+_PASSWORDS: Final = "robolink_cli.access.password"
 
 
 def run_line(
     line: Sequence[str],
     plant: PlantMachine,
+    process: VirtualProcess,
     connect: Callable[[], Controller],
     folder: str,
     tell: Tell,
@@ -34,6 +39,7 @@ def run_line(
     Args:
         line: The line, without the program's name.
         plant: The cell's machine; its person sees what ``--assist`` shows.
+        process: In which it runs.
         connect: Connects to its controller over the wire that is watched.
         folder: The cell's disk.
         tell: Told of the last lines that are printed.
@@ -52,6 +58,10 @@ def run_line(
         stack.enter_context(contextlib.redirect_stderr(shown))
         stack.enter_context(mock.patch.object(sys, "stdin", io.StringIO()))
         stack.enter_context(mock.patch("robolink.connect", _connecting(connect)))
+        for name, opened in plant.openings(process).items():
+            stack.enter_context(mock.patch(name, opened))
+        stack.enter_context(mock.patch.dict(os.environ, ROBOLINK_PASSWORD=plant.password))
+        stack.enter_context(mock.patch(f"{_PASSWORDS}.from_keyring", return_value=None))
         # A socket of this computer, with a thread of its own, is no part of a cell.
         unheard = "robolink_cli.session.opening.listening_for_stop"
         stack.enter_context(mock.patch(unheard, return_value=nullcontext()))

@@ -30,6 +30,7 @@ class VirtualProcess:
         put_back: Tools whose old value it has written since.
         cut_off: Whether a link of it has failed.
         overtaken: Whether another client was acknowledged in the place of a movement or write.
+        held_back: Whether a stop was begun in it, and nobody has released it since.
     """
 
     def __init__(self, number: int, person: str, holder: LeaseHolder, path: Path) -> None:
@@ -41,6 +42,7 @@ class VirtualProcess:
         self.put_back: set[int] = set()
         self.cut_off = False
         self.overtaken = False
+        self.held_back = False
         self._holder = holder
         self._path = path
         self._journal: Journal | None = None

@@ -36,6 +36,7 @@ class ProgramPlant(EpsonPlant):
     kind = "epson"
     moved_by_robolink = False
     calls_back = True
+    models = "T6-602S"
     world = WorldParameters(contact_input=CONTACT)
 
     def __init__(self, clock: ManualClock, tap: WireTap, seed: int, turns: TurnTaking) -> None:

@@ -123,10 +123,6 @@ class WireRules:
             "StillAfterStop", allowed, f"{sent.text} leaves after the stop was acknowledged"
         )
 
-    def stopped(self) -> None:
-        """Check the machine at the moment in which a stop is acknowledged."""
-        self._on.hold("AtRestWhenStopped", not self._on.plant.moving, "it still moves")
-
     def _puts_back(self, sent: SentRequest, markers: Sequence[BookedMarker]) -> bool:
         """Tell whether the write that is marked brings back what was there before."""
         if not self._on.books.trusted:

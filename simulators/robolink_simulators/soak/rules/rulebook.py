@@ -149,8 +149,8 @@ class Rulebook(Grounds):
         self._on_wire.given(tool, value)
 
     def stopped(self) -> None:
-        """Check the machine at the moment in which a stop is acknowledged."""
-        self._on_wire.stopped()
+        """Check the machine when a stop from outside the driver is acknowledged."""
+        self.contract.stops.acknowledged()
 
     def ended(
         self, process: VirtualProcess, error: BaseException | None, state: MachineState
@@ -197,6 +197,7 @@ class Rulebook(Grounds):
 
     def left(self, state: MachineState) -> None:
         """Check what a deed left behind, before anybody acts."""
+        self.contract.passed()
         self._at_rest.left(state)
         self._before.left(state)
         self._asked.left(state)

@@ -24,6 +24,10 @@ def _machine(what, match, at, position):
     return Disturbance(Hindrance.MACHINE, what, match, at, 0.0, position)
 
 
+def _hand_types(at):
+    return Disturbance(Hindrance.HAND, "type", "question", at, 0.01, None)
+
+
 HISTORIES = (
     History(
         5034,
@@ -369,6 +373,47 @@ HISTORIES = (
                     Disturbance(Hindrance.POWER_CUT, "SYNC_LIES", "PROVE", 0, 0.0, None),
                     Disturbance(Hindrance.POWER_CUT, "SYNC_LIES", "commit after", 1, 0.0, None),
                     Disturbance(Hindrance.KILL, "", "VALUE", 0, 0.0, None),
+                ),
+            ),
+        ),
+    ),
+    History(
+        635312984,
+        CellKind.EPSON_SERIAL,
+        (
+            Hour(
+                12,
+                Deed.COMMAND,
+                Habit(),
+                (Disturbance(Hindrance.STOP, "", "wire sent", 4, 0.0, None),),
+                ("expert", "check-contract", "--yes"),
+            ),
+        ),
+    ),
+    History(
+        30313,
+        CellKind.EPSON_SERIAL,
+        (
+            Hour(4, Deed.UNDO, Habit(), ()),
+            Hour(5, Deed.CHANGE_NOZZLE, Habit(), ()),
+            Hour(6, Deed.CHANGE_NOZZLE, Habit(), (_hand_types(12),)),
+            Hour(
+                7,
+                Deed.CHANGE_NOZZLE,
+                Habit(),
+                (Disturbance(Hindrance.FREEZE, "", "question", 1, 0.0, None),),
+            ),
+            Hour(8, Deed.UNDO, Habit(), ()),
+            Hour(9, Deed.CHANGE_NOZZLE, Habit(), ()),
+            Hour(
+                16,
+                Deed.CHANGE_NOZZLE,
+                Habit(impatient=True),
+                (
+                    _hand_types(6),
+                    Disturbance(Hindrance.STOP, "", 'wire sent $Execute,"Move ', 13, 0.01, None),
+                    _hand_types(9),
+                    Disturbance(Hindrance.STOP, "", "lock Move ", 11, 20.0, None),
                 ),
             ),
         ),

@@ -230,11 +230,11 @@ class VirtualCell:
         raise Killed
 
     def _stop(self, process: VirtualProcess) -> None:
-        controller = process.controller
-        if controller is None:
+        stopper = process.stopper or process.controller
+        if stopper is None:
             return
         try:
-            controller.stop()
+            stopper.stop()
         except RobolinkError as error:
             self._note(f"stop: {describe(error)}")
             return

@@ -10,6 +10,7 @@ from typing import Any, Final
 from unittest import mock
 
 from robolink_cli import main
+from robolink_cli.commands.controller.contract_trials import TrialConnections
 from robolink_cli.console.exit_codes import UNKNOWN
 from robolink_cli.console.ways import SHELL_WAYS
 
@@ -65,6 +66,7 @@ def run_line(
         # A socket of this computer, with a thread of its own, is no part of a cell.
         unheard = "robolink_cli.session.opening.listening_for_stop"
         stack.enter_context(mock.patch(unheard, return_value=nullcontext()))
+        stack.enter_context(mock.patch.object(TrialConnections, "_listen", _heard_by(process)))
         stack.enter_context(speaking(SHELL_WAYS))
         stack.callback(close_files)
         stack.callback(lambda: tell(" / ".join(shown.getvalue().splitlines()[-2:])))
@@ -73,6 +75,15 @@ def run_line(
         )
     if code == UNKNOWN:
         raise OutcomeUnknownError("the command says that something is left open")
+
+
+def _heard_by(process: VirtualProcess) -> Callable[[TrialConnections], None]:
+    """Let a stop from another terminal reach what connects for each check anew."""
+
+    def listen(trials: TrialConnections) -> None:
+        process.stopper = trials
+
+    return listen
 
 
 def _connecting(connect: Callable[[], Controller]) -> Callable[..., Controller]:

@@ -4,7 +4,7 @@ import shutil
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import ClassVar, Final
+from typing import ClassVar, Final, Protocol
 
 from robolink.files.durable import state_folder
 from robolink.journal import Journal, JournalOutcomeLog, LeaseHolder
@@ -14,6 +14,14 @@ from robolink.model import Controller, Signature
 from robolink.timing import Clock
 from robolink_simulators.faults import FaultyDisk
 from robolink_simulators.soak.surroundings import SeededSurroundings
+
+
+class Stopper(Protocol):
+    """What listens for a stop from another terminal."""
+
+    def stop(self) -> None:
+        """Bring the controller to rest."""
+
 
 _SUFFIXES: Final = ("", "-wal", "-shm")
 
@@ -30,6 +38,7 @@ class VirtualProcess:
         put_back: Tools whose old value it has written since.
         cut_off: Whether a link of it has failed.
         overtaken: Whether another client was acknowledged in the place of a movement or write.
+        stopper: What a stop from another terminal goes to, where that is not the controller.
         held_back: Whether a stop was begun in it, and nobody has released it since.
     """
 
@@ -43,6 +52,7 @@ class VirtualProcess:
         self.cut_off = False
         self.overtaken = False
         self.held_back = False
+        self.stopper: Stopper | None = None
         self._holder = holder
         self._path = path
         self._journal: Journal | None = None

@@ -40,10 +40,14 @@ _NOT_DRAWN: Final = frozenset(
     {
         *("--password-file", "--timeout", "--remote-timeout", "--operator", "--record"),
         *("-c", "--json", "--lang", "--keys", "--plain", "--help"),
-        *("--driver", "named"),
+        *("--driver", "named", "--write", "--move"),
     }
 )
-"""Options of the link and of the terminal, the same for all commands; and what names a module."""
+"""Options of the link and of the terminal, the same for all commands, and what names a module.
+
+Checks of the contract that write or move open markers on purpose, in a record that is in memory
+only; no rule that looks past the driver can read that (``tests/cli/test_check_contract.py``).
+"""
 
 _EXPERT: Final = "expert"
 """The group of what integrators and engineers need besides; no help page lists it."""

@@ -32,9 +32,11 @@ class ContractRules:
         self._asked: set[int] = set()
         self._selects = False
         self._last: MachineState | None = None
+        self._previews = False
 
-    def begin(self, state: MachineState) -> None:
-        """Begin an hour."""
+    def begin(self, state: MachineState, *, previews: bool) -> None:
+        """Begin an hour; ``previews`` where its line only shows what it would send."""
+        self._previews = previews
         self._states.forget()
         self._states.note(state)
         self._aims.clear()
@@ -43,12 +45,20 @@ class ContractRules:
         self._places.begin()
         self._selects, self._last = False, state
 
+    def left(self) -> None:
+        """Check what a deed has left; what people do from here on, they do."""
+        self.passed()
+        self._previews = False
+
     # After every event.
 
     def leaving(self, process: VirtualProcess, sent: SentRequest) -> None:
         """Check a request that is about to leave: a movement is for the tool in force."""
         self.passed()
         self.stops.leaving(process, sent)
+        if self._previews:
+            only_read = sent.kind in (SentKind.OTHER, SentKind.STOP)
+            self._on.hold(_RULE, only_read, f"{sent.text} leaves, and was only to be shown")
         if sent.kind is SentKind.WRITE and sent.tool is not None:
             self._asked.add(sent.tool)
         self._selects |= sent.kind is SentKind.SELECT

@@ -86,10 +86,23 @@ class WireRules:
             bool(ours or whole),
             f"{sent.text} leaves process {process.number} without a marker",
         )
+        self._not_again(sent, ours)
         wanted = self._on.now.wanted.setdefault(tool or 0, [None])
         for marker in ours:
             wanted.append(read_offset(marker.details.get("requested")))
             wanted.append(read_offset(marker.details.get("before")))
+
+    def _not_again(self, sent: SentRequest, ours: Sequence[BookedMarker]) -> None:
+        """Check that a value is not written that is there already: a write wears the memory."""
+        tool, plant = sent.tool or 0, self._on.plant
+        if not ours or tool in plant.touched or self._on.now.crowded or plant.bent:
+            return  # somebody else may have written it since it was looked at
+        new, holds = read_offset(ours[-1].details.get("requested")), plant.shown(tool)
+        self._on.hold(
+            "ContractHolds",
+            not plant.same(new, holds),
+            f"{sent.text} leaves, and tool {tool} holds {holds} already",
+        )
 
     def given(self, tool: int, value: ToolOffset) -> None:
         """Check a value that the machine's own program is about to be given, and to write."""

@@ -96,7 +96,7 @@ class Rulebook(Grounds):
         self.plant.moved_itself = self.plant.settings_reset = False
         self._asked.begin()
         self._by_hand.begin()
-        self.contract.begin(state)
+        self.contract.begin(state, previews="--dry-run" in hour.line)
 
     def begin_again(self) -> None:
         """Begin another try in the same hour; what is open by now is of before."""
@@ -197,7 +197,7 @@ class Rulebook(Grounds):
 
     def left(self, state: MachineState) -> None:
         """Check what a deed left behind, before anybody acts."""
-        self.contract.passed()
+        self.contract.left()
         self._at_rest.left(state)
         self._before.left(state)
         self._asked.left(state)

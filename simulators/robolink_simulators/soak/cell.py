@@ -3,7 +3,7 @@
 import gc
 import os
 import random
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import replace
 from functools import partial
@@ -35,13 +35,9 @@ from robolink_simulators.soak.history import (
     Hour,
 )
 from robolink_simulators.soak.people import AGREE, OTHERS_TOOL, TOOL, describe, habits_in, wish_of
-from robolink_simulators.soak.plant.canopen import CanopenPlant
-from robolink_simulators.soak.plant.epson import PASSWORD, EpsonPlant
-from robolink_simulators.soak.plant.epson_serial import EpsonSerialPlant
-from robolink_simulators.soak.plant.machine import PlantMachine, SentRequest, WireTap
-from robolink_simulators.soak.plant.modbus import ModbusRtuPlant, ModbusTcpPlant
-from robolink_simulators.soak.plant.register_map import RegisterMapPlant
-from robolink_simulators.soak.plant.softmotion import SoftMotionPlant
+from robolink_simulators.soak.plant.epson import PASSWORD
+from robolink_simulators.soak.plant.kinds import PLANTS
+from robolink_simulators.soak.plant.machine import PlantMachine, SentRequest
 from robolink_simulators.soak.rules import Rulebook
 from robolink_simulators.soak.story import Story
 from robolink_simulators.soak.surroundings import SeededSurroundings
@@ -49,15 +45,6 @@ from robolink_simulators.soak.threads import Killed, TurnTaking
 from robolink_simulators.soak.typed_lines import STOP, is_stop
 from robolink_simulators.soak.watching import watched
 
-_PLANTS: Final[Mapping[CellKind, Callable[[ManualClock, WireTap, int], PlantMachine]]] = {
-    CellKind.EPSON: EpsonPlant,
-    CellKind.SOFTMOTION: SoftMotionPlant,
-    CellKind.EPSON_SERIAL: EpsonSerialPlant,
-    CellKind.MODBUS_TCP: ModbusTcpPlant,
-    CellKind.MODBUS_RTU: ModbusRtuPlant,
-    CellKind.CANOPEN: CanopenPlant,
-    CellKind.REGISTER_MAP: RegisterMapPlant,
-}
 _TRIES: Final = 8
 """How often people try to get a cell going again; each time they look longer."""
 
@@ -129,10 +116,10 @@ class VirtualCell:
         return self.story
 
     def _built(self) -> PlantMachine:
-        seed = self._history.seed
-        if self._history.kind is CellKind.PROGRAM:
+        kind, seed = self._history.kind, self._history.seed
+        if kind is CellKind.PROGRAM:
             return ProgramPlant(self._clock, self, seed, self._turns)
-        return _PLANTS[self._history.kind](self._clock, self, seed)
+        return PLANTS[kind](self._clock, self, seed)
 
     # What the machine's wire, and the checkpoints, tell.
 
@@ -353,15 +340,10 @@ class VirtualCell:
             # A connection that a killed process dropped is closed when it is collected; until then
             # it holds a lock, and whoever opens what is left of the file waits for it in real time.
             gc.collect()
-            share = (disturbance.at % 97) / 97
-            if disturbance.what == "bent":
-                self._computer.bend(share)
-            elif disturbance.what == "truncated":
-                self._computer.truncate(share)
-            else:
+            if disturbance.what == "lost":
                 self._books.lost = self._computer.known and self._books.last_number() > 0
                 self._books.close()
-                self._computer.lose()
+            self._computer.harm(disturbance.what, (disturbance.at % 97) / 97)
             self._books.trusted = False
 
     def _do(self, hour: Hour) -> None:
@@ -511,11 +493,5 @@ class VirtualCell:
 
     def _look_for_the_password(self) -> None:
         lines = "\n".join(self.story.lines())
-        shown = [str(path.name) for path in self._computer.files() if _holds_password(path)]
+        shown = list(self._computer.files_with(PASSWORD))
         self._rules.hold("NoPasswordShown", PASSWORD not in lines and not shown, f"in {shown}")
-
-
-def _holds_password(path: Path) -> bool:
-    with suppress(OSError):
-        return PASSWORD.encode() in path.read_bytes()
-    return False

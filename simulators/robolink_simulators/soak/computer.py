@@ -3,6 +3,7 @@
 import shutil
 import tempfile
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import ClassVar, Final, Protocol
 
@@ -146,6 +147,15 @@ class VirtualComputer:
         self.boots += 1
         self._surroundings.booted_ns = now_ns
 
+    def harm(self, what: str, share: float) -> None:
+        """Bend, truncate or lose the journal, that far into its file."""
+        if what == "bent":
+            self.bend(share)
+        elif what == "truncated":
+            self.truncate(share)
+        else:
+            self.lose()
+
     def bend(self, share: float) -> None:
         """Flip bits of one byte of the journal, that far into its file."""
         data = bytearray(self.journal.read_bytes())
@@ -177,8 +187,14 @@ class VirtualComputer:
             if path.exists():
                 path.replace(path.with_name(f"damaged-{self._count}{path.name}"))
 
-    def files(self) -> Iterator[Path]:
-        """Yield every file that was written, for a look at what is in them."""
+    def files_with(self, text: str) -> Iterator[str]:
+        """Yield the names of the files that were written and hold a text."""
+        for path in self._files():
+            with suppress(OSError):
+                if text.encode() in path.read_bytes():
+                    yield path.name
+
+    def _files(self) -> Iterator[Path]:
         for folder in (self.journal.parent, state_folder("controllers")):
             if folder.exists():
                 yield from sorted(path for path in folder.rglob("*") if path.is_file())

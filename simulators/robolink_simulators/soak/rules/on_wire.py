@@ -95,6 +95,8 @@ class WireRules:
     def _not_again(self, sent: SentRequest, ours: Sequence[BookedMarker]) -> None:
         """Check that a value is not written that is there already: a write wears the memory."""
         tool, plant = sent.tool or 0, self._on.plant
+        # The mark under which an earlier write left stays where nothing can be stored any more.
+        ours = [m for m in ours if self._on.now.writes[m.operation] == sent.text]
         if not ours or tool in plant.touched or self._on.now.crowded or plant.bent:
             return  # somebody else may have written it since it was looked at
         new, holds = read_offset(ours[-1].details.get("requested")), plant.shown(tool)
@@ -141,8 +143,7 @@ class WireRules:
         if not self._on.books.trusted:
             return True
         tool = sent.tool or 0
-        # The mark under which an earlier write left stays where nothing can be stored any more.
-        left = self._on.now.writes
+        left = self._on.now.writes  # as in _not_again
         ours = [m for m in _of_tool(tool, markers) if left.get(m.operation, sent.text) == sent.text]
         wanted = read_offset(ours[-1].details.get("requested")) if ours else None
         before: list[ToolOffset | None] = [

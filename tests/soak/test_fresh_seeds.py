@@ -391,6 +391,18 @@ HISTORIES = (
         ),
     ),
     History(
+        767170911,
+        CellKind.SOFTMOTION,
+        (
+            Hour(
+                19,
+                Deed.CHANGE_NOZZLE,
+                Habit("ben", keeps=True),
+                (Disturbance(Hindrance.POWER_CUT, "", "lock 5205", 0, 0.0, None),),
+            ),
+        ),
+    ),
+    History(
         30313,
         CellKind.EPSON_SERIAL,
         (

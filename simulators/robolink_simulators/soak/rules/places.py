@@ -1,6 +1,7 @@
 """A pose is where the tip is, and what was sent somewhere arrives there: by the machine itself."""
 
 import math
+import weakref
 from typing import Final
 
 from robolink.model import Motion, Pose, WorkBox
@@ -26,7 +27,8 @@ class PlaceRules:
     def __init__(self, grounds: Grounds) -> None:
         self._on = grounds
         self._before: dict[int, Frame | None] = {}
-        self._sent: dict[int, Motion] = {}
+        # Not the movement itself: it holds the controller of a process that may be killed.
+        self._sent: dict[int, weakref.ref[Motion]] = {}
 
     def begin(self) -> None:
         """Begin an hour."""
@@ -41,7 +43,7 @@ class PlaceRules:
         self, process: VirtualProcess, motion: Motion, target: Pose, box: WorkBox
     ) -> tuple[bool, str]:
         """Return whether a movement goes where it was sent, in its box; and what was seen."""
-        self._sent[process.number] = motion
+        self._sent[process.number] = weakref.ref(motion)
         limits = (
             (box.x_min_mm, target.x_mm, box.x_max_mm),
             (box.y_min_mm, target.y_mm, box.y_max_mm),
@@ -56,7 +58,8 @@ class PlaceRules:
     def arrived(self, process: VirtualProcess, motion: Motion) -> tuple[bool, str]:
         """Return whether a movement that arrived is where it was sent; and what was seen."""
         tip, target = self._standing(), motion.target
-        if self._sent.get(process.number) is not motion or tip is None:
+        sent = self._sent.get(process.number)
+        if sent is None or sent() is not motion or tip is None:
             return True, ""  # one that ends at an input ends somewhere on its way
         if target.tool != self._on.plant.state().selected:
             return True, ""  # somebody has selected another one meanwhile

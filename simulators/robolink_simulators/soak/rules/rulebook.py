@@ -58,7 +58,7 @@ class Rulebook(Grounds):
         >>> plant.simulator.machine.tools.set(2, ToolOffset(9.0, 9.0))
         >>> rules.left(plant.state())
         >>> cell.story.broken[0].rule
-        'OnlyWantedValues'
+        'ContractHolds'
     """
 
     def __init__(self, story: Story, plant: PlantMachine, books: Books) -> None:

@@ -403,6 +403,21 @@ HISTORIES = (
         ),
     ),
     History(
+        424472547,
+        CellKind.CANOPEN,
+        (
+            Hour(
+                16,
+                Deed.CHANGE_NOZZLE,
+                Habit(),
+                (
+                    Disturbance(Hindrance.FREEZE, "", "question", 10, 0.0, None),
+                    Disturbance(Hindrance.MACHINE, "RESTART", "write_command", 0, 20.0, None),
+                ),
+            ),
+        ),
+    ),
+    History(
         30313,
         CellKind.EPSON_SERIAL,
         (

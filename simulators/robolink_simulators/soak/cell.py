@@ -260,6 +260,7 @@ class VirtualCell:
                 with self._connected(process) as controller:
                     with suppress(NotReadyError):
                         controller.reset_fault()
+                    self._rules.others_settle()
                     recover(controller, keep=False, confirm=self._rules.word_on)
                     held = controller.tools.read(tool)
                     offset = ToolOffset(8.0, -8.0, -float(1 + process.number % 40))

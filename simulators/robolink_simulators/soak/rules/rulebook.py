@@ -128,6 +128,15 @@ class Rulebook(Grounds):
             self.books.lost = False
         return True
 
+    def others_settle(self) -> None:
+        """Note that a second person is about to settle what is open, whoever left it."""
+        self.now.crowded = True
+        for marker in self.books.markers():
+            named = (marker.details.get("tool"), *marker.details.get("tools", {}))
+            self.now.settled_by_others |= {int(tool) for tool in named if tool is not None}
+        if not self.books.trusted:
+            self.now.settled_by_others |= {*self.plant.state().tools}
+
     def others_write(self, process: VirtualProcess, typed: Typed) -> None:
         """Note that a second person has read a tool, and writes it."""
         tool, offset = typed

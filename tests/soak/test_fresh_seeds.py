@@ -391,6 +391,19 @@ HISTORIES = (
         ),
     ),
     History(
+        242685805,
+        CellKind.MODBUS_RTU,
+        (
+            Hour(17, Deed.SET_TOOL, Habit(), ()),
+            Hour(
+                18,
+                Deed.SET_TWO,
+                Habit(),
+                (Disturbance(Hindrance.DISK, "UNWRITABLE", "commit before", 2, 0.0, None),),
+            ),
+        ),
+    ),
+    History(
         767170911,
         CellKind.SOFTMOTION,
         (

@@ -431,6 +431,19 @@ HISTORIES = (
         ),
     ),
     History(
+        552290885,
+        CellKind.MODBUS_RTU,
+        (
+            Hour(
+                12,
+                Deed.COMMAND,
+                Habit(),
+                (Disturbance(Hindrance.STOP, "", "", 21, 0.0, None),),
+                ("expert", "verify-controller"),
+            ),
+        ),
+    ),
+    History(
         30313,
         CellKind.EPSON_SERIAL,
         (

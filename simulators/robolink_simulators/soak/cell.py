@@ -217,7 +217,8 @@ class VirtualCell:
         raise Killed
 
     def _stop(self, process: VirtualProcess) -> None:
-        stopper = process.stopper or process.controller
+        commanded = self._hour is not None and self._hour.deed is Deed.COMMAND
+        stopper = process.stopper or (None if commanded else process.controller)
         if stopper is None:
             return
         try:

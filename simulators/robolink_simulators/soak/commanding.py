@@ -5,7 +5,7 @@ import io
 import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager, nullcontext
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from typing import Any, Final
 from unittest import mock
 
@@ -65,7 +65,7 @@ def run_line(
         stack.enter_context(mock.patch(f"{_PASSWORDS}.from_keyring", return_value=None))
         # A socket of this computer, with a thread of its own, is no part of a cell.
         unheard = "robolink_cli.session.opening.listening_for_stop"
-        stack.enter_context(mock.patch(unheard, return_value=nullcontext()))
+        stack.enter_context(mock.patch(unheard, _listening(process)))
         stack.enter_context(mock.patch.object(TrialConnections, "_listen", _heard_by(process)))
         stack.enter_context(speaking(SHELL_WAYS))
         stack.callback(close_files)
@@ -75,6 +75,16 @@ def run_line(
         )
     if code == UNKNOWN:
         raise OutcomeUnknownError("the command says that something is left open")
+
+
+def _listening(process: VirtualProcess) -> Callable[..., AbstractContextManager[None]]:
+    """Let a stop from another terminal reach the controller that a command has opened."""
+
+    def listening(controller: Controller, *_given: object, **_terms: object) -> Any:
+        process.stopper = controller
+        return nullcontext()
+
+    return listening
 
 
 def _heard_by(process: VirtualProcess) -> Callable[[TrialConnections], None]:

@@ -80,7 +80,9 @@ def run_line(
 def _listening(process: VirtualProcess) -> Callable[..., AbstractContextManager[None]]:
     """Let a stop from another terminal reach the controller that a command has opened."""
 
-    def listening(controller: Controller, *_given: object, **_terms: object) -> Any:
+    def listening(
+        controller: Controller, *_given: object, **_terms: object
+    ) -> AbstractContextManager[None]:
         process.stopper = controller
         return nullcontext()
 

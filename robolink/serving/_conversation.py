@@ -5,6 +5,7 @@ answer, and the program, left without one, puts the old value back.
 """
 
 from collections.abc import Callable, Collection, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
@@ -90,6 +91,8 @@ class CallbackConversation:
         controllers: Names under which its robots are on record, see ``record_name``; without one,
             that of the robot's serial number.
         cell: The cell, whose stations a program may measure at; those on record count without.
+        tell: Told of each refusal: the code that the program is given, and the error, which says
+            what a person has to do. The program cannot show that.
 
     Attributes:
         over: Whether the program has said that it is done.
@@ -115,6 +118,7 @@ class CallbackConversation:
         signature: Signature | None = None,
         controllers: Collection[str] = (),
         cell: "Cell | None" = None,
+        tell: Callable[[str, RobolinkError], None] = lambda _code, _error: None,
     ) -> None:
         self.over = False
         self._journal = journal
@@ -122,6 +126,7 @@ class CallbackConversation:
         self._peer = peer
         self._signature = signature or Signature()
         self._controllers, self._cell = tuple(controllers), cell
+        self._tell = tell
         self._log: JournalOutcomeLog | None = None
         self._number = 0
         self._flag = 0
@@ -342,6 +347,7 @@ class CallbackConversation:
         """Put a refusal on record; a program that has written puts the old value back."""
         code = error.code if isinstance(error, CalibrationError) else _code(error)
         run, log = self._run, self._log
+        self._say(code, error)
         if log is None:
             return CallbackWord.REFUSE, (code,)
         entry = NewEntry(
@@ -352,14 +358,24 @@ class CallbackConversation:
         )
         try:
             log.append(entry)
-        except ConfigError:
-            code = "journal"
-        except OutcomeUnknownError:
-            code = "unsettled"  # the record is missing: nothing goes on it until a person looks
+        except ConfigError as unrecorded:
+            code = self._unrecorded("journal", unrecorded, besides=error)
+        except OutcomeUnknownError as missing:  # nothing goes on it until a person has looked
+            code = self._unrecorded("unsettled", missing, besides=error)
         if self._in_work():
             return CallbackWord.BACK, (code,)
         self._run = None
         return CallbackWord.REFUSE, (code,)
+
+    def _unrecorded(self, code: str, error: RobolinkError, *, besides: RobolinkError) -> str:
+        """Tell why a refusal is not on record, unless it was refused for that; return the code."""
+        if str(error) != str(besides):
+            self._say(code, error)
+        return code
+
+    def _say(self, code: str, error: RobolinkError) -> None:
+        with suppress(Exception):  # a console that is gone ends nobody's conversation
+            self._tell(code, error)
 
     def _in_work(self) -> bool:
         return self._run is not None and self._run.change is not None

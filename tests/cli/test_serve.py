@@ -9,6 +9,9 @@ import threading
 from contextlib import ExitStack
 
 import pytest
+from click.testing import CliRunner
+from robolink_cli.commands.simulate import serving
+from robolink_cli.main import cli
 
 from robolink import ambient
 from robolink.errors import ConfigError, JournalError
@@ -260,3 +263,50 @@ def test_what_is_no_question_here_is_cut_off_without_an_answer(sent):
     finally:
         server.close()
     assert len(told) == 1
+
+
+class DamagedJournal:
+    """A journal of which nothing can be used."""
+
+    def log(self, _controller, **_given):
+        """Refuse."""
+        raise JournalError("The journal is damaged.", remedy="Move the file away.")
+
+
+class OneProgram:
+    """A server to which one program has called, in a thread of its own, when it begins."""
+
+    def __init__(self, host, port, conversation, **_given):
+        self.address, self._conversation = (host, port), conversation
+
+    def start(self):
+        """Let it call, and say who it is."""
+        line = CallbackLine(1, CallbackWord.HELLO, ("S", "1", "0", "-", "1", "1", *["0"] * 6))
+        calls = threading.Thread(target=lambda: self._conversation("10.0.0.7").answer(line))
+        calls.start()
+        calls.join(30)
+
+    def close(self):
+        """End."""
+
+
+@pytest.mark.parametrize("as_json", [False, True])
+def test_whoever_watches_reads_why_a_program_was_refused_and_what_to_do(monkeypatch, as_json):
+    monkeypatch.setattr("robolink.serving.CallbackServer", OneProgram)
+    monkeypatch.setattr("robolink.journal.open_journal", DamagedJournal)
+    monkeypatch.setattr(serving.Termination, "wait", lambda _termination: None)
+    line = ["expert", "serve", "--spel", "127.0.0.1:5001", *(["--json"] if as_json else [])]
+    result = CliRunner().invoke(cli, line)
+    assert result.exit_code == 0, result.output
+    sentence = "10.0.0.7 is answered journal: The journal is damaged. Move the file away."
+    assert sentence in " ".join(result.stderr.split())
+    if as_json:
+        event, _ = map(json.loads, result.stdout.splitlines())
+        assert event == {
+            "schema": "robolink/serve-event/1",
+            "event": "refused",
+            "code": "journal",
+            "what": "The journal is damaged.",
+            "remedy": "Move the file away.",
+            "peer": "10.0.0.7",
+        }

@@ -57,6 +57,7 @@ _RECALIBRATION: Final = "stops in a whole recalibration"
 _PROXY: Final = "disturbed runs"
 _REAL_DRIVERS: Final = "kinds of defects that real drivers had"
 _MOVEMENT: Final = "robolink.controllers.epson.motion.movement"
+_EPSON_GROUP: Final = "robolink.controllers.epson.motion.group.EpsonGroup"
 _EPSON_TOOLS: Final = "robolink.controllers.epson.tools.table.EpsonToolTable"
 
 DEFECTS: Final = (
@@ -91,7 +92,13 @@ DEFECTS: Final = (
     ),
     KnownDefect(
         "an EPSON stop that is refused while a movement runs is acknowledged",
-        {"robolink.controllers.epson.motion.group.bring_to_rest": stand_ins.stop_not_looked_after},
+        {
+            f"{place}.bring_to_rest": stand_ins.stop_not_looked_after
+            for place in (
+                "robolink.controllers.epson.motion.group",
+                "robolink.controllers.epson.link.stopping",
+            )
+        },
         CellKind.EPSON,
         found_by="a jog that was killed",
     ),
@@ -136,18 +143,10 @@ DEFECTS: Final = (
     KnownDefect(
         "recover believes that a write did not take, and reads nothing",
         {"robolink.controllers.resolving.examine_write": stand_ins.unread},
-        missed_because=(
-            "a write that took, its answer lost, and nobody who tries again is drawn too "
-            "rarely; found in 121 hours before other instants were drawn"
-        ),
     ),
     KnownDefect(
         "what the journal commits is not synced",
         {"robolink.journal.store.engines._prepare": stand_ins.not_synced},
-        missed_because=(
-            "a power cut between a commit and what follows is drawn too rarely; found in 98 "
-            "hours before a deleted journal was drawn more often"
-        ),
     ),
     KnownDefect(
         "an error of the journal's disk is one of SQLAlchemy's",
@@ -216,7 +215,7 @@ DEFECTS: Final = (
         "who only presses ENTER gets a proof",
         {
             "robolink.procedures.pin.touch_plan.TouchPlan.__init__": stand_ins.nominal,
-            "robolink.nozzle_change._change.require_proved": stand_ins.nothing,
+            "robolink.nozzle_change._turn_verdict.require_proved": stand_ins.nothing,
         },
         found_by="careless people",
     ),
@@ -230,10 +229,6 @@ DEFECTS: Final = (
         "an interruption strikes in the middle of an exchange",
         {"robolink.interrupts.InterruptGate.__enter__": stand_ins.nothing},
         found_by="a closed window",
-        missed_because=(
-            "it has to come inside of one exchange of a movement or write; found in 54 "
-            "hours before other instants were drawn"
-        ),
     ),
     KnownDefect(
         "a login that comes back bent is shown",
@@ -310,5 +305,19 @@ DEFECTS: Final = (
         },
         CellKind.EPSON,
         found_by=_REAL_DRIVERS,
+    ),
+    KnownDefect(
+        "a pose is told a tenth of a millimetre off",
+        {f"{_EPSON_GROUP}.pose": stand_ins.a_tenth_off},
+        CellKind.EPSON,
+    ),
+    KnownDefect(
+        "a session leaves another robot in force",
+        {
+            "robolink.controllers.epson.controller.EpsonController._take_leave": (
+                stand_ins.with_another_robot
+            )
+        },
+        CellKind.EPSON,
     ),
 )

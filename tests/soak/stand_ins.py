@@ -7,13 +7,16 @@ import contextlib
 import sqlite3
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.controllers.controller_core import ControllerCore
+from robolink.controllers.epson.controller import EpsonController
 from robolink.controllers.epson.link.requests import command_class_of
 from robolink.controllers.epson.link.session import EpsonSession
+from robolink.controllers.epson.motion.group import EpsonGroup
 from robolink.controllers.markers import MarkerStore
 from robolink.controllers.softmotion.link.commands import CommandSender
 from robolink.controllers.tool_table import ToolTableCore
@@ -26,11 +29,13 @@ from robolink.model import (
     Marker,
     MarkerKind,
     NewEntry,
+    Pose,
     ToolOffset,
     Verdict,
     new_operation,
 )
 from robolink.procedures.pin.touch_plan import TouchPlan
+from robolink.protocols.epson_text import parse_status
 from robolink.stop_latch import StopLatch
 from robolink.timing import wall_label
 from robolink.transaction import _put_back as putting_back
@@ -89,10 +94,11 @@ def open_while_stopping(_latch: StopLatch) -> Iterator[None]:
     yield
 
 
-def stop_not_looked_after(ask: Function, _clock: object, *, controller: str) -> None:
+def stop_not_looked_after(ask: Function, _clock: object, *, controller: str) -> Any:
     """Send the Stop that ends tasks, and take a refusal of it for rest."""
     with contextlib.suppress(RobolinkError):
         ask("Stop")
+    return parse_status(ask("GetStatus"))
 
 
 def stop_sent_only(
@@ -319,3 +325,21 @@ def over_anything(controller: Any, step: Any, *, spoiled: bool, selected: int) -
 
 
 GIVING_UP_IS_A_REFUSAL = SimpleNamespace(TIMED_OUT=-1)
+
+
+_pose = EpsonGroup.pose
+
+
+def a_tenth_off(group: EpsonGroup) -> Pose:
+    """Tell a pose that is not where the tip is."""
+    pose = _pose(group)
+    return replace(pose, x_mm=pose.x_mm + 0.1)
+
+
+_take_leave = EpsonController._take_leave
+
+
+def with_another_robot(controller: EpsonController) -> None:
+    """Leave with the second robot in force."""
+    controller._link.session.exchange("SetCurRobot", "2")
+    _take_leave(controller)

@@ -29,6 +29,8 @@ def test_each_command_is_drawn_or_left_out_for_a_reason():
     for name in LEFT_OUT:
         assert any(f"{one.name} ".startswith(f"{name} ") for one in every), name
     for name in (
+        "stop",
+        "expert check-contract",
         "tool set",
         "tool clear",
         "tool restore",
@@ -55,11 +57,17 @@ def test_commands_do_in_a_virtual_cell_what_they_say():
             ("robot", "jog", "z+0.5", "--yes"),
             ("undo", "--yes"),
             ("robot", "take-ownership", "--yes"),
+            ("stop",),
+            ("expert", "verify-controller"),
         ]
     )
     assert story.broken == [], story.told()
     done, refused = (story.endings[f"type a command: {end}"] for end in ("done", "ConfigError"))
-    assert (done, refused) == (4, 1)
+    assert (done, refused) == (6, 1)
+    # A stop and a look at what it does go over the wire that is watched.
+    stop, look = (story.lines(hour=hour) for hour in (5, 6))
+    assert any(line.endswith("> $Abort") for line in stop)
+    assert any(line.endswith("> $Login") for line in look)
 
 
 @pytest.mark.soak
@@ -70,7 +78,7 @@ def test_undisturbed_commands_end_well_or_are_refused_cleanly(kind):
     assert story.broken == [], story.told()
     assert story.checks["NoDefectShown"] >= len(lines)
     ends: Counter[str] = story.endings
-    assert ends["type a command: done"] > len(lines) // 4
+    assert ends["type a command: done"] > len(lines) // 6
 
 
 def test_what_is_no_error_of_robolink_counts_as_a_defect():

@@ -15,6 +15,19 @@ from robolink_simulators.soak.history import (
     Hour,
 )
 
+
+def _wire(what, match, at, position):
+    return Disturbance(Hindrance.WIRE, what, match, at, 0.0, position)
+
+
+def _machine(what, match, at, position):
+    return Disturbance(Hindrance.MACHINE, what, match, at, 0.0, position)
+
+
+def _hand_types(at):
+    return Disturbance(Hindrance.HAND, "type", "question", at, 0.01, None)
+
+
 HISTORIES = (
     History(
         5034,
@@ -333,6 +346,128 @@ HISTORIES = (
                 Habit(),
                 (Disturbance(Hindrance.STOP, "", "procedure", 0, 0.0, None),),
                 ("robot", "motors", "off", "--yes"),
+            ),
+        ),
+    ),
+    History(
+        919892577,
+        CellKind.PROGRAM,
+        (
+            Hour(0, Deed.PRODUCE, Habit(), (_wire("BEND_ANSWERED", "", 7, 4),)),
+            Hour(1, Deed.PRODUCE, Habit(), (_machine("RESTART", "SOLVE", 0, 0),)),
+            Hour(2, Deed.PRODUCE, Habit(), (_machine("PIN_BUMPED", "POSE", 2, 1),)),
+            Hour(
+                3,
+                Deed.PRODUCE,
+                Habit("ben", impatient=True),
+                (_wire("BEND_ANSWERED", "SOLVE", 0, 8),),
+            ),
+            Hour(4, Deed.PRODUCE, Habit(), (_wire("DROP_ASKED", "POSE", 3, 8),)),
+            Hour(5, Deed.PRODUCE, Habit("ben"), ()),
+            Hour(6, Deed.PRODUCE, Habit(), (_machine("TOUCH_BESIDE", "SOLVE", 0, 0),)),
+            Hour(
+                7,
+                Deed.PRODUCE,
+                Habit(keeps=True, impatient=True),
+                (
+                    Disturbance(Hindrance.POWER_CUT, "SYNC_LIES", "PROVE", 0, 0.0, None),
+                    Disturbance(Hindrance.POWER_CUT, "SYNC_LIES", "commit after", 1, 0.0, None),
+                    Disturbance(Hindrance.KILL, "", "VALUE", 0, 0.0, None),
+                ),
+            ),
+        ),
+    ),
+    History(
+        635312984,
+        CellKind.EPSON_SERIAL,
+        (
+            Hour(
+                12,
+                Deed.COMMAND,
+                Habit(),
+                (Disturbance(Hindrance.STOP, "", "wire sent", 4, 0.0, None),),
+                ("expert", "check-contract", "--yes"),
+            ),
+        ),
+    ),
+    History(
+        242685805,
+        CellKind.MODBUS_RTU,
+        (
+            Hour(17, Deed.SET_TOOL, Habit(), ()),
+            Hour(
+                18,
+                Deed.SET_TWO,
+                Habit(),
+                (Disturbance(Hindrance.DISK, "UNWRITABLE", "commit before", 2, 0.0, None),),
+            ),
+        ),
+    ),
+    History(
+        767170911,
+        CellKind.SOFTMOTION,
+        (
+            Hour(
+                19,
+                Deed.CHANGE_NOZZLE,
+                Habit("ben", keeps=True),
+                (Disturbance(Hindrance.POWER_CUT, "", "lock 5205", 0, 0.0, None),),
+            ),
+        ),
+    ),
+    History(
+        424472547,
+        CellKind.CANOPEN,
+        (
+            Hour(
+                16,
+                Deed.CHANGE_NOZZLE,
+                Habit(),
+                (
+                    Disturbance(Hindrance.FREEZE, "", "question", 10, 0.0, None),
+                    Disturbance(Hindrance.MACHINE, "RESTART", "write_command", 0, 20.0, None),
+                ),
+            ),
+        ),
+    ),
+    History(
+        552290885,
+        CellKind.MODBUS_RTU,
+        (
+            Hour(
+                12,
+                Deed.COMMAND,
+                Habit(),
+                (Disturbance(Hindrance.STOP, "", "", 21, 0.0, None),),
+                ("expert", "verify-controller"),
+            ),
+        ),
+    ),
+    History(
+        30313,
+        CellKind.EPSON_SERIAL,
+        (
+            Hour(4, Deed.UNDO, Habit(), ()),
+            Hour(5, Deed.CHANGE_NOZZLE, Habit(), ()),
+            Hour(6, Deed.CHANGE_NOZZLE, Habit(), (_hand_types(12),)),
+            Hour(
+                7,
+                Deed.CHANGE_NOZZLE,
+                Habit(),
+                (Disturbance(Hindrance.FREEZE, "", "question", 1, 0.0, None),),
+            ),
+            Hour(8, Deed.UNDO, Habit(), ()),
+            Hour(9, Deed.CHANGE_NOZZLE, Habit(), ()),
+            Hour(
+                16,
+                Deed.CHANGE_NOZZLE,
+                Habit(impatient=True),
+                (
+                    _hand_types(6),
+                    Disturbance(Hindrance.STOP, "", 'wire sent $Execute,"Move ', 13, 0.01, None),
+                    _hand_types(9),
+                    Disturbance(Hindrance.STOP, "", "lock Move ", 11, 20.0, None),
+                ),
             ),
         ),
     ),

@@ -1,6 +1,8 @@
 """Known defects that are put back are found; all of them: ``make soak`` prints the table."""
 
+from contextlib import ExitStack
 from functools import cache
+from unittest import mock
 
 import pytest
 from robolink_simulators.soak import CellKind, live_through
@@ -32,6 +34,13 @@ def test_a_defect_that_is_put_back_is_found_by_its_rule_and_only_with_it(name, r
     story = live_through(ONE_CHANGE, BY_NAME[name].replacements)
     assert rule in {one.rule for one in story.broken}, story.told()
     assert undisturbed_by_defects().broken == []
+
+
+@pytest.mark.parametrize("name", BY_NAME)
+def test_what_a_defect_replaces_is_there(name):
+    with ExitStack() as stack:
+        for place, replacement in BY_NAME[name].replacements.items():
+            stack.enter_context(mock.patch(place, replacement))
 
 
 def test_each_known_defect_has_one_name_and_a_miss_is_printed_as_one():

@@ -13,11 +13,13 @@ SET_BACK = Disturbance(Hindrance.CLOCK, match="question", at=1, seconds=-86400.0
 GIVES_UP = Disturbance(Hindrance.MACHINE, "GIVES_UP", "Move ", 1)
 FROZEN = Disturbance(Hindrance.FREEZE, match="question", at=2)
 TYPES = Disturbance(Hindrance.HAND, "type", "question", 12)
+STOPS_IT = Disturbance(Hindrance.STOP, match='wire sent $Execute,"Move ')
+STOPS_BEFORE = Disturbance(Hindrance.STOP, match="lock Move ")
 INTERRUPT = Disturbance(Hindrance.INTERRUPT, match="question", at=14)
 
 
-def one_hour(deed, *disturbances, number=0, kind=CellKind.EPSON):
-    return History(3, kind, (Hour(number, deed, Habit(), disturbances),))
+def one_hour(deed, *disturbances, number=0, kind=CellKind.EPSON, seed=3):
+    return History(seed, kind, (Hour(number, deed, Habit(), disturbances),))
 
 
 SHOWN = {
@@ -36,6 +38,13 @@ SHOWN = {
     ),
     "a marker outlives what it marks": ("NothingOutlives", one_hour(Deed.MOVE_AND_LEAVE)),
     "power and speed are not put back": ("AsBefore", one_hour(Deed.MOVE_AND_LEAVE)),
+    "a pose is told a tenth of a millimetre off": ("ContractHolds", one_hour(Deed.MOVE_AND_LEAVE)),
+    "a session leaves another robot in force": ("ContractHolds", one_hour(Deed.SELECT_TOOL)),
+    "an EPSON stop that is refused while a movement runs is acknowledged": (
+        "AtRestWhenStopped",
+        one_hour(Deed.MOVE_AND_LEAVE, STOPS_IT, seed=1),
+    ),
+    "a stop holds nothing back": ("StillAfterStop", one_hour(Deed.MOVE_AND_LEAVE, STOPS_BEFORE)),
 }
 """Defect, the rule that it breaks, and the hour in which it does."""
 

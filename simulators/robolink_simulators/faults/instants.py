@@ -32,12 +32,13 @@ class Instant:
     first: int = 0
 
 
-SHARE: Final = 0.4
+SHARE: Final = 0.5
 """Share of all faults that are drawn from here."""
 
 _NOZZLE: Final = ("change the nozzle",)
 _TYPED: Final = ("type a tool offset", "type two tool offsets")
 _TWO: Final = ("type two tool offsets",)
+_LEFT: Final = ("begin a movement and leave",)
 
 INSTANTS: Final[Mapping[str, Sequence[Instant]]] = {
     "epson": (
@@ -45,12 +46,24 @@ INSTANTS: Final[Mapping[str, Sequence[Instant]]] = {
         Instant("wire", "GARBLE_REQUEST", "Login"),
         # A write that is acknowledged, and not carried out.
         Instant("wire", "IGNORE_WRITE", "TLSet ", 2),
+        *(Instant("wire", "IGNORE_WRITE", "TLSet ", 1, _TYPED),) * 2,
         Instant("wire", "IGNORE_WRITE", "TLSet 3, XY", 1, _TWO),
         # An answer that comes when nobody waits for it any more.
         Instant("wire", "DELAY", "Print", 40),
         # Just before a movement leaves, and at its answer.
         *(Instant("stop", "", "lock Move ", 15, _NOZZLE),) * 5,
         Instant("stop", "", "lock Go ", 3, _NOZZLE),
+        # While the arm moves: whoever stops waits for no lock then, and is told that it rests.
+        *(Instant("stop", "", 'wire sent $Execute,"Move ', 15, _NOZZLE),) * 3,
+        *(Instant("stop", "", 'wire sent $Execute,"Move ', 1, _LEFT),) * 3,
+        # Between a request and its answer.
+        *(Instant("interrupt", "", 'wire sent $Execute,"TLSet ', 1, _TYPED),) * 2,
+        Instant("interrupt", "", 'wire sent $Execute,"TLSet ', 1, _NOZZLE),
+        Instant("interrupt", "", 'wire sent $Execute,"Move ', 15, _NOZZLE),
+        # The journal cannot be written any more, behind a write and before it is on record.
+        *(Instant("disk", "UNWRITABLE", "commit before", 2, _TYPED, first=1),) * 2,
+        # Killed while the arm moves; whoever sees it go on stops it from another terminal.
+        Instant("kill", "", 'wire sent $Execute,"Move ', 15, _NOZZLE),
         # The controller gives up waiting for a movement, and the arm goes on.
         Instant("machine", "GIVES_UP", "Move ", 15, _NOZZLE),
         # Somebody at the pendant, between the look and the write, and while the proof is asked for.
@@ -83,6 +96,12 @@ INSTANTS: Final[Mapping[str, Sequence[Instant]]] = {
         Instant("clock", "", "question", 3, ("type an offset twice, and take the last one back",)),
         # Just before a movement leaves; behind the last write; between two tools.
         *(Instant("stop", "", "lock 2103", 15, _NOZZLE),) * 5,
+        *(Instant("stop", "", "wire sent MOVE_LINEAR", 15, _NOZZLE),) * 2,
+        *(Instant("interrupt", "", "wire sent WRITE_TOOL", 1, _TYPED),) * 2,
+        Instant("interrupt", "", "wire sent WRITE_TOOL", 1, _NOZZLE),
+        Instant("interrupt", "", "wire sent MOVE_LINEAR", 15, _NOZZLE),
+        *(Instant("disk", "UNWRITABLE", "commit before", 2, _TYPED, first=1),) * 2,
+        Instant("kill", "", "wire sent MOVE_LINEAR", 15, _NOZZLE),
         Instant("stop", "", "exchange 5205", 2, _TYPED),
         *(Instant("stop", "", "commit ", 6, _TYPED),) * 2,
         Instant("stop", "", "commit after", 8, _NOZZLE, first=68),
@@ -104,7 +123,7 @@ def drawn_instant(rng: random.Random, cell: str, deed: str) -> tuple[Instant, in
     return instant, instant.first + rng.randrange(instant.count)
 
 
-RARE_SHARE: Final = 0.09
+RARE_SHARE: Final = 0.15
 """Share of hours in which one of these comes besides."""
 
 RARE: Final[Mapping[str, Sequence[Instant]]] = {
@@ -113,6 +132,8 @@ RARE: Final[Mapping[str, Sequence[Instant]]] = {
         Instant("disk", "lost", ""),
         # A write that takes, and whose answer is lost.
         Instant("wire", "DROP_REPLY", "TLSet 2, XY", 1, _TYPED),
+        # A write that is acknowledged, and not carried out.
+        *(Instant("wire", "IGNORE_WRITE", "TLSet ", 1, _TYPED),) * 2,
     ),
     "softmotion": (
         Instant("disk", "lost", ""),

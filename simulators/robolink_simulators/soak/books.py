@@ -83,14 +83,14 @@ class Books:
     def digest(self) -> str:
         """Return a hash over all entries, the same wherever the disk lies.
 
-        A record that was begun anew names the file of the old one, so the journal's own hashes
-        are others in each folder.
+        A record that was begun anew names the file of the old one, and a backup its own, so the
+        journal's own hashes are others in each folder.
         """
         rows = self._rows(
             "SELECT number, at, kind, tool, verdict, details FROM entries ORDER BY number"
         )
         told = "\n".join(map(repr, rows))
-        return sha256(told.replace(str(self._path.resolve()), "journal").encode()).hexdigest()
+        return sha256(told.replace(str(self._path.resolve().parent), "disk").encode()).hexdigest()
 
     def value_of(self, tool: int) -> tuple[bool, ToolOffset | None]:
         """Return whether a value of a tool is on record as proved, and the newest one."""

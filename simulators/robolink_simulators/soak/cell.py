@@ -3,8 +3,9 @@
 import gc
 import os
 import random
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -34,28 +35,16 @@ from robolink_simulators.soak.history import (
     Hour,
 )
 from robolink_simulators.soak.people import AGREE, OTHERS_TOOL, TOOL, describe, habits_in, wish_of
-from robolink_simulators.soak.plant.canopen import CanopenPlant
-from robolink_simulators.soak.plant.epson import PASSWORD, EpsonPlant
-from robolink_simulators.soak.plant.epson_serial import EpsonSerialPlant
-from robolink_simulators.soak.plant.machine import PlantMachine, SentRequest, WireTap
-from robolink_simulators.soak.plant.modbus import ModbusRtuPlant, ModbusTcpPlant
-from robolink_simulators.soak.plant.register_map import RegisterMapPlant
-from robolink_simulators.soak.plant.softmotion import SoftMotionPlant
+from robolink_simulators.soak.plant.epson import PASSWORD
+from robolink_simulators.soak.plant.kinds import PLANTS
+from robolink_simulators.soak.plant.machine import PlantMachine, SentRequest
 from robolink_simulators.soak.rules import Rulebook
 from robolink_simulators.soak.story import Story
 from robolink_simulators.soak.surroundings import SeededSurroundings
 from robolink_simulators.soak.threads import Killed, TurnTaking
+from robolink_simulators.soak.typed_lines import STOP, is_stop
 from robolink_simulators.soak.watching import watched
 
-_PLANTS: Final[Mapping[CellKind, Callable[[ManualClock, WireTap, int], PlantMachine]]] = {
-    CellKind.EPSON: EpsonPlant,
-    CellKind.SOFTMOTION: SoftMotionPlant,
-    CellKind.EPSON_SERIAL: EpsonSerialPlant,
-    CellKind.MODBUS_TCP: ModbusTcpPlant,
-    CellKind.MODBUS_RTU: ModbusRtuPlant,
-    CellKind.CANOPEN: CanopenPlant,
-    CellKind.REGISTER_MAP: RegisterMapPlant,
-}
 _TRIES: Final = 8
 """How often people try to get a cell going again; each time they look longer."""
 
@@ -127,10 +116,10 @@ class VirtualCell:
         return self.story
 
     def _built(self) -> PlantMachine:
-        seed = self._history.seed
-        if self._history.kind is CellKind.PROGRAM:
+        kind, seed = self._history.kind, self._history.seed
+        if kind is CellKind.PROGRAM:
             return ProgramPlant(self._clock, self, seed, self._turns)
-        return _PLANTS[self._history.kind](self._clock, self, seed)
+        return PLANTS[kind](self._clock, self, seed)
 
     # What the machine's wire, and the checkpoints, tell.
 
@@ -208,7 +197,7 @@ class VirtualCell:
             case Hindrance.HAND:
                 self._act_by_hand(disturbance)
             case Hindrance.FREEZE:
-                self._freeze()
+                self._freeze(process)
             case Hindrance.INTERRUPT:
                 if self._turns.current.name == "main":
                     output_closed()
@@ -228,18 +217,18 @@ class VirtualCell:
         raise Killed
 
     def _stop(self, process: VirtualProcess) -> None:
-        controller = process.controller
-        if controller is None:
+        commanded = self._hour is not None and self._hour.deed is Deed.COMMAND
+        stopper = process.stopper or (None if commanded else process.controller)
+        if stopper is None:
             return
         try:
-            controller.stop()
+            stopper.stop()
         except RobolinkError as error:
             self._note(f"stop: {describe(error)}")
             return
         self._note("stop: acknowledged")
         if process.alive:
             process.stopped_ns = self._clock.now_ns()
-            self._rules.stopped()
 
     def _act_by_hand(self, disturbance: Disturbance) -> None:
         """Let somebody do something at the pendant, while robolink asks and nothing moves."""
@@ -252,14 +241,15 @@ class VirtualCell:
         tool = next((tool for tool, _ in wish_of(self._hour).typed), TOOL)
         self._rules.hand_typed(tool, self._plant.type_by_hand(tool))
 
-    def _freeze(self) -> None:
+    def _freeze(self, process: VirtualProcess) -> None:
         """Let a process stand still, as one that is suspended, until another has been at work."""
         if self._turns.current.name != "main":
             return
         other = self._computer.start("dora")
         self._others.append(other)
         thread = self._turns.start("dora", other, lambda: self._take_over(other))
-        self._turns.wait_until(lambda: thread.over)
+        with self._turns.suspended(process):
+            self._turns.wait_until(lambda: thread.over)
 
     def _take_over(self, process: VirtualProcess) -> None:
         """Somebody else waits, settles what the process that stands still left, types a tool."""
@@ -271,6 +261,7 @@ class VirtualCell:
                 with self._connected(process) as controller:
                     with suppress(NotReadyError):
                         controller.reset_fault()
+                    self._rules.others_settle()
                     recover(controller, keep=False, confirm=self._rules.word_on)
                     held = controller.tools.read(tool)
                     offset = ToolOffset(8.0, -8.0, -float(1 + process.number % 40))
@@ -351,15 +342,10 @@ class VirtualCell:
             # A connection that a killed process dropped is closed when it is collected; until then
             # it holds a lock, and whoever opens what is left of the file waits for it in real time.
             gc.collect()
-            share = (disturbance.at % 97) / 97
-            if disturbance.what == "bent":
-                self._computer.bend(share)
-            elif disturbance.what == "truncated":
-                self._computer.truncate(share)
-            else:
+            if disturbance.what == "lost":
                 self._books.lost = self._computer.known and self._books.last_number() > 0
                 self._books.close()
-                self._computer.lose()
+            self._computer.harm(disturbance.what, (disturbance.at % 97) / 97)
             self._books.trusted = False
 
     def _do(self, hour: Hour) -> None:
@@ -398,6 +384,7 @@ class VirtualCell:
             self._rules.killed()
             self._turns.join()
             process.end()
+            self._stop_what_goes_on(hour)
             return
         self._turns.join()
         process.stopped_ns = stopped_ns if error is None and process.controller else None
@@ -415,7 +402,27 @@ class VirtualCell:
             return process.controller
 
         self._note("types " + " ".join(hour.line))
-        run_line(hour.line, self._plant, connect, str(self._folder), self._note_said)
+        folder = str(self._folder)
+        run_line(hour.line, self._plant, process, connect, folder, self._note_said)
+        if is_stop(hour.line):
+            self._rules.stopped()
+
+    def _stop_what_goes_on(self, hour: Hour) -> None:
+        """Let whoever sees the machine move on after a process died stop it from another one."""
+        self._plant.advance()
+        if self._plant.calls_back or not self._plant.moving:
+            return
+        process = self._turns.current.owner = self._computer.start(hour.habit.person)
+        try:
+            self._type_line(process, replace(hour, line=STOP))
+            self._note("stop: acknowledged")
+        except Killed:
+            self._plant.hang_up(process)
+        except (Exception, KeyboardInterrupt) as error:
+            self._note(f"stop: {describe(error)}")
+        finally:
+            self._turns.current.owner = None
+            process.end()
 
     def _end(self, hour: Hour, how: str) -> None:
         self.story.endings[f"{hour.deed}: {how}"] += 1
@@ -488,11 +495,5 @@ class VirtualCell:
 
     def _look_for_the_password(self) -> None:
         lines = "\n".join(self.story.lines())
-        shown = [str(path.name) for path in self._computer.files() if _holds_password(path)]
+        shown = list(self._computer.files_with(PASSWORD))
         self._rules.hold("NoPasswordShown", PASSWORD not in lines and not shown, f"in {shown}")
-
-
-def _holds_password(path: Path) -> bool:
-    with suppress(OSError):
-        return PASSWORD.encode() in path.read_bytes()
-    return False

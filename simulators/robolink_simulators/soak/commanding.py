@@ -2,13 +2,15 @@
 
 import contextlib
 import io
+import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager, nullcontext
-from typing import Any
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
+from typing import Any, Final
 from unittest import mock
 
 from robolink_cli import main
+from robolink_cli.commands.controller.contract_trials import TrialConnections
 from robolink_cli.console.exit_codes import UNKNOWN
 from robolink_cli.console.ways import SHELL_WAYS
 
@@ -17,14 +19,18 @@ from robolink.journal._opening import close_files
 from robolink.model import Controller
 from robolink.ways import speaking
 from robolink_simulators.hosting.in_process import epson, softmotion
+from robolink_simulators.soak.computer import VirtualProcess
 from robolink_simulators.soak.drawing.commands import ASSIST, FOLDER
 from robolink_simulators.soak.people import Tell
 from robolink_simulators.soak.plant.machine import PlantMachine
+
+_PASSWORDS: Final = "robolink_cli.access.password"
 
 
 def run_line(
     line: Sequence[str],
     plant: PlantMachine,
+    process: VirtualProcess,
     connect: Callable[[], Controller],
     folder: str,
     tell: Tell,
@@ -34,6 +40,7 @@ def run_line(
     Args:
         line: The line, without the program's name.
         plant: The cell's machine; its person sees what ``--assist`` shows.
+        process: In which it runs.
         connect: Connects to its controller over the wire that is watched.
         folder: The cell's disk.
         tell: Told of the last lines that are printed.
@@ -52,9 +59,14 @@ def run_line(
         stack.enter_context(contextlib.redirect_stderr(shown))
         stack.enter_context(mock.patch.object(sys, "stdin", io.StringIO()))
         stack.enter_context(mock.patch("robolink.connect", _connecting(connect)))
+        for name, opened in plant.openings(process).items():
+            stack.enter_context(mock.patch(name, opened))
+        stack.enter_context(mock.patch.dict(os.environ, ROBOLINK_PASSWORD=plant.password))
+        stack.enter_context(mock.patch(f"{_PASSWORDS}.from_keyring", return_value=None))
         # A socket of this computer, with a thread of its own, is no part of a cell.
         unheard = "robolink_cli.session.opening.listening_for_stop"
-        stack.enter_context(mock.patch(unheard, return_value=nullcontext()))
+        stack.enter_context(mock.patch(unheard, _listening(process)))
+        stack.enter_context(mock.patch.object(TrialConnections, "_listen", _heard_by(process)))
         stack.enter_context(speaking(SHELL_WAYS))
         stack.callback(close_files)
         stack.callback(lambda: tell(" / ".join(shown.getvalue().splitlines()[-2:])))
@@ -63,6 +75,27 @@ def run_line(
         )
     if code == UNKNOWN:
         raise OutcomeUnknownError("the command says that something is left open")
+
+
+def _listening(process: VirtualProcess) -> Callable[..., AbstractContextManager[None]]:
+    """Let a stop from another terminal reach the controller that a command has opened."""
+
+    def listening(
+        controller: Controller, *_given: object, **_terms: object
+    ) -> AbstractContextManager[None]:
+        process.stopper = controller
+        return nullcontext()
+
+    return listening
+
+
+def _heard_by(process: VirtualProcess) -> Callable[[TrialConnections], None]:
+    """Let a stop from another terminal reach what connects for each check anew."""
+
+    def listen(trials: TrialConnections) -> None:
+        process.stopper = trials
+
+    return listen
 
 
 def _connecting(connect: Callable[[], Controller]) -> Callable[..., Controller]:

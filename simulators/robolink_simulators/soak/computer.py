@@ -3,8 +3,9 @@
 import shutil
 import tempfile
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
-from typing import ClassVar, Final
+from typing import ClassVar, Final, Protocol
 
 from robolink.files.durable import state_folder
 from robolink.journal import Journal, JournalOutcomeLog, LeaseHolder
@@ -14,6 +15,14 @@ from robolink.model import Controller, Signature
 from robolink.timing import Clock
 from robolink_simulators.faults import FaultyDisk
 from robolink_simulators.soak.surroundings import SeededSurroundings
+
+
+class Stopper(Protocol):
+    """What listens for a stop from another terminal."""
+
+    def stop(self) -> None:
+        """Bring the controller to rest."""
+
 
 _SUFFIXES: Final = ("", "-wal", "-shm")
 
@@ -30,6 +39,8 @@ class VirtualProcess:
         put_back: Tools whose old value it has written since.
         cut_off: Whether a link of it has failed.
         overtaken: Whether another client was acknowledged in the place of a movement or write.
+        stopper: What a stop from another terminal goes to, where that is not the controller.
+        held_back: Whether a stop was begun in it, and nobody has released it since.
     """
 
     def __init__(self, number: int, person: str, holder: LeaseHolder, path: Path) -> None:
@@ -41,6 +52,8 @@ class VirtualProcess:
         self.put_back: set[int] = set()
         self.cut_off = False
         self.overtaken = False
+        self.held_back = False
+        self.stopper: Stopper | None = None
         self._holder = holder
         self._path = path
         self._journal: Journal | None = None
@@ -134,6 +147,15 @@ class VirtualComputer:
         self.boots += 1
         self._surroundings.booted_ns = now_ns
 
+    def harm(self, what: str, share: float) -> None:
+        """Bend, truncate or lose the journal, that far into its file."""
+        if what == "bent":
+            self.bend(share)
+        elif what == "truncated":
+            self.truncate(share)
+        else:
+            self.lose()
+
     def bend(self, share: float) -> None:
         """Flip bits of one byte of the journal, that far into its file."""
         data = bytearray(self.journal.read_bytes())
@@ -165,8 +187,14 @@ class VirtualComputer:
             if path.exists():
                 path.replace(path.with_name(f"damaged-{self._count}{path.name}"))
 
-    def files(self) -> Iterator[Path]:
-        """Yield every file that was written, for a look at what is in them."""
+    def files_with(self, text: str) -> Iterator[str]:
+        """Yield the names of the files that were written and hold a text."""
+        for path in self._files():
+            with suppress(OSError):
+                if text.encode() in path.read_bytes():
+                    yield path.name
+
+    def _files(self) -> Iterator[Path]:
         for folder in (self.journal.parent, state_folder("controllers")):
             if folder.exists():
                 yield from sorted(path for path in folder.rglob("*") if path.is_file())

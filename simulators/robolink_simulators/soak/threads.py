@@ -7,7 +7,8 @@ away; where everybody waits for a time, virtual time goes on to the first of the
 
 import random
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from math import ceil
 from types import TracebackType
 from typing import Final, Protocol
@@ -59,6 +60,7 @@ class SteppedThread:
     Attributes:
         error: What ended it, ``None`` for nothing.
         over: Whether it has ended.
+        suspended: Whether its whole process stands still.
     """
 
     def __init__(self, name: str, owner: Mortal | None) -> None:
@@ -66,13 +68,14 @@ class SteppedThread:
         self.owner = owner
         self.error: BaseException | None = None
         self.over = False
+        self.suspended = False
         self.ready: Callable[[], bool] | None = None
         self.until_ns: int | None = None
         self.turn = threading.Semaphore(0)
 
     def can_go_on(self, now_ns: int) -> bool:
         """Tell whether what it waits for is there, its time has come, or its process is dead."""
-        if self.over:
+        if self.over or self.suspended:
             return False
         if self.ready is None or self.ready() or (self.owner is not None and not self.owner.alive):
             return True
@@ -197,6 +200,18 @@ class TurnTaking:
         finally:
             me.ready = me.until_ns = None
 
+    @contextmanager
+    def suspended(self, owner: Mortal) -> Iterator[None]:
+        """Let every other thread of a process stand still within the block, as this one does."""
+        others = [one for one in self._threads if one.owner is owner and one is not self.current]
+        for thread in others:
+            thread.suspended = True
+        try:
+            yield
+        finally:
+            for thread in others:
+                thread.suspended = False
+
     def join(self) -> None:
         """Let every other thread run to its end."""
         me = self.current
@@ -212,7 +227,8 @@ class TurnTaking:
                 return self._favoured
             if ready:
                 return ready[0] if len(ready) == 1 else self.rng.choice(ready)
-            times = [t.until_ns for t in self._threads if not t.over and t.until_ns is not None]
+            waiting_for = [t for t in self._threads if not (t.over or t.suspended)]
+            times = [t.until_ns for t in waiting_for if t.until_ns is not None]
             if not times:
                 waiting = ", ".join(t.name for t in self._threads if not t.over)
                 message = f"everybody waits: {waiting}"

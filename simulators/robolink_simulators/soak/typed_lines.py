@@ -16,6 +16,14 @@ _UNITS: Final = {
     "--w": "w_deg",
 }
 
+STOP: Final = ("stop",)
+"""The line that stops a machine, whoever moves it."""
+
+
+def is_stop(line: Sequence[str]) -> bool:
+    """Return whether a line stops the machine, and shows more than what it would send."""
+    return tuple(line[:1]) == STOP and "--dry-run" not in line
+
 
 def typed_components(line: Sequence[str]) -> tuple[int, dict[str, float]] | None:
     """Return which tool a line writes, and the components that it names; ``None`` for none."""

@@ -10,6 +10,7 @@ from robolink_cli.console.render import note
 from robolink_cli.session.context import CliContext, optional_controller
 
 if TYPE_CHECKING:
+    from robolink.errors import RobolinkError
     from robolink.serving import CallbackLimits, CallbackServer
 
 
@@ -157,12 +158,18 @@ def _serve_programs(
     from robolink import __version__
     from robolink.journal import open_journal, signature_here
     from robolink.serving import CallbackConversation, CallbackServer
+    from robolink_cli.commands.companions.serve_events import ServeEvents
     from robolink_cli.commands.simulate.serving import Termination, host_and_port
 
     host, port = host_and_port(address, "--spel")
     journal, signature = open_journal(), signature_here(__version__)
+    events = ServeEvents()
 
     def conversation(peer: str) -> CallbackConversation:
+        def tell(code: str, error: "RobolinkError") -> None:
+            sentence = tr("{peer} is answered {code}: {cause}", peer=peer, code=code, cause=error)
+            events.refused(sentence, code, error, peer=peer)
+
         return CallbackConversation(
             journal,
             limits,
@@ -170,6 +177,7 @@ def _serve_programs(
             signature=signature,
             controllers=controllers,
             cell=context.cell,
+            tell=tell,
         )
 
     server = CallbackServer(host, port, conversation, allow=allow, tell=note)

@@ -1,14 +1,12 @@
 """Answers the program of a PLC, call after call, until somebody ends it."""
 
-import json
 from typing import TYPE_CHECKING
 
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.serving import PermitCall, free_machine
+from robolink_cli.commands.companions.serve_events import ServeEvents
 from robolink_cli.commands.simulate.serving import Termination
-from robolink_cli.console.output import hand_over, show
-from robolink_cli.console.render import json_is_on, note
 from robolink_cli.session.context import CliContext
 from robolink_cli.session.opening import open_controller
 
@@ -23,11 +21,14 @@ def serve_plc(context: CliContext, plan: "PermitPlan", limits: "CallbackLimits")
     Raises:
         RobolinkError: The PLC is not reached, or a write is in doubt: the machine stays blocked.
     """
+    events = ServeEvents()
     with Termination() as termination:
         with open_controller(context, changes=True) as controller:
             free_machine(controller)
             where = controller.identity
-        _tell("listening", tr("The program of {where} may call. Ctrl-C ends it.", where=where))
+        events.tell(
+            "listening", tr("The program of {where} may call. Ctrl-C ends it.", where=where)
+        )
         while not termination.came:
             try:
                 with open_controller(
@@ -42,14 +43,13 @@ def serve_plc(context: CliContext, plan: "PermitPlan", limits: "CallbackLimits")
                     )
                     kept = call.answer()
             except CalibrationError as error:
-                note(str(error))
-                _tell("refused", "", code=error.code)
+                events.refused(str(error), error.code, error)
             else:
                 if kept is not None:
-                    _tell_kept(plan.tool, kept)
+                    _tell_kept(events, plan.tool, kept)
 
 
-def _tell_kept(tool: int, kept: "ToolOffset") -> None:
+def _tell_kept(events: ServeEvents, tool: int, kept: "ToolOffset") -> None:
     sentence = tr(
         "Tool {tool} was tested and kept: X {x:.3f} Y {y:.3f} Z {z:.3f}.",
         tool=tool,
@@ -57,12 +57,4 @@ def _tell_kept(tool: int, kept: "ToolOffset") -> None:
         y=kept.y_mm,
         z=kept.z_mm,
     )
-    _tell("kept", sentence, tool=tool, x_mm=kept.x_mm, y_mm=kept.y_mm, z_mm=kept.z_mm)
-
-
-def _tell(event: str, sentence: str, **payload: object) -> None:
-    """Say it at once: a line of JSON for a script, a sentence for a person."""
-    if json_is_on():
-        hand_over(json.dumps({"schema": "robolink/serve-event/1", "event": event, **payload}))
-    elif sentence:
-        show(sentence)
+    events.tell("kept", sentence, tool=tool, x_mm=kept.x_mm, y_mm=kept.y_mm, z_mm=kept.z_mm)

@@ -3,7 +3,7 @@
 import random
 from typing import Final, cast
 
-from robolink.errors import NotReadyError, NotReadyReason
+from robolink.errors import JournalError, NotReadyError, NotReadyReason, RobolinkError
 from robolink.model import Controller, OutcomeLog, ToolOffset
 from robolink.nozzle_change import ChangeReport
 from robolink_simulators.cell.clock import ManualClock
@@ -36,6 +36,7 @@ class ProgramPlant(EpsonPlant):
     kind = "epson"
     moved_by_robolink = False
     calls_back = True
+    models = "T6-602S"
     world = WorldParameters(contact_input=CONTACT)
 
     def __init__(self, clock: ManualClock, tap: WireTap, seed: int, turns: TurnTaking) -> None:
@@ -46,12 +47,19 @@ class ProgramPlant(EpsonPlant):
         on_record = f"epson:C-{serial}/{serial}"
         self._service = ProgramService(clock, turns, tap.passed, on_record=on_record)
         self._service.on_value = self._given
+        self._service.on_refusal = self._refused
+        self._shown: JournalError | None = None
         self._production = Production(self.simulator, clock, self._service, self._rng)
         self._nominal_pin = self.simulator.world.pin_mm
 
     def _given(self, value: ToolOffset) -> None:
         self.values.append(value)
         self.tap.given(1, value)
+
+    def _refused(self, _code: str, error: RobolinkError) -> None:
+        """Note what the screen of the service shows, as far as it is about the journal."""
+        if isinstance(error, JournalError):
+            self._shown = error
 
     def prepare(self, person: WorldParameters) -> None:
         """Put another needle on, and teach where it touches the pin."""
@@ -78,11 +86,14 @@ class ProgramPlant(EpsonPlant):
         world.pin_mm = self._nominal_pin
         self._production.teach()
         self._production.restore()
+        self._shown = None
         printed = self._production.run()
         tell(f"the program prints {printed}")
         if self._service.lacks_record():
             self._recover(habit, tell)
         left = cast(_Served, controller).outcomes.open_markers()
+        if printed != "kept" and self._shown is not None:
+            raise self._shown  # the people do what it says
         if printed != "kept":
             raise NotReadyError(f"the program prints {printed!r}", reason=NotReadyReason.NOT_REMOTE)
         return not left

@@ -37,6 +37,7 @@ class ProgramService:
             it to ``robolink expert serve``.
         on_question: Told of each question of the program.
         on_value: Told of each value that the program is given.
+        on_refusal: Told of each refusal as the screen shows it: its code, and the error.
     """
 
     def __init__(
@@ -52,6 +53,7 @@ class ProgramService:
         self.process: VirtualProcess | None = None
         self.on_question: Callable[[str], None] = lambda _text: None
         self.on_value: Callable[[ToolOffset], None] = lambda _value: None
+        self.on_refusal: Callable[[str, RobolinkError], None] = lambda _code, _error: None
         self._clock = clock
         self._turns = turns
         self._note = note
@@ -82,7 +84,13 @@ class ProgramService:
     def conversation(self) -> CallbackConversation:
         """Begin to talk with a program, with the journal of the process."""
         journal = cast(Journal, _OpenJournal(self))
-        return CallbackConversation(journal, LIMITS, peer=_PEER, controllers=(self._on_record,))
+        return CallbackConversation(
+            journal,
+            LIMITS,
+            peer=_PEER,
+            controllers=(self._on_record,),
+            tell=self.on_refusal,
+        )
 
     def log(self, controller: str) -> JournalOutcomeLog:
         """Return the record of a controller, kept by the process that serves."""

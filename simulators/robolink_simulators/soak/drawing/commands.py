@@ -20,7 +20,6 @@ FOLDER: Final = "{folder}"
 """What stands in a line for what is only known when it is typed."""
 
 LEFT_OUT: Final[Mapping[str, str]] = {
-    "stop": "its frame has a way of its own, past the driver; a stop is drawn by itself",
     "sim": "it serves simulators until it is ended",
     "demo": "it brings a controller of its own",
     "cell list": "it reads files of this computer alone",
@@ -32,6 +31,8 @@ LEFT_OUT: Final[Mapping[str, str]] = {
     "cell scan": "it looks for controllers on a network",
     "cell ports": "it looks at the ports of this computer",
     "cell people": "it reads files of this computer alone",
+    "expert serve": "it serves until it is ended; cells whose program calls back have it",
+    "expert spel run": "it brings a controller of its own",
 }
 """Commands, or groups of them, that are not drawn, and why."""
 
@@ -39,9 +40,17 @@ _NOT_DRAWN: Final = frozenset(
     {
         *("--password-file", "--timeout", "--remote-timeout", "--operator", "--record"),
         *("-c", "--json", "--lang", "--keys", "--plain", "--help"),
+        *("--driver", "named", "--write", "--move"),
     }
 )
-"""Options of the link and of the terminal; each is the same for all commands."""
+"""Options of the link and of the terminal, the same for all commands, and what names a module.
+
+Checks of the contract that write or move open markers on purpose, in a record that is in memory
+only; no rule that looks past the driver can read that (``tests/cli/test_check_contract.py``).
+"""
+
+_EXPERT: Final = "expert"
+"""The group of what integrators and engineers need besides; no help page lists it."""
 
 _FILES: Final = (f"{FOLDER}/kept.json", f"{FOLDER}/other.json")
 _TOOLS: Final = ("1", "2", "2", "3", "3", "4", "0", "16")
@@ -50,6 +59,11 @@ _WORDS: Final[Mapping[str, tuple[str, ...]]] = {
     "name": ("g_lot", "pin", "last"),
     "value": ("1", "2.5", "on", "a"),
     "file": _FILES,
+    "files": _FILES,
+    "path": _FILES,
+    "folder": (f"{FOLDER}/companions",),
+    "page": ("stopping", "tutorial", "zzzz"),
+    "statement": ("Print CZ(Here)", "Print TLSet(2)", "Print Tool", "Weight 2", "Print"),
     "number": _TOOLS,
     "change": ("zzzz", "1"),
     "recipe": (f"{FOLDER}/recipe.toml",),
@@ -100,7 +114,14 @@ _WEIGHTS: Final[Mapping[str, float]] = {
     "robot jog": 5.0,
     "calibrate two-pose": 5.0,
     "calibrate n-angle": 2.0,
+    "stop": 4.0,
+    "expert check-contract": 2.0,
+    "expert verify-controller": 2.0,
+    "expert execute-raw": 2.0,
 }
+
+_USUAL: Final[Mapping[str, float]] = {_EXPERT: 0.5}
+"""Weight of the other commands of a group; those for integrators mostly act on files alone."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,8 +143,12 @@ class DrawnCommand:
 
 
 def every_command() -> Iterator[DrawnCommand]:
-    """Yield each command of the program that is listed."""
-    yield from _below(cli, (), click.Context(cli, info_name="robolink"))
+    """Yield each command of the program that is listed, and those for integrators."""
+    root = click.Context(cli, info_name="robolink")
+    yield from _below(cli, (), root)
+    expert = cli.get_command(root, _EXPERT)
+    assert expert is not None  # noqa: S101 - it stands in the map
+    yield from _below(expert, (_EXPERT,), click.Context(expert, parent=root, info_name=_EXPERT))
 
 
 @cache
@@ -142,7 +167,7 @@ def left_out(one: DrawnCommand) -> str:
 def drawn_line(rng: random.Random) -> tuple[str, ...]:
     """Return a line that somebody types."""
     commands = drawn_commands()
-    weights = [_WEIGHTS.get(one.name, 1.0) for one in commands]
+    weights = [_WEIGHTS.get(one.name, _USUAL.get(one.path[0], 1.0)) for one in commands]
     chosen = rng.choices(commands, weights)[0]
     seldom = _SELDOM / max(1, len(chosen.command.params) / 12)
     options: list[str] = []

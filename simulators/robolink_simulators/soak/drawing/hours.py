@@ -104,9 +104,12 @@ _JUMPS_S: Final = (-86400.0, -5.0, 3600.0, 40 * 86400.0)
 """By how much a clock is set wrong."""
 
 _CLOCK_SHARE: Final = 0.7
-_TAKEN_BACK_SHARE: Final = 0.06
-_FREEZE_SHARE: Final = 0.04
+_TAKEN_BACK_SHARE: Final = 0.1
+_FREEZE_SHARE: Final = 0.08
 """How often what tells in one deed alone comes in it."""
+
+_NOT_ALWAYS_ASKED: Final = 3
+"""How many of the questions that were counted in a change some seeds do not come to."""
 
 _WHILE_ASKED: Final = frozenset({Hindrance.HAND, Hindrance.FREEZE})
 _QUESTION: Final = "question"
@@ -156,7 +159,9 @@ def _hour(seed: int, number: int, kind: CellKind) -> Hour:
     rare = drawn_rarity(rarely, _FAMILIES.get(kind, ""), deed.value)
     if rare is not None:
         drawn.append(Disturbance(Hindrance(rare.kind), rare.what, rare.match))
-    drawn += _of_the_deed(random.Random(f"deed {number} of {seed}"), kind, deed)
+    told = _of_the_deed(random.Random(f"deed {number} of {seed}"), kind, deed)
+    # What comes at a question comes alone: anything else would mostly end the deed before it.
+    drawn = told if told and told[0].kind in _WHILE_ASKED else drawn + told
     line: tuple[str, ...] = ()
     if deed is Deed.COMMAND:
         line = drawn_line(random.Random(f"line {number} of {seed}"))
@@ -172,9 +177,9 @@ def _of_the_deed(rng: random.Random, kind: CellKind, deed: Deed) -> list[Disturb
     if deed is not Deed.CHANGE_NOZZLE:
         return []
     if chance < _TAKEN_BACK_SHARE:  # a hand while the new value is proved, and then a stop
-        last = dict(length_of(kind, deed).points)[_QUESTION] - 1
+        last = dict(length_of(kind, deed).points)[_QUESTION] - _NOT_ALWAYS_ASKED
         return [
-            Disturbance(Hindrance.HAND, "type", _QUESTION, last - at),
+            Disturbance(Hindrance.HAND, "type", _QUESTION, last - at % 3),
             Disturbance(Hindrance.INTERRUPT, match=_QUESTION, at=last),
         ]
     if chance < _TAKEN_BACK_SHARE + _FREEZE_SHARE:

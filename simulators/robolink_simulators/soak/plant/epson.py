@@ -1,17 +1,20 @@
 """An EPSON controller in a virtual cell, and the link that leads to it."""
 
 import re
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Final
 
 from robolink.controllers.epson import open_epson
-from robolink.controllers.epson.link.line import text_line
+from robolink.controllers.epson.link.line import EpsonLine, text_line
 from robolink.errors import TransportError
 from robolink.model import Controller, OutcomeLog, Secret, ToolOffset
 from robolink.timing import Deadline
 from robolink.transport import parse_url
 from robolink_simulators.cell.clock import ManualClock
+from robolink_simulators.cell.frames import Frame
 from robolink_simulators.cell.world_parameters import WorldParameters
+from robolink_simulators.epson.arm.kinematics import frame_of
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.faults import Fault, FaultAction
 from robolink_simulators.hosting.seam import WireDevice
@@ -53,12 +56,16 @@ class EpsonPlant(PlantWithWorld):
 
     kind = "epson"
     address = "epson+sim://cell"
+    password = PASSWORD
+    models = "T6-602S,GX4-C351S"
+    """The first is the cell's own; the other one never moves, and nobody chooses it."""
+
     world = WorldParameters()
 
     def __init__(self, clock: ManualClock, tap: WireTap, seed: int) -> None:
         super().__init__(clock, tap)
         self._simulator = EpsonSimulator(
-            "T6-602S",
+            self.models,
             seed=seed,
             password=Secret(PASSWORD),
             serial=f"SOAK{seed:06d}",
@@ -79,12 +86,27 @@ class EpsonPlant(PlantWithWorld):
 
     def connect(self, process: VirtualProcess, outcomes: OutcomeLog) -> Controller:
         """Log in."""
+        line = self.line_of(process)
+        return open_epson(line, outcomes=outcomes, password=Secret(PASSWORD))
+
+    def line_of(self, process: VirtualProcess) -> EpsonLine:
+        """Open the wire for a process."""
         link = TappedTransport(
             self._simulator, self._simulator, self.clock, process, self.tap, self.address
         )
         link.impatience = self.impatience
         self._links[process.number] = link
-        return open_epson(text_line(link), outcomes=outcomes, password=Secret(PASSWORD))
+        return text_line(link)
+
+    def openings(self, process: VirtualProcess) -> Mapping[str, Callable[..., object]]:
+        """See ``PlantMachine.openings``."""
+
+        def opened(_url: object, **_terms: object) -> EpsonLine:
+            return self.line_of(process)
+
+        # In this order: what imports the other one must not meet its stand-in.
+        package = "robolink.controllers.epson"
+        return {f"{package}.verify.run.open_line": opened, f"{package}.link.line.open_line": opened}
 
     def hang_up(self, process: VirtualProcess) -> None:
         """Close the connection of a process that died."""
@@ -99,7 +121,18 @@ class EpsonPlant(PlantWithWorld):
         if parameters is not self._parameters:  # Motor On, Reset and the like make new ones
             self._parameters, self.settings_reset = parameters, True
         settings = (float(machine.power_high), *parameters.speed, *parameters.speed_s)
-        return MachineState(dict(machine.tools.defined()), machine.tools.selected, settings)
+        tools, selected = machine.tools, machine.tools.selected
+        return MachineState(dict(tools.defined()), selected, settings, machine.robot_number)
+
+    def flange(self) -> Frame:
+        """Return where the flange of the robot in force is commanded to be."""
+        self._simulator.advance(self.clock.now_ns())
+        return frame_of(self._simulator.machine.arm.flange())
+
+    def tip(self) -> Frame:
+        """Return where the tip of the tool in force is commanded to be."""
+        self._simulator.advance(self.clock.now_ns())
+        return frame_of(self._simulator.machine.robot.tip())
 
     def prepare(self, person: WorldParameters) -> None:
         """See ``PlantMachine.prepare``; power and speed are those of production."""

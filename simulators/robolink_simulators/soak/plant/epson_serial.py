@@ -1,9 +1,7 @@
 """An EPSON controller with Remote RS232 in a virtual cell, and the line that leads to it."""
 
-from robolink.controllers.epson import open_epson
 from robolink.controllers.epson.link.line import EpsonLine
 from robolink.controllers.epson.link.serial_opening import turn_on
-from robolink.model import Controller, OutcomeLog, Secret
 from robolink.protocols.epson_binary import EpsonBinaryCodec, Role
 from robolink.protocols.epson_text import BadRequest, Request
 from robolink_simulators.cell.clock import ManualClock
@@ -13,7 +11,7 @@ from robolink_simulators.hosting.in_process.line_port import LinePort
 from robolink_simulators.hosting.streams.epson_serial import SerialFace
 from robolink_simulators.soak.computer import VirtualProcess
 from robolink_simulators.soak.history import Disturbance, Hindrance
-from robolink_simulators.soak.plant.epson import PASSWORD, EpsonPlant, TappedTransport
+from robolink_simulators.soak.plant.epson import EpsonPlant, TappedTransport
 from robolink_simulators.soak.plant.lines.bent_line import BentLine
 from robolink_simulators.soak.plant.machine import WireTap
 
@@ -27,8 +25,8 @@ class EpsonSerialPlant(EpsonPlant):
         self._line = BentLine()
         self._dialect = serial_dialect(self.simulator.options)
 
-    def connect(self, process: VirtualProcess, outcomes: OutcomeLog) -> Controller:
-        """Open the port, turn the line on and log in."""
+    def line_of(self, process: VirtualProcess) -> EpsonLine:
+        """Open the port and turn the line on."""
         link = TappedLine(self.simulator, self._port, self.clock, process, self.tap, self.address)
         link.line = self._line
         self._links[process.number] = link
@@ -38,8 +36,7 @@ class EpsonSerialPlant(EpsonPlant):
             link.close()
             raise
         codec = EpsonBinaryCodec(Role.HOST, self._dialect)
-        line = EpsonLine(link, codec, outlives_sessions=True)
-        return open_epson(line, outcomes=outcomes, password=Secret(PASSWORD))
+        return EpsonLine(link, codec, outlives_sessions=True)
 
     def arm(self, disturbance: Disturbance) -> None:
         """See :meth:`EpsonPlant.arm`; a line bends bytes, too."""

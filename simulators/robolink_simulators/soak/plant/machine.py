@@ -1,7 +1,7 @@
 """What a machine in a virtual cell is to the adversary, whatever its kind."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final, Protocol
@@ -10,6 +10,7 @@ from robolink.model import Controller, OutcomeLog, ToolOffset
 from robolink.nozzle_change import ChangeReport
 from robolink_simulators.assist.port import InProcessEyes
 from robolink_simulators.cell.clock import ManualClock
+from robolink_simulators.cell.frames import Frame
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.plc.device import PlcSimulator
@@ -64,11 +65,13 @@ class MachineState:
         tools: Every tool that is defined.
         selected: The tool in force, 0 for none.
         settings: Power and speeds that a procedure has to leave as they were, where it has any.
+        robot: The robot in force, where a controller has several.
     """
 
     tools: Mapping[int, ToolOffset]
     selected: int
     settings: tuple[float, ...] = ()
+    robot: int = 1
 
 
 class WireTap(Protocol):
@@ -97,6 +100,7 @@ class PlantMachine(ABC):
 
     Attributes:
         moved_by_robolink: Whether robolink moves it, resets it and selects its tools.
+        password: Its remote password; empty where it has none.
         calls_back: Whether its own program changes the tool, and calls robolink back.
         numbered: Whether its commands have numbers, so that one that comes twice counts once.
         touched: Tools that somebody past this computer has written since the last look.
@@ -109,6 +113,7 @@ class PlantMachine(ABC):
 
     kind: str
     address: str
+    password: str = ""
     moved_by_robolink: bool = True
     calls_back: bool = False
     numbered: bool = False
@@ -174,6 +179,14 @@ class PlantMachine(ABC):
             RobolinkError: That fails.
         """
 
+    def openings(self, process: VirtualProcess) -> Mapping[str, Callable[..., object]]:  # noqa: ARG002 - as above
+        """Return what opens the wire for what needs no record, by dotted name.
+
+        A stop and a look at what a controller does open it by themselves. They get the wire that is
+        watched.
+        """
+        return {}
+
     def shown(self, tool: int) -> ToolOffset | None:
         """Return what it shows of a tool, which may be written already and not be in force."""
         return self.state().tools.get(tool)
@@ -198,6 +211,14 @@ class PlantMachine(ABC):
     @abstractmethod
     def moving(self) -> bool:
         """Whether something moves."""
+
+    def flange(self) -> Frame | None:
+        """Return where its flange is, ``None`` where robolink moves nothing."""
+        return None
+
+    def tip(self) -> Frame | None:
+        """Return where the tip of the tool in force is, ``None`` where robolink moves nothing."""
+        return None
 
     @property
     @abstractmethod

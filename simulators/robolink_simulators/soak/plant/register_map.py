@@ -103,7 +103,7 @@ class RegisterMapPlant(PlantMachine):
 
     kind = "plc"
     moved_by_robolink = False
-    address = "epson+sim://map-cell"
+    address = "plc+modbus-rtu:///dev/map-cell?map=cell.toml"
 
     def __init__(self, clock: ManualClock, tap: WireTap, seed: int) -> None:
         super().__init__(clock, tap)

@@ -1,7 +1,7 @@
 """A SoftMotion PLC in a virtual cell, and the mailbox link that leads to it."""
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
 from robolink.controllers.softmotion import open_softmotion
@@ -9,6 +9,7 @@ from robolink.model import Controller, OutcomeLog, ToolOffset
 from robolink.protocols.mailbox import WordOrder, Words
 from robolink.transport import MailboxLink
 from robolink_simulators.cell.clock import ManualClock
+from robolink_simulators.cell.frames import Frame
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.faults import PlcFault, PlcFaultAction
 from robolink_simulators.faults.fieldbus import Order
@@ -89,6 +90,14 @@ class SoftMotionPlant(PlantWithWorld):
         """Let the adversary see what passes on a link."""
         return TappedMailboxLink(link, process, self.tap, self)
 
+    def openings(self, process: VirtualProcess) -> Mapping[str, Callable[..., object]]:
+        """See ``PlantMachine.openings``."""
+
+        def opened(_url: object, **_terms: object) -> MailboxLink:
+            return self.tapped(self.link(), process)
+
+        return {"robolink.transport.open_quick_link": opened}
+
     def announce(self, text: str, words: Sequence[int] = ()) -> None:
         """Count a request before it leaves; a rival's block may take the place of this one."""
         self._taken_over = another_clients(words) if self._rivals.due(text) and words else ()
@@ -109,6 +118,16 @@ class SoftMotionPlant(PlantWithWorld):
         """Tell whether it read an offset in an order of words that a fault let it take on."""
         pairs = list(zip(asked.components(), held.components(), strict=True))
         return any(all(b in _readings(a, order) for a, b in pairs) for order in self._laid)
+
+    def flange(self) -> Frame:
+        """Return where the flange is."""
+        self._simulator.advance(self.clock.now_ns())
+        return self._simulator.plc.group.flange()
+
+    def tip(self) -> Frame:
+        """Return where the tip of the slot in force is."""
+        self._simulator.advance(self.clock.now_ns())
+        return self._simulator.plc.group.tcp()
 
     @property
     def moving(self) -> bool:

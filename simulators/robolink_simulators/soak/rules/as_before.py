@@ -55,6 +55,8 @@ class BeforeRules:
     def left(self, state: MachineState) -> None:
         """Check what a deed left, before anybody acts."""
         plant, before = self._on.plant, self._on.now.before.settings
+        robot = self._on.now.before.robot
+        self._on.hold("AsBefore", state.robot == robot, f"robot {state.robot}, not {robot}")
         if plant.calls_back or plant.settings_reset:
             return
         self._on.hold(

@@ -113,6 +113,7 @@ class EndRules:
     def _foreign(self) -> set[int]:
         """Return the tools that somebody else may have written since."""
         others = {tool for tool, _ in self._on.now.typed_by_others}
+        others |= self._on.now.settled_by_others
         return self._on.plant.touched | others | ({OTHERS_TOOL} if self._on.now.crowded else set())
 
     def _succeeded(self, process: VirtualProcess, state: MachineState) -> None:

@@ -1,8 +1,9 @@
 """What somebody does at the pendant while robolink asks a question stays, and is noticed.
 
 Only then: what a hand does between a look and the request that follows it can be seen by nobody.
-What is typed by hand later takes the place of what was typed before; and a second person who has
-read a value and then types another one replaces it on purpose.
+What is typed by hand later takes the place of what was typed before; where that is what was there
+when the deed began, nobody can tell. A second person who has read a value and then types another
+one replaces it on purpose.
 """
 
 from robolink.model import ToolOffset
@@ -29,7 +30,10 @@ class HandRules:
         self._replacing.clear()
 
     def typed(self, tool: int, offset: ToolOffset) -> None:
-        """Note what was typed."""
+        """Note what was typed, unless whoever is at work saw the same when they began."""
+        if self._on.plant.same(offset, self._on.now.before.tools.get(tool)):
+            self._typed.pop(tool, None)
+            return
         self._typed[tool] = offset
         self._replacing.pop(tool, None)
 

@@ -2,10 +2,13 @@
 
 from typing import Final
 
-from robolink.model import ToolOffset, ToolReceipt
+from robolink.controllers.controller_core import ControllerCore
+from robolink.model import Motion, Pose, ToolOffset, ToolReceipt, WorkBox
 from robolink_simulators.soak.computer import VirtualProcess
 from robolink_simulators.soak.plant.machine import MachineState, SentKind, SentRequest
+from robolink_simulators.soak.rules.places import PlaceRules
 from robolink_simulators.soak.rules.so_far import Grounds
+from robolink_simulators.soak.rules.stops import StopRules
 from robolink_simulators.soak.watching import SeenStates
 
 _RULE: Final = "ContractHolds"
@@ -16,29 +19,46 @@ class ContractRules:
 
     Args:
         grounds: What the rules rest on.
+
+    Attributes:
+        stops: What a stop promises.
     """
 
     def __init__(self, grounds: Grounds) -> None:
         self._on = grounds
+        self.stops, self._places = StopRules(grounds), PlaceRules(grounds)
         self._states = SeenStates()
         self._aims: dict[int, int | None] = {}
         self._asked: set[int] = set()
         self._selects = False
         self._last: MachineState | None = None
+        self._previews = False
 
-    def begin(self, state: MachineState) -> None:
-        """Begin an hour."""
+    def begin(self, state: MachineState, *, previews: bool) -> None:
+        """Begin an hour; ``previews`` where its line only shows what it would send."""
+        self._previews = previews
         self._states.forget()
         self._states.note(state)
         self._aims.clear()
         self._asked.clear()
+        self.stops.begin()
+        self._places.begin()
         self._selects, self._last = False, state
+
+    def left(self) -> None:
+        """Check what a deed has left; what people do from here on, they do."""
+        self.passed()
+        self._previews = False
 
     # After every event.
 
     def leaving(self, process: VirtualProcess, sent: SentRequest) -> None:
         """Check a request that is about to leave: a movement is for the tool in force."""
         self.passed()
+        self.stops.leaving(process, sent)
+        if self._previews:
+            only_read = sent.kind in (SentKind.OTHER, SentKind.STOP)
+            self._on.hold(_RULE, only_read, f"{sent.text} leaves, and was only to be shown")
         if sent.kind is SentKind.WRITE and sent.tool is not None:
             self._asked.add(sent.tool)
         self._selects |= sent.kind is SentKind.SELECT
@@ -54,6 +74,7 @@ class ContractRules:
     def passed(self) -> None:
         """Check what has changed since the last event: nothing that nobody asked for."""
         state, last = self._on.plant.state(), self._last
+        self.stops.passed()
         self._states.note(state)
         self._last = state
         if last is None or state == last or self._on.plant.calls_back:
@@ -76,6 +97,11 @@ class ContractRules:
             or state.selected in self._on.now.chosen_by_hand,
             f"tool {state.selected} is in force in place of {last.selected}, and nobody chose it",
         )
+        self._on.hold(
+            _RULE,
+            state.robot == last.robot,
+            f"robot {state.robot} is in force in place of {last.robot}, and nobody chose it",
+        )
 
     # After every call.
 
@@ -83,6 +109,7 @@ class ContractRules:
         """A call begins."""
         self.passed()
         self._states.begin(process)
+        self._places.begins(process)
 
     def aims(self, process: VirtualProcess, tool: int | None) -> None:
         """A movement is about to leave that is meant for a tool."""
@@ -123,10 +150,48 @@ class ContractRules:
         held = [state.selected for state in self._since(process)]
         self._promise(tool in held, f"tool {tool} was selected, in force were {held}")
 
-    def has_arrived(self, process: VirtualProcess) -> None:
-        """Check that a movement that arrived is over."""
-        del process
+    def has_begun(
+        self, process: VirtualProcess, motion: Motion, target: Pose, box: WorkBox
+    ) -> None:
+        """Check where a movement goes that was begun."""
+        self._promise(*self._places.begun(process, motion, target, box))
+
+    def has_arrived(self, process: VirtualProcess, motion: Motion) -> None:
+        """Check that a movement that arrived is over, where it was sent."""
         self._promise(not self._on.plant.moving, "a movement arrived, and the arm moves")
+        self._promise(*self._places.arrived(process, motion))
+
+    def has_read_pose(self, process: VirtualProcess, pose: Pose) -> None:
+        """Check a pose that was read: whose tip it is, and where that is."""
+        held = [state.selected for state in self._since(process)]
+        self._promise(pose.tool in held, f"{pose} names its tool, in force were {held}")
+        self._promise(*self._places.read(process, pose))
+
+    def has_read_robot(self, process: VirtualProcess, robot: int) -> None:
+        """Check which robot was read to be in force."""
+        held = [state.robot for state in self._since(process)]
+        self._promise(robot in held, f"robot {robot} was read, in force were {held}")
+
+    def stopping(self, process: VirtualProcess) -> None:
+        """A stop begins."""
+        self.passed()
+        process.held_back = True
+
+    def has_stopped(
+        self, process: VirtualProcess, controller: ControllerCore, *, acknowledged: bool
+    ) -> None:
+        """Check the latch when a stop has ended, and the machine where it was acknowledged."""
+        self.stops.held(process, controller, "stop()")
+        if acknowledged:
+            self.stops.acknowledged()
+
+    def has_reset(self, process: VirtualProcess, controller: ControllerCore) -> None:
+        """Check that clearing an error has opened no latch."""
+        self.stops.held(process, controller, "reset_fault()")
+
+    def releasing(self, process: VirtualProcess) -> None:
+        """A person lets things move again."""
+        process.held_back = False
 
     def _since(self, process: VirtualProcess) -> list[MachineState]:
         self._states.note(self._on.plant.state())

@@ -86,10 +86,25 @@ class WireRules:
             bool(ours or whole),
             f"{sent.text} leaves process {process.number} without a marker",
         )
+        self._not_again(sent, ours)
         wanted = self._on.now.wanted.setdefault(tool or 0, [None])
         for marker in ours:
             wanted.append(read_offset(marker.details.get("requested")))
             wanted.append(read_offset(marker.details.get("before")))
+
+    def _not_again(self, sent: SentRequest, ours: Sequence[BookedMarker]) -> None:
+        """Check that a value is not written that is there already: a write wears the memory."""
+        tool, plant = sent.tool or 0, self._on.plant
+        # The mark under which an earlier write left stays where nothing can be stored any more.
+        ours = [m for m in ours if self._on.now.writes[m.operation] == sent.text]
+        if not ours or tool in plant.touched or self._on.now.crowded or plant.bent:
+            return  # somebody else may have written it since it was looked at
+        new, holds = read_offset(ours[-1].details.get("requested")), plant.shown(tool)
+        self._on.hold(
+            "ContractHolds",
+            not plant.same(new, holds),
+            f"{sent.text} leaves, and tool {tool} holds {holds} already",
+        )
 
     def given(self, tool: int, value: ToolOffset) -> None:
         """Check a value that the machine's own program is about to be given, and to write."""
@@ -123,17 +138,12 @@ class WireRules:
             "StillAfterStop", allowed, f"{sent.text} leaves after the stop was acknowledged"
         )
 
-    def stopped(self) -> None:
-        """Check the machine at the moment in which a stop is acknowledged."""
-        self._on.hold("AtRestWhenStopped", not self._on.plant.moving, "it still moves")
-
     def _puts_back(self, sent: SentRequest, markers: Sequence[BookedMarker]) -> bool:
         """Tell whether the write that is marked brings back what was there before."""
         if not self._on.books.trusted:
             return True
         tool = sent.tool or 0
-        # The mark under which an earlier write left stays where nothing can be stored any more.
-        left = self._on.now.writes
+        left = self._on.now.writes  # as in _not_again
         ours = [m for m in _of_tool(tool, markers) if left.get(m.operation, sent.text) == sent.text]
         wanted = read_offset(ours[-1].details.get("requested")) if ours else None
         before: list[ToolOffset | None] = [

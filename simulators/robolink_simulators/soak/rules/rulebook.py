@@ -58,7 +58,7 @@ class Rulebook(Grounds):
         >>> plant.simulator.machine.tools.set(2, ToolOffset(9.0, 9.0))
         >>> rules.left(plant.state())
         >>> cell.story.broken[0].rule
-        'OnlyWantedValues'
+        'ContractHolds'
     """
 
     def __init__(self, story: Story, plant: PlantMachine, books: Books) -> None:
@@ -96,7 +96,7 @@ class Rulebook(Grounds):
         self.plant.moved_itself = self.plant.settings_reset = False
         self._asked.begin()
         self._by_hand.begin()
-        self.contract.begin(state)
+        self.contract.begin(state, previews="--dry-run" in hour.line)
 
     def begin_again(self) -> None:
         """Begin another try in the same hour; what is open by now is of before."""
@@ -128,6 +128,15 @@ class Rulebook(Grounds):
             self.books.lost = False
         return True
 
+    def others_settle(self) -> None:
+        """Note that a second person is about to settle what is open, whoever left it."""
+        self.now.crowded = True
+        for marker in self.books.markers():
+            named = (marker.details.get("tool"), *marker.details.get("tools", {}))
+            self.now.settled_by_others |= {int(tool) for tool in named if tool is not None}
+        if not self.books.trusted:
+            self.now.settled_by_others |= {*self.plant.state().tools}
+
     def others_write(self, process: VirtualProcess, typed: Typed) -> None:
         """Note that a second person has read a tool, and writes it."""
         tool, offset = typed
@@ -149,8 +158,8 @@ class Rulebook(Grounds):
         self._on_wire.given(tool, value)
 
     def stopped(self) -> None:
-        """Check the machine at the moment in which a stop is acknowledged."""
-        self._on_wire.stopped()
+        """Check the machine when a stop from outside the driver is acknowledged."""
+        self.contract.stops.acknowledged()
 
     def ended(
         self, process: VirtualProcess, error: BaseException | None, state: MachineState
@@ -197,6 +206,7 @@ class Rulebook(Grounds):
 
     def left(self, state: MachineState) -> None:
         """Check what a deed left behind, before anybody acts."""
+        self.contract.left()
         self._at_rest.left(state)
         self._before.left(state)
         self._asked.left(state)

@@ -73,6 +73,7 @@ class HourSoFar:
         writes: The first write that has left under each marker, by operation.
         crowded: Whether a second person was at work.
         typed_by_others: What they typed, by tool.
+        settled_by_others: Tools of what was open when a second person began to recover.
         chosen_by_hand: Tools that somebody put in force at the machine.
     """
 
@@ -91,6 +92,7 @@ class HourSoFar:
     writes: dict[str, str] = field(default_factory=dict)
     crowded: bool = False
     typed_by_others: list[tuple[int, ToolOffset]] = field(default_factory=list)
+    settled_by_others: set[int] = field(default_factory=set)
     chosen_by_hand: list[int] = field(default_factory=list)
 
 

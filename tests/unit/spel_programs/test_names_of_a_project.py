@@ -98,6 +98,19 @@ def test_what_is_divided_by_a_flag_or_a_number_stays_a_quotient(printed):
     assert printed(*lines, **files) == ["6 3", "2"]
 
 
+@pytest.mark.parametrize("point", ["origin", "P7", "P(7)"])
+def test_the_local_of_a_point_may_be_computed(printed, point):
+    """A public program turns a table and names the local of each nest by a variable."""
+    lines = ("Integer n", "n = 1", f"P9 = {point} /(n + 1)", "Print P9")
+    assert printed(*lines, **PROJECT) == printed(f"P9 = {point} /2", "Print P9", **PROJECT)
+
+
+@pytest.mark.parametrize("number", [16, -1])
+def test_a_computed_local_that_does_not_exist_is_refused(failure, number):
+    refused = failure("Integer n", f"n = {number}", "P9 = P7 /(n)", **PROJECT)
+    assert f"There is no local {number}" in str(refused)
+
+
 def test_a_label_and_a_flag_that_nobody_knows_are_told_at_the_build(faults):
     text = "Function main\n  P1 = nowhere /L\n  P2 = origin -Z(bogus)\nFend\n"
     found = faults(text, **PROJECT)

@@ -249,6 +249,10 @@ class TreeBuilder(Transformer[Token, tuple[Statement, ...]]):
         """Build ``/J1A(30)``."""
         return Modifier(ModifierKind.ANGLE, word[1:].strip().upper(), value)
 
+    def computed_local(self, _: Token, number: Expression) -> Modifier:
+        """Build ``/(n)``, with which a public program names the local of a turning table."""
+        return Modifier(ModifierKind.LOCAL, "", number)
+
     def at_local(self, word: Token) -> Modifier:
         """Build ``@1``."""
         return Modifier(ModifierKind.CONVERT, word[1:].strip())

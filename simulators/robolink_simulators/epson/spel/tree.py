@@ -69,6 +69,7 @@ class ModifierKind(Enum):
 
     FLAG = "/"
     ANGLE = "/J1A"
+    LOCAL = "/("
     CONVERT = "@"
     SHIFT = "+"
     REPLACE = ":"
@@ -323,9 +324,9 @@ def label_in(value: "Expression", known: Callable[[str], bool]) -> str | None:
 def _taken_apart(value: "Expression") -> "tuple[Expression, tuple[Modifier, ...]]":
     """Return what an operation begins with and what can be read as modifiers behind it."""
     match value:
-        case Binary("/", left, right) if (flag := _flag(right)) is not None:
+        case Binary("/", left, right):
             base, before = _taken_apart(left)
-            return base, (*before, flag)
+            return base, (*before, _flag(right))
         case Binary("+" | "-" as sign, left, right):
             # "/" binds closer than the sign: label -Z(10) /L arrives as label - (Z(10) / L).
             match _taken_apart(right):
@@ -336,7 +337,7 @@ def _taken_apart(value: "Expression") -> "tuple[Expression, tuple[Modifier, ...]
     return value, ()
 
 
-def _flag(value: "Expression") -> Modifier | None:
+def _flag(value: "Expression") -> Modifier:
     match value:
         case Name(word, None) if _FLAG.fullmatch(word.upper()):
             return Modifier(ModifierKind.FLAG, word.upper())
@@ -344,4 +345,4 @@ def _flag(value: "Expression") -> Modifier | None:
             return Modifier(ModifierKind.ANGLE, word.upper(), angle)
         case Literal(int(local)):
             return Modifier(ModifierKind.FLAG, str(local))
-    return None
+    return Modifier(ModifierKind.LOCAL, "", value)

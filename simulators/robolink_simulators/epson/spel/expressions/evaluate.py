@@ -230,6 +230,9 @@ class Evaluator:
                     point = _flagged(point, modifier.word)
                 case ModifierKind.ANGLE:
                     point = self._angled(point, modifier)
+                case ModifierKind.LOCAL if modifier.value is not None:
+                    number = _local_number(str(self.integer(modifier.value)))
+                    point = replace(point, local=number)
                 case ModifierKind.CONVERT:
                     number = _local_number(modifier.word)
                     point = self.session.machine.locals.convert(point, number)
@@ -261,7 +264,7 @@ def _bounded(point: Point) -> Point:
 
 def _local_number(word: str) -> int:
     number = int(word)
-    if number > HIGHEST_LOCAL:
+    if not 0 <= number <= HIGHEST_LOCAL:
         raise out_of_range(f"There is no local {number}")
     return number
 

@@ -168,7 +168,7 @@ class Hears(Listener):
 class Person(AssistedOperator):
     """The person of the cell, who answers questions with yes or no by a rule.
 
-    Of rows they choose the first, unless ``chooses`` names another one by its beginning.
+    Of rows they choose the first, unless ``chooses`` names another one by some of its words.
     """
 
     says: Callable[[str], bool] = staticmethod(lambda _question: True)
@@ -190,9 +190,9 @@ class Person(AssistedOperator):
 
 
 def row_of(question: str, does: str) -> str:
-    """Return the number of the row that begins in a way; empty for none."""
+    """Return the number of the first row with some words; empty for none."""
     rows = [line.split(maxsplit=1) for line in question.splitlines()[1:]]
-    return next((row[0] for row in rows if does and row[1].startswith(does)), "")
+    return next((number for number, text in rows if does and number.isdigit() and does in text), "")
 
 
 def person_at(cell: Any) -> Person:

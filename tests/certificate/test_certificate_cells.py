@@ -534,3 +534,22 @@ def test_and_a_question_with_one(at, yes):
     assert sum(KEEPS in one for one in answers.asked) == 1
     assert ended.code == ("" if yes else "proof_contradicts_repeatability")
     assert ended.taken_back is not yes
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize(
+    "course", [pytest.param(one, id=one.name) for one in BY_NAME.values() if one.proves]
+)
+def test_every_method_turns_once_more_from_where_its_turn_test_has_ended(course):
+    at = AtTerminal(course.name, lambda _cell: None, lambda _cell: None, {}, 0.0)
+    surface = course.method in ("plane-touch", "sphere-touch", "z-touch")
+    for slip_mm in (0.06, 0.09, 0.12, 0.15, 0.18):
+        answers = Answers("once more", "once more")
+        slip = slips(0.0, 0.0, slip_mm) if surface else slips(slip_mm, -slip_mm / 4)
+        ended = at_a_terminal(at, answers, at_write=slip)
+        if rows_asked(answers):
+            break
+    assert ended.taken_back
+    assert ended.proof is not None
+    assert ended.proof.judgement is not None
+    assert ended.proof.judgement.tests == 3, ended.code

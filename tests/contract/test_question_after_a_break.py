@@ -1,0 +1,142 @@
+"""A turn test after a break that contradicts its measurement asks as the change itself does."""
+
+from contextlib import contextmanager
+from dataclasses import replace
+
+import pytest
+
+from robolink.errors import NotAllowedError, RobolinkError, VerifyError
+from robolink.methods import BeamsSource
+from robolink.model import EntryKind, ToolOffset
+from robolink.nozzle_change import finish_by_turn_test, open_turn_tests
+from robolink.report import reports_of
+from robolink.runner import Question
+from robolink.transaction import recover
+from tests.certificate.live import BEAM_NOISE, row_of, wrong_by
+from tests.contract._sensor_cell import TOOL, sensor_cell
+from tests.contract.test_proof_after_a_break import Later
+
+pytestmark = [pytest.mark.simulator_only, pytest.mark.timeout(60)]
+
+WIDER, AGAIN = "Keep the value and state", "Look once more."
+POWER_GOES = "(the power goes)"
+
+
+class Broken(Later):
+    """A change by beams that moved, cut off when its value was written."""
+
+    choices: tuple[str, ...] = ()
+    role = ""
+    old: ToolOffset | None = None
+    new: ToolOffset | None = None
+
+    @contextmanager
+    def connected(self):
+        with super().connected() as controller:
+            if self.role:
+                outcomes = controller.outcomes
+                outcomes.signature = replace(outcomes.signature, operator="Kim", role=self.role)
+            yield controller
+
+    def person(self):
+        later, found = self, super().person()
+        poll = found.poll
+
+        def chosen(wait_s):
+            if found._kind is not Question.CHOICE:
+                return poll(wait_s)
+            wanted, later.choices = (*later.choices, "")[0], later.choices[1:]
+            if wanted == POWER_GOES:
+                later.cell.simulator.panel.cut_link()
+                return None
+            return row_of(later.asked[-1], wanted) or ""
+
+        found.poll = chosen
+        return found
+
+    def asked_to_finish(self, *choices, attended=True):
+        self.choices = choices
+        with self.connected() as controller:
+            (operation,) = open_turn_tests(controller)
+            recover(controller, keep=True, confirm=lambda _finding: True, later=[operation])
+            finish_by_turn_test(controller, operation, self.person(), attended=attended)
+
+    def now(self):
+        with self.connected() as controller:
+            return controller.tools.read(TOOL), controller.outcomes.open_markers()
+
+    def entries(self, *kinds):
+        log = self.journal.log(self.cell.url, clock=self.cell.clock)
+        return [*log.recorded(kinds=kinds)][::-1]
+
+
+@pytest.fixture
+def broken(tmp_path):
+    with sensor_cell(5) as cell:
+        cell.mount_beams(cell.beams(radius_mm=0.1), **BEAM_NOISE)
+        later = Broken(cell, tmp_path)
+        later.old, _ = later.now()
+        wrong_by({"place_mm": (0.03, 0.04)})(cell)
+        later.broken_off(BeamsSource(cell.station))
+        later.new, markers = later.now()
+        assert markers
+        yield later
+
+
+def test_whoever_only_presses_enter_gets_the_old_value_back(broken):
+    with pytest.raises(VerifyError) as refused:
+        broken.asked_to_finish("")
+    assert refused.value.code == "proof_contradicts_accuracy"
+    assert broken.now() == (broken.old, ())
+    assert sum("What is to follow?" in one for one in broken.asked) == 1
+
+
+def test_where_nobody_may_be_asked_nobody_is(broken):
+    with pytest.raises(VerifyError):
+        broken.asked_to_finish(attended=False)
+    assert broken.now() == (broken.old, ())
+    assert broken.asked == []
+
+
+def test_a_wider_statement_is_taken_after_a_break_too_and_is_on_record(broken):
+    broken.asked_to_finish(WIDER)
+    assert broken.now() == (broken.new, ())
+    (done,) = broken.entries(EntryKind.DONE)
+    assert done.details["accurate_to_mm"] == pytest.approx(0.107, abs=0.02)
+    (chosen,) = [e for e in broken.entries(EntryKind.DECISION) if e.details.get("chosen")]
+    assert chosen.details["chosen"] == "wider"
+    assert chosen.change == done.change
+    about = {"made_at": "", "robolink_version": "", "check": ""}
+    (report,) = reports_of([e for e in broken.entries() if e.change == done.change], **about)
+    assert report.widened_mm == done.details["accurate_to_mm"]
+
+
+def test_an_operator_may_not_take_it_there_either(broken):
+    broken.role = "operator"
+    with pytest.raises(NotAllowedError):
+        broken.asked_to_finish(WIDER)
+    assert broken.now() == (broken.old, ())
+
+
+def test_looking_once_more_after_a_break_counts_all_looks(broken):
+    with pytest.raises(VerifyError) as refused:
+        broken.asked_to_finish(AGAIN, AGAIN, AGAIN)
+    assert refused.value.code == "proof_contradicts_accuracy"
+    entries = broken.entries(EntryKind.VERIFY)
+    assert [one.details["judgement"]["tests"] for one in entries] == [1, 2, 3]
+    assert [AGAIN in one for one in broken.asked if "follow" in one] == [True, True, False]
+
+
+def test_ending_the_process_at_the_question_is_no_way_to_a_fresh_test(broken):
+    """What was seen before the power went counts, although the beams are put right meanwhile."""
+    with pytest.raises(RobolinkError):
+        broken.asked_to_finish(POWER_GOES)
+    assert broken.now()[1], "the change is open"
+    wrong_by({"place_mm": (-0.03, -0.04)})(broken.cell)
+    with pytest.raises(VerifyError) as refused:
+        broken.asked_to_finish("")
+    assert refused.value.code.startswith("proof_contradicts_")
+    last = broken.entries(EntryKind.VERIFY)[-1]
+    assert last.details["judgement"]["tests"] == 2
+    assert last.details["judgement"]["apart_mm"] > 0.05
+    assert broken.now() == (broken.old, ())

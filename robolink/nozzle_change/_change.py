@@ -392,8 +392,10 @@ class NozzleChange:
 
         attended = None
         if self._plan.asks:
+            person = context.runner(tool=tool)
             attended = Attended(
-                context.runner(tool=tool).choose,
+                person.choose,
+                person.confirm,
                 # What proves by plain values can begin once more from where it has ended.
                 turned if isinstance(source, KeepsProof) else None,
                 relearning_commands(self._controller, plan, proposal.result),

@@ -36,18 +36,23 @@ class TurnTestStep(StrEnum):
     WIDER = "wider"
 
 
+KEEPING: Final = frozenset({TurnTestStep.KEEP, TurnTestStep.WIDER})
+
+
 @dataclass(frozen=True, slots=True)
 class Attended:
     """That a person may be asked, and what can be done on their word.
 
     Attributes:
-        choose: Asks.
+        choose: Asks which row.
+        confirm: Asks for a yes, so that no number alone keeps a value.
         again: Makes the turn test once more; ``None`` where that cannot be done.
         relearning: Commands that learn anew the station on whose place the measurement rests, each
             after ``robolink`` and the name of the cell; empty for none.
     """
 
     choose: Choosing
+    confirm: Callable[[str], bool]
     again: Callable[[], VerifyResult] | None = None
     relearning: tuple[str, ...] = ()
 
@@ -118,11 +123,26 @@ def asked_what_follows(
         step, row = kept
         rows[step] = row
     offered = OfferedChoice(tr("Turn test"), tuple(rows.values()))
-    return list(rows)[attended.choose(joined(" ", (question, tr("What is to follow?"))), offered)]
+    asked = joined(" ", (question, tr("What should happen now?")))
+    step = list(rows)[attended.choose(asked, offered)]
+    if step in KEEPING and not attended.confirm(_sure(step, judgement, stated_mm)):
+        return TurnTestStep.TAKE_BACK
+    return step
+
+
+def _sure(step: TurnTestStep, judgement: TurnJudgement, stated_mm: float | None) -> str:
+    """Return what a person says yes to before a value is kept: rows change their numbers."""
+    if step is TurnTestStep.KEEP:
+        return tr("The tip is still within {mm:.3f} mm, as stated. Keep the value?", mm=stated_mm)
+    return tr(
+        "Keep the value and state that it is accurate to +-{wider:.3f} mm, not +-{stated:.3f} mm?",
+        wider=judgement.wider_mm,
+        stated=stated_mm or 0.0,
+    )
 
 
 def _take_back() -> ChoiceRow:
-    return ChoiceRow(tr("Put the old value back."), tr("The new one is not kept."))
+    return ChoiceRow(tr("Put the old value back."), tr("The new value is not kept."))
 
 
 def _again(left: int, *, by_touch: bool) -> ChoiceRow:

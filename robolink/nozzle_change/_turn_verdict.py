@@ -22,6 +22,7 @@ from robolink.model import Controller, require_engineer
 from robolink.nozzle_change._acceptance import require_proved
 from robolink.nozzle_change._records import decision_entry, verification_entry
 from robolink.nozzle_change._turn_question import (
+    KEEPING,
     Attended,
     TurnTestStep,
     asked_what_follows,
@@ -111,7 +112,7 @@ def conclude_turn_test(
         if step is TurnTestStep.AGAIN and attended.again is not None:
             tests.append(attended.again())
             continue
-        if step in (TurnTestStep.KEEP, TurnTestStep.WIDER):
+        if step in KEEPING:
             return replace(shown, accurate_to_mm=accurate_mm)
         raise with_step(_contradicted(controller, shown, judgement), step, attended.relearning)
 
@@ -144,7 +145,7 @@ def _record(
         NotAllowedError: A wider statement takes an engineer.
     """
     outcomes = controller.outcomes
-    keeps = step in (TurnTestStep.KEEP, TurnTestStep.WIDER)
+    keeps = step in KEEPING
     again = step is TurnTestStep.AGAIN
     verdict = tr("accepted") if keeps else tr("the turn test is made again")
     entry = decision_entry(

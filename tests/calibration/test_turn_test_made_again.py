@@ -56,8 +56,8 @@ def test_looks_are_weighed_by_how_many_they_are():
 
 
 def test_marks_at_one_angle_and_angles_of_their_own_stay_apart():
-    made = shown((0.01, 0.0), (0.0, 0.02)), shown((0.03, 0.0), (0.0, 0.04)), shown((1, 1), u_deg=90.0)
-    drifts = looks_together(made).drifts
+    made = shown((0.01, 0.0), (0.0, 0.02)), shown((0.03, 0.0), (0.0, 0.04))
+    drifts = looks_together((*made, shown((1, 1), u_deg=90.0))).drifts
     assert [one.looks for one in drifts] == [2, 2, 1]
     assert drifts[0].dx_mm == pytest.approx(0.02)
     assert drifts[1].dy_mm == pytest.approx(0.03)
@@ -71,7 +71,8 @@ def test_one_test_is_judged_as_it_was():
 
 
 def test_what_is_seen_again_is_contradicted_again():
-    judgement = held_together(BEAMS, (shown((0.1, 0.0)), shown((0.097, 0.002)), shown((0.102, 0.0))))
+    made = shown((0.1, 0.0)), shown((0.097, 0.002)), shown((0.102, 0.0))
+    judgement = held_together(BEAMS, made)
     assert judgement.contradicts_accuracy
     assert judgement.tests == 3
     assert judgement.apart_mm is None

@@ -465,7 +465,7 @@ def at_a_terminal(at: AtTerminal, answers: Answers, *, little: bool = False, **m
 
 def rows_asked(answers: Answers) -> list[str]:
     """Return the questions with rows."""
-    return [one for one in answers.asked if "What is to follow?" in one]
+    return [one for one in answers.asked if "What should happen now?" in one]
 
 
 @EACH

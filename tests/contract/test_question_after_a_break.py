@@ -88,7 +88,7 @@ def test_whoever_only_presses_enter_gets_the_old_value_back(broken):
         broken.asked_to_finish("")
     assert refused.value.code == "proof_contradicts_accuracy"
     assert broken.now() == (broken.old, ())
-    assert sum("What is to follow?" in one for one in broken.asked) == 1
+    assert sum("What should happen now?" in one for one in broken.asked) == 1
 
 
 def test_where_nobody_may_be_asked_nobody_is(broken):
@@ -124,7 +124,7 @@ def test_looking_once_more_after_a_break_counts_all_looks(broken):
     assert refused.value.code == "proof_contradicts_accuracy"
     entries = broken.entries(EntryKind.VERIFY)
     assert [one.details["judgement"]["tests"] for one in entries] == [1, 2, 3]
-    assert [AGAIN in one for one in broken.asked if "follow" in one] == [True, True, False]
+    assert [AGAIN in one for one in broken.asked if "happen now" in one] == [True, True, False]
 
 
 def test_ending_the_process_at_the_question_is_no_way_to_a_fresh_test(broken):

@@ -53,7 +53,8 @@ class Person:
     def __init__(self, *answers, again=(), relearning=RELEARN):
         self.answers, self.tests = list(answers), list(again)
         self.asked: list[tuple[str, tuple[str, ...]]] = []
-        self.relearning = relearning
+        self.relearning, self.sure = relearning, True
+        self.confirmed: list[str] = []
 
     def choose(self, question, offered):
         rows = tuple(row.does for row in offered.rows)
@@ -65,7 +66,11 @@ class Person:
     @property
     def attended(self):
         again = (lambda: self.tests.pop(0)) if self.tests else None
-        return Attended(self.choose, again, self.relearning)
+        return Attended(self.choose, self.confirm, again, self.relearning)
+
+    def confirm(self, question):
+        self.confirmed.append(question)
+        return self.sure
 
 
 def concluded(proof, person=None, controller=None, claim=BEAMS, **more):
@@ -173,6 +178,19 @@ def test_a_person_takes_a_wider_statement_and_it_is_on_record():
     assert entry.tool == 1
     assert entry.details["accurate_to_mm"] == pytest.approx(proof.accurate_to_mm)
     assert (entry.details["chosen"], entry.details["accepted"]) == ("wider", True)
+
+
+def test_a_number_alone_keeps_no_value_because_rows_change_their_numbers():
+    controller, person = controller_of_its_own(), Person(KEEPS)
+    person.sure = False
+
+    with pytest.raises(VerifyError):
+        concluded(shown(0.1), person, controller)
+
+    assert person.confirmed == [
+        "Keep the value and state that it is accurate to +-0.107 mm, not +-0.028 mm?"
+    ]
+    assert decisions(controller)[0].details["chosen"] == "take_back"
 
 
 def test_a_doubt_that_the_accuracy_covers_may_be_kept_as_stated():

@@ -175,7 +175,7 @@ def _prove(
         with context.telling(lambda _done: None, tool=test.tool):
             return _touches_counting(controller, test, context)
 
-    choose = context.runner(tool=test.tool).choose
+    person = context.runner(tool=test.tool)
     proof = turned()
     return conclude_turn_test(
         controller,
@@ -183,7 +183,9 @@ def _prove(
         proof,
         claim=test.claim,
         interval_mm=test.interval_mm,
-        attended=Attended(choose, turned, test.relearning) if attended else None,
+        attended=Attended(person.choose, person.confirm, turned, test.relearning)
+        if attended
+        else None,
         earlier=tests_on_record(controller.outcomes, test.tool, proof),
         tell=lambda result: tell(test.tool, result),
     )

@@ -176,8 +176,12 @@ def _asked(state: WizardState, asked: WasAsked) -> WizardState:
     if reading is not None and asked.at_s - reading.at_s > 1.0:
         # Where it was before the robot moved is not where it is.
         reading = replace(reading, pose=None)
+    subject = state.subject
+    if isinstance(subject, ChoiceSubject) and asked.kind is Question.YES_NO:
+        subject = asked  # a list that was chosen from is not what is asked about
     return replace(
         state,
+        subject=subject,
         reading=reading,
         question=asked,
         fresh=(),
@@ -187,7 +191,7 @@ def _asked(state: WizardState, asked: WasAsked) -> WizardState:
         typed="",
         typing=False,
         pose_typed="",
-        marked=state.subject.marked if isinstance(state.subject, ChoiceSubject) else None,
+        marked=subject.marked if isinstance(subject, ChoiceSubject) else None,
         message="",
         ending=False,
         jogging=Jogging(size=size, quarters=state.jogging.quarters),

@@ -20,6 +20,8 @@ from robolink_cli.wizard.happenings import (
     WizardCommand,
 )
 from robolink_cli.wizard.screens.choosing import choice_screen
+from robolink_cli.wizard.screens.drawing import screen_of
+from robolink_cli.wizard.screens.told import told_question
 from robolink_cli.wizard.screens.touching import instruction
 from robolink_cli.wizard.state import STEP_SIZES, LastScreen
 
@@ -561,3 +563,12 @@ def test_what_came_before_the_question_of_a_contradiction_answers_nothing():
     assert hand.key("main").sent == []
     hand.now = 10.4
     assert hand.line("2").sent == ["2"]
+
+
+def test_after_a_list_a_yes_or_no_is_asked_for_itself():
+    hand = at_contradiction().line("5")
+    hand.asked(None, Question.YES_NO, "Keep the value?")
+    assert hand.line("5").sent == ["5"]
+    assert told_question(hand.state) == "Keep the value? [y or n]"
+    assert "[1] Yes" in screen_of(hand.state, hand.now).rows()[-1]
+    assert hand.line("n").sent == ["5", "n"]

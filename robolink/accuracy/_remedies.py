@@ -53,8 +53,9 @@ def learning_commands(
 ) -> tuple[str, ...]:
     """Return the commands that learn a station anew, each after ``robolink`` and the cell's name.
 
-    A pin and a camera are found together with the tip. Beams and a plate need a tip that is known:
-    where none is, the tool is measured by touch first.
+    A pin and a camera are found together with the tip. Beams and a plate need a tip that is known.
+    For beams the tool can be measured by touch first; of its length that tells nothing, so for a
+    plate there is no command then.
 
     Args:
         station: Its name.
@@ -75,6 +76,8 @@ def learning_commands(
         return (f"calibrate camera-affine --station {at} --tool {tool}",)
     if known_tool is not None:
         return (f"cell station learn {at} --tool {known_tool}",)
+    if kind is StationKind.TOUCH:
+        return ()
     return f"calibrate two-pose --tool {tool}", f"cell station learn {at} --tool {tool}"
 
 

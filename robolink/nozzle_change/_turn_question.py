@@ -198,7 +198,7 @@ def with_step(error: VerifyError, step: TurnTestStep, relearning: tuple[str, ...
         error.next_commands = relearning
         error.remedy = tr(
             "Learn the station again with a tip that is known, then measure this one anew: "
-            "{commands}",
+            "{commands}.",
             commands=named,
         )
     return error

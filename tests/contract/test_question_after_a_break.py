@@ -5,16 +5,22 @@ from dataclasses import replace
 
 import pytest
 
+from robolink.accuracy import learning_commands
+from robolink.calibration import AccuracyFacts, ErrorSource, assessed, solve_two_pose
 from robolink.errors import NotAllowedError, RobolinkError, VerifyError
 from robolink.methods import BeamsSource
-from robolink.model import EntryKind, ToolOffset
-from robolink.nozzle_change import finish_by_turn_test, open_turn_tests
+from robolink.model import EntryKind, Pose, ToolOffset
+from robolink.nozzle_change import ToolPlan, finish_by_turn_test, open_turn_tests
+from robolink.nozzle_change._turn_question import relearning_commands
 from robolink.report import reports_of
 from robolink.runner import Question
+from robolink.stations import Found, StationKind, station_entry
+from robolink.testing import MemoryController
 from robolink.transaction import recover
 from tests.certificate.live import BEAM_NOISE, row_of, wrong_by
 from tests.contract._sensor_cell import TOOL, sensor_cell
 from tests.contract.test_proof_after_a_break import Later
+from tests.packaging.test_documented_commands import problem
 
 pytestmark = [pytest.mark.simulator_only, pytest.mark.timeout(60)]
 
@@ -140,3 +146,47 @@ def test_ending_the_process_at_the_question_is_no_way_to_a_fresh_test(broken):
     assert last.details["judgement"]["tests"] == 2
     assert last.details["judgement"]["apart_mm"] > 0.05
     assert broken.now() == (broken.old, ())
+
+
+@pytest.mark.parametrize(
+    ("kind", "known", "commands"),
+    [
+        (StationKind.BEAMS, 15, ["cell station learn 'B 2' --tool 15"]),
+        (
+            StationKind.BEAMS,
+            None,
+            ["calibrate two-pose --tool 1", "cell station learn 'B 2' --tool 1"],
+        ),
+        (StationKind.TOUCH, 15, ["cell station learn 'B 2' --tool 15"]),
+        (StationKind.TOUCH, None, []),
+        (StationKind.PIN, 15, ["calibrate n-angle --station 'B 2' --tool 1"]),
+        (StationKind.CAMERA, None, ["calibrate camera-affine --station 'B 2' --tool 1"]),
+    ],
+)
+def test_the_commands_that_learn_a_station_again_can_be_typed(kind, known, commands):
+    found = learning_commands("B 2", kind, tool=1, known_tool=known)
+    assert [*found] == commands
+    assert [problem(f"robolink {one}") for one in found] == [None] * len(found)
+
+
+@pytest.mark.parametrize(
+    ("by", "commands"),
+    [
+        (None, ("calibrate two-pose --tool 1", "cell station learn BEAMS-02 --tool 1")),
+        (1, ("calibrate two-pose --tool 1", "cell station learn BEAMS-02 --tool 1")),
+        (9, ("cell station learn BEAMS-02 --tool 9",)),
+    ],
+)
+def test_a_station_is_learnt_with_another_tool_than_the_one_in_doubt(by, commands):
+    controller = MemoryController(identity=f"relearning-{by}")
+    if by is not None:
+        found = Found(id="BEAMS-02", kind=StationKind.BEAMS, x_mm=1.0, y_mm=2.0, tool=by)
+        controller.outcomes.append(station_entry(found))
+    touches = Pose(298, 99, -60, 0), Pose(322, 91, -60, 180)
+    plain = solve_two_pose(*touches, sigma_mm=0.01)
+    place = (ErrorSource.of_lengths("place_mm", 2, turning="in_base"),)
+    rests = assessed(replace(plain, method="beams", sources=place), AccuracyFacts())
+    assert relearning_commands(controller, ToolPlan(1, at="BEAMS-02"), rests) == commands
+    assert relearning_commands(controller, ToolPlan(1), rests) == (), "it has no name"
+    alone = assessed(plain, AccuracyFacts())
+    assert relearning_commands(controller, ToolPlan(1, pin="PIN-07"), alone) == (), "no place"

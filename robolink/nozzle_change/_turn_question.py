@@ -142,7 +142,7 @@ def _sure(step: TurnTestStep, judgement: TurnJudgement, stated_mm: float | None)
 
 
 def _take_back() -> ChoiceRow:
-    return ChoiceRow(tr("Put the old value back."), tr("The new value is not kept."))
+    return ChoiceRow(tr("Put the old value back."), tr("All that this change wrote is taken back."))
 
 
 def _again(left: int, *, by_touch: bool) -> ChoiceRow:
@@ -171,7 +171,7 @@ def _kept(
         return None
     return TurnTestStep.WIDER, ChoiceRow(
         tr(
-            "Keep the value and state that it is accurate to +-{wider:.3f} mm, not "
+            "Keep the value with a wider statement: accurate to +-{wider:.3f} mm, not "
             "+-{stated:.3f} mm.",
             wider=wider_mm,
             stated=stated_mm or 0.0,

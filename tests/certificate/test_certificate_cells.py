@@ -429,7 +429,7 @@ EACH = pytest.mark.parametrize(
 BOTH = pytest.mark.parametrize("at", [pytest.param(PIN, id="pin"), pytest.param(BEAMS, id="beams")])
 
 
-WIDER = "Keep the value and state"
+WIDER = "Keep the value with a wider"
 KEEPS = "Keep the value: it is"
 AGAIN = "Touch once more.", "Look once more."
 

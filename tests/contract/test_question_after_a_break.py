@@ -24,7 +24,7 @@ from tests.packaging.test_documented_commands import problem
 
 pytestmark = [pytest.mark.simulator_only, pytest.mark.timeout(60)]
 
-WIDER, AGAIN = "Keep the value and state", "Look once more."
+WIDER, AGAIN = "Keep the value with a wider", "Look once more."
 POWER_GOES = "(the power goes)"
 
 
@@ -117,6 +117,7 @@ def test_a_wider_statement_is_taken_after_a_break_too_and_is_on_record(broken):
     assert report.widened_mm == done.details["accurate_to_mm"]
 
 
+@pytest.mark.soak
 def test_an_operator_may_not_take_it_there_either(broken):
     broken.role = "operator"
     with pytest.raises(NotAllowedError):
@@ -124,6 +125,7 @@ def test_an_operator_may_not_take_it_there_either(broken):
     assert broken.now() == (broken.old, ())
 
 
+@pytest.mark.soak
 def test_looking_once_more_after_a_break_counts_all_looks(broken):
     with pytest.raises(VerifyError) as refused:
         broken.asked_to_finish(AGAIN, AGAIN, AGAIN)

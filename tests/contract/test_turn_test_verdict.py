@@ -147,7 +147,7 @@ def test_what_may_follow_is_offered_in_rows_and_the_first_is_the_old_value():
         AGAIN,
         LEARNS,
         MOUNT,
-        "Keep the value and state that it is accurate to +-0.107 mm, not +-0.028 mm.",
+        "Keep the value with a wider statement: accurate to +-0.107 mm, not +-0.028 mm.",
     )
 
 

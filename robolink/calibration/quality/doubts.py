@@ -145,8 +145,8 @@ _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
         "the nozzle loose, was the camera turned?"
     ),
     "turn_test_repeated": lambda: tr(
-        "The turn test contradicted the measurement and was made again: what the looks say "
-        "together fits it."
+        "The turn test was made again after it had contradicted the measurement; all its looks "
+        "count together."
     ),
     "tested_at_small_angle": lambda: tr(
         "The turn test turned the tool by less than 90 degrees from where it was measured, so it "

@@ -377,6 +377,8 @@ class VerifyError(RobolinkError):
     Attributes:
         code: The named reason: ``large_drift``, ``drift_undecided``, ``not_touched`` ..; empty
             where there is none of its own.
+        next_commands: What a person chose to do next, each after ``robolink`` and the name of the
+            cell; empty for beginning the same again.
     """
 
     def __init__(
@@ -384,6 +386,7 @@ class VerifyError(RobolinkError):
     ) -> None:
         super().__init__(what, remedy=remedy, controller=controller)
         self.code = code
+        self.next_commands: tuple[str, ...] = ()
 
 
 class DeclinedError(RobolinkError):

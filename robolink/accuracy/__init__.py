@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from robolink.accuracy._overview import RowsAt as RowsAt
     from robolink.accuracy._overview import mm_per_px as mm_per_px
     from robolink.accuracy._overview import rows_of_cell as rows_of_cell
+    from robolink.accuracy._remedies import learning_commands as learning_commands
     from robolink.accuracy._remedies import measuring_step as measuring_step
     from robolink.accuracy._repeats import learnt_rows as learnt_rows
     from robolink.accuracy._stated import rows_of_station as rows_of_station
@@ -51,7 +52,7 @@ __getattr__ = lazy_exports(
         "_looks": "LooksAlike pooled_look",
         "_measured": "MeasuredRow measured_entry measured_row",
         "_overview": "RowsAt mm_per_px rows_of_cell",
-        "_remedies": "measuring_step",
+        "_remedies": "learning_commands measuring_step",
         "_repeats": "learnt_rows",
         "_stated": "rows_of_station stated_rows",
         "_studies": "MeasuredTip artefact_row measured_tips study_row tip_image_row turned_pairs",

@@ -1,5 +1,7 @@
 """Which command measures a row that a cell has by default."""
 
+import shlex
+
 from robolink.messages import tr
 from robolink.stations import StationKind
 
@@ -44,6 +46,39 @@ def measuring_step(
         "bend_deg": _stated(key),
         "print_mm": _stated(key),
     }[key]
+
+
+def learning_commands(
+    station: str, kind: StationKind, *, tool: int, known_tool: int | None = None
+) -> tuple[str, ...]:
+    """Return the commands that learn a station anew, each after ``robolink`` and the cell's name.
+
+    A pin and a camera are found together with the tip. Beams and a plate need a tip that is known.
+    For beams the tool can be measured by touch first; of its length that tells nothing, so for a
+    plate there is no command then.
+
+    Args:
+        station: Its name.
+        kind: What it is.
+        tool: The tool whose measurement is in doubt.
+        known_tool: Another tool, whose tip is known; ``None`` for none.
+
+    Example:
+        >>> from robolink.accuracy import learning_commands
+        >>> from robolink.stations import StationKind
+        >>> learning_commands("BEAMS-02", StationKind.BEAMS, tool=1, known_tool=15)
+        ('cell station learn BEAMS-02 --tool 15',)
+    """
+    at = shlex.quote(station)
+    if kind is StationKind.PIN:
+        return (f"calibrate n-angle --station {at} --tool {tool}",)
+    if kind is StationKind.CAMERA:
+        return (f"calibrate camera-affine --station {at} --tool {tool}",)
+    if known_tool is not None:
+        return (f"cell station learn {at} --tool {known_tool}",)
+    if kind is StationKind.TOUCH:
+        return ()
+    return f"calibrate two-pose --tool {tool}", f"cell station learn {at} --tool {tool}"
 
 
 def _stated(key: str) -> str:

@@ -110,6 +110,7 @@ if TYPE_CHECKING:
     from robolink.calibration.core.turn_claim import (
         CONTRADICTS_REPEATABILITY as CONTRADICTS_REPEATABILITY,
     )
+    from robolink.calibration.core.turn_claim import REPEATED as REPEATED
     from robolink.calibration.core.turn_claim import SMALL_ANGLE as SMALL_ANGLE
     from robolink.calibration.core.turn_claim import DriftLimits as DriftLimits
     from robolink.calibration.core.turn_claim import TurnClaim as TurnClaim
@@ -221,6 +222,9 @@ if TYPE_CHECKING:
     from robolink.calibration.statement.turn_test import LEAST_TURN_DEG as LEAST_TURN_DEG
     from robolink.calibration.statement.turn_test import held_to_claim as held_to_claim
     from robolink.calibration.statement.turn_test import turn_claim as turn_claim
+    from robolink.calibration.statement.turn_test_again import MOST_REPEATS as MOST_REPEATS
+    from robolink.calibration.statement.turn_test_again import held_together as held_together
+    from robolink.calibration.statement.turn_test_again import looks_together as looks_together
     from robolink.calibration.statement.turn_test_sentences import (
         proved_statements as proved_statements,
     )
@@ -303,7 +307,7 @@ __getattr__ = lazy_exports(
         "core.robust": "Floats Robust",
         "core.rotations": "pose_arrays quaternion_rotations rotation_of rotations uvw_deg zyz_deg",
         "core.turn_claim": "CONTRADICTS_ACCURACY CONTRADICTS_REPEATABILITY DriftLimits "
-        "SMALL_ANGLE TurnClaim TurnJudgement",
+        "REPEATED SMALL_ANGLE TurnClaim TurnJudgement",
         "core.statistics": "NORMAL_95 chi_square_quantile f_quantile normal_quantile "
         "shifted_half95 shifted_region95 student_t studentized_range_0999",
         "crossed_beams": (
@@ -340,6 +344,7 @@ __getattr__ = lazy_exports(
         "evidence.approach_bias": "with_approach_bias",
         "evidence.units": "RobotReach require_near require_stored_scale require_within_reach",
         "statement.turn_test": "LEAST_TURN_DEG held_to_claim turn_claim",
+        "statement.turn_test_again": "MOST_REPEATS held_together looks_together",
         "statement.turn_test_sentences": "proved_statements turn_test_headline turn_test_sentences",
         "quality.update_guard": "Correction NEEDLE_LIMIT_MM require_shrinking update_guard "
         "writes_refused_unattended",

@@ -38,6 +38,8 @@ if TYPE_CHECKING:
     from robolink.nozzle_change._seating import seating_of as seating_of
     from robolink.nozzle_change._seating import tip_sigma_mm as tip_sigma_mm
     from robolink.nozzle_change._seating import touching_as_recorded as touching_as_recorded
+    from robolink.nozzle_change._turn_question import Attended as Attended
+    from robolink.nozzle_change._turn_question import TurnTestStep as TurnTestStep
     from robolink.nozzle_change._turn_verdict import conclude_turn_test as conclude_turn_test
     from robolink.nozzle_change._turn_verdict import told_of_contradiction as told_of_contradiction
     from robolink.nozzle_change.open_turn_test.finishing import (
@@ -66,6 +68,7 @@ __getattr__ = lazy_exports(
         "_proposal": "ChangeReport LimitVerdict Listener Moment Proposal ToolReport WriteSubject",
         "_records": "touches_made",
         "_seating": "Seating height_is_known seating_of tip_sigma_mm touching_as_recorded",
+        "_turn_question": "Attended TurnTestStep",
         "_turn_verdict": "conclude_turn_test told_of_contradiction",
     },
 )

@@ -49,9 +49,10 @@ from robolink.nozzle_change._proposal import (
 )
 from robolink.nozzle_change._records import decision_entry, refusal_entry
 from robolink.nozzle_change._station_check import check_stations, found_with, stations_found
-from robolink.nozzle_change._turn_verdict import conclude_turn_test, judged_proof
+from robolink.nozzle_change._turn_question import Attended, relearning_commands
+from robolink.nozzle_change._turn_verdict import conclude_turn_test
 from robolink.nozzle_change.open_turn_test.marking import marked_turn_tests
-from robolink.procedures import TOUCH_CODES, MeasurementContext
+from robolink.procedures import TOUCH_CODES, KeepsProof, MeasurementContext
 from robolink.runner import Operator, regard
 from robolink.timing import NS_PER_S
 from robolink.transaction import Order, ToolChange, Wanted, plain_result
@@ -373,28 +374,39 @@ class NozzleChange:
         if source is None or not plan.verify:
             return None
         tool, criteria = receipt.tool, plan.criteria
-        with (
-            context.telling(lambda done: self._listener.step(tool, done), tool=tool),
-            self._touches_counting(tool, criteria),
-        ):
-            result = source.verify(
-                context,
-                tool,
-                proposal.result,
-                tip=proposal.tip,
-                tolerance_mm=criteria.drift_tolerance_mm,
+
+        def turned() -> VerifyResult:
+            with (
+                context.telling(lambda done: self._listener.step(tool, done), tool=tool),
+                self._touches_counting(tool, criteria),
+            ):
+                return source.verify(
+                    context,
+                    tool,
+                    proposal.result,
+                    tip=proposal.tip,
+                    tolerance_mm=criteria.drift_tolerance_mm,
+                )
+
+        attended = None
+        if self._plan.asks:
+            person = context.runner(tool=tool)
+            attended = Attended(
+                person.choose,
+                person.confirm,
+                # What proves by plain values can begin once more from where it has ended.
+                turned if isinstance(source, KeepsProof) else None,
+                relearning_commands(self._controller, plan, proposal.result),
             )
-        shown = judged_proof(proposal.claim, result)
-        accurate_mm = conclude_turn_test(
+        return conclude_turn_test(
             self._controller,
             tool,
-            result,
+            turned(),
             claim=proposal.claim,
             interval_mm=criteria.interval_mm,
-            confirm=context.runner().confirm if self._plan.asks else None,
+            attended=attended,
             tell=lambda proof: self._listener.verified(tool, proof),
         )
-        return replace(shown, accurate_to_mm=accurate_mm)
 
     @contextmanager
     def _touches_counting(self, tool: int, criteria: AcceptanceCriteria) -> Iterator[None]:

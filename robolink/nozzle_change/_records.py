@@ -1,12 +1,21 @@
 """What a nozzle change puts on record: raw poses, verdicts in words, decisions."""
 
-from collections.abc import Sequence
-from dataclasses import asdict, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, fields, replace
+from typing import Any
 
-from robolink.calibration import CalibrationResult, VerifyResult
+from robolink.calibration import CalibrationResult, Drift, VerifyResult
 from robolink.errors import CalibrationError, RobolinkError
 from robolink.messages import tr
-from robolink.model import ControllerFacts, EntryKind, NewEntry, Pose, describe_offset, plain_offset
+from robolink.model import (
+    ControllerFacts,
+    EntryKind,
+    NewEntry,
+    OutcomeLog,
+    Pose,
+    describe_offset,
+    plain_offset,
+)
 from robolink.nozzle_change._acceptance import AcceptanceCriteria
 from robolink.nozzle_change._proposal import Proposal
 from robolink.procedures import jog_mm
@@ -84,17 +93,26 @@ def refusal_entry(
     )
 
 
-def verification_entry(tool: int, result: VerifyResult) -> NewEntry:
-    """Return the record of a test about the new tip."""
+def verification_entry(
+    tool: int, result: VerifyResult, *, tests: Sequence[VerifyResult] = ()
+) -> NewEntry:
+    """Return the record of a test about the new tip.
+
+    Args:
+        tool: Number of the tool.
+        result: What it says.
+        tests: Each time that it was made, where that is more than once.
+    """
     verdict = tr("passed") if result.passed else tr("failed")
     details: dict[str, object] = {
         "passed": result.passed,
         "max_drift_mm": result.max_drift_mm,
         "tolerance_mm": result.tolerance_mm,
-        "drifts": [asdict(drift) for drift in result.drifts],
+        "drifts": _drifts(result),
         "warnings": list(result.warnings),
         "verdict": result.codes[0] if result.codes else result.verdict.value,
         "judgement": result.judgement.as_json() if result.judgement else None,
+        **({"tests": [_drifts(one) for one in tests]} if len(tests) > 1 else {}),
         **touches_made(result.inputs),
     }
     return NewEntry(
@@ -104,6 +122,34 @@ def verification_entry(tool: int, result: VerifyResult) -> NewEntry:
         verdict=tr("{verdict}: {drift:.3f} mm", verdict=verdict, drift=result.max_drift_mm),
         details=details,
     )
+
+
+def _drifts(result: VerifyResult) -> list[dict[str, object]]:
+    return [asdict(drift) for drift in result.drifts]
+
+
+def tests_on_record(outcomes: OutcomeLog, tool: int, proof: VerifyResult) -> list[VerifyResult]:
+    """Return the turn tests of the change under way that contradicted its measurement.
+
+    Whoever ends the process and begins anew does not get rid of what was seen.
+
+    Args:
+        outcomes: The record, with the id of the change.
+        tool: Number of the tool.
+        proof: The test that follows them; theirs are held to its limit.
+    """
+    made = outcomes.recorded(tool=tool, change=outcomes.change, kinds=(EntryKind.VERIFY,))
+    last = next(iter(made), None) if outcomes.change else None
+    if last is None:
+        return []
+    details: Mapping[str, Any] = last.details
+    if not (details.get("judgement") or {}).get("code"):
+        return []
+    found = details.get("tests") or [details["drifts"]]
+    return [
+        replace(proof, drifts=tuple(Drift(**drift) for drift in drifts), inputs=(), warnings=())
+        for drifts in found
+    ]
 
 
 def decision_entry(verdict: str, **details: object) -> NewEntry:

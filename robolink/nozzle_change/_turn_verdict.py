@@ -5,7 +5,7 @@ pass: what was measured, or what was written, is not what it is said to be
 (docs/reference/evidence.md 20).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from robolink.calibration import (
@@ -13,29 +13,21 @@ from robolink.calibration import (
     TurnJudgement,
     VerifyResult,
     doubt_sentence,
-    held_to_claim,
+    held_together,
+    looks_together,
 )
 from robolink.errors import VerifyError
 from robolink.messages import joined, tr
 from robolink.model import Controller, require_engineer
 from robolink.nozzle_change._acceptance import require_proved
 from robolink.nozzle_change._records import decision_entry, verification_entry
-
-Confirming = Callable[[str], bool]
-"""Asks a person and returns whether they said yes."""
-
-
-def judged_proof(claim: TurnClaim | None, proof: VerifyResult) -> VerifyResult:
-    """Return a turn test with what it says about the statements of its measurement.
-
-    Args:
-        claim: What the measurement lets it expect; ``None`` where nothing tells it.
-        proof: The turn test.
-    """
-    if claim is None or proof.codes:
-        return proof
-    judgement = held_to_claim(claim, proof)
-    return replace(proof, judgement=judgement, warnings=(*proof.warnings, *judgement.codes))
+from robolink.nozzle_change._turn_question import (
+    KEEPING,
+    Attended,
+    TurnTestStep,
+    asked_what_follows,
+    with_step,
+)
 
 
 def conclude_turn_test(
@@ -45,9 +37,10 @@ def conclude_turn_test(
     *,
     claim: TurnClaim | None,
     interval_mm: float | None = None,
-    confirm: Confirming | None = None,
+    attended: Attended | None = None,
+    earlier: Sequence[VerifyResult] = (),
     tell: Callable[[VerifyResult], None] = lambda _proof: None,
-) -> float | None:
+) -> VerifyResult:
     """Put a turn test on record, and refuse one that did not pass or that nobody may let pass.
 
     Args:
@@ -56,12 +49,14 @@ def conclude_turn_test(
         proof: What it showed.
         claim: What the measurement lets it expect.
         interval_mm: What the process allows the tip to be off, if it says so.
-        confirm: Asks a person; ``None`` where nobody may be asked.
-        tell: Told how it ended, before anything is refused.
+        attended: Who is asked about a contradiction; ``None`` where nobody may be.
+        earlier: The tests of this change that contradicted the measurement before; their looks
+            count too.
+        tell: Told how each test ended, before anything is refused.
 
     Returns:
-        What the tip is accurate to now: the statement of the measurement, or a wider one that a
-        person took; ``None`` where nothing says it.
+        The turn test, all looks together, with what the tip is accurate to now: the statement of
+        the measurement, or a wider one that a person took; ``None`` where nothing says it.
 
     Raises:
         VerifyError: ``large_drift``, ``drift_undecided``, ``touch_heights_differ``,
@@ -88,99 +83,86 @@ def conclude_turn_test(
         ...     print(error.code)
         proof_contradicts_accuracy
     """
-    proof = judged_proof(claim, proof)
-    controller.outcomes.append(verification_entry(tool, proof))
-    tell(proof)
-    judgement = proof.judgement
+    tests, outcomes, identity = [*earlier, proof], controller.outcomes, controller.identity
     stated_mm = None if claim is None else claim.accurate_mm
-    if judgement is None or not judgement.code or proof.codes:
-        require_proved(proof, controller.identity)
-        return stated_mm
-    # Too large a drift for the process is that first, whatever else it says.
-    require_proved(replace(proof, judgement=None), controller.identity)
-    return _weighed(
-        controller, tool, proof, judgement, stated_mm, interval_mm=interval_mm, confirm=confirm
-    )
-
-
-def _weighed(
-    controller: Controller,
-    tool: int,
-    proof: VerifyResult,
-    judgement: TurnJudgement,
-    stated_mm: float | None,
-    *,
-    interval_mm: float | None,
-    confirm: Confirming | None,
-) -> float | None:
-    """Return the statement that stands after a contradiction.
-
-    Raises:
-        VerifyError: None does.
-    """
-    outcomes, wider_mm = controller.outcomes, judgement.wider_mm
-    if not judgement.fails:
-        if confirm is None:
-            return stated_mm
-        question = joined(
-            " ",
-            (
-                told_of_contradiction(proof, judgement),
-                tr("The tip is still within {mm:.3f} mm, as stated. Keep the value?", mm=stated_mm),
-            ),
+    while True:
+        shown = _judged(claim, tests)
+        outcomes.append(verification_entry(tool, shown, tests=tests))
+        tell(shown)
+        judgement = shown.judgement
+        # Too large a drift for the process is that first, whatever else it says.
+        for one in (*tests, replace(shown, judgement=None)):
+            require_proved(one, identity)
+        if judgement is None or not judgement.code:
+            return replace(shown, accurate_to_mm=stated_mm)
+        if attended is None:
+            if judgement.fails:
+                raise _contradicted(controller, shown, judgement)
+            return replace(shown, accurate_to_mm=stated_mm)
+        step = asked_what_follows(
+            told_of_contradiction(shown, judgement),
+            shown,
+            judgement,
+            attended,
+            stated_mm=stated_mm,
+            widest_mm=interval_mm,
         )
-        _require_yes(controller, tool, proof, judgement, question, confirm, stated_mm)
-        return stated_mm
-    allowed = wider_mm is not None and (interval_mm is None or wider_mm <= interval_mm)
-    if confirm is None or not judgement.offers_wider or not allowed:
-        raise _contradicted(controller, proof, judgement)
-    question = joined(
-        " ",
-        (
-            told_of_contradiction(proof, judgement),
-            tr(
-                "Keep the value and state that it is accurate to +-{wider:.3f} mm, not "
-                "+-{stated:.3f} mm?",
-                wider=wider_mm,
-                stated=stated_mm or 0.0,
-            ),
-        ),
-    )
-    _require_yes(controller, tool, proof, judgement, question, confirm, wider_mm)
-    require_engineer(
-        outcomes,
-        tr("state that tool {tool} is accurate to +-{mm:.3f} mm", tool=tool, mm=wider_mm),
-        tool=tool,
-        accurate_to_mm=wider_mm,
-    )
-    return wider_mm
+        accurate_mm = judgement.wider_mm if step is TurnTestStep.WIDER else stated_mm
+        _record(controller, tool, judgement, step, accurate_mm)
+        if step is TurnTestStep.AGAIN and attended.again is not None:
+            tests.append(attended.again())
+            continue
+        if step in KEEPING:
+            return replace(shown, accurate_to_mm=accurate_mm)
+        raise with_step(_contradicted(controller, shown, judgement), step, attended.relearning)
 
 
-def _require_yes(
+def _judged(claim: TurnClaim | None, tests: Sequence[VerifyResult]) -> VerifyResult:
+    """Return the last test, with the looks of those before, and what they say.
+
+    One that failed by itself is told by itself: no look of another one makes it better.
+    """
+    last = tests[-1]
+    if claim is None or last.codes:
+        return last
+    if not last.passed:
+        tests = tests[-1:]
+    judgement = held_together(claim, tests)
+    shown = looks_together(tests)
+    return replace(shown, judgement=judgement, warnings=(*shown.warnings, *judgement.codes))
+
+
+def _record(
     controller: Controller,
     tool: int,
-    proof: VerifyResult,
     judgement: TurnJudgement,
-    question: str,
-    confirm: Confirming,
+    step: TurnTestStep,
     accurate_mm: float | None,
 ) -> None:
-    """Have a person decide, on record.
+    """Put on record what a person chose.
 
     Raises:
-        VerifyError: The person said no.
+        NotAllowedError: A wider statement takes an engineer.
     """
-    accepted = confirm(question)
+    outcomes = controller.outcomes
+    keeps = step in KEEPING
+    again = step is TurnTestStep.AGAIN
+    verdict = tr("accepted") if keeps else tr("the turn test is made again")
     entry = decision_entry(
-        tr("accepted") if accepted else tr("declined"),
-        accepted=accepted,
-        question=question,
+        verdict if keeps or again else tr("declined"),
+        **({} if again else {"accepted": keeps}),
+        chosen=step.value,
         code=judgement.code,
-        accurate_to_mm=accurate_mm,
+        accurate_to_mm=accurate_mm if keeps else None,
     )
-    controller.outcomes.append(replace(entry, tool=tool))
-    if not accepted:
-        raise _contradicted(controller, proof, judgement)
+    outcomes.append(replace(entry, tool=tool))
+    if step is TurnTestStep.WIDER:
+        require_engineer(
+            outcomes,
+            tr("state that tool {tool} is accurate to +-{mm:.3f} mm", tool=tool, mm=accurate_mm),
+            tool=tool,
+            accurate_to_mm=accurate_mm,
+        )
 
 
 def told_of_contradiction(proof: VerifyResult, judgement: TurnJudgement) -> str:
@@ -190,6 +172,12 @@ def told_of_contradiction(proof: VerifyResult, judgement: TurnJudgement) -> str:
         proof: The turn test.
         judgement: What it says.
     """
+    if judgement.apart_mm is not None:
+        found = tr(
+            "Turn test: at one angle its looks lie {apart:.3f} mm apart, more than they scatter.",
+            apart=judgement.apart_mm,
+        )
+        return joined(" ", (found, doubt_sentence(judgement.code)))
     drift, limits = proof.drifts[judgement.worst], judgement.limits[judgement.worst]
     limit_mm = limits.accurate_mm if judgement.contradicts_accuracy else limits.repeatable_mm
     found = tr(

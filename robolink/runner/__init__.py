@@ -53,12 +53,14 @@ if TYPE_CHECKING:
     from robolink.runner._steps import TeachPrompt as TeachPrompt
     from robolink.runner._steps import TouchedAt as TouchedAt
     from robolink.runner._subjects import AngleShown as AngleShown
+    from robolink.runner._subjects import ChoiceRow as ChoiceRow
     from robolink.runner._subjects import FitRow as FitRow
     from robolink.runner._subjects import FitSubject as FitSubject
     from robolink.runner._subjects import GuidedOperator as GuidedOperator
     from robolink.runner._subjects import JogRange as JogRange
     from robolink.runner._subjects import JogSubject as JogSubject
     from robolink.runner._subjects import MoveSubject as MoveSubject
+    from robolink.runner._subjects import OfferedChoice as OfferedChoice
     from robolink.runner._subjects import TouchSubject as TouchSubject
     from robolink.runner._subjects import regard as regard
     from robolink.runner._yes_no import BACK as BACK
@@ -81,8 +83,8 @@ __getattr__ = lazy_exports(
         "_settings": "RunSettings",
         "_steps": "Ask Confirm Consider Look Move Notify Procedure Seek SeenAt Step TakenStep "
         "StepDone TeachPrompt TouchedAt",
-        "_subjects": "AngleShown FitRow FitSubject GuidedOperator JogRange JogSubject MoveSubject "
-        "TouchSubject regard",
+        "_subjects": "AngleShown ChoiceRow FitRow FitSubject GuidedOperator JogRange JogSubject "
+        "MoveSubject OfferedChoice TouchSubject regard",
         "_yes_no": "BACK MORE ask_yes_no ask_yes_no_or yes_or_no",
     },
 )

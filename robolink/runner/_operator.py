@@ -28,6 +28,9 @@ class Question(Enum):
     TEXT = "text"
     """A line of text that is not empty; ``q`` alone ends."""
 
+    CHOICE = "choice"
+    """The number of a row; an empty line, or ``q``, is the first, which is safe."""
+
 
 class Operator(Protocol):
     """The person at the cell, or whoever stands in for one."""

@@ -45,7 +45,14 @@ from robolink.runner._steps import (
     StepDone,
     TakenStep,
 )
-from robolink.runner._subjects import GuidedOperator, JogRange, JogSubject, MoveSubject, regard
+from robolink.runner._subjects import (
+    GuidedOperator,
+    JogRange,
+    JogSubject,
+    MoveSubject,
+    OfferedChoice,
+    regard,
+)
 from robolink.runner._yes_no import Asking
 from robolink.sensing import median_spot, scatter_of, seen_in
 from robolink.ways import Way, way
@@ -343,6 +350,10 @@ class Runner:
             'more'
         """
         return self._asking.confirm_or(question, also=also, decides=decides)
+
+    def choose(self, question: str, offered: OfferedChoice) -> int:
+        """Have one of several rows chosen under the same watch; see :meth:`Asking.choose`."""
+        return self._asking.choose(question, offered)
 
     def ask_text(self, question: str) -> str:
         """Ask for a line of text under the same watch; see :meth:`Asking.text`."""

@@ -152,6 +152,32 @@ class JogSubject:
     longest: float
 
 
+@dataclass(frozen=True, slots=True)
+class ChoiceRow:
+    """One of several things that a person may choose.
+
+    Attributes:
+        does: What it does, a sentence.
+        detail: What else is to be known of it, a sentence.
+    """
+
+    does: str
+    detail: str
+
+
+@dataclass(frozen=True, slots=True)
+class OfferedChoice:
+    """What a person may choose from. The first row is safe: whoever only presses ENTER gets it.
+
+    Attributes:
+        title: What the question belongs to.
+        rows: The rows.
+    """
+
+    title: str
+    rows: tuple[ChoiceRow, ...]
+
+
 @runtime_checkable
 class GuidedOperator(Operator, Protocol):
     """An operator who is shown what it is about, before it is said or asked.

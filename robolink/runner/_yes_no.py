@@ -1,5 +1,6 @@
 """Asking a person for a word: what counts as a yes and as a no, and the record of the answer."""
 
+import unicodedata
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Final
@@ -9,6 +10,7 @@ from robolink.messages import tr
 from robolink.model import AnsweredBy, OutcomeLog, answer_entry
 from robolink.runner._operator import Operator, Question
 from robolink.runner._place_question import MOST_REFUSED, ended_by_operator
+from robolink.runner._subjects import GuidedOperator, OfferedChoice, regard
 
 _YES: Final = frozenset({"y", "yes", "j", "ja", "是"})
 MORE: Final = "more"
@@ -138,6 +140,54 @@ class Asking:
         self._record(question, said, **decided)
         return said
 
+    def choose(self, question: str, offered: OfferedChoice) -> int:
+        """Have one of several rows chosen; return its index, 0 where no other was clearly meant.
+
+        Args:
+            question: What is asked.
+            offered: The rows; the first is the safe one.
+
+        Raises:
+            ConfigError: The answer cannot be recorded.
+
+        Example:
+            >>> from robolink.journal import memory_journal
+            >>> from robolink.runner import ChoiceRow, OfferedChoice
+            >>> from robolink.runner._yes_no import Asking
+            >>> class Panel:  # implements robolink.Operator
+            ...     def ask(self, question, kind):
+            ...         print(question)
+            >>> rows = ChoiceRow("Take it back.", "As before."), ChoiceRow("Keep it.", "As it is.")
+            >>> log = memory_journal("choosing-example").log("a")
+            >>> Asking(Panel(), lambda: "2", log).choose("And now?", OfferedChoice("Test", rows))
+            And now?
+              1 Take it back.
+                As before.
+              2 Keep it.
+                As it is.
+            1
+        """
+        guided = isinstance(self.operator, GuidedOperator)
+        shown = question if guided else "\n".join((question, *_listed(offered)))
+        chosen = None
+        for left in (1, 0):
+            regard(self.operator, [offered])
+            self.operator.ask(shown, Question.CHOICE)
+            line = self.line().strip()
+            chosen = _row_meant(line, len(offered.rows))
+            if chosen is not None or not left:
+                break
+            self.operator.tell(
+                tr(
+                    "{line!r} is not the number of a row. It is asked once more; then anything "
+                    "else counts as 1.",
+                    line=line,
+                )
+            )
+        row = chosen or 0
+        self._record(question, offered.rows[row].does)
+        return row
+
     def text(self, question: str) -> str:
         """Ask for a line of text.
 
@@ -161,3 +211,17 @@ class Asking:
     def _record(self, question: str, answer: bool | str, **details: object) -> None:
         by = getattr(self.operator, "answers_as", AnsweredBy.PERSON)
         self.outcomes.append(answer_entry(question, answer, by, tool=self.tool, **details))
+
+
+def _listed(offered: OfferedChoice) -> list[str]:
+    rows = enumerate(offered.rows, start=1)
+    return [line for k, row in rows for line in (f"  {k} {row.does}", f"    {row.detail}")]
+
+
+def _row_meant(line: str, count: int) -> int | None:
+    """Return the index of the row that a line means, ``None`` for none of them."""
+    word = unicodedata.normalize("NFKC", line)
+    if word in ("", "q"):
+        return 0
+    known = word.isascii() and word.isdigit() and 1 <= int(word) <= count
+    return int(word) - 1 if known else None

@@ -58,6 +58,7 @@ from robolink.nozzle_change import (
     ToolPlan,
 )
 from robolink.procedures import LookPlan, TouchPlan
+from robolink.runner import Question
 from tests.contract._camera_cell import camera_station, furnish
 from tests.contract._sensor_cell import PLATE_INPUT, TOOL, plc_sensor_cell, sensor_cell
 
@@ -165,20 +166,33 @@ class Hears(Listener):
 
 
 class Person(AssistedOperator):
-    """The person of the cell, who answers questions with yes or no by a rule."""
+    """The person of the cell, who answers questions with yes or no by a rule.
+
+    Of rows they choose the first, unless ``chooses`` names another one by some of its words.
+    """
 
     says: Callable[[str], bool] = staticmethod(lambda _question: True)
+    chooses: Callable[[], str] = staticmethod(lambda: "")
     asked: list[str]
 
     def ask(self, question: str, kind: Any) -> None:
         """Keep the question."""
-        self.asked = [*getattr(self, "asked", []), question]
+        self.asked = getattr(self, "asked", [])
+        self.asked.append(question)
         super().ask(question, kind)
 
     def poll(self, wait_s: float) -> str | None:
         """Answer."""
         answer = super().poll(wait_s)
+        if answer is not None and self._kind is Question.CHOICE:
+            return row_of(self.asked[-1], self.chooses()) or answer
         return "n" if answer == "y" and not self.says(self.asked[-1]) else answer
+
+
+def row_of(question: str, does: str) -> str:
+    """Return the number of the first row with some words; empty for none."""
+    rows = [line.split(maxsplit=1) for line in question.splitlines()[1:]]
+    return next((number for number, text in rows if does and number.isdigit() and does in text), "")
 
 
 def person_at(cell: Any) -> Person:

@@ -429,22 +429,27 @@ EACH = pytest.mark.parametrize(
 BOTH = pytest.mark.parametrize("at", [pytest.param(PIN, id="pin"), pytest.param(BEAMS, id="beams")])
 
 
-class Answers:
-    """Says yes to all but questions that name a word, and keeps what was asked."""
+WIDER = "Keep the value with a wider"
+KEEPS = "Keep the value: it is"
+AGAIN = "Touch once more.", "Look once more."
 
-    def __init__(self, no_to: str = ""):
-        self.no_to = no_to
+
+class Answers:
+    """Chooses one row after the other by its beginning, and keeps what was asked."""
+
+    def __init__(self, *rows: str):
+        self.rows = list(rows)
         self.asked: list[str] = []
 
-    def __call__(self, question: str) -> bool:
-        self.asked.append(question)
-        return not self.no_to or self.no_to not in question
+    def __call__(self) -> str:
+        return self.rows.pop(0) if self.rows else ""
 
 
 def at_a_terminal(at: AtTerminal, answers: Answers, *, little: bool = False, **more: Any):
     def person(cell: Any) -> Person:
         found = person_at(cell)
-        found.says = answers
+        found.chooses = answers
+        found.asked = answers.asked
         return found
 
     return change(
@@ -458,35 +463,55 @@ def at_a_terminal(at: AtTerminal, answers: Answers, *, little: bool = False, **m
     )
 
 
-WIDER = "state that it is accurate to"
+def rows_asked(answers: Answers) -> list[str]:
+    """Return the questions with rows."""
+    return [one for one in answers.asked if "What should happen now?" in one]
 
 
 @EACH
 def test_an_engineer_takes_the_wider_statement_and_it_holds(at):
-    answers = Answers()
+    answers = Answers(WIDER)
     ended = at_a_terminal(at, answers, role="engineer")
     assert not ended.code
     assert "proof_contradicts_accuracy" in ended.doubts
     assert ended.accurate_mm == pytest.approx(at.wider_mm, abs=0.04)
     assert ended.share < 0.8, "the tip is inside, whichever of both it was"
-    assert sum(WIDER in one for one in answers.asked) == 1
-
-
-@EACH
-def test_an_operator_may_not_take_it_and_the_old_value_is_back(at):
-    assert at_a_terminal(at, Answers(), role="operator").code == "NotAllowedError"
-
-
-@EACH
-def test_a_no_takes_the_value_back(at):
-    ended = at_a_terminal(at, Answers(WIDER), role="engineer")
-    assert ended.code == "proof_contradicts_accuracy"
-    assert ended.taken_back
+    assert len(rows_asked(answers)) == 1
 
 
 @pytest.mark.soak
-def test_beyond_the_limit_of_the_process_nobody_is_asked():
+@EACH
+def test_an_operator_may_not_take_it_and_the_old_value_is_back(at):
+    assert at_a_terminal(at, Answers(WIDER), role="operator").code == "NotAllowedError"
+
+
+@EACH
+def test_whoever_only_presses_enter_gets_the_old_value_back(at):
     answers = Answers()
+    ended = at_a_terminal(at, answers, role="engineer")
+    assert ended.code == "proof_contradicts_accuracy"
+    assert ended.taken_back
+    assert len(rows_asked(answers)) == 1
+
+
+@EACH
+def test_once_more_shows_a_station_that_was_moved_again_and_twice_at_most(at):
+    more = next(row for row in AGAIN if row.startswith("Touch" if at is PIN else "Look"))
+    answers = Answers(more, more, more)
+    ended = at_a_terminal(at, answers)
+    assert ended.code == "proof_contradicts_accuracy"
+    assert ended.taken_back
+    asked = rows_asked(answers)
+    assert [more in one for one in asked] == [True, True, False]
+    assert ended.proof is not None
+    assert ended.proof.judgement is not None
+    assert ended.proof.judgement.tests == 3
+    assert {one.looks for one in ended.proof.drifts} == {3}
+
+
+@pytest.mark.soak
+def test_beyond_the_limit_of_the_process_it_is_not_offered():
+    answers = Answers(WIDER)
     ended = at_a_terminal(BEAMS, answers, role="engineer", interval_mm=0.05)
     assert ended.taken_back
     assert not any(WIDER in one for one in answers.asked)
@@ -504,8 +529,27 @@ def test_what_the_statement_covers_is_a_warning_without_a_person(at):
 @BOTH
 @pytest.mark.parametrize("yes", [True, False])
 def test_and_a_question_with_one(at, yes):
-    answers = Answers("" if yes else "Keep the value?")
+    answers = Answers(KEEPS if yes else "")
     ended = at_a_terminal(at, answers, little=True)
-    assert sum("Keep the value?" in one for one in answers.asked) == 1
+    assert sum(KEEPS in one for one in answers.asked) == 1
     assert ended.code == ("" if yes else "proof_contradicts_repeatability")
     assert ended.taken_back is not yes
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize(
+    "course", [pytest.param(one, id=one.name) for one in BY_NAME.values() if one.proves]
+)
+def test_every_method_turns_once_more_from_where_its_turn_test_has_ended(course):
+    at = AtTerminal(course.name, lambda _cell: None, lambda _cell: None, {}, 0.0)
+    surface = course.method in ("plane-touch", "sphere-touch", "z-touch")
+    for slip_mm in (0.06, 0.09, 0.12, 0.15, 0.18):
+        answers = Answers("once more", "once more")
+        slip = slips(0.0, 0.0, slip_mm) if surface else slips(slip_mm, -slip_mm / 4)
+        ended = at_a_terminal(at, answers, at_write=slip)
+        if rows_asked(answers):
+            break
+    assert ended.taken_back
+    assert ended.proof is not None
+    assert ended.proof.judgement is not None
+    assert ended.proof.judgement.tests == 3, ended.code

@@ -265,3 +265,24 @@ def test_a_group_of_axes_is_tested_too(tmp_path):
         assert ended.code == 0, ended.err
         assert (cell.changed(), cell.open_markers(), verified(cell)) == ({1}, (), [True])
         assert len(cell.writes()) == written
+
+
+@pytest.mark.parametrize(
+    ("said", "tests", "told"),
+    [
+        ({}, 1, "The old value of tool 1 is back."),
+        ({5: "3"}, 1, "Then start again: the tip is measured anew."),
+        pytest.param({5: "2"}, 2, "up to 0.0", marks=pytest.mark.soak),
+    ],
+    ids=["ENTER", "mount", "once more"],
+)
+def test_a_contradiction_after_a_break_is_asked_about_at_the_terminal(cell, said, tests, told):
+    x_mm, y_mm, z_mm = cell.simulator.world.pin_mm
+    cell.simulator.world.pin_mm = (x_mm + 0.15, y_mm, z_mm)
+    written = len(cell.writes())
+    ended, questions = new_chosen(cell, answers=said)
+    assert "1 Put the old value back." in questions[4]
+    assert "Keep the value" not in questions[4], "a wider one is over the limit of the recipe"
+    assert (ended.code, told in ended.err) == (8, True), ended.err
+    assert (cell.changed(), cell.open_markers()) == (set(), ())
+    assert (verified(cell), len(cell.writes()) - written) == ([False] * tests, 1)

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 WAY_MM: Final = 60.0
 """How far the stand-in jogs to show an axis."""
 
+_PLACES: Final = frozenset({Question.PLACE, Question.ROOM, Question.ALONG_X, Question.ALONG_Z})
+
 MOST_STEPS: Final = 300
 """So many answers to one question are enough for 1.5 m of jogging: the stand-in gives up then."""
 
@@ -69,7 +71,7 @@ class TerminalOperator:
                 tr("The keyboard is gone. Nothing was answered for you."),
                 remedy=tr("Run it on a terminal, or with --assist on a simulator."),
             ) from error
-        if line is None or line.strip() or self._kind in (Question.YES_NO, Question.TEXT):
+        if line is None or line.strip() or self._kind not in _PLACES:
             return line
         # Scanners send ENTER, and hands do by mistake: it records no place.
         self._show(tr("ENTER alone does nothing. When it is there: done."))
@@ -88,6 +90,8 @@ def _how(kind: Question) -> str:
         return tr("Type or scan it, then Enter. To end: q.")
     if kind is Question.YES_NO:
         return tr("y or n")
+    if kind is Question.CHOICE:
+        return tr("Number of a row, then Enter. Enter alone: 1.")
     return tr("Steps: x+0.1 z-0.5. When it is there: done. To end: q.")
 
 
@@ -219,6 +223,8 @@ class AssistedOperator:
             )
         if self._kind is Question.YES_NO:
             return "y"
+        if self._kind is Question.CHOICE:
+            return "1"  # whoever stands in for a person decides nothing
         if self._kind is Question.TEXT:
             return tr("simulated")
         if self._stays:

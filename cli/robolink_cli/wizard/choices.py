@@ -7,7 +7,7 @@ from typing import Final
 from robolink.errors import DeclinedError
 from robolink.messages import tr
 from robolink.model import AnsweredBy
-from robolink.runner import Question, awaited_line
+from robolink.runner import OfferedChoice, Question, awaited_line
 from robolink_cli.console.language import other_language, speak_from_now
 from robolink_cli.prompts.present import AskingDesk
 from robolink_cli.prompts.questions import keep_answer
@@ -26,6 +26,8 @@ class ChoiceSubject:
         leaves: What the stop key is called.
         details: What is to be read of each option while it is marked; empty for nothing.
         enters: Whether ENTER takes the marked row as the main key does; not where a row writes.
+        safe: Index of the row that ENTER takes all the same, and an empty line too; ``None`` for
+            none.
         other: The language that a key changes to; empty where none does.
     """
 
@@ -37,7 +39,22 @@ class ChoiceSubject:
     leaves: str = ""
     details: tuple[tuple[str, ...], ...] = ()
     enters: bool = True
+    safe: int | None = None
     other: str = ""
+
+
+def subject_of(offered: OfferedChoice) -> ChoiceSubject:
+    """Return the list of what the work lets a person choose; its first row is safe."""
+    return ChoiceSubject(
+        offered.title,
+        (),
+        tuple(row.does for row in offered.rows),
+        does=tr("Do it"),
+        leaves=offered.rows[0].does,
+        details=tuple((row.detail,) for row in offered.rows),
+        enters=False,
+        safe=0,
+    )
 
 
 CHANGE_LANGUAGE: Final = "language"

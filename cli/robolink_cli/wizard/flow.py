@@ -15,11 +15,12 @@ from robolink.runner import (
     FitSubject,
     JogSubject,
     MoveSubject,
+    OfferedChoice,
     Question,
     refuse_decimal_comma,
 )
 from robolink_cli.wizard.check_list import CheckSubject
-from robolink_cli.wizard.choices import ChoiceSubject
+from robolink_cli.wizard.choices import ChoiceSubject, subject_of
 from robolink_cli.wizard.happenings import (
     CellIs,
     Effect,
@@ -143,6 +144,8 @@ def _regarding(state: WizardState, subject: object) -> WizardState:
         return replace(state, report=subject)
     if isinstance(subject, FitSubject):
         return replace(state, subject=subject, fit=subject)
+    if isinstance(subject, OfferedChoice):
+        return replace(state, subject=subject_of(subject))
     return replace(state, subject=subject)
 
 
@@ -173,8 +176,12 @@ def _asked(state: WizardState, asked: WasAsked) -> WizardState:
     if reading is not None and asked.at_s - reading.at_s > 1.0:
         # Where it was before the robot moved is not where it is.
         reading = replace(reading, pose=None)
+    subject = state.subject
+    if isinstance(subject, ChoiceSubject) and asked.kind is Question.YES_NO:
+        subject = asked  # a list that was chosen from is not what is asked about
     return replace(
         state,
+        subject=subject,
         reading=reading,
         question=asked,
         fresh=(),
@@ -184,7 +191,7 @@ def _asked(state: WizardState, asked: WasAsked) -> WizardState:
         typed="",
         typing=False,
         pose_typed="",
-        marked=state.subject.marked if isinstance(state.subject, ChoiceSubject) else None,
+        marked=subject.marked if isinstance(subject, ChoiceSubject) else None,
         message="",
         ending=False,
         jogging=Jogging(size=size, quarters=state.jogging.quarters),
@@ -347,7 +354,9 @@ def _line(state: WizardState, line: LineTyped) -> Advanced:
         return _stop(state)
     if question is None or not state.waits:
         return state, []
-    if typed and not isinstance(state.subject, ChoiceSubject) and not _armed(state, line.at_s):
+    listed = typed and isinstance(state.subject, ChoiceSubject)
+    settles = typed or question.kind is Question.CHOICE
+    if settles and not listed and not _armed(state, line.at_s):
         # The end of a code that a scanner began before the question was there is another code.
         return state.says(tr("Typed too early, so nothing of it was taken. Please once more.")), []
     if state.at_place:

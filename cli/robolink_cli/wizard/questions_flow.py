@@ -68,6 +68,8 @@ def answered_by_line(state: WizardState, line: str) -> Answered:
         return state
     if isinstance(subject, ChoiceSubject):
         word = folded(line)
+        if not word and subject.safe is not None:
+            return str(subject.safe + 1)
         if subject.other and meaning_of(line) == subject.other:
             return CHANGE_LANGUAGE
         known = word.isdigit() and 1 <= int(word) <= len(subject.options)
@@ -145,7 +147,7 @@ def _choice_key(state: WizardState, subject: ChoiceSubject, key: KeyPressed) -> 
         return replace(state, marked=last if marked is None else max(marked - 1, 0), message="")
     if key.name == "f2" and subject.other:
         return CHANGE_LANGUAGE
-    if key.name == "enter" and not subject.enters:
+    if key.name == "enter" and not subject.enters and (marked is None or marked != subject.safe):
         return state.says(tr("ENTER does nothing here. [5] does what the marked row says."))
     if key.name in ("5", "main", "enter"):
         return state.says(tr("Mark a row first.")) if marked is None else str(marked + 1)

@@ -7,6 +7,7 @@ from typing import Any, Final, Self
 CONTRADICTS_REPEATABILITY: Final = "proof_contradicts_repeatability"
 CONTRADICTS_ACCURACY: Final = "proof_contradicts_accuracy"
 SMALL_ANGLE: Final = "tested_at_small_angle"
+REPEATED: Final = "turn_test_repeated"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,6 +83,9 @@ class TurnJudgement:
         offers_wider: Whether that may be taken as a statement: not while the drifts were seen
             through what may be wrong itself.
         covered: Whether it is no more than what was said.
+        tests: How often the test was made, the first of them contradicted; all looks count
+            together.
+        apart_mm: How far two looks at one angle lie apart where that is more than they scatter.
     """
 
     code: str
@@ -91,6 +95,8 @@ class TurnJudgement:
     wider_mm: float | None = None
     offers_wider: bool = True
     covered: bool = False
+    tests: int = 1
+    apart_mm: float | None = None
 
     @property
     def contradicts_accuracy(self) -> bool:
@@ -112,13 +118,14 @@ class TurnJudgement:
 
     @property
     def good(self) -> bool:
-        """Whether nothing is contradicted, and the turn was large enough to show it."""
-        return not self.code and not self.small_angle
+        """Whether nothing was ever contradicted, and the turn was large enough to show it."""
+        return not self.codes
 
     @property
     def codes(self) -> tuple[str, ...]:
         """Names of what is contradicted or doubtful."""
-        return (*filter(None, (self.code,)), *((SMALL_ANGLE,) if self.small_angle else ()))
+        named = (self.code, SMALL_ANGLE * self.small_angle, REPEATED * (self.tests > 1))
+        return tuple(filter(None, named))
 
     @classmethod
     def from_json(cls, document: Mapping[str, Any]) -> Self:
@@ -140,6 +147,8 @@ class TurnJudgement:
             None if wider_mm is None else float(wider_mm),
             bool(document["offers_wider"]),
             bool(document["covered"]),
+            int(document.get("tests", 1)),
+            None if (apart_mm := document.get("apart_mm")) is None else float(apart_mm),
         )
 
     def as_json(self) -> dict[str, object]:
@@ -159,4 +168,6 @@ class TurnJudgement:
             "wider_mm": self.wider_mm,
             "offers_wider": self.offers_wider,
             "covered": self.covered,
+            "tests": self.tests,
+            "apart_mm": self.apart_mm,
         }

@@ -144,6 +144,10 @@ _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
         "The turn test contradicts what the measurement is accurate to: was the station moved, is "
         "the nozzle loose, was the camera turned?"
     ),
+    "turn_test_repeated": lambda: tr(
+        "The turn test was made again after it had contradicted the measurement; all its looks "
+        "count together."
+    ),
     "tested_at_small_angle": lambda: tr(
         "The turn test turned the tool by less than 90 degrees from where it was measured, so it "
         "shows little."

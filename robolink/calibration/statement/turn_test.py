@@ -31,7 +31,7 @@ from robolink.calibration.core.turn_claim import (
 from robolink.calibration.statement.accuracy import row_covariance, usual_look_sigma_mm
 from robolink.model import angle_difference_deg
 
-_FALSE_ALARMS: Final = 0.001
+FALSE_ALARMS: Final = 0.001
 """So often may a right result be contradicted, all drifts of one test together."""
 
 _ENOUGH_NU: Final = 6
@@ -308,10 +308,10 @@ def _limits(
 def _both(
     scatter: float, rows: float, count: int, coordinates: int, nu: float | None, turn_deg: float
 ) -> DriftLimits:
-    known = chi_square_quantile(1 - _FALSE_ALARMS / count, coordinates)
+    known = chi_square_quantile(1 - FALSE_ALARMS / count, coordinates)
     estimated = known
     if nu is not None:
-        estimated = coordinates * f_quantile(1 - _FALSE_ALARMS / count, coordinates, nu)
+        estimated = coordinates * f_quantile(1 - FALSE_ALARMS / count, coordinates, nu)
     return DriftLimits(
         math.sqrt(estimated * scatter), math.sqrt(estimated * scatter + known * rows), turn_deg
     )

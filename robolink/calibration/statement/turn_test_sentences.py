@@ -38,7 +38,7 @@ def turn_test_headline(result: VerifyResult) -> str:
         )
     if result.heights_only:
         return tr("Touched again: {drift:.3f} mm off at most, limit {limit:.3f} mm.", **found)
-    if judgement is not None and judgement.contradicts_repeatability:
+    if judgement is not None and (judgement.code or judgement.tests > 1):
         return tr(
             "Turn test within its limit, with a doubt: {drift:.3f} mm off at most, limit "
             "{limit:.3f} mm.",
@@ -77,28 +77,44 @@ def turn_test_sentences(
     """
     if judgement is None:
         return
-    limit = judgement.limits[judgement.worst]
-    if judgement.contradicts_accuracy:
+    if judgement.tests > 1:
         yield tr(
-            "All that is stated explains {mm} mm, no more: the tip is not where it was measured.",
-            mm=stated_mm(limit.accurate_mm),
+            "The turn test was made {count} times, because the first contradicted the measurement; "
+            "all its looks count together.",
+            count=judgement.tests,
         )
-    elif judgement.contradicts_repeatability:
+    if judgement.apart_mm is not None:
         yield tr(
-            "Scatter alone explains {mm} mm, no more: it does not repeat as stated.",
-            mm=stated_mm(limit.repeatable_mm),
+            "At one angle its looks lie {mm} mm apart: it does not repeat as stated.",
+            mm=stated_mm(judgement.apart_mm),
         )
-    elif not judgement.small_angle:
-        yield tr(
-            "It contradicts nothing that is stated: scatter alone explains {mm} mm.",
-            mm=stated_mm(limit.repeatable_mm),
-        )
+    yield from _explained(judgement)
     if judgement.code:
         yield from _causes(None if measured is None else measured.accuracy)
     if judgement.small_angle:
         yield tr(
             "The tool was turned by {turn:.0f} degrees; less than 90 is not called tested.",
             turn=max(one.turn_deg for one in judgement.limits),
+        )
+
+
+def _explained(judgement: TurnJudgement) -> Iterator[str]:
+    """Yield how much of a drift the statements explain."""
+    limit = judgement.limits[judgement.worst]
+    if judgement.contradicts_accuracy:
+        yield tr(
+            "All that is stated explains {mm} mm, no more: the tip is not where it was measured.",
+            mm=stated_mm(limit.accurate_mm),
+        )
+    elif judgement.contradicts_repeatability and judgement.apart_mm is None:
+        yield tr(
+            "Scatter alone explains {mm} mm, no more: it does not repeat as stated.",
+            mm=stated_mm(limit.repeatable_mm),
+        )
+    elif not judgement.code and not judgement.small_angle:
+        yield tr(
+            "It contradicts nothing that is stated: scatter alone explains {mm} mm.",
+            mm=stated_mm(limit.repeatable_mm),
         )
 
 

@@ -5,8 +5,9 @@ in the test leaves what it found
 (docs/decisions/0060-a-change-is-taken-up-again-for-its-turn-test.md).
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Final
 
 from robolink.calibration import VerifyResult
@@ -21,9 +22,11 @@ from robolink.errors import (
 )
 from robolink.messages import joined, tr
 from robolink.model import Controller, Finding, Marker, MarkerKind, Verdict
+from robolink.nozzle_change._records import tests_on_record
+from robolink.nozzle_change._turn_question import Attended
 from robolink.nozzle_change._turn_verdict import conclude_turn_test
 from robolink.nozzle_change.open_turn_test.marking import OpenTurnTest, tests_of
-from robolink.procedures import TOUCH_CODES, MeasurementContext
+from robolink.procedures import TOUCH_CODES, KeptProof, MeasurementContext
 from robolink.runner import Operator
 from robolink.transaction import Settler
 
@@ -36,6 +39,7 @@ def finish_by_turn_test(
     operation: str,
     operator: Operator,
     *,
+    attended: bool = False,
     tell: Callable[[int, VerifyResult], None] = lambda _tool, _result: None,
 ) -> Finding:
     """Make the turn test of an open change, then keep its values or put the old ones back.
@@ -49,6 +53,8 @@ def finish_by_turn_test(
         controller: The controller, connected.
         operation: Of the marker of the change.
         operator: Who brings the tip onto the pin.
+        attended: Whether they are asked what follows where it contradicts the measurement, as in
+            the change itself; else the old values come back.
         tell: Told of each tool how its test ended.
 
     Returns:
@@ -107,8 +113,11 @@ def finish_by_turn_test(
             controller.preserved(tr("turn test")),
             _put_back_unless_kept(controller, marker),
         ):
-            for one in tests_of(marker):
-                _prove(controller, one, operator, tell)
+            proofs = {
+                one.test.tool: _prove(controller, one, operator, tell, attended=attended)
+                for one in tests_of(marker)
+            }
+            finding = _with_statements(finding, proofs)
             Settler(controller, keep=True).settle(finding)
     finally:
         outcomes.change = ""
@@ -133,24 +142,61 @@ def _open(controller: Controller, operation: str) -> tuple[Marker, Finding]:
     )
 
 
+def _with_statements(finding: Finding, proofs: Mapping[int, VerifyResult]) -> Finding:
+    """Return what was found with what each tip is accurate to by its turn test, for the record."""
+    entries = []
+    for entry in finding.entries:
+        proof = None if entry.tool is None else proofs.get(entry.tool)
+        said = {} if proof is None else {"accurate_to_mm": proof.accurate_to_mm}
+        entries.append(replace(entry, details={**entry.details, **said}))
+    return replace(finding, entries=tuple(entries))
+
+
 def _prove(
     controller: Controller,
     one: OpenTurnTest,
     operator: Operator,
     tell: Callable[[int, VerifyResult], None],
-) -> None:
-    """Make one test.
+    *,
+    attended: bool,
+) -> VerifyResult:
+    """Make one test; what this change has shown before counts too.
 
     Raises:
         VerifyError: It did not pass.
     """
-    tool = one.test.tool
-    controller.tools.select(tool)
+    test = one.test
+    controller.tools.select(test.tool)
     context = MeasurementContext(
         controller, operator, start=None, settings=lambda _start, _tip: one.settings
     )
+
+    def turned() -> VerifyResult:
+        with context.telling(lambda _done: None, tool=test.tool):
+            return _touches_counting(controller, test, context)
+
+    person = context.runner(tool=test.tool)
+    proof = turned()
+    return conclude_turn_test(
+        controller,
+        test.tool,
+        proof,
+        claim=test.claim,
+        interval_mm=test.interval_mm,
+        attended=Attended(person.choose, person.confirm, turned, test.relearning)
+        if attended
+        else None,
+        earlier=tests_on_record(controller.outcomes, test.tool, proof),
+        tell=lambda result: tell(test.tool, result),
+    )
+
+
+def _touches_counting(
+    controller: Controller, test: KeptProof, context: MeasurementContext
+) -> VerifyResult:
+    """Make a test; touches that were not made end it as a failed one."""
     try:
-        result = one.test.prove_after_a_break(context)
+        return test.prove_after_a_break(context)
     except CalibrationError as error:
         if error.code not in TOUCH_CODES:
             raise
@@ -160,9 +206,6 @@ def _prove(
             code=error.code,
             controller=controller.identity,
         ) from error
-    conclude_turn_test(
-        controller, tool, result, claim=one.test.claim, tell=lambda proof: tell(tool, proof)
-    )
 
 
 @contextmanager

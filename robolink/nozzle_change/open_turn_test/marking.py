@@ -15,6 +15,7 @@ from robolink.methods import find_method
 from robolink.model import Controller, Marker, MarkerKind, Verdict
 from robolink.nozzle_change._plan import Limits, ToolPlan
 from robolink.nozzle_change._proposal import Proposal
+from robolink.nozzle_change._turn_question import relearning_commands
 from robolink.procedures import KeepsProof, KeptProof, MeasurementContext
 from robolink.runner import RunSettings
 from robolink.transaction import Settler
@@ -81,7 +82,12 @@ def _kept(
         tip=proposal.tip,
         tolerance_mm=plan.criteria.drift_tolerance_mm,
     )
-    test = replace(test, claim=proposal.claim)
+    test = replace(
+        test,
+        claim=proposal.claim,
+        interval_mm=plan.criteria.interval_mm,
+        relearning=relearning_commands(context.controller, plan, proposal.result),
+    )
     settings = limits.settings(start, proposal.result.offset)
     if not all(map(math.isfinite, astuple(settings.box))):
         return "no_box"

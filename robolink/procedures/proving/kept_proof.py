@@ -25,6 +25,10 @@ class KeptProof(ABC):
         tip: Where the tip was found; it differs where a difference was written.
         tolerance_mm: Largest drift that passes.
         claim: What the measurement lets its drifts be; ``None`` where nothing tells it.
+        interval_mm: What the process allows the tip to be off; ``None`` for anything, 0 where
+            nobody wrote it down, so that nothing wider may be stated.
+        relearning: Commands that learn anew the station on whose place the measurement rests, each
+            after ``robolink`` and the name of the cell; empty for none.
     """
 
     method: ClassVar[str]
@@ -35,6 +39,8 @@ class KeptProof(ABC):
     tip: ToolOffset
     tolerance_mm: float
     claim: TurnClaim | None = None
+    interval_mm: float | None = 0.0
+    relearning: tuple[str, ...] = ()
 
     @abstractmethod
     def moves(self, here: Pose) -> int:

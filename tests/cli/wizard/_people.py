@@ -18,10 +18,26 @@ from robolink_cli.wizard.happenings import (
 )
 from robolink_cli.wizard.state import Header, WizardState
 
-from robolink.calibration import AccuracyFacts, assessed, solve_two_pose
+from robolink.calibration import (
+    AccuracyFacts,
+    Drift,
+    DriftLimits,
+    TurnJudgement,
+    VerifyResult,
+    assessed,
+    solve_two_pose,
+)
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
-from robolink.nozzle_change import LimitVerdict, Proposal, Seating, WriteSubject
+from robolink.nozzle_change import (
+    Attended,
+    LimitVerdict,
+    Proposal,
+    Seating,
+    WriteSubject,
+    told_of_contradiction,
+)
+from robolink.nozzle_change._turn_question import asked_what_follows
 from robolink.runner import FitRow, FitSubject, JogSubject, Question, TouchSubject
 
 ARRIVAL = Pose(249.992, 200.004, -81.563, 90.0, tool=0)
@@ -55,6 +71,26 @@ def write_subject(*tools):
     proposals = tuple(Proposal(tool, old, result, seating=Seating()) for tool in tools)
     verdict = LimitVerdict("implausible_change", tr("Change of the tip"), 0.391, 2.0)
     return WriteSubject(proposals, ((verdict,),) * len(tools))
+
+
+def contradicted(**more):
+    """Return the question of a turn test that contradicts its measurement, and its rows."""
+    limits = DriftLimits(repeatable_mm=0.016, accurate_mm=0.087, turn_deg=180.0)
+    judgement = TurnJudgement(
+        "proof_contradicts_accuracy", (limits,), **{"wider_mm": 0.107, **more}
+    )
+    proof = VerifyResult((Drift(180.0, 0.1, 0.0),), 0.2, inputs=(ARRIVAL,), judgement=judgement)
+    asked = []
+
+    def choose(question, offered):
+        asked.append((question, offered))
+        return 0
+
+    attended = Attended(choose, bool, lambda: proof, ("cell station learn BEAMS-02 --tool 15",))
+    said = told_of_contradiction(proof, judgement)
+    asked_what_follows(said, proof, judgement, attended, stated_mm=0.028, widest_mm=None)
+    ((question, offered),) = asked
+    return question, offered
 
 
 CHECK = CheckSubject(

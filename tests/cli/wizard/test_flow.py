@@ -20,6 +20,8 @@ from robolink_cli.wizard.happenings import (
     WizardCommand,
 )
 from robolink_cli.wizard.screens.choosing import choice_screen
+from robolink_cli.wizard.screens.drawing import screen_of
+from robolink_cli.wizard.screens.told import told_question
 from robolink_cli.wizard.screens.touching import instruction
 from robolink_cli.wizard.state import STEP_SIZES, LastScreen
 
@@ -30,6 +32,7 @@ from tests.cli.wizard._people import (
     ARRIVAL,
     CHECK,
     Sitting,
+    contradicted,
     fit_subject,
     touch_subject,
     write_subject,
@@ -517,3 +520,55 @@ def test_what_is_chosen_from_is_seen_however_much_there_is_to_be_read_above():
     text = "\n".join(rows)
     assert all(option in text for option in CHOICES)
     assert any(row.strip() == "..." for row in rows)
+
+
+def at_contradiction():
+    question, offered = contradicted()
+    return Sitting(in_tool=1).asked(offered, Question.CHOICE, question)
+
+
+def test_enter_at_a_contradicted_turn_test_is_the_old_value_and_never_another_row():
+    assert at_contradiction().key("enter").sent == ["1"]
+    assert at_contradiction().line("").sent == ["1"]
+    marked = at_contradiction().keys("2", "2", "2", "2")
+    assert marked.key("enter").sent == []
+    assert "ENTER does nothing here" in marked.state.message
+    assert marked.keys("5").sent == ["5"]
+
+
+@pytest.mark.parametrize("ends", ["stop", "0"])
+def test_who_stops_at_a_contradicted_turn_test_gets_the_old_value(ends):
+    assert at_contradiction().keys(ends).sent == ["q"]
+    assert at_contradiction().line("stop").sent == ["q"]
+
+
+@pytest.mark.parametrize("typed", ["N-0418", "y", "6", "0", "2 3", "\uff15x"])
+def test_what_is_no_number_of_a_row_decides_nothing_about_a_contradiction(typed):
+    hand = at_contradiction().line(typed)
+    assert hand.sent == []
+    assert hand.state.message == "Type the number of a row."
+    assert hand.line("\uff12").sent == ["2"], "a wide figure is one"
+
+
+def test_what_came_before_the_question_of_a_contradiction_answers_nothing():
+    question, offered = contradicted()
+    hand = Sitting()
+    hand.happens(WasRegarded(offered))
+    hand.happens(WasAsked(1, question, Question.CHOICE, 10.0))
+    assert hand.line("").sent == [], "the work does not wait yet"
+    hand.happens(WaitsForAnswer(1, 10.0))
+    hand.now = 10.2
+    assert hand.line("5").sent == []
+    assert hand.key("enter").sent == []
+    assert hand.key("main").sent == []
+    hand.now = 10.4
+    assert hand.line("2").sent == ["2"]
+
+
+def test_after_a_list_a_yes_or_no_is_asked_for_itself():
+    hand = at_contradiction().line("5")
+    hand.asked(None, Question.YES_NO, "Keep the value?")
+    assert hand.line("5").sent == ["5"]
+    assert told_question(hand.state) == "Keep the value? [y or n]"
+    assert "[1] Yes" in screen_of(hand.state, hand.now).rows()[-1]
+    assert hand.line("n").sent == ["5", "n"]

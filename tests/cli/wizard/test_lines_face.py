@@ -141,3 +141,32 @@ def test_motors_that_are_off_are_switched_on_from_the_list(hand, simulator):
     assert simulator.machine.motors_on
     hand.type("n")
     assert hand.terminal.end() == 9
+
+
+@pytest.mark.soak
+def test_a_bumped_pin_is_asked_about_and_enter_alone_brings_the_old_value_back(url, simulator):
+    words = ("calibrate", "two-pose", "--tool", "1", "--sigma", "0.01", "-c", url)
+    terminal = Terminal(*words, controlling=True)
+    hand, before = LineHand(terminal, simulator), stored(simulator)
+    try:
+        hand.start()
+        hand.touch()
+        hand.touch()
+        terminal.wait_for("tool number")
+        time.sleep(0.35)
+        hand.type("1")
+        x_mm, y_mm, z_mm = simulator.world.pin_mm
+        simulator.world.pin_mm = (x_mm + 0.11, y_mm, z_mm)
+        hand.touch()
+        hand.touch()
+        hand.type("4")  # typed ahead: the value would be kept
+        terminal.wait_for("Typed too early|Enter alone: 1")
+        time.sleep(0.6)
+        assert stored(simulator) != before
+        hand.type("")
+        code = terminal.end()
+    finally:
+        terminal.close()
+    assert code == 8, terminal.shown
+    assert "The old value of tool 1 is back." in terminal.shown
+    assert stored(simulator) == before

@@ -25,7 +25,7 @@ from wcwidth import wcswidth
 
 from robolink import messages
 from robolink.calibration import Drift, DriftLimits, TurnJudgement, VerifyResult, impact_on
-from robolink.errors import DeclinedError, OutcomeUnknownError
+from robolink.errors import DeclinedError, OutcomeUnknownError, VerifyError
 from robolink.locale.languages import CHINESE, ENGLISH, translator
 from robolink.messages import spoken, tr
 from robolink.methods import find_method
@@ -38,6 +38,7 @@ from tests.cli.wizard._people import (
     ARRIVAL,
     CHECK,
     Sitting,
+    contradicted,
     fit_subject,
     touch_subject,
     write_subject,
@@ -199,6 +200,13 @@ def recovering():
     return Sitting(WizardState(Header("line3", "Recover"))).asked(subject, Question.TEXT, question)
 
 
+def turn_test_asks():
+    """A turn test that contradicts its measurement: what is to follow."""
+    question, offered = contradicted()
+    hand = Sitting(replace(Sitting().state, accepted=True), in_tool=1)
+    return hand.asked(offered, Question.CHOICE, question)
+
+
 def taught():
     """What the proposal does at fifteen points."""
     (proposal,) = write_subject(1).proposals
@@ -298,6 +306,7 @@ SCREENS = {
     "first touch": lambda: Sitting().asked(touch_subject(number=1, arrival=None)),
     "turn test": lambda: Sitting(in_tool=1).asked(touch_subject(limit_mm=0.2, total=None)),
     "turn test more": turning_on,
+    "turn test asks": turn_test_asks,
     "fit": lambda: Sitting().asked(
         fit_subject(0.006, 0.004, 0.131, 0.007, worst=2), Question.YES_NO
     ),
@@ -447,3 +456,28 @@ def test_a_path_that_is_wider_than_the_screen_is_shown_to_its_end():
     rows = list(broken(f"Saved in {path}"))
     assert max(map(len, rows)) <= 80
     assert "".join(rows).replace(" ", "") == f"Savedin{path}"
+
+
+def test_the_next_command_after_a_contradiction_learns_the_station_where_that_was_chosen():
+    error = VerifyError("Contradicted.", code="proof_contradicts_accuracy")
+    header = Header("line3", "Change needle", command="robolink -c line3 change n.toml")
+    again = ended(header, error).state.ended
+    assert again is not None
+    assert again.lines[-1] == "Next: robolink -c line3 change n.toml"
+    error.next_commands = "calibrate two-pose --tool 1", "cell station learn B --tool 1"
+    learning = ended(header, error).state.ended
+    assert learning is not None
+    assert learning.lines[-2:] == (
+        'Next: robolink -c "line3" calibrate two-pose --tool 1',
+        'Next: robolink -c "line3" cell station learn B --tool 1',
+    )
+
+
+def test_lines_show_each_row_of_a_contradicted_turn_test_and_what_enter_does():
+    hand = turn_test_asks()
+    told = told_before(hand.state)
+    assert told[0] == "  1 Put the old value back."
+    assert told[2] == "  2 Touch once more."
+    assert told_question(hand.state).endswith(
+        "What should happen now? [Type the number of a row. Enter alone: 1.]"
+    )

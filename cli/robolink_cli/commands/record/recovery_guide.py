@@ -253,7 +253,9 @@ class TurnTests:
             self._agreed(tests)
             tool, clock = tests[0].test.tool, self._controller.clock
             with operator_at(None, lambda: tool, clock) as person:  # noqa: B023 - used inside the turn
-                yield finish_by_turn_test(self._controller, operation, person, tell=_tell)
+                yield finish_by_turn_test(
+                    self._controller, operation, person, attended=True, tell=_tell
+                )
 
     def _agreed(self, tests: "tuple[OpenTurnTest, ...]") -> None:
         settings = tests[0].settings

@@ -129,7 +129,7 @@ class LineFace:
         if self._lines is None:
             self._lines = open_lines()
         self._forget(QUIET_S)
-        if kind in (Question.YES_NO, Question.TEXT):
+        if kind in (Question.YES_NO, Question.TEXT, Question.CHOICE):
             for row in told_before(state):
                 _put(row)
 

@@ -35,7 +35,8 @@ def choice_screen(state: WizardState, subject: ChoiceSubject, now_s: float) -> S
         ("0", subject.leaves or tr("Leave")),
     )
     return Screen(
-        title_row(state, subject.step, JobStep.CHOOSE),
+        # What is chosen after the write belongs to the turn test.
+        title_row(state, subject.step, JobStep.TURN_TEST if state.accepted else JobStep.CHOOSE),
         (*above, "", state.question.text, *rows, *(["", *told] if told else ())),
         keys,
         status=status_row(state, now_s) if state.reading is not None else "",

@@ -7,7 +7,7 @@ from robolink.calibration import (
     turn_test_headline,
     turn_test_sentences,
 )
-from robolink.errors import DeclinedError, OutcomeUnknownError, RobolinkError
+from robolink.errors import DeclinedError, OutcomeUnknownError, RobolinkError, VerifyError
 from robolink.messages import joined, tr
 from robolink.model import describe_offset, describe_standing
 from robolink.nozzle_change import ChangeReport, ToolReport, next_steps
@@ -152,9 +152,14 @@ def _where(state: WizardState) -> list[str]:
 
 
 def _next(state: WizardState, error: RobolinkError) -> list[str]:
-    """Return the one command to go on with, where it is known; a blocked robot takes no other."""
+    """Return the commands to go on with, where they are known; a blocked robot takes one only."""
     if standing_after(error).left_open or isinstance(error, OutcomeUnknownError):
         command = f'robolink -c "{state.header.cell}" recover'
+    elif isinstance(error, VerifyError) and error.next_commands:
+        return [
+            tr("Next: {command}", command=f'robolink -c "{state.header.cell}" {command}')
+            for command in error.next_commands
+        ]
     else:
         command = state.header.command
     return [tr("Next: {command}", command=command)] if command else []

@@ -65,6 +65,12 @@ def told_question(state: WizardState) -> str:
 
 
 def _choice(question: str, subject: ChoiceSubject) -> str:
+    if subject.safe is not None:
+        return tr(
+            "{question} [Type the number of a row. Enter alone: {safe}.]",
+            question=question,
+            safe=subject.safe + 1,
+        )
     if not subject.other:
         return tr("{question} [Type the number of a row. To leave: stop.]", question=question)
     english = subject.other == ENGLISH

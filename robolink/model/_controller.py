@@ -61,6 +61,11 @@ class ControllerStatus:
     code: int = 0
 
     @property
+    def needs_reset(self) -> bool:
+        """Whether a reset comes before anything else; one does not clear a serious fault."""
+        return (self.emergency_stop or self.fault) and not self.serious_fault
+
+    @property
     def state(self) -> ControllerState:
         """The worst thing that is true."""
         checks = (

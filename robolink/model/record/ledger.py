@@ -74,6 +74,7 @@ class Ledger:
         self._holds: dict[int, ToolOffset | None] = {}
         self._requested: dict[int, ToolOffset | None] = {}
         self._selected: int | None = None
+        self._reset_first = False
         self._whole = Account()
         self._accounts = [self._whole]
         self._unkept: list[Account] = []
@@ -156,6 +157,11 @@ class Ledger:
                     del self._doubts[deed.marker.operation]
                 self._selected = tool
 
+    def saw_status(self, *, needs_reset: bool) -> None:
+        """Note whether the controller needs a reset, as its state was read."""
+        with self._lock:
+            self._reset_first = needs_reset
+
     # What stands.
 
     @contextmanager
@@ -219,6 +225,7 @@ class Ledger:
                 moving=tuple(deed.marker.request for deed in moves),
                 settled=not unproved and not standing,
                 left_open=bool(self._open) or standing,
+                reset_first=self._reset_first,
             )
 
     def _tool(self, tool: int, before: ToolOffset | None) -> ToolStanding:

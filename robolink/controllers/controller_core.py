@@ -169,7 +169,7 @@ class ControllerCore(ABC):
         """Read the state flags; others see by it that this process is alive."""
         self._driver.markers.beat()
         status = self._read_status()
-        self.ledger.saw_status(needs_reset=status.needs_reset)
+        self.ledger.saw_status(status, self.clock.now_ns())
         return status
 
     def stop(self) -> None:

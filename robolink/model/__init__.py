@@ -8,8 +8,6 @@ if TYPE_CHECKING:
     from robolink.model._controller import Act as Act
     from robolink.model._controller import Capabilities as Capabilities
     from robolink.model._controller import Controller as Controller
-    from robolink.model._controller import ControllerState as ControllerState
-    from robolink.model._controller import ControllerStatus as ControllerStatus
     from robolink.model._controller_cameras import ControllerSensor as ControllerSensor
     from robolink.model._controller_cameras import LookingController as LookingController
     from robolink.model._identity import ControllerFacts as ControllerFacts
@@ -26,6 +24,8 @@ if TYPE_CHECKING:
     from robolink.model._people import PersonRole as PersonRole
     from robolink.model._people import require_engineer as require_engineer
     from robolink.model._secret import Secret as Secret
+    from robolink.model._status import ControllerState as ControllerState
+    from robolink.model._status import ControllerStatus as ControllerStatus
     from robolink.model._tools import ANY as ANY
     from robolink.model._tools import Expect as Expect
     from robolink.model._tools import Expected as Expected
@@ -111,8 +111,9 @@ else:
     __getattr__ = lazy_exports(
         __name__,
         {
-            "_controller": "Act Capabilities Controller ControllerState ControllerStatus",
+            "_controller": "Act Capabilities Controller",
             "_controller_cameras": "ControllerSensor LookingController",
+            "_status": "ControllerState ControllerStatus",
             "record.findings": "Finding Resolver Verdict",
             "motion.custom_kinematics": (
                 "AxisKind AxisPositions FlangeFrame ISMKinematicsWithOrientationImage "

@@ -6,19 +6,18 @@ a local socket, for its own user only, and stops on request. Where the system ha
 or the path is too long for one, it listens on the loopback address, and a token in a file that only
 this user can read opens it.
 
-The thread that listens is the only one that robolink starts on its own; it does nothing but
-``controller.stop()``, which any thread may call.
+The thread that listens does nothing but ``controller.stop()``, which any thread may call. Who only
+wants to look asks another socket, with a thread of its own: it answers with the state that was read
+last and its age, reads nothing for it and takes no lock, so that neither the work nor a stop waits
+for those who look on.
 """
 
 import json
 import os
-import selectors
 import socket
-import threading
-import time
 from collections.abc import Callable
 from contextlib import suppress
-from pathlib import Path
+from dataclasses import asdict
 from typing import Final, Protocol
 
 from robolink import ambient
@@ -28,17 +27,10 @@ from robolink.files.durable import make_folder, state_folder
 from robolink.messages import tr
 from robolink.model import ControllerStatus, is_own_name
 from robolink.stopping._far_end import far_end_of
+from robolink.stopping._local_socket import LocalServer, tell
+from robolink.timing import NS_PER_S
 
 KIND: Final = "holders"
-MOST_BYTES: Final = 4096
-"""Nothing that is asked or answered here is longer."""
-
-_HEARD_S: Final = 1.0
-_LAST_STOP_S: Final = 10.0
-"""Longest wait for a stop under way before the controller is left."""
-
-_LONGEST_PATH: Final = 100
-"""Bytes of a socket's path; Linux takes 107, others 103."""
 
 
 class Stoppable(Protocol):
@@ -49,6 +41,13 @@ class Stoppable(Protocol):
 
     def status(self) -> ControllerStatus:
         """Read its state."""
+
+
+class Seen(Protocol):
+    """What was seen of a controller last; looked up by another thread, without a lock."""
+
+    def __call__(self) -> tuple[ControllerStatus, int] | None:
+        """Return the state, and how many nanoseconds old it is; ``None`` for never."""
 
 
 class StopListener(ClosedAtExit):
@@ -64,6 +63,7 @@ class StopListener(ClosedAtExit):
             that a stop finds it by another address, too; empty where that is not known.
         heard: Called with who asked for it, in the listener's thread, after the stop; what it
             raises is lost.
+        seen: What others may see of it; ``None`` lets nobody look.
 
     Raises:
         OSError: There is no place to listen.
@@ -86,81 +86,67 @@ class StopListener(ClosedAtExit):
         who: str = "",
         name: str = "",
         heard: Callable[[str], None] | None = None,
+        seen: Seen | None = None,
     ) -> None:
         self._controller = controller
         self._heard = heard
-        self._token = ambient.random_bytes(16).hex()
+        self._seen = seen
+        token = ambient.random_bytes(16).hex()
         folder = state_folder(KIND)
         make_folder(folder)
-        file = f"{os.getpid()}-{self._token[:8]}"
+        file = f"{os.getpid()}-{token[:8]}"
         own = name if is_own_name(name) else ""
         self._card = folder / f"{file}.json"
-        self._socket, self._path = _listening(folder / f"{file}.sock")
-        self._wake, self._awake = socket.socketpair()
+        self._servers = [LocalServer(folder / f"{file}.sock", token, self._stop, "robolink-stop")]
         card: dict[str, object] = {
             "keys": sorted(far_end_of(url) | ({own} if own else set())),
             "controller": own,
-            "place": self._path or list(self._socket.getsockname()),
-            "token": self._token,
+            "place": self._servers[0].place,
+            "token": token,
             "pid": os.getpid(),
             "who": who,
         }
-        self._publish(card)
-        self._thread = threading.Thread(target=self._listen, name="robolink-stop", daemon=True)
-        self._thread.start()
+        try:
+            if seen is not None:
+                look = LocalServer(folder / f"{file}.look", token, self._show, "robolink-look")
+                self._servers.append(look)
+                card["look"] = look.place
+            self._publish(card)
+        except BaseException:
+            self._end_servers()
+            raise
 
     def close(self) -> None:
         """Stop listening, after a stop that is under way has been answered. Idempotent."""
-        with suppress(OSError):
-            self._wake.send(b"\0")
-        self._thread.join(_LAST_STOP_S)
+        self._end_servers()
         self._card.unlink(missing_ok=True)
-        if self._path:
-            Path(self._path).unlink(missing_ok=True)
-        self._close_sockets()
 
-    def _close_sockets(self) -> None:
-        for one in (self._socket, self._wake, self._awake):
-            one.close()
+    def _end_servers(self) -> None:
+        for server in self._servers:
+            server.close()
 
     def _publish(self, card: dict[str, object]) -> None:
         """Write where to knock; not synced to the disk, because it dies with the process."""
-        try:
-            draft = self._card.with_suffix(".new")
-            descriptor = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-            with open(descriptor, "w", encoding="utf-8") as file:
-                json.dump(card, file)
-            os.replace(draft, self._card)
-        except BaseException:
-            self._close_sockets()
-            raise
+        draft = self._card.with_suffix(".new")
+        descriptor = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+        with open(descriptor, "w", encoding="utf-8") as file:
+            json.dump(card, file)
+        os.replace(draft, self._card)
 
-    def _listen(self) -> None:
-        # No plain select: it takes no descriptor above 1023, and whoever holds us may have more.
-        with selectors.DefaultSelector() as selector:
-            for one in (self._socket, self._awake):
-                selector.register(one, selectors.EVENT_READ)
-            while self._awake not in [key.fileobj for key, _ in selector.select()]:
-                with suppress(OSError):  # whoever knocked has left
-                    caller, _ = self._socket.accept()
-                    with caller:
-                        caller.settimeout(_HEARD_S)
-                        self._serve(caller)
+    def _show(self, caller: socket.socket, _asked: dict[str, object]) -> None:
+        found = self._seen() if self._seen else None
+        if found is None:
+            tell(caller, {"status": None})
+        else:
+            tell(caller, {"status": asdict(found[0]), "age_s": found[1] / NS_PER_S})
 
-    def _serve(self, caller: socket.socket) -> None:
-        asked = _read_line(caller)
-        from hmac import compare_digest  # here, because nobody knocks on most commands
-
-        # As bytes: it refuses to compare text that is not ASCII, with an error that would end us.
-        shown = str(asked.get("token", "")).encode("utf-8", "surrogatepass")
-        if not compare_digest(shown, self._token.encode()):
-            return
-        _tell(caller, {"taken": True})
+    def _stop(self, caller: socket.socket, asked: dict[str, object]) -> None:
+        tell(caller, {"taken": True})
         try:
             self._controller.stop()
-            _tell(caller, {"state": str(self._controller.status().state)})
+            tell(caller, {"state": str(self._controller.status().state)})
         except RobolinkError as error:
-            _tell(
+            tell(
                 caller,
                 {"error": type(error).__name__, "what": error.what, "remedy": error.remedy},
             )
@@ -168,47 +154,9 @@ class StopListener(ClosedAtExit):
             what = tr(
                 "A defect in robolink: {kind}: {error}", kind=type(error).__name__, error=error
             )
-            _tell(caller, {"error": "OutcomeUnknownError", "what": what, "remedy": ""})
+            tell(caller, {"error": "OutcomeUnknownError", "what": what, "remedy": ""})
         # Last: a console that is held up must not hold up a stop. And one that fails ends nothing:
         # how the stop ended has been told, and the next one has to be heard.
         with suppress(Exception):
             if self._heard:
                 self._heard(str(asked.get("who", "")))
-
-
-def _listening(path: Path) -> tuple[socket.socket, str]:
-    """Return a listening socket, and its path where it has one."""
-    family = getattr(socket, "AF_UNIX", None)
-    if family is not None and len(os.fsencode(path)) <= _LONGEST_PATH:
-        listening = socket.socket(family, socket.SOCK_STREAM)
-        try:
-            listening.bind(str(path))
-            path.chmod(0o600)  # the folder was its owner's alone before
-            listening.listen()
-        except OSError:
-            listening.close()
-        else:
-            return listening, str(path)
-    return socket.create_server(("127.0.0.1", 0)), ""
-
-
-def _read_line(caller: socket.socket) -> dict[str, object]:
-    data = b""
-    # One deadline for the whole line: whoever drips bytes must not keep the next one waiting.
-    until = time.monotonic() + _HEARD_S
-    while not data.endswith(b"\n") and len(data) < MOST_BYTES:
-        caller.settimeout(max(until - time.monotonic(), 0.001))
-        piece = caller.recv(MOST_BYTES - len(data))
-        if not piece:
-            break
-        data += piece
-    try:
-        asked = json.loads(data)
-    except (ValueError, RecursionError):
-        return {}
-    return asked if isinstance(asked, dict) else {}
-
-
-def _tell(caller: socket.socket, answer: dict[str, object]) -> None:
-    with suppress(OSError):  # whoever asked has left; the stop goes on
-        caller.sendall(json.dumps(answer).encode() + b"\n")

@@ -34,11 +34,20 @@ if TYPE_CHECKING:
 @click.command()
 @looking_options
 def status(context: CliContext) -> None:
-    """Show what the controller is doing. Reads only; legal while production runs."""
+    """Show what the controller is doing. Reads only; legal while production runs.
+
+    A controller that serves one client is not asked while another robolink of this computer has
+    it: who that is, and what it saw last, is shown instead.
+    """
+    from robolink_cli.session.looking_on import seen_by_another
     from robolink_cli.session.selected_tool import note_doubts
     from robolink_cli.views.documents import status_payload
-    from robolink_cli.views.tables import show_status
+    from robolink_cli.views.tables import show_seen, show_status
 
+    beside = seen_by_another(context.require_url())
+    if beside is not None:
+        context.emit("status-beside", beside, lambda: show_seen(beside))
+        return
     with open_controller(context, looks=True) as controller:
         payload = status_payload(controller)
         note_doubts(payload, controller, context.expected)

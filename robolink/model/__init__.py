@@ -98,6 +98,7 @@ if TYPE_CHECKING:
     from robolink.model.record.journal_entries import answered_by_in_words as answered_by_in_words
     from robolink.model.record.ledger import Account as Account
     from robolink.model.record.ledger import Ledger as Ledger
+    from robolink.model.record.marker_words import begun_in_words as begun_in_words
     from robolink.model.record.method_names import finding_named_now as finding_named_now
     from robolink.model.record.method_names import method_name_now as method_name_now
     from robolink.model.record.method_names import with_method_name_now as with_method_name_now
@@ -133,6 +134,7 @@ else:
             "_optional_parts": (
                 "AlarmList DigitalIo PointReader Value ValueReceipt ValueT VariableTable"
             ),
+            "record.marker_words": "begun_in_words",
             "record.method_names": "finding_named_now method_name_now with_method_name_now",
             "record.outcomes": "ClientRun Marker MarkerKind OutcomeLog new_operation",
             "_people": "PersonRole require_engineer",

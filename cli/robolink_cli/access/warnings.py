@@ -88,7 +88,7 @@ def marker_notice(marker: "Marker", url: str) -> str:
 
 
 def _notice(marker: "Marker", url: str, back: str) -> str:
-    from robolink.model import MarkerKind
+    from robolink.model import MarkerKind, begun_in_words
 
     if marker.kind is MarkerKind.HISTORY:
         return _record_missing(marker, url)
@@ -96,14 +96,14 @@ def _notice(marker: "Marker", url: str, back: str) -> str:
         return tr(
             "Not finished since {when}: {request}.\n  Next: {commands}",
             when=local_label(marker.begun_at),
-            request=marker.request,
+            request=begun_in_words(marker),
             commands=back,
         )
     return tr(
         "Sent {when} without a clear answer: {request}. It may or may not have run, so the "
         "robot stays blocked.\n  Next: {commands}",
         when=local_label(marker.begun_at),
-        request=marker.request,
+        request=begun_in_words(marker),
         commands=back,
     )
 
@@ -156,12 +156,14 @@ def _selected_now(controller: "Controller", marker: "Marker") -> str:
 
 
 def _unfinished(marker: "Marker", back: str, now: str) -> str:
+    from robolink.model import begun_in_words
+
     before = str(marker.details.get("tool", "?"))
     parts = [
         tr(
             "Not finished since {when}: {request}.",
             when=local_label(marker.begun_at),
-            request=marker.request,
+            request=begun_in_words(marker),
         )
     ]
     if now == before:

@@ -29,8 +29,13 @@ def show_status(payload: Mapping[str, object]) -> None:
             say(f"  {state_word(key)}: {payload[key]}")
 
 
-def show_seen(payload: Mapping[str, object]) -> None:
-    """Print what the process that has the controller saw of it last, and how old that is."""
+def show_seen(payload: Mapping[str, object], named: str) -> None:
+    """Print what the process that has the controller saw of it last, and how old that is.
+
+    Args:
+        payload: The document of it.
+        named: How the person names the controller.
+    """
     say(tr("{holder} has this controller.", holder=payload["held_by"]))
     age_s = payload["age_s"]
     if not isinstance(age_s, float):
@@ -45,7 +50,7 @@ def show_seen(payload: Mapping[str, object]) -> None:
         )
     )
     _show_flags(payload)
-    say(tr("To stop it: robolink -c {url} stop", url=payload["controller"]))
+    say(tr('To stop it: robolink -c "{url}" stop', url=named))
 
 
 def _show_flags(payload: Mapping[str, object]) -> None:

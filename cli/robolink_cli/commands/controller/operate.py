@@ -44,9 +44,10 @@ def status(context: CliContext) -> None:
     from robolink_cli.views.documents import status_payload
     from robolink_cli.views.tables import show_seen, show_status
 
+    named = context.expected.cell if context.expected else context.require_url()
     beside = seen_by_another(context.require_url())
     if beside is not None:
-        context.emit("status-beside", beside, lambda: show_seen(beside))
+        context.emit("status-beside", beside, lambda: show_seen(beside, named))
         return
     with open_controller(context, looks=True) as controller:
         payload = status_payload(controller)

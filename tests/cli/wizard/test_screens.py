@@ -238,6 +238,14 @@ def test_after_an_emergency_stop_the_reset_comes_before_recover():
     )
 
 
+@pytest.mark.parametrize(("role", "offered"), [("", True), ("engineer", True), ("operator", False)])
+def test_an_operator_is_not_offered_what_takes_an_engineer(role, offered):
+    report = done().state.report
+    assert report is not None
+    shown = ended(Header("line3", "Change needle"), report=replace(report, role=role))
+    assert any("undo" in line for line in shown.state.ended.lines) is offered
+
+
 def test_what_was_refused_is_not_proposed_again():
     error = ConfigError("The recipe is for another cell.", remedy="Nothing was sent.")
     shown = ended(Header("line3", "Change needle", command="robolink change n.toml"), error)

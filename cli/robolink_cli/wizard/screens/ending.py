@@ -16,7 +16,7 @@ from robolink.errors import (
     VerifyError,
 )
 from robolink.messages import joined, tr
-from robolink.model import describe_offset, describe_standing
+from robolink.model import PersonRole, describe_offset, describe_standing
 from robolink.nozzle_change import ChangeReport, ToolReport, next_steps
 from robolink.standing import UNTOUCHED, standing_after
 from robolink_cli.access.warnings import way_back
@@ -41,12 +41,13 @@ def done_lines(state: WizardState, report: ChangeReport) -> list[str]:
     )
     lines.append(record)
     if any(one.receipt is not None for one in report.tools):
-        back = tr(
-            'To take it back: robolink -c "{cell}" undo {id}',
-            cell=state.header.cell,
-            id=report.change[:8],
-        )
-        lines.append(back)
+        if report.role != PersonRole.OPERATOR:
+            back = tr(
+                'To take it back: robolink -c "{cell}" undo {id}',
+                cell=state.header.cell,
+                id=report.change[:8],
+            )
+            lines.append(back)
         lines.append(tr("Run the first part slowly and look at it."))
     for one in report.tools:
         if one.receipt is not None:

@@ -94,13 +94,38 @@ def _usual_s(ends: Iterable[Recorded]) -> float | None:
 
 
 def _changes_left(loaded: LoadedRecipe, journal: "Journal", address: str) -> int | None:
+    return min(changes_left_of(loaded, journal, address).values(), default=None)
+
+
+def changes_left_of(loaded: LoadedRecipe, journal: "Journal", address: str) -> dict[int, int]:
+    """Return after how many more changes a full calibration is due, by tool; 0 for now.
+
+    Tools of which the record does not say it are left out.
+
+    Args:
+        loaded: The recipe.
+        journal: The journal; it is read.
+        address: Under which address the journal knows the controller.
+
+    Raises:
+        JournalError: It cannot be read.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from robolink.journal import memory_journal
+        >>> from robolink.recipe import changes_left_of, load_recipe
+        >>> from robolink_simulators.testkit.recipes import written_recipe
+        >>> loaded = load_recipe(written_recipe(Path.cwd()))
+        >>> changes_left_of(loaded, memory_journal("left-example"), "epson+tcp://192.168.0.1:5000")
+        {}
+    """
     recipe = loaded.recipe
     tells = recipe.source.of_method.changes_left
     if tells is None or journal.robots_of(address):
-        return None  # of several robots it is not known here which one is meant
+        return {}  # of several robots it is not known here which one is meant
     from robolink.recipe._plans import parameters_of
 
-    left = []
+    left = {}
     for tool in recipe.tools:
         holds = journal.last_value(address, tool.number)
         history = ToolHistory(
@@ -110,6 +135,7 @@ def _changes_left(loaded: LoadedRecipe, journal: "Journal", address: str) -> int
             sigma_mm=recipe.tolerances.sigma_mm,
             interval_mm=recipe.tolerances.interval_mm,
         )
-        left.append(tells(parameters_of(recipe), history))
-    known = [one for one in left if one is not None]
-    return min(known, default=None)
+        found = tells(parameters_of(recipe), history)
+        if found is not None:
+            left[tool.number] = found
+    return left

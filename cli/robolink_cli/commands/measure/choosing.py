@@ -114,7 +114,7 @@ def choose_recipe(
         ConfigError: There is none, or it is wrong.
         DeclinedError: The person leaves.
     """
-    paths = _recipes(cell)
+    paths = recipes_at(cell)
     loaded: list[LoadedRecipe] = []
 
     def ask() -> tuple[str, ChoiceSubject]:
@@ -231,11 +231,16 @@ def _told_of(loaded: "LoadedRecipe", past: "RecipePast") -> tuple[str, ...]:
             )
         )
     if past.changes_left is not None:
-        said.append(_due(past.changes_left))
+        said.append(due_in(past.changes_left))
     return tuple(said)
 
 
-def _due(left: int) -> str:
+def due_in(left: int) -> str:
+    """Return after how many more changes a full calibration is due, in words.
+
+    Args:
+        left: So many, 0 for now.
+    """
     if left == 0:
         return tr("A full calibration is due now.")
     if left == 1:
@@ -243,7 +248,12 @@ def _due(left: int) -> str:
     return tr("A full calibration is due after {n} more changes.", n=left)
 
 
-def _recipes(cell: "Cell | None") -> list[Path]:
+def recipes_at(cell: "Cell | None") -> list[Path]:
+    """Return the files of recipes beside the cell file and in the working folder.
+
+    Args:
+        cell: The cell, ``None`` where only a URL is known.
+    """
     roots = [Path.cwd()]
     if cell is not None and "url" in cell.origins:
         roots.insert(0, cell.origins["url"].parent)

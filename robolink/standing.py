@@ -63,6 +63,8 @@ class Standing:
         left_open: Whether ``recover`` has something to do: what is not settled, or another tool
             than the cell's own that is still selected. The next command that moves or writes is
             refused until then.
+        reset_first: Whether the controller, as it was seen last, needs a reset before anything
+            else: ``recover`` is refused until then.
     """
 
     tools: Mapping[int, ToolStanding] = field(default_factory=dict)
@@ -75,6 +77,7 @@ class Standing:
     moving: tuple[str, ...] = ()
     settled: bool = True
     left_open: bool = False
+    reset_first: bool = False
 
     @property
     def effect(self) -> Effect:
@@ -127,6 +130,7 @@ class Standing:
             moving=(*self.moving, *later.moving),
             settled=self.settled and later.settled,
             left_open=self.left_open or later.left_open,
+            reset_first=later.reset_first,
         )
 
     def put_back(self) -> "Standing":

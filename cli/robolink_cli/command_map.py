@@ -53,7 +53,7 @@ _LOOK_BACK: Final = {
 }
 
 _SET_UP: Final = {
-    "cell": (f"{GROUPS}:cell", "list show check doctor scan people station accuracy"),
+    "cell": (f"{GROUPS}:cell", "list new show tools check doctor scan people station accuracy"),
     "sim": (f"{SIMULATE}.sim:sim", declared("Simulated controllers to practise on")),
     "demo": (
         f"{SIMULATE}.demo:demo",

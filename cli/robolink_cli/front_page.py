@@ -48,4 +48,7 @@ class FrontPage(LazyGroup):
             formatter.dedent()
         formatter.write_paragraph()
         formatter.write_text(tr("First time here? robolink demo. More: robolink expert --help"))
+        formatter.write_text(
+            tr("Pages to read: robolink docs. Recipes to begin with: robolink recipe list")
+        )
         self.format_epilog(ctx, formatter)

@@ -71,7 +71,14 @@ class LazyGroup(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Return the command that was typed; say it when it has another name today."""
-        found = super().resolve_command(ctx, args)
+        try:
+            found = super().resolve_command(ctx, args)
+        except click.exceptions.NoSuchCommand as error:
+            # click looks among the commands that are loaded only.
+            names = [*self.list_commands(ctx), *(self._unlisted.keys() - self.renamed.keys())]
+            raise click.exceptions.NoSuchCommand(
+                error.command_name, error.message, names, error.ctx
+            ) from None
         if args[0] in self.renamed and not ctx.resilient_parsing and sys.stderr.isatty():
             typed = " ".join([*ctx.command_path.split()[1:], args[0]])
             now = self.renamed[args[0]][1]

@@ -124,13 +124,21 @@ def check_file(path: Path) -> tuple[Problem, ...]:
     Raises:
         ConfigError: It cannot be read, or is no TOML.
     """
+    return problems_in(read_document(path))
+
+
+def problems_in(document: dict[str, object]) -> tuple[Problem, ...]:
+    """Return everything that is wrong in what a cell file says.
+
+    Args:
+        document: All of the file.
+    """
     from pydantic import ValidationError
 
     from robolink.config._accuracy_settings import AccuracySettings
     from robolink.config._settings import CellFile, CellSettings
     from robolink.config._station_settings import station_keys
 
-    document = read_document(path)
     cells = document.get("cells")
     names = [
         Problem(

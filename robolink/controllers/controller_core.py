@@ -170,7 +170,9 @@ class ControllerCore(ABC):
     def status(self) -> ControllerStatus:
         """Read the state flags; others see by it that this process is alive."""
         self._driver.markers.beat()
-        return self._read_status()
+        status = self._read_status()
+        self.ledger.saw_status(status, self.clock.now_ns())
+        return status
 
     def stop(self) -> None:
         """Bring everything to rest; from any thread, at any time, more than once.

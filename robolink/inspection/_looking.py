@@ -18,6 +18,7 @@ from robolink.model import (
     ControllerStatus,
     EntryKind,
     ToolOffset,
+    begun_in_words,
 )
 from robolink.stations import find_stations
 from robolink.timing import local_label
@@ -113,7 +114,7 @@ def _unsettled(controller: Controller) -> Iterator[InspectionFinding]:
             tr(
                 "Not finished since {when}: {request}.",
                 when=local_label(marker.begun_at),
-                request=marker.request,
+                request=begun_in_words(marker),
             ),
             tr("Next: robolink recover"),
         )

@@ -10,8 +10,6 @@ if TYPE_CHECKING:
     from robolink.model._controller import Act as Act
     from robolink.model._controller import Capabilities as Capabilities
     from robolink.model._controller import Controller as Controller
-    from robolink.model._controller import ControllerState as ControllerState
-    from robolink.model._controller import ControllerStatus as ControllerStatus
     from robolink.model._controller_cameras import ControllerSensor as ControllerSensor
     from robolink.model._controller_cameras import LookingController as LookingController
     from robolink.model._identity import ControllerFacts as ControllerFacts
@@ -29,6 +27,8 @@ if TYPE_CHECKING:
     from robolink.model._people import refuse_operator as refuse_operator
     from robolink.model._people import require_engineer as require_engineer
     from robolink.model._secret import Secret as Secret
+    from robolink.model._status import ControllerState as ControllerState
+    from robolink.model._status import ControllerStatus as ControllerStatus
     from robolink.model._tools import ANY as ANY
     from robolink.model._tools import Expect as Expect
     from robolink.model._tools import Expected as Expected
@@ -101,6 +101,7 @@ if TYPE_CHECKING:
     from robolink.model.record.journal_entries import answered_by_in_words as answered_by_in_words
     from robolink.model.record.ledger import Account as Account
     from robolink.model.record.ledger import Ledger as Ledger
+    from robolink.model.record.marker_words import begun_in_words as begun_in_words
     from robolink.model.record.method_names import finding_named_now as finding_named_now
     from robolink.model.record.method_names import method_name_now as method_name_now
     from robolink.model.record.method_names import with_method_name_now as with_method_name_now
@@ -115,8 +116,9 @@ else:
         __name__,
         {
             "_change_limits": "ChangeGuard ChangeLimits",
-            "_controller": "Act Capabilities Controller ControllerState ControllerStatus",
+            "_controller": "Act Capabilities Controller",
             "_controller_cameras": "ControllerSensor LookingController",
+            "_status": "ControllerState ControllerStatus",
             "record.findings": "Finding Resolver Verdict",
             "motion.custom_kinematics": (
                 "AxisKind AxisPositions FlangeFrame ISMKinematicsWithOrientationImage "
@@ -136,6 +138,7 @@ else:
             "_optional_parts": (
                 "AlarmList DigitalIo PointReader Value ValueReceipt ValueT VariableTable"
             ),
+            "record.marker_words": "begun_in_words",
             "record.method_names": "finding_named_now method_name_now with_method_name_now",
             "record.outcomes": "ClientRun Marker MarkerKind OutcomeLog new_operation",
             "_people": "PersonRole refuse_operator require_engineer",

@@ -179,7 +179,8 @@ class NozzleChange:
             )
         measuring.go_to(plan.safe, tr("Moving to the safe pose."))
         listener.moment(Moment.END, context)
-        return ChangeReport(self._controller.outcomes.change, reports)
+        outcomes = self._controller.outcomes
+        return ChangeReport(outcomes.change, reports, outcomes.signature.role)
 
     def _agreed(
         self, context: MeasurementContext, measuring: Measuring, *, write: bool

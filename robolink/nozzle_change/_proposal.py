@@ -163,10 +163,12 @@ class ChangeReport:
     Attributes:
         change: Its id in the journal.
         tools: One report a tool, in the order of the plan.
+        role: The role at this cell of the person who made it; empty where the cell names no people.
     """
 
     change: str
     tools: tuple[ToolReport, ...]
+    role: str = ""
 
 
 class Moment(StrEnum):

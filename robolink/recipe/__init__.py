@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from robolink.recipe._answers import Answers as Answers
     from robolink.recipe._answers import require_answers as require_answers
     from robolink.recipe._past import RecipePast as RecipePast
+    from robolink.recipe._past import changes_left_of as changes_left_of
     from robolink.recipe._past import pasts_of as pasts_of
     from robolink.recipe._run import RecipeRun as RecipeRun
     from robolink.recipe.file.method_tables import MethodTable as MethodTable
@@ -37,6 +38,7 @@ _LOADED_LATER = {
     "Answers": "_answers",
     "require_answers": "_answers",
     "RecipePast": "_past",
+    "changes_left_of": "_past",
     "pasts_of": "_past",
     "RecipeRun": "_run",
     "MethodTable": "file.method_tables",

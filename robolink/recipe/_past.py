@@ -24,8 +24,8 @@ class RecipePast:
     """What is on record of a recipe.
 
     Attributes:
-        last: The end of the last change with it from this computer, on any controller; ``None``
-            for none.
+        last: The end of the last change with it on this controller; ``None`` for none.
+        elsewhere: The same on another controller, where it was never used on this one.
         usual_s: How many seconds a change with it takes on this controller, from its first
             movement to the end of its test: the median of the last ones; ``None`` where it was
             never done, or no record says how long it took.
@@ -34,6 +34,7 @@ class RecipePast:
     """
 
     last: Recorded | None = None
+    elsewhere: Recorded | None = None
     usual_s: float | None = None
     changes_left: int | None = None
 
@@ -47,7 +48,7 @@ def pasts_of(
         recipes: The recipes.
         journal: The journal; it is read.
         address: Under which address the journal knows the controller, empty where none is known:
-            then only ``last`` is told.
+            then nothing is told.
 
     Raises:
         JournalError: It cannot be read.
@@ -58,17 +59,28 @@ def pasts_of(
         >>> pasts_of([], memory_journal("pasts-example"), "epson+tcp://192.168.0.1:5000")
         ()
     """
+    if not address:
+        return (RecipePast(),) * len(recipes)
     entries = list(journal.entries(kinds=KEPT, limit=_LOOKED_AT))
-    here = journal.names_of(address) if address else ()
-    return tuple(
-        RecipePast(
-            next((one for one in ends if one.kind is EntryKind.DONE), None),
-            _usual_s(one for one in ends if one.controller in here),
-            _changes_left(loaded, journal, address) if address else None,
+    names = journal.names_of(address)
+    found = []
+    for loaded in recipes:
+        ends = [one for one in entries if one.signature.recipe == loaded.name]
+        here = [one for one in ends if one.controller in names]
+        last = _last_done(here)
+        found.append(
+            RecipePast(
+                last,
+                _last_done(ends) if last is None else None,
+                _usual_s(here),
+                _changes_left(loaded, journal, address),
+            )
         )
-        for loaded in recipes
-        for ends in ([one for one in entries if one.signature.recipe == loaded.name],)
-    )
+    return tuple(found)
+
+
+def _last_done(ends: Iterable[Recorded]) -> Recorded | None:
+    return next((one for one in ends if one.kind is EntryKind.DONE), None)
 
 
 def _usual_s(ends: Iterable[Recorded]) -> float | None:
@@ -82,13 +94,38 @@ def _usual_s(ends: Iterable[Recorded]) -> float | None:
 
 
 def _changes_left(loaded: LoadedRecipe, journal: "Journal", address: str) -> int | None:
+    return min(changes_left_of(loaded, journal, address).values(), default=None)
+
+
+def changes_left_of(loaded: LoadedRecipe, journal: "Journal", address: str) -> dict[int, int]:
+    """Return after how many more changes a full calibration is due, by tool; 0 for now.
+
+    Tools of which the record does not say it are left out.
+
+    Args:
+        loaded: The recipe.
+        journal: The journal; it is read.
+        address: Under which address the journal knows the controller.
+
+    Raises:
+        JournalError: It cannot be read.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from robolink.journal import memory_journal
+        >>> from robolink.recipe import changes_left_of, load_recipe
+        >>> from robolink_simulators.testkit.recipes import written_recipe
+        >>> loaded = load_recipe(written_recipe(Path.cwd()))
+        >>> changes_left_of(loaded, memory_journal("left-example"), "epson+tcp://192.168.0.1:5000")
+        {}
+    """
     recipe = loaded.recipe
     tells = recipe.source.of_method.changes_left
     if tells is None or journal.robots_of(address):
-        return None  # of several robots it is not known here which one is meant
+        return {}  # of several robots it is not known here which one is meant
     from robolink.recipe._plans import parameters_of
 
-    left = []
+    left = {}
     for tool in recipe.tools:
         holds = journal.last_value(address, tool.number)
         history = ToolHistory(
@@ -98,6 +135,7 @@ def _changes_left(loaded: LoadedRecipe, journal: "Journal", address: str) -> int
             sigma_mm=recipe.tolerances.sigma_mm,
             interval_mm=recipe.tolerances.interval_mm,
         )
-        left.append(tells(parameters_of(recipe), history))
-    known = [one for one in left if one is not None]
-    return min(known, default=None)
+        found = tells(parameters_of(recipe), history)
+        if found is not None:
+            left[tool.number] = found
+    return left

@@ -61,8 +61,9 @@ class RecipeRun:
 
     Raises:
         CalibrationError: ``rank_deficient``: this robot cannot tilt its tool, and would have to.
-        ConfigError: Neither the recipe nor the station's record says where the station is, the
-            recipe takes no reference, or a person would have to touch where only is measured.
+        ConfigError: The recipe is for another cell, neither it nor the station's record says
+            where the station is, it takes no reference, or a person would have to touch where
+            only is measured.
 
     Example:
         >>> from pathlib import Path
@@ -93,6 +94,7 @@ class RecipeRun:
         order: Order | None = None,
         describe: DescribeReport | None = None,
     ) -> None:
+        _require_cell(loaded, cell)
         if measure_only:
             _require_sensor(loaded)
         self._controller = controller
@@ -258,6 +260,30 @@ class RecipeRun:
                     accept_jump=way(Way.ACCEPT_JUMP),
                 ),
             )
+
+
+def _require_cell(loaded: LoadedRecipe, cell: Cell | None) -> None:
+    name, cells = cell.name if cell else "", ", ".join(loaded.recipe.cells)
+    if loaded.recipe.is_for(name):
+        return
+    raise ConfigError(
+        tr(
+            "The recipe {recipe!r} is for {cells}, not for {cell}.",
+            recipe=loaded.name,
+            cells=cells,
+            cell=name,
+        )
+        if name
+        else tr(
+            "The recipe {recipe!r} is for {cells}; no cell is named here.",
+            recipe=loaded.name,
+            cells=cells,
+        ),
+        remedy=tr(
+            "Choose a recipe of this cell, or name the cell; 'cells' in the recipe says "
+            "which it is for. Nothing was sent."
+        ),
+    )
 
 
 def _require_sensor(loaded: LoadedRecipe) -> None:

@@ -12,6 +12,7 @@ from robolink.lazy_exports import lazy_exports
 if TYPE_CHECKING:
     from robolink.stopping._asking import ControllerHolder as ControllerHolder
     from robolink.stopping._asking import HolderGoneError as HolderGoneError
+    from robolink.stopping._asking import LastSeen as LastSeen
     from robolink.stopping._asking import holders_of as holders_of
     from robolink.stopping._far_end import far_end_of as far_end_of
     from robolink.stopping._listener import StopListener as StopListener
@@ -23,7 +24,7 @@ else:
     __getattr__ = lazy_exports(
         __name__,
         {
-            "_asking": "ControllerHolder HolderGoneError holders_of",
+            "_asking": "ControllerHolder HolderGoneError LastSeen holders_of",
             "_far_end": "far_end_of",
             "_listener": "StopListener",
             "_notes": "StopNote clear_note find_note leave_note",

@@ -8,11 +8,14 @@ from collections.abc import Iterator, Set
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from robolink import errors
 from robolink.files.durable import state_folder
 from robolink.messages import tr
+
+if TYPE_CHECKING:
+    from robolink.model import ControllerStatus
 
 KIND: Final = "holders"
 MOST_BYTES: Final = 65_536
@@ -22,6 +25,19 @@ _TAKEN_S: Final = 1.0
 
 _RESTS_S: Final = 8.0
 """Longest wait for the end of a stop that was taken: five seconds to rest, and the exchanges."""
+
+
+@dataclass(frozen=True, slots=True)
+class LastSeen:
+    """What a process that has a controller saw of it last.
+
+    Attributes:
+        status: The state flags.
+        age_s: How many seconds ago it read them.
+    """
+
+    status: "ControllerStatus"
+    age_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +51,7 @@ class ControllerHolder:
         who: Who it is, and what it does, as a person is told.
         controller: Which controller that is, as it said of itself; empty where it did not.
         card: The file that says so.
+        look: Where to look at what it saw last; ``None`` where it lets nobody look.
     """
 
     place: str | tuple[str, int]
@@ -43,6 +60,40 @@ class ControllerHolder:
     who: str
     controller: str
     card: Path
+    look: str | tuple[str, int] | None = None
+
+    def last_seen(self) -> LastSeen | None:
+        """Return what it saw of its controller last; ``None`` where it has not read it yet.
+
+        Nothing is read from the controller for it, and the work there does not wait.
+
+        Raises:
+            HolderGoneError: It does not answer, or lets nobody look.
+        """
+        if self.look is None:
+            raise HolderGoneError(self.pid)
+        try:
+            with _reached(self.look) as line, line.makefile("rwb") as talk:
+                talk.write(json.dumps({"token": self.token}).encode() + b"\n")
+                talk.flush()
+                said = _answer(talk.readline(MOST_BYTES))
+        except OSError as error:
+            raise HolderGoneError(self.pid) from error
+        return self._understood(said)
+
+    def _understood(self, said: dict[str, object]) -> LastSeen | None:
+        from robolink.model import ControllerStatus  # here, because a stop needs none of it
+
+        try:
+            status = said["status"]
+            if status is None:
+                return None
+            if not isinstance(status, dict):
+                raise TypeError
+            known = {key: status[key] for key in ControllerStatus.__dataclass_fields__}
+            return LastSeen(ControllerStatus(**known), float(str(said["age_s"])))
+        except (KeyError, TypeError, ValueError) as error:
+            raise HolderGoneError(self.pid) from error
 
     def ask_to_stop(self, who: str) -> str:
         """Let it stop its controller; return the state that shows rest.
@@ -75,17 +126,7 @@ class ControllerHolder:
         return self._state(end)
 
     def _knock(self) -> socket.socket:
-        if isinstance(self.place, str):
-            line = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        else:
-            line = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-        line.settimeout(_TAKEN_S)
-        try:
-            line.connect(self.place)
-        except OSError:
-            line.close()
-            raise
-        return line
+        return _reached(self.place)
 
     def _state(self, end: dict[str, object]) -> str:
         if "state" in end:
@@ -150,13 +191,41 @@ def _read(card: Path, keys: Set[str]) -> ControllerHolder | None:
             return None
         if _is_gone(pid):
             card.unlink()
-            card.with_suffix(".sock").unlink(missing_ok=True)
+            for suffix in (".sock", ".look"):
+                card.with_suffix(suffix).unlink(missing_ok=True)
             return None
-        where = place if isinstance(place, str) else (str(place[0]), int(place[1]))
-        controller = str(said.get("controller", ""))
-        return ControllerHolder(where, str(said["token"]), pid, str(said["who"]), controller, card)
+        look = said.get("look")
+        return ControllerHolder(
+            _place(place),
+            str(said["token"]),
+            pid,
+            str(said["who"]),
+            str(said.get("controller", "")),
+            card,
+            None if look is None else _place(look),
+        )
     except (OSError, ValueError, TypeError, KeyError, IndexError, RecursionError):
         return None
+
+
+def _place(said: object) -> str | tuple[str, int]:
+    if isinstance(said, list):
+        return str(said[0]), int(said[1])
+    return str(said)
+
+
+def _reached(place: str | tuple[str, int]) -> socket.socket:
+    if isinstance(place, str):
+        line = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    else:
+        line = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    line.settimeout(_TAKEN_S)
+    try:
+        line.connect(place)
+    except OSError:
+        line.close()
+        raise
+    return line
 
 
 def _is_gone(pid: int) -> bool:

@@ -6,8 +6,10 @@ a local socket, for its own user only, and stops on request. Where the system ha
 or the path is too long for one, it listens on the loopback address, and a token in a file that only
 this user can read opens it.
 
-The thread that listens is the only one that robolink starts on its own; it does nothing but
-``controller.stop()``, which any thread may call.
+The thread that listens does nothing but ``controller.stop()``, which any thread may call. Who only
+wants to look asks another socket, with a thread of its own: it answers with the state that was read
+last and its age, reads nothing for it and takes no lock, so that neither the work nor a stop waits
+for those who look on.
 """
 
 import json
@@ -18,6 +20,7 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import asdict
 from pathlib import Path
 from typing import Final, Protocol
 
@@ -28,17 +31,22 @@ from robolink.files.durable import make_folder, state_folder
 from robolink.messages import tr
 from robolink.model import ControllerStatus, is_own_name
 from robolink.stopping._far_end import far_end_of
+from robolink.timing import NS_PER_S
 
 KIND: Final = "holders"
+
 MOST_BYTES: Final = 4096
-"""Nothing that is asked or answered here is longer."""
+"""Nothing that is asked here is longer."""
 
 _HEARD_S: Final = 1.0
-_LAST_STOP_S: Final = 10.0
-"""Longest wait for a stop under way before the controller is left."""
+_LAST_ANSWER_S: Final = 10.0
+"""Longest wait for an answer under way before the socket is closed."""
 
 _LONGEST_PATH: Final = 100
 """Bytes of a socket's path; Linux takes 107, others 103."""
+
+Answer = Callable[[socket.socket, dict[str, object]], None]
+"""Answers one who has the token."""
 
 
 class Stoppable(Protocol):
@@ -49,6 +57,13 @@ class Stoppable(Protocol):
 
     def status(self) -> ControllerStatus:
         """Read its state."""
+
+
+class Seen(Protocol):
+    """What was seen of a controller last; looked up by another thread, without a lock."""
+
+    def __call__(self) -> tuple[ControllerStatus, int] | None:
+        """Return the state, and how many nanoseconds old it is; ``None`` for never."""
 
 
 class StopListener(ClosedAtExit):
@@ -64,6 +79,7 @@ class StopListener(ClosedAtExit):
             that a stop finds it by another address, too; empty where that is not known.
         heard: Called with who asked for it, in the listener's thread, after the stop; what it
             raises is lost.
+        seen: What others may see of it; ``None`` lets nobody look.
 
     Raises:
         OSError: There is no place to listen.
@@ -86,75 +102,61 @@ class StopListener(ClosedAtExit):
         who: str = "",
         name: str = "",
         heard: Callable[[str], None] | None = None,
+        seen: Seen | None = None,
     ) -> None:
         self._controller = controller
         self._heard = heard
-        self._token = ambient.random_bytes(16).hex()
+        self._seen = seen
+        token = ambient.random_bytes(16).hex()
         folder = state_folder(KIND)
         make_folder(folder)
-        file = f"{os.getpid()}-{self._token[:8]}"
+        file = f"{os.getpid()}-{token[:8]}"
         own = name if is_own_name(name) else ""
         self._card = folder / f"{file}.json"
-        self._socket, self._path = _listening(folder / f"{file}.sock")
-        self._wake, self._awake = socket.socketpair()
+        self._servers = [_LocalServer(folder / f"{file}.sock", token, self._stop, "robolink-stop")]
         card: dict[str, object] = {
             "keys": sorted(far_end_of(url) | ({own} if own else set())),
             "controller": own,
-            "place": self._path or list(self._socket.getsockname()),
-            "token": self._token,
+            "place": self._servers[0].place,
+            "token": token,
             "pid": os.getpid(),
             "who": who,
         }
-        self._publish(card)
-        self._thread = threading.Thread(target=self._listen, name="robolink-stop", daemon=True)
-        self._thread.start()
+        try:
+            if seen is not None:
+                look = _LocalServer(folder / f"{file}.look", token, self._show, "robolink-look")
+                self._servers.append(look)
+                card["look"] = look.place
+            self._publish(card)
+        except BaseException:
+            self._end_servers()
+            raise
 
     def close(self) -> None:
         """Stop listening, after a stop that is under way has been answered. Idempotent."""
-        with suppress(OSError):
-            self._wake.send(b"\0")
-        self._thread.join(_LAST_STOP_S)
+        self._end_servers()
         self._card.unlink(missing_ok=True)
-        if self._path:
-            Path(self._path).unlink(missing_ok=True)
-        self._close_sockets()
 
-    def _close_sockets(self) -> None:
-        for one in (self._socket, self._wake, self._awake):
-            one.close()
+    def _end_servers(self) -> None:
+        for server in self._servers:
+            server.close()
 
     def _publish(self, card: dict[str, object]) -> None:
         """Write where to knock; not synced to the disk, because it dies with the process."""
-        try:
-            draft = self._card.with_suffix(".new")
-            descriptor = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-            with open(descriptor, "w", encoding="utf-8") as file:
-                json.dump(card, file)
-            os.replace(draft, self._card)
-        except BaseException:
-            self._close_sockets()
-            raise
+        draft = self._card.with_suffix(".new")
+        descriptor = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+        with open(descriptor, "w", encoding="utf-8") as file:
+            json.dump(card, file)
+        os.replace(draft, self._card)
 
-    def _listen(self) -> None:
-        # No plain select: it takes no descriptor above 1023, and whoever holds us may have more.
-        with selectors.DefaultSelector() as selector:
-            for one in (self._socket, self._awake):
-                selector.register(one, selectors.EVENT_READ)
-            while self._awake not in [key.fileobj for key, _ in selector.select()]:
-                with suppress(OSError):  # whoever knocked has left
-                    caller, _ = self._socket.accept()
-                    with caller:
-                        caller.settimeout(_HEARD_S)
-                        self._serve(caller)
+    def _show(self, caller: socket.socket, _asked: dict[str, object]) -> None:
+        found = self._seen() if self._seen else None
+        if found is None:
+            _tell(caller, {"status": None})
+        else:
+            _tell(caller, {"status": asdict(found[0]), "age_s": found[1] / NS_PER_S})
 
-    def _serve(self, caller: socket.socket) -> None:
-        asked = _read_line(caller)
-        from hmac import compare_digest  # here, because nobody knocks on most commands
-
-        # As bytes: it refuses to compare text that is not ASCII, with an error that would end us.
-        shown = str(asked.get("token", "")).encode("utf-8", "surrogatepass")
-        if not compare_digest(shown, self._token.encode()):
-            return
+    def _stop(self, caller: socket.socket, asked: dict[str, object]) -> None:
         _tell(caller, {"taken": True})
         try:
             self._controller.stop()
@@ -174,6 +176,73 @@ class StopListener(ClosedAtExit):
         with suppress(Exception):
             if self._heard:
                 self._heard(str(asked.get("who", "")))
+
+
+class _LocalServer(ClosedAtExit):
+    """Hears one after the other, in a thread of its own; a context manager.
+
+    Args:
+        path: Where to listen, if that can be.
+        token: What opens it.
+        answer: What is answered; it raises nothing.
+        name: Of the thread.
+
+    Raises:
+        OSError: There is no place to listen.
+    """
+
+    def __init__(self, path: Path, token: str, answer: Answer, name: str) -> None:
+        self._token, self._answer = token, answer
+        self._socket, self._path = _listening(path)
+        self._wake, self._awake = socket.socketpair()
+        self._thread = threading.Thread(target=self._listen, name=name, daemon=True)
+        self._thread.start()
+
+    @property
+    def place(self) -> str | list[object]:
+        """Path of the socket, or address and port."""
+        return self._path or list(self._socket.getsockname())
+
+    def close(self) -> None:
+        """Stop listening, after an answer that is under way. Idempotent."""
+        with suppress(OSError):
+            self._wake.send(b"\0")
+        self._thread.join(_LAST_ANSWER_S)
+        if self._path:
+            Path(self._path).unlink(missing_ok=True)
+        for one in (self._socket, self._wake, self._awake):
+            one.close()
+
+    def _listen(self) -> None:
+        # No plain select: it takes no descriptor above 1023, and whoever holds us may have more.
+        with selectors.DefaultSelector() as selector:
+            for one in (self._socket, self._awake):
+                selector.register(one, selectors.EVENT_READ)
+            while self._awake not in [key.fileobj for key, _ in selector.select()]:
+                with suppress(OSError):  # whoever knocked has left
+                    caller, _ = self._socket.accept()
+                    with caller:
+                        self._hear(caller)
+
+    def _hear(self, caller: socket.socket) -> None:
+        asked = _read_line(caller)
+        from hmac import compare_digest  # here, because nobody knocks on most commands
+
+        # As bytes: it refuses to compare text that is not ASCII, with an error that would end us.
+        shown = str(asked.get("token", "")).encode("utf-8", "surrogatepass")
+        if compare_digest(shown, self._token.encode()):
+            self._answer(caller, asked)
+
+
+def _tell(caller: socket.socket, answer: dict[str, object]) -> None:
+    """Send one line; whoever asked may have left.
+
+    Args:
+        caller: Who asked.
+        answer: The line, plain JSON.
+    """
+    with suppress(OSError):
+        caller.sendall(json.dumps(answer).encode() + b"\n")
 
 
 def _listening(path: Path) -> tuple[socket.socket, str]:
@@ -207,8 +276,3 @@ def _read_line(caller: socket.socket) -> dict[str, object]:
     except (ValueError, RecursionError):
         return {}
     return asked if isinstance(asked, dict) else {}
-
-
-def _tell(caller: socket.socket, answer: dict[str, object]) -> None:
-    with suppress(OSError):  # whoever asked has left; the stop goes on
-        caller.sendall(json.dumps(answer).encode() + b"\n")

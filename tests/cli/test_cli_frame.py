@@ -16,7 +16,7 @@ from robolink_cli.session.opening import open_controller
 
 import robolink
 from robolink.errors import NotReadyError, NotReadyReason
-from robolink.model import Ledger, Marker, MarkerKind
+from robolink.model import ControllerStatus, Ledger, Marker, MarkerKind
 from robolink.stop_latch import StopLatch
 
 URL = "epson+tcp://192.0.2.1:5000"
@@ -168,6 +168,9 @@ class UnfinishedController:
 
     def at_work(self):
         return ""
+
+    def status(self):
+        return ControllerStatus(guard_open=True)
 
     def selected(self):
         raise NotReadyError("The safety guard is open.", reason=NotReadyReason.GUARD_OPEN)

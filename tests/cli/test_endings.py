@@ -207,7 +207,8 @@ def test_a_write_that_stays_unsettled_is_6_though_a_signal_ended_it(ended, simul
     code, out, err = ended(act, "--json")
     assert code == 6
     assert json.loads(out)["error"]["ended_by"] == "SIGTERM"
-    assert err.splitlines()[-1].endswith("Next: robolink recover.")
+    last = err.splitlines()[-1]
+    assert last.endswith("Next: robolink robot reset, then robolink recover.")
 
 
 def test_a_list_that_is_cut_off_by_its_reader_is_no_news_to_him(ended):

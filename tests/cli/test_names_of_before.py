@@ -130,6 +130,32 @@ def test_the_first_page_has_at_most_twelve_entries_and_names_what_is_there(capsy
     assert shown == list(entries)
 
 
+@pytest.mark.parametrize(
+    ("typed", "offered"),
+    [
+        (["chnage"], "'change'"),
+        (["tool", "lst"], "'list'"),
+        (["robot", "rset"], "'reset'"),
+        (["recieps"], "'recipe'"),
+        (["xyzzy"], ""),
+    ],
+)
+def test_a_name_that_is_mistyped_gets_one_of_today_suggested(typed, offered, capsys):
+    assert main.run(typed) == 2
+    said = capsys.readouterr().err
+    assert offered in said
+    assert ("Did you mean" in said) is bool(offered)
+    assert "recalibrate" not in said
+
+
+def test_the_first_page_names_the_pages_and_the_recipes(capsys):
+    assert main.run(["--help"]) == 0
+    page = capsys.readouterr().out
+    for words in (["docs"], ["recipe", "list"]):
+        assert f"robolink {' '.join(words)}" in page
+        assert main.run(words) == 0
+
+
 def test_old_names_are_offered_nowhere():
     assert not set(main.cli.list_commands(click.Context(main.cli))) & set(RENAMED)
     assert config.list_commands(click.Context(config)) == []

@@ -12,8 +12,9 @@ from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 
 import robolink
 from robolink.errors import OutcomeUnknownError, RejectedError, StoppedError
-from robolink.model import MotionProfile, WorkBox
+from robolink.model import ControllerStatus, MotionProfile, WorkBox
 from robolink.stopping import HolderGoneError, StopListener, far_end_of, holders_of
+from robolink.timing import NS_PER_S
 
 
 @pytest.fixture(params=["path", "loopback"])
@@ -198,3 +199,45 @@ def test_what_a_dead_process_left_is_taken_away(tmp_path):
         assert not gone.exists()
         gone.write_text("{")
         assert len(list(holders_of(far_end_of(url)))) == 1
+
+
+def test_who_looks_on_sees_what_was_read_last_and_its_age_and_nothing_is_read_for_it(controller):
+    aged = controller.clock.now_ns() - 3 * NS_PER_S
+    with StopListener(controller, url_of(controller), seen=lambda: None):
+        assert holder_of(controller).last_seen() is None
+    now = controller.status()
+    seen = [(now, controller.clock.now_ns() - aged)]
+    with StopListener(controller, url_of(controller), seen=lambda: seen[0]):
+        before, holder = controller.exchanges, holder_of(controller)
+        found = [holder.last_seen() for _ in range(50)]
+        assert {one and one.status for one in found} == {now}
+        assert all(one and one.age_s >= 3.0 for one in found)
+        assert controller.exchanges == before
+    with StopListener(controller, url_of(controller)), pytest.raises(HolderGoneError):
+        holder_of(controller).last_seen()
+
+
+def test_a_look_is_answered_while_a_stop_is_under_way_and_by_a_thread_that_holds_no_lock():
+    began, let_go = threading.Event(), threading.Event()
+
+    class Slow:
+        def stop(self):
+            began.set()
+            assert let_go.wait(30)
+
+        def status(self):
+            return ControllerStatus(remote=True, ready=True)
+
+    url = "epson+tcp://127.0.0.1:5000"
+    with StopListener(Slow(), url, seen=lambda: (ControllerStatus(paused=True), 0)):
+        (holder,) = holders_of(far_end_of(url))
+        ended: list[str] = []
+        stopping = threading.Thread(target=lambda: ended.append(holder.ask_to_stop("anna")))
+        stopping.start()
+        assert began.wait(30)
+        found = holder.last_seen()
+        assert found is not None
+        assert found.status.paused
+        let_go.set()
+        stopping.join(30)
+    assert ended == ["ready"]

@@ -6,12 +6,13 @@ import subprocess
 import sys
 import tomllib
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from robolink.config import Cell
 from robolink.errors import ConfigError
 from robolink.methods import (
     BeamsParameters,
@@ -28,13 +29,16 @@ from robolink.methods import (
 from robolink.nozzle_change import AcceptanceCriteria, Limits, Moment
 from robolink.procedures import TWO_ANGLES_DEG, LookPlan, TouchPlan
 from robolink.recipe import (
+    LoadedRecipe,
     Output,
     Prompt,
     Recipe,
+    RecipeRun,
     check_recipe,
     load_recipe,
 )
 from robolink.recipe._loading import _checked
+from robolink.testing import MemoryController
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "recipes").iterdir())
 KINDS = (
@@ -388,3 +392,23 @@ def test_whatever_stands_in_a_place_is_accepted_or_told(data):
     recipe, problems = _checked(document)
     assert (recipe is None) <= bool(problems)
     assert all(problem.where and problem.what for problem in problems)
+
+
+def of_cells(*cells):
+    return Recipe.model_validate({**tomllib.loads(LEAST), "cells": cells})
+
+
+def test_a_recipe_that_names_no_cell_is_for_every_cell():
+    assert of_cells().is_for("")
+    assert of_cells().is_for("mixer")
+    assert of_cells("line3", "mixer").is_for("mixer")
+
+
+def test_a_recipe_for_another_cell_is_refused_before_anything_is_looked_at():
+    loaded: Any = LoadedRecipe(of_cells("line3", "line4"), Path("a.toml"), "")
+    nobody: Any = None
+    with pytest.raises(ConfigError, match="is for line3, line4; no cell is named"):
+        RecipeRun(MemoryController(), loaded, operator=nobody)
+    mixer = Cell("mixer", "memory://", settings=nobody, origins={})
+    with pytest.raises(ConfigError, match="is for line3, line4, not for mixer"):
+        RecipeRun(MemoryController(), loaded, operator=nobody, cell=mixer)

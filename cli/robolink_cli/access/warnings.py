@@ -25,11 +25,36 @@ def note_unsettled(controller: "Controller", markers: "Sequence[Marker]", url: s
 
     if not markers or note_at_work(controller.outcomes, url):
         return
+    back = way_back(url, reset_first=_needs_reset(controller))
     for marker in markers:
         if marker.kind is MarkerKind.SELECTION:
-            note(_unfinished(marker, url, _selected_now(controller, marker)))
+            note(_unfinished(marker, back, _selected_now(controller, marker)))
         else:
-            note(marker_notice(marker, url))
+            note(_notice(marker, url, back))
+
+
+def way_back(url: str, *, reset_first: bool) -> str:
+    """Return the commands that settle what was left open, in the order that works.
+
+    A controller in its error state, and one whose emergency stop was released without a reset,
+    refuses what ``recover`` has to ask it.
+
+    Args:
+        url: How a person names the controller.
+        reset_first: Whether it needs a reset.
+    """
+    if reset_first:
+        return f'robolink -c "{url}" robot reset, then robolink -c "{url}" recover'
+    return f'robolink -c "{url}" recover'
+
+
+def _needs_reset(controller: "Controller") -> bool:
+    """Return whether a reset comes first: read, or else as it was seen last."""
+    from robolink.errors import RobolinkError
+
+    with suppress(RobolinkError):
+        return controller.status().needs_reset
+    return controller.ledger.standing().reset_first
 
 
 def note_at_work(outcomes: "OutcomeLog", url: str) -> bool:
@@ -56,23 +81,30 @@ def marker_notice(marker: "Marker", url: str) -> str:
     """Return the sentences about an unsettled marker, and the command that settles it."""
     from robolink.model import MarkerKind
 
+    back = way_back(url, reset_first=False)
     if marker.kind is MarkerKind.SELECTION:
-        return _unfinished(marker, url, str(marker.details.get("now", "?")))
+        return _unfinished(marker, back, str(marker.details.get("now", "?")))
+    return _notice(marker, url, back)
+
+
+def _notice(marker: "Marker", url: str, back: str) -> str:
+    from robolink.model import MarkerKind, begun_in_words
+
     if marker.kind is MarkerKind.HISTORY:
         return _record_missing(marker, url)
     if marker.kind is MarkerKind.CHANGE:
         return tr(
-            'Not finished since {when}: {request}.\n  Next: robolink -c "{url}" recover',
+            "Not finished since {when}: {request}.\n  Next: {commands}",
             when=local_label(marker.begun_at),
-            request=marker.request,
-            url=url,
+            request=begun_in_words(marker),
+            commands=back,
         )
     return tr(
         "Sent {when} without a clear answer: {request}. It may or may not have run, so the "
-        'robot stays blocked.\n  Next: robolink -c "{url}" recover',
+        "robot stays blocked.\n  Next: {commands}",
         when=local_label(marker.begun_at),
-        request=marker.request,
-        url=url,
+        request=begun_in_words(marker),
+        commands=back,
     )
 
 
@@ -123,13 +155,15 @@ def _selected_now(controller: "Controller", marker: "Marker") -> str:
         return now
 
 
-def _unfinished(marker: "Marker", url: str, now: str) -> str:
+def _unfinished(marker: "Marker", back: str, now: str) -> str:
+    from robolink.model import begun_in_words
+
     before = str(marker.details.get("tool", "?"))
     parts = [
         tr(
             "Not finished since {when}: {request}.",
             when=local_label(marker.begun_at),
-            request=marker.request,
+            request=begun_in_words(marker),
         )
     ]
     if now == before:
@@ -143,12 +177,11 @@ def _unfinished(marker: "Marker", url: str, now: str) -> str:
             )
         )
     if now == before:
-        remedy = tr('Next: robolink -c "{url}" recover', url=url)
+        remedy = tr("Next: {command}", command=back)
     else:
         remedy = tr(
-            "This puts tool {tool} back, with the earlier power mode and speed: "
-            'robolink -c "{url}" recover',
-            url=url,
+            "This puts tool {tool} back, with the earlier power mode and speed: {commands}",
+            commands=back,
             tool=before,
         )
     return f"{' '.join(parts)}\n  {remedy}"

@@ -37,7 +37,15 @@ _ROBOT: Final = {
 
 _CELL: Final = {
     "list": (f"{COMPUTER}.config:list_cells", declared("The cells that have a name here.")),
+    "new": (
+        f"{COMPUTER}.new_cell:new_cell",
+        declared("Write a new cell into a cell file; asks what it needs."),
+    ),
     "show": (f"{COMPUTER}.config:show", declared("All settings that count for one cell.")),
+    "tools": (
+        f"{MEASURE}.cell_tools:cell_tools",
+        declared("All tools of a cell: value, last change, age, and what is due."),
+    ),
     "check": (
         f"{COMPUTER}.cell_check:check",
         declared(

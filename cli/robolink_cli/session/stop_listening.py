@@ -11,7 +11,7 @@ from robolink.messages import tr
 from robolink_cli.console.render import note
 
 if TYPE_CHECKING:
-    from robolink.model import Controller
+    from robolink.model import Controller, ControllerStatus
     from robolink_cli.session.context import CliContext
 
 
@@ -36,7 +36,14 @@ def listening_for_stop(
         with suppress(RobolinkError):
             name = controller.outcomes.identity
     try:
-        listener = StopListener(controller, url, who=_who(context), name=name, heard=_say_who)
+        listener = StopListener(
+            controller,
+            url,
+            who=_who(context),
+            name=name,
+            heard=_say_who,
+            seen=None if looks else lambda: _last_seen(controller),
+        )
     except OSError as error:
         note(
             tr(
@@ -48,6 +55,11 @@ def listening_for_stop(
         return
     with listener:
         yield
+
+
+def _last_seen(controller: "Controller") -> "tuple[ControllerStatus, int] | None":
+    found = controller.ledger.seen
+    return None if found is None else (found[0], controller.clock.now_ns() - found[1])
 
 
 def remember_address(context: "CliContext") -> None:

@@ -20,14 +20,42 @@ def show_status(payload: Mapping[str, object]) -> None:
     if payload["code"]:
         text = payload.get("text", "")
         say(tr("  code {code:04d} {text}", code=payload["code"], text=text).rstrip())
-    on = [key for key, value in payload.items() if value is True and key != "motors_on"]
-    say(tr("  flags: {flags}", flags=", ".join(map(state_word, on)) or tr("none")))
+    _show_flags(payload)
     if "power" in payload:
         _show_epson(payload)
         return
     for key in [name for name in payload if name not in _SAID]:
         if payload[key] not in (None, "") and not isinstance(payload[key], bool):
             say(f"  {state_word(key)}: {payload[key]}")
+
+
+def show_seen(payload: Mapping[str, object], named: str) -> None:
+    """Print what the process that has the controller saw of it last, and how old that is.
+
+    Args:
+        payload: The document of it.
+        named: How the person names the controller.
+    """
+    say(tr("{holder} has this controller.", holder=payload["held_by"]))
+    age_s = payload["age_s"]
+    if not isinstance(age_s, float):
+        say(tr("It has not read the state yet."))
+        return
+    say(
+        tr(
+            "{controller}, {age:.1f} s ago: {state}",
+            controller=payload["controller"],
+            age=age_s,
+            state=state_word(payload["state"]),
+        )
+    )
+    _show_flags(payload)
+    say(tr('To stop it: robolink -c "{url}" stop', url=named))
+
+
+def _show_flags(payload: Mapping[str, object]) -> None:
+    on = [key for key, value in payload.items() if value is True and key != "motors_on"]
+    say(tr("  flags: {flags}", flags=", ".join(map(state_word, on)) or tr("none")))
 
 
 def _show_epson(payload: Mapping[str, object]) -> None:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
+from robolink.model._status import ControllerStatus
 from robolink.model._tools import ToolOffset, read_offset
 from robolink.model.record.outcomes import Marker, MarkerKind
 from robolink.standing import Components, Standing, ToolStanding, note_standing
@@ -74,6 +75,7 @@ class Ledger:
         self._holds: dict[int, ToolOffset | None] = {}
         self._requested: dict[int, ToolOffset | None] = {}
         self._selected: int | None = None
+        self._seen: tuple[ControllerStatus, int] | None = None
         self._whole = Account()
         self._accounts = [self._whole]
         self._unkept: list[Account] = []
@@ -156,6 +158,18 @@ class Ledger:
                     del self._doubts[deed.marker.operation]
                 self._selected = tool
 
+    def saw_status(self, status: ControllerStatus, at_ns: int) -> None:
+        """Note what state was read, and when on the controller's clock."""
+        self._seen = (status, at_ns)
+
+    @property
+    def seen(self) -> tuple[ControllerStatus, int] | None:
+        """The state that was read last, and when on the controller's clock; ``None`` for never.
+
+        It takes no lock: whoever looks on from another thread holds up nobody at work.
+        """
+        return self._seen
+
     # What stands.
 
     @contextmanager
@@ -219,6 +233,7 @@ class Ledger:
                 moving=tuple(deed.marker.request for deed in moves),
                 settled=not unproved and not standing,
                 left_open=bool(self._open) or standing,
+                reset_first=self._seen is not None and self._seen[0].needs_reset,
             )
 
     def _tool(self, tool: int, before: ToolOffset | None) -> ToolStanding:

@@ -11,7 +11,9 @@ def describe_standing(standing: Standing) -> str:
     It claims nothing that was not looked at.
     """
     parts = [_movement(standing), *_writes(standing), _selection(standing)]
-    if standing.left_open:
+    if standing.left_open and standing.reset_first:
+        parts.append(tr("Next: robolink robot reset, then robolink recover."))
+    elif standing.left_open:
         parts.append(tr("Next: robolink recover."))
     return joined(" ", parts)
 

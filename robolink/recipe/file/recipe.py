@@ -38,6 +38,9 @@ class Recipe(Table):
     """What people call it; it goes on record with everything that the recipe does."""
     notes: Note = ""
     """For people."""
+    cells: Annotated[tuple[Line, ...], Field(strict=False)] = ()
+    """Names of the cells that it is for; without it, any cell. At another it is neither offered
+    nor run: its poses would lead somewhere else there."""
     basis: Basis
     """What is written: with "difference" the stored offset, moved by how much the tip moved
     against the reference of the same tool at the same station; with "absolute" what was
@@ -75,6 +78,10 @@ class Recipe(Table):
     def verifies(self) -> bool:
         """Whether the new tips are proved by turning about them."""
         return self.source.of_method.needs.motion and self.verify is not False
+
+    def is_for(self, cell: str) -> bool:
+        """Tell whether it may be run at a cell; ``""`` stands for one that has no name."""
+        return not self.cells or cell in self.cells
 
     @property
     def attempts(self) -> int:

@@ -25,7 +25,13 @@ from wcwidth import wcswidth
 
 from robolink import messages
 from robolink.calibration import Drift, DriftLimits, TurnJudgement, VerifyResult, impact_on
-from robolink.errors import DeclinedError, OutcomeUnknownError, VerifyError
+from robolink.errors import (
+    ConfigError,
+    ControllerFaultError,
+    DeclinedError,
+    OutcomeUnknownError,
+    VerifyError,
+)
 from robolink.locale.languages import CHINESE, ENGLISH, translator
 from robolink.messages import spoken, tr
 from robolink.methods import find_method
@@ -230,6 +236,29 @@ def test_a_job_that_was_refused_for_an_earlier_one_names_recover_last():
     last = shown.state.ended
     assert last is not None
     assert last.lines[-1] == 'Next: robolink -c "line3" recover'
+
+
+def test_after_an_emergency_stop_the_reset_comes_before_recover():
+    error = ControllerFaultError("The emergency stop was pressed.", remedy="Release it.")
+    note_standing(error, Standing(left_open=True, reset_first=True))
+    last = ended(Header("line3", "Change needle", command="robolink change n.toml"), error)
+    assert last.state.ended.lines[-1] == (
+        'Next: robolink -c "line3" robot reset, then robolink -c "line3" recover'
+    )
+
+
+@pytest.mark.parametrize(("role", "offered"), [("", True), ("engineer", True), ("operator", False)])
+def test_an_operator_is_not_offered_what_takes_an_engineer(role, offered):
+    report = done().state.report
+    assert report is not None
+    shown = ended(Header("line3", "Change needle"), report=replace(report, role=role))
+    assert any("undo" in line for line in shown.state.ended.lines) is offered
+
+
+def test_what_was_refused_is_not_proposed_again():
+    error = ConfigError("The recipe is for another cell.", remedy="Nothing was sent.")
+    shown = ended(Header("line3", "Change needle", command="robolink change n.toml"), error)
+    assert "n.toml" not in " ".join(shown.state.ended.lines + shown.state.ended.kept)
 
 
 def ended(header, error=None, report=None, offers=frozenset()):

@@ -323,7 +323,18 @@ def test_a_job_is_chosen_by_what_it_does_and_when_it_did_so_last(tmp_path, monke
     log = open_log("x", durable=True, signature=Signature(recipe=name, nozzle="N-7"))
     log.append(NewEntry(EntryKind.DONE, tool=1, details={"took_s": 600.0}))
     log.close()
-    assert "needle N-7" in offered()[2]
+    assert offered()[2].startswith("Used so far on another robot only, x, last ")
+    assert "needle N-7" not in offered()[2], "that was on another robot"
+    other = (
+        (tmp_path / "a.toml").read_text(encoding="utf-8").replace(f'name = "{name}"', 'name = "B"')
+    )
+    (tmp_path / "b.toml").write_text(other, encoding="utf-8")
+    assert [row.partition(" ")[0] for row in offered(rows=True)] == ["B", name.partition(" ")[0]]
+    (tmp_path / "b.toml").write_text(
+        other.replace('name = "B"', 'name = "B"\ncells = ["line3"]'), encoding="utf-8"
+    )
+    assert len(offered(rows=True)) == 1, "one for another cell is not offered"
+    (tmp_path / "b.toml").unlink()
     assert "about" not in offered(rows=True)[0], "of another cell, and nobody knows how long"
     here = open_log("epson+tcp://x:5000", durable=True, signature=Signature(recipe=name))
     touch = {

@@ -153,6 +153,7 @@ def check_lines_of_cells() -> Iterator[Remark]:
 def check_journal() -> Iterator[Remark]:
     """List what was begun on any controller and is not proved finished."""
     from robolink.journal import default_location, may_exist, open_journal
+    from robolink.model import begun_in_words
 
     try:
         if not may_exist(default_location()):
@@ -173,7 +174,7 @@ def check_journal() -> Iterator[Remark]:
                 "{identity}, since {when}: {request}",
                 identity=identity,
                 when=local_label(marker.begun_at),
-                request=marker.request,
+                request=begun_in_words(marker),
             ),
             journal.log(identity).at_work()
             or tr('Run: robolink -c "{where}" recover', where=where),

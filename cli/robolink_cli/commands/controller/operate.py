@@ -4,9 +4,11 @@ from typing import TYPE_CHECKING
 
 import click
 
+from robolink.errors import JournalError
 from robolink.messages import tr
 from robolink.model import Act
 from robolink_cli.access.capabilities import preferences_of, require_epson, require_softmotion
+from robolink_cli.access.warnings import note_unsettled
 from robolink_cli.console.machine_words import state_word
 from robolink_cli.console.render import note, say
 from robolink_cli.options.consent import dry_run_option, yes_option
@@ -26,17 +28,27 @@ from robolink_cli.session.opening import open_controller
 from robolink_cli.stopping.notes import forget_stop, own_name_of
 
 if TYPE_CHECKING:
-    from robolink.model import Controller
+    from robolink.model import Controller, Marker
 
 
 @click.command()
 @looking_options
 def status(context: CliContext) -> None:
-    """Show what the controller is doing. Reads only; legal while production runs."""
+    """Show what the controller is doing. Reads only; legal while production runs.
+
+    A controller that serves one client is not asked while another robolink of this computer has
+    it: who that is, and what it saw last, is shown instead.
+    """
+    from robolink_cli.session.looking_on import seen_by_another
     from robolink_cli.session.selected_tool import note_doubts
     from robolink_cli.views.documents import status_payload
-    from robolink_cli.views.tables import show_status
+    from robolink_cli.views.tables import show_seen, show_status
 
+    named = context.expected.cell if context.expected else context.require_url()
+    beside = seen_by_another(context.require_url())
+    if beside is not None:
+        context.emit("status-beside", beside, lambda: show_seen(beside, named))
+        return
     with open_controller(context, looks=True) as controller:
         payload = status_payload(controller)
         note_doubts(payload, controller, context.expected)
@@ -112,7 +124,7 @@ def release(yes: bool) -> None:
 @yes_option
 def reset(context: CliContext, dry_run: bool, yes: bool) -> None:
     """Clear an error. May switch outputs off: a gripper may drop its part."""
-    with open_controller(context, calms=True) as controller:
+    with open_controller(context, calms=True, quiet=True) as controller:
         if dry_run:
             context.show_requests(controller.preview(Act.RESET))
             return
@@ -124,6 +136,10 @@ def reset(context: CliContext, dry_run: bool, yes: bool) -> None:
             controller.reset_fault()
         state = controller.status().state
         name = own_name_of(controller)
+        left = _left_open(controller)
+        named = context.expected.cell if context.expected else context.require_url()
+        # After the reset, because what is left can be settled from now on.
+        note_unsettled(controller, left, named)
     forget_stop(context.require_url(), name)
     payload: dict[str, object] = {"state": state}
     context.emit(
@@ -133,6 +149,14 @@ def reset(context: CliContext, dry_run: bool, yes: bool) -> None:
             tr("The reset was carried out; the controller is: {state}.", state=state_word(state))
         ),
     )
+
+
+def _left_open(controller: "Controller") -> "tuple[Marker, ...]":
+    """Return what is unsettled; a journal that is broken is told of at the end."""
+    try:
+        return controller.outcomes.open_markers()
+    except JournalError:
+        return ()
 
 
 def _effect_of_reset(controller: "Controller") -> tuple[str, bool]:

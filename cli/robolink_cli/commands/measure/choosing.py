@@ -102,6 +102,8 @@ def choose_recipe(
 ) -> "LoadedRecipe":
     """Have one of the recipes chosen that stand beside the cell file or here.
 
+    Those of other cells are not among them. What was only used on another robot so far comes last.
+
     Args:
         desk: Where.
         cell: The cell, ``None`` where only a URL is known.
@@ -112,14 +114,19 @@ def choose_recipe(
         ConfigError: There is none, or it is wrong.
         DeclinedError: The person leaves.
     """
-    paths = _recipes(cell)
+    paths = recipes_at(cell)
     loaded: list[LoadedRecipe] = []
 
     def ask() -> tuple[str, ChoiceSubject]:
         if head is not None:
             desk.regard(head())
-        loaded[:] = _loaded(desk, paths)
-        pasts = _pasts(loaded, url)
+        found = _of_this_cell(_loaded(desk, paths), cell)
+        ordered = sorted(
+            zip(found, _pasts(found, url), strict=True),
+            key=lambda one: one[1].elsewhere is not None,
+        )
+        loaded[:] = [recipe for recipe, _ in ordered]
+        pasts = [past for _, past in ordered]
         details = tuple(_told_of(*one) for one in zip(loaded, pasts, strict=True))
         rows = _rows_of(loaded, pasts)
         return tr("Which job?"), ChoiceSubject(tr("Choose"), (), rows, details=details)
@@ -150,6 +157,23 @@ def _loaded(desk: AskingDesk, paths: Sequence[Path]) -> "list[LoadedRecipe]":
             ),
         )
     return loaded
+
+
+def _of_this_cell(loaded: "list[LoadedRecipe]", cell: "Cell | None") -> "list[LoadedRecipe]":
+    """Return the recipes that may be run here.
+
+    Raises:
+        ConfigError: There is none.
+    """
+    name = cell.name if cell else ""
+    fitting = [one for one in loaded if one.recipe.is_for(name)]
+    if fitting:
+        return fitting
+    others = (f"{one.path.name} ({', '.join(one.recipe.cells)})" for one in loaded)
+    raise ConfigError(
+        tr("Every recipe found here is for another cell: {recipes}.", recipes=", ".join(others)),
+        remedy=tr("Name that cell, or write a recipe for this one: robolink recipe list"),
+    )
 
 
 def _pasts(loaded: "list[LoadedRecipe]", url: str | None) -> "tuple[RecipePast, ...]":
@@ -194,16 +218,29 @@ def _told_of(loaded: "LoadedRecipe", past: "RecipePast") -> tuple[str, ...]:
     if past.last is not None:
         when, nozzle = local_label(past.last.at), past.last.signature.nozzle
         said.append(
-            tr("Last change with it from here: {when}, needle {id}", when=when, id=nozzle)
+            tr("Last change with it on this robot: {when}, needle {id}", when=when, id=nozzle)
             if nozzle
-            else tr("Last change with it from here: {when}", when=when)
+            else tr("Last change with it on this robot: {when}", when=when)
+        )
+    if past.elsewhere is not None:
+        said.append(
+            tr(
+                "Used so far on another robot only, {robot}, last {when}. Do its poses fit here?",
+                robot=past.elsewhere.controller,
+                when=local_label(past.elsewhere.at),
+            )
         )
     if past.changes_left is not None:
-        said.append(_due(past.changes_left))
+        said.append(due_in(past.changes_left))
     return tuple(said)
 
 
-def _due(left: int) -> str:
+def due_in(left: int) -> str:
+    """Return after how many more changes a full calibration is due, in words.
+
+    Args:
+        left: So many, 0 for now.
+    """
     if left == 0:
         return tr("A full calibration is due now.")
     if left == 1:
@@ -211,7 +248,12 @@ def _due(left: int) -> str:
     return tr("A full calibration is due after {n} more changes.", n=left)
 
 
-def _recipes(cell: "Cell | None") -> list[Path]:
+def recipes_at(cell: "Cell | None") -> list[Path]:
+    """Return the files of recipes beside the cell file and in the working folder.
+
+    Args:
+        cell: The cell, ``None`` where only a URL is known.
+    """
     roots = [Path.cwd()]
     if cell is not None and "url" in cell.origins:
         roots.insert(0, cell.origins["url"].parent)

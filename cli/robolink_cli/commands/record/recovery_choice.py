@@ -3,7 +3,7 @@
 from typing import Final
 
 from robolink.messages import tr
-from robolink.model import Controller, Finding, Marker, MarkerKind, Verdict
+from robolink.model import Controller, Finding, MarkerKind, Verdict, begun_in_words
 from robolink.timing import local_label
 from robolink.transaction import look
 from robolink_cli.prompts.present import present_desk
@@ -73,19 +73,6 @@ def _rows(finding: Finding) -> list[str]:
         ),
         tr("What we read: {sentence}", sentence=finding.sentence),
     ]
-
-
-def begun_in_words(marker: Marker) -> str:
-    """Return what a marker was stored for: of a movement where it was to go, else what it says.
-
-    Args:
-        marker: Of a movement with its ``target`` (mm, degrees), or of anything else.
-    """
-    target = marker.details.get("target") if marker.kind is MarkerKind.MOVE else None
-    if not isinstance(target, list) or len(target) < 4:
-        return marker.request
-    x, y, z, u = (float(value) for value in target[:4])
-    return tr("a movement to X {x:.3f} Y {y:.3f} Z {z:.3f} U {u:.3f}", x=x, y=y, z=z, u=u)
 
 
 def _selected(controller: Controller) -> list[str]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 from robolink.errors import ControllerError
 from robolink.messages import declared, spoken, tr
-from robolink.model import AnsweredBy, Controller, Finding, MarkerKind, Pose
+from robolink.model import AnsweredBy, Controller, Finding, MarkerKind, Pose, begun_in_words
 from robolink.timing import local_label
 from robolink.transaction import Recovery, Settler, look, recover
 from robolink_cli.console.render import json_is_on, note, say
@@ -218,7 +218,8 @@ def _foretell(finding: Finding) -> None:
 
 
 def _show(finding: Finding) -> None:
-    note(f"{local_label(finding.marker.begun_at)}  {finding.marker.request}\n  {finding.sentence}")
+    when, begun = local_label(finding.marker.begun_at), begun_in_words(finding.marker)
+    note(f"{when}  {begun}\n  {finding.sentence}")
 
 
 class TurnTests:

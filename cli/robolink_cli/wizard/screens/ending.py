@@ -7,11 +7,19 @@ from robolink.calibration import (
     turn_test_headline,
     turn_test_sentences,
 )
-from robolink.errors import DeclinedError, OutcomeUnknownError, RobolinkError, VerifyError
+from robolink.errors import (
+    CalibrationError,
+    DeclinedError,
+    OutcomeUnknownError,
+    RobolinkError,
+    StoppedError,
+    VerifyError,
+)
 from robolink.messages import joined, tr
-from robolink.model import describe_offset, describe_standing
+from robolink.model import PersonRole, describe_offset, describe_standing
 from robolink.nozzle_change import ChangeReport, ToolReport, next_steps
 from robolink.standing import UNTOUCHED, standing_after
+from robolink_cli.access.warnings import way_back
 from robolink_cli.console.render import next_lines
 from robolink_cli.wizard.check_list import CheckSubject
 from robolink_cli.wizard.choices import ChoiceSubject
@@ -33,12 +41,13 @@ def done_lines(state: WizardState, report: ChangeReport) -> list[str]:
     )
     lines.append(record)
     if any(one.receipt is not None for one in report.tools):
-        back = tr(
-            'To take it back: robolink -c "{cell}" undo {id}',
-            cell=state.header.cell,
-            id=report.change[:8],
-        )
-        lines.append(back)
+        if report.role != PersonRole.OPERATOR:
+            back = tr(
+                'To take it back: robolink -c "{cell}" undo {id}',
+                cell=state.header.cell,
+                id=report.change[:8],
+            )
+            lines.append(back)
         lines.append(tr("Run the first part slowly and look at it."))
     for one in report.tools:
         if one.receipt is not None:
@@ -152,14 +161,23 @@ def _where(state: WizardState) -> list[str]:
 
 
 def _next(state: WizardState, error: RobolinkError) -> list[str]:
-    """Return the commands to go on with, where they are known; a blocked robot takes one only."""
-    if standing_after(error).left_open or isinstance(error, OutcomeUnknownError):
-        command = f'robolink -c "{state.header.cell}" recover'
+    """Return what to go on with, where it is known; a blocked robot takes nothing else.
+
+    What was refused would be refused again, so it is proposed only where a person, or what was
+    measured, ended it.
+    """
+    standing = standing_after(error)
+    if standing.left_open or isinstance(error, OutcomeUnknownError):
+        command = way_back(state.header.cell, reset_first=standing.reset_first)
     elif isinstance(error, VerifyError) and error.next_commands:
         return [
             tr("Next: {command}", command=f'robolink -c "{state.header.cell}" {command}')
             for command in error.next_commands
         ]
-    else:
+    elif isinstance(error, (DeclinedError, StoppedError)) or (
+        isinstance(error, (CalibrationError, VerifyError)) and state.touch is not None
+    ):
         command = state.header.command
+    else:
+        return []
     return [tr("Next: {command}", command=command)] if command else []

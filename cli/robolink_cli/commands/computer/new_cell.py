@@ -1,0 +1,93 @@
+"""cell new: asks what a cell file has to say, and writes it."""
+
+from pathlib import Path
+
+import click
+
+from robolink.errors import DeclinedError
+from robolink.messages import declared, tr
+from robolink_cli.console.numbers import NumberInside
+from robolink_cli.console.render import emit_json, json_is_on, say
+from robolink_cli.options.shared import json_option
+from robolink_cli.prompts.questions import asked_for_text, on_terminal
+
+_LEFT_OUT = "-"
+"""What a person types for something that is not known yet."""
+
+
+@click.command("new")
+@click.argument("name", required=False)
+@click.option("--url", help=declared("The controller's URL."))
+@click.option("--robot", help=declared("The model that must be there, as the controller says it."))
+@click.option(
+    "--time-out-set",
+    "remote_timeout_s",
+    type=NumberInside(min=0, min_open=True),
+    metavar="S",
+    help=declared("The remote time-out that is set in an EPSON controller."),
+)
+@click.option(
+    "--read-by", help=declared("Who read that time-out on the controller, and when; goes with it.")
+)
+@click.option(
+    "--file",
+    type=click.Path(dir_okay=False, path_type=Path),
+    default=Path("robolink.toml"),
+    show_default=True,
+    help=declared("The cell file; what it says already stays."),
+)
+@json_option
+def new_cell(
+    name: str | None,
+    url: str | None,
+    robot: str | None,
+    remote_timeout_s: float | None,
+    read_by: str | None,
+    file: Path,
+) -> None:
+    """Write a cell into a cell file; what is not given is asked for on a terminal.
+
+    No controller is asked. A cell of the same name is never changed.
+    """
+    from robolink.config import add_cell
+
+    asks = on_terminal() and not json_is_on()
+    if not asks and (name is None or url is None):
+        raise DeclinedError(
+            tr("A cell needs a name and a URL, and there is nobody to ask."),
+            remedy=tr("Write for example: robolink cell new line3 --url URL"),
+        )
+    name = name or asked_for_text(tr("What is the cell called? For example: line3"))
+    url = url or asked_for_text(
+        tr(
+            "Where is the controller? For example: epson+tcp://192.168.0.1:5000 or "
+            "softmotion+modbus-tcp://192.168.0.2"
+        )
+    )
+    said: dict[str, str | float] = {"url": url}
+    robot = robot or (_if_known(tr("Which robot model must be there?")) if asks else None)
+    if robot:
+        said["robot"] = robot
+    if remote_timeout_s is None and asks and url.startswith("epson+"):
+        typed = _if_known(tr("Which remote time-out is set in the controller, in seconds?"))
+        remote_timeout_s = None if typed is None else _seconds(typed)
+    if remote_timeout_s is not None:
+        said["remote_timeout_s"] = remote_timeout_s
+        read_by = read_by or (asked_for_text(tr("Who read it there, and when?")) if asks else None)
+    if read_by:
+        said["remote_timeout_confirmed_by"] = read_by
+    add_cell(file, name, said)
+    if json_is_on():
+        emit_json("robolink/cell-new/1", {"cell": name, "path": str(file)})
+        return
+    say(tr("Written: {path}", path=file))
+    say(tr("Next: {command}", command=f'robolink -c "{name}" status'))
+
+
+def _if_known(question: str) -> str | None:
+    answer = asked_for_text(tr("{question} Type - if you do not know.", question=question))
+    return None if answer == _LEFT_OUT else answer
+
+
+def _seconds(text: str) -> float:
+    return float(NumberInside(min=0, min_open=True).convert(text, None, None))

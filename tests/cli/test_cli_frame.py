@@ -216,6 +216,7 @@ def test_what_was_left_unfinished_is_said_on_connecting(command, capsys, monkeyp
         "trace": None,
         "glance": False,
         "tell": note,
+        "limits": None,
     }
     shown = capsys.readouterr()
     assert shown.out == ""

@@ -4,7 +4,7 @@ import re
 
 import click
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from robolink_cli import main
 from robolink_cli.console.columns import columns
@@ -51,7 +51,8 @@ def test_a_page_is_shown_as_a_terminal_holds_it(shown):
     assert [one for one in lines if CODE_WORDS.match(one[1])] == []
 
 
-WORDS = st.lists(st.text("ab-.\t\n \x1b[é", max_size=9), max_size=6).map(" ".join)
+# No escape sequences: click's own wrapping never ends where a word is cut inside one.
+WORDS = st.lists(st.text("ab-.\t\n é", max_size=9), max_size=6).map(" ".join)
 
 
 @given(
@@ -59,6 +60,7 @@ WORDS = st.lists(st.text("ab-.\t\n \x1b[é", max_size=9), max_size=6).map(" ".jo
     indent=st.integers(0, 2),
     rows=st.lists(st.tuples(WORDS, WORDS), min_size=1, max_size=3),
 )
+@example(width=40, indent=0, rows=[("\x1b[1mbold\x1b[0m", "in \x1b[1mbold\x1b[0m letters")])
 @settings(deadline=None, max_examples=60)
 def test_a_page_without_wide_characters_is_click_s_own(width, indent, rows):
     written = []

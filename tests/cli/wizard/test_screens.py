@@ -296,7 +296,9 @@ def jobs():
             (
                 summary,
                 tr("Tool: {numbers}", numbers="1"),
-                tr("Last change with it from here: {when}, needle {id}", when=when, id="N-0417"),
+                tr(
+                    "Last change with it on this robot: {when}, needle {id}", when=when, id="N-0417"
+                ),
                 tr("A full calibration is due after {n} more changes.", n=6),
             )
             for summary in summaries

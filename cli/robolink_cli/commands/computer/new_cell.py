@@ -17,8 +17,12 @@ _LEFT_OUT = "-"
 
 @click.command("new")
 @click.argument("name", required=False)
-@click.option("--url", help=declared("The controller's URL."))
-@click.option("--robot", help=declared("The model that must be there, as the controller says it."))
+@click.option("--url", metavar="URL", help=declared("The controller's URL."))
+@click.option(
+    "--robot",
+    metavar="MODEL",
+    help=declared("The model that must be there, as the controller says it."),
+)
 @click.option(
     "--time-out-set",
     "remote_timeout_s",
@@ -27,7 +31,9 @@ _LEFT_OUT = "-"
     help=declared("The remote time-out that is set in an EPSON controller."),
 )
 @click.option(
-    "--read-by", help=declared("Who read that time-out on the controller, and when; goes with it.")
+    "--read-by",
+    metavar="WHO",
+    help=declared("Who read that time-out on the controller, and when; goes with it."),
 )
 @click.option(
     "--file",

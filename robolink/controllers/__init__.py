@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from robolink.controllers.registry import CONTROLLERS_GROUP as CONTROLLERS_GROUP
     from robolink.controllers.registry import ConnectionTerms as ConnectionTerms
     from robolink.controllers.registry import ControllerOpener as ControllerOpener
+    from robolink.controllers.registry import capabilities_of_kind as capabilities_of_kind
     from robolink.controllers.registry import connect as connect
     from robolink.controllers.resolving import MarkerResolver as MarkerResolver
     from robolink.controllers.stopping import stop_now as stop_now
@@ -35,7 +36,7 @@ else:
             "polled_motion": "PolledGroup",
             "preserving": "Preserver",
             "reaching": "connect_when_reachable",
-            "registry": "CONTROLLERS_GROUP ConnectionTerms ControllerOpener connect",
+            "registry": "CONTROLLERS_GROUP ConnectionTerms ControllerOpener capabilities_of_kind connect",
             "resolving": "MarkerResolver",
             "stopping": "stop_now stop_requests",
             "tool_table": "ToolTableCore",

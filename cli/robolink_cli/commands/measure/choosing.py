@@ -102,7 +102,8 @@ def choose_recipe(
 ) -> "LoadedRecipe":
     """Have one of the recipes chosen that stand beside the cell file or here.
 
-    Those of other cells are not among them. What was only used on another robot so far comes last.
+    Those of other cells, and those that this kind of controller could not carry out, are not among
+    them. What was only used on another robot so far comes last.
 
     Args:
         desk: Where.
@@ -120,7 +121,7 @@ def choose_recipe(
     def ask() -> tuple[str, ChoiceSubject]:
         if head is not None:
             desk.regard(head())
-        found = _of_this_cell(_loaded(desk, paths), cell)
+        found = _of_this_kind(_of_this_cell(_loaded(desk, paths), cell), url)
         ordered = sorted(
             zip(found, _pasts(found, url), strict=True),
             key=lambda one: one[1].elsewhere is not None,
@@ -173,6 +174,29 @@ def _of_this_cell(loaded: "list[LoadedRecipe]", cell: "Cell | None") -> "list[Lo
     raise ConfigError(
         tr("Every recipe found here is for another cell: {recipes}.", recipes=", ".join(others)),
         remedy=tr("Name that cell, or write a recipe for this one: robolink recipe list"),
+    )
+
+
+def _of_this_kind(loaded: "list[LoadedRecipe]", url: str | None) -> "list[LoadedRecipe]":
+    """Return the recipes that this kind of controller can carry out, by what a run refuses too.
+
+    Raises:
+        ConfigError: There is none.
+    """
+    from robolink.controllers import capabilities_of_kind
+    from robolink.recipe import beyond
+
+    able = capabilities_of_kind((url or "").partition("+")[0])
+    if able is None:
+        return loaded
+    found = [(one, beyond(one.recipe, able)) for one in loaded]
+    fitting = [one for one, why in found if not why]
+    if fitting:
+        return fitting
+    told = (f"{one.path.name}: {' '.join(why)}" for one, why in found)
+    raise ConfigError(
+        tr("No recipe found here can be run on this controller. {recipes}", recipes=" ".join(told)),
+        remedy=tr("Write a recipe for this kind of controller: robolink recipe list"),
     )
 
 

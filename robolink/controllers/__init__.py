@@ -36,7 +36,9 @@ else:
             "polled_motion": "PolledGroup",
             "preserving": "Preserver",
             "reaching": "connect_when_reachable",
-            "registry": "CONTROLLERS_GROUP ConnectionTerms ControllerOpener capabilities_of_kind connect",
+            "registry": (
+                "CONTROLLERS_GROUP ConnectionTerms ControllerOpener capabilities_of_kind connect"
+            ),
             "resolving": "MarkerResolver",
             "stopping": "stop_now stop_requests",
             "tool_table": "ToolTableCore",

@@ -1,8 +1,9 @@
-"""Whether a kind of controller can do what a recipe asks for; nothing is sent."""
+"""Whether a controller can do what a recipe asks for, and may: by its kind and its numbers."""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from robolink.controllers import says_it_is_simulated
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.methods import PointsParameters
@@ -10,6 +11,7 @@ from robolink.model import Capabilities, Controller, LookingController
 from robolink.sensing import VISION_GUIDE
 
 if TYPE_CHECKING:
+    from robolink.recipe._loading import LoadedRecipe
     from robolink.recipe.file.recipe import Recipe
 
 
@@ -79,3 +81,25 @@ def require_able(
             remedy=tr("Choose a recipe for this kind of controller. Nothing was moved or written."),
             controller=controller.identity,
         )
+
+
+def require_own_numbers(controller: Controller, loaded: "LoadedRecipe") -> None:
+    """Refuse a copy that nobody has put the numbers of the cell in, where something moves; reads.
+
+    Args:
+        controller: The controller, connected.
+        loaded: The recipe.
+
+    Raises:
+        ConfigError: Its numbers are those of a simulated cell, and the controller is a real one.
+    """
+    if loaded.recipe.numbers is None or says_it_is_simulated(controller):
+        return
+    raise ConfigError(
+        tr("The numbers of {path} are those of a simulated cell.", path=loaded.path),
+        remedy=tr(
+            "Put in stations, poses, box and limits of this cell, then delete the line "
+            "'numbers'. Nothing was moved or written."
+        ),
+        controller=controller.identity,
+    )

@@ -19,7 +19,7 @@ from robolink.nozzle_change import (
     require_inside,
     require_ready,
 )
-from robolink.recipe._able import require_able
+from robolink.recipe._able import require_able, require_own_numbers
 from robolink.recipe._answers import Answers
 from robolink.recipe._listening import RecipeListener
 from robolink.recipe._loading import LoadedRecipe
@@ -137,6 +137,7 @@ class RecipeRun:
 
         Raises:
             CalibrationError: ``reference_outdated``, ``no_last_touch`` or ``sensor_not_found``.
+            ConfigError: The recipe's numbers are those of a simulated cell, and this is none.
             ConnectError: A camera is not there.
             LimitError: A foreseen target lies outside the box.
             NotReadyError: The station was learnt in another base.
@@ -146,6 +147,7 @@ class RecipeRun:
             RobolinkError: The controller's state forbids it.
         """
         controller, recipe = self._controller, self._loaded.recipe
+        require_own_numbers(controller, self._loaded)
         controller.outcomes.look()
         controller.require_settled(tr("recipe {name!r}", name=recipe.name))
         self._require_role()

@@ -1,15 +1,18 @@
 """What a recipe asks for and a kind of controller cannot do: not offered, and refused at once."""
 
+import re
 import tomllib
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+from robolink_cli.commands.shipped.recipe_copies import copy_recipe, models
 
+import robolink
 from robolink.controllers import capabilities_of_kind
-from robolink.errors import ConfigError
-from robolink.recipe import LoadedRecipe, Recipe, RecipeRun, beyond
+from robolink.errors import ConfigError, LimitError
+from robolink.recipe import LoadedRecipe, Recipe, RecipeRun, beyond, load_recipe
 from robolink.testing import MemoryController
 
 RECIPES = Path(__file__).parents[2] / "examples" / "recipes"
@@ -70,3 +73,41 @@ def test_a_run_refuses_by_the_same_sentences_before_anything_is_asked(case):
 
 def test_a_kind_that_only_a_connected_one_tells_is_held_against_nobody():
     assert capabilities_of_kind("gantry") is None
+
+
+def copied(**more):
+    return LoadedRecipe(written("scara-pin", numbers="simulated", **more), Path("a.toml"), "")
+
+
+def run_of(controller, loaded):
+    nobody: Any = None
+    return RecipeRun(controller, loaded, operator=nobody)
+
+
+def test_a_copy_with_simulated_numbers_is_refused_by_a_real_controller():
+    with MemoryController() as controller:
+        with pytest.raises(ConfigError, match=r"numbers of a\.toml are those of a simulated cell"):
+            run_of(controller, copied()).preflight()
+        # Whoever has put in their own deletes the line; what is refused then is something else.
+        with pytest.raises(LimitError):
+            run_of(controller, replace(copied(), recipe=written("scara-pin"))).preflight()
+
+
+def test_a_copy_with_simulated_numbers_runs_on_a_simulated_controller():
+    with robolink.connect("epson+sim://recipe-able?seed=1") as controller:
+        with pytest.raises(LimitError):
+            run_of(controller, copied(box={"sideways_mm": 1})).preflight()
+
+
+@pytest.mark.parametrize("name", models())
+def test_each_copy_is_right_and_marks_the_numbers_of_the_cell(name, tmp_path):
+    path = tmp_path / "copy.toml"
+    copy_recipe(name, path)
+    loaded = load_recipe(path)
+    assert loaded.recipe.numbers == "simulated"
+    assert loaded.recipe.model_copy(update={"numbers": None}) == load_recipe(models()[name]).recipe
+    lines = path.read_text(encoding="utf-8").splitlines()
+    places = [line for line in lines if re.match(r"[^#]*\bx_mm =", line)]
+    marked = [line for line in lines if line.endswith("# SIMULATED")]
+    assert marked
+    assert set(places) <= set(marked)

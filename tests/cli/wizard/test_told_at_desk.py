@@ -30,6 +30,7 @@ from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 import robolink
 from robolink.backup import keep_first_backup, load, save
+from robolink.config import find_cell
 from robolink.errors import ConfigError, DeclinedError, NotReadyError
 from robolink.journal import EntryKind, NewEntry, Signature, memory_journal, open_log
 from robolink.model import Path as Way
@@ -380,6 +381,28 @@ def test_a_job_that_this_kind_of_controller_cannot_do_is_not_offered(tmp_path, m
     assert jobs_offered("gantry+usb://x") == ["pendant-points.toml", "scara-pin.toml"]
     with pytest.raises(ConfigError, match=r"scara-pin.toml: The recipe moves the robot"):
         jobs_offered("plc+modbus-tcp://x?map=a.toml")
+
+
+def test_where_there_is_no_recipe_one_that_fits_is_copied_and_not_run(tmp_path, monkeypatch):
+    cells = tmp_path / "cells"
+    cells.mkdir()
+    (cells / "robolink.toml").write_text('[cells.line3]\nurl = "softmotion+modbus-tcp://x"\n')
+    monkeypatch.chdir(cells)
+    cell = find_cell("line3")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ConfigError, match="It is not run yet") as told:
+        choose_recipe(desk := Chooser(1), cell, cell.url)
+    (path,) = cells.glob("five*.toml")
+    assert desk.marked == [("five-axes-pivot", "Choose")]
+    assert path.name in told.value.what
+    assert load_recipe(path).recipe.numbers == "simulated"
+    desk = Leaver()
+    with pytest.raises(DeclinedError):
+        choose_recipe(desk, None, cell.url)
+    offered = [one.subject.options for one in desk.happened() if isinstance(one, WasRegarded)]
+    assert "scara-pin" in offered[0]
+    assert "pendant-points" not in offered[0], "a PLC has no taught points"
+    assert not list(tmp_path.glob("*.toml")), "whoever leaves has nothing written"
 
 
 def test_the_step_is_numbered_where_that_cuts_nothing_off():

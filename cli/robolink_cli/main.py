@@ -139,7 +139,7 @@ def _answer(arguments: Sequence[str]) -> int:
         # That nobody is left to read how it ended is no other end.
         with suppress(Interrupted):
             # Looked for by hand, because the arguments may be what is wrong.
-            report(error, as_json="--json" in arguments)
+            report(error, as_json="--json" in arguments, typed=arguments)
         return code
 
 

@@ -14,7 +14,7 @@ from typing import Final, Protocol, cast
 from robolink.errors import ConfigError, RobolinkError
 from robolink.journal import GlancingLog, open_log, signature_here
 from robolink.messages import tr
-from robolink.model import ChangeLimits, Controller, OutcomeLog, Secret, Signature
+from robolink.model import Capabilities, ChangeLimits, Controller, OutcomeLog, Secret, Signature
 from robolink.plug_ins import PlugInError, find_plug_in
 from robolink.timing import Clock
 from robolink.transport import LinkUrl, TraceSink, parse_url
@@ -23,9 +23,13 @@ from robolink.version import VERSION
 CONTROLLERS_GROUP: Final = "robolink.controllers"
 
 _KINDS: Final = {
-    "epson": ("robolink.controllers.epson.controller", "open_epson_url"),
-    "softmotion": ("robolink.controllers.softmotion.controller", "open_softmotion_url"),
-    "plc": ("robolink.controllers.plc_map.controller", "open_plc_map_url"),
+    "epson": ("robolink.controllers.epson.controller", "open_epson_url", "EpsonController"),
+    "softmotion": (
+        "robolink.controllers.softmotion.controller",
+        "open_softmotion_url",
+        "SoftMotionController",
+    ),
+    "plc": ("robolink.controllers.plc_map.controller", "open_plc_map_url", "PlcMapController"),
 }
 
 
@@ -111,7 +115,7 @@ def find_opener(url: LinkUrl) -> ControllerOpener:
         ConfigError: Nothing knows the kind, or what does cannot be loaded.
     """
     if url.kind in _KINDS:
-        module, name = _KINDS[url.kind]
+        module, name, _ = _KINDS[url.kind]
         return cast(ControllerOpener, getattr(import_module(module), name))
     for name in (url.scheme, url.kind):
         try:
@@ -131,6 +135,26 @@ def find_opener(url: LinkUrl) -> ControllerOpener:
         tr("robolink does not know controllers of the kind {kind!r}.", kind=url.kind),
         remedy=tr("Write for example epson+tcp://192.168.0.1:5000."),
     )
+
+
+def capabilities_of_kind(kind: str) -> Capabilities | None:
+    """Return the most that a controller of a kind can be asked for; nothing is connected.
+
+    Args:
+        kind: The first word of its URL.
+
+    Returns:
+        ``None`` where only a connected one tells it.
+
+    Example:
+        >>> from robolink.controllers import capabilities_of_kind
+        >>> capabilities_of_kind("plc").motion, capabilities_of_kind("acme")
+        (False, None)
+    """
+    if kind not in _KINDS:
+        return None
+    module, _, name = _KINDS[kind]
+    return cast(Capabilities, getattr(import_module(module), name).OF_KIND)
 
 
 def _told_as_its_own(kind: str, opener: ControllerOpener) -> ControllerOpener:

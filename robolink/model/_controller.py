@@ -41,6 +41,8 @@ class Capabilities:
             one line to the controller is waited on.
         low_power: Whether each movement is made in a power mode of the controller's that is
             gentle.
+        looks: Whether it has a vision system of its own (:class:`LookingController`).
+        inputs_only: Whether ``io`` reads inputs and switches no output.
     """
 
     tool_write: bool = False
@@ -48,6 +50,8 @@ class Capabilities:
     motors: bool = False
     pose_while_moving: bool = False
     low_power: bool = False
+    looks: bool = False
+    inputs_only: bool = False
     io: bool = False
     points: bool = False
     variables: bool = False

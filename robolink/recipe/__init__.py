@@ -11,6 +11,7 @@ from robolink.recipe._loading import check_recipe as check_recipe
 from robolink.recipe._loading import load_recipe as load_recipe
 
 if TYPE_CHECKING:
+    from robolink.recipe._able import beyond as beyond
     from robolink.recipe._answers import Answers as Answers
     from robolink.recipe._answers import require_answers as require_answers
     from robolink.recipe._past import RecipePast as RecipePast
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from robolink.recipe.file.tables import Tool as Tool
 
 _LOADED_LATER = {
+    "beyond": "_able",
     "Answers": "_answers",
     "require_answers": "_answers",
     "RecipePast": "_past",

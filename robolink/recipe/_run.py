@@ -19,6 +19,7 @@ from robolink.nozzle_change import (
     require_inside,
     require_ready,
 )
+from robolink.recipe._able import require_able, require_own_numbers
 from robolink.recipe._answers import Answers
 from robolink.recipe._listening import RecipeListener
 from robolink.recipe._loading import LoadedRecipe
@@ -61,7 +62,8 @@ class RecipeRun:
 
     Raises:
         CalibrationError: ``rank_deficient``: this robot cannot tilt its tool, and would have to.
-        ConfigError: The recipe is for another cell, neither it nor the station's record says
+        ConfigError: The recipe is for another cell, or asks for what this kind of controller
+            cannot do, neither it nor the station's record says
             where the station is, it takes no reference, or a person would have to touch where
             only is measured.
 
@@ -97,6 +99,9 @@ class RecipeRun:
         _require_cell(loaded, cell)
         if measure_only:
             _require_sensor(loaded)
+        require_able(
+            controller, loaded.recipe, other_sensor=sensor is not None, writes=not measure_only
+        )
         self._controller = controller
         self._measure_only = measure_only
         self._order, self._describe = order, describe
@@ -132,6 +137,7 @@ class RecipeRun:
 
         Raises:
             CalibrationError: ``reference_outdated``, ``no_last_touch`` or ``sensor_not_found``.
+            ConfigError: The recipe's numbers are those of a simulated cell, and this is none.
             ConnectError: A camera is not there.
             LimitError: A foreseen target lies outside the box.
             NotReadyError: The station was learnt in another base.
@@ -141,6 +147,7 @@ class RecipeRun:
             RobolinkError: The controller's state forbids it.
         """
         controller, recipe = self._controller, self._loaded.recipe
+        require_own_numbers(controller, self._loaded)
         controller.outcomes.look()
         controller.require_settled(tr("recipe {name!r}", name=recipe.name))
         self._require_role()

@@ -12,4 +12,5 @@ from robolink.sensing._registry import SENSORS_GROUP as SENSORS_GROUP
 from robolink.sensing._registry import SensorOpener as SensorOpener
 from robolink.sensing._registry import open_sensor as open_sensor
 from robolink.sensing._registry import sensor_name as sensor_name
+from robolink.sensing._vision_guide import VISION_GUIDE as VISION_GUIDE
 from robolink.sensing._vision_guide import VisionGuideCamera as VisionGuideCamera

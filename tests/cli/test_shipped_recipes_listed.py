@@ -3,14 +3,14 @@
 import json
 
 from robolink_cli import main
-from robolink_cli.commands.shipped.recipe import _models, _purpose
+from robolink_cli.commands.shipped.recipe_copies import first_comment, models
 from robolink_cli.commands.shipped.recipe_purposes import PURPOSES
 
 from tests.contract._terminal import Terminal
 
 
 def test_each_recipe_says_what_its_file_says():
-    assert {name: _purpose(path) for name, path in _models().items()} == PURPOSES
+    assert {name: first_comment(path) for name, path in models().items()} == PURPOSES
 
 
 def test_a_person_reads_it_in_their_language_and_a_program_in_english(capsys):

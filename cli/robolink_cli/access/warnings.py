@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 from robolink.messages import tr
 from robolink.timing import local_label
+from robolink_cli.console.next_command import recover_after
 from robolink_cli.console.render import note
 
 if TYPE_CHECKING:
@@ -36,16 +37,11 @@ def note_unsettled(controller: "Controller", markers: "Sequence[Marker]", url: s
 def way_back(url: str, *, reset_first: bool) -> str:
     """Return the commands that settle what was left open, in the order that works.
 
-    A controller in its error state, and one whose emergency stop was released without a reset,
-    refuses what ``recover`` has to ask it.
-
     Args:
         url: How a person names the controller.
         reset_first: Whether it needs a reset.
     """
-    if reset_first:
-        return f'robolink -c "{url}" robot reset, then robolink -c "{url}" recover'
-    return f'robolink -c "{url}" recover'
+    return recover_after(f'robolink -c "{url}"', again=False, reset_first=reset_first)
 
 
 def _needs_reset(controller: "Controller") -> bool:

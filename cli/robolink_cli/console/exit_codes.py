@@ -2,6 +2,7 @@
 
 import io
 import os
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
 import click
@@ -9,6 +10,7 @@ import click
 from robolink import errors
 from robolink.interrupts import EndedBy, Interrupted, ended_by
 from robolink.messages import tr
+from robolink_cli.console.next_command import next_of
 from robolink_cli.console.output import hand_over, sentences, show
 from robolink_cli.console.render import dumps
 
@@ -96,8 +98,14 @@ def exit_code(error: BaseException) -> int:
     return next((code for kind, code in EXIT_CODES if isinstance(error, kind)), BUG)
 
 
-def report(error: BaseException, *, as_json: bool) -> int:
-    """Tell a person, or a machine, about ``error``; return the exit code."""
+def report(error: BaseException, *, as_json: bool, typed: Sequence[str] = ()) -> int:
+    """Tell a person, or a machine, about ``error``; return the exit code.
+
+    Args:
+        error: What ended a command.
+        as_json: Whether a machine is told.
+        typed: The command line, without the program's name: it is not proposed again.
+    """
     from robolink.standing import UNTOUCHED, standing_after
 
     code = exit_code(error)
@@ -108,19 +116,19 @@ def report(error: BaseException, *, as_json: bool) -> int:
     if is_cut_off(error) and standing_after(error) is UNTOUCHED:
         return code  # a list, cut off by its reader: no news to him
     if as_json:
-        hand_over(error_document(error))
+        hand_over(error_document(error, typed))
     elif isinstance(error, click.ClickException):
         usage = io.StringIO()
         error.show(file=usage)  # it repeats what was typed
         show(sentences(usage.getvalue().rstrip("\n")), beside=True)
     else:
-        what, remedy = _sentences(error)
+        what, remedy = _sentences(error, typed)
         show(sentences(f"robolink: {what}"), beside=True)
         if remedy:
             show(sentences(f"  {remedy}"), beside=True)
     if not as_json or isinstance(error, KeyboardInterrupt):
         # Whoever ended it may not be who reads the document.
-        tell_standing(standing_after(error))
+        tell_standing(error, typed)
     return code
 
 
@@ -129,16 +137,17 @@ def is_cut_off(error: BaseException) -> bool:
     return isinstance(error, Interrupted) and error.by is EndedBy.OUTPUT_CLOSED
 
 
-def error_document(error: BaseException) -> str:
-    """Return the JSON document that stands for ``error``."""
-    return dumps("robolink/error/1", {"error": error_body(error), "exit_code": exit_code(error)})
+def error_document(error: BaseException, typed: Sequence[str] = ()) -> str:
+    """Return the JSON document that stands for ``error``; arguments as for :func:`report`."""
+    body = error_body(error, typed)
+    return dumps("robolink/error/1", {"error": body, "exit_code": exit_code(error)})
 
 
-def error_body(error: BaseException) -> dict[str, object]:
-    """Return what is known about ``error``, as plain JSON."""
+def error_body(error: BaseException, typed: Sequence[str] = ()) -> dict[str, object]:
+    """Return what is known about ``error``, as plain JSON; arguments as for :func:`report`."""
     from robolink.standing import standing_after
 
-    what, remedy = _sentences(error)
+    what, remedy = _sentences(error, typed)
     ours = isinstance(error, errors.RobolinkError)
     standing = standing_after(error)
     ended = _ending(error) if isinstance(error, KeyboardInterrupt) else ended_by()
@@ -169,9 +178,12 @@ def _ending_in_words(by: EndedBy) -> str:
     return tr("You stopped it (Ctrl-C).")
 
 
-def _sentences(error: BaseException) -> tuple[str, str]:
+def _sentences(error: BaseException, typed: Sequence[str]) -> tuple[str, str]:
     if isinstance(error, errors.RobolinkError):
-        return error.what, error.remedy
+        from robolink.standing import standing_after
+
+        left = standing_after(error)
+        return next_of(error.what, error, left, typed), next_of(error.remedy, error, left, typed)
     if isinstance(error, click.ClickException):
         return error.format_message(), tr("'robolink COMMAND --help' shows what can be given.")
     if isinstance(error, KeyboardInterrupt):
@@ -191,14 +203,16 @@ def _sentences(error: BaseException) -> tuple[str, str]:
 _NAMES: Final = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
 
 
-def tell_standing(standing: "Standing") -> None:
+def tell_standing(error: BaseException, typed: Sequence[str] = ()) -> None:
     """Say on stderr what stands; nothing of a command that had no controller, or only looked."""
-    from robolink.standing import UNTOUCHED
+    from robolink.standing import UNTOUCHED, standing_after
 
+    standing = standing_after(error)
     if standing is not UNTOUCHED:
         from robolink.model import describe_standing  # here, because --help needs none
 
-        show(sentences(describe_standing(standing)), beside=True)
+        told = next_of(describe_standing(standing), error, standing, typed)
+        show(sentences(told), beside=True)
 
 
 def standing_payload(standing: "Standing") -> dict[str, object]:

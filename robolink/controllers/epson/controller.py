@@ -2,6 +2,7 @@
 
 from contextlib import suppress
 from functools import cached_property
+from typing import ClassVar
 
 from robolink.controllers.controller_core import ControllerCore
 from robolink.controllers.epson.condition import ConditionReader
@@ -65,6 +66,17 @@ class EpsonController(ControllerCore):
         True
     """
 
+    OF_KIND: ClassVar = Capabilities(
+        tool_write=True,
+        motion=True,
+        motors=True,
+        low_power=True,
+        looks=True,
+        io=True,
+        points=True,
+        variables=True,
+        alarms=True,
+    )
     tools: EpsonToolTable
     groups: tuple[EpsonGroup]
 
@@ -73,17 +85,7 @@ class EpsonController(ControllerCore):
     ) -> None:
         link = self._link = EpsonLink(session, outcomes)
         self.groups = (EpsonGroup(link, remote_timeout_s=remote_timeout_s),)
-        able = Capabilities(
-            tool_write=True,
-            motion=True,
-            motors=True,
-            low_power=True,
-            io=True,
-            points=True,
-            variables=True,
-            alarms=True,
-        )
-        super().__init__(link, capabilities=able, tools=EpsonToolTable(link))
+        super().__init__(link, capabilities=self.OF_KIND, tools=EpsonToolTable(link))
 
     @cached_property
     def io(self) -> EpsonIo:

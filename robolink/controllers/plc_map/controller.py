@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
+from typing import ClassVar
 
 from robolink.controllers.controller_core import ControllerCore
 from robolink.controllers.plc_map.flange import FlangeReader
@@ -63,6 +64,7 @@ class PlcMapController(ControllerCore):
         [1, 2]
     """
 
+    OF_KIND: ClassVar = Capabilities(tool_write=True, inputs_only=True, io=True)
     tools: RegisterToolTable
     groups: tuple[FlangeReader]
 
@@ -72,7 +74,7 @@ class PlcMapController(ControllerCore):
         plc = self._plc = MappedPlc(client, register_map, outcomes)
         self.register_map = register_map
         self.groups = (FlangeReader(plc),)
-        able = Capabilities(tool_write=register_map.writable, io=True)
+        able = replace(self.OF_KIND, tool_write=register_map.writable)
         super().__init__(plc, capabilities=able, tools=RegisterToolTable(plc))
 
     @cached_property

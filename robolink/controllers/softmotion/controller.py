@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, ClassVar, Final
 
 from robolink import ambient
 from robolink.controllers.controller_core import ControllerCore
@@ -82,6 +82,9 @@ class SoftMotionController(ControllerCore):
         images: What is known of the machine builder's own kinematics.
     """
 
+    OF_KIND: ClassVar = Capabilities(
+        pose_while_moving=True, tool_write=True, motion=True, motors=True, io=True
+    )
     tools: SoftMotionToolTable
     groups: tuple[SoftMotionGroup]
 
@@ -90,12 +93,8 @@ class SoftMotionController(ControllerCore):
         self.groups = (SoftMotionGroup(mailbox),)
         able = mailbox.snapshots.met.capabilities
         moves = Capability.MOTION in able
-        offered = Capabilities(
-            pose_while_moving=True,
-            tool_write=Capability.TOOLS in able,
-            motion=moves,
-            motors=moves,
-            io=True,
+        offered = replace(
+            self.OF_KIND, tool_write=Capability.TOOLS in able, motion=moves, motors=moves
         )
         tools = SoftMotionToolTable(mailbox, images)
         super().__init__(mailbox, capabilities=offered, tools=tools)

@@ -41,6 +41,10 @@ class Recipe(Table):
     cells: Annotated[tuple[Line, ...], Field(strict=False)] = ()
     """Names of the cells that it is for; without it, any cell. At another it is neither offered
     nor run: its poses would lead somewhere else there."""
+    numbers: Literal["simulated"] | None = None
+    """Whose numbers these are: "simulated" stands in the copy of a recipe that comes along, which
+    runs on simulated controllers alone. Whoever has put in stations, poses, box and limits of the
+    cell deletes the line."""
     basis: Basis
     """What is written: with "difference" the stored offset, moved by how much the tip moved
     against the reference of the same tool at the same station; with "absolute" what was

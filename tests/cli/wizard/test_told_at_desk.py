@@ -1,5 +1,6 @@
 """What a person at the screen reads, and what ENTER and a key that is too early do not do."""
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -29,7 +30,8 @@ from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 import robolink
 from robolink.backup import keep_first_backup, load, save
-from robolink.errors import DeclinedError, NotReadyError
+from robolink.config import find_cell
+from robolink.errors import ConfigError, DeclinedError, NotReadyError
 from robolink.journal import EntryKind, NewEntry, Signature, memory_journal, open_log
 from robolink.model import Path as Way
 from robolink.model import Pose, ToolOffset, describe_offset
@@ -355,6 +357,52 @@ def test_a_job_is_chosen_by_what_it_does_and_when_it_did_so_last(tmp_path, monke
     here.append(NewEntry(EntryKind.READ_BACK, tool=1, details={"value": [1.0, *value[1:]]}))
     assert "due" not in offered()[-1]
     here.close()
+
+
+def jobs_offered(url):
+    desk = Leaver()
+    with pytest.raises(DeclinedError):
+        choose_recipe(desk, None, url)
+    (subject,) = (
+        one.subject
+        for one in desk.happened()
+        if isinstance(one, WasRegarded) and isinstance(one.subject, ChoiceSubject)
+    )
+    return [row.rpartition("(")[2].rstrip(")") for row in subject.options]
+
+
+def test_a_job_that_this_kind_of_controller_cannot_do_is_not_offered(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
+    for name in ("pendant-points", "scara-pin"):
+        shutil.copy(RECIPES / f"{name}.toml", tmp_path)
+    assert jobs_offered("epson+tcp://x:5000") == ["pendant-points.toml", "scara-pin.toml"]
+    assert jobs_offered("softmotion+modbus-tcp://x") == ["scara-pin.toml"]
+    assert jobs_offered("gantry+usb://x") == ["pendant-points.toml", "scara-pin.toml"]
+    with pytest.raises(ConfigError, match=r"scara-pin.toml: The recipe moves the robot"):
+        jobs_offered("plc+modbus-tcp://x?map=a.toml")
+
+
+def test_where_there_is_no_recipe_one_that_fits_is_copied_and_not_run(tmp_path, monkeypatch):
+    cells = tmp_path / "cells"
+    cells.mkdir()
+    (cells / "robolink.toml").write_text('[cells.line3]\nurl = "softmotion+modbus-tcp://x"\n')
+    monkeypatch.chdir(cells)
+    cell = find_cell("line3")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ConfigError, match="It is not run yet") as told:
+        choose_recipe(desk := Chooser(1), cell, cell.url)
+    (path,) = cells.glob("five*.toml")
+    assert desk.marked == [("five-axes-pivot", "Choose")]
+    assert path.name in told.value.what
+    assert load_recipe(path).recipe.numbers == "simulated"
+    desk = Leaver()
+    with pytest.raises(DeclinedError):
+        choose_recipe(desk, None, cell.url)
+    offered = [one.subject.options for one in desk.happened() if isinstance(one, WasRegarded)]
+    assert "scara-pin" in offered[0]
+    assert "pendant-points" not in offered[0], "a PLC has no taught points"
+    assert not list(tmp_path.glob("*.toml")), "whoever leaves has nothing written"
 
 
 def test_the_step_is_numbered_where_that_cuts_nothing_off():

@@ -102,7 +102,8 @@ def choose_recipe(
 ) -> "LoadedRecipe":
     """Have one of the recipes chosen that stand beside the cell file or here.
 
-    Those of other cells are not among them. What was only used on another robot so far comes last.
+    Those of other cells, and those that this kind of controller could not carry out, are not among
+    them. What was only used on another robot so far comes last.
 
     Args:
         desk: Where.
@@ -111,16 +112,19 @@ def choose_recipe(
         head: Makes the first row, in the language that is spoken by then; ``None`` leaves it.
 
     Raises:
-        ConfigError: There is none, or it is wrong.
+        ConfigError: There is none, or it is wrong; where there is none, one that comes along was
+            copied if the person chose it.
         DeclinedError: The person leaves.
     """
     paths = recipes_at(cell)
+    if not paths:
+        raise _copied(desk, cell, url, head)
     loaded: list[LoadedRecipe] = []
 
     def ask() -> tuple[str, ChoiceSubject]:
         if head is not None:
             desk.regard(head())
-        found = _of_this_cell(_loaded(desk, paths), cell)
+        found = _of_this_kind(_of_this_cell(_loaded(desk, paths), cell), url)
         ordered = sorted(
             zip(found, _pasts(found, url), strict=True),
             key=lambda one: one[1].elsewhere is not None,
@@ -150,13 +154,51 @@ def _loaded(desk: AskingDesk, paths: Sequence[Path]) -> "list[LoadedRecipe]":
             desk.tell(f"{path}: {error.what}")
     if not loaded:
         raise ConfigError(
-            tr("There is no recipe beside the cell file, nor in this folder."),
-            remedy=tr(
-                "To begin with one that comes along: robolink recipe list. To measure one tool "
-                "without a recipe: robolink calibrate two-pose --tool N"
-            ),
+            tr("No recipe beside the cell file or in this folder is right."),
+            remedy=tr("'robolink recipe check FILE' says everything that is wrong with one."),
         )
     return loaded
+
+
+def _copied(
+    desk: AskingDesk,
+    cell: "Cell | None",
+    url: str | None,
+    head: "Callable[[], Header] | None",
+) -> ConfigError:
+    """Have one of the recipes that come along copied; return that it is not run as it is.
+
+    Raises:
+        ConfigError: None of them can be run by this kind of controller.
+        DeclinedError: The person leaves.
+    """
+    from robolink.recipe import load_recipe
+    from robolink_cli.commands.shipped.recipe_copies import copy_recipe, models, purpose_of
+
+    fitting = _of_this_kind([load_recipe(path) for path in models().values()], url)
+
+    def ask() -> tuple[str, ChoiceSubject]:
+        if head is not None:
+            desk.regard(head())
+        said = tr("Its numbers are those of a simulated cell: you put in yours before it runs.")
+        rows = tuple(one.path.stem for one in fitting)
+        details = tuple((spoken(purpose_of(one.path)), said) for one in fitting)
+        question = tr("There is no recipe here yet. Which one is copied to begin with?")
+        return question, ChoiceSubject(
+            tr("Choose"), (), rows, details=details, does=tr("Copy it"), enters=False
+        )
+
+    name = fitting[choose_in_either_language(desk, ask, _nothing)].path.stem
+    path = _folders(cell)[0] / f"{name}.toml"
+    copy_recipe(name, path)
+    return ConfigError(
+        tr("Written: {path}. It is not run yet: its numbers are of a simulated cell.", path=path),
+        remedy=tr(
+            "Put in those of your cell in the marked lines, delete the line 'numbers', then: "
+            "robolink recipe check {path}",
+            path=path,
+        ),
+    )
 
 
 def _of_this_cell(loaded: "list[LoadedRecipe]", cell: "Cell | None") -> "list[LoadedRecipe]":
@@ -173,6 +215,29 @@ def _of_this_cell(loaded: "list[LoadedRecipe]", cell: "Cell | None") -> "list[Lo
     raise ConfigError(
         tr("Every recipe found here is for another cell: {recipes}.", recipes=", ".join(others)),
         remedy=tr("Name that cell, or write a recipe for this one: robolink recipe list"),
+    )
+
+
+def _of_this_kind(loaded: "list[LoadedRecipe]", url: str | None) -> "list[LoadedRecipe]":
+    """Return the recipes that this kind of controller can carry out, by what a run refuses too.
+
+    Raises:
+        ConfigError: There is none.
+    """
+    from robolink.controllers import capabilities_of_kind
+    from robolink.recipe import beyond
+
+    able = capabilities_of_kind((url or "").partition("+")[0])
+    if able is None:
+        return loaded
+    found = [(one, beyond(one.recipe, able)) for one in loaded]
+    fitting = [one for one, why in found if not why]
+    if fitting:
+        return fitting
+    told = (f"{one.path.name}: {' '.join(why)}" for one, why in found)
+    raise ConfigError(
+        tr("No recipe found here can be run on this controller. {recipes}", recipes=" ".join(told)),
+        remedy=tr("Write a recipe for this kind of controller: robolink recipe list"),
     )
 
 
@@ -254,11 +319,8 @@ def recipes_at(cell: "Cell | None") -> list[Path]:
     Args:
         cell: The cell, ``None`` where only a URL is known.
     """
-    roots = [Path.cwd()]
-    if cell is not None and "url" in cell.origins:
-        roots.insert(0, cell.origins["url"].parent)
     found: dict[Path, None] = {}
-    for root in roots:
+    for root in _folders(cell):
         for folder in _FOLDERS:
             place = root / folder
             if place.is_dir():
@@ -266,6 +328,12 @@ def recipes_at(cell: "Cell | None") -> list[Path]:
                     if is_recipe(path):
                         found[path.resolve()] = None
     return list(found)
+
+
+def _folders(cell: "Cell | None") -> list[Path]:
+    """Return the folder of the cell file, where there is one, and the working folder."""
+    here = [Path.cwd()]
+    return [cell.origins["url"].parent, *here] if cell and "url" in cell.origins else here
 
 
 def _nothing() -> None:

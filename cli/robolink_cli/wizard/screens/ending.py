@@ -12,7 +12,6 @@ from robolink.errors import (
     DeclinedError,
     OutcomeUnknownError,
     RobolinkError,
-    StoppedError,
     VerifyError,
 )
 from robolink.messages import joined, tr
@@ -20,6 +19,7 @@ from robolink.model import PersonRole, describe_offset, describe_standing
 from robolink.nozzle_change import ChangeReport, ToolReport, next_steps
 from robolink.standing import UNTOUCHED, standing_after
 from robolink_cli.access.warnings import way_back
+from robolink_cli.console.next_command import next_of, was_refused
 from robolink_cli.console.render import next_lines
 from robolink_cli.wizard.check_list import CheckSubject
 from robolink_cli.wizard.choices import ChoiceSubject
@@ -111,7 +111,9 @@ def stopped_lines(state: WizardState, error: RobolinkError) -> list[str]:
     stands = "" if standing is UNTOUCHED else describe_standing(standing)
     # What stands says best that nothing was written.
     remedy = "" if error.remedy in stands else error.remedy
-    said = [one for one in (error.what, remedy, stands) if one]
+    typed = state.header.command.split()
+    texts = (next_of(one, error, standing, typed) for one in (error.what, remedy, stands))
+    said = [one for one in texts if one]
     return [*_where(state), *said, "", *_next(state, error)]
 
 
@@ -168,16 +170,16 @@ def _next(state: WizardState, error: RobolinkError) -> list[str]:
     """
     standing = standing_after(error)
     if standing.left_open or isinstance(error, OutcomeUnknownError):
-        command = way_back(state.header.cell, reset_first=standing.reset_first)
-    elif isinstance(error, VerifyError) and error.next_commands:
+        back = way_back(state.header.cell, reset_first=standing.reset_first)
+        line = tr("Next: {command}", command=back)
+        return [next_of(line, error, standing, state.header.command.split())]
+    if isinstance(error, VerifyError) and error.next_commands:
         return [
             tr("Next: {command}", command=f'robolink -c "{state.header.cell}" {command}')
             for command in error.next_commands
         ]
-    elif isinstance(error, (DeclinedError, StoppedError)) or (
-        isinstance(error, (CalibrationError, VerifyError)) and state.touch is not None
-    ):
-        command = state.header.command
-    else:
+    measured = isinstance(error, (CalibrationError, VerifyError)) and state.touch is not None
+    command = state.header.command
+    if not command or (was_refused(error) and not measured):
         return []
-    return [tr("Next: {command}", command=command)] if command else []
+    return [tr("Next: {command}", command=command)]

@@ -53,7 +53,8 @@ def test_what_a_kind_cannot_do_is_told_and_nothing_else(case, kind):
 
 
 def test_another_camera_and_a_run_that_writes_nothing_ask_for_less():
-    able = replace(capabilities_of_kind("softmotion"), tool_write=False)
+    able: Any = capabilities_of_kind("softmotion")
+    able = replace(able, tool_write=False)
     recipe, _ = CASES["own camera"]
     assert len(beyond(recipe, able)) == 2
     assert beyond(recipe, able, other_sensor=True, writes=False) == ()

@@ -43,10 +43,39 @@ def pytest_configure(config):
 
 
 def pytest_sessionstart():
-    """Let Ctrl-C interrupt: a shell starts what runs in the background with it ignored."""
+    """Prepare what every test of this process needs."""
+    hear_signals()
+    install(CANARIES)
+
+
+def hear_signals():
+    """Undo what a shell does to jobs in the background, and ``nohup`` to all: signals ignored.
+
+    Whatever the tests start would inherit that. A signal that has a handler is the usual one again
+    in a program that is started; so this process outlives a closed window, as ``nohup`` wants it,
+    and a command under test does not.
+    """
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
-    install(CANARIES)
+    hang_up = getattr(signal, "SIGHUP", None)  # Windows has none
+    if hang_up is not None and signal.getsignal(hang_up) is signal.SIG_IGN:
+        signal.signal(hang_up, _outlived)
+
+
+def _outlived(_number, _frame):
+    """Go on."""
+
+
+@pytest.fixture
+def signals_of_a_terminal():
+    """Ctrl-C, a termination and a closed window do in this process what they usually do."""
+    usual = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
+    if hasattr(signal, "SIGHUP"):
+        usual[signal.SIGHUP] = signal.SIG_DFL
+    before = {number: signal.signal(number, handler) for number, handler in usual.items()}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
 
 
 @pytest.hookimpl(tryfirst=True)

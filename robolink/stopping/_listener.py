@@ -28,8 +28,8 @@ from robolink import ambient
 from robolink.closing import ClosedAtExit
 from robolink.errors import RobolinkError
 from robolink.files.durable import make_folder, state_folder
-from robolink.messages import tr
 from robolink.model import ControllerStatus, is_own_name
+from robolink.plug_ins import unexpected
 from robolink.stopping._far_end import far_end_of
 from robolink.timing import NS_PER_S
 
@@ -167,9 +167,7 @@ class StopListener(ClosedAtExit):
                 {"error": type(error).__name__, "what": error.what, "remedy": error.remedy},
             )
         except Exception as error:
-            what = tr(
-                "A defect in robolink: {kind}: {error}", kind=type(error).__name__, error=error
-            )
+            what = unexpected(error)
             _tell(caller, {"error": "OutcomeUnknownError", "what": what, "remedy": ""})
         # Last: a console that is held up must not hold up a stop. And one that fails ends nothing:
         # how the stop ended has been told, and the next one has to be heard.

@@ -16,6 +16,8 @@ from robolink.interrupts import EndedBy, Interrupted, InterruptGate, ended_by, o
 from robolink.model import EntryKind, ToolOffset
 from robolink.transaction import ToolChange, Wanted, change_tools
 
+pytestmark = pytest.mark.usefixtures("signals_of_a_terminal")
+
 NEW = ToolOffset(1.5, 2.5, 3.5)
 
 CODES = {signal.SIGHUP: 129, signal.SIGINT: 130, signal.SIGTERM: 143}
@@ -61,14 +63,15 @@ def test_without_a_command_around_it_a_session_leaves_sigterm_to_the_program():
     gate.close()
 
 
-def test_what_nohup_ignores_stays_ignored():
-    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
-    try:
-        with one_ending():
-            signal.raise_signal(signal.SIGHUP)
-        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
-    finally:
-        signal.signal(signal.SIGHUP, before)
+def test_what_nohup_or_a_job_in_the_background_ignores_stays_ignored(number):
+    signal.signal(number, signal.SIG_IGN)
+    gate = InterruptGate()
+    with one_ending():
+        gate.open()
+        signal.raise_signal(number)
+        assert signal.getsignal(number) is signal.SIG_IGN
+        gate.close()
+    assert signal.getsignal(number) is signal.SIG_IGN
 
 
 @pytest.mark.parametrize("session", ["closed", "left open"])

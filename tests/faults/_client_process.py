@@ -80,8 +80,6 @@ def _robolink(
     os.environ.update(environment)
     for number, path in ((1, out_path), (2, err_path)):
         os.dup2(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600), number)
-    # A shell that starts a test run in the background has SIGINT ignored.
-    signal.signal(signal.SIGINT, signal.default_int_handler)
     from robolink_cli.main import run
 
     sys.exit(run(arguments, last=True))

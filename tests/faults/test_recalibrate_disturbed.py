@@ -11,7 +11,6 @@ inner ones of rows of polls. ``pytest -s`` shows how many.
 """
 
 import re
-import signal
 from typing import Final
 
 import pytest
@@ -41,14 +40,6 @@ POLLS: Final = re.compile("wait|(request|answer) (read_head|beat)")
 SHOWS_LATER: Final = re.compile(r"commit|answer \d+: (read|beat)")
 """What happens to a controller while the driver stores something, or just after a PLC was read,
 shows with the next exchange, which is an instant of its own."""
-
-
-@pytest.fixture(autouse=True)
-def _ctrl_c_interrupts():
-    # A shell that starts a test run in the background has it ignored.
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
 
 
 @pytest.fixture(scope="module")

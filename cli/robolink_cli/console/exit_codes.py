@@ -15,6 +15,7 @@ from robolink_cli.console.output import hand_over, sentences, show
 from robolink_cli.console.render import dumps
 
 if TYPE_CHECKING:
+    from robolink.plug_ins import PlugInModule
     from robolink.standing import Components, Standing
 
 DONE: Final = 0
@@ -95,7 +96,9 @@ def exit_code(error: BaseException) -> int:
         return INTERRUPTED
     if isinstance(error, click.ClickException):
         return USAGE
-    return next((code for kind, code in EXIT_CODES if isinstance(error, kind)), BUG)
+    if isinstance(error, errors.RobolinkError):
+        return next((code for kind, code in EXIT_CODES if isinstance(error, kind)), BUG)
+    return BUG if _plug_in(error) is None else USAGE
 
 
 def report(error: BaseException, *, as_json: bool, typed: Sequence[str] = ()) -> int:
@@ -190,14 +193,23 @@ def _sentences(error: BaseException, typed: Sequence[str]) -> tuple[str, str]:
         return _ending_in_words(_ending(error)), ""
     if isinstance(error, (EOFError, click.Abort)):
         return tr("You stopped it (Ctrl-C)."), ""
-    return (
-        tr(
-            "A defect in robolink: {kind}: {error}",
-            kind=type(error).__name__,
-            error=error,
-        ),
-        tr("Set ROBOLINK_DEBUG=1 to see where, and report it with that text."),
-    )
+    from robolink.plug_ins import unexpected
+
+    plug_in = _plug_in(error)
+    if plug_in is None:
+        remedy = tr("Set ROBOLINK_DEBUG=1 to see where, and report it with that text.")
+    else:
+        remedy = tr(
+            "Set ROBOLINK_DEBUG=1 to see where, and report it to whoever made {package}.",
+            package=plug_in.package,
+        )
+    return unexpected(error), remedy
+
+
+def _plug_in(error: BaseException) -> "PlugInModule | None":
+    from robolink.plug_ins import plug_in_module  # here, because --help needs none
+
+    return plug_in_module(error)
 
 
 _NAMES: Final = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")

@@ -6,7 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from robolink.calibration import Beam, Crossing, find_beams, rotation_of, solve_crossed_beams
+from robolink.calibration import (
+    Beam,
+    Crossing,
+    TipHeight,
+    find_beams,
+    rotation_of,
+    solve_crossed_beams,
+)
 from robolink.methods.beams.solving import CrossingSolver
 from robolink.model import Pose, ToolOffset, angle_difference_deg, rotate_xy
 from tests.calibration._simulated import assert_honest, coverage, refused
@@ -242,3 +249,19 @@ def test_the_step_of_a_latch_counts_however_often_it_repeats_itself():
     bare = solve_crossed_beams(travels(TIP, repeats=2), TRUE)
     assert bare.half_width95 == pytest.approx((0.0005, 0.0005))
     assert bare.region95_radius_mm == pytest.approx(0.0005)
+
+
+@pytest.mark.parametrize("frame", [Pose(0, 0, 0, 0, 9, 0, tool=0), Pose(0, 0, 0, 25, 4, -6, tool=0)])
+def test_an_unsure_height_enters_x_and_y_as_it_moves_them(frame):
+    """By how much each moves is what a height that is 1 mm off makes of it."""
+    seen, stored = needle_crossings(frame, TIP, (0.0, 0.0), dip_mm=0.0)
+
+    def found(off_mm=0.0, sigma_mm=None):
+        height = TipHeight(stored.z_mm + off_mm, sigma_mm)
+        return solve_crossed_beams(seen, TRUE, sigma_mm=0.004, height=height)
+
+    exact, unsure = found(), found(sigma_mm=0.5)
+    moved = [a - b for a, b in zip(xy(found(1.0)), xy(exact), strict=True)]
+    added = np.subtract(unsure.covariance, exact.covariance)[:2, :2]
+    assert np.hypot(*moved) > 0.1
+    assert added == pytest.approx(0.25 * np.outer(moved, moved), abs=1e-7)

@@ -30,9 +30,9 @@ def xyu(result):
     return (result.offset.x_mm, result.offset.y_mm, result.offset.u_deg)
 
 
-def seen_by_a_camera_that_is_off(angles, drawing, place=0j, turn=0j):
+def seen_by_a_camera_that_is_off(angles, drawing, place=0j, turn=0j, turned_deg=10.0):
     """Fiducials of a board that is held at (5, -3), turned by 10 degrees, below the camera."""
-    tool, looks = ToolOffset(5.0, -3.0, 0.0, 10.0), []
+    tool, looks = ToolOffset(5.0, -3.0, 0.0, turned_deg), []
     for u_deg in angles:
         for d in drawing:
             at = complex(*rotate_xy(d[0], d[1], tool.u_deg)) + complex(tool.x_mm, tool.y_mm)
@@ -92,3 +92,19 @@ def test_a_board_is_no_surer_than_the_camera_that_saw_it():
     alone = solve_board_round(twice, BOARD * 2, sigma_mm=0.001)
     found = solve_board_round(twice, BOARD * 2, sigma_mm=0.001, camera=sure)
     assert found.half95_mm == pytest.approx(alone.half95_mm, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    "solve",
+    [
+        lambda looks: solve_board(*looks[:2], sigma_mm=1e-9, camera=CAMERA),
+        lambda looks: solve_board_fit(looks, BOARD, sigma_mm=1e-9, camera=CAMERA),
+    ],
+)
+def test_a_board_that_hangs_the_wrong_way_round_is_known_as_well_as_any(solve):
+    """At 180 degrees, where an angle goes on at -180."""
+    some, other = (
+        solve(seen_by_a_camera_that_is_off((30.0,), BOARD, turned_deg=turned_deg)).covariance[2][2]
+        for turned_deg in (10.0, 180.0)
+    )
+    assert other == pytest.approx(some, rel=1e-3)

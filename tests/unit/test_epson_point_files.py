@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robolink.errors import ConfigError
-from robolink.model import Hand, Pose, Posture
+from robolink.model import Elbow, Hand, Pose, Posture, Wrist
 from robolink.pose_tables import parse_pts, read_poses, read_pts
 
 
@@ -62,6 +62,16 @@ def test_the_angle_of_a_singular_place_is_read_from_a_point_file():
     assert told.posture == Posture(j1_angle_deg=57.5)
     assert untold is not None
     assert untold.posture is None
+
+
+def test_the_posture_of_a_six_axis_robot_is_read_from_a_point_file():
+    flags = "\tnWrist=2\n\tnJ1Flag=1\n\tnJ4Flag=1\n\tnJ6Flag=-2\n}"
+    there = block(1, 1, V=10)[:-1].replace("nElbow=1", "nElbow=2") + flags
+    pose = parse_pts(pts(there))[1]
+    assert pose is not None
+    assert pose.posture == Posture(
+        elbow=Elbow.BELOW, wrist=Wrist.FLIP, j1_flag=1, j4_flag=1, j6_flag=-2
+    )
 
 
 def test_an_empty_point_file_has_no_points():

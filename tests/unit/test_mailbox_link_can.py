@@ -14,8 +14,9 @@ from robolink.errors import (
     TransportClosedError,
     TransportTimeoutError,
 )
+from robolink.transport import parse_url
 from robolink.transport.can.bus import CanLine
-from robolink.transport.can.mailbox import CanopenMailboxLink
+from robolink.transport.can.mailbox import CanopenMailboxLink, open_canopen_link
 from tests.unit._scripted_can import (
     HEARTBEAT,
     IDENTITY,
@@ -283,3 +284,19 @@ def test_a_caller_who_asks_for_what_there_is_not_is_told_so_and_the_link_lives(l
         misuse(link)
     assert len(bus.sent) == sent
     link.beat(1)
+
+
+def test_frames_of_a_bus_by_multicast_stay_on_this_computer(monkeypatch):
+    asked: dict[str, Any] = {}
+
+    def opened(**settings: Any) -> can.BusABC:
+        asked.update(settings)
+        raise OSError("as far as here")
+
+    monkeypatch.setattr(can, "Bus", opened)
+    url = parse_url("softmotion+can://239.74.163.2?interface=udp_multicast&node=1")
+    with pytest.raises(ConnectError, match="as far as here"):
+        open_canopen_link(url, timeout_s=1.0)
+    # 0 hops is this computer alone; classic frames are what a node on a bus understands.
+    assert asked["hop_limit"] == 0
+    assert asked["fd"] is False

@@ -465,6 +465,14 @@ def test_the_picture_finds_the_elbow_by_angles_alone():
     assert elbow_of(ARRIVAL, (170.0, 120.0)) is None
 
 
+@pytest.mark.parametrize(("upper", "fore"), [(400.0, 100.0), (100.0, 400.0)])
+def test_either_link_of_an_arm_may_be_the_short_one(upper, fore):
+    from robolink_cli.wizard.screens.picture import elbow_of
+
+    elbow = elbow_of(Pose(upper, fore, -60.0, 90.0), (0.0, 90.0))
+    assert elbow == pytest.approx((upper, 0.0))
+
+
 @pytest.mark.parametrize("language_of_page", ["en", "zh"])
 def test_the_pictures_of_the_pages_are_those_of_the_screens(language_of_page):
     from tests.cli.wizard.pictures import SHOWN, picture

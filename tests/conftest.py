@@ -8,6 +8,7 @@ import sys
 import pytest
 
 from tests._canary import Watch, install
+from tests._documents import DOCUMENTS
 from tests._from_both_ends import import_from_the_other_end
 
 # Before anything imports numpy: threads for matrices of six rows cost far more than they bring,
@@ -46,6 +47,7 @@ def pytest_sessionstart():
     """Prepare what every test of this process needs."""
     hear_signals()
     install(CANARIES)
+    DOCUMENTS.install()
 
 
 def hear_signals():
@@ -97,6 +99,15 @@ def no_password_shows(request):
     folders = {given[name] for name in ("tmp_path", "robolink_state") if name in given}
     if leaks := CANARIES.leaks(*folders):
         pytest.fail("a password shows: " + ", ".join(leaks), pytrace=False)
+
+
+@pytest.fixture(autouse=True)
+def documents_fit_their_schemas():
+    """Fail a test in which a command printed a document that docs/documents.schema.json denies."""
+    DOCUMENTS.begin()
+    yield
+    if DOCUMENTS.wrong:
+        pytest.fail("\n".join(DOCUMENTS.wrong[:9]), pytrace=False)
 
 
 def pytest_collection(session):

@@ -18,6 +18,23 @@ from robolink_cli.console.tolerance import tolerate_any_console
 
 _FOUND = 1
 _NOT_RUNNABLE = 2
+_NOTHING_BEGUN = {
+    "reason": None,
+    "code": None,
+    "ended_by": None,
+    "controller_state": "unchanged",
+    "stands": {
+        "tools": {},
+        "selected_tool": None,
+        "selected_before": None,
+        "carried_out": [],
+        "doubtful": [],
+        "moving": [],
+        "settled": True,
+        "left_open": False,
+    },
+}
+"""The rest of an error document, as of a command that reached no controller."""
 
 
 def unfit_packages() -> list[Remark]:
@@ -64,7 +81,8 @@ def answer_without_click(arguments: Sequence[str], error: Exception) -> int:
             return _examined(as_json="--json" in arguments)
         lines = [cannot_run(unfit, error), *(remark.remedy for remark in unfit)]
         if "--json" in arguments:
-            body = {"kind": type(error).__name__, "what": lines[0], "remedy": " ".join(lines[1:])}
+            told = {"kind": type(error).__name__, "what": lines[0], "remedy": " ".join(lines[1:])}
+            body = {**told, **_NOTHING_BEGUN}
             document = {"schema": "robolink/error/1", "error": body, "exit_code": _NOT_RUNNABLE}
             sys.stdout.write(json.dumps(document, indent=2) + "\n")
         else:

@@ -13,6 +13,8 @@ from robolink_cli.session.context import controller_options
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.in_process.epson import register, unregister
 
+from tests._documents import DOCUMENTS
+
 _numbers = count()
 
 
@@ -27,6 +29,7 @@ def plain_environment(monkeypatch, tmp_path):
 @pytest.fixture
 def command(monkeypatch):
     """Put a command of the test's own in place of ``status``, and one for ``sim``."""
+    DOCUMENTS.forgive()  # what the commands of these tests print is made up
     seen = []
 
     def install(act=lambda context: None):

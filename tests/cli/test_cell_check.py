@@ -128,6 +128,9 @@ def test_one_cell_that_does_not_answer_leaves_the_others_looked_at(cells, simula
     by_name = {cell["cell"]: cell for cell in document["cells"]}
     assert by_name["line3"]["ok"]
     assert by_name["away"]["error"]["kind"] == "ConnectError"
+    assert by_name["away"].keys() == by_name["line3"].keys()
+    assert by_name["away"]["tools"] is by_name["away"]["changes"] is None
+    assert by_name["away"]["findings"] == []
     assert sorted(entry.verdict.split(":")[0] for entry in recorded()) == [
         "In order.",
         "The cell could not be looked at",

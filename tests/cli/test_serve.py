@@ -20,6 +20,7 @@ from robolink.model import EntryKind, new_operation
 from robolink.protocols.spel_callback import CallbackLine, CallbackWord, encode_line
 from robolink.serving import CallbackConversation, CallbackLimits, CallbackServer
 from robolink.serving._server import MOST_PROGRAMS
+from tests._documents import wrong_in
 from tests.faults._callback_cell import Bend, CallbackCell
 
 SERVED = ("--spel", "127.0.0.1:0", "--sigma-mm", "0.01", "--json")
@@ -42,6 +43,7 @@ def started(stack):
     stack.callback(process.stdout.close)
     document = json.loads(process.stdout.readline())
     assert document["schema"] == "robolink/serve/1"
+    assert wrong_in(document) == []
     return process, (document["host"], document["port"])
 
 

@@ -23,6 +23,7 @@ from robolink import ToolOffset
 from robolink.controllers.plc_map import PlcMapController
 from robolink.errors import ConfigError
 from robolink.testing import confirm_whole_map
+from tests._documents import wrong_in
 
 MAP = Path(__file__).parents[2] / "examples/plc-maps/commit-bit.toml"
 HEAD = 'schema = "robolink/sim-cells/1"\n'
@@ -260,6 +261,7 @@ def test_all_kinds_are_served_by_one_process_until_it_is_told_to_end(file, tmp_p
     done = started(file(ALL_KINDS), "--wait-ready", "--idle-exit", "60", folder=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     document = json.loads(done.stdout)
+    assert wrong_in(document) == []
     try:
         cells = document["cells"]
         assert list(cells) == ["press-1", "press-2", "line", "glue", "filler"]

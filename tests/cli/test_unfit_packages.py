@@ -12,6 +12,8 @@ from importlib import metadata
 
 import pytest
 
+from tests._documents import wrong_in
+
 BREAKS = "raise ImportError('no such thing in this version')"
 
 
@@ -60,6 +62,7 @@ def test_doctor_without_click_speaks_json_too(instead):
     assert done.returncode == 1, done.stderr
     document = json.loads(done.stdout)
     assert (document["schema"], document["healthy"]) == ("robolink/doctor/1", False)
+    assert wrong_in(document) == []
     first = document["checks"][0]
     assert (first["subject"], first["level"]) == ("click", "bad")
 
@@ -69,6 +72,7 @@ def test_a_command_that_such_a_package_breaks_is_no_defect(instead, name):
     done = instead(name, "1.0.3", BREAKS, "cell", "list", "--json")
     assert done.returncode == 2, done.stdout
     document = json.loads(done.stdout)
+    assert wrong_in(document) == []
     assert document["exit_code"] == 2
     assert f"{name}: 1.0.3 is installed" in document["error"]["what"]
     assert "no such thing in this version" in document["error"]["what"]

@@ -18,7 +18,7 @@ from robolink_simulators.plc import PlcSimulator
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 from robolink.register_maps import load_map
-from tests.contract._json_schema import Schemas
+from tests._json_schema import Schemas
 
 MAP = Path(__file__).parents[2] / "examples/plc-maps/commit-bit.toml"
 DOCUMENT = json.loads(files("robolink_simulators.control").joinpath("openapi.json").read_bytes())

@@ -98,7 +98,7 @@ def test_the_wheel_brings_the_programs_for_controllers_and_their_licence(wheel, 
 def test_the_wheel_brings_the_pages_and_the_recipes_to_begin_with(wheel, names):
     shipped = {
         f"robolink_cli/docs/{path.relative_to(ROOT / 'docs').as_posix()}": path
-        for pattern in ("*.md", "reference/*.md", "decisions/*.md", "pictures/*.svg")
+        for pattern in ("*.md", "*.json", "reference/*.md", "decisions/*.md", "pictures/*.svg")
         for path in (ROOT / "docs").glob(pattern)
     }
     shipped |= {

@@ -195,6 +195,7 @@ def _not_looked(error: RobolinkError) -> "NewEntry":
 
 
 def _payload(one: CheckedCell) -> Mapping[str, object]:
+    """Return what is known of one cell; ``None`` for what nobody could look at."""
     from robolink_cli.views.documents import offset_payload
 
     error = one.error and {
@@ -202,21 +203,20 @@ def _payload(one: CheckedCell) -> Mapping[str, object]:
         "what": one.error.what,
         "remedy": one.error.remedy,
     }
-    if one.inspection is None:
-        return {"cell": one.name, "ok": False, "error": error}
     found = one.inspection
+    tools = found and {str(number): offset_payload(it) for number, it in found.tools.items()}
     return {
         "cell": one.name,
         "ok": one.well,
         "error": error,
-        "controller": found.controller,
-        "tools": {str(number): offset_payload(value) for number, value in found.tools.items()},
-        "selected_tool": found.selected,
-        "stations": list(found.stations),
-        "changes": found.changes,
+        "controller": found and found.controller,
+        "tools": tools,
+        "selected_tool": found and found.selected,
+        "stations": found and list(found.stations),
+        "changes": found and found.changes,
         "findings": [
             {"code": f.code, "subject": f.subject, "sentence": f.sentence, "remedy": f.remedy}
-            for f in found.findings
+            for f in (found.findings if found else ())
         ],
     }
 

@@ -17,7 +17,8 @@ _TYPES: Final[dict[str, tuple[type, ...]]] = {
 }
 _KNOWN: Final = frozenset(
     {"description", "type", "enum", "const", "properties", "required", "additionalProperties"}
-    | {"items", "minItems", "maxItems", "oneOf", "allOf", "$ref"}
+    | {"unevaluatedProperties"}
+    | {"items", "minItems", "maxItems", "oneOf", "allOf", "$ref", "x-commands"}
 )
 
 
@@ -42,9 +43,8 @@ class Schemas:
     def wrong(self, schema: dict[str, Any], value: object, at: str = "") -> list[str]:
         """Return what is wrong with a value, each with its place."""
         found = self._differs(schema, value, at)
-        if isinstance(value, dict) and "additionalProperties" not in schema:
-            unnamed = value.keys() - self._names(schema)
-            found += [f"{at}/{name} is not described" for name in sorted(unnamed)]
+        if isinstance(value, dict) and not self._says_what_else(schema):
+            found += self._undescribed(schema, value, at)
         return found
 
     def _differs(self, schema: dict[str, Any], value: Any, at: str) -> list[str]:
@@ -81,11 +81,25 @@ class Schemas:
         found = [
             f"{at}/{name} is missing" for name in schema.get("required", ()) if name not in value
         ]
+        if False in (schema.get("additionalProperties"), schema.get("unevaluatedProperties")):
+            found += self._undescribed(schema, value, at)
         for name, held in value.items():
             inner = schema.get("properties", {}).get(name) or schema.get("additionalProperties")
-            if inner:
+            if isinstance(inner, dict):
                 found += self.wrong(inner, held, f"{at}/{name}")
         return found
+
+    def _says_what_else(self, schema: dict[str, Any]) -> bool:
+        """Tell whether a schema itself says which other keys there may be, or one of several."""
+        if "$ref" in schema:
+            return self._says_what_else(self._referred(schema))
+        parts = (*schema.get("allOf", ()), *schema.get("oneOf", ()))
+        says = {"additionalProperties", "unevaluatedProperties"} & schema.keys()
+        return bool(says) or any(map(self._says_what_else, parts))
+
+    def _undescribed(self, schema: dict[str, Any], value: dict[str, Any], at: str) -> list[str]:
+        unnamed = value.keys() - self._names(schema)
+        return [f"{at}/{name} is not described" for name in sorted(unnamed)]
 
     def _names(self, schema: dict[str, Any]) -> set[str]:
         """Return the keys that a schema names, whichever of several it is."""

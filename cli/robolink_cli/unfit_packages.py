@@ -8,6 +8,7 @@ import json
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
+from typing import Any, Final
 
 from robolink.messages import joined, tr
 from robolink_cli.commands.computer.doctor_finding import Level, Remark
@@ -18,7 +19,7 @@ from robolink_cli.console.tolerance import tolerate_any_console
 
 _FOUND = 1
 _NOT_RUNNABLE = 2
-_NOTHING_BEGUN = {
+_NOTHING_BEGUN: Final[dict[str, Any]] = {
     "reason": None,
     "code": None,
     "ended_by": None,

@@ -396,12 +396,13 @@ def test_where_there_is_no_recipe_one_that_fits_is_copied_and_not_run(tmp_path, 
     monkeypatch.chdir(tmp_path)
     with pytest.raises(ConfigError, match="It is not run yet") as told:
         choose_recipe(desk := Chooser(1), cell, cell.url)
-    (path,) = cells.glob("five*.toml")
-    assert desk.marked == [("five-axes-pivot", "Choose")]
+    (path,) = cells.glob("gantry*.toml")
+    assert desk.marked == [("gantry-touch-probe", "Choose")]
     assert path.name in told.value.what
     assert load_recipe(path).recipe.numbers == "simulated"
     offered = rows_offered(cell.url)
     assert "scara-pin" in offered
+    assert {"five-axes-pivot", "sphere"} <= set(offered[-3:]), "what few robots can comes last"
     assert "pendant-points" not in offered, "a PLC has no taught points"
     assert not list(tmp_path.glob("*.toml")), "whoever leaves has nothing written"
 

@@ -176,6 +176,8 @@ def _copied(
     from robolink_cli.commands.shipped.recipe_copies import copy_recipe, models, purpose_of
 
     fitting = _of_this_kind([load_recipe(path) for path in models().values()], url)
+    # Only a connected controller tells its axes: what fits every robot comes first.
+    fitting.sort(key=lambda one: one.recipe.source.of_method.needs.tilt)
 
     def ask() -> tuple[str, ChoiceSubject]:
         if head is not None:

@@ -251,7 +251,9 @@ def test_the_step_of_a_latch_counts_however_often_it_repeats_itself():
     assert bare.region95_radius_mm == pytest.approx(0.0005)
 
 
-@pytest.mark.parametrize("frame", [Pose(0, 0, 0, 0, 9, 0, tool=0), Pose(0, 0, 0, 25, 4, -6, tool=0)])
+@pytest.mark.parametrize(
+    "frame", [Pose(0, 0, 0, 0, 9, 0, tool=0), Pose(0, 0, 0, 25, 4, -6, tool=0)]
+)
 def test_an_unsure_height_enters_x_and_y_as_it_moves_them(frame):
     """By how much each moves is what a height that is 1 mm off makes of it."""
     seen, stored = needle_crossings(frame, TIP, (0.0, 0.0), dip_mm=0.0)

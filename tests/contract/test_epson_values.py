@@ -159,6 +159,7 @@ def test_nothing_is_set_in_a_state_that_forbids_it_and_all_is_read(
         ("Byte", -128),
         ("Integer", 32767),
         ("Long", -(2**31)),
+        ("Long", 2**31 - 1),
         ("Real", 0.1),
         ("Real", -1.25e20),
         ("Double", 1 / 3),

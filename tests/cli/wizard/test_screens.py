@@ -18,7 +18,7 @@ from robolink_cli.wizard.happenings import (
 )
 from robolink_cli.wizard.screens.drawing import screen_of
 from robolink_cli.wizard.screens.ending import ended_of
-from robolink_cli.wizard.screens.layout import broken
+from robolink_cli.wizard.screens.layout import broken, key_rows
 from robolink_cli.wizard.screens.told import told_before, told_question
 from robolink_cli.wizard.state import Header, WizardState
 from wcwidth import wcswidth
@@ -488,6 +488,16 @@ def test_keys_of_a_list_stand_at_the_right_edge_in_every_language(language):
     keyed = [row for row in rows[3:12] if "[7]" in row or "[3]" in row]
     assert len(keyed) == 2
     assert {wcswidth(row) for row in keyed} == {79}, language
+
+
+@pytest.mark.parametrize("width", range(34, 42))
+def test_keys_stand_at_least_two_blanks_apart(width):
+    """As many in a row as that leaves room for; what does not fit goes on in a second row."""
+    keys = [("*", "x" * (width - 4)), ("#", "y" * 16), ("Esc", "z" * 14)]
+    rows = list(key_rows(keys))
+    shown = [f"[{key}] {does}" for key, does in keys]
+    assert [cell.strip() for row in rows for cell in row.split("  ") if cell.strip()] == shown
+    assert len(rows) == (1 if sum(map(len, shown)) + 4 <= 80 else 2)
 
 
 def test_a_path_that_is_wider_than_the_screen_is_shown_to_its_end():

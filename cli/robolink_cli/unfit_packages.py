@@ -18,7 +18,7 @@ from robolink_cli.console.tolerance import tolerate_any_console
 
 _FOUND = 1
 _NOT_RUNNABLE = 2
-_NOTHING_BEGUN = {
+_NOTHING_BEGUN: dict[str, object] = {
     "reason": None,
     "code": None,
     "ended_by": None,

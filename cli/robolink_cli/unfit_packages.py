@@ -19,7 +19,7 @@ from robolink_cli.console.tolerance import tolerate_any_console
 
 _FOUND = 1
 _NOT_RUNNABLE = 2
-_NOTHING_BEGUN: Final[dict[str, Any]] = {
+_NOTHING_BEGUN: Final[dict[str, object]] = {
     "reason": None,
     "code": None,
     "ended_by": None,

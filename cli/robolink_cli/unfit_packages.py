@@ -8,7 +8,7 @@ import json
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import Any, Final
+from typing import Final
 
 from robolink.messages import joined, tr
 from robolink_cli.commands.computer.doctor_finding import Level, Remark

@@ -72,7 +72,7 @@ def _outlived(_number, _frame):
 @pytest.fixture
 def signals_of_a_terminal():
     """Ctrl-C, a termination and a closed window do in this process what they usually do."""
-    usual: dict[signal.Signals, Any] = {
+    usual: dict[int, Any] = {
         signal.SIGINT: signal.default_int_handler,
         signal.SIGTERM: signal.SIG_DFL,
     }

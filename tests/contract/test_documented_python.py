@@ -355,6 +355,8 @@ def test_every_block_is_run_and_no_python_stands_outside_of_a_fence():
         "structured-text.md 2",
         "testing.md 1",
         "testing.md 2",
+        "testing.md 3",
+        "testing.md 4",
         "verify-controller.md 1",
     } == TESTS
     for page in PAGES:
@@ -388,10 +390,10 @@ def test_the_test_of_an_integrator_s_program_passes_and_sees_a_changed_line(pyte
 
 
 def test_the_tests_of_readme_pass_in_somebody_else_s_run(pytester):
-    blocks = ("README.md 3", "README.md 4", "testing.md 1", "testing.md 2")
+    blocks = ("README.md 3", "README.md 4", *(f"testing.md {number}" for number in range(1, 5)))
     pytester.makepyfile("".join(BLOCKS[name] for name in blocks))
     result = pytester.runpytest_subprocess("-p", "no:cacheprovider", "--strict-markers")
-    result.assert_outcomes(passed=6)
+    result.assert_outcomes(passed=10)
 
 
 def test_the_test_of_a_recording_passes_and_sees_a_difference(pytester):

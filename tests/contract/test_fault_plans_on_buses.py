@@ -13,6 +13,7 @@ from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 from robolink.errors import (
+    RejectedError,
     RemoteProtocolError,
     TransportBrokenError,
     TransportError,
@@ -67,6 +68,29 @@ def test_a_fault_meets_one_read_and_no_other(bus, action, error, tmp_path):
             assert faults.fired == [fault]
         with closing(open_mailbox_link(url, timeout_s=2.0)) as link:
             assert decode_response(link.read_response()).boot_id == 1
+
+
+@pytest.mark.parametrize(
+    ("bus", "request_of"),
+    [
+        ("modbus-tcp", "read"),
+        ("modbus-tcp", "write"),
+        pytest.param("modbus-rtu", "read", marks=pytest.mark.soak),
+        pytest.param("modbus-rtu", "write", marks=pytest.mark.soak),
+    ],
+)
+def test_a_server_refuses_each_time_until_the_fault_is_removed(bus, request_of):
+    with served(bus, "") as (url, faults), closing(open_mailbox_link(url, timeout_s=2.0)) as link:
+        ask = link.beat if request_of == "write" else link.read_slot
+        match = "beat" if request_of == "write" else "read_slot 3"
+        faults.add(PlcFault(PlcFaultAction.MODBUS_EXCEPTION, match=match, code=6, every=1))
+        for _ in range(2):
+            with pytest.raises(RejectedError) as refused:
+                ask(3)
+            assert refused.value.code == 6
+        faults.clear()
+        ask(3)
+        assert faults.times_fired == 2
 
 
 @pytest.mark.parametrize(

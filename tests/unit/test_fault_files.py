@@ -92,6 +92,8 @@ match = "read_response"
         ("[[fault]]\naction = 'delay'\nseconds = nan", "line 5, fault 1, seconds: must be at most"),
         ("[[fault]]\naction = 'delay'\nseconds = -1", "line 5, fault 1, seconds: must be at least"),
         ("[[fault]]\naction = 'delay'\nposition = true", "line 5, .*position: must be a whole"),
+        ("[[fault]]\naction = 'delay'\nevery = -1", "line 5, fault 1, every: must be at least 0"),
+        ("[[fault]]\naction = 'modbus_exception'", "modbus_exception cannot happen on epson.tcp"),
         ("[[fault]]\naction = 'garble_reply'\nbit = 8", "line 5, fault 1, bit: must be at most 7"),
         ("[[fault]]\naction = 'delay'\nmatch = 3", "line 5, fault 1, match: must be a text"),
         ("[[fault]]\naction = 'wrong_toggle'", "line 4, .*wrong_toggle cannot happen on epson.tcp"),

@@ -25,6 +25,16 @@ def test_the_count_of_an_added_fault_starts_when_it_is_added():
     assert [fault.action for fault in plan.take("GetStatus")] == [FaultAction.DELAY]
 
 
+def test_a_fault_goes_on_in_its_steps_until_it_is_removed():
+    slow = Fault(FaultAction.DELAY, on_exchange=1, match="Execute", seconds=0.3, every=2)
+    plan = FaultPlan([slow])
+    asked = ("Execute a", "Execute b", "GetStatus", "Execute c", "Execute d", "Execute e")
+    assert [len(plan.take(text)) for text in asked] == [0, 1, 0, 0, 1, 0]
+    assert (plan.pending, plan.times_fired) == ((slow,), 2)
+    plan.clear()
+    assert plan.take("Execute f") == plan.pending == ()
+
+
 @pytest.mark.parametrize(
     ("fault", "left"),
     [

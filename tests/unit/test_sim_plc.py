@@ -12,10 +12,12 @@ from pymodbus.pdu.register_message import (
     WriteMultipleRegistersRequest,
     WriteSingleRegisterRequest,
 )
-from robolink_simulators.faults import Fault, FaultAction
+from robolink_simulators.faults import Fault, FaultAction, PlcFault, PlcFaultAction
+from robolink_simulators.faults.stream import EXCEPTION_CODES
 from robolink_simulators.plc import PlcSimulator, device
 from robolink_simulators.plc.frames import LineFrames
 
+from robolink.errors import ConfigError
 from robolink.register_maps import load_map
 
 MAP = Path("examples/plc-maps/commit-bit.toml")
@@ -99,6 +101,26 @@ def test_an_unknown_function_is_refused(plc):
     link = plc.connect(0)
     link.receive(bytes.fromhex("0007 0000 0003 01 2b 0e"), 0)
     assert link.outgoing()[7:] == bytes.fromhex("ab 01")
+
+
+@pytest.mark.parametrize("code", EXCEPTION_CODES)
+def test_a_request_is_refused_as_planned_and_not_carried_out(plc, code):
+    refused = Fault(FaultAction.MODBUS_EXCEPTION, match="fc16 100", code=code)
+    plc.faults.add(refused)
+    link, write = plc.connect(0), WriteMultipleRegistersRequest(address=100, registers=[1, 2])
+    assert ask(link, ReadHoldingRegistersRequest(address=100, count=2)).registers != [1, 2]
+    answer = ask(link, write)
+    assert (answer.exception_code, plc.writes, plc.faults.fired) == (code, [], [refused])
+    assert not ask(link, write).isError()
+    assert plc.writes == ["fc16 100"]
+
+
+@pytest.mark.parametrize("code", [0, 9, 12])
+def test_an_exception_that_there_is_not_cannot_be_planned(code):
+    with pytest.raises(ConfigError, match=f"no Modbus exception {code}"):
+        Fault(FaultAction.MODBUS_EXCEPTION, code=code)
+    with pytest.raises(ConfigError, match=f"no Modbus exception {code}"):
+        PlcFault(PlcFaultAction.MODBUS_EXCEPTION, code=code)
 
 
 def test_a_stream_that_is_no_modbus_ends_the_connection_and_not_the_plc(plc):

@@ -2,7 +2,8 @@
 
 import math
 import random
-from dataclasses import replace
+from dataclasses import fields, replace
+from pathlib import Path
 from statistics import fmean, pstdev
 
 import pytest
@@ -380,3 +381,8 @@ def test_a_share_of_still_spots_is_a_share():
 def test_an_option_that_makes_no_world_is_refused(name, text, said):
     with pytest.raises(ConfigError, match=said):
         parameters_from_text({name: text})
+
+
+def test_the_page_names_every_parameter():
+    page = (Path(__file__).parents[2] / "docs" / "camera-and-board.md").read_text(encoding="utf-8")
+    assert [it.name for it in fields(WorldParameters) if f"`{it.name}`" not in page] == []

@@ -23,6 +23,10 @@ class Planned(Protocol):
     def match(self) -> str:
         """Text that a request must contain to be counted; empty counts all."""
 
+    @property
+    def every(self) -> int:
+        """0 for once; else the steps in which it goes on meeting requests that match."""
+
 
 MOST_FIRED: Final = 2000
 """So many of those that happened are told, the last ones."""
@@ -139,7 +143,7 @@ class CountedFaults(Generic[AnyFault]):
 
     @property
     def pending(self) -> tuple[AnyFault, ...]:
-        """What has not fired yet, in the order in which it was planned."""
+        """What has not fired yet, or goes on, in the order in which it was planned."""
         waiting = [item for group in self._groups.values() for item in group.due]
         return tuple(fault for _, _, fault in sorted(waiting, key=lambda item: item[1]))
 
@@ -157,8 +161,10 @@ class CountedFaults(Generic[AnyFault]):
             if key[0] not in request or (link is not None and link not in key[1]):
                 continue
             while group.due and group.due[0][0] == group.seen:
-                _, number, fault = heappop(group.due)
+                at, number, fault = heappop(group.due)
                 due.append((number, fault))
+                if fault.every:
+                    heappush(group.due, (at + fault.every, number, fault))
             group.seen += 1
             if not group.due:
                 del self._groups[key]

@@ -8,7 +8,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_simulators.faults.fieldbus import Order, PlcFault, PlcFaultAction
 from robolink_simulators.faults.links import AnyAction, LinkKind, links_of, require_possible
-from robolink_simulators.faults.stream import Fault, FaultAction
+from robolink_simulators.faults.stream import EXCEPTION_CODES, Fault, FaultAction
 
 MOST_EXCHANGES: Final = 1_000_000
 _ORDERS: Final[tuple[Order, ...]] = ("high_first", "pairs_swapped", "halves_swapped")
@@ -42,6 +42,9 @@ _OF_READS: Final = frozenset(
     }
 )
 
+ONLY_BY_NAME: Final = frozenset({FaultAction.MODBUS_EXCEPTION, PlcFaultAction.MODBUS_EXCEPTION})
+"""Came later: where no fault is named, a seed draws what it drew before."""
+
 Action = TypeVar("Action", FaultAction, PlcFaultAction)
 
 
@@ -52,7 +55,8 @@ class FaultRates:
     Attributes:
         rate: Faults per exchange, 0 to 1.
         exchanges: Over how many exchanges, at most 1,000,000.
-        actions: Which faults are drawn from; none at all means all that the link can have.
+        actions: Which faults are drawn from; none at all means all that the link can have but
+            MODBUS_EXCEPTION.
         match: As of a fault: only requests that contain it are counted.
 
     Raises:
@@ -99,11 +103,11 @@ def drawn_faults(seed: int, kind: LinkKind, rates: FaultRates) -> tuple[Fault, .
     actions = _drawable(kind, rates, FaultAction)
     return tuple(
         Fault(
-            chance.choice(actions),
+            (action := chance.choice(actions)),
             on_exchange=exchange,
             match=rates.match,
             seconds=chance.choice(_DELAYS_S),
-            code=chance.choice(_CODES),
+            code=chance.choice(EXCEPTION_CODES if action in ONLY_BY_NAME else _CODES),
             position=chance.randrange(_FRAME_BYTES),
             bit=chance.randrange(8),
         )
@@ -140,7 +144,7 @@ def drawn_plc_faults(seed: int, kind: LinkKind, rates: FaultRates) -> tuple[PlcF
                 on_exchange=on_exchange,
                 match=match,
                 seconds=chance.choice(_DELAYS_S),
-                code=chance.choice(_AXIS_ERRORS),
+                code=chance.choice(EXCEPTION_CODES if action in ONLY_BY_NAME else _AXIS_ERRORS),
                 position=chance.randrange(_FRAME_BYTES),
                 bit=chance.randrange(16),
                 order=chance.choice(_ORDERS),
@@ -168,7 +172,7 @@ def _drawable(kind: LinkKind, rates: FaultRates, family: type[Action]) -> list[A
     """Return what is drawn from, in the order of the vocabulary."""
     for action in rates.actions:
         require_possible(action, {kind})
-    wanted: tuple[object, ...] = rates.actions or tuple(family)
+    wanted: tuple[object, ...] = rates.actions or tuple(set(family) - ONLY_BY_NAME)
     drawable = [action for action in family if action in wanted and kind in links_of(action)]
     if not drawable:
         raise ConfigError(

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from enum import Enum, auto
 from typing import Literal
 
+from robolink_simulators.faults.stream import require_exception
+
 
 class PlcFaultAction(Enum):
     """What goes wrong with one exchange, or after it."""
@@ -78,6 +80,8 @@ class PlcFaultAction(Enum):
     """CAN: another node with our number answers for an object that nobody asked for (F51)."""
     ECHO = auto()
     """CAN: the client's own frame comes back to it from the bus (F51)."""
+    MODBUS_EXCEPTION = auto()
+    """Nothing is carried out, and the answer is the Modbus exception ``code``."""
 
 
 Order = Literal["low_first", "high_first", "pairs_swapped", "halves_swapped"]
@@ -86,7 +90,7 @@ Order = Literal["low_first", "high_first", "pairs_swapped", "halves_swapped"]
 
 @dataclass(frozen=True, slots=True)
 class PlcFault:
-    """One planned fault. It fires once.
+    """One planned fault. It fires once, or until it is removed.
 
     Attributes:
         action: What goes wrong.
@@ -95,11 +99,15 @@ class PlcFault:
             read ``write_command MOVE_LINEAR 7``, ``beat``, ``read_head``, ``read_response``,
             ``read_slot 3``, ``snapshot``.
         seconds: A delay in simulated time, where the action has one.
-        code: Error number of AXIS_ERROR.
+        code: Error number of AXIS_ERROR; exception of MODBUS_EXCEPTION, which needs one.
         position: Index of a word, a byte of a frame, or a segment; ``None`` takes the middle.
             Past the end it counts from the front again.
         bit: Which bit of that word, 0 to 15; ``None`` draws it from the plan's seed.
         order: Of WORD_ORDER.
+        every: 0 for once; else it meets, from that request on, every so many-th one that matches.
+
+    Raises:
+        ConfigError: There is no such exception.
     """
 
     action: PlcFaultAction
@@ -110,3 +118,8 @@ class PlcFault:
     position: int | None = None
     bit: int | None = None
     order: Order = "high_first"
+    every: int = 0
+
+    def __post_init__(self) -> None:
+        if self.action is PlcFaultAction.MODBUS_EXCEPTION:
+            require_exception(self.code)

@@ -78,6 +78,7 @@ _OF_CAN: Final = frozenset(
 )
 _OF_FRAMES: Final = frozenset(
     {
+        PlcFaultAction.MODBUS_EXCEPTION,
         PlcFaultAction.TRUNCATE_REPLY,
         PlcFaultAction.DUPLICATE_REPLY,
         PlcFaultAction.SPLIT_REPLY,
@@ -96,6 +97,8 @@ def links_of(action: AnyAction) -> frozenset[LinkKind]:
     """Return the links on which a fault can happen."""
     if isinstance(action, FaultAction):
         links = EPSON_LINKS if action in _OF_EPSON else _STREAMS
+        if action is FaultAction.MODBUS_EXCEPTION:
+            links = PLC_LINKS
     elif action in _OF_CAN:
         links = frozenset({LinkKind.CAN})
     elif action in _OF_FRAMES:

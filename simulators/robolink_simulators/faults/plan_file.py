@@ -27,7 +27,7 @@ from robolink_simulators.faults.links import (
     LinkKind,
     require_possible,
 )
-from robolink_simulators.faults.stream import Fault, FaultAction
+from robolink_simulators.faults.stream import EXCEPTION_CODES, Fault, FaultAction
 
 SCHEMA: Final = "robolink/faults/1"
 MOST_FAULTS: Final = 2000
@@ -46,6 +46,7 @@ _NUMBERS: Final[Mapping[str, _Number]] = {
     "code": (int, 0, 65_535),
     "position": (int, 0, 65_535),
     "bit": (int, 0, 15),
+    "every": (int, 0, MOST_EXCHANGES),
     "rate": (float, 0, 1),
     "exchanges": (int, 0, MOST_EXCHANGES),
     "seed": (int, 0, 2**63 - 1),
@@ -187,6 +188,10 @@ class _Reader:
         if "action" not in table:
             where = f"fault {number}, action"
             self._object(where, tr("is missing"), self._line("fault", number, ""))
+        excepting = table.get("action") == FaultAction.MODBUS_EXCEPTION.name.lower()
+        if excepting and values.get("code") not in EXCEPTION_CODES:
+            where, line = f"fault {number}, code", self._line("fault", number, "code")
+            self._object(where, one_of(map(str, EXCEPTION_CODES)), line)
         return kind(**values) if len(self.problems) == before else None
 
     def _action(self, where: str, value: object, link: LinkKind, line: int) -> AnyAction | None:

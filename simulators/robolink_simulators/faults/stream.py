@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from enum import Enum, auto
+from typing import Final
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
@@ -65,11 +66,17 @@ class FaultAction(Enum):
     """An error that only a restart clears comes ``seconds`` after the request (F20)."""
     IGNORE_WRITE = auto()
     """The statement is acknowledged and not carried out (F43)."""
+    MODBUS_EXCEPTION = auto()
+    """Nothing is carried out, and the answer is the Modbus exception ``code``."""
+
+
+EXCEPTION_CODES: Final = (1, 2, 3, 4, 5, 6, 7, 8, 10, 11)
+"""The exceptions that there are (Modbus application protocol 1.1b3, chapter 7)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """One planned fault. It fires once.
+    """One planned fault. It fires once, or until it is removed.
 
     Attributes:
         action: What goes wrong; its name in small letters will do.
@@ -77,13 +84,14 @@ class Fault:
         match: Text that a request must contain to be counted; empty counts all.
         seconds: A delay in simulated time, where the action has one. With 0 a stop or error
             comes before the request is carried out.
-        code: Error number of DEVICE_FAULT.
+        code: Error number of DEVICE_FAULT; exception of MODBUS_EXCEPTION, which needs one.
         position: Index of a byte; ``None`` takes the middle (DISCONNECT: nothing leaves;
             GARBLE: drawn from the plan's seed). Past the end it counts from the front again.
         bit: Which bit of that byte, 0 to 7; ``None`` draws it from the plan's seed.
+        every: 0 for once; else it meets, from that request on, every so many-th one that matches.
 
     Raises:
-        ConfigError: There is no such action.
+        ConfigError: There is no such action, or no such exception.
     """
 
     action: FaultAction
@@ -93,9 +101,12 @@ class Fault:
     code: int = 0
     position: int | None = None
     bit: int | None = None
+    every: int = 0
 
     def __post_init__(self) -> None:
         if isinstance(self.action, FaultAction):
+            if self.action is FaultAction.MODBUS_EXCEPTION:
+                require_exception(self.code)
             return
         named = FaultAction.__members__.get(str(self.action).upper())
         if named is None:
@@ -106,3 +117,17 @@ class Fault:
                 ),
             )
         object.__setattr__(self, "action", named)
+        self.__post_init__()
+
+
+def require_exception(code: int) -> None:
+    """Refuse a number that is no Modbus exception.
+
+    Raises:
+        ConfigError: It is none.
+    """
+    if code not in EXCEPTION_CODES:
+        raise ConfigError(
+            tr("There is no Modbus exception {code}.", code=code),
+            remedy=tr("Give code= one of {codes}.", codes=", ".join(map(str, EXCEPTION_CODES))),
+        )

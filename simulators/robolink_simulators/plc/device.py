@@ -182,7 +182,11 @@ class PlcSimulator(HostedDevice):
             link.stall(request, stall.seconds)
             return []
         ignored = FaultAction.IGNORE_WRITE in actions
-        reply = self._answer(request, frames, ignored=ignored)
+        refusal = actions.get(FaultAction.MODBUS_EXCEPTION)
+        if refusal is None:
+            reply = self._answer(request, frames, ignored=ignored)
+        else:
+            reply = frames.refusal(request, refusal.code)
         self.exchanges += 1
         self.log.add(self.now_ns, "<", request.words)
         leaving = self.faults.departures(reply, met)

@@ -196,6 +196,7 @@ class FaultKeys:
         position: A byte, a word or a segment.
         bit: Which bit of it.
         order: Of words.
+        every: It goes on, with every so many-th request that matches, until it is removed.
     """
 
     action: str
@@ -206,6 +207,7 @@ class FaultKeys:
     position: Annotated[int, LEFT_OUT]
     bit: Annotated[int, LEFT_OUT]
     order: Annotated[Order, LEFT_OUT]
+    every: Annotated[int, LEFT_OUT]
 
 
 @dataclass(frozen=True, slots=True)

@@ -83,7 +83,7 @@ class Taken:
             case _:
                 fits = isinstance(value, str) and self._is_one(value)
         if not fits:
-            raise ConfigError(self._needs(act), remedy=self._example())
+            raise ConfigError(self._needs(act, value), remedy=self._example())
         return float(value) if self.form == "number" else value  # type: ignore[arg-type]
 
     def _is_one(self, text: str) -> bool:
@@ -93,7 +93,9 @@ class Taken:
         fits = len(text) <= LONGEST_TEXT
         return fits and (not self.ascii or re.fullmatch(PRINTABLE, text) is not None)
 
-    def _needs(self, act: str) -> str:
+    def _needs(self, act: str, value: object) -> str:
+        if self.choices and isinstance(value, str):
+            return tr("{act} knows no {name} {value!r}.", act=act, name=self.name, value=value[:80])
         match self.form:
             case "whole":
                 least, most = self.whole_limits

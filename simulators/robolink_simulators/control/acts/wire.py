@@ -58,6 +58,11 @@ def _add_fault(cell: ControlledCell, given: Given) -> Answer:
     """Plan a fault for requests that match, as docs/fault-plans.md explains; times in a row."""
     table: dict[str, Any] = dict(given)
     times, first = table.pop("times", 1), table.get("on_exchange", 0)
+    if times > 1 and table.get("every"):
+        raise ConfigError(
+            tr("A fault that goes on until it is removed happens no certain number of times."),
+            remedy=tr("Give either times or every."),
+        )
     tables = [{**table, "on_exchange": first + further} for further in range(times)]
     planned: Any = cell.simulator.faults
     wait = len(planned.pending)
@@ -108,6 +113,7 @@ WIRE_ACTS: Final = (
             Taken("bit", "whole", needed=False, most=15),
             Taken("code", "whole", needed=False),
             Taken("order", "text", needed=False, choices=get_args(Order)),
+            Taken("every", "whole", needed=False, most=1_000_000),
         ),
         gives=FaultsTold,
     ),

@@ -194,6 +194,8 @@ class ModbusServerThread:
             served = self._in_time(self._registers.read, _READS[function], first, count)
             words = list(served.words)
             await self._let_go(served)
+            if (refusal := served.meets(PlcFaultAction.MODBUS_EXCEPTION)) is not None:
+                return ExcCodes(refusal.code)
         else:
             if coils:
                 bits = [bool(bit) for bit in values]
@@ -202,7 +204,8 @@ class ModbusServerThread:
                 asked = [int(word) for word in values]
                 served = self._in_time(self._registers.write, address, asked)
             await self._let_go(served)
-            return None
+            refusal = served.meets(PlcFaultAction.MODBUS_EXCEPTION)
+            return None if refusal is None else ExcCodes(refusal.code)
         registers[first - start : first - start + count] = words
         return None
 

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from robolink_simulators.faults import FaultAction, LinkKind, PlcFaultAction, links_of
+from robolink_simulators.faults.drawn import ONLY_BY_NAME
 from robolink_simulators.soak.history import CellKind
 
 MAILBOX_KINDS: Final = frozenset(
@@ -42,6 +43,7 @@ _OF_MAILBOX: Final = (
     PlcFaultAction.SHIFT_MAP,
 )
 _OF_MACHINES: Final = frozenset((*_OF_EPSON, *_OF_MAILBOX))
+_NOT_OF_WIRES: Final = _OF_MACHINES | ONLY_BY_NAME
 
 
 def _machine_faults(kind: CellKind) -> tuple[str, ...]:
@@ -71,7 +73,7 @@ def _wire_faults(kind: CellKind) -> tuple[str, ...]:
     family = PlcFaultAction if kind in MAILBOX_KINDS else FaultAction
     link = _LINKS[kind]
     return tuple(
-        action.name for action in family if action not in _OF_MACHINES and link in links_of(action)
+        action.name for action in family if action not in _NOT_OF_WIRES and link in links_of(action)
     )
 
 

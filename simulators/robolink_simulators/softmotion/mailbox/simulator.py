@@ -307,7 +307,8 @@ class SoftMotionSimulator(HostedDevice):
             if self.on_request is not None:
                 self.on_request(number, shown)
         finally:
-            words = carry_out(faults)
+            refused = PlcFaultAction.MODBUS_EXCEPTION in actions
+            words = () if refused else carry_out(faults)
             self._file.save_changes()
         self.exchanges += 1
         self.log.add(self.now_ns, "<", shown)

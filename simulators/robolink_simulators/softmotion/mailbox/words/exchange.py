@@ -56,6 +56,7 @@ _OF_HOSTS: Final = frozenset(
         PlcFaultAction.WRONG_TOGGLE,
         PlcFaultAction.FOREIGN_NODE,
         PlcFaultAction.ECHO,
+        PlcFaultAction.MODBUS_EXCEPTION,
     }
 )
 
@@ -138,7 +139,8 @@ class WireFaults(CountedFaults[PlcFault]):
                 # There is nothing stale yet: it did not happen, and waits for the next one.
                 self.fired.remove(fault)
                 self.times_fired -= 1
-                self.add(replace(fault, on_exchange=0, match=fault.match or shown))
+                if not fault.every:  # else it comes again by itself
+                    self.add(replace(fault, on_exchange=0, match=fault.match or shown))
         return words
 
     def _garbled(self, words: Sequence[int], fault: PlcFault) -> Words:

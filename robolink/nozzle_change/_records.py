@@ -30,6 +30,7 @@ def calibration_entry(
     *,
     source: str,
     facts: ControllerFacts | None = None,
+    simulated: bool = False,
     gauge: Gauge | None = None,
 ) -> NewEntry:
     """Return the record of a measurement that was believed, with all that it rests on.
@@ -39,6 +40,7 @@ def calibration_entry(
         criteria: What was allowed.
         source: How it was measured, one sentence.
         facts: Which machine it was, where it was asked.
+        simulated: Whether the controller says that nothing real moves.
         gauge: The gauge that was measured against, where one is known.
     """
     result = proposal.result
@@ -51,6 +53,7 @@ def calibration_entry(
         # Entries are labelled in UTC; whoever stood there knows it by the clock on the wall.
         "local_time": wall_time().astimezone().isoformat(timespec="seconds"),
         **({} if facts is None else {"facts": asdict(facts)}),
+        **({"simulated": True} if simulated else {}),
         "gauges": [] if gauge is None else [asdict(gauge)],
         **_result(result),
         "seating": proposal.seating.as_json() if proposal.seating else None,

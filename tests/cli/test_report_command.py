@@ -185,7 +185,7 @@ def test_several_tools_stand_on_one_page(run, recorded, tmp_path):
     assert code == 0
     assert [tool["tool"] for tool in json.loads(out)["tools"]] == [1, 2]
     text = text_of(tmp_path / "page.html")
-    assert "Tools 1, 2: change of the offsets Not finished" in text
+    assert "Tools 1, 2: change of the offsets Simulated: Not finished" in text
     assert text.count("X mm 12.000 12.300 0.300") == 2
 
 

@@ -75,9 +75,12 @@ class ReportDraft:
     There is something to report from :meth:`propose` on.
     """
 
-    def __init__(self, controller: "Controller", facts: "ControllerFacts") -> None:
+    def __init__(
+        self, controller: "Controller", facts: "ControllerFacts", *, simulated: bool
+    ) -> None:
         self._controller = controller.identity
         self._facts = facts
+        self._simulated = simulated
         self._proposed: dict[str, Any] = {}
         self._receipt: ToolReceipt | None = None
         self._verification: VerifyResult | None = None
@@ -152,6 +155,7 @@ class ReportDraft:
             robolink_version=__version__,
             controller=self._controller,
             facts=self._facts,
+            simulated=self._simulated,
             outcome=self._outcome(error),
             ending=_ending(error, self._proposed["tool"]),
             verification=self._verification,
@@ -198,9 +202,11 @@ def reporting(request: ReportRequest | None, controller: "Controller") -> "Itera
     A report that cannot be written changes nothing about how the command ends: it is said.
     Nothing is written when the command ends before there is a proposal.
     """
-    from robolink.model import ControllerFacts
+    from robolink.model import ControllerFacts, says_it_is_simulated
 
-    draft = ReportDraft(controller, ControllerFacts() if request is None else controller.facts())
+    facts = ControllerFacts() if request is None else controller.facts()
+    simulated = request is not None and says_it_is_simulated(controller, facts)
+    draft = ReportDraft(controller, facts, simulated=simulated)
     try:
         yield draft
     except BaseException as error:

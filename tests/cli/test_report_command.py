@@ -12,7 +12,15 @@ from robolink_simulators.epson.memory.points import Point
 from robolink.calibration import Drift, VerifyResult
 from robolink.errors import ConfigError
 from robolink.journal import open_journal
-from robolink.model import EntryKind, NewEntry, Pose, Signature, ToolOffset
+from robolink.model import (
+    AnsweredBy,
+    EntryKind,
+    NewEntry,
+    Pose,
+    Signature,
+    ToolOffset,
+    answer_entry,
+)
 from robolink.nozzle_change._records import verification_entry
 
 ELSEWHERE = "epson+tcp://192.168.0.9:5000"
@@ -273,3 +281,15 @@ def test_without_any_change_there_is_nothing_to_report(run, simulator):
     open_journal().log(simulator.url).append(DECLINED)
     code, _, err = run("report")
     assert (code, "No tool change is on record" in err) == (2, True)
+
+
+def test_a_nozzle_that_was_only_noted_is_no_row_and_an_answer_is_called_one(
+    run, recorded, tmp_path
+):
+    noted = NewEntry(EntryKind.DECISION, tool=1, verdict=ANN.nozzle)
+    asked = answer_entry("Is the new tip as long?", True, AnsweredBy.PERSON, tool=1)
+    recorded(noted, asked, CALIBRATION, *WRITTEN, PASSED, DONE)
+    assert run("report", "1", "page.html")[0] == 0
+    text = text_of(tmp_path / "page.html")
+    assert f"decision - {ANN.nozzle}" not in text
+    assert "answer - Is the new tip as long? accepted (asked and answered)" in text

@@ -13,7 +13,7 @@ from robolink.model import (
     NewEntry,
     OutcomeLog,
     Pose,
-    describe_offset,
+    ToolOffset,
     plain_offset,
 )
 from robolink.nozzle_change._acceptance import AcceptanceCriteria
@@ -59,13 +59,34 @@ def calibration_entry(
         "seating": proposal.seating.as_json() if proposal.seating else None,
         **proposal.record,
     }
-    verdict = tr("measured: {offset}", offset=describe_offset(result.offset))
     return NewEntry(
         EntryKind.CALIBRATION,
         tool=proposal.tool,
         tolerance=criteria.tolerance,
-        verdict=verdict,
+        verdict=_measured(proposal),
         details=details,
+    )
+
+
+def _measured(proposal: Proposal) -> str:
+    """Return the offset in words: what was measured of it, then what was not."""
+    found = proposal.result.found
+    if proposal.z_from == "measured":
+        found = (*found, "z_mm")
+    own: list[str] = []
+    others: list[str] = []
+    for field in fields(ToolOffset):
+        # Adding zero takes the sign off what rounds to zero.
+        value = round(getattr(proposal.offset, field.name), 3) + 0.0
+        axis, measured = field.name[0].upper(), field.name in found
+        if measured or axis not in "VW" or value:
+            (own if measured else others).append(f"{axis} {value:.3f}")
+    if not others:
+        return tr("measured: {offset}", offset=" ".join(own))
+    return tr(
+        "measured: {offset}; not measured: {others}",
+        offset=" ".join(own),
+        others=" ".join(others),
     )
 
 

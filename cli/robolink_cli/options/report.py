@@ -2,14 +2,14 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from robolink import __version__
-from robolink.errors import ConfigError
+from robolink.errors import ConfigError, JournalError
 from robolink.messages import declared, joined, tr
 from robolink_cli.console.render import note
 
@@ -79,6 +79,7 @@ class ReportDraft:
         self, controller: "Controller", facts: "ControllerFacts", *, simulated: bool
     ) -> None:
         self._controller = controller.identity
+        self._outcomes, self._change = controller.outcomes, ""
         self._facts = facts
         self._simulated = simulated
         self._proposed: dict[str, Any] = {}
@@ -120,6 +121,7 @@ class ReportDraft:
     ) -> None:
         """Note what was measured."""
         result = proposal.result
+        self._change = self._outcomes.change
         self._proposed = {
             "tool": proposal.tool,
             "before": proposal.before,
@@ -146,7 +148,35 @@ class ReportDraft:
             self._verification = result
 
     def finish(self, error: BaseException | None) -> "Report":
-        """Return the report of a change that ended with ``error``, or well."""
+        """Return the report of a change that ended with ``error``, or well.
+
+        What is on record is told from the record, as ``journal report`` tells it; an offset that
+        was only looked at, and a dry run, are on none.
+        """
+        noted = self._noted(error)
+        if not self._change:
+            return noted
+        from robolink_cli.access.change_page import report_on_record
+
+        try:
+            recorded = report_on_record(self._outcomes, self._change, noted.tool)
+        except (ConfigError, JournalError) as failure:
+            note(str(failure))
+            return noted
+        from robolink.report import Outcome
+
+        # That nobody could be asked is on no record.
+        open_end = recorded.outcome is Outcome.PROPOSED
+        return replace(
+            recorded,
+            outcome=noted.outcome if open_end else recorded.outcome,
+            facts=noted.facts,
+            impact=noted.impact,
+            ending=noted.ending or recorded.ending,
+            simulated=noted.simulated or recorded.simulated,
+        )
+
+    def _noted(self, error: BaseException | None) -> "Report":
         from robolink.report import Report
         from robolink.timing import wall_time
 

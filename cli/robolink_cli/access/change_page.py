@@ -76,7 +76,10 @@ def report_on_record(outcomes: OutcomeLog, change: str, tool: int) -> Report:
     for report in reports:
         if report.tool == tool:
             return report
-    raise ConfigError(tr("Tool {tool} is not on record in this change.", tool=tool))
+    raise ConfigError(
+        tr("Tool {tool} is not on record in this change.", tool=tool),
+        remedy=tr("'robolink journal list' shows what is on record."),
+    )
 
 
 def _made(entries: Sequence[Recorded], check: str, problems: Sequence[str]) -> tuple[Report, ...]:

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from robolink.controllers.registry import capabilities_of_kind as capabilities_of_kind
     from robolink.controllers.registry import connect as connect
     from robolink.controllers.resolving import MarkerResolver as MarkerResolver
-    from robolink.controllers.simulated import says_it_is_simulated as says_it_is_simulated
     from robolink.controllers.stopping import stop_now as stop_now
     from robolink.controllers.stopping import stop_requests as stop_requests
     from robolink.controllers.tool_table import ToolTableCore as ToolTableCore
@@ -41,7 +40,6 @@ else:
                 "CONTROLLERS_GROUP ConnectionTerms ControllerOpener capabilities_of_kind connect"
             ),
             "resolving": "MarkerResolver",
-            "simulated": "says_it_is_simulated",
             "stopping": "stop_now stop_requests",
             "tool_table": "ToolTableCore",
             "tool_writing": "ToolWrite",

@@ -7,7 +7,7 @@ from robolink.calibration import LEAST_BASELINE
 from robolink.drift.charts import Chart, charts_of
 from robolink.drift.findings import DriftFinding, findings_in
 from robolink.drift.history import MeasuredChange, measured_changes
-from robolink.model import Recorded
+from robolink.model import Recorded, is_simulated_name
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +25,12 @@ class CellDrift:
     changes: tuple[MeasuredChange, ...]
     charts: tuple[Chart, ...]
     findings: tuple[DriftFinding, ...]
+
+    @property
+    def simulated(self) -> bool:
+        """Whether it, or one of its changes, was simulated; else nothing says so."""
+        simulated = any(change.simulated for change in self.changes)
+        return simulated or is_simulated_name(self.controller)
 
 
 def drift_of(

@@ -31,6 +31,7 @@ class MeasuredChange:
             not on record.
         accurate_to_mm: Within which of the truth it lies in 95 %, by the statement that stood when
             it was kept; ``None`` likewise.
+        simulated: Whether the controller said then that nothing real moves.
     """
 
     number: int
@@ -44,6 +45,7 @@ class MeasuredChange:
     turn_test_mm: float | None
     repeatable_to_mm: float | None = None
     accurate_to_mm: float | None = None
+    simulated: bool = False
 
 
 def measured_changes(
@@ -102,6 +104,7 @@ def _change(
         turn_test_mm=turn_test_mm,
         repeatable_to_mm=_number(said, "repeatable_to_mm"),
         accurate_to_mm=_number(done.details, "accurate_to_mm") or _number(said, "accurate_to_mm"),
+        simulated=said.get("simulated") is True,
     )
 
 

@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from robolink.model._people import refuse_operator as refuse_operator
     from robolink.model._people import require_engineer as require_engineer
     from robolink.model._secret import Secret as Secret
+    from robolink.model._simulated import are_simulated_facts as are_simulated_facts
+    from robolink.model._simulated import is_simulated_name as is_simulated_name
+    from robolink.model._simulated import says_it_is_simulated as says_it_is_simulated
     from robolink.model._status import ControllerState as ControllerState
     from robolink.model._status import ControllerStatus as ControllerStatus
     from robolink.model._tools import ANY as ANY
@@ -143,6 +146,7 @@ else:
             "record.outcomes": "ClientRun Marker MarkerKind OutcomeLog new_operation",
             "_people": "PersonRole refuse_operator require_engineer",
             "_secret": "Secret",
+            "_simulated": "are_simulated_facts is_simulated_name says_it_is_simulated",
             "record.standing_words": "describe_standing",
             "motion.orientation_coupling": "CsTool OrientationImage combined_space",
             "motion.orientation_space": (

@@ -9,7 +9,7 @@ from typing import Final
 from robolink.calibration import CalibrationResult, turn_claim
 from robolink.errors import CalibrationError, ConfigError, RobolinkError
 from robolink.messages import joined, tr
-from robolink.model import EntryKind, NewEntry, Pose, ToolOffset
+from robolink.model import EntryKind, NewEntry, Pose, ToolOffset, says_it_is_simulated
 from robolink.nozzle_change._accuracy import assessed_in_cell
 from robolink.nozzle_change._first_touch import told_by_first_touch
 from robolink.nozzle_change._plan import ToolPlan
@@ -46,6 +46,7 @@ class Measuring:
         self._context = context
         self._listener = listener
         self._facts = context.controller.facts()
+        self._simulated = says_it_is_simulated(context.controller, self._facts)
 
     def propose(self, plan: ToolPlan) -> Proposal:
         """Measure one tool, again where the plan allows it, and put it on record.
@@ -131,6 +132,7 @@ class Measuring:
             plan.criteria,
             source=plan.source.sentence,
             facts=self._facts,
+            simulated=self._simulated,
             gauge=plan.gauge,
         )
         context.controller.outcomes.append(entry)

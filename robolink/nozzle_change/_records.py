@@ -13,7 +13,7 @@ from robolink.model import (
     NewEntry,
     OutcomeLog,
     Pose,
-    describe_offset,
+    ToolOffset,
     plain_offset,
 )
 from robolink.nozzle_change._acceptance import AcceptanceCriteria
@@ -30,6 +30,7 @@ def calibration_entry(
     *,
     source: str,
     facts: ControllerFacts | None = None,
+    simulated: bool = False,
     gauge: Gauge | None = None,
 ) -> NewEntry:
     """Return the record of a measurement that was believed, with all that it rests on.
@@ -39,6 +40,7 @@ def calibration_entry(
         criteria: What was allowed.
         source: How it was measured, one sentence.
         facts: Which machine it was, where it was asked.
+        simulated: Whether the controller says that nothing real moves.
         gauge: The gauge that was measured against, where one is known.
     """
     result = proposal.result
@@ -51,18 +53,40 @@ def calibration_entry(
         # Entries are labelled in UTC; whoever stood there knows it by the clock on the wall.
         "local_time": wall_time().astimezone().isoformat(timespec="seconds"),
         **({} if facts is None else {"facts": asdict(facts)}),
+        **({"simulated": True} if simulated else {}),
         "gauges": [] if gauge is None else [asdict(gauge)],
         **_result(result),
         "seating": proposal.seating.as_json() if proposal.seating else None,
         **proposal.record,
     }
-    verdict = tr("measured: {offset}", offset=describe_offset(result.offset))
     return NewEntry(
         EntryKind.CALIBRATION,
         tool=proposal.tool,
         tolerance=criteria.tolerance,
-        verdict=verdict,
+        verdict=_measured(proposal),
         details=details,
+    )
+
+
+def _measured(proposal: Proposal) -> str:
+    """Return the offset in words: what was measured of it, then what was not."""
+    found = proposal.result.found
+    if proposal.z_from == "measured":
+        found = (*found, "z_mm")
+    own: list[str] = []
+    others: list[str] = []
+    for field in fields(ToolOffset):
+        # Adding zero takes the sign off what rounds to zero.
+        value = round(getattr(proposal.offset, field.name), 3) + 0.0
+        axis, measured = field.name[0].upper(), field.name in found
+        if measured or axis not in "VW" or value:
+            (own if measured else others).append(f"{axis} {value:.3f}")
+    if not others:
+        return tr("measured: {offset}", offset=" ".join(own))
+    return tr(
+        "measured: {offset}; not measured: {others}",
+        offset=" ".join(own),
+        others=" ".join(others),
     )
 
 

@@ -3,11 +3,10 @@
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from robolink.controllers import says_it_is_simulated
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.methods import PointsParameters
-from robolink.model import Capabilities, Controller, LookingController
+from robolink.model import Capabilities, Controller, LookingController, says_it_is_simulated
 from robolink.sensing import VISION_GUIDE
 
 if TYPE_CHECKING:

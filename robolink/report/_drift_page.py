@@ -11,6 +11,7 @@ from robolink.files.named import save_named
 from robolink.messages import tr
 from robolink.report._page import POLICY, templates
 from robolink.report.pictures.control_chart import chart_drawing, chart_title
+from robolink.report.sections.summary import simulated_band, simulated_verdict
 
 
 def render_drift(cells: Sequence[CellDrift], *, made_at: str, robolink_version: str) -> str:
@@ -31,17 +32,23 @@ def render_drift(cells: Sequence[CellDrift], *, made_at: str, robolink_version: 
         >>> "Nothing stands out" in page
         True
     """
+    band = simulated_band(any(cell.simulated for cell in cells))
     found = sum(len(cell.findings) for cell in cells)
+    verdict = tr("To look at: {count}", count=found) if found else tr("Nothing stands out")
     style = files("robolink.report").joinpath("style.css").read_text(encoding="utf-8")
     return (
         templates()
         .get_template("drift.html")
         .render(
-            title=tr("Tool offsets over time"),
+            title=tr(
+                "Tool offsets over time: {cell}",
+                cell=", ".join(cell.controller for cell in cells),
+            ),
             policy=POLICY,
             style=Markup(style),
             tone="bad" if found else "good",
-            verdict=tr("To look at: {count}", count=found) if found else tr("Nothing stands out"),
+            verdict=simulated_verdict(verdict) if band else verdict,
+            band=band,
             cells=cells,
             chart_drawing=chart_drawing,
             chart_title=chart_title,

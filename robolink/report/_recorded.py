@@ -115,10 +115,23 @@ def _people(entries: Sequence[Recorded]) -> Iterator[str]:
 
 def _judged(entries: Sequence[Recorded]) -> Iterator[Judgement]:
     for entry in entries:
-        if entry.tolerance or entry.verdict:
+        if (entry.tolerance or entry.verdict) and not _stands_in_the_head(entry):
             said = (_answer(entry) or entry.verdict, _fit(entry.details))
             found = "; ".join(part for part in said if part)
-            yield Judgement(str(entry.kind), entry.tolerance, found)
+            yield Judgement(_what(entry), entry.tolerance, found)
+
+
+def _stands_in_the_head(entry: Recorded) -> bool:
+    """Tell whether an entry only repeats which nozzle or lot it was: an older one, unasked."""
+    named = entry.verdict and entry.verdict in (entry.signature.nozzle, entry.signature.lot)
+    return bool(named) and entry.kind is EntryKind.DECISION and "question" not in entry.details
+
+
+def _what(entry: Recorded) -> str:
+    """Return what a row is about: a question that was answered says more than its kind."""
+    if entry.kind is EntryKind.DECISION and "question" in entry.details:
+        return tr("answer")
+    return str(entry.kind)
 
 
 def _answer(entry: Recorded) -> str:

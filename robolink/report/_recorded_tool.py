@@ -10,7 +10,9 @@ from robolink.model import (
     EntryKind,
     Recorded,
     ToolOffset,
+    are_simulated_facts,
     describe_offset,
+    is_simulated_name,
     read_offset,
     with_method_name_now,
 )
@@ -50,12 +52,13 @@ def report_of_tool(
     outcome, ending = _outcome(entries)
     measured = _last(entries, EntryKind.CALIBRATION)
     calibration = with_method_name_now(measured.details) if measured else {}
+    facts = _facts(calibration.get("facts"))
     compared = _offsets(tool, entries, done=outcome in (Outcome.VERIFIED, Outcome.WRITTEN))
     return Report(
         made_at=made_at,
         robolink_version=robolink_version,
         controller=entries[0].controller,
-        facts=_facts(calibration.get("facts")),
+        facts=facts,
         tool=tool,
         before=compared.get("before"),
         after=compared.get("after"),
@@ -82,6 +85,9 @@ def report_of_tool(
         touches=tuple(_touch(said) for said in calibration.get("touches", ()) if said),
         evidence=calibration.get("evidence") or {},
         seating=_seating(calibration.get("seating")),
+        simulated=calibration.get("simulated") is True
+        or is_simulated_name(entries[0].controller)
+        or are_simulated_facts(facts),
     )
 
 

@@ -145,6 +145,8 @@ class Report:
         evidence: Figures of the checks that the measurement went through, plain JSON.
         seating: How differently nozzles sit in this cell, plain JSON; ``None`` where that is not on
             record.
+        simulated: Whether it was obtained from a simulated controller; where it is not set,
+            nothing says so.
     """
 
     made_at: str
@@ -173,6 +175,7 @@ class Report:
     touches: tuple[TouchOnRecord, ...] = ()
     evidence: Mapping[str, Any] = field(default_factory=dict)
     seating: Mapping[str, Any] | None = None
+    simulated: bool = False
 
     @property
     def widened_mm(self) -> float | None:

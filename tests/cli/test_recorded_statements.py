@@ -162,3 +162,18 @@ def test_a_table_for_a_spreadsheet_has_both_figures(shown, tmp_path):
     assert float(measured["repeatable_to_mm"]) == pytest.approx(0.0346, abs=1e-4)
     assert float(measured["accurate_to_mm"]) == pytest.approx(0.0786, abs=1e-4)
     assert float(kept["accurate_to_mm"]) == 0.15
+
+
+@pytest.mark.parametrize("z_from", ["kept", "typed", "measured"])
+def test_a_z_that_was_kept_or_typed_is_not_called_measured(z_from):
+    found = solve_two_pose(*TOUCHES, stored=OLD)
+    entry = calibration_entry(
+        Proposal(1, OLD, found, z_from=z_from), AcceptanceCriteria(), source="touched"
+    )
+    own, _, others = entry.verdict.partition("; not measured: ")
+    assert own.startswith("measured: X 12.000 Y -4.000"), entry.verdict
+    assert ("Z -20.000" in own, "Z -20.000" in others) == (
+        z_from == "measured",
+        z_from != "measured",
+    )
+    assert others.endswith("U 0.000")

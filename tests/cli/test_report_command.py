@@ -12,7 +12,15 @@ from robolink_simulators.epson.memory.points import Point
 from robolink.calibration import Drift, VerifyResult
 from robolink.errors import ConfigError
 from robolink.journal import open_journal
-from robolink.model import EntryKind, NewEntry, Pose, Signature, ToolOffset
+from robolink.model import (
+    AnsweredBy,
+    EntryKind,
+    NewEntry,
+    Pose,
+    Signature,
+    ToolOffset,
+    answer_entry,
+)
 from robolink.nozzle_change._records import verification_entry
 
 ELSEWHERE = "epson+tcp://192.168.0.9:5000"
@@ -185,7 +193,7 @@ def test_several_tools_stand_on_one_page(run, recorded, tmp_path):
     assert code == 0
     assert [tool["tool"] for tool in json.loads(out)["tools"]] == [1, 2]
     text = text_of(tmp_path / "page.html")
-    assert "Tools 1, 2: change of the offsets Not finished" in text
+    assert "Tools 1, 2: change of the offsets Simulated: Not finished" in text
     assert text.count("X mm 12.000 12.300 0.300") == 2
 
 
@@ -273,3 +281,15 @@ def test_without_any_change_there_is_nothing_to_report(run, simulator):
     open_journal().log(simulator.url).append(DECLINED)
     code, _, err = run("report")
     assert (code, "No tool change is on record" in err) == (2, True)
+
+
+def test_a_nozzle_that_was_only_noted_is_no_row_and_an_answer_is_called_one(
+    run, recorded, tmp_path
+):
+    noted = NewEntry(EntryKind.DECISION, tool=1, verdict=ANN.nozzle)
+    asked = answer_entry("Is the new tip as long?", True, AnsweredBy.PERSON, tool=1)
+    recorded(noted, asked, CALIBRATION, *WRITTEN, PASSED, DONE)
+    assert run("report", "1", "page.html")[0] == 0
+    text = text_of(tmp_path / "page.html")
+    assert f"decision - {ANN.nozzle}" not in text
+    assert "answer - Is the new tip as long? accepted (asked and answered)" in text

@@ -368,7 +368,7 @@ def test_a_tool_changed_meanwhile_is_not_overwritten(command, simulator, monkeyp
 def test_the_impact_is_shown_before_the_question(command):
     code, out, _ = command(*calibrate("--points", "901,902", "--impact", "1-5"))
     assert code == 9
-    assert "largest: 0.500 mm at P1" in out
+    assert "at every point: 0.500 mm" in out
     assert "not taught, skipped: 2" in out
     assert "P4 (local 5)" in out
 

@@ -57,7 +57,8 @@ def check_numbers(page, impact):
         for key, value in entry.items():
             if key != "point":
                 assert f'<data value="{float(value)!r}">' in page
-    assert f"P{impact['largest_point']}, largest" in page
+    assert "At every point: " in page
+    assert ", largest" not in page
 
 
 def test_an_impact_is_reported_with_the_numbers_of_its_document(command, tmp_path):
@@ -83,11 +84,15 @@ def test_a_write_from_poses_is_reported(command, tmp_path):
     document, page = json.loads(out), page_of(tmp_path / "page.html")
     assert (code, document["report"]) == (0, "page.html")
     check_numbers(page, document["impact"])
-    for value in [*document["before"].values(), *document["proposed"].values()]:
+    written = document["write"]["read_back"]
+    for value in [*document["before"].values(), *written.values()]:
         assert f'<data value="{float(value)!r}">' in page
     assert "Written and read back, not tested" in page
     assert "It was not proved by turning about the new tip." in page
     assert "typed poses; taught with tool 0" in page
+    # As in the page of the journal.
+    for said in ("Entries of the journal", "done by", "What was judged", "report number"):
+        assert said in page
 
 
 ENDS = {
@@ -181,6 +186,7 @@ def test_a_live_calibration_is_reported_with_its_drifts(simulator, capsys, tmp_p
     assert (code, document["report"]) == (0, "page.html")
     check_numbers(page, document["impact"])
     assert "Written, read back and tested" in page
+    assert "entries of the journal were checked when this page was made" in page
     for drift in document["verification"]["drifts"]:
         assert f'<data value="{drift["distance_mm"]!r}">' in page
 

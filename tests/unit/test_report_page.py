@@ -1,6 +1,7 @@
 """The report as a page: well formed, escaped, whole by itself, and equal to its numbers."""
 
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import pytest
@@ -139,12 +140,22 @@ def test_the_numbers_of_the_points_are_whole_and_shown_with_three_digits():
 
 
 def test_the_largest_is_marked_once_in_the_table_and_once_in_the_picture():
-    page = Page(render(EVERY["50 points"]))
+    made = impact_on(POINTS, old=OLD, new=NEW)
+    first, *others = made.entries
+    least = [replace(one, dx_mm=one.dx_mm / 2, dy_mm=one.dy_mm / 2) for one in others]
+    page = Page(render(report(impact=replace(made, entries=(first, *least)))))
     assert len(page.under("tr", "largest")) == len(page.under("g", "largest")) == 1
     assert page.text.count("P1, largest") == 1
     assert "P1: 0.500 mm" in page.text
     assert "Largest: 0.500 mm, P1." in page.text
-    assert "It is the same at every point" in page.text
+    assert "The ring marks the largest." in page.text
+
+
+def test_where_the_tip_moves_equally_far_at_every_point_none_is_called_the_largest():
+    page = Page(render(EVERY["50 points"]))
+    assert page.under("tr", "largest") == page.under("g", "largest") == []
+    assert "largest" not in page.text.lower()
+    assert "At every point: 0.500 mm. Only its direction turns with U." in page.text
 
 
 @pytest.mark.parametrize("name", ["50 points", "one point", "a huge shift"])
@@ -179,7 +190,7 @@ def test_every_point_of_an_ordinary_picture_has_its_number_and_no_two_overlap():
         (float(x) - 2.6 * len(number), float(y) - 7, float(x) + 2.6 * len(number), float(y))
         for number, x, y in names_of(render(EVERY["50 points"]))
     ]
-    assert len(boxes) == 49
+    assert len(boxes) == 50
     for i, a in enumerate(boxes):
         for b in boxes[:i]:
             assert a[2] <= b[0] or b[2] <= a[0] or a[3] <= b[1] or b[3] <= a[1]
@@ -193,7 +204,7 @@ def names_of(text):
 def test_numbers_without_room_are_left_out_and_counted():
     text = render(EVERY["all on one spot"])
     (count,) = re.findall(r"(\d+) numbers have no room", text)
-    assert len(names_of(text)) + int(count) == 58
+    assert len(names_of(text)) + int(count) == 59
     assert "P1: 0.500 mm" in text
 
 
@@ -203,7 +214,7 @@ def test_without_a_shift_there_is_no_arrow_and_it_is_said():
     assert "The tip stays where it is" in page.text
     upwards = Page(render(EVERY["upwards only"]))
     assert "polygon" not in upwards.tags
-    assert "Largest: 1.000 mm" in upwards.text
+    assert "At every point: 1.000 mm." in upwards.text
     assert "only its direction turns" not in upwards.text
     assert "Nothing moves sideways" in upwards.text
 

@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from robolink import __version__
-from robolink.errors import JournalError
+from robolink.errors import ConfigError, JournalError
 from robolink.files.named import require_free
 from robolink.journal import Journal, open_journal
 from robolink.messages import tr
-from robolink.model import Recorded
+from robolink.model import OutcomeLog, Recorded
 from robolink.report import Report, reports_of, save
 from robolink.timing import wall_time
 
@@ -52,14 +52,44 @@ def reports_from(
         ConfigError: The entries are not about a change, or cannot be understood.
     """
     check, problems = _checked(journal)
-    reports = reports_of(
+    return _made(entries, check, problems), problems
+
+
+def report_on_record(outcomes: OutcomeLog, change: str, tool: int) -> Report:
+    """Return the report of a tool of a change that this command made.
+
+    Args:
+        outcomes: The record of its controller.
+        change: Its whole id.
+        tool: Number of the tool.
+
+    Raises:
+        ConfigError: The entries cannot be understood, or are not about the tool.
+        JournalError: The journal cannot be read.
+    """
+    entries = tuple(outcomes.recorded(change=change))[::-1]
+    if outcomes.durable:
+        reports, _ = reports_from(open_journal(read_only=True), entries)
+    else:
+        kept_nowhere = tr("The journal of this simulator ends with this command.")
+        reports = _made(entries, kept_nowhere, ())
+    for report in reports:
+        if report.tool == tool:
+            return report
+    raise ConfigError(
+        tr("Tool {tool} is not on record in this change.", tool=tool),
+        remedy=tr("'robolink journal list' shows what is on record."),
+    )
+
+
+def _made(entries: Sequence[Recorded], check: str, problems: Sequence[str]) -> tuple[Report, ...]:
+    return reports_of(
         entries,
         made_at=wall_time().isoformat(timespec="seconds"),
         robolink_version=__version__,
         check=check,
         problems=problems,
     )
-    return reports, problems
 
 
 def _checked(journal: Journal) -> tuple[str, list[str]]:

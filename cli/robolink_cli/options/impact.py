@@ -127,7 +127,15 @@ def show_impact(tool: int, impact: "Impact") -> None:
         table(
             tr("where the tip of tool {tool} will be, compared with now", tool=tool), columns, rows
         )
-    if impact.largest is not None:
+    if impact.alike and impact.largest is not None:
+        say(
+            tr(
+                "  at every point: {distance:.3f} mm, if tool {tool} is used there",
+                distance=impact.largest.distance_mm,
+                tool=tool,
+            )
+        )
+    elif impact.largest is not None:
         say(
             tr(
                 "  largest: {distance:.3f} mm at P{point}, if tool {tool} is used there",

@@ -2,14 +2,14 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from robolink import __version__
-from robolink.errors import ConfigError
+from robolink.errors import ConfigError, JournalError
 from robolink.messages import declared, joined, tr
 from robolink_cli.console.render import note
 
@@ -75,9 +75,13 @@ class ReportDraft:
     There is something to report from :meth:`propose` on.
     """
 
-    def __init__(self, controller: "Controller", facts: "ControllerFacts") -> None:
+    def __init__(
+        self, controller: "Controller", facts: "ControllerFacts", *, simulated: bool
+    ) -> None:
         self._controller = controller.identity
+        self._outcomes, self._change = controller.outcomes, ""
         self._facts = facts
+        self._simulated = simulated
         self._proposed: dict[str, Any] = {}
         self._receipt: ToolReceipt | None = None
         self._verification: VerifyResult | None = None
@@ -117,6 +121,7 @@ class ReportDraft:
     ) -> None:
         """Note what was measured."""
         result = proposal.result
+        self._change = self._outcomes.change
         self._proposed = {
             "tool": proposal.tool,
             "before": proposal.before,
@@ -143,7 +148,35 @@ class ReportDraft:
             self._verification = result
 
     def finish(self, error: BaseException | None) -> "Report":
-        """Return the report of a change that ended with ``error``, or well."""
+        """Return the report of a change that ended with ``error``, or well.
+
+        What is on record is told from the record, as ``journal report`` tells it; an offset that
+        was only looked at, and a dry run, are on none.
+        """
+        noted = self._noted(error)
+        if not self._change:
+            return noted
+        from robolink_cli.access.change_page import report_on_record
+
+        try:
+            recorded = report_on_record(self._outcomes, self._change, noted.tool)
+        except (ConfigError, JournalError) as failure:
+            note(str(failure))
+            return noted
+        from robolink.report import Outcome
+
+        # That nobody could be asked is on no record.
+        open_end = recorded.outcome is Outcome.PROPOSED
+        return replace(
+            recorded,
+            outcome=noted.outcome if open_end else recorded.outcome,
+            facts=noted.facts,
+            impact=noted.impact,
+            ending=noted.ending or recorded.ending,
+            simulated=noted.simulated or recorded.simulated,
+        )
+
+    def _noted(self, error: BaseException | None) -> "Report":
         from robolink.report import Report
         from robolink.timing import wall_time
 
@@ -152,6 +185,7 @@ class ReportDraft:
             robolink_version=__version__,
             controller=self._controller,
             facts=self._facts,
+            simulated=self._simulated,
             outcome=self._outcome(error),
             ending=_ending(error, self._proposed["tool"]),
             verification=self._verification,
@@ -198,9 +232,11 @@ def reporting(request: ReportRequest | None, controller: "Controller") -> "Itera
     A report that cannot be written changes nothing about how the command ends: it is said.
     Nothing is written when the command ends before there is a proposal.
     """
-    from robolink.model import ControllerFacts
+    from robolink.model import ControllerFacts, says_it_is_simulated
 
-    draft = ReportDraft(controller, ControllerFacts() if request is None else controller.facts())
+    facts = ControllerFacts() if request is None else controller.facts()
+    simulated = request is not None and says_it_is_simulated(controller, facts)
+    draft = ReportDraft(controller, facts, simulated=simulated)
     try:
         yield draft
     except BaseException as error:

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from robolink.model import says_it_is_simulated
 from robolink_cli.prompts.present import present_desk
 
 if TYPE_CHECKING:
@@ -17,7 +18,6 @@ def watched_at_desk(controller: "Controller") -> Iterator[None]:
     if desk is None:
         yield
         return
-    from robolink.controllers import says_it_is_simulated
     from robolink_cli.wizard.glance import ControllerGlance
     from robolink_cli.wizard.happenings import CellIs
 

@@ -23,6 +23,7 @@ angle between the two tools' orientations then, about whichever axis.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Final
 
 from robolink.model import Pose, ToolOffset, angle_difference_deg, rotate_xy
 
@@ -52,6 +53,10 @@ class PointImpact:
         return math.hypot(self.dx_mm, self.dy_mm, self.dz_mm)
 
 
+_SAME_MM: Final = 1e-6
+"""Displacements that differ by less are equal but for rounding."""
+
+
 @dataclass(frozen=True, slots=True)
 class Impact:
     """What a change of a tool offset does at taught points.
@@ -73,6 +78,19 @@ class Impact:
         The first of several: on four axes they differ by rounding alone.
         """
         return max(self.entries, key=lambda entry: round(entry.distance_mm, 9), default=None)
+
+    @property
+    def alike(self) -> bool:
+        """Whether the tip moves equally far at all of several points: none is the largest."""
+        if len(self.entries) < 2:
+            return False
+        lengths_mm = [entry.distance_mm for entry in self.entries]
+        return max(lengths_mm) - min(lengths_mm) < _SAME_MM
+
+    @property
+    def farthest(self) -> PointImpact | None:
+        """The largest, where the points differ; one point is its own. ``None`` where none is."""
+        return None if self.alike else self.largest
 
 
 def impact_on(points: Mapping[int, Pose | None], *, old: ToolOffset, new: ToolOffset) -> Impact:

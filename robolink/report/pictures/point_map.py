@@ -23,7 +23,7 @@ def draw(impact: Impact) -> Drawing:
     plane = plane_around(places)
     longest_mm = max(math.hypot(entry.dx_mm, entry.dy_mm) for entry in impact.entries)
     factor = enlargement(plane, places, longest_mm) if longest_mm > _STILL_MM else None
-    marks = _Marks(plane, factor, impact.largest)
+    marks = _Marks(plane, factor, impact.farthest)
     drawn = [marks.draw(entry) for entry in _largest_last(impact)]
     names, unnamed = marks.names(impact)
     content = [*_grid(plane), *drawn, *names]
@@ -36,15 +36,16 @@ def draw(impact: Impact) -> Drawing:
         viewBox=f"0 0 {WIDTH + _LEFT + 10:g} {height:g}",
         role="img",
     )
-    return Drawing(svg, _caption(factor, unnamed))
+    return Drawing(svg, _caption(factor, unnamed, ringed=impact.farthest is not None))
 
 
-def _caption(factor: float | None, unnamed: int) -> str:
+def _caption(factor: float | None, unnamed: int, *, ringed: bool) -> str:
     """Return what must be said beside it.
 
     Args:
         factor: How many times longer than true the arrows are, ``None`` without arrows.
         unnamed: How many points have no room for their number.
+        ringed: Whether one of them is the largest.
     """
     said = [tr("Taught points in base coordinates, seen from above, with equal axes.")]
     if factor is None:
@@ -53,10 +54,12 @@ def _caption(factor: float | None, unnamed: int) -> str:
         said.append(
             tr(
                 "Each arrow is the sideways movement of the tip, drawn {factor:g} times as long "
-                "as it is; the ring marks the largest.",
+                "as it is.",
                 factor=factor,
             )
         )
+        if ringed:
+            said.append(tr("The ring marks the largest."))
     if unnamed:
         said.append(tr("{count} numbers have no room; the table has them.", count=unnamed))
     return " ".join(said)
@@ -113,7 +116,7 @@ class _Marks:
 
 def _largest_last(impact: Impact) -> list[PointImpact]:
     """Return the points so that the largest is drawn over the others."""
-    return sorted(impact.entries, key=lambda entry: entry is impact.largest)
+    return sorted(impact.entries, key=lambda entry: entry is impact.farthest)
 
 
 def _grid(plane: Plane) -> list[Element]:

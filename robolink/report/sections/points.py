@@ -25,11 +25,9 @@ def moves_nothing(impact: Impact) -> bool:
 def is_alike(impact: Impact) -> bool:
     """Tell whether the tip moves equally far at every point, and sideways."""
     largest = impact.largest
-    if largest is None or len(impact.entries) < 2:
+    if largest is None or not impact.alike:
         return False
-    least_mm = min(entry.distance_mm for entry in impact.entries)
-    aside = abs(largest.dx_mm) > _SAME_MM or abs(largest.dy_mm) > _SAME_MM
-    return aside and largest.distance_mm - least_mm < _SAME_MM
+    return abs(largest.dx_mm) > _SAME_MM or abs(largest.dy_mm) > _SAME_MM
 
 
 def values_of(entry: PointImpact) -> tuple[float, ...]:

@@ -35,6 +35,7 @@ class Heading:
         verdict: What became of the change, in words.
         tone: How that looks: ``good``, ``still`` or ``bad``.
         endings: Why it ended so, one sentence each.
+        band: That it was obtained from a simulated controller; empty where nothing says so.
         suspicion: That the record behind the page was tampered with; empty when it was not.
     """
 
@@ -42,6 +43,7 @@ class Heading:
     verdict: str
     tone: str
     endings: tuple[str, ...]
+    band: str
     suspicion: str
 
 
@@ -59,7 +61,22 @@ def heading(reports: Sequence[Report]) -> Heading:
     verdict, tone = _verdict(worst.outcome), _TONES[worst.outcome]
     if tone == "good" and any(map(turn_test_doubted, reports)):
         verdict, tone = tr("Written and read back; the turn test leaves a doubt"), "still"
-    return Heading(title, verdict, tone, tuple(endings), suspicion)
+    band = simulated_band(any(report.simulated for report in reports))
+    if band:
+        verdict = simulated_verdict(verdict)
+    return Heading(title, verdict, tone, tuple(endings), band, suspicion)
+
+
+def simulated_band(simulated: bool) -> str:
+    """Return the band at the top of a page about a simulated controller; empty for another."""
+    if not simulated:
+        return ""
+    return tr("SIMULATED: these results come from a simulator. No real robot moved.")
+
+
+def simulated_verdict(verdict: str) -> str:
+    """Return a verdict that says of itself that it is about a simulation."""
+    return tr("Simulated: {verdict}", verdict=verdict)
 
 
 def facts(reports: Sequence[Report]) -> list[tuple[str, str]]:

@@ -335,9 +335,9 @@ CELLS = (
 )
 
 
-LETS_PASS = {"two-pose": 1.9, "n-angle": 2.1}
-"""So many times U, of touches in the plane whose scatter is neither stated nor told by residuals:
-a drift of 0.14 to 0.16 mm is not more than what is usual of a person would make."""
+LETS_PASS = {"two-pose": 1.9, "n-angle": 2.1, "plane-touch": 1.9}
+"""So many times U, where scatter is neither stated nor told well by residuals: a drift of 0.14 to
+0.19 mm is not more than it would make."""
 
 
 @pytest.mark.soak

@@ -434,6 +434,11 @@ OTHERS = {
     ),
     "a tip that wobbles, held to its table": Cell(wobbling_cell, (100.0, 225.0, 10.0)),
     "camera found with the tip": Cell(affine_cell, (30.0, 150.0, 90.0)),
+    "four touches, scatter not stated": Cell(
+        touching_pin((0.0, 90.0, 180.0, -90.0), solve_n_angle),
+        (45.0, -135.0, 135.0),
+        AccuracyFacts(),
+    ),
     "a tilted tool on a pin": Cell(tilted_cell, (30.0, 210.0, 120.0)),
 }
 
@@ -498,6 +503,25 @@ def test_rough_looks_say_so_themselves():
     usual = claim_of(solve_camera_round(quiet, camera=cells.CAMERA))
     assert usual.look_nu is None
     assert usual.look_sigma_mm == pytest.approx(0.002)
+
+
+def test_few_touches_that_agree_let_no_drift_pass_that_the_statement_excludes():
+    """Four residuals, finer than is usual of a person; the statement is made by them."""
+    tip, random = (TIP.real, TIP.imag), np.random.default_rng(27)
+    touches = [touching(tip, u_deg) for u_deg in (0.0, 90.0, 180.0, -90.0)]
+    fine, usual = (shaken(touches, random, sigma_mm) for sigma_mm in (0.004, 0.03))
+    slipped = VerifyResult((Drift(45.0, 0.1, 0.06),), tolerance_mm=0.2)
+    results = [assessed(solve_n_angle(poses), AccuracyFacts()) for poses in (fine, usual)]
+    claims = [turn_claim(result, AccuracyFacts()) for result in results]
+    assert [claim is not None and claim.look_nu for claim in claims] == [4.0, None]
+    for result, claim in zip(results, claims, strict=True):
+        assert claim is not None
+        judgement = held_to_claim(claim, slipped)
+        if claim.look_nu is None:
+            assert claim.look_sigma_mm == pytest.approx(0.03)
+        else:
+            assert (result.accurate_to_mm or 0.0) < 0.1
+            assert judgement.contradicts_accuracy
 
 
 def test_a_stated_scatter_stands_until_it_is_contradicted():

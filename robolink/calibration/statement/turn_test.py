@@ -35,7 +35,8 @@ FALSE_ALARMS: Final = 0.001
 """So often may a right result be contradicted, all drifts of one test together."""
 
 _ENOUGH_NU: Final = 6
-"""From so many degrees of freedom on an estimated scatter may be used in place of a usual one."""
+"""From so many degrees of freedom on an estimated scatter is used in place of a usual one; from
+fewer only where that would let too much pass."""
 
 LEAST_TURN_DEG: Final = 90.0
 """A tool that is turned by less from where it was measured is not called tested."""
@@ -219,11 +220,29 @@ def _look_scatter(
         squares = dof * (own_mm / least_mm) ** 2
         if squares > chi_square_quantile(_ROUGHER, dof):
             return _together(own_mm, dof, least_mm)
+        if _tells_more(result, own_mm, dof, least_mm, facts.look_nu if recorded else None):
+            return own_mm, float(dof)
     if facts.look_sigma_mm is not None and facts.look_nu >= _ENOUGH_NU:
         return facts.look_sigma_mm, facts.look_nu
     if usual_mm is not None:
         return usual_mm, None
     return None if own_mm is None else (own_mm, None)
+
+
+def _tells_more(
+    result: CalibrationResult, own_mm: float, dof: int, usual_mm: float, nu: float | None
+) -> bool:
+    """Return whether few residuals tell more than what is usual.
+
+    They do where a usual scatter would let a drift pass that is larger than what the result, by
+    the same residuals, says it is accurate to, and their own F lets less pass. Two fresh looks are
+    taken for the geometry.
+    """
+    coordinates = 3 if result.by_surface or "z_mm" in result.measured else 2
+    usual_limit_mm = usual_mm * math.sqrt(2 * _quantile(1, coordinates, nu))
+    own_limit_mm = own_mm * math.sqrt(2 * _quantile(1, coordinates, dof))
+    stated_mm = result.accurate_to_mm
+    return stated_mm is not None and max(stated_mm, own_limit_mm) < usual_limit_mm
 
 
 def _together(own_mm: float, dof: int, expected_mm: float) -> tuple[float, float]:
@@ -308,13 +327,18 @@ def _limits(
 def _both(
     scatter: float, rows: float, count: int, coordinates: int, nu: float | None, turn_deg: float
 ) -> DriftLimits:
-    known = chi_square_quantile(1 - FALSE_ALARMS / count, coordinates)
-    estimated = known
-    if nu is not None:
-        estimated = coordinates * f_quantile(1 - FALSE_ALARMS / count, coordinates, nu)
+    known, estimated = _quantile(count, coordinates, None), _quantile(count, coordinates, nu)
     return DriftLimits(
         math.sqrt(estimated * scatter), math.sqrt(estimated * scatter + known * rows), turn_deg
     )
+
+
+def _quantile(count: int, coordinates: int, nu: float | None) -> float:
+    """Return what the square of a drift may be, as a multiple of its variance."""
+    likely = 1 - FALSE_ALARMS / count
+    if nu is None:
+        return chi_square_quantile(likely, coordinates)
+    return coordinates * f_quantile(likely, coordinates, nu)
 
 
 def _turned(headings_deg: Sequence[float], u_deg: float) -> complex:

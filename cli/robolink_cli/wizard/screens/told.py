@@ -4,6 +4,7 @@ import math
 
 from robolink.locale.languages import ENGLISH
 from robolink.messages import joined, tr
+from robolink.model import describe_pose
 from robolink.nozzle_change import WriteSubject
 from robolink.runner import FitSubject, Question, TouchSubject
 from robolink_cli.wizard.check_list import CheckSubject
@@ -111,15 +112,10 @@ def told_where(state: WizardState) -> str:
     pose = state.pose
     if pose is None:
         return ""
-    values = {
-        "x": mm(pose.x_mm),
-        "y": mm(pose.y_mm),
-        "z": mm(pose.z_mm),
-        "u": f"{pose.u_deg:.2f}",
-    }
+    where = describe_pose(pose)
     if pose.tool:
-        return tr("Tip X {x} Y {y} Z {z} U {u}.", **values)
-    return tr("Flange X {x} Y {y} Z {z} U {u}.", **values)
+        return tr("Tip {pose}.", pose=where)
+    return tr("Flange {pose}.", pose=where)
 
 
 def told_after_jog(state: WizardState) -> str:

@@ -1,5 +1,6 @@
 """The wizard as a dialogue of lines: for a dumb terminal, a narrow one, a screen reader."""
 
+import sys
 import time
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
@@ -7,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 from robolink.interrupts import ended_by
 from robolink.messages import tr
 from robolink.runner import Question
-from robolink_cli.console.output import draw, sentences
+from robolink_cli.console.output import draw, sentences, terminal_width
 from robolink_cli.prompts.lines import QUIET_S, Lines, open_lines
 from robolink_cli.wizard.desk import Desk
 from robolink_cli.wizard.faces.effects import carry_out, leaves
@@ -22,6 +23,7 @@ from robolink_cli.wizard.happenings import (
     WasTold,
 )
 from robolink_cli.wizard.screens.ending import ended_of, told_end
+from robolink_cli.wizard.screens.layout import WIDTH
 from robolink_cli.wizard.screens.told import told_after_jog, told_before, told_question
 from robolink_cli.wizard.state import WizardState
 
@@ -130,7 +132,7 @@ class LineFace:
             self._lines = open_lines()
         self._forget(QUIET_S)
         if kind in (Question.YES_NO, Question.TEXT):
-            for row in told_before(state):
+            for row in told_before(state, terminal_width(sys.stderr) or WIDTH):
                 _put(row)
 
     def _forget(self, quiet_s: float) -> None:

@@ -12,17 +12,23 @@ from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.screens.checking import mark_of
 from robolink_cli.wizard.screens.choosing import language_label
 from robolink_cli.wizard.screens.fitting import fit_lines
+from robolink_cli.wizard.screens.layout import WIDTH
 from robolink_cli.wizard.screens.rows import mm
 from robolink_cli.wizard.screens.touching import angle_word, instruction, touch_title
 from robolink_cli.wizard.screens.values import taught_lines
 from robolink_cli.wizard.state import WizardState
 
 
-def told_before(state: WizardState) -> list[str]:
-    """Return what is to be read before a yes-or-no question."""
+def told_before(state: WizardState, width: int = WIDTH) -> list[str]:
+    """Return what is to be read before a yes-or-no question.
+
+    Args:
+        state: The state.
+        width: How many columns there are for what stands in columns.
+    """
     match state.subject:
         case FitSubject() as fit:
-            return fit_lines(fit)
+            return fit_lines(fit, width)
         case ChoiceSubject() as subject:
             rows = []
             for index, option in enumerate(subject.options):

@@ -150,7 +150,7 @@ def test_a_table_fits_every_terminal(name, language, monkeypatch):
 SENTENCES = (
     "-1112.512",
     "A sentence about a tool that is somewhat longer than a column.",
-    "这是关于工具的一句比较长的说明，其中没有空格，只有标点。",
+    "这是关于工具的一句比较长的说明。其中没有空格。只有标点。",
     "/home/cell/" + "folder/" * 20 + "end.json",
 )
 
@@ -239,7 +239,7 @@ def labels(root):
 def check_labels(root):
     _, _, width, height = map(float, root.get("viewBox").split())
     for text, left, right, foot in labels(root):
-        assert 0 <= left, (text, left)
+        assert left >= 0, (text, left)
         assert right <= width, (text, right, width)
         assert 8 <= foot <= height, (text, foot, height)
 

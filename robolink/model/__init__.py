@@ -68,6 +68,7 @@ if TYPE_CHECKING:
     from robolink.model.motion.geometry import Posture as Posture
     from robolink.model.motion.geometry import Wrist as Wrist
     from robolink.model.motion.geometry import angle_difference_deg as angle_difference_deg
+    from robolink.model.motion.geometry import describe_pose as describe_pose
     from robolink.model.motion.geometry import rotate_xy as rotate_xy
     from robolink.model.motion.movement import Motion as Motion
     from robolink.model.motion.movement import MotionGroup as MotionGroup
@@ -128,7 +129,8 @@ else:
                 "ISMOrientationKinematicsWithOriImage2 ISMPositionKinematics2 MCKinRefSM3 "
                 "is_custom kinematics_class kinematics_object"
             ),
-            "motion.geometry": "Elbow Hand Pose Posture Wrist angle_difference_deg rotate_xy",
+            "motion.geometry": "Elbow Hand Pose Posture Wrist angle_difference_deg describe_pose "
+            "rotate_xy",
             "_identity": "ControllerFacts Identity Who is_own_name",
             "record.journal_entries": (
                 "AnsweredBy NO_HISTORY PROOFS EntryKind NewEntry Recorded Signature answer_entry "

@@ -9,7 +9,7 @@ from typing import Final, Literal, Protocol, runtime_checkable
 
 from robolink.errors import ConfigError, ToolChangedError
 from robolink.messages import tr
-from robolink.model.motion.geometry import angle_difference_deg
+from robolink.model.motion.geometry import angle_difference_deg, described
 
 _LEAST: Final = 1e-100
 _MOST: Final = 1e9
@@ -94,11 +94,7 @@ def describe_offset(offset: ToolOffset | None) -> str:
     if offset.of_no_tool:
         numbers = ", ".join(f"{value:g}" for value in offset.components())
         return tr("not the values of a tool ({numbers})", numbers=numbers)
-    names = ("X", "Y", "Z", "U", "V", "W")
-    pairs = zip(names, offset.components(), strict=True)
-    # Adding 0.0 takes the sign off a negative zero.
-    shown = [(name, round(value, 3) + 0.0) for name, value in pairs]
-    return " ".join(f"{name} {value:.3f}" for name, value in shown if name not in "VW" or value)
+    return described(offset.components())
 
 
 def put_right(offset: ToolOffset | None) -> str:

@@ -7,7 +7,7 @@ from typing import Final
 
 from robolink.errors import ConfigError, LimitError
 from robolink.messages import tr
-from robolink.model import Path, Pose, angle_difference_deg
+from robolink.model import Path, Pose, angle_difference_deg, describe_pose
 from robolink.runner._settings import RunSettings
 from robolink.ways import Way, way
 
@@ -144,13 +144,7 @@ def way_in_words(before: Pose, after: Pose) -> str:
     """
     way_mm = math.dist(before.coordinates()[:3], after.coordinates()[:3])
     turned_deg = angle_difference_deg(after.u_deg, before.u_deg)
-    where = tr(
-        "X {x:.3f} Y {y:.3f} Z {z:.3f} U {u:.3f}",
-        x=after.x_mm,
-        y=after.y_mm,
-        z=after.z_mm,
-        u=after.u_deg,
-    )
+    where = describe_pose(after)
     if abs(turned_deg) < _TURNED_DEG:
         return tr("  done: moved {way:.3f} mm. Now at {where}", way=way_mm, where=where)
     return tr(

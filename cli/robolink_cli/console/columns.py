@@ -1,7 +1,11 @@
 """How many columns of a terminal a text takes: a Chinese character takes two."""
 
 import re
+from collections.abc import Iterator
 from typing import Final
+
+SCREEN: Final = 80
+"""So many columns a whole screen has, on a wider terminal too."""
 
 _WIDE: Final = "\u1100-\u115f\u2e80-\u303e\u3041-\ua4cf\uac00-\ud7a3\uf900-\ufaff\ufe30-\ufe6f"
 _WIDE_FORMS: Final = "\uff00-\uff60\uffe0-\uffe6"
@@ -50,6 +54,27 @@ def filled(text: str, width: int, *, indent: str = "") -> str:
         if piece != " " or line.strip():
             line += piece
     return "\n".join([*lines, line.rstrip()])
+
+
+def cut(text: str, width: int) -> str:
+    """Return as much of a text as fits into a width."""
+    if columns(text) <= width:
+        return text
+    kept = ""
+    for character in text:
+        if columns(kept + character) > width:
+            break
+        kept += character
+    return kept
+
+
+def pieces(row: str, width: int) -> Iterator[str]:
+    """Yield a row that is one long word, such as a path, in pieces: nothing of it is lost."""
+    while columns(row) > width:
+        piece = cut(row, width)
+        yield piece
+        row = row[len(piece) :]
+    yield row
 
 
 def within(text: str, width: int) -> str:

@@ -18,7 +18,7 @@ import re
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, TextIO
 
 from robolink.interrupts import Interrupted, output_closed
 from robolink_cli.console.columns import filled, within
@@ -101,12 +101,8 @@ def sentences(text: str) -> str:
 
     In a file, or for a reader who searches, a sentence stays one line.
     """
-    try:
-        width = os.get_terminal_size(sys.stderr.fileno()).columns if sys.stderr.isatty() else 0
-    except (OSError, ValueError, AttributeError):
-        width = 0
-    # One that is not told its size says 0.
-    return text if width < _NARROWEST else within(text, width)
+    width = terminal_width(sys.stderr)
+    return within(text, width) if width else text
 
 
 def beside(text: str, taken: int) -> str:
@@ -116,11 +112,22 @@ def beside(text: str, taken: int) -> str:
         text: One paragraph.
         taken: Columns of the names.
     """
-    try:
-        width = os.get_terminal_size(sys.stdout.fileno()).columns if sys.stdout.isatty() else 0
-    except (OSError, ValueError, AttributeError):
-        width = 0
+    width = terminal_width(sys.stdout)
     return text if width - taken < _NARROWEST else filled(text, width - taken)
+
+
+def terminal_width(stream: TextIO) -> int:
+    """Return how many columns there are, 0 where nobody knows or nothing can be said in them.
+
+    Args:
+        stream: Where it is to stand.
+    """
+    try:
+        width = os.get_terminal_size(stream.fileno()).columns if stream.isatty() else 0
+    except (OSError, ValueError, AttributeError):
+        return 0
+    # One that is not told its size says 0.
+    return width if width >= _NARROWEST else 0
 
 
 def hand_over(document: str) -> None:

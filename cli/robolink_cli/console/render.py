@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING
 import click
 
 from robolink.messages import tr
+from robolink_cli.console.columns import SCREEN
 from robolink_cli.console.output import beside, drawn_elsewhere, hand_over, sentences, show, visible
+from robolink_cli.console.tables import drawn_table
 
 if TYPE_CHECKING:
     from robolink.methods import NextStep
@@ -51,36 +53,28 @@ def note(text: str) -> None:
 
 
 def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """Show a person a table: numbers to the right and whole, words to the left and folded."""
-    from rich import box
+    """Show a person a table: numbers to the right and whole, words to the left and folded.
+
+    One that is too wide for the terminal is turned (:mod:`robolink_cli.console.tables`).
+    """
     from rich.console import Console
-    from rich.table import Table
     from rich.text import Text
 
     cells = [[visible(str(cell)) for cell in row] for row in rows]
-    shown = Table(title=Text(visible(title)), title_justify="left", box=box.SIMPLE_HEAD)
-    for number, column in enumerate(columns):
-        if all(_is_figure(row[number]) for row in cells):
-            shown.add_column(Text(visible(column)), justify="right", no_wrap=True)
-        else:
-            shown.add_column(Text(visible(column)), overflow="fold")
-    for row in cells:
-        shown.add_row(*(Text(cell) for cell in row))
+    heads = [visible(column) for column in columns]
     console = Console(stderr=json_is_on(), highlight=False, no_color=drawn_elsewhere() or None)
+    if drawn_elsewhere():
+        console.width = min(console.width, SCREEN)  # whoever draws has no more
+    elif not console.is_terminal:
+        console.width = 1000  # nothing may be folded to an assumed width of 80
+    drawn = drawn_table(visible(title), heads, cells, console.width)
+    shown = Text(drawn) if isinstance(drawn, str) else drawn
     if drawn_elsewhere():
         with console.capture() as captured:
             console.print(shown, crop=False)
         say(captured.get().rstrip("\n"))
         return
-    if not console.is_terminal:
-        console.width = 1000  # nothing may be folded to an assumed width of 80
     console.print(shown, crop=False)
-
-
-def _is_figure(cell: str) -> bool:
-    """Tell whether a cell holds a number, a number with a mark, or nothing."""
-    digits = cell.strip().lstrip("*+-").replace(".", "", 1)
-    return digits.isdigit() or not digits
 
 
 def emit_json(schema: str, payload: Mapping[str, object]) -> None:

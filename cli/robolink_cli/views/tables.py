@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from robolink.messages import tr
-from robolink.model import of_no_tool
+from robolink.model import angle_difference_deg, of_no_tool
 from robolink_cli.console.machine_words import hand_words, power_words, state_word
 from robolink_cli.console.render import say, table
 from robolink_cli.views.documents import number, offset_cells
@@ -172,7 +172,7 @@ def show_change(
         [after_name, *offset_cells(after)],
     ]
     if before and after:
-        delta = {key: _difference(after[key], before[key]) for key in before}
+        delta = {key: _difference(key, after[key], before[key]) for key in before}
         rows.append([tr("change"), *offset_cells(delta)])
     table(tr("tool {tool}", tool=tool), ("", *AXES), rows)
     for name in unmeasured:
@@ -186,5 +186,6 @@ def show_change(
             )
 
 
-def _difference(a: object, b: object) -> float:
-    return float(str(a)) - float(str(b))
+def _difference(name: str, new: object, old: object) -> float:
+    a, b = float(str(new)), float(str(old))
+    return angle_difference_deg(a, b) if name.endswith("_deg") else a - b

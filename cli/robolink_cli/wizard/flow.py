@@ -223,6 +223,18 @@ def _stop(state: WizardState) -> Advanced:
     return ending, [WizardCommand.END_WORK]  # a no would go on
 
 
+def armed_anew(state: WizardState, at_s: float) -> WizardState:
+    """Return a state whose question is shown anew: no key from before answers it.
+
+    Args:
+        state: The state.
+        at_s: When it is shown.
+    """
+    question = state.question
+    asked = None if question is None else replace(question, at_s=at_s)
+    return replace(state, question=asked, typed="", typing=False, message="")
+
+
 def _armed(state: WizardState, at_s: float) -> bool:
     return state.question is not None and at_s - state.question.at_s >= ARMED_AFTER_S
 

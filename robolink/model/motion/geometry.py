@@ -6,6 +6,7 @@ docs/reference/calibration.md 1.4).
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -86,6 +87,28 @@ class Pose:
     def coordinates(self) -> tuple[float, float, float, float, float, float]:
         """Return x, y, z in mm and u, v, w in degrees."""
         return (self.x_mm, self.y_mm, self.z_mm, self.u_deg, self.v_deg, self.w_deg)
+
+
+def described(coordinates: Sequence[float]) -> str:
+    """Return x, y, z in mm and u, v, w in degrees as a person reads them; V and W where not 0."""
+    # Adding 0.0 takes the sign off a negative zero.
+    named = zip("XYZUVW", coordinates, strict=True)
+    shown = [(name, round(value, 3) + 0.0) for name, value in named]
+    return " ".join(f"{name} {value:.3f}" for name, value in shown if name not in "VW" or value)
+
+
+def describe_pose(pose: Pose) -> str:
+    """Return a pose as a person reads it, mm and degrees; V and W only where they are not 0.
+
+    Example:
+        >>> from robolink import Pose
+        >>> from robolink.model import describe_pose
+        >>> describe_pose(Pose(250, 200, -83, 90))
+        'X 250.000 Y 200.000 Z -83.000 U 90.000'
+        >>> describe_pose(Pose(250, 200, 83, 90, 0, 165))
+        'X 250.000 Y 200.000 Z 83.000 U 90.000 W 165.000'
+    """
+    return described(pose.coordinates())
 
 
 def angle_difference_deg(a_deg: float, b_deg: float) -> float:

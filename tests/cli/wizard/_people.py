@@ -64,6 +64,23 @@ def fit_subject(*off_mm, worst=None):
     return FitSubject(rows, 0.066, repeatable_mm=0.074, next_mm=0.063, worst=worst, limit_mm=0.15)
 
 
+def tilted_fit():
+    """Twelve touches of a tilted tool; each is off along another axis."""
+    rows = tuple(
+        FitRow(
+            number,
+            tr(
+                "Touch {number} at {where}",
+                number=number,
+                where=tr("U {u:.1f} V {v:.1f} W {w:.1f}", u=-15.0 * number, v=-10.5, w=-165.0),
+            ),
+            (0.001 * number, -0.002 * number, 0.04 - 0.013 * number),
+        )
+        for number in range(1, 13)
+    )
+    return FitSubject(rows, 0.066, repeatable_mm=0.074, next_mm=0.063, worst=11, more=True)
+
+
 def write_subject(*tools):
     first, second = Pose(250.0, 200.0, -83.0, 0.0), Pose(274.6, 192.5, -83.0, 180.0)
     old = ToolOffset(11.998, -3.502, -20.0)

@@ -19,6 +19,7 @@ from prompt_toolkit.key_binding import KeyPress
 from prompt_toolkit.keys import Keys
 from prompt_toolkit.output.vt100 import Vt100_Output
 from robolink_cli.wizard.desk import Desk
+from robolink_cli.wizard.faces import lines
 from robolink_cli.wizard.faces.arrivals import TimedPress
 from robolink_cli.wizard.faces.full import FullFace
 from robolink_cli.wizard.happenings import Reading, WizardCommand
@@ -50,8 +51,8 @@ class Drawn:
 
     def __init__(self, desk, work, source):
         self.screen, self.paper = pyte.Screen(80, 24), StringIO()
-        self.source, self.done = source, None
-        output = Vt100_Output(self.paper, lambda: Size(rows=24, columns=80), term="xterm")
+        self.source, self.done, self.size = source, None, Size(rows=24, columns=80)
+        output = Vt100_Output(self.paper, lambda: self.size, term="xterm")
         face = FullFace(source, output)
         self.thread = threading.Thread(target=lambda: self.show(face, desk, work))
         self.thread.start()
@@ -135,6 +136,52 @@ def test_keys_of_a_pipe_jog_take_and_write():
             face.thread.join(5.0)
     assert work.error is None, work.error
     assert answers == ["N-7", "z-0.1", "done", "y"]
+
+
+def test_the_screen_comes_back_when_a_small_window_grew(monkeypatch):
+    """What is asked goes on in lines meanwhile, and no key counts that was on its way."""
+    monkeypatch.setattr(lines, "_STEADY_S", 0.1)
+    monkeypatch.setattr(lines, "open_lines", NoLines)
+    desk, shown = Desk(), []
+    desk.glance = lambda: Reading(time.monotonic(), "ready", pose=ARRIVAL)
+    monkeypatch.setattr(lines, "draw", lambda text, **_: shown.append(text))
+
+    def do():
+        desk.regard(touch_subject())
+        desk.ask("?", Question.PLACE)
+        while desk.poll(0.2) is None:
+            pass
+
+    with click.Context(click.Command("x")), create_pipe_input() as source:
+        work = Work(do)
+        face = Drawn(desk, work, source)
+        try:
+            work.start()
+            until(lambda: "Touch 2 of 4" in face.text)
+            face.size = Size(rows=23, columns=79)
+            until(lambda: any("Type steps" in text for text in shown))
+            face.paper.truncate(0)
+            grew_s = time.monotonic()
+            face.size = Size(rows=24, columns=80)
+            until(lambda: "[5] Record this touch" in face.text)
+            source.send_text("0")
+            until(lambda: work.ended)
+        finally:
+            desk.leave()
+            work.wait(5.0)
+            face.thread.join(5.0)
+    assert work.error is None, "the key of the screen answered"
+    assert face.state.question.at_s >= grew_s
+
+
+class NoLines:
+    """Lines of a person who types none."""
+
+    def next(self, wait_s):
+        time.sleep(wait_s)
+
+    def forget(self, quiet_s):
+        return ["stop"]
 
 
 def test_two_keys_of_a_hand_count_though_the_screen_was_drawn_for_longer():
@@ -345,6 +392,28 @@ def test_a_window_that_becomes_too_small_goes_on_as_lines(hand):
     hand.rest(0.5)
     os.write(hand.master, b"stop\n")
     assert hand.end() == 9
+
+
+@pytest.mark.soak
+def test_a_window_that_grew_again_shows_the_screen_and_takes_no_half_line(hand, simulator):
+    """And a second time; what stood in a line that was not ended is no key of the screen."""
+    hand.start()
+    hand.see("Touch 1 of 2")
+    for _ in range(2):
+        hand.size(79, 23)
+        hand.see(r"Type steps \(x\+0\.1 z-0\.5\)")
+        hand.rest(0.3)
+        os.write(hand.master, b"6")
+        hand.size(80, 24)
+        hand.see(r"\[5\] Record this touch")
+        hand.rest(0.6)
+        assert simulator.machine.arm.moves_started == 0
+    hand.rest(0.4)
+    os.write(hand.master, b"6")
+    until(lambda: hand.read() and simulator.machine.arm.moves_started == 1)
+    hand.press(["0"])
+    assert hand.end() == 9
+    check_terminal_is_restored(hand)
 
 
 @pytest.mark.soak

@@ -36,7 +36,7 @@ from robolink.locale.languages import CHINESE, ENGLISH, translator
 from robolink.messages import spoken, tr
 from robolink.methods import find_method
 from robolink.model import Path as Way
-from robolink.model import Pose, ToolReceipt, WorkBox
+from robolink.model import Pose, ToolOffset, ToolReceipt, WorkBox
 from robolink.nozzle_change import ChangeReport, ToolReport
 from robolink.runner import AngleShown, JogRange, MoveSubject, Question
 from robolink.standing import Standing, note_standing
@@ -46,6 +46,7 @@ from tests.cli.wizard._people import (
     Sitting,
     contradicted,
     fit_subject,
+    tilted_fit,
     touch_subject,
     write_subject,
 )
@@ -86,6 +87,44 @@ def length_seen():
         half="0.14",
     )
     return Sitting().happens(WasTold(said)).asked(touch_subject(retakes=True, types=True))
+
+
+TILTED = Pose(-249.992, -200.004, 181.563, -90.0, -10.5, -165.0, tool=0)
+
+
+def touching_tilted(**more):
+    """A touch of an arm with six axes."""
+    hand = Sitting()
+    hand.here = TILTED
+    subject = touch_subject(arrival=replace(TILTED, z_mm=183.563, v_deg=-10.0), types=True, **more)
+    return hand.asked(subject)
+
+
+def turning_tilted():
+    """The turn test of such an arm, with as much above the keys as there can be."""
+    earlier = tuple(AngleShown(-150.0 + 60.0 * n, 0.018, True) for n in range(5))
+    return touching_tilted(number=6, total=None, limit_mm=0.1, earlier=earlier)
+
+
+def writing_tilted():
+    """New values of a tool whose tilt was measured."""
+    subject = write_subject(1)
+    (proposal,) = subject.proposals
+    old = ToolOffset(-111.998, -103.502, 220.0, -90.0, -179.9, -165.0)
+    result = replace(proposal.result, offset=replace(old, x_mm=-112.3, v_deg=179.9))
+    proposals = (replace(proposal, before=old, result=result),)
+    return Sitting().asked(replace(subject, proposals=proposals), Question.YES_NO)
+
+
+def moving_for_long():
+    """What is done and what follows are longer than what the picture leaves."""
+    hand = moving()
+    going = replace(
+        hand.state.subject,
+        purpose="Turning in the air to U -90.0 V -10.5 W -165.0, tilted away from the pin.",
+        then="Lowering beside the pin until the tip is 2 mm above where it is expected to touch.",
+    )
+    return hand.happens(WasRegarded(going))
 
 
 def turning_on():
@@ -338,6 +377,11 @@ SCREENS = {
     "turn test": lambda: Sitting(in_tool=1).asked(touch_subject(limit_mm=0.2, total=None)),
     "turn test more": turning_on,
     "turn test asks": turn_test_asks,
+    "touch tilted": touching_tilted,
+    "turn test tilted": turning_tilted,
+    "values tilted": writing_tilted,
+    "fit tilted": lambda: Sitting().asked(tilted_fit(), Question.YES_NO),
+    "moving for long": moving_for_long,
     "fit": lambda: Sitting().asked(
         fit_subject(0.006, 0.004, 0.131, 0.007, worst=2), Question.YES_NO
     ),

@@ -27,7 +27,7 @@ from robolink_cli.wizard.faces.arrivals import TimedKeys, TimedPress
 from robolink_cli.wizard.faces.console_keys import timed
 from robolink_cli.wizard.faces.effects import carry_out, leaves
 from robolink_cli.wizard.faces.lines import LineFace
-from robolink_cli.wizard.flow import advance, stops_at_once
+from robolink_cli.wizard.flow import advance, armed_anew, stops_at_once
 from robolink_cli.wizard.happenings import Happening, HasEnded, KeyPressed, TooFast
 from robolink_cli.wizard.key_gate import CountedKey, KeyGate, name_of
 from robolink_cli.wizard.screens.drawing import screen_of
@@ -44,7 +44,7 @@ _REPAINT_S: Final = 0.4
 
 
 class FullFace:
-    """Shows a desk on the whole terminal; goes on as lines where the window becomes too small.
+    """Shows a desk on the whole terminal; as lines while the window is too small.
 
     Args:
         source: Where keys come from, ``None`` for this process's terminal.
@@ -62,6 +62,17 @@ class FullFace:
         """Show it until the work has ended; return the last state."""
         self._desk, self._state, self._work = desk, state, work
         self._left = False
+        while self._draws():
+            lines = LineFace(self._has_room)
+            self._state = lines.run(desk, self._state, work)
+            if not lines.handed_back:
+                break
+            self._gate = KeyGate()
+            self._state = armed_anew(self._state, time.monotonic())
+        return self._state
+
+    def _draws(self) -> bool:
+        """Draw until the work has ended; return whether it goes on and the window is too small."""
         application: Application[bool] = Application(
             layout=Layout(Window(FormattedTextControl(self._text, show_cursor=False))),
             key_bindings=self._bindings(),
@@ -77,7 +88,12 @@ class FullFace:
         # The handlers of the command stay: they reach the work, which ends in order.
         narrow = application.run(pre_run=begin, handle_sigint=False)
         self._forget_keys()
-        return LineFace().run(desk, self._state, work) if narrow else self._state
+        return narrow
+
+    def _has_room(self) -> bool:
+        """Tell whether a screen has room in the window."""
+        size = self._output.get_size()
+        return size.columns >= WIDTH and size.rows >= HEIGHT
 
     async def _turn(self, application: "Application[bool]") -> None:
         """Take what happens, until the work has ended or the window is too small."""
@@ -90,8 +106,7 @@ class FullFace:
             if happened or now_s - self._painted_s > _REPAINT_S:
                 self._painted_s = now_s
                 application.invalidate()
-            size = self._output.get_size()
-            narrow = size.columns < WIDTH or size.rows < HEIGHT
+            narrow = not self._has_room()
             if narrow or (ended and not self._shows_the_end()):
                 application.exit(result=not ended)
                 return

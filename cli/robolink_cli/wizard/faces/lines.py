@@ -1,13 +1,15 @@
 """The wizard as a dialogue of lines: for a dumb terminal, a narrow one, a screen reader."""
 
+import sys
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 from robolink.interrupts import ended_by
 from robolink.messages import tr
 from robolink.runner import Question
-from robolink_cli.console.output import draw, sentences
+from robolink_cli.console.output import draw, sentences, terminal_width
 from robolink_cli.prompts.lines import QUIET_S, Lines, open_lines
 from robolink_cli.wizard.desk import Desk
 from robolink_cli.wizard.faces.effects import carry_out, leaves
@@ -22,6 +24,7 @@ from robolink_cli.wizard.happenings import (
     WasTold,
 )
 from robolink_cli.wizard.screens.ending import ended_of, told_end
+from robolink_cli.wizard.screens.layout import WIDTH
 from robolink_cli.wizard.screens.told import told_after_jog, told_before, told_question
 from robolink_cli.wizard.state import WizardState
 
@@ -29,14 +32,26 @@ if TYPE_CHECKING:
     from robolink_cli.wizard.work import Work
 
 _TURN_S: Final = 0.05
+_STEADY_S: Final = 0.5
+"""So long a window has room before a screen is drawn in it: a hand that drags its edge is slow."""
 
 
 class LineFace:
-    """Shows a desk line after line, on stderr."""
+    """Shows a desk line after line, on stderr.
 
-    def __init__(self) -> None:
+    Attributes:
+        handed_back: Whether it ended because a screen has room again.
+
+    Args:
+        has_room: Tells whether the window has room for a screen; ``None`` where none is wanted.
+    """
+
+    def __init__(self, has_room: Callable[[], bool] | None = None) -> None:
         self._lines: Lines | None = None
         self._shown = 0
+        self._has_room = has_room
+        self._room_since_s: float | None = None
+        self.handed_back = False
 
     def run(self, desk: Desk, state: WizardState, work: "Work[Any]") -> WizardState:
         """Show it until the work has ended; return the last state."""
@@ -54,10 +69,27 @@ class LineFace:
             if ended:
                 # All of what was told stands above.
                 return self._at_the_end(replace(state, fresh=()), work)
+            if self._screen_may_follow():
+                return state
             if state.question is None or not state.waits:
                 work.wait(_TURN_S)
                 continue
             state = self._listen(desk, state)
+
+    def _screen_may_follow(self) -> bool:
+        """Tell whether a screen has had room for a while; what was typed by then is dropped."""
+        now_s = time.monotonic()
+        if self._has_room is None or not self._has_room():
+            self._room_since_s = None
+            return False
+        if self._room_since_s is None:
+            self._room_since_s = now_s
+        if now_s - self._room_since_s < _STEADY_S:
+            return False
+        # A line that was begun here would be keys there.
+        self._forget(0.0)
+        self.handed_back = True
+        return True
 
     def _listen(self, desk: Desk, state: WizardState) -> WizardState:
         assert self._lines is not None  # noqa: S101 - opened with the first question
@@ -130,7 +162,7 @@ class LineFace:
             self._lines = open_lines()
         self._forget(QUIET_S)
         if kind in (Question.YES_NO, Question.TEXT, Question.CHOICE):
-            for row in told_before(state):
+            for row in told_before(state, terminal_width(sys.stderr) or WIDTH):
                 _put(row)
 
     def _forget(self, quiet_s: float) -> None:

@@ -4,9 +4,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from robolink_cli.console.columns import columns, filled
+from robolink_cli.console.columns import SCREEN, columns, cut, filled, pieces
 
-WIDTH: Final = 80
+WIDTH: Final = SCREEN
 HEIGHT: Final = 24
 BODY: Final = 17
 """Rows between the two rules."""
@@ -50,7 +50,9 @@ class Screen:
         room = HEIGHT - len(shown) - 2 - len(keys) - len(messages)
         # The keys stand at the same place on every screen.
         below = [""] * (room - len(body))
-        return [cut(row) for row in [*shown, rule, *body[:room], *below, *messages, rule, *keys]]
+        return [
+            cut(row, WIDTH) for row in [*shown, rule, *body[:room], *below, *messages, rule, *keys]
+        ]
 
 
 def key_rows(actions: Sequence[tuple[str, str]]) -> Iterator[str]:
@@ -70,18 +72,6 @@ def key_rows(actions: Sequence[tuple[str, str]]) -> Iterator[str]:
     yield row.rstrip()
 
 
-def cut(text: str, width: int = WIDTH) -> str:
-    """Return as much of a text as fits into a width."""
-    if columns(text) <= width:
-        return text
-    kept = ""
-    for character in text:
-        if columns(kept + character) > width:
-            break
-        kept += character
-    return kept
-
-
 def broken(text: str, width: int = WIDTH) -> Iterator[str]:
     """Yield the rows of a text; one that fits keeps its blanks."""
     for line in text.split("\n"):
@@ -89,16 +79,7 @@ def broken(text: str, width: int = WIDTH) -> Iterator[str]:
             yield line.rstrip()
         else:
             for row in filled(line, width).split("\n"):
-                yield from _pieces(row, width)
-
-
-def _pieces(row: str, width: int) -> Iterator[str]:
-    """Yield a row that is one long word, such as a path, in pieces: nothing of it is lost."""
-    while columns(row) > width:
-        piece = cut(row, width)
-        yield piece
-        row = row[len(piece) :]
-    yield row
+                yield from pieces(row, width)
 
 
 def row_of(values: Sequence[str], width: int = 11) -> str:

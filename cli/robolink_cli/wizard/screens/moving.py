@@ -1,14 +1,17 @@
 """Screen (c): the robot goes by itself, or the work goes on without a question."""
 
 import math
+import re
+from collections.abc import Iterator
+from itertools import zip_longest
 from typing import Final
 
 from robolink.messages import tr
 from robolink.model import Path, Pose, angle_difference_deg
 from robolink.runner import MoveSubject
-from robolink_cli.console.columns import padded
+from robolink_cli.console.columns import columns, padded
 from robolink_cli.wizard.happenings import Reading
-from robolink_cli.wizard.screens.layout import Screen, broken
+from robolink_cli.wizard.screens.layout import WIDTH, Screen, broken
 from robolink_cli.wizard.screens.picture import COLUMNS, ROWS, picture
 from robolink_cli.wizard.screens.rows import JobStep, status_row, title_row
 from robolink_cli.wizard.state import WizardState
@@ -16,6 +19,9 @@ from robolink_cli.wizard.state import WizardState
 _TURNS_DEG: Final = 0.05
 """Less is what a reading of U differs by."""
 
+
+_LEFT: Final = COLUMNS + 4
+"""Columns of the picture, with the room between it and what stands beside it."""
 
 _OLD_S: Final = 1.0
 """A reading of longer ago says nothing about where the robot is now."""
@@ -38,9 +44,10 @@ def moving_screen(state: WizardState, now_s: float) -> Screen:
     low_power = state.reading is not None and state.reading.low_power is True
     follows = state.reading is None or state.reading.follows
     told = _told(subject, state.pose, low_power=low_power, left=_is_left(state.reading, now_s))
+    beside = [row for line in told for row in _hanging(line)]
     lines = [
-        padded(left, COLUMNS + 4) + right
-        for left, right in zip(drawn, [*told, *[""] * (ROWS - len(told))], strict=True)
+        (padded(left, _LEFT) + right).rstrip()
+        for left, right in zip_longest(drawn, beside, fillvalue="")
     ]
     legend = tr("# base   O elbow   @ flange and its U direction   * where it goes")
     unknown = tr("Picture of the start: this controller tells no position while it moves.")
@@ -56,6 +63,15 @@ def moving_screen(state: WizardState, now_s: float) -> Screen:
 def step_of_movement(state: WizardState) -> JobStep:
     """Return the step of a movement: once a write was agreed to, those of the turn test follow."""
     return JobStep.TURN_TEST if state.accepted else JobStep.ON_THE_WAY
+
+
+def _hanging(line: str) -> Iterator[str]:
+    """Yield a line in rows that fit beside the picture, those after the first below its text."""
+    named = re.match(r"\S+ {2,}", line)
+    name = named[0] if named else ""
+    first, *more = broken(line.removeprefix(name), WIDTH - _LEFT - columns(name))
+    yield name + first
+    yield from (" " * columns(name) + row for row in more)
 
 
 def _told(subject: MoveSubject, here: Pose | None, *, low_power: bool, left: bool) -> list[str]:

@@ -2,8 +2,10 @@
 
 from collections.abc import Iterator
 from enum import IntEnum
+from typing import Final
 
 from robolink.messages import tr
+from robolink.model import Pose, ToolOffset
 from robolink_cli.console.columns import columns
 from robolink_cli.console.machine_words import state_word
 from robolink_cli.wizard.happenings import Reading
@@ -62,6 +64,18 @@ def _switched(reading: Reading) -> Iterator[str]:
         yield tr("motors on") if reading.motors else tr("motors OFF")
     if reading.low_power is not None:
         yield tr("power LOW") if reading.low_power else tr("power HIGH")
+
+
+UPRIGHT: Final = ("X", "Y", "Z", "U")
+_TILTED: Final = (*UPRIGHT, "V", "W")
+_TILTS_DEG: Final = 0.005
+"""Less than this is 0 in the two decimals that are shown."""
+
+
+def coordinate_names(*shown: Pose | ToolOffset) -> tuple[str, ...]:
+    """Return which coordinates a table has: V and W only where one of its rows tilts."""
+    tilts = any(abs(angle) >= _TILTS_DEG for one in shown for angle in (one.v_deg, one.w_deg))
+    return _TILTED if tilts else UPRIGHT
 
 
 def mm(value: float) -> str:

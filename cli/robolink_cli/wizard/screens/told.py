@@ -4,6 +4,7 @@ import math
 
 from robolink.locale.languages import ENGLISH
 from robolink.messages import joined, tr
+from robolink.model import describe_pose
 from robolink.nozzle_change import WriteSubject
 from robolink.runner import FitSubject, Question, TouchSubject
 from robolink_cli.wizard.check_list import CheckSubject
@@ -11,17 +12,23 @@ from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.screens.checking import mark_of
 from robolink_cli.wizard.screens.choosing import language_label
 from robolink_cli.wizard.screens.fitting import fit_lines
+from robolink_cli.wizard.screens.layout import WIDTH
 from robolink_cli.wizard.screens.rows import mm
 from robolink_cli.wizard.screens.touching import angle_word, instruction, touch_title
 from robolink_cli.wizard.screens.values import taught_lines
 from robolink_cli.wizard.state import WizardState
 
 
-def told_before(state: WizardState) -> list[str]:
-    """Return what is to be read before a yes-or-no question."""
+def told_before(state: WizardState, width: int = WIDTH) -> list[str]:
+    """Return what is to be read before a yes-or-no question.
+
+    Args:
+        state: The state.
+        width: How many columns there are for what stands in columns.
+    """
     match state.subject:
         case FitSubject() as fit:
-            return fit_lines(fit)
+            return fit_lines(fit, width)
         case ChoiceSubject() as subject:
             rows = []
             for index, option in enumerate(subject.options):
@@ -117,15 +124,10 @@ def told_where(state: WizardState) -> str:
     pose = state.pose
     if pose is None:
         return ""
-    values = {
-        "x": mm(pose.x_mm),
-        "y": mm(pose.y_mm),
-        "z": mm(pose.z_mm),
-        "u": f"{pose.u_deg:.2f}",
-    }
+    where = describe_pose(pose)
     if pose.tool:
-        return tr("Tip X {x} Y {y} Z {z} U {u}.", **values)
-    return tr("Flange X {x} Y {y} Z {z} U {u}.", **values)
+        return tr("Tip {pose}.", pose=where)
+    return tr("Flange {pose}.", pose=where)
 
 
 def told_after_jog(state: WizardState) -> str:

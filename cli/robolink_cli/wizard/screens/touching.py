@@ -7,7 +7,15 @@ from robolink.model import angle_difference_deg
 from robolink.runner import AngleShown, JogRange, Question, TouchSubject
 from robolink_cli.console.columns import padded
 from robolink_cli.wizard.screens.layout import Screen, row_of
-from robolink_cli.wizard.screens.rows import JobStep, mm, signed, status_row, title_row
+from robolink_cli.wizard.screens.rows import (
+    UPRIGHT,
+    JobStep,
+    coordinate_names,
+    mm,
+    signed,
+    status_row,
+    title_row,
+)
 from robolink_cli.wizard.state import STEP_SIZES, WizardState
 
 _HEAD = 14
@@ -21,7 +29,7 @@ def touch_screen(state: WizardState, now_s: float) -> Screen:
     touch = state.touch
     lines = [
         *_what(state, touch),
-        *_angles(touch),
+        *_angles(touch, _MOST_ANGLES - _is_tilted(state)),
         "",
         *_where(state),
         *_since(state),
@@ -80,12 +88,12 @@ def _what(state: WizardState, touch: TouchSubject | None) -> list[str]:
     return lines
 
 
-def _angles(touch: TouchSubject | None) -> list[str]:
+def _angles(touch: TouchSubject | None, most: int) -> list[str]:
     """Return what the turn test has shown at each angle so far, the newest, and the one to come."""
     if touch is None or not touch.earlier:
         return []
     rows = [row_of((tr("U"), tr("off by")))]
-    for one in touch.earlier[-_MOST_ANGLES:]:
+    for one in touch.earlier[-most:]:
         off = f"{mm(one.off_mm)} mm"
         rows.append(row_of((f"{one.u_deg:.1f}", off), 11) + f"     {angle_word(one)}")
     if touch.arrival is not None:
@@ -105,8 +113,10 @@ def _where(state: WizardState) -> list[str]:
     pose = state.pose
     if pose is None:
         return [tr("No position from the controller yet.")]
-    head = padded("", _HEAD) + row_of(("X", "Y", "Z", "U"))
-    where = (mm(pose.x_mm), mm(pose.y_mm), mm(pose.z_mm), f"{pose.u_deg:.2f}")
+    names = _names(state)
+    head = padded("", _HEAD) + row_of(names)
+    places = (*map(mm, pose.coordinates()[:3]), *(f"{at:.2f}" for at in pose.coordinates()[3:]))
+    where = places[: len(names)]
     # A touch is measured with the flange; elsewhere it is the tool that is selected.
     name = tr("Flange now") if not pose.tool else tr("Tip now")
     return [head, padded(f" {name}", _HEAD) + row_of(where)]
@@ -116,18 +126,33 @@ def _since(state: WizardState) -> list[str]:
     way, touch, pose, arrival = state.way_mm(), state.touch, state.pose, state.arrival
     if way is None or pose is None or arrival is None:
         return []
-    turned = signed(angle_difference_deg(pose.u_deg, arrival.u_deg), 2)
+    angles = zip(pose.coordinates()[3:], arrival.coordinates()[3:], strict=True)
+    turned = [signed(angle_difference_deg(now, then), 2) for now, then in angles]
     apart, steps = f"{math.hypot(*way):.2f}", state.jogging.steps
     total = tr("{mm} mm, {n} steps", mm=apart, n=steps)
     if steps == 1:
         total = tr("{mm} mm, 1 step", mm=apart)
-    parts = row_of((*map(signed, way), turned))
+    parts = row_of((*map(signed, way), *turned)[: len(_names(state))])
     name = tr("Since arrival") if touch is not None else tr("Since start")
-    lines = [padded(f" {name}", _HEAD) + parts + f"   {total}"]
+    lines = [padded(f" {name}", _HEAD) + parts]
+    if _is_tilted(state):
+        lines.append(padded("", _HEAD) + f"   {total}")
+    else:
+        lines[0] += f"   {total}"
     if touch is not None and touch.first_z_mm is not None:
         apart = signed(pose.z_mm - touch.first_z_mm)
         lines.append(" " + tr("Height against touch 1") + f"   {apart} mm")
     return lines
+
+
+def _names(state: WizardState) -> tuple[str, ...]:
+    """Return the names of the coordinates that are shown: V and W of an arm that tilts its tool."""
+    return coordinate_names(*(one for one in (state.pose, state.arrival) if one is not None))
+
+
+def _is_tilted(state: WizardState) -> bool:
+    """Tell whether six columns are shown: they fill a row, and nothing stands beside them."""
+    return len(_names(state)) > len(UPRIGHT)
 
 
 def _contact(touch: TouchSubject | None) -> list[str]:
@@ -171,7 +196,14 @@ def _keypad(state: WizardState) -> list[str]:
 def _typing(state: WizardState) -> list[str]:
     """Return the field of a typed pose, where one can be typed."""
     if state.typing:
-        return ["", tr("Pose X Y Z U: {typed}_   Enter closes the field.", typed=state.typed)]
+        return [
+            "",
+            tr(
+                "Pose {names}: {typed}_  Enter closes the field.",
+                names=" ".join(_names(state)),
+                typed=state.typed,
+            ),
+        ]
     if state.touch is None or not state.touch.types:
         return []
     return ["", tr("[.] Type the pose, if an instrument fails")]

@@ -1,21 +1,34 @@
 """Screen (f): the new values, and the question before they are written."""
 
 import math
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
 from robolink.messages import tr
-from robolink.model import ToolOffset
+from robolink.model import ToolOffset, angle_difference_deg
 from robolink.nozzle_change import LimitVerdict, Proposal, WriteSubject
 from robolink_cli.console.columns import padded
 from robolink_cli.wizard.screens.layout import BODY, Screen, broken, row_of
-from robolink_cli.wizard.screens.rows import JobStep, mm, signed, title_row
+from robolink_cli.wizard.screens.rows import (
+    UPRIGHT,
+    JobStep,
+    coordinate_names,
+    mm,
+    signed,
+    title_row,
+)
 from robolink_cli.wizard.state import WizardState
 
 if TYPE_CHECKING:
     from robolink.calibration import Impact  # numpy, which a touch does without
 
 _HEAD = 18
+_COLUMN = 11
+_NARROW = 10
+"""Six columns of numbers beside the names."""
+
 _ROOM = BODY - 2
+_LENGTHS = 3
 
 
 def values_screen(state: WizardState, subject: WriteSubject) -> Screen:
@@ -143,23 +156,32 @@ def judgement(proposal: Proposal, verdicts: tuple[LimitVerdict, ...]) -> list[st
 
 def _table(proposal: Proposal, *, short: bool) -> list[str]:
     old, new = proposal.before, proposal.offset
-    head = padded(" " + tr("Tool {n}", n=proposal.tool), _HEAD) + row_of(("X", "Y", "Z", "U"))
-    lines = [head]
+    names = coordinate_names(*(one for one in (old, new) if one is not None))
+
+    def row(name: str, values: Iterable[str]) -> str:
+        return padded(f" {name}", _HEAD) + row_of(
+            [*values][: len(names)], _COLUMN if len(names) == len(UPRIGHT) else _NARROW
+        )
+
+    lines = [row(tr("Tool {n}", n=proposal.tool), names)]
     if old is not None:
-        lines.append(padded(" " + tr("now"), _HEAD) + row_of(_four(old)))
-    lines.append(padded(" " + tr("new"), _HEAD) + row_of(_four(new)))
+        lines.append(row(tr("now"), map(mm, old.components())))
+    lines.append(row(tr("new"), map(mm, new.components())))
     if old is not None:
-        changes = [
-            signed(b - a) for a, b in zip(old.components()[:4], new.components()[:4], strict=True)
-        ]
-        shown = [tr("stays") if float(one) == 0.0 else one for one in changes]
-        lines.append(padded(" " + tr("change"), _HEAD) + row_of(shown))
+        changes = map(signed, _changes(old, new))
+        lines.append(row(tr("change"), (tr("stays") if not float(c) else c for c in changes)))
     if proposal.change_mm is not None and not short:
         tip = math.dist((old or new).components()[:3], new.components()[:3])
         lines += ["", tr("The tip moves {d} mm.", d=mm(tip))]
     if not short:
         lines += stated_lines(proposal)
     return lines
+
+
+def _changes(old: ToolOffset, new: ToolOffset) -> Iterator[float]:
+    """Yield by how much each component changes, mm and degrees."""
+    for number, (before, after) in enumerate(zip(old.components(), new.components(), strict=True)):
+        yield after - before if number < _LENGTHS else angle_difference_deg(after, before)
 
 
 def stated_lines(proposal: Proposal) -> list[str]:
@@ -173,7 +195,3 @@ def stated_lines(proposal: Proposal) -> list[str]:
     if line and proposal.seating is not None:
         lines.append(proposal.seating.sentence)
     return lines
-
-
-def _four(offset: ToolOffset) -> tuple[str, ...]:
-    return tuple(mm(value) for value in offset.components()[:4])

@@ -12,6 +12,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import patch
 
 import pytest
 from robolink_simulators.cell.tip_switches import LightBeam
@@ -300,6 +301,12 @@ def nothing(stack: ExitStack) -> dict[str, Any]:
     return {}
 
 
+def as_in_a_wheel(stack: ExitStack) -> dict[str, Any]:
+    """Lay the pages where a wheel has them; a checkout has them at its top."""
+    stack.enter_context(patch("importlib.resources.files", lambda _: ROOT))
+    return {}
+
+
 def a_fault_plan(stack: ExitStack) -> dict[str, Any]:
     page = (ROOT / "docs" / "fault-plans.md").read_text(encoding="utf-8")
     Path("lost.toml").write_text(page.partition("```toml\n")[2].partition("```")[0])
@@ -327,6 +334,7 @@ MAKERS = {
     "fault-plans.md 1": a_fault_plan,
     "io-and-variables.md 1": with_variables,
     "journal.md 1": a_journal,
+    "json.md 1": as_in_a_wheel,
     "line-computer.md 1": undelivered,
     "plc-maps.md 1": a_map,
     "recipes.md 1": a_recipe,

@@ -64,7 +64,7 @@ def test_the_assist_port_shows_the_axes_of_the_true_tool(assisted):
     aside = [50 * math.cos(u_deg), 50 * math.sin(u_deg), 0]
     assert assist.way_along("z", 50.0, 1) == pytest.approx(aside, abs=1e-9)
     assert assist.way_along("x", 50.0, 1) == pytest.approx([0, 0, -50], abs=1e-9)
-    with pytest.raises(ConfigError, match=r"way_along needs axis.*x, z"):
+    with pytest.raises(ConfigError, match=r"way_along knows no axis.*x, z"):
         assist.do("way_along", axis="y", length_mm=50)
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from tests.packaging._way_to_the_wire import follow_a_tool_write, follow_typed_poses
 
-MOST_FILES = {"set_tool": 81, "change_tools": 42}
+MOST_FILES = {"set_tool": 84, "change_tools": 42}
 MOST_CALLS = 14
 MOST_FILES_OPEN = 9
 MOST_FILES_TO_SOLVE = 8

@@ -54,6 +54,22 @@ def test_select_takes_texts_conditions_and_comparisons(printed):
     assert printed(*lines, *more, *less) == ["2", "3", "4"]
 
 
+def test_a_statement_may_follow_a_case_without_a_semicolon(printed):
+    """A public program has four such lines, ``Case 1 MemOn 3; Wait MemSw(3)`` alike."""
+    lines = ("Select 1", "Case 1 MemOn 3; Print MemSw(3)", "Case 2 MemOff 3", "Send")
+    signed = ("Select 0", 'Case < 1 Print "under"', "Send")
+    assert printed(*lines, *signed) == ["1", "under"]
+
+
+@pytest.mark.parametrize(
+    "line", ["Case 1 2", "Case MemOn 3", "Case 1 Send", "Case 1 MemOn 3 MemOn 4"]
+)
+def test_a_case_with_anything_else_behind_it_is_refused(faults, line):
+    """Only a statement may follow, and only one without a semicolon."""
+    (fault,) = faults("\n".join(["Function main", "Select 1", line, "Send", "Fend"]))
+    assert "main.prg:3" in fault
+
+
 def test_branches_stand_in_blocks_and_on_lines(printed):
     """P. 419; ambiguity 5: Else on a line belongs to the nearest If."""
     lines = (

@@ -7,7 +7,7 @@ from importlib.resources import files
 from typing import Final
 
 from lark import Lark, Token
-from lark.exceptions import LarkError
+from lark.exceptions import LarkError, UnexpectedInput
 
 from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.values import number_value
@@ -109,6 +109,8 @@ _REFUSED_WORDS: Final = (
     (NOT_SIMULATED, RefusalKind.NOT_SIMULATED, "is not simulated"),
 )
 
+_CASE_AND_VALUE: Final = re.compile(r"""\s*case\s[^;]*\S\s*""", re.IGNORECASE)
+
 _STATEMENT_WORDS = re.compile(r"""(?:^|;)\s*([a-z][a-z0-9_]*\$?)|"[^"]*"|'.*""", re.IGNORECASE)
 
 
@@ -170,9 +172,30 @@ def _read(text: str) -> tuple[Statement, ...]:
 def parse_program_line(text: str) -> tuple[LineNode, ...]:
     """Return the statements in one line of a program, without its label.
 
+    After ``Case 1`` a statement may stand without a semicolon, as in ``Case 1 MemOn 3`` of a public
+    program; no page of the reference says so.
+
     Raises:
         UnexpectedInput: It is not SPEL+; says where, and what could have stood there.
     """
+    try:
+        return _program_line(text)
+    except UnexpectedInput as error:
+        place = error.pos_in_stream or 0
+        if not _CASE_AND_VALUE.fullmatch(text, 0, place) or not _statement_word().match(
+            text, place
+        ):
+            raise
+        return _program_line(f"{text[:place]};{text[place:]}")
+
+
+@lru_cache(maxsize=1)
+def _statement_word() -> re.Pattern[str]:
+    terminals = (_parser().get_terminal(name).pattern for name in ("COMMAND", "MOTION", "PRINT"))
+    return re.compile("|".join(one.to_regexp() for one in terminals), re.IGNORECASE)
+
+
+def _program_line(text: str) -> tuple[LineNode, ...]:
     nodes: tuple[LineNode, ...] = _parser().parse(text, start="program_line")  # type: ignore[assignment]
     return nodes
 

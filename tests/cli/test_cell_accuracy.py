@@ -118,6 +118,25 @@ def test_a_plate_that_was_learnt_has_its_place_row_and_what_learning_left_unsure
     assert plate["half_width"] == pytest.approx((0.02**2 + 3 * 0.01**2) ** 0.5)
 
 
+def test_beams_that_were_learnt_five_times_have_the_scatter_of_their_crossing(run):
+    def beam(x_mm, y_mm, direction_deg):
+        return {"x_mm": x_mm, "y_mm": y_mm, "direction_deg": direction_deg}
+
+    with open("robolink.toml", "a", encoding="utf-8") as file:
+        file.write('[cells.line3.stations.BEAMS-02]\nkind = "beams"\nz_mm = -100.0\nbeams = [')
+        file.write("{input = 3, x_mm = 300.0, y_mm = 90.0, direction_deg = 90.0},")
+        file.write("{input = 4, x_mm = 280.0, y_mm = 100.0, direction_deg = 0.0}]\n")
+    for x_mm in (300.0, 300.01, 300.0, 300.01, 300.0):
+        crossed = [beam(x_mm, 90.0, 90.0), beam(280.0, 100.0, 0.0)]
+        recorded(learnt("BEAMS-02", "beams", z_mm=-100.0, beams=crossed))
+    recorded(learnt("BEAMS-02", "beams", z_mm=-100.0, beams=crossed[:1]))
+    _, document, _ = run("-c", "line3", "cell", "accuracy", "--json")
+    place = rows(document, "BEAMS-02")["place_mm"]
+    assert place["basis"] == "record"
+    assert 0.005 < place["half_width"] < 0.03
+    assert "learnt 5 times" in place["told"]
+
+
 def test_a_station_that_was_learnt_five_times_has_its_place_row_from_the_record(run):
     places = [(300.0, 100.0), (300.01, 100.0), (300.0, 100.01), (300.01, 100.01), (300.0, 100.0)]
     for x_mm, y_mm in places:
@@ -158,6 +177,8 @@ def test_an_artefact_test_finds_a_person_who_is_always_beside_and_is_used_from_t
     code, refused, _ = run("-c", "line3", "--operator", "4711", *measure, *true)
     assert code != 0
     assert "engineer" in refused["error"]["what"]
+    entries = memory_journal(ADDRESS).entries(kinds=(EntryKind.ACCURACY,))
+    assert not list(entries), "what was refused is on record"
     code, found, _ = run("-c", "line3", "--operator", "9", *measure, *true)
     assert code == 0
     assert len(found["records"]) == 5

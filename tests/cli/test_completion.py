@@ -126,6 +126,8 @@ def offered(tmp_path, monkeypatch):
         f'[cells.a]\nurl = "{OTHER}"\n'
     )
     (tmp_path / "needle.toml").write_text('schema = "robolink/recipe/1"\n')
+    (tmp_path / "needle.txt").write_text('schema = "robolink/recipe/1"\n')
+    (tmp_path / "needles.toml").mkdir()
     (tmp_path / "recipes").mkdir()
     (tmp_path / "recipes" / "pin.toml").write_text('schema = "robolink/recipe/1"\n')
     monkeypatch.chdir(tmp_path)

@@ -16,6 +16,7 @@ from robolink.protocols.epson_text import (
     Request,
     Role,
 )
+from robolink.protocols.epson_text._messages import next_request
 
 HOST_CASES: list[tuple[bytes, list[Event]]] = [
     (b"#Login,0\r\n", [Reply("Login", ("0",))]),
@@ -132,6 +133,11 @@ def test_bytes_behind_a_message_are_kept_for_the_next(role, data, expected):
     [last] = events_of(codec, [rest])
     assert last == (Reply("Stop", ("0",)) if role is Role.HOST else Request("Stop"))
     assert codec.bytes_held == b""
+
+
+def test_a_request_behind_blanks_and_a_lone_sign_is_not_skipped():
+    assert next_request(b"  $$Login,a", 0) == 3
+    assert next_request(b"  $Login,a", 0) == -1, "it is the request that is being read"
 
 
 def test_an_event_does_not_wait_for_the_line_feed_after_a_carriage_return():

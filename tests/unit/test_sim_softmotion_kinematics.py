@@ -30,7 +30,13 @@ from robolink_simulators.softmotion.motion.paths import axes_for_tcp
 from robolink_simulators.softmotion.rows import five_axes
 
 from robolink.errors import ConfigError
-from robolink.model import OrientationDof, OrientationSpace
+from robolink.model import (
+    CsTool,
+    OrientationDof,
+    OrientationImage,
+    OrientationSpace,
+    combined_space,
+)
 from tests.unit._softmotion_rows import AXES, DOF, drawn, image_of
 
 GANTRY = Gantry("Kin_Gantry3")
@@ -380,3 +386,20 @@ def test_the_flange_of_a_gantry_never_turns():
     assert GANTRY.flange((1.0, 2.0, 3.0)) == Frame((1.0, 2.0, 3.0))
     assert GANTRY.orientation_image(about_z(30)) == OrientationSpace.known(NO_TURN)
     assert GANTRY.axes_for(ORIGIN, ANY_CONFIGURATION, (9.0, 9.0, 9.0)) == (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(("first_deg", "second_deg"), [(0, 0), (30, 0), (0, -70), (30, 100)])
+def test_two_free_turns_about_one_tilted_axis_are_one_that_holds_their_product(
+    first_deg, second_deg
+):
+    axis, flange_axis, base_axis = (0.6, 0.0, 0.8), Y_AXIS, X_AXIS
+    carried = OrientationSpace.directed(axis, base_axis)
+    carrying = OrientationSpace.directed(flange_axis, axis)
+    image = OrientationImage(CsTool.FLANGE, carrying, b_active=False)
+    space = combined_space(carried, image, NO_TURN)
+    assert space.dof is OrientationDof.ONE
+    base = product(about(base_axis, math.radians(first_deg)), carried.m_ori_zero)
+    wrist = product(about(axis, math.radians(second_deg)), carrying.m_ori_zero)
+    assert carried.holds(base)
+    assert carrying.holds(wrist)
+    assert space.holds(product(base, wrist))

@@ -19,8 +19,13 @@ from typing import Final, Self
 
 from robolink.calibration.core.accuracy import AccuracyFacts, ErrorSource
 from robolink.calibration.core.frames import tip_pose
-from robolink.calibration.core.result import CalibrationResult, Drift, VerifyResult
-from robolink.calibration.core.statistics import chi_square_quantile, f_quantile
+from robolink.calibration.core.result import GUARD_FACTOR, CalibrationResult, Drift, VerifyResult
+from robolink.calibration.core.statistics import (
+    chi_square_quantile,
+    f_quantile,
+    normal_quantile,
+    student_t,
+)
 from robolink.calibration.core.turn_claim import (
     CONTRADICTS_ACCURACY,
     CONTRADICTS_REPEATABILITY,
@@ -41,6 +46,9 @@ fewer only where that would let too much pass."""
 LEAST_TURN_DEG: Final = 90.0
 """A tool that is turned by less from where it was measured is not called tested."""
 
+SHOWN_IN: Final = 0.95
+"""In so many tests a shift is contradicted from which on a turn test is said to show it."""
+
 _SHOWN: Final = 0.5
 """A drift that shows less than this share of an error tells no wider statement."""
 
@@ -49,6 +57,8 @@ _ROUGHER: Final = 0.99
 
 _WITH_DIRECTION: Final = 3
 """X, Y and the direction of a tool."""
+
+_PLANE: Final = 2
 
 _LEAST_TILTED: Final = 4
 
@@ -108,6 +118,7 @@ def turn_claim(result: CalibrationResult, facts: AccuracyFacts) -> TurnClaim | N
         repeatable_mm=result.repeatable_to_mm,
         accurate_mm=result.accurate_to_mm,
         by_camera=any(one.row == "tip_image_px" for one in sources),
+        measures_z="z_mm" in result.found,
     )
 
 
@@ -276,8 +287,7 @@ def held_to_claim(claim: TurnClaim, proof: VerifyResult) -> TurnJudgement:
         >>> held_to_claim(claim, little).code
         'proof_contradicts_repeatability'
     """
-    drifts = proof.drifts
-    coordinates = 1 if proof.heights_only else 3 if any(one.dz_mm for one in drifts) else 2
+    drifts, coordinates = proof.drifts, proof.coordinates
     limits = tuple(_limits(claim, one, len(drifts), coordinates, proof) for one in drifts)
     pairs = list(zip(drifts, limits, strict=True))
     worst = max(range(len(pairs)), key=lambda i: pairs[i][0].distance_mm / pairs[i][1].accurate_mm)
@@ -291,6 +301,8 @@ def held_to_claim(claim: TurnClaim, proof: VerifyResult) -> TurnJudgement:
         )
     turned = max(limit.turn_deg for limit in limits)
     wider_mm, stated_mm = _wider_mm(claim, pairs), claim.accurate_mm
+    shows_mm = _shows_from_mm(claim, proof, limits) if proof.passed else None
+    shows_z_mm = _shows_z_from_mm(claim, proof, shows_mm)
     return TurnJudgement(
         code,
         limits,
@@ -299,7 +311,49 @@ def held_to_claim(claim: TurnClaim, proof: VerifyResult) -> TurnJudgement:
         wider_mm=wider_mm,
         offers_wider=not claim.by_camera,
         covered=wider_mm is not None and stated_mm is not None and wider_mm <= stated_mm,
+        shows_from_mm=None if proof.heights_only else shows_mm,
+        shows_z_from_mm=shows_z_mm,
+        misses_z=claim.measures_z and proof.passed and shows_z_mm is None,
+        accurate_mm=stated_mm,
     )
+
+
+def _shows_from_mm(claim: TurnClaim, proof: VerifyResult, limits: Sequence[DriftLimits]) -> float:
+    """Return the smallest shift of the tip between measurement and test that the test shows.
+
+    A tip that shifted by t gives a drift as long as t at every angle, in any direction, and what
+    scatters beside it: v = s^2 (1 + h) in each of m coordinates. Beside t the m - 1 others bring
+    (m - 1) v on average, so beyond a limit L it is in 95 % from
+
+        t = sqrt(L^2 - (m - 1) v) + z sqrt(v)
+
+    on, z being the 95 % quantile of the normal distribution, or of Student's t where v was
+    estimated by the residuals that L rests on: (t - drift) / sqrt(v) has that distribution. L is
+    the limit of repeatability, or of the process with its guard band where that is less. It is the
+    power of a test on a mean against a shift (ISO 3494; the noncentral chi-squared distribution
+    gives the same within 1 %). One drift that shows it is enough, so of several the one that shows
+    most counts; together they show it in more than 95 %. Rows are left out: where an error of the
+    place hides a shift, the tip is off by that error alone, which its row holds.
+    """
+    coordinates, nu = proof.coordinates, claim.look_nu
+    quantile = _quantile(len(limits), coordinates, nu)
+    beyond = normal_quantile(SHOWN_IN) if nu is None else student_t(SHOWN_IN, nu)
+    found = []
+    for drift, limit in zip(proof.drifts, limits, strict=True):
+        sigma_mm = limit.repeatable_mm / math.sqrt(quantile)
+        allowed_mm = min(limit.repeatable_mm, proof.tolerance_mm - GUARD_FACTOR * drift.u_mm)
+        along = max(allowed_mm, 0.0) ** 2 - (coordinates - 1) * sigma_mm**2
+        found.append(math.sqrt(max(along, 0.0)) + beyond * sigma_mm)
+    return min(found)
+
+
+def _shows_z_from_mm(claim: TurnClaim, proof: VerifyResult, shows_mm: float | None) -> float | None:
+    """Return the same of a shift in height: by the drifts, or by heights that were compared."""
+    if not claim.measures_z or shows_mm is None:
+        return None
+    by_drifts = shows_mm if proof.coordinates != _PLANE else None
+    told = [one for one in (by_drifts, proof.height_shows_from_mm) if one is not None]
+    return min(told, default=None)
 
 
 def _limits(

@@ -192,5 +192,5 @@ class TurnJudgement:
         }
 
 
-def _length(value: Any) -> float | None:
+def _length(value: float | None) -> float | None:
     return None if value is None else float(value)

@@ -20,12 +20,7 @@ from typing import Final, Self
 from robolink.calibration.core.accuracy import AccuracyFacts, ErrorSource
 from robolink.calibration.core.frames import tip_pose
 from robolink.calibration.core.result import GUARD_FACTOR, CalibrationResult, Drift, VerifyResult
-from robolink.calibration.core.statistics import (
-    chi_square_quantile,
-    f_quantile,
-    normal_quantile,
-    student_t,
-)
+from robolink.calibration.core.statistics import chi_square_quantile, f_quantile
 from robolink.calibration.core.turn_claim import (
     CONTRADICTS_ACCURACY,
     CONTRADICTS_REPEATABILITY,
@@ -34,6 +29,7 @@ from robolink.calibration.core.turn_claim import (
     TurnJudgement,
 )
 from robolink.calibration.statement.accuracy import row_covariance, usual_look_sigma_mm
+from robolink.calibration.statement.turn_test_power import View, shows_from_mm
 from robolink.model import angle_difference_deg
 
 FALSE_ALARMS: Final = 0.001
@@ -45,9 +41,6 @@ fewer only where that would let too much pass."""
 
 LEAST_TURN_DEG: Final = 90.0
 """A tool that is turned by less from where it was measured is not called tested."""
-
-SHOWN_IN: Final = 0.95
-"""In so many tests a shift is contradicted from which on a turn test is said to show it."""
 
 _SHOWN: Final = 0.5
 """A drift that shows less than this share of an error tells no wider statement."""
@@ -321,30 +314,18 @@ def held_to_claim(claim: TurnClaim, proof: VerifyResult) -> TurnJudgement:
 def _shows_from_mm(claim: TurnClaim, proof: VerifyResult, limits: Sequence[DriftLimits]) -> float:
     """Return the smallest shift of the tip between measurement and test that the test shows.
 
-    A tip that shifted by t gives a drift as long as t at every angle, in any direction, and what
-    scatters beside it: v = s^2 (1 + h) in each of m coordinates. Beside t the m - 1 others bring
-    (m - 1) v on average, so beyond a limit L it is in 95 % from
-
-        t = sqrt(L^2 - (m - 1) v) + z sqrt(v)
-
-    on, z being the 95 % quantile of the normal distribution, or of Student's t where v was
-    estimated by the residuals that L rests on: (t - drift) / sqrt(v) has that distribution. L is
-    the limit of repeatability, or of the process with its guard band where that is less. It is the
-    power of a test on a mean against a shift (ISO 3494; the noncentral chi-squared distribution
-    gives the same within 1 %). One drift that shows it is enough, so of several the one that shows
-    most counts; together they show it in more than 95 %. Rows are left out: where an error of the
-    place hides a shift, the tip is off by that error alone, which its row holds.
+    Beyond the limit of repeatability it is at least doubted, and beyond that of the process, with
+    its guard band, it does not pass. Rows are left out: where an error of the place hides a shift,
+    the tip is off by that error alone, which its row holds.
     """
-    coordinates, nu = proof.coordinates, claim.look_nu
-    quantile = _quantile(len(limits), coordinates, nu)
-    beyond = normal_quantile(SHOWN_IN) if nu is None else student_t(SHOWN_IN, nu)
-    found = []
+    coordinates, views = proof.coordinates, []
+    quantile = _quantile(len(limits), coordinates, claim.look_nu)
     for drift, limit in zip(proof.drifts, limits, strict=True):
-        sigma_mm = limit.repeatable_mm / math.sqrt(quantile)
         allowed_mm = min(limit.repeatable_mm, proof.tolerance_mm - GUARD_FACTOR * drift.u_mm)
-        along = max(allowed_mm, 0.0) ** 2 - (coordinates - 1) * sigma_mm**2
-        found.append(math.sqrt(max(along, 0.0)) + beyond * sigma_mm)
-    return min(found)
+        scatter = limit.repeatable_mm**2 / quantile
+        own = min(claim.look_sigma_mm**2 / drift.looks, scatter)
+        views.append(View(max(allowed_mm, 0.0), math.sqrt(own), math.sqrt(scatter - own)))
+    return shows_from_mm(views, coordinates, claim.look_nu)
 
 
 def _shows_z_from_mm(claim: TurnClaim, proof: VerifyResult, shows_mm: float | None) -> float | None:

@@ -121,8 +121,8 @@ def _not_shown(judgement: TurnJudgement) -> Iterator[str]:
     ]
     if shifts:
         yield tr(
-            "The accuracy holds as long as the tip did not shift in its mount between measurement "
-            "and test: a shift of less than {shifts} may not show.",
+            "The accuracy assumes that the tip did not shift in its mount before the test: less "
+            "than {shifts} may not show.",
             shifts=", ".join(shifts),
         )
     if judgement.misses_z:

@@ -124,7 +124,8 @@ def with_contact_input(cell: Any, _rng: random.Random) -> Any:
 def one_touch_by_input(cell: Any, rng: random.Random) -> Any:
     """The input shows how high the tip is as well."""
     furnish(cell, contact_input=9)
-    pin = Pin(*cell.simulator.world.pin_mm, sigma_mm=0.005)
+    x_mm, y_mm, z_mm = cell.simulator.world.pin_mm
+    pin = Pin(x_mm, y_mm, z_mm, sigma_mm=0.005)
     touch = TouchPlan(contact=InputEdge(9), clearance_mm=5.0, seed=rng.getrandbits(32))
     return OneTouchSource(Absolute(pin, 0.01), touch)
 
@@ -428,7 +429,10 @@ def test_what_a_turn_test_would_not_show_is_said_where_it_is_more_than_is_stated
 ):
     ended = change(BY_NAME[course] if isinstance(course, str) else course, 11)
     assert not ended.code, ended
+    assert ended.proof is not None
+    assert ended.proposal is not None
     judgement = ended.proof.judgement
+    assert judgement is not None
     told = [judgement.shows_from_mm, judgement.shows_z_from_mm]
     assert max(one for one in told if one) < less_mm, told
     assert not judgement.misses_z

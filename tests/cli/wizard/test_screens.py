@@ -162,6 +162,7 @@ def done():
     shown = VerifyResult((Drift(90.0, 0.006, 0.004), Drift(0.0, 0.002, 0.001)), 0.1)
     (proposal,) = write_subject(1).proposals
     claim = turn_claim(proposal.result, AccuracyFacts())
+    assert claim is not None
     return proved(replace(shown, judgement=held_to_claim(claim, shown)))
 
 

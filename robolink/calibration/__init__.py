@@ -259,6 +259,9 @@ if TYPE_CHECKING:
     from robolink.calibration.touch.touch_evidence import TouchEvidence as TouchEvidence
     from robolink.calibration.touch.touch_evidence import WitnessedTouch as WitnessedTouch
     from robolink.calibration.touch.touch_evidence import height_limit_mm as height_limit_mm
+    from robolink.calibration.touch.touch_evidence import (
+        height_shows_from_mm as height_shows_from_mm,
+    )
     from robolink.calibration.touch.touch_evidence import judge_touches as judge_touches
     from robolink.calibration.touch.touch_evidence import least_jog_mm as least_jog_mm
     from robolink.calibration.touch.touch_evidence import stand_upright as stand_upright
@@ -357,7 +360,7 @@ __getattr__ = lazy_exports(
         "touch.surface_fit": "tip_is_told",
         "touch.surface_standoff": "SurfaceStandoffs",
         "touch.touch_evidence": "TouchEvidence WitnessedTouch "
-        "height_limit_mm judge_touches least_jog_mm stand_upright",
+        "height_limit_mm height_shows_from_mm judge_touches least_jog_mm stand_upright",
         "touch.touch_limits": "FARTHEST_MM HIGHEST_MM MOST_RESIDUAL_MM "
         "PERSON_SIGMA_Z_MM PROBE_SIGMA_Z_MM",
         "z_touch": "USUAL_DECELERATION_MM_S2 Touch ZTouchResult solve_z_touch touch_sigma_gain",

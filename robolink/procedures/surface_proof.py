@@ -82,4 +82,6 @@ class SurfaceProof:
 
     def result(self) -> VerifyResult:
         """Return what they say together."""
-        return VerifyResult((self.drift(),), self.tolerance_mm, inputs=tuple(self.touches))
+        return VerifyResult(
+            (self.drift(),), self.tolerance_mm, inputs=tuple(self.touches), in_space=True
+        )

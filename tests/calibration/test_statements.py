@@ -144,6 +144,66 @@ def test_a_turn_test_is_called_passed_only_where_both_statements_stand(judgement
         assert TurnJudgement.from_json(judgement.as_json()) == judgement
 
 
+@pytest.mark.parametrize(
+    ("shows", "said"),
+    [
+        ({}, ""),
+        ({"shows_from_mm": 0.049, "shows_z_from_mm": 0.05}, ""),
+        ({"shows_from_mm": 0.052}, "less than 0.052 mm (X, Y) may not show."),
+        ({"shows_from_mm": 0.04, "shows_z_from_mm": 0.35}, "less than 0.350 mm (Z) may not show."),
+        ({"shows_from_mm": 0.07, "shows_z_from_mm": 0.07}, "less than 0.070 mm (X, Y, Z) may not"),
+        (
+            {"shows_from_mm": 0.07, "shows_z_from_mm": 0.12},
+            "less than 0.070 mm (X, Y), 0.120 mm (Z) may not show.",
+        ),
+        ({"shows_from_mm": 0.04, "misses_z": True}, "This test tells no height"),
+    ],
+)
+def test_what_a_shift_would_have_to_be_is_said_where_it_is_more_than_is_stated(shows, said):
+    stated = replace(judged(), accurate_mm=0.05, **shows)
+    first, *more = turn_test_sentences(stated)
+    assert first.startswith("It contradicts nothing")
+    assert len(more) == bool(said)
+    assert all(said in one for one in more), more
+    assert TurnJudgement.from_json(stated.as_json()) == stated
+    # Nothing is left to hold where it is contradicted, and nothing to hold to without a statement.
+    for none in (replace(stated, code="proof_contradicts_accuracy"), judged()):
+        assert not any(
+            "may not show" in one or "height" in one for one in turn_test_sentences(none)
+        )
+
+
+def test_an_entry_from_before_says_nothing_of_what_a_test_shows():
+    later = ("shows_from_mm", "shows_z_from_mm", "misses_z", "accurate_mm")
+    old = {key: value for key, value in judged().as_json().items() if key not in later}
+    assert TurnJudgement.from_json(old) == judged()
+
+
+def test_the_figure_is_of_the_limit_that_is_met_first_and_of_the_axes_that_are_told():
+    found = two(sigma_mm=0.02)
+    claim = turn_claim(found, AccuracyFacts())
+    assert claim is not None
+    held = held_to_claim(claim, VerifyResult((Drift(90.0, 0.0, 0.0),), 0.2))
+    assert (held.shows_z_from_mm, held.misses_z) == (None, False), "Z was not measured"
+    assert held.accurate_mm == found.accurate_to_mm
+    # 5.2 standard deviations of a drift, of a limit of 3.7.
+    assert held.shows_from_mm == pytest.approx(5.22 * 0.02 * math.sqrt(2), rel=0.01)
+    strict = held_to_claim(claim, VerifyResult((Drift(90.0, 0.0, 0.0),), 0.06))
+    assert 0.06 < (strict.shows_from_mm or 0.0) < (held.shows_from_mm or 0.0)
+    failed = held_to_claim(claim, VerifyResult((Drift(90.0, 0.3, 0.0),), 0.2))
+    assert failed.shows_from_mm is None, "its value was taken back"
+    plane = replace(claim, measures_z=True)
+    flat = VerifyResult((Drift(90.0, 0.0, 0.0),), 0.2)
+    assert held_to_claim(plane, flat).misses_z
+    compared = held_to_claim(plane, replace(flat, height_shows_from_mm=0.35))
+    assert (compared.shows_z_from_mm, compared.misses_z) == (0.35, False)
+    space = held_to_claim(plane, replace(flat, in_space=True, height_shows_from_mm=0.35))
+    assert space.shows_z_from_mm == space.shows_from_mm
+    up = held_to_claim(plane, replace(flat, heights_only=True))
+    assert up.shows_from_mm is None
+    assert up.shows_z_from_mm is not None
+
+
 def test_a_failed_or_undecided_test_is_called_so_whatever_the_statements_say():
     failed = VerifyResult((Drift(180.0, 0.3, 0.0),), 0.2, judgement=judged())
     assert turn_test_headline(failed).startswith("Turn test failed")

@@ -13,7 +13,15 @@ from typing import Any
 
 import pytest
 
-from robolink.methods import NAngleSource, PlaneSurvey, PlaneTouchSource, TwoPoseSource
+from robolink.calibration import Pin, turn_test_sentences
+from robolink.methods import (
+    Absolute,
+    NAngleSource,
+    OneTouchSource,
+    PlaneSurvey,
+    PlaneTouchSource,
+    TwoPoseSource,
+)
 from robolink.model import InputEdge
 from robolink.procedures import TouchPlan
 from tests.certificate.live import (
@@ -113,6 +121,16 @@ def with_contact_input(cell: Any, _rng: random.Random) -> Any:
     return NAngleSource((90.0, 180.0, 270.0), TouchPlan(contact=InputEdge(9)))
 
 
+def one_touch_by_input(cell: Any, rng: random.Random) -> Any:
+    """The input shows how high the tip is as well."""
+    furnish(cell, contact_input=9)
+    x_mm, y_mm, z_mm = cell.simulator.world.pin_mm
+    pin = Pin(x_mm, y_mm, z_mm, sigma_mm=0.005)
+    touch = TouchPlan(contact=InputEdge(9), clearance_mm=5.0, seed=rng.getrandbits(32))
+    return OneTouchSource(Absolute(pin, 0.01), touch)
+
+
+ONE_BY_INPUT = by_sensors("one-touch on EPSON", source=one_touch_by_input)
 BY_INPUT = by_sensors("n-angle on EPSON", source=with_contact_input)
 SURE_PERSON = by_sensors(
     "two-pose on EPSON", source=lambda _cell, _rng: TwoPoseSource(sigma_mm=0.01)
@@ -220,6 +238,13 @@ CELLS = (
     *(
         Cell(f"slips by {mm:g}", course, TAKEN_BACK, CONTRADICTED, at_write=slipped(mm))
         for course, mm in (("camera on PLC", 0.08), ("camera on EPSON", 0.05))
+    ),
+    Cell(
+        "slips up by 0.075",
+        ONE_BY_INPUT,
+        TAKEN_BACK,
+        CONTRADICTED,
+        at_write=slipped_up(0.075),
     ),
     *soak(
         *(
@@ -386,6 +411,35 @@ def judge(cell: Cell, seed: int) -> None:
 )
 def test_a_cell_in_which_the_tip_is_wrong_ends_as_it_must(cell):
     judge(cell, 11)
+
+
+@pytest.mark.parametrize(
+    ("course", "misses", "less_mm"),
+    [
+        pytest.param("two-pose on EPSON", "", 0.1, id="two-pose"),
+        pytest.param(BY_INPUT, "(X, Y)", 0.25, id="n-angle, contact input"),
+        pytest.param("one-touch on EPSON", "(Z)", 0.4, id="one-touch"),
+        pytest.param(ONE_BY_INPUT, "(X, Y, Z)", 0.1, id="one-touch, contact input"),
+        pytest.param("beams on EPSON", "", 0.03, id="beams"),
+        pytest.param("z-touch on EPSON", "", 0.05, id="z-touch"),
+    ],
+)
+def test_what_a_turn_test_would_not_show_is_said_where_it_is_more_than_is_stated(
+    course, misses, less_mm
+):
+    ended = change(BY_NAME[course] if isinstance(course, str) else course, 11)
+    assert not ended.code, ended
+    assert ended.proof is not None
+    assert ended.proposal is not None
+    judgement = ended.proof.judgement
+    assert judgement is not None
+    told = [judgement.shows_from_mm, judgement.shows_z_from_mm]
+    assert max(one for one in told if one) < less_mm, told
+    assert not judgement.misses_z
+    assert (judgement.shows_z_from_mm is not None) is ("z_mm" in ended.proposal.result.measured)
+    said = [one for one in turn_test_sentences(judgement) if "may not show" in one]
+    assert len(said) == bool(misses)
+    assert all(misses in one for one in said), said
 
 
 @pytest.mark.soak

@@ -33,12 +33,12 @@ CLAIM = TurnClaim(
 )
 
 
-def record(*, sigma_mm=None, drift_mm=0.06, wider_mm=None, damaged=False):
+def record(*, sigma_mm=None, drift_mm=0.06, wider_mm=None, damaged=False, claim=CLAIM):
     """Put a change on record, and return the number of its first entry."""
     found = assessed(solve_two_pose(*TOUCHES, stored=OLD, sigma_mm=sigma_mm), AccuracyFacts())
     proposal = Proposal(1, OLD, found, seating=Seating((0.05, 0.05, 0.05), changes=12))
     shown = VerifyResult((Drift(180.0, drift_mm, 0.0),), 0.2)
-    proof = VerifyResult(shown.drifts, 0.2, judgement=held_to_claim(CLAIM, shown))
+    proof = VerifyResult(shown.drifts, 0.2, judgement=held_to_claim(claim, shown))
     measured = calibration_entry(proposal, AcceptanceCriteria(), source="touched")
     if damaged:
         details = {**measured.details, "accuracy": {"rows": "torn"}}
@@ -94,6 +94,17 @@ def test_the_entry_of_a_turn_test_says_what_it_contradicts(shown):
     text = shown("journal", "show", str(record(sigma_mm=0.02) + 4))
     assert "Scatter alone explains 0.0" in text
     assert "it does not repeat as stated" in text
+
+
+def test_the_entry_and_the_page_say_what_the_turn_test_would_not_show(shown, tmp_path):
+    page, said = tmp_path / "page.html", "less than 0.022 mm (X, Y) may not show."
+    record(sigma_mm=0.02, drift_mm=0.004, claim=replace(CLAIM, accurate_mm=0.02))
+    assert said in shown("journal", "show", "5")
+    (tool,) = shown("journal", "report", "c0ffee", str(page), "--json")["tools"]
+    assert tool["verification"]["judgement"]["shows_from_mm"] == pytest.approx(0.0222, abs=1e-4)
+    assert said in page.read_text(encoding="utf-8")
+    less = record(sigma_mm=0.02, drift_mm=0.004)
+    assert "may not show" not in shown("journal", "show", str(less + 4))
 
 
 def test_a_damaged_statement_is_shown_as_it_stands(shown):

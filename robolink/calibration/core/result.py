@@ -327,7 +327,9 @@ class VerifyResult:
     """Drift of the tip about the reference point, one entry per angle.
 
     ``warnings`` are named doubts about the test itself; ``heights_only`` tells that a surface was
-    touched, which shows Z and nothing else. ``codes`` name why its touches do not count;
+    touched, which shows Z and nothing else, ``in_space`` that drifts have a height, too. Where
+    heights were compared beside the drifts, ``height_shows_from_mm`` is the smallest shift in
+    height that shows so in 95 %. ``codes`` name why its touches do not count;
     ``inputs`` are their poses, where a person made them. ``judgement`` is what the drifts say about
     the statement of the measurement, once they were held to it
     (:func:`~robolink.calibration.held_to_claim`); ``accurate_to_mm`` is what the tip is accurate to
@@ -342,6 +344,15 @@ class VerifyResult:
     inputs: tuple[Pose, ...] = ()
     judgement: TurnJudgement | None = None
     accurate_to_mm: float | None = None
+    in_space: bool = False
+    height_shows_from_mm: float | None = None
+
+    @property
+    def coordinates(self) -> int:
+        """How many coordinates its drifts have."""
+        if self.heights_only:
+            return 1
+        return 3 if self.in_space or any(drift.dz_mm for drift in self.drifts) else 2
 
     @property
     def max_drift_mm(self) -> float:

@@ -35,6 +35,7 @@ class TurnClaim:
         accurate_mm: What it says it is accurate to, ``None`` for nothing.
         by_camera: Whether the drift itself is seen through a camera whose scale, turn or mirror
             may be what is wrong.
+        measures_z: Whether Z was measured, or its change.
     """
 
     look_sigma_mm: float
@@ -52,6 +53,7 @@ class TurnClaim:
     repeatable_mm: float | None = None
     accurate_mm: float | None = None
     by_camera: bool = False
+    measures_z: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +88,12 @@ class TurnJudgement:
         tests: How often the test was made, the first of them contradicted; all looks count
             together.
         apart_mm: How far two looks at one angle lie apart where that is more than they scatter.
+        shows_from_mm: The smallest shift of the tip in X, Y between measurement and test that this
+            test shows in 95 %; ``None`` where it tells heights only, did not pass, or is on record
+            from before this was told.
+        shows_z_from_mm: The same of a shift in height; ``None`` also where Z was not measured.
+        misses_z: Whether Z was measured and the test tells no height at all.
+        accurate_mm: What the measurement said it is accurate to, ``None`` for nothing.
     """
 
     code: str
@@ -97,6 +105,10 @@ class TurnJudgement:
     covered: bool = False
     tests: int = 1
     apart_mm: float | None = None
+    shows_from_mm: float | None = None
+    shows_z_from_mm: float | None = None
+    misses_z: bool = False
+    accurate_mm: float | None = None
 
     @property
     def contradicts_accuracy(self) -> bool:
@@ -138,17 +150,20 @@ class TurnJudgement:
             DriftLimits(float(a["repeatable_mm"]), float(a["accurate_mm"]), float(a["turn_deg"]))
             for a in document["limits"]
         )
-        wider_mm = document["wider_mm"]
         return cls(
             document["code"] or "",
             limits,
             int(document["worst"]),
             bool(document["small_angle"]),
-            None if wider_mm is None else float(wider_mm),
+            _length(document["wider_mm"]),
             bool(document["offers_wider"]),
             bool(document["covered"]),
             int(document.get("tests", 1)),
-            None if (apart_mm := document.get("apart_mm")) is None else float(apart_mm),
+            _length(document.get("apart_mm")),
+            _length(document.get("shows_from_mm")),
+            _length(document.get("shows_z_from_mm")),
+            bool(document.get("misses_z", False)),
+            _length(document.get("accurate_mm")),
         )
 
     def as_json(self) -> dict[str, object]:
@@ -170,4 +185,12 @@ class TurnJudgement:
             "covered": self.covered,
             "tests": self.tests,
             "apart_mm": self.apart_mm,
+            "shows_from_mm": self.shows_from_mm,
+            "shows_z_from_mm": self.shows_z_from_mm,
+            "misses_z": self.misses_z,
+            "accurate_mm": self.accurate_mm,
         }
+
+
+def _length(value: float | None) -> float | None:
+    return None if value is None else float(value)

@@ -19,7 +19,7 @@ from typing import Final, Self
 
 from robolink.calibration.core.accuracy import AccuracyFacts, ErrorSource
 from robolink.calibration.core.frames import tip_pose
-from robolink.calibration.core.result import CalibrationResult, Drift, VerifyResult
+from robolink.calibration.core.result import GUARD_FACTOR, CalibrationResult, Drift, VerifyResult
 from robolink.calibration.core.statistics import chi_square_quantile, f_quantile
 from robolink.calibration.core.turn_claim import (
     CONTRADICTS_ACCURACY,
@@ -29,6 +29,7 @@ from robolink.calibration.core.turn_claim import (
     TurnJudgement,
 )
 from robolink.calibration.statement.accuracy import row_covariance, usual_look_sigma_mm
+from robolink.calibration.statement.turn_test_power import View, shows_from_mm
 from robolink.model import angle_difference_deg
 
 FALSE_ALARMS: Final = 0.001
@@ -49,6 +50,8 @@ _ROUGHER: Final = 0.99
 
 _WITH_DIRECTION: Final = 3
 """X, Y and the direction of a tool."""
+
+_PLANE: Final = 2
 
 _LEAST_TILTED: Final = 4
 
@@ -108,6 +111,7 @@ def turn_claim(result: CalibrationResult, facts: AccuracyFacts) -> TurnClaim | N
         repeatable_mm=result.repeatable_to_mm,
         accurate_mm=result.accurate_to_mm,
         by_camera=any(one.row == "tip_image_px" for one in sources),
+        measures_z="z_mm" in result.found,
     )
 
 
@@ -276,8 +280,7 @@ def held_to_claim(claim: TurnClaim, proof: VerifyResult) -> TurnJudgement:
         >>> held_to_claim(claim, little).code
         'proof_contradicts_repeatability'
     """
-    drifts = proof.drifts
-    coordinates = 1 if proof.heights_only else 3 if any(one.dz_mm for one in drifts) else 2
+    drifts, coordinates = proof.drifts, proof.coordinates
     limits = tuple(_limits(claim, one, len(drifts), coordinates, proof) for one in drifts)
     pairs = list(zip(drifts, limits, strict=True))
     worst = max(range(len(pairs)), key=lambda i: pairs[i][0].distance_mm / pairs[i][1].accurate_mm)
@@ -291,6 +294,8 @@ def held_to_claim(claim: TurnClaim, proof: VerifyResult) -> TurnJudgement:
         )
     turned = max(limit.turn_deg for limit in limits)
     wider_mm, stated_mm = _wider_mm(claim, pairs), claim.accurate_mm
+    shows_mm = _shows_from_mm(claim, proof, limits) if proof.passed else None
+    shows_z_mm = _shows_z_from_mm(claim, proof, shows_mm)
     return TurnJudgement(
         code,
         limits,
@@ -299,7 +304,37 @@ def held_to_claim(claim: TurnClaim, proof: VerifyResult) -> TurnJudgement:
         wider_mm=wider_mm,
         offers_wider=not claim.by_camera,
         covered=wider_mm is not None and stated_mm is not None and wider_mm <= stated_mm,
+        shows_from_mm=None if proof.heights_only else shows_mm,
+        shows_z_from_mm=shows_z_mm,
+        misses_z=claim.measures_z and proof.passed and shows_z_mm is None,
+        accurate_mm=stated_mm,
     )
+
+
+def _shows_from_mm(claim: TurnClaim, proof: VerifyResult, limits: Sequence[DriftLimits]) -> float:
+    """Return the smallest shift of the tip between measurement and test that the test shows.
+
+    Beyond the limit of repeatability it is at least doubted, and beyond that of the process, with
+    its guard band, it does not pass. Rows are left out: where an error of the place hides a shift,
+    the tip is off by that error alone, which its row holds.
+    """
+    coordinates, views = proof.coordinates, []
+    quantile = _quantile(len(limits), coordinates, claim.look_nu)
+    for drift, limit in zip(proof.drifts, limits, strict=True):
+        allowed_mm = min(limit.repeatable_mm, proof.tolerance_mm - GUARD_FACTOR * drift.u_mm)
+        scatter = limit.repeatable_mm**2 / quantile
+        own = min(claim.look_sigma_mm**2 / drift.looks, scatter)
+        views.append(View(max(allowed_mm, 0.0), math.sqrt(own), math.sqrt(scatter - own)))
+    return shows_from_mm(views, coordinates, claim.look_nu)
+
+
+def _shows_z_from_mm(claim: TurnClaim, proof: VerifyResult, shows_mm: float | None) -> float | None:
+    """Return the same of a shift in height: by the drifts, or by heights that were compared."""
+    if not claim.measures_z or shows_mm is None:
+        return None
+    by_drifts = shows_mm if proof.coordinates != _PLANE else None
+    told = [one for one in (by_drifts, proof.height_shows_from_mm) if one is not None]
+    return min(told, default=None)
 
 
 def _limits(

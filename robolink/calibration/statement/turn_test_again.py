@@ -119,8 +119,7 @@ def _mean(group: Sequence[Drift]) -> Drift:
 def _apart_mm(claim: TurnClaim, tests: Sequence[VerifyResult]) -> float | None:
     """Return how far looks at one angle lie apart, where that is more than they scatter."""
     groups = [group for group in _by_place(tests) if len(group) > 1]
-    drifts = [drift for test in tests for drift in test.drifts]
-    coordinates = 1 if tests[-1].heights_only else 3 if any(d.dz_mm for d in drifts) else 2
+    coordinates = max(test.coordinates for test in tests)
     found = [
         max(_distance_mm(one, other) for one, other in combinations(group, 2))
         for group in groups

@@ -62,6 +62,8 @@ def turn_test_sentences(
         measured: The measurement; its rows tell with what it was made. Without it the causes are
             named for all of them.
 
+    Where a shift of the tip shows only from more on than is stated, that is said, too.
+
     Example:
         >>> from robolink.calibration import DriftLimits, TurnJudgement, turn_test_sentences
         >>> limits = DriftLimits(repeatable_mm=0.016, accurate_mm=0.09, turn_deg=180.0)
@@ -96,6 +98,35 @@ def turn_test_sentences(
             "The tool was turned by {turn:.0f} degrees; less than 90 is not called tested.",
             turn=max(one.turn_deg for one in judgement.limits),
         )
+    yield from _not_shown(judgement)
+
+
+def _not_shown(judgement: TurnJudgement) -> Iterator[str]:
+    """Yield by how much the tip may have shifted unseen, where that is more than is stated.
+
+    No statement is left where the test contradicts it; a wider one covers what was seen.
+    """
+    stated, in_plane, in_z = (
+        judgement.accurate_mm,
+        judgement.shows_from_mm,
+        judgement.shows_z_from_mm,
+    )
+    if stated is None or judgement.fails:
+        return
+    named = {"X, Y, Z": in_plane} if in_plane == in_z else {"X, Y": in_plane, "Z": in_z}
+    shifts = [
+        f"{stated_mm(mm)} mm ({axes})"
+        for axes, mm in named.items()
+        if mm is not None and mm > stated
+    ]
+    if shifts:
+        yield tr(
+            "The accuracy assumes that the tip did not shift in its mount before the test: less "
+            "than {shifts} may not show.",
+            shifts=", ".join(shifts),
+        )
+    if judgement.misses_z:
+        yield tr("This test tells no height: a shift in Z would not show.")
 
 
 def _explained(judgement: TurnJudgement) -> Iterator[str]:

@@ -11,7 +11,11 @@ from typing import Final
 import numpy as np
 
 from robolink.calibration.core.robust import Floats
-from robolink.calibration.core.statistics import student_t, studentized_range_0999
+from robolink.calibration.core.statistics import (
+    normal_quantile,
+    student_t,
+    studentized_range_0999,
+)
 from robolink.calibration.touch.standoff import (
     NO_STANDOFF,
     Standoff,
@@ -185,6 +189,12 @@ def least_jog_mm(resolution_mm: float) -> float:
 def height_limit_mm(count: int, sigma_z_mm: float) -> float:
     """Return by how much the heights of so many touches of one pin may differ, 99.9 %."""
     return max(LEAST_HEIGHT_LIMIT_MM, studentized_range_0999(count) * sigma_z_mm)
+
+
+def height_shows_from_mm(count: int, sigma_z_mm: float) -> float:
+    """Return by how much one height of so many has to differ to be beyond that limit in 95 %."""
+    scatter_mm = math.sqrt(2) * sigma_z_mm
+    return height_limit_mm(count, sigma_z_mm) + normal_quantile(0.95) * scatter_mm
 
 
 def stand_upright(poses: Sequence[Pose]) -> bool:

@@ -104,7 +104,10 @@ class OneTouchSource(ProvesAgain):
         tip: ToolOffset,
         tolerance_mm: float,
     ) -> TurnTest:
-        """Return the test by half a turn; see :class:`~robolink.procedures.KeepsProof`."""
+        """Return the test by half a turn; see :class:`~robolink.procedures.KeepsProof`.
+
+        Z was measured, or its change: where an input shows contact the height counts as drift.
+        """
         from robolink.calibration import toward_zero  # numpy, which a look does without
 
         measured_deg = tip_pose(result.inputs[-1], result.offset, tool=tool).u_deg
@@ -117,4 +120,5 @@ class OneTouchSource(ProvesAgain):
             u_mm=drift_uncertainty_mm(result),
             written=result.offset,
             tip=tip,
+            in_space=self.touch.contact is not None and "z_mm" in result.found,
         )

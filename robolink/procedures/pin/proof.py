@@ -37,6 +37,7 @@ def verify_by_turning(
     u_mm: float | None = None,
     written: ToolOffset = NO_OFFSET,
     tip: ToolOffset = NO_OFFSET,
+    in_space: bool = False,
 ) -> Procedure[VerifyResult]:
     """Turn about the new tip and let a person show where it went. Runs in the new tool.
 
@@ -49,6 +50,9 @@ def verify_by_turning(
         written: The offset in force.
         tip: Where the tip was found. It differs from ``written`` where a difference was
             written, and then the frame in force does not turn about the tip.
+        in_space: Whether its height counts as drift. Only a contact input tells a height as well as
+            a place; what a person sees of it scatters more (docs/reference/evidence.md 1), so their
+            heights are compared by a limit of their own.
 
     The tip starts lifted. The distance that the person jogs it, from where it should have
     been to the pin, is the drift; the robot stops beside that place, so that no jog is no answer.
@@ -80,15 +84,23 @@ def verify_by_turning(
     )
     proof = DriftProof(tolerance_mm, PERSON_U_DRIFT_MM if u_mm is None else u_mm)
     for angle_deg in angles_deg:
-        proof.add(*(yield from turning.shown(angle_deg, proof.so_far())))
+        shown = yield from turning.shown(angle_deg, proof.so_far())
+        proof.add(*shown, in_space=in_space)
     for _ in range(MOST_MORE):
         doubted = proof.undecided()
         if doubted is None:
             break
         yield Notify(proof.told(doubted))
-        proof.add(*(yield from turning.shown(doubted.u_deg, proof.so_far())))
+        shown = yield from turning.shown(doubted.u_deg, proof.so_far())
+        proof.add(*shown, in_space=in_space)
+    from robolink.calibration import height_shows_from_mm  # numpy, which a look does without
+
     heights_mm = [contact.z_mm, *(touch.z_mm for touch in proof.touches)]
-    return proof.result(heights_agree(heights_mm, plan.sigma_in_height_mm))
+    sigma_z_mm = plan.sigma_in_height_mm
+    return replace(
+        proof.result(heights_agree(heights_mm, sigma_z_mm)),
+        height_shows_from_mm=height_shows_from_mm(len(heights_mm), sigma_z_mm),
+    )
 
 
 def _nearer(u_deg: float, angle_deg: float) -> float:
@@ -183,6 +195,7 @@ class DriftProof:
     u_mm: float
     touches: list[TouchedAt] = field(default_factory=list)
     _apart: dict[float, list[tuple[float, float, float]]] = field(default_factory=dict)
+    _in_space: bool = False
 
     def add(self, place: Pose, found: TouchedAt, *, in_space: bool = False) -> None:
         """Take a touch.
@@ -203,6 +216,7 @@ class DriftProof:
             (False, 0.5)
         """
         self.touches.append(found)
+        self._in_space = self._in_space or in_space
         dz_mm = found.z_mm - place.z_mm if in_space else 0.0
         apart = (found.x_mm - place.x_mm, found.y_mm - place.y_mm, dz_mm)
         self._apart.setdefault(place.u_deg, []).append(apart)
@@ -243,6 +257,7 @@ class DriftProof:
             self.tolerance_mm,
             codes=() if heights_agree else ("touch_heights_differ",),
             inputs=tuple(self.touches),
+            in_space=self._in_space,
         )
 
     def _drifts(self) -> tuple[Drift, ...]:

@@ -26,6 +26,7 @@ class TurnTest(KeptProof):
         contact: Pose of the new tool's tip on the pin, as the measurement implies it.
         angles_deg: Tool angles U at which the tip is brought back onto the pin.
         u_mm: Standard uncertainty of the drift that one touch shows.
+        in_space: Whether the height of a touch counts as drift.
     """
 
     method: ClassVar[str] = "two-pose"
@@ -34,6 +35,7 @@ class TurnTest(KeptProof):
     contact: Pose
     angles_deg: tuple[float, ...]
     u_mm: float
+    in_space: bool = False
 
     def moves(self, here: Pose) -> int:  # noqa: ARG002 - it begins where the person touches
         """Return how many movements there are; see :meth:`KeptProof.moves`."""
@@ -61,6 +63,7 @@ class TurnTest(KeptProof):
             u_mm=self.u_mm,
             written=self.written,
             tip=self.tip,
+            in_space=self.in_space,
         )
 
     def steps_after_a_break(self) -> Procedure[VerifyResult]:

@@ -24,7 +24,16 @@ from robolink_cli.wizard.state import Header, WizardState
 from wcwidth import wcswidth
 
 from robolink import messages
-from robolink.calibration import Drift, DriftLimits, TurnJudgement, VerifyResult, impact_on
+from robolink.calibration import (
+    AccuracyFacts,
+    Drift,
+    DriftLimits,
+    TurnJudgement,
+    VerifyResult,
+    held_to_claim,
+    impact_on,
+    turn_claim,
+)
 from robolink.errors import (
     ConfigError,
     ControllerFaultError,
@@ -149,8 +158,12 @@ def choosing():
 
 
 def done():
-    """A needle that was written and proved."""
-    return proved(VerifyResult((Drift(90.0, 0.006, 0.004), Drift(0.0, 0.002, 0.001)), 0.1))
+    """A needle that was written and proved by a test that shows large shifts only."""
+    shown = VerifyResult((Drift(90.0, 0.006, 0.004), Drift(0.0, 0.002, 0.001)), 0.1)
+    (proposal,) = write_subject(1).proposals
+    claim = turn_claim(proposal.result, AccuracyFacts())
+    assert claim is not None
+    return proved(replace(shown, judgement=held_to_claim(claim, shown)))
 
 
 def done_doubtful():

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, cast
 
 import click
 
-from robolink.messages import spoken, tr
+from robolink.messages import joined, spoken, tr
 from robolink_cli.console.help_pages import in_language
 from robolink_cli.console.render import note
 
@@ -76,6 +76,14 @@ class LazyGroup(click.Group):
         except click.exceptions.NoSuchCommand as error:
             # click looks among the commands that are loaded only.
             names = [*self.list_commands(ctx), *(self._unlisted.keys() - self.renamed.keys())]
+            if grouped := self._groups_with(ctx, error.command_name):
+                names, error.message = [], joined(
+                    " ",
+                    (
+                        error.message,
+                        *(tr("There is 'robolink {command}'.", command=one) for one in grouped),
+                    ),
+                )
             raise click.exceptions.NoSuchCommand(
                 error.command_name, error.message, names, error.ctx
             ) from None
@@ -83,6 +91,16 @@ class LazyGroup(click.Group):
             typed = " ".join([*ctx.command_path.split()[1:], args[0]])
             now = self.renamed[args[0]][1]
             note(tr("{old} is now called {new}.", old=typed, new=now))
+        return found
+
+    def _groups_with(self, ctx: click.Context, typed: str) -> list[str]:
+        """Return the commands of that name in groups whose one line of help names it."""
+        found = []
+        for group, (_, summary) in self.lazy.items():
+            if typed in summary.split():
+                command = self.get_command(ctx, group)
+                if isinstance(command, click.Group) and typed in command.list_commands(ctx):
+                    found.append(" ".join([*ctx.command_path.split()[1:], group, typed]))
         return found
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

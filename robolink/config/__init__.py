@@ -12,6 +12,7 @@ from robolink.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from robolink.config._adding import add_cell as add_cell
+    from robolink.config._adding import content_with_cell as content_with_cell
     from robolink.config._cells import USUAL_CHANGE_MM as USUAL_CHANGE_MM
     from robolink.config._cells import Cell as Cell
     from robolink.config._cells import CellGlimpse as CellGlimpse
@@ -35,7 +36,7 @@ else:
     __getattr__ = lazy_exports(
         __name__,
         {
-            "_adding": "add_cell",
+            "_adding": "add_cell content_with_cell",
             "_cells": "Cell CellGlimpse USUAL_CHANGE_MM cell_names check_file find_cell "
             "glimpse_of_cell load_cells settings_of_file",
             "_files": "ConfigFile Source config_files",

@@ -29,6 +29,33 @@ def add_cell(path: Path, name: str, said: Mapping[str, str | float]) -> None:
         >>> cell_names()
         ['line3']
     """
+    content = content_with_cell(path, name, said)
+    try:
+        write_whole(path, content, mode=0o666)
+    except OSError as error:
+        raise ConfigError(
+            tr("{path} cannot be written: {cause}.", path=path, cause=error.strerror or error),
+            remedy=tr("Nothing was written."),
+        ) from error
+
+
+def content_with_cell(path: Path, name: str, said: Mapping[str, str | float]) -> bytes:
+    """Return what a cell file says with one more cell, so far as its keys are known by now.
+
+    Args:
+        path: The file; it is read where there is one.
+        name: The cell's name.
+        said: Its keys, in this order.
+
+    Raises:
+        ConfigError: The file has a cell of that name, is wrong, or would be.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from robolink.config import content_with_cell
+        >>> content_with_cell(Path("new-cell-example.toml"), "line3", {})
+        b'[cells."line3"]\\n'
+    """
     before = CELL_FILE.read(path) if path.exists() else b""
     cells = CELL_FILE.parse(path, before).get("cells")
     if isinstance(cells, dict) and name in cells:
@@ -46,13 +73,7 @@ def add_cell(path: Path, name: str, said: Mapping[str, str | float]) -> None:
         error = CELL_FILE.refusal(path, problems)
         error.remedy = tr("Nothing was written.")
         raise error
-    try:
-        write_whole(path, content, mode=0o666)
-    except OSError as error:
-        raise ConfigError(
-            tr("{path} cannot be written: {cause}.", path=path, cause=error.strerror or error),
-            remedy=tr("Nothing was written."),
-        ) from error
+    return content
 
 
 def _quoted(value: str | float) -> str:

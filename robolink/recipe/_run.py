@@ -131,6 +131,7 @@ class RecipeRun:
             )
         self.takes_reference = take_reference
         self.changed: tuple[ChangedSince, ...] = ()
+        self._looked_ahead = False
 
     def preflight(self) -> None:
         """Find out, reading only, whatever would end the run later.
@@ -177,6 +178,7 @@ class RecipeRun:
             )
         require_ready(controller, self.plan)
         require_inside(controller, preview(controller, self.plan))
+        self._looked_ahead = True
 
     def ask_ids(self, ask: Callable[[str], str]) -> Iterator[str]:
         """Have the ids of nozzles and lots asked before anything moves; yield each.
@@ -194,12 +196,15 @@ class RecipeRun:
                 yield answer
 
     def run(self) -> ChangeReport:
-        """Carry it out, after :meth:`preflight`.
+        """Carry it out; :meth:`preflight` comes first where it has not passed yet.
 
         Raises:
-            RobolinkError: As :meth:`robolink.nozzle_change.NozzleChange.run`; outputs that the
-                recipe switched stay as they are, and the error names them.
+            RobolinkError: As :meth:`preflight`, and as
+                :meth:`robolink.nozzle_change.NozzleChange.run`; outputs that the recipe switched
+                stay as they are, and the error names them.
         """
+        if not self._looked_ahead:
+            self.preflight()
         outcomes, loaded = self._controller.outcomes, self._loaded
         before = outcomes.signature
         outcomes.signature = replace(

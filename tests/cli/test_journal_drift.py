@@ -86,6 +86,18 @@ def test_the_charts_hold_what_was_measured_and_kept(run):
     assert charts["pin", "PIN-07", "y"] == pytest.approx(pins)
 
 
+def test_one_change_draws_no_empty_table_and_is_headed_by_the_cell_that_was_named(run, tmp_path):
+    (tmp_path / "robolink.toml").write_text(f'[cells.line3]\nurl = "{HERE}"\n')
+    record(course(1, 1))
+    code, out, _ = run("-c", "line3")
+    assert code == 0
+    first, *rest = out.splitlines()
+    assert first.startswith(f"line3 ({HERE}): measured changes: 1, ")
+    assert "from the second measured change of a tool on" in rest[0]
+    assert "limits" not in out
+    assert run("-c", HERE)[1].startswith(f"{HERE}: "), "a URL is no name"
+
+
 def test_a_kept_z_is_not_charted_and_a_used_pin_is_not_found(run):
     record(course(1, 3), method="one-touch")
     (charts,) = charted(run("--json")[1]).values()

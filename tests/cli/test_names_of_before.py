@@ -148,6 +148,23 @@ def test_a_name_that_is_mistyped_gets_one_of_today_suggested(typed, offered, cap
     assert "recalibrate" not in said
 
 
+@pytest.mark.parametrize(
+    ("typed", "named"),
+    [
+        ("drift", ["journal drift"]),
+        ("list", ["tool list", "journal list", "cell list"]),
+        ("motors", []),
+        ("needle", []),
+    ],
+)
+def test_a_command_of_a_group_is_named_where_its_group_was_left_out(typed, named, capsys):
+    assert (main.run([typed]) == 2) or typed == "motors", "that one has an older, shorter name"
+    said = capsys.readouterr().err
+    assert said.count("There is 'robolink ") == len(named)
+    for one in named:
+        assert f"There is 'robolink {one}'." in said
+
+
 def test_the_first_page_names_the_pages_and_the_recipes(capsys):
     assert main.run(["--help"]) == 0
     page = capsys.readouterr().out

@@ -41,6 +41,25 @@ def test_what_is_typed_is_a_cell(typing, capsys):
     assert 'Next: robolink -c "line3" status' in capsys.readouterr().out
 
 
+def test_what_is_typed_wrongly_is_told_at_once_and_asked_again(
+    state_folder, tmp_path, typing, capsys
+):
+    (tmp_path / "robolink.toml").write_text('[cells.a]\nurl = "epson+sim://a"\n')
+    asked = typing("a", "b c", "b", "nonsense", URL, "-", "soon", "60", "me")
+    assert main.run(["cell", "new"]) == 0
+    assert find_cell("b").url == URL
+    said = capsys.readouterr().err
+    for told in ("has a cell a already", "cannot be the name", "'nonsense' is not", "'soon'"):
+        assert told in said
+    assert len(asked) == 9
+
+
+def test_what_is_given_wrongly_is_refused_before_the_first_question(typing, capsys):
+    asked = typing("-")
+    assert main.run(["cell", "new", "b", "--url", "nonsense"]) == 2
+    assert asked == []
+
+
 @pytest.mark.usefixtures("state_folder")
 def test_what_is_not_known_is_left_out_and_a_plc_is_asked_for_no_time_out(typing):
     asked = typing("mixer", "softmotion+modbus-tcp://192.0.2.2", "-")

@@ -139,12 +139,12 @@ def test_the_page_that_the_wizard_shows_is_that_of_the_command(run, recorded, tm
     assert made.sub("", text_of(page)) == made.sub("", text_of(tmp_path / "page.html"))
     # What stands there already is not written over, and a change that nobody made has no page.
     page.write_text("mine")
-    with pytest.raises(ConfigError):
-        page_of_change(change)
+    beside = page.with_stem(f"{page.stem}-2")
+    assert page_of_change(change) == (f"Report: {beside}",)
     assert page.read_text() == "mine"
     with pytest.raises(ConfigError):
         page_of_change("facade00" * 4)
-    assert [one.name for one in tmp_path.glob("change-*")] == [page.name]
+    assert {*tmp_path.glob("change-*")} == {page, beside}
 
 
 def test_the_page_says_who_when_with_what_and_what_came_of_it(run, recorded, simulator, tmp_path):
@@ -259,6 +259,15 @@ def test_a_file_is_replaced_only_with_force(run, recorded, tmp_path):
     assert (code, "exists already" in err) == (2, True)
     assert run("report", "1", "page.html", "--force")[0] == 0
     assert "A proposal" in text_of(tmp_path / "page.html")
+
+
+def test_a_page_that_nobody_names_is_written_beside_the_one_that_is_there(run, recorded, tmp_path):
+    recorded(CALIBRATION)
+    for made in (1, 2, 3):
+        assert run("report", "1")[0] == 0, "the last screen proposes it again"
+        assert len(list(tmp_path.glob("change-*.html"))) == made
+    assert run("report", "1", "--force")[0] == 0
+    assert len(list(tmp_path.glob("change-*.html"))) == 3
 
 
 REFUSALS = {

@@ -13,6 +13,7 @@ import robolink
 from robolink.controllers import capabilities_of_kind
 from robolink.errors import ConfigError, LimitError
 from robolink.recipe import LoadedRecipe, Recipe, RecipeRun, beyond, load_recipe
+from robolink.standing import standing_after
 from robolink.testing import MemoryController
 
 RECIPES = Path(__file__).parents[2] / "examples" / "recipes"
@@ -98,6 +99,15 @@ def test_a_copy_with_simulated_numbers_runs_on_a_simulated_controller():
     with robolink.connect("epson+sim://recipe-able?seed=1") as controller:
         with pytest.raises(LimitError):
             run_of(controller, copied(box={"sideways_mm": 1})).preflight()
+
+
+def test_a_run_that_nobody_looked_ahead_of_refuses_all_the_same():
+    with MemoryController() as controller:
+        before = controller.tools.selected()
+        with pytest.raises(ConfigError, match="simulated cell") as refused:
+            run_of(controller, copied()).run()
+        assert standing_after(refused.value).untouched
+        assert controller.tools.selected() == before
 
 
 @pytest.mark.parametrize("name", models())

@@ -23,22 +23,32 @@ def page_of_change(change: str) -> tuple[str, ...]:
         Where it is, and what is wrong with the journal; each a sentence.
 
     Raises:
-        ConfigError: The change is not in the journal, or a file of that name is there already.
+        ConfigError: The change is not in the journal.
         JournalError: The journal cannot be read.
         OSError: The page cannot be written.
     """
     journal = open_journal(read_only=True)
     entries = list(journal.entries(change=change, newest_first=False))
-    path = Path(page_name(change)).absolute()
+    path = free_page(change).absolute()
     require_free(path, replace=False)
     reports, problems = reports_from(journal, entries)
     save(reports[0], path, others=reports[1:], replace=False)
     return (tr("Report: {path}", path=path), *problems)
 
 
-def page_name(change: str) -> str:
-    """Return how the file of a page is called where nobody names it."""
-    return f"change-{change[:8]}.html"
+def free_page(change: str, *, replace: bool = False) -> Path:
+    """Return where a page is written that nobody names: an older one of the same change stays.
+
+    Args:
+        change: Its whole id.
+        replace: Whether the older one gives way.
+    """
+    first = Path(f"change-{change[:8]}.html")
+    path, number = first, 1
+    while path.exists() and not replace:
+        number += 1
+        path = first.with_stem(f"{first.stem}-{number}")
+    return path
 
 
 def reports_from(

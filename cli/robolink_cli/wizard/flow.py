@@ -130,10 +130,13 @@ def _regarding(state: WizardState, subject: object) -> WizardState:
             reading = replace(reading, pose=subject.after)
         return replace(state, jogging=jogging, reading=reading, message="")
     if isinstance(subject, MoveSubject):
-        # What it is for stands beside its picture.
-        fresh = tuple(text for text in state.fresh if text != subject.purpose)
-        moves = replace(state, subject=subject, question=None, waits=False, fresh=fresh)
-        return replace(moves, carried=True, message="")
+        # What it is for stands beside its picture, and heads no question that follows.
+        fresh, remarks = (
+            tuple(text for text in told if text != subject.purpose)
+            for told in (state.fresh, state.remarks)
+        )
+        moves = replace(state, subject=subject, question=None, waits=False)
+        return replace(moves, fresh=fresh, remarks=remarks, carried=True, message="")
     if isinstance(subject, Header):
         return _known(replace(state, header=subject), state.header.simulated, state.header.needle)
     if isinstance(subject, CellIs):

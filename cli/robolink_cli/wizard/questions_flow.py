@@ -104,7 +104,9 @@ def chosen_by_key(state: WizardState, ended: LastScreen, key: KeyPressed) -> Wiz
     if key.name in ("stop", "0", "q"):
         return WizardCommand.LEAVE
     if key.name in ("5", "main"):
-        return WizardCommand.LEAVE if ended.done else WizardCommand.BEGIN_AGAIN
+        if ended.done:
+            return WizardCommand.LEAVE
+        return WizardCommand.BEGIN_AGAIN if ended.again else None
     offered = _OFFERED.get(key.name)
     return offered if ended.done and offered in state.offers else None
 

@@ -87,12 +87,16 @@ class LastScreen:
         kept: What stays on the terminal when the screen is gone; how every command ends is said
             besides.
         at_s: When.
+        headed: Whether it was carried out, stopped, or never begun, as the first row says it.
+        again: Whether the job may be begun once more from here.
     """
 
     done: bool
     lines: tuple[str, ...]
     kept: tuple[str, ...]
     at_s: float
+    headed: str = ""
+    again: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,12 +5,18 @@ from robolink.model._tools import ToolOffset, describe_offset
 from robolink.standing import Components, Standing, ToolStanding
 
 
-def describe_standing(standing: Standing) -> str:
+def describe_standing(standing: Standing, *, settles: bool = True) -> str:
     """Return what moved, what was written, which tool is selected, and what settles the rest.
 
     It claims nothing that was not looked at.
+
+    Args:
+        standing: What stands.
+        settles: Whether to say which command settles it; not where that is said besides.
     """
     parts = [_movement(standing), *_writes(standing), _selection(standing)]
+    if not settles:
+        return joined(" ", parts)
     if standing.left_open and standing.reset_first:
         parts.append(tr("Next: robolink robot reset, then robolink recover."))
     elif standing.left_open:

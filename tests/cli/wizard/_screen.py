@@ -78,7 +78,7 @@ class ScreenHand(HandAtScreen):
         """Leave the last screen, where there is one, and return the exit code."""
         end_s, shown = time.monotonic() + self.longest_s, ""
         while self.read(0.2) and time.monotonic() < end_s:
-            if re.search(r"(DONE|STOPPED) *(SIMULATED *)?$", self.screen.display[0]) and not shown:
+            if re.search(r"(DONE|STOPPED|NOT STARTED) *(SIMULATED *)?$", self.screen.display[0]) and not shown:
                 self.rest(0.5)
                 shown = self.last = self.text
                 self.press(["0"])

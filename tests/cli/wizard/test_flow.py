@@ -498,6 +498,17 @@ def test_what_nobody_had_a_screen_to_read_is_kept_for_the_end():
     assert hand.state.fresh == ("settled",)
 
 
+def test_a_question_is_not_headed_by_movements_that_had_a_screen_of_their_own():
+    going = MoveSubject(ARRIVAL, Way.JOINT, 20.0, "Lifting.")
+    hand = Sitting().happens(WasTold("The pin is as high as before."))
+    for one in (WasTold("Lifting."), WasRegarded(going)):
+        hand.happens(one)
+    hand.asked(None, Question.YES_NO, "As long as the old one?")
+    shown = "\n".join(screen_of(hand.state, hand.now).lines)
+    assert "The pin is as high as before." in shown
+    assert "Lifting." not in shown
+
+
 @pytest.mark.parametrize(
     "subject",
     [

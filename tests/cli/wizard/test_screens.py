@@ -35,6 +35,7 @@ from robolink.calibration import (
     turn_claim,
 )
 from robolink.errors import (
+    CalibrationError,
     ConfigError,
     ControllerFaultError,
     DeclinedError,
@@ -297,6 +298,36 @@ def test_after_an_emergency_stop_the_reset_comes_before_recover():
     assert last.state.ended.lines[-1] == (
         'Next: robolink -c "line3" robot reset, then robolink -c "line3" recover'
     )
+    assert str(last.state.ended.lines).count("Next:") == 1
+    keys = [key for key, _ in screen_of(last.state, last.now).actions]
+    assert keys == ["0"], "beginning again would be refused"
+
+
+@pytest.mark.parametrize(
+    ("error", "standing", "headed"),
+    [
+        (ConfigError("It is a copy."), None, "NOT STARTED"),
+        (ControllerFaultError("The guard is open."), Standing(selected=1), "NOT STARTED"),
+        (ControllerFaultError("The guard is open."), Standing(moved=True), "STOPPED"),
+        (DeclinedError("You stopped it."), None, "STOPPED"),
+        (CalibrationError("too_few", "Too few points."), None, "STOPPED"),
+    ],
+)
+def test_what_was_refused_before_anything_happened_was_not_stopped(error, standing, headed):
+    if standing is not None:
+        note_standing(error, standing)
+    state = WizardState(Header("line3", "Change needle"), subject="a question before the list")
+    last = ended_of(state, error, 0.0)
+    assert last is not None
+    assert last.kept[0].endswith(headed)
+    hand = Sitting(state).happens(HasEnded(last))
+    assert hand.state.ended is last
+    assert headed in screen_of(hand.state, 1.0).title
+
+
+def test_after_a_touch_it_was_stopped_whatever_was_refused():
+    last = ended(Header("line3", "Change needle"), ControllerFaultError("The guard is open."))
+    assert "STOPPED" in screen_of(last.state, last.now).title
 
 
 @pytest.mark.parametrize(("role", "offered"), [("", True), ("engineer", True), ("operator", False)])

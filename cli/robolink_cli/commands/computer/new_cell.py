@@ -1,13 +1,14 @@
 """cell new: asks what a cell file has to say, and writes it."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import click
 
-from robolink.errors import DeclinedError
+from robolink.errors import ConfigError, DeclinedError
 from robolink.messages import declared, tr
 from robolink_cli.console.numbers import NumberInside
-from robolink_cli.console.render import emit_json, json_is_on, say
+from robolink_cli.console.render import emit_json, json_is_on, note, say
 from robolink_cli.options.shared import json_option
 from robolink_cli.prompts.questions import asked_for_text, on_terminal
 
@@ -55,7 +56,7 @@ def new_cell(
 
     No controller is asked. A cell of the same name is never changed.
     """
-    from robolink.config import add_cell
+    from robolink.config import add_cell, content_with_cell
 
     asks = on_terminal() and not json_is_on()
     if not asks and (name is None or url is None):
@@ -63,20 +64,35 @@ def new_cell(
             tr("A cell needs a name and a URL, and there is nobody to ask."),
             remedy=tr("Write for example: robolink cell new line3 --url URL"),
         )
-    name = name or asked_for_text(tr("What is the cell called? For example: line3"))
-    url = url or asked_for_text(
-        tr(
-            "Where is the controller? For example: epson+tcp://192.168.0.1:5000 or "
-            "softmotion+modbus-tcp://192.168.0.2"
-        )
+    name = _right(
+        name,
+        lambda: asked_for_text(tr("What is the cell called? For example: line3")),
+        lambda typed: content_with_cell(file, typed, {}),
+    )
+    url = _right(
+        url,
+        lambda: asked_for_text(
+            tr(
+                "Where is the controller? For example: epson+tcp://192.168.0.1:5000 or "
+                "softmotion+modbus-tcp://192.168.0.2"
+            )
+        ),
+        lambda typed: content_with_cell(file, name, {"url": typed}),
     )
     said: dict[str, str | float] = {"url": url}
     robot = robot or (_if_known(tr("Which robot model must be there?")) if asks else None)
     if robot:
         said["robot"] = robot
     if remote_timeout_s is None and asks and url.startswith("epson+"):
-        typed = _if_known(tr("Which remote time-out is set in the controller, in seconds?"))
-        remote_timeout_s = None if typed is None else _seconds(typed)
+        typed = _right(
+            None,
+            lambda: (
+                _if_known(tr("Which remote time-out is set in the controller, in seconds?"))
+                or _LEFT_OUT
+            ),
+            lambda typed: typed == _LEFT_OUT or _seconds(typed),
+        )
+        remote_timeout_s = None if typed == _LEFT_OUT else _seconds(typed)
     if remote_timeout_s is not None:
         said["remote_timeout_s"] = remote_timeout_s
         read_by = read_by or (asked_for_text(tr("Who read it there, and when?")) if asks else None)
@@ -88,6 +104,27 @@ def new_cell(
         return
     say(tr("Written: {path}", path=file))
     say(tr("Next: {command}", command=f'robolink -c "{name}" status'))
+
+
+def _right(given: str | None, ask: Callable[[], str], check: Callable[[str], object]) -> str:
+    """Return what was given, or typed; of what is typed wrongly a person is told, and asked again.
+
+    Raises:
+        ConfigError: What was given is wrong.
+    """
+    if given is not None:
+        check(given)
+        return given
+    while True:
+        typed = ask()
+        try:
+            check(typed)
+        except ConfigError as error:
+            note(error.what)
+        except click.BadParameter as error:
+            note(error.format_message())
+        else:
+            return typed
 
 
 def _if_known(question: str) -> str | None:

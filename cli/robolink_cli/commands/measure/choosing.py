@@ -76,8 +76,8 @@ def choose_cell(desk: AskingDesk, head: "Callable[[], Header]", *, marked: str =
         raise ConfigError(
             tr("No cell is set up on this computer."),
             remedy=tr(
-                "To set one up: robolink docs cell-files. To practise on a simulated robot: "
-                "robolink docs tutorial"
+                "To set one up: robolink cell new. To practise on a simulated robot: robolink "
+                "docs tutorial"
             ),
         )
     if len(cells) == 1:

@@ -73,7 +73,7 @@ class Recalibration:
         """
         if not dry_run and self._assist_url is None and not on_terminal():
             require_answers(self._answers, self._loaded.recipe)
-        progress = Progress(self._events)
+        progress = Progress(self._events, len(self._loaded.recipe.tools))
         answers, loaded = self._answers, self._loaded
         with (
             open_controller(

@@ -14,7 +14,7 @@ from robolink.nozzle_change import Listener, Moment, Proposal
 from robolink.procedures import MeasurementContext
 from robolink.runner import Ask, Confirm, Notify, StepDone, TakenStep
 from robolink_cli.console.exit_codes import error_body, exit_code
-from robolink_cli.console.output import hand_over
+from robolink_cli.console.output import drawn_elsewhere, hand_over
 from robolink_cli.console.render import note, switch_json_on
 from robolink_cli.views.documents import (
     pose_payload,
@@ -58,17 +58,26 @@ class Progress(Listener):
 
     Attributes:
         tool: Number of the tool at work.
+
+    Args:
+        events: The stream of a script.
+        tools: How many tools the recipe has.
     """
 
-    def __init__(self, events: EventStream) -> None:
-        self._events = events
+    def __init__(self, events: EventStream, tools: int) -> None:
+        self._events, self._tools = events, tools
         self.tool = 0
 
     def moment(self, moment: Moment, bench: MeasurementContext, tool: int | None = None) -> None:  # noqa: ARG002 - a phase is a phase
         """Say which phase begins."""
         if tool is not None:
             self.tool = tool
-        heading = _heading(moment, self.tool)
+        if not drawn_elsewhere():
+            heading = _heading(moment, self.tool)
+        elif self._tools > 1 and moment is Moment.BEFORE_MEASURE:
+            heading = tr("Tool {tool} is measured now.", tool=self.tool)
+        else:
+            heading = ""  # the screen has one of its own
         if heading:
             note(heading)
         self._events.emit("phase", phase=moment, tool=tool)

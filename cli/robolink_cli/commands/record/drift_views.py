@@ -13,27 +13,37 @@ _COLUMNS: Final = 60
 _LEAST_REACH_MM: Final = 0.005
 
 
-def show_drift(cells: Sequence[CellDrift], *, all_plots: bool) -> None:
-    """Print a table a controller, the charts of what stands out, and what that means."""
+def show_drift(cells: Sequence[CellDrift], *, all_plots: bool, called: str = "") -> None:
+    """Print a table a controller, the charts of what stands out, and what that means.
+
+    Args:
+        cells: The controllers.
+        all_plots: Whether every chart is drawn.
+        called: What a person calls the only one; empty where nobody named it.
+    """
     for number, cell in enumerate(cells):
         if number:
             say("")
-        _show_cell(cell, all_plots=all_plots)
+        _show_cell(cell, called if len(cells) == 1 else "", all_plots=all_plots)
     if not any(cell.findings for cell in cells):
         say(tr("Nothing stands out."))
 
 
-def _show_cell(cell: CellDrift, *, all_plots: bool) -> None:
+def _show_cell(cell: CellDrift, called: str, *, all_plots: bool) -> None:
     first, last = cell.changes[0].at[:10], cell.changes[-1].at[:10]
     title = tr(
-        "{controller}: {count} measured changes, {first} to {last}",
-        controller=cell.controller,
+        "{controller}: measured changes: {count}, {first} to {last}",
+        controller=f"{called} ({cell.controller})" if called else cell.controller,
         count=len(cell.changes),
         first=first,
         last=last,
     )
-    columns = (tr("what"), tr("values"), tr("mean mm"), tr("last mm"), tr("limits mm"), "")
-    table(title, columns, [_row(chart) for chart in cell.charts])
+    if cell.charts:
+        columns = (tr("what"), tr("values"), tr("mean mm"), tr("last mm"), tr("limits mm"), "")
+        table(title, columns, [_row(chart) for chart in cell.charts])
+    else:
+        say(title)
+        say(tr("A course shows from the second measured change of a tool on."))
     for sentence in last_statements(cell.changes):
         say(sentence)
     for chart in cell.charts:

@@ -90,10 +90,17 @@ def drift(
     elif not cells:
         say(tr("No measured change is on record here."))
     else:
-        show_drift(cells, all_plots=plots)
+        show_drift(cells, all_plots=plots, called=_called(controller))
         if page is not None:
             say(tr("Page: {path}", path=page))
     return DIFFERENT if any(cell.findings for cell in cells) else 0
+
+
+def _called(controller: str | None) -> str:
+    """Return the name of the cell that was named; empty for a URL, and for none."""
+    from robolink.config import cell_names
+
+    return controller if controller in cell_names() else ""
 
 
 def _cells(

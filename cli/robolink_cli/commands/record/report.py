@@ -41,7 +41,7 @@ def report(
     from robolink.files.named import require_free
     from robolink.report import save
     from robolink.transaction import id_of_change
-    from robolink_cli.access.change_page import page_name, reports_from
+    from robolink_cli.access.change_page import free_page, reports_from
     from robolink_cli.commands.record.journal_lookup import journal_to_read
     from robolink_cli.commands.record.recorded_change import (
         find_change,
@@ -57,7 +57,7 @@ def report(
         context.require_url()
     journal = journal_to_read()
     entries = find_change(journal, change, controller=context.url)
-    path = file or Path(page_name(id_of_change(entries[-1])))
+    path = file or free_page(id_of_change(entries[-1]), replace=force)
     require_free(path, replace=force)
     reports, problems = reports_from(journal, entries)
     if request is not None:

@@ -94,21 +94,25 @@ def ended_of(state: WizardState, error: BaseException | None, at_s: float) -> La
         if state.report is None:
             return None
         lines = done_lines(state, state.report)
-        return LastScreen(True, tuple(lines), (_head(state, tr("DONE")), *lines), at_s)
+        done = tr("DONE")
+        return LastScreen(True, tuple(lines), (_head(state, done), *lines), at_s, done)
     begun = state.subject is not None
     left = isinstance(error, DeclinedError) and isinstance(
         state.subject, (ChoiceSubject, CheckSubject)
     )
     if not begun or left or state.free_jog is not None or not isinstance(error, RobolinkError):
         return None
-    kept = (_head(state, tr("STOPPED")), *_where(state), *_next(state, error))
-    return LastScreen(False, tuple(stopped_lines(state, error)), kept, at_s)
+    headed = _headed(state, error)
+    kept = (_head(state, headed), *_where(state), *_next(state, error))
+    lines = tuple(stopped_lines(state, error))
+    return LastScreen(False, lines, kept, at_s, headed, again=not _is_blocked(error))
 
 
 def stopped_lines(state: WizardState, error: RobolinkError) -> list[str]:
     """Return why it ended, where, what stands on the controller, and the one command to go on."""
     standing = standing_after(error)
-    stands = "" if standing is UNTOUCHED else describe_standing(standing)
+    blocked = _is_blocked(error)
+    stands = "" if standing is UNTOUCHED else describe_standing(standing, settles=not blocked)
     # What stands says best that nothing was written.
     remedy = "" if error.remedy in stands else error.remedy
     typed = state.header.command.split()
@@ -121,7 +125,9 @@ def kept_lines(state: WizardState, error: BaseException | None) -> list[str]:
     """Return what stays on the terminal when no last screen was shown."""
     if error is None:
         return []
-    return [_head(state, tr("STOPPED")), *_where(state)] if state.subject is not None else []
+    if state.subject is None:
+        return []
+    return [_head(state, _headed(state, error)), *_where(state)]
 
 
 def ended_screen(state: WizardState, ended: LastScreen) -> Screen:
@@ -129,9 +135,9 @@ def ended_screen(state: WizardState, ended: LastScreen) -> Screen:
     if ended.done:
         keys: tuple[tuple[str, str], ...] = (("5", tr("Finish")), *_offered(state))
     else:
-        keys = (("5", tr("Start again")), ("0", tr("Leave")))
-    title = title_row(state, tr("DONE") if ended.done else tr("STOPPED"))
-    return Screen(title, ended.lines, keys, message=state.message)
+        again = (("5", tr("Start again")),) if ended.again else ()
+        keys = (*again, ("0", tr("Leave")))
+    return Screen(title_row(state, ended.headed), ended.lines, keys, message=state.message)
 
 
 def _offered(state: WizardState) -> Iterator[tuple[str, str]]:
@@ -155,6 +161,19 @@ def _head(state: WizardState, ended: str) -> str:
     return f"{state.header.cell}   {state.header.job}   {ended}"
 
 
+def _headed(state: WizardState, error: BaseException) -> str:
+    """Return whether a job was stopped, or was refused before anything happened."""
+    measured = state.touch is not None or isinstance(error, (CalibrationError, VerifyError))
+    if was_refused(error) and not measured and standing_after(error).untouched:
+        return tr("NOT STARTED")
+    return tr("STOPPED")
+
+
+def _is_blocked(error: RobolinkError) -> bool:
+    """Tell whether the robot takes nothing but ``recover``, and what comes before it."""
+    return standing_after(error).left_open or isinstance(error, OutcomeUnknownError)
+
+
 def _where(state: WizardState) -> list[str]:
     touch = state.touch
     if touch is None or not touch.number:
@@ -169,7 +188,7 @@ def _next(state: WizardState, error: RobolinkError) -> list[str]:
     measured, ended it.
     """
     standing = standing_after(error)
-    if standing.left_open or isinstance(error, OutcomeUnknownError):
+    if _is_blocked(error):
         back = way_back(state.header.cell, reset_first=standing.reset_first)
         line = tr("Next: {command}", command=back)
         return [next_of(line, error, standing, state.header.command.split())]

@@ -36,8 +36,11 @@ def test_no_translation_has_another_way():
     ("sentence", "shown"),
     [
         ("X, Y: repeatable to +-0.035 mm (95 %).", "X, Y: repeatable to \u00b1 0.035 mm (95 %)."),
-        ("seems longer (+-{half} mm)".format(half=0.14), "seems longer (\u00b1 0.14 mm)"),
-        ("the +- is taken from how well they agree", "the \u00b1 is taken from how well they agree"),
+        ("seems longer (+-0.14 mm)", "seems longer (\u00b1 0.14 mm)"),
+        (
+            "the +- is taken from how well they agree",
+            "the \u00b1 is taken from how well they agree",
+        ),
         ("+-", "\u00b1 "),
         ("可重复至+-0.035 mm", "可重复至\u00b1 0.035 mm"),
         # What is no half width stays as it was written.

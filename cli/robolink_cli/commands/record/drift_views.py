@@ -27,7 +27,7 @@ def _show_cell(cell: CellDrift, *, all_plots: bool) -> None:
     first, last = cell.changes[0].at[:10], cell.changes[-1].at[:10]
     title = tr(
         "{controller}: {count} measured changes, {first} to {last}",
-        controller=cell.controller,
+        controller=f"{cell.controller} ({tr('SIMULATED')})" if cell.simulated else cell.controller,
         count=len(cell.changes),
         first=first,
         last=last,
@@ -129,6 +129,7 @@ def drift_payload(cells: Sequence[CellDrift]) -> dict[str, object]:
         "controllers": [
             {
                 "controller": cell.controller,
+                "simulated": cell.simulated,
                 "change_count": len(cell.changes),
                 "charts": [_chart(chart) for chart in cell.charts],
                 "findings": [

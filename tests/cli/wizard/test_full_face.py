@@ -115,6 +115,8 @@ def test_keys_of_a_pipe_jog_take_and_write():
             source.send_text("4006381333931\r\n")
             time.sleep(0.3)
             assert "Too fast for a hand. Ignored." in face.text
+            source.send_text("\t")
+            until(lambda: "[8] X-" in face.text)  # the arrows are turned
             source.send_text("\x1b[6~")  # PgDn: Z down
             until(lambda: answers == ["N-7", "z-0.1"])
             time.sleep(0.4)

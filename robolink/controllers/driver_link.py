@@ -132,11 +132,16 @@ class DriverLink:
         self.identity = identity
         self.clock = clock
         self.latch = latch
-        self.markers = MarkerStore(identity, outcomes, latch)
+        self.markers = MarkerStore(identity, outcomes, latch, simulated=lambda: self.simulated)
         self.change_guard = ChangeGuard(outcomes, latch)
         self.lock = ProcedureLock(identity, latch)
         self._gate = gate
         self._waiting: list[None] = []
+
+    @property
+    def simulated(self) -> bool:
+        """Whether the controller has said by now that nothing real moves; it is not asked."""
+        return False
 
     @cached_property
     def signs_of_life(self) -> SignsOfLife:

@@ -92,11 +92,21 @@ class MarkerStore:
         latch: Knows whether a thread puts back what was in force before. That goes on when the
             journal fails in the middle: the marker of the procedure, which names what is to be
             put back, is stored, and nothing but the old state comes of it.
+        simulated: Tells whether the controller has said by now that nothing real moves; what
+            writes carries it, so that no record of it passes for one of a real machine.
     """
 
-    def __init__(self, identity: str, outcomes: OutcomeLog, latch: StopLatch) -> None:
+    def __init__(
+        self,
+        identity: str,
+        outcomes: OutcomeLog,
+        latch: StopLatch,
+        *,
+        simulated: Callable[[], bool] = bool,
+    ) -> None:
         self._identity = identity
         self._latch = latch
+        self._simulated = simulated
         self._unstored: set[str] = set()
         self.outcomes = outcomes
         self.ledger = Ledger()
@@ -156,7 +166,9 @@ class MarkerStore:
                 self._refuse_unsettled(request, besides=self._under_way)
                 raise self._overtaken(request)
         name = operation or new_operation()
-        marker = Marker(name, kind, request, wall_label(), dict(details))
+        writes = kind in (MarkerKind.SET, MarkerKind.CHANGE)
+        said = {"simulated": True} if writes and self._simulated() else {}
+        marker = Marker(name, kind, request, wall_label(), {**details, **said})
         if not self._recorded(lambda: self.outcomes.begin(marker)):
             self._unstored.add(name)
         self.ledger.begin(marker)

@@ -13,12 +13,11 @@ from robolink.drift.history import MeasuredChange
 from robolink.messages import tr
 
 
-def last_statements(changes: Sequence[MeasuredChange], sign: str = "+-") -> Iterator[str]:
+def last_statements(changes: Sequence[MeasuredChange]) -> Iterator[str]:
     """Yield a sentence for each tool whose last change has a statement on record.
 
     Args:
         changes: The changes of one controller, oldest first.
-        sign: What stands before a half width; a page has ``\u00b1``.
 
     Example:
         >>> from robolink.drift import MeasuredChange, last_statements
@@ -33,17 +32,14 @@ def last_statements(changes: Sequence[MeasuredChange], sign: str = "+-") -> Iter
         accurate = stated_mm(last.accurate_to_mm)
         if last.repeatable_to_mm is None:
             yield tr(
-                "Tool {tool}, last change: repeatable: not known, accurate to {sign}{u} mm (95 %).",
+                "Tool {tool}, last change: repeatable: not known, accurate to +-{u} mm (95 %).",
                 tool=tool,
-                sign=sign,
                 u=accurate,
             )
         else:
             yield tr(
-                "Tool {tool}, last change: repeatable to {sign}{r} mm, accurate to {sign}{u} mm "
-                "(95 %).",
+                "Tool {tool}, last change: repeatable to +-{r} mm, accurate to +-{u} mm (95 %).",
                 tool=tool,
-                sign=sign,
                 r=stated_mm(last.repeatable_to_mm),
                 u=accurate,
             )

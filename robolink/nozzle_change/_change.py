@@ -167,6 +167,7 @@ class NozzleChange:
         require_motion(self._controller, self._plan)
         plan, listener, context = self._plan, self._listener, self._context(write=write)
         measuring = Measuring(context, listener)
+        self._simulated = measuring.simulated
         measuring.go_to(plan.safe, tr("Moving to the safe pose."))
         listener.moment(Moment.START, context)
         proposals = self._agreed(context, measuring, write=write)
@@ -179,8 +180,11 @@ class NozzleChange:
             )
         measuring.go_to(plan.safe, tr("Moving to the safe pose."))
         listener.moment(Moment.END, context)
+        return self._report(reports)
+
+    def _report(self, tools: tuple[ToolReport, ...]) -> ChangeReport:
         outcomes = self._controller.outcomes
-        return ChangeReport(outcomes.change, reports, outcomes.signature.role)
+        return ChangeReport(outcomes.change, tools, outcomes.signature.role, self._simulated)
 
     def _agreed(
         self, context: MeasurementContext, measuring: Measuring, *, write: bool
@@ -340,7 +344,7 @@ class NozzleChange:
         def describe(receipts: Sequence[ToolReceipt]) -> Mapping[str, object]:
             if self._describe is None:
                 return plain_result(receipts)
-            return self._describe(ChangeReport(self._controller.outcomes.change, reports(receipts)))
+            return self._describe(self._report(reports(receipts)))
 
         self._written = ToolChange(
             self._controller,

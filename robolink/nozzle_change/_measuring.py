@@ -40,13 +40,16 @@ class Measuring:
     Args:
         context: What the sources work with.
         listener: Told of steps and refusals.
+
+    Attributes:
+        simulated: Whether the controller says that nothing real moves.
     """
 
     def __init__(self, context: MeasurementContext, listener: Listener) -> None:
         self._context = context
         self._listener = listener
         self._facts = context.controller.facts()
-        self._simulated = says_it_is_simulated(context.controller, self._facts)
+        self.simulated = says_it_is_simulated(context.controller, self._facts)
 
     def propose(self, plan: ToolPlan) -> Proposal:
         """Measure one tool, again where the plan allows it, and put it on record.
@@ -132,7 +135,7 @@ class Measuring:
             plan.criteria,
             source=plan.source.sentence,
             facts=self._facts,
-            simulated=self._simulated,
+            simulated=self.simulated,
             gauge=plan.gauge,
         )
         context.controller.outcomes.append(entry)

@@ -164,11 +164,13 @@ class ChangeReport:
         change: Its id in the journal.
         tools: One report a tool, in the order of the plan.
         role: The role at this cell of the person who made it; empty where the cell names no people.
+        simulated: Whether the controller says that nothing real moves.
     """
 
     change: str
     tools: tuple[ToolReport, ...]
     role: str = ""
+    simulated: bool = False
 
 
 class Moment(StrEnum):

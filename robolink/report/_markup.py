@@ -1,5 +1,6 @@
 """Elements of a drawing, and text and figures of a page. All text goes through here."""
 
+import re
 import unicodedata
 from typing import Final, TypeAlias
 from xml.etree.ElementTree import Element, tostring
@@ -8,6 +9,9 @@ Content: TypeAlias = Element | str | None
 
 _INVISIBLE: Final = ("Cc", "Cf", "Cs")
 """Control characters, marks that change the direction of writing, halves of pairs."""
+
+_PLUS_MINUS: Final = re.compile(r"(?<![0-9A-Za-z.])\+-(?: |(?=\d)|\Z)")
+"""How every sentence writes plus or minus: each console has it, also one that is ASCII alone."""
 
 
 def element(tag: str, *content: Content, **attributes: object) -> Element:
@@ -37,11 +41,13 @@ def drawing(svg: Element) -> str:
 
 
 def plain(text: str) -> str:
-    """Return ``text`` with every invisible character replaced.
+    """Return ``text`` with every invisible character replaced, and with the signs of a page.
 
     Names come from files and controllers; no file name may turn the line around, and
-    half a surrogate pair could not be written at all.
+    half a surrogate pair could not be written at all. Sentences say ``+-``, which every console
+    has; here is the one place at which that becomes a sign.
     """
+    text = _PLUS_MINUS.sub("\u00b1 ", text)
     return "".join("\ufffd" if unicodedata.category(c) in _INVISIBLE else c for c in text)
 
 

@@ -85,7 +85,7 @@ def report_of_tool(
         touches=tuple(_touch(said) for said in calibration.get("touches", ()) if said),
         evidence=calibration.get("evidence") or {},
         seating=_seating(calibration.get("seating")),
-        simulated=calibration.get("simulated") is True
+        simulated=any(entry.details.get("simulated") is True for entry in entries)
         or is_simulated_name(entries[0].controller)
         or are_simulated_facts(facts),
     )

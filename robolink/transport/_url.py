@@ -1,13 +1,19 @@
 """URLs that name a controller: ``KIND+MEDIUM://HOST:PORT/PATH?OPTION=VALUE``."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from ipaddress import ip_address
+from pathlib import Path
 from typing import Final
 from urllib.parse import parse_qsl, urlsplit
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.ways import Way, way
+
+_PSEUDO_TERMINAL: Final = re.compile(r"/dev/pts/\d+|/dev/ttys\d+")
+"""Names that Linux and macOS give to pseudo terminals, and to no port with a cable."""
 
 _MODBUS_PORT: Final = 502
 _USUAL_UNITS: Final = {"modbus-tcp": "255", "modbus-rtu": "1"}
@@ -67,6 +73,16 @@ class LinkUrl:
         told = "&".join(f"{name}={telling[name]}" for name in sorted(telling, reverse=True))
         identity = replace(self, port=port).identity
         return f"{identity}?{told}" if told else identity
+
+    @property
+    def stays_here(self) -> bool:
+        """Whether it leads to this computer: to a loopback address, or a pseudo terminal."""
+        if self.path:
+            return _PSEUDO_TERMINAL.fullmatch(str(Path(self.path).resolve())) is not None
+        try:
+            return self.host == "localhost" or ip_address(self.host).is_loopback
+        except ValueError:
+            return False
 
     @property
     def place(self) -> str:

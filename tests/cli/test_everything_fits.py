@@ -264,6 +264,12 @@ def test_the_labels_of_a_report_s_pictures_stand_on_their_paper(language):
         assert one.caption
 
 
+def test_what_six_axes_measured_is_said_of_all_three_lengths():
+    (said,) = (one.caption for one in fit_drawings(tilted_result()) if "Accurate" in one.caption)
+    assert re.search(r"Repeatable: X \+-[\d.]+ mm, Y \+-[\d.]+ mm, Z \+-[\d.]+ mm, each", said)
+    assert "Accurate, 95 %, X, Y, Z together: dashed circle" in said
+
+
 def test_the_touch_turned_by_half_is_one_pin():
     """Two pins would be another lesson: the needle comes back to the same one."""
     root = ElementTree.parse(ROOT / "docs/pictures/turn.svg").getroot()

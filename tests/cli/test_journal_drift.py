@@ -163,6 +163,18 @@ def test_a_new_beginning_forgets_what_was_before(run):
     assert "yesterday" in err
 
 
+def test_what_a_simulator_measured_is_told_from_what_says_nothing(run):
+    record(course(1, 3))
+    record(course(1, 3), "epson:C-SIM7782B265")
+    _, out, _ = run()
+    assert f"{HERE}: 3 measured changes" in out
+    assert "epson:C-SIM7782B265 (SIMULATED): 3 measured changes" in out
+    assert out.count("SIMULATED") == 1
+    _, out, _ = run("--json")
+    told = {one["controller"]: one["simulated"] for one in json.loads(out)["controllers"]}
+    assert told == {HERE: False, "epson:C-SIM7782B265": True}
+
+
 def test_the_page_has_every_chart_and_escapes_what_people_typed(run, tmp_path):
     record(course(1, 32, shift=lambda i, _: (0.1 * (i >= 25), 0, 0)))
     page = tmp_path / "drift.html"

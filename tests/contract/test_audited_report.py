@@ -67,5 +67,6 @@ def test_machine_gauge_people_times_budget_touches_and_rule_stand_on_the_page(ce
         "The tool conforms",
     ):
         assert words in text
+    assert "+-" not in text
     assert "not assessed" not in text
     assert text.count("undecided") == 1  # in the rule alone

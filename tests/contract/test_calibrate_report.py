@@ -65,7 +65,7 @@ def test_an_impact_is_reported_with_the_numbers_of_its_document(command, tmp_pat
     words = ("impact", "--tool", "1", "--x", "12.3", "--y", "-3.9", "--points", "1-5")
     code, out, err = command(*words, "--report", "page.html", "--json")
     document, page = json.loads(out), page_of(tmp_path / "page.html")
-    assert (code, document["report"]) == (0, "page.html")
+    assert (code, document["report"], document["simulated"]) == (0, "page.html", True)
     assert "Report: page.html" in err
     check_numbers(page, document)
     for said in ("A proposal, nothing was written", "T6-602S", "SIM00001", "typed"):
@@ -163,7 +163,8 @@ def test_a_page_that_cannot_be_saved_changes_nothing_about_the_end(
 
     monkeypatch.setattr("robolink.files.named.write_whole", fill_the_disk)
     code, out, err = command(*FROM_POSES, "--yes", "--report", "page.html", "--json")
-    assert (code, json.loads(out)["report"]) == (0, None)
+    document = json.loads(out)
+    assert (code, document["report"], document["simulated"]) == (0, None, True)
     assert "cannot be written: No space left on device" in err
     assert simulator.machine.tools.get(1) != STORED
 

@@ -162,6 +162,7 @@ def test_pendant_points_only_and_nothing_moves(cell):
     assert cell.tool_1.x_mm == pytest.approx(OLD_TIP.x_mm + 0.1, abs=2e-3)
     # What was measured is charted, not what was written.
     (charted,) = json.loads(cell.run("journal", "drift", "--json").out)["controllers"]
+    assert json.loads(third.out)["simulated"] is charted["simulated"] is True
     tips = {c["axis"]: c["points"] for c in charted["charts"] if c["quantity"] == "tip"}
     assert set(tips) == {"x", "y"}, "Z was kept"
     assert [p["value_mm"] for p in tips["x"]][-2:] == pytest.approx([12.5, 12.4], abs=2e-3)

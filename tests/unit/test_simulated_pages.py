@@ -1,9 +1,17 @@
 """What comes from a simulator says so on every page, and nothing is called real."""
 
-import pytest
+import contextlib
+from dataclasses import replace
+from pathlib import Path
 
-from robolink import connect
+import pytest
+from robolink_simulators.plc import PlcSimulator
+from robolink_simulators.plc.serving import serve_plc
+
+from robolink import ToolOffset, connect
+from robolink.controllers.plc_map import open_plc_map
 from robolink.drift import CellDrift, MeasuredChange, measured_changes
+from robolink.errors import ConfigError
 from robolink.journal import memory_journal
 from robolink.model import (
     ControllerFacts,
@@ -12,9 +20,13 @@ from robolink.model import (
     is_simulated_name,
     says_it_is_simulated,
 )
+from robolink.register_maps import load_map
 from robolink.report import render, render_drift, reports_of
-from robolink.testing import MemoryController
+from robolink.testing import MemoryController, confirm_whole_map
+from robolink.transaction import Wanted, change_tools
+from robolink.transport import parse_url
 
+MAP = Path("examples/plc-maps/no-handshake.toml")
 BAND, VERDICT = "SIMULATED: these results come from a simulator", "Simulated: "
 OFFSET = [12.3, -3.9, -20.0, 0.0, 0.0, 0.0]
 MADE: dict[str, str] = {"made_at": "2026-11-23T08:00:00Z", "robolink_version": "1.2.3"}
@@ -83,3 +95,67 @@ def test_a_simulator_says_what_it_is_and_a_controller_that_says_nothing_is_not_o
         assert says_it_is_simulated(controller)
     assert not says_it_is_simulated(MemoryController(), ControllerFacts(controller_serial="SIM1"))
     assert not is_simulated_name("epson:SIMATIC/SIMPLE01")
+
+
+@pytest.fixture(params=["softmotion", "plc", "plc of another address"])
+def changed_by_hand(request):
+    """Return what is on record after a value was typed, and whether that was simulated."""
+    kind = request.param
+    log = memory_journal(f"typed-{kind}").log(f"typed-{kind}")
+    with contextlib.ExitStack() as open_things:
+        url = "softmotion+sim://typed-example"
+        if kind != "softmotion":
+            plc = PlcSimulator(load_map(MAP), seed=7)
+            url = open_things.enter_context(serve_plc(plc, MAP)).url
+            if kind != "plc":
+                url = url.replace("&simulated=yes", "")
+        controller = open_things.enter_context(connect(url, outcomes=log))
+        if kind != "softmotion":
+            confirm_whole_map(controller)
+        assert says_it_is_simulated(controller) is (kind != "plc of another address")
+        old = controller.tools.read(1)
+        change_tools(controller, [Wanted(1, replace(old or ToolOffset(), x_mm=12.5), old)])
+        return list(log.recorded())[::-1], kind != "plc of another address"
+
+
+@pytest.mark.simulator_only
+def test_a_typed_value_on_a_simulated_controller_has_a_band_too(changed_by_hand):
+    entries, simulated = changed_by_hand
+    entries = [entry for entry in entries if entry.change]
+    (report,) = reports_of(entries, check="", **MADE)
+    page = body_of(render(report))
+    assert (BAND in page, VERDICT in page) == (simulated, simulated)
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        "plc+modbus-tcp://192.168.0.2?map={map}&simulated=yes",
+        "plc+modbus-tcp://plc-07?map={map}&simulated=yes",
+        "plc+modbus-tcp://0.0.0.0?map={map}&simulated=yes",
+        "plc+modbus-rtu:///dev/ttyUSB0?map={map}&simulated=yes",
+        "plc+modbus-rtu:///dev/ttyS1?map={map}&simulated=yes",
+        "plc+modbus-rtu://COM3?map={map}&simulated=yes",
+        "plc+modbus-tcp://127.0.0.1?map={map}&simulated=no",
+    ],
+)
+def test_the_sign_of_a_simulator_is_refused_where_a_machine_could_be(address):
+    with pytest.raises(ConfigError, match="Only the address of a simulator on this computer"):
+        open_plc_map(parse_url(address.format(map=MAP)), outcomes=lambda name: pytest.fail(name))
+
+
+@pytest.mark.parametrize(
+    ("address", "here"),
+    [
+        ("127.0.0.1:502", True),
+        ("[::1]:502", True),
+        ("localhost", True),
+        ("/dev/pts/7", True),
+        ("/dev/ttys004", True),
+        ("/dev/ttyS0", False),
+        ("192.168.0.2", False),
+        ("localhost.example.org", False),
+    ],
+)
+def test_what_stays_on_this_computer(address, here):
+    assert parse_url(f"plc+any://{address}").stays_here is here

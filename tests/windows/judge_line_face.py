@@ -13,7 +13,7 @@ def console(opened):
     console.see("Type the number of a row")
     console.type("1\r")
     console.rest(0.5)
-    console.type("3\r")
+    console.type("2\r")
     console.see("All rows are confirmed.")
     return console
 

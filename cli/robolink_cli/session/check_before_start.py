@@ -270,14 +270,15 @@ def _points(
         *left,
         CheckPoint(Mark.OK, terms.watch),
     ]
-    if off:
-        points.append(CheckPoint(Mark.TO_DO, tr("Motors are off"), "7", tr("Switch them on")))
-    else:
-        points.append(CheckPoint(Mark.OK, tr("Motors are on")))
     new = tr("The new nozzle is mounted and tight; tip and pin are clean")
     clear = tr("Nobody in the cell, hoses free")
-    points.append(CheckPoint(Mark.YOU, new, "1", tr("Yes")))
-    points.append(CheckPoint(Mark.YOU, clear, "3", tr("Yes")))
+    points.append(CheckPoint(Mark.YOU, new, "mounted", tr("Yes")))
+    points.append(CheckPoint(Mark.YOU, clear, "clear", tr("Yes")))
+    # Last: who switches them on has looked into the cell, and the rows above keep their numbers.
+    if off:
+        points.append(CheckPoint(Mark.TO_DO, tr("Motors are off"), "motors", tr("Switch them on")))
+    else:
+        points.append(CheckPoint(Mark.OK, tr("Motors are on")))
     return tuple(points)
 
 

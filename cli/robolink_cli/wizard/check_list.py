@@ -1,5 +1,6 @@
 """What is looked at before the robot starts, as the screen of it and the flow know it."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -21,14 +22,18 @@ class CheckPoint:
     Attributes:
         mark: How it stands.
         text: What it says.
-        key: The key that does or confirms it, empty for none.
-        does: What that key is called.
+        name: What it is known by while the list is gone through; empty for what is only read.
+        does: What the main key does on its row.
     """
 
     mark: Mark
     text: str
-    key: str = ""
+    name: str = ""
     does: str = ""
+
+    def is_open(self, confirmed: Collection[str]) -> bool:
+        """Tell whether something is still to be done or confirmed."""
+        return self.mark is Mark.TO_DO or (self.mark is Mark.YOU and self.name not in confirmed)
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,13 +48,14 @@ class CheckSubject:
     points: tuple[CheckPoint, ...]
     plan: str
 
-    def open_keys(self, confirmed: frozenset[str]) -> tuple[str, ...]:
-        """Return the keys of the points that are not settled yet."""
-        return tuple(
-            point.key
-            for point in self.points
-            if point.mark is Mark.TO_DO or (point.mark is Mark.YOU and point.key not in confirmed)
-        )
+    @property
+    def rows(self) -> tuple[CheckPoint, ...]:
+        """The points that a person goes through; after them comes the row that starts."""
+        return tuple(point for point in self.points if point.name)
+
+    def open_rows(self, confirmed: Collection[str]) -> tuple[int, ...]:
+        """Return the indices of the rows that are not settled yet."""
+        return tuple(i for i, point in enumerate(self.rows) if point.is_open(confirmed))
 
 
 SWITCH_ON = "motors"

@@ -149,6 +149,11 @@ def _regarding(state: WizardState, subject: object) -> WizardState:
         return replace(state, subject=subject, fit=subject)
     if isinstance(subject, OfferedChoice):
         return replace(state, subject=subject_of(subject))
+    if isinstance(subject, CheckSubject):
+        before = state.subject
+        same = isinstance(before, CheckSubject) and before.rows == subject.rows
+        # No finger is to come down on another row than the one that was read.
+        return replace(state, subject=subject, marked=state.marked if same else None)
     return replace(state, subject=subject)
 
 
@@ -294,7 +299,7 @@ def _key_at_place(state: WizardState, key: KeyPressed) -> Advanced:
         size = jogging.size + (1 if key.name == "+" else -1)
         size = min(max(size, 0), len(STEP_SIZES) - 1)
         return replace(state, jogging=replace(jogging, size=size), message=""), []
-    if key.name == "*":
+    if key.name == "tab":
         turned = replace(jogging, quarters=(jogging.quarters + 1) % 4)
         return replace(state, jogging=turned, message=""), []
     if key.name in ("main", "5", "t"):

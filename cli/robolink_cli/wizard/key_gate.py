@@ -30,6 +30,7 @@ _NAMES: Final = {
     "c-m": "enter",
     "c-j": "enter",
     "c-h": "backspace",
+    "c-i": "tab",
     **KEYPAD,
 }
 

@@ -19,7 +19,11 @@ Answered = WizardState | str
 
 _WRITES: Final = frozenset({"*", "main"})
 
-_OFFERED: Final = {"1": WizardCommand.SHOW_REPORT, "3": WizardCommand.NEXT_TOOL}
+_OFFERED: Final = {
+    ".": WizardCommand.SHOW_REPORT,
+    "delete": WizardCommand.SHOW_REPORT,
+    "+": WizardCommand.NEXT_TOOL,
+}
 _OFFERED_WORDS: Final = {"report": WizardCommand.SHOW_REPORT, "next": WizardCommand.NEXT_TOOL}
 
 _LIKELY_SHARE: Final = 3.0
@@ -53,12 +57,10 @@ def answered_by_key(state: WizardState, key: KeyPressed) -> Answered:
     if isinstance(subject, WriteSubject):
         return _write_key(state, subject, key)
     if isinstance(subject, CheckSubject):
-        return _check(state, subject, "main" if key.name == "5" else key.name)
+        return _check_key(state, subject, key)
     if isinstance(subject, FitSubject):
-        return _fit_key(state, subject, key)
-    return {"1": "y", "y": "y", "j": "y", "3": "n", "n": "n"}.get(key.name) or state.says(
-        tr("Press [1] for yes or [3] for no.")
-    )
+        return _fit_key(subject, key) or state
+    return _yes_no_key(state, key)
 
 
 def answered_by_line(state: WizardState, line: str) -> Answered:
@@ -83,8 +85,7 @@ def answered_by_line(state: WizardState, line: str) -> Answered:
             return word
         return _write(state, subject, folded(line), said_no=meaning == "no")
     if isinstance(subject, CheckSubject):
-        word = {"yes": "main", "no": "0"}.get(meaning, folded(line))
-        return "n" if word == "0" else _check(state, subject, word)
+        return _check_line(state, subject, meaning, folded(line))
     if isinstance(subject, FitSubject) and meaning == "again":
         return "y"
     if isinstance(subject, FitSubject) and subject.more and meaning == "more":
@@ -129,31 +130,65 @@ def worst_first(fit: FitSubject) -> bool:
     return worst > fit.limit_mm * _LEAST_SHARE and all(worst > _LIKELY_SHARE * one for one in away)
 
 
-def _fit_key(state: WizardState, fit: FitSubject, key: KeyPressed) -> Answered:
-    first = worst_first(fit)
-    answers = {"/": "y", "y": "y", "n": "n"} | ({"3": "n"} if first else {})
-    answers |= dict.fromkeys(("5", "main"), "y" if first else "n")
-    if fit.more:
-        answers["1"] = MORE
-    elif not first:
-        answers["1"] = "y"
-    return answers.get(key.name, state)
+def _fit_key(fit: FitSubject, key: KeyPressed) -> str:
+    """Return what a key answers; empty for nothing. The key that goes on moves nothing."""
+    if key.name in ("5", "main", "n"):
+        return "n"
+    if key.name in ("/", "y"):
+        return "y"
+    return MORE if fit.more and key.name == "+" else ""
+
+
+def _marked(state: WizardState, key: KeyPressed, rows: int, first: int = 0) -> WizardState | None:
+    """Return the state after an arrow went to another row, ``None`` for another key.
+
+    Args:
+        state: The state.
+        key: The key.
+        rows: How many rows there are.
+        first: Which one an arrow down goes to where none is marked.
+    """
+    marked = state.marked
+    if key.name == "2":
+        return replace(
+            state, marked=first if marked is None else min(marked + 1, rows - 1), message=""
+        )
+    if key.name == "8":
+        return replace(state, marked=rows - 1 if marked is None else max(marked - 1, 0), message="")
+    return None
+
+
+def _row_done(state: WizardState, key: KeyPressed, *, enters: bool = False) -> WizardState | None:
+    """Return what only says why a key does nothing on a list; ``None`` where it does its row."""
+    if key.name == "enter" and not enters:
+        return state.says(tr("ENTER does nothing here. [5] does what the marked row says."))
+    if key.name not in ("5", "main", "enter"):
+        return state
+    return state.says(tr("Mark a row first.")) if state.marked is None else None
 
 
 def _choice_key(state: WizardState, subject: ChoiceSubject, key: KeyPressed) -> Answered:
     """Mark a row with the arrows; take the marked one."""
-    marked, last = state.marked, len(subject.options) - 1
-    if key.name == "2":
-        return replace(state, marked=0 if marked is None else min(marked + 1, last), message="")
-    if key.name == "8":
-        return replace(state, marked=last if marked is None else max(marked - 1, 0), message="")
+    moved = _marked(state, key, len(subject.options))
+    if moved is not None:
+        return moved
     if key.name == "f2" and subject.other:
         return CHANGE_LANGUAGE
-    if key.name == "enter" and not subject.enters and (marked is None or marked != subject.safe):
-        return state.says(tr("ENTER does nothing here. [5] does what the marked row says."))
-    if key.name in ("5", "main", "enter"):
-        return state.says(tr("Mark a row first.")) if marked is None else str(marked + 1)
-    return state
+    safe = state.marked is not None and state.marked == subject.safe
+    refused = _row_done(state, key, enters=subject.enters or safe)
+    return str((state.marked or 0) + 1) if refused is None else refused
+
+
+def _yes_no_key(state: WizardState, key: KeyPressed) -> Answered:
+    """Mark yes or no with the arrows, and take it; a letter answers too."""
+    said = {"y": "y", "j": "y", "n": "n"}.get(key.name)
+    if said is not None:
+        return said
+    moved = _marked(state, key, 2)
+    if moved is not None:
+        return moved
+    refused = _row_done(state, key)
+    return "yn"[state.marked or 0] if refused is None else refused
 
 
 def _text_key(state: WizardState, key: KeyPressed) -> Answered:
@@ -199,21 +234,47 @@ def _write(state: WizardState, subject: WriteSubject, typed: str, *, said_no: bo
     )
 
 
-def _check(state: WizardState, subject: CheckSubject, word: str) -> Answered:
-    """Confirm a point, or start where none is open."""
-    for point in subject.points:
-        if point.key != word:
-            continue
-        if point.mark is Mark.TO_DO:
-            return SWITCH_ON
-        checked = state.checked ^ {word}
-        return replace(state, checked=checked, message=_left_open(subject, checked))
-    if word != "main":
+def _check_key(state: WizardState, subject: CheckSubject, key: KeyPressed) -> Answered:
+    """Mark a row with the arrows; do or confirm it, or start where none is open.
+
+    No row is marked when the list is shown, and the mark stays where it is: a key that is held
+    down, or meant for the list before, confirms nothing and never starts.
+    """
+    start, left = len(subject.rows), subject.open_rows(state.checked)
+    moved = _marked(state, key, start + 1, first=left[0] if left else start)
+    if moved is not None:
+        return moved
+    refused = _row_done(state, key)
+    if refused is not None:
+        return refused
+    if state.marked is None or state.marked == start:
+        return state.says(tr("Not yet: {n} open.", n=len(left))) if left else "y"
+    return _confirmed(state, subject, state.marked)
+
+
+def _check_line(state: WizardState, subject: CheckSubject, meaning: str, word: str) -> Answered:
+    """Do or confirm the row of a number, or start where none is open."""
+    if meaning == "no" or word == "0":
+        return "n"
+    if word.isdigit() and 1 <= int(word) <= len(subject.rows):
+        said = _confirmed(state, subject, int(word) - 1)
+        return said if isinstance(said, str) else said.says(_left_open(subject, said.checked))
+    if meaning != "yes":
         return state.says(tr("Confirm each row first, by its number."))
-    left = subject.open_keys(state.checked)
+    left = subject.open_rows(state.checked)
     return state.says(_left_open(subject, state.checked)) if left else "y"
 
 
+def _confirmed(state: WizardState, subject: CheckSubject, index: int) -> Answered:
+    """Do what a row says, or confirm it; a row that was confirmed is taken back."""
+    point = subject.rows[index]
+    if point.mark is Mark.TO_DO:
+        return SWITCH_ON
+    checked = state.checked ^ {point.name}
+    settled = "" if subject.open_rows(checked) else tr("All rows are confirmed.")
+    return replace(state, checked=checked, message=settled)
+
+
 def _left_open(subject: CheckSubject, checked: frozenset[str]) -> str:
-    keys = " ".join(f"[{key}]" for key in subject.open_keys(checked))
-    return tr("Not yet. First: {keys}.", keys=keys) if keys else tr("All rows are confirmed.")
+    rows = ", ".join(str(index + 1) for index in subject.open_rows(checked))
+    return tr("Not yet. First: {keys}.", keys=rows) if rows else tr("All rows are confirmed.")

@@ -110,7 +110,7 @@ class WizardState:
         waits: Whether the work waits for an answer; what is pressed meanwhile is dropped.
         subject: What the question, or the movement under way, is about.
         fit: How well the samples agree, as it was told last.
-        checked: Which points of a check list the person has confirmed.
+        checked: Which points of a check list the person has confirmed, by their names.
         carried: Whether the robot has moved by itself: a tip that was not jogged since then stands
             where the robot put it.
         accepted: Whether the person has let the new values be written.
@@ -118,7 +118,7 @@ class WizardState:
         typed: What stands in the field.
         typing: Whether the field of a pose is open at a touch.
         pose_typed: The pose that was typed there, and is taken next; empty for none.
-        marked: Index of the marked row of a list.
+        marked: Index of the marked row of a list, a check list or a question of yes or no.
         remarks: What was told last, oldest first.
         fresh: What of it was told since the last question, so that nobody had a screen to read it.
         heard: What was told before the present question: its screen shows it.

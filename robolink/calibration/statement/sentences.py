@@ -43,12 +43,11 @@ def measured_axes(result: "CalibrationResult") -> str:
     return ", ".join(name[0].upper() for name in result.measured if name.endswith("_mm"))
 
 
-def repeatable_sentence(result: "CalibrationResult", sign: str = "+-") -> str:
+def repeatable_sentence(result: "CalibrationResult") -> str:
     """Return what a result is repeatable to, or why that is not known; empty without a length.
 
     Args:
         result: What was measured.
-        sign: What stands before a half width; a page has ``±``.
 
     Example:
         >>> from robolink import Pose
@@ -64,9 +63,8 @@ def repeatable_sentence(result: "CalibrationResult", sign: str = "+-") -> str:
         return ""
     if within_mm is not None:
         return tr(
-            "{axes}: repeatable to {sign}{mm} mm (95 %).",
+            "{axes}: repeatable to +-{mm} mm (95 %).",
             axes=axes,
-            sign=sign,
             mm=stated_mm(within_mm),
         )
     if result.method == "one-touch":
@@ -76,12 +74,11 @@ def repeatable_sentence(result: "CalibrationResult", sign: str = "+-") -> str:
     return tr("Repeatable: not known (nothing is left over that could check it).")
 
 
-def accurate_sentence(result: "CalibrationResult", sign: str = "+-") -> str:
+def accurate_sentence(result: "CalibrationResult") -> str:
     """Return what a result is accurate to; empty without a length.
 
     Args:
         result: What was measured; :func:`~robolink.calibration.assessed` has judged it.
-        sign: What stands before a half width; a page has ``±``.
 
     Example:
         >>> from robolink import Pose
@@ -98,19 +95,17 @@ def accurate_sentence(result: "CalibrationResult", sign: str = "+-") -> str:
     if result.accuracy is None:
         return tr("Accurate: not known (its possible errors are not on record).")
     return tr(
-        "{axes}: accurate to {sign}{mm} mm (95 %).",
+        "{axes}: accurate to +-{mm} mm (95 %).",
         axes=axes,
-        sign=sign,
         mm=stated_mm(result.accuracy.within_mm),
     )
 
 
-def largest_row_sentence(accuracy: Accuracy, sign: str = "+-") -> str:
+def largest_row_sentence(accuracy: Accuracy) -> str:
     """Return which row brings most, how large it is, and what tells that.
 
     Args:
         accuracy: What a result is accurate to.
-        sign: What stands before a half width; a page has ``±``.
 
     Example:
         >>> from robolink import Pose
@@ -122,18 +117,17 @@ def largest_row_sentence(accuracy: Accuracy, sign: str = "+-") -> str:
         'Largest row: how a person sees contact, +-0.05 mm (default, not measured).'
     """
     row = accuracy.largest
-    facts = {"row": row_title(row), "sign": sign, "basis": basis_in_words(row)}
+    facts = {"row": row_title(row), "basis": basis_in_words(row)}
     if row.half_width is None:
         return tr("Largest row: {row} ({basis}).", **facts)
-    return tr("Largest row: {row}, {sign}{half} ({basis}).", half=half_width_of(row), **facts)
+    return tr("Largest row: {row}, +-{half} ({basis}).", half=half_width_of(row), **facts)
 
 
-def statement_sentences(result: "CalibrationResult", sign: str = "+-") -> Iterator[str]:
+def statement_sentences(result: "CalibrationResult") -> Iterator[str]:
     """Yield both statements and the largest row, a sentence each; nothing without a length.
 
     Args:
         result: What was measured.
-        sign: What stands before a half width; a page has ``±``.
 
     Example:
         >>> from robolink import Pose
@@ -147,11 +141,11 @@ def statement_sentences(result: "CalibrationResult", sign: str = "+-") -> Iterat
         X, Y: accurate to +-0.088 mm (95 %).
         Largest row: how a person sees contact, +-0.05 mm (default, not measured).
     """
-    for sentence in (repeatable_sentence(result, sign), accurate_sentence(result, sign)):
+    for sentence in (repeatable_sentence(result), accurate_sentence(result)):
         if sentence:
             yield sentence
     if measured_axes(result) and result.accuracy is not None:
-        yield largest_row_sentence(result.accuracy, sign)
+        yield largest_row_sentence(result.accuracy)
 
 
 def statement_line(result: "CalibrationResult") -> str:
@@ -236,13 +230,12 @@ def basis_words(basis: str) -> str:
     }.get(basis, basis)
 
 
-def seating_sentence(within_mm: float | None, changes: int | None, sign: str = "+-") -> str:
+def seating_sentence(within_mm: float | None, changes: int | None) -> str:
     """Return how far off the tip may be after the next mounting; no part of the accuracy.
 
     Args:
         within_mm: In which distance it lies then, in 95 %; ``None`` where the record is too short.
         changes: How many changes tell it.
-        sign: What stands before a half width; a page has ``±``.
 
     Example:
         >>> from robolink.calibration import seating_sentence
@@ -254,8 +247,7 @@ def seating_sentence(within_mm: float | None, changes: int | None, sign: str = "
     if within_mm is None:
         return tr("Seating: not known (too few nozzle changes on record).")
     return tr(
-        "Seating: mounted anew, the tip lies within {sign}{mm} mm of here (95 %, {count} changes).",
-        sign=sign,
+        "Seating: mounted anew, the tip lies within +-{mm} mm of here (95 %, {count} changes).",
         mm=stated_mm(within_mm),
         count=changes,
     )

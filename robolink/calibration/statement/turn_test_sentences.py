@@ -149,9 +149,7 @@ def _explained(judgement: TurnJudgement) -> Iterator[str]:
         )
 
 
-def proved_statements(
-    measured: CalibrationResult, result: VerifyResult | None, sign: str = "+-"
-) -> Iterator[str]:
+def proved_statements(measured: CalibrationResult, result: VerifyResult | None) -> Iterator[str]:
     """Yield what a tip is repeatable and accurate to after its turn test, a sentence each.
 
     Where a person took a wider statement, it stands in place of the one that was contradicted.
@@ -159,7 +157,6 @@ def proved_statements(
     Args:
         measured: The measurement with its own statements.
         result: The turn test; ``None`` for none.
-        sign: What stands before a half width; a page has ``\u00b1``.
 
     Example:
         >>> from robolink import Pose
@@ -175,13 +172,12 @@ def proved_statements(
     """
     own_mm, now_mm = measured.accurate_to_mm, None if result is None else result.accurate_to_mm
     if now_mm is None or (own_mm is not None and now_mm <= own_mm):
-        yield from statement_sentences(measured, sign)
+        yield from statement_sentences(measured)
         return
-    yield repeatable_sentence(measured, sign)
+    yield repeatable_sentence(measured)
     yield tr(
-        "{axes}: accurate to {sign}{mm} mm (95 %), widened after the turn test.",
+        "{axes}: accurate to +-{mm} mm (95 %), widened after the turn test.",
         axes=measured_axes(measured),
-        sign=sign,
         mm=stated_mm(now_mm),
     )
 

@@ -46,6 +46,7 @@ class PlcMapController(ControllerCore):
         client: An open Modbus client; the controller owns it from here on.
         register_map: The map.
         outcomes: Where doubtful outcomes of this PLC are kept.
+        simulated: Whether it is a simulator's address; nothing in the registers tells that.
 
     Example:
         >>> from pathlib import Path
@@ -69,9 +70,14 @@ class PlcMapController(ControllerCore):
     groups: tuple[FlangeReader]
 
     def __init__(
-        self, client: RegisterClient, register_map: RegisterMap, outcomes: OutcomeLog
+        self,
+        client: RegisterClient,
+        register_map: RegisterMap,
+        outcomes: OutcomeLog,
+        *,
+        simulated: bool = False,
     ) -> None:
-        plc = self._plc = MappedPlc(client, register_map, outcomes)
+        plc = self._plc = MappedPlc(client, register_map, outcomes, simulated=simulated)
         self.register_map = register_map
         self.groups = (FlangeReader(plc),)
         able = replace(self.OF_KIND, tool_write=register_map.writable)
@@ -123,13 +129,17 @@ class PlcMapController(ControllerCore):
         return self.tools.handshake.error_text(code)
 
     def condition(self) -> dict[str, object]:
-        """Read the tool in force, and the text of an error, as far as the map has them."""
+        """Read the tool in force, and the text of an error, as far as the map has them.
+
+        ``simulated`` stands there for a simulator's address alone: without it nothing is known.
+        """
         fault = self.tools.handshake.fault()
         return {
             "text": self.error_text(fault) if fault else "",
             "selected_tool": self.tools.selected() if self.register_map.selected else None,
             "map": self.register_map.name,
             "permitted": self._plc.permitted,
+            **({"simulated": True} if self._plc.simulated else {}),
         }
 
     def preview(self, act: Act) -> tuple[str, ...]:  # noqa: ARG002 - the model's form
@@ -209,8 +219,9 @@ def open_plc_map(
     """Open ``plc+modbus-tcp://host?map=machine.toml`` and compare the probe, if there is one.
 
     Args:
-        url: ``map`` names the map, seen from the working folder; the other options are those
-            of a Modbus client (docs/plc-links.md).
+        url: ``map`` names the map, seen from the working folder, ``simulated=yes`` stands in the
+            address of a simulator; the other options are those of a Modbus client
+            (docs/plc-links.md).
         outcomes: Opens the record of the PLC whose identity it is given.
         timeout_s: Longest wait for the connection, and for each answer.
         clock: Replaces the machine's clock.
@@ -237,10 +248,12 @@ def open_plc_map(
         ...         controller.register_map.name
         'simulated dispenser'
     """
-    register_map, url = _with_map(url)
+    register_map, url, simulated = _with_map(url)
     client = open_modbus(url, timeout_s=timeout_s, clock=clock)
     try:
-        controller = PlcMapController(client, register_map, outcomes(client.identity))
+        controller = PlcMapController(
+            client, register_map, outcomes(client.identity), simulated=simulated
+        )
     except BaseException:
         client.close()
         raise
@@ -253,10 +266,10 @@ def open_plc_map(
     return controller
 
 
-def _with_map(url: LinkUrl) -> tuple[RegisterMap, LinkUrl]:
-    """Return the map that a URL names, and the URL of the client without it."""
+def _with_map(url: LinkUrl) -> tuple[RegisterMap, LinkUrl, bool]:
+    """Return the map that a URL names, the URL of the client, and whether it is a simulator's."""
     options = dict(url.options)
-    file = options.pop("map", "")
+    file, said = options.pop("map", ""), options.pop("simulated", None)
     if not file:
         raise ConfigError(
             tr("The option {name} is missing in the {scheme} URL.", name="map", scheme=url.scheme),
@@ -264,4 +277,19 @@ def _with_map(url: LinkUrl) -> tuple[RegisterMap, LinkUrl]:
                 "Write for example {scheme}://192.168.0.2?map=machine.toml.", scheme=url.scheme
             ),
         )
-    return load_map(Path(file).expanduser()), replace(url, options=options)
+    if said is not None:
+        _require_simulator(url, said)
+    return load_map(Path(file).expanduser()), replace(url, options=options), said is not None
+
+
+def _require_simulator(url: LinkUrl, said: str) -> None:
+    """Refuse the sign of a simulator where a machine could stand behind the address.
+
+    Raises:
+        ConfigError: It leads out of this computer, or the sign is another than ``yes``.
+    """
+    if said != "yes" or not url.stays_here:
+        raise ConfigError(
+            tr("Only the address of a simulator on this computer has the option simulated=yes."),
+            remedy=tr("Leave it out of the address of a machine. Nothing was sent."),
+        )

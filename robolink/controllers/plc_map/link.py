@@ -22,11 +22,18 @@ class MappedPlc(DriverLink):
         client: An open Modbus client.
         register_map: Where everything stands.
         outcomes: Where doubtful outcomes of this PLC are kept.
+        simulated: Whether it is a simulator's address.
     """
 
     def __init__(
-        self, client: RegisterClient, register_map: RegisterMap, outcomes: OutcomeLog
+        self,
+        client: RegisterClient,
+        register_map: RegisterMap,
+        outcomes: OutcomeLog,
+        *,
+        simulated: bool,
     ) -> None:
+        self._simulated = simulated
         registers = self.registers = Registers(client)
         self.register_map = register_map
         self._identity = MapIdentityReader(registers, register_map)
@@ -34,6 +41,11 @@ class MappedPlc(DriverLink):
         super().__init__(
             client.identity, registers.clock, registers.latch, outcomes, gate=registers.gate
         )
+
+    @property
+    def simulated(self) -> bool:
+        """Whether it is a simulator's address; the registers of a machine say nothing of it."""
+        return self._simulated
 
     @property
     def permitted(self) -> bool:

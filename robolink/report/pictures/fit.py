@@ -78,9 +78,16 @@ def _residuals(result: CalibrationResult) -> Drawing:
 
 def _interval(result: CalibrationResult, axes: Axes, within_mm: float | None) -> Drawing:
     """Draw both statements about the measured tip, in the axes of the flange."""
-    halves = [result.half_width95[result.measured.index(name)] for name in ("x_mm", "y_mm")]
+    halves = {
+        name[0].upper(): half
+        for name, half in zip(result.measured, result.half_width95, strict=True)
+        if name.endswith("_mm")
+    }
+    together = ", ".join(halves)
     radius_mm = result.region95_radius_mm
-    panel = PlotPanel(max(*halves, radius_mm or 0.0, within_mm or 0.0, _LOWEST_MM) * 1.25)
+    panel = PlotPanel(
+        max(halves["X"], halves["Y"], radius_mm or 0.0, within_mm or 0.0, _LOWEST_MM) * 1.25
+    )
     middle = panel.at(0, 0)
     long_mm, short_mm, turn_deg = axes
     shape: list[Element] = [
@@ -89,19 +96,22 @@ def _interval(result: CalibrationResult, axes: Axes, within_mm: float | None) ->
         )
     ]
     said = tr(
-        "Repeatable: X \u00b1 {x} mm, Y \u00b1 {y} mm, each 95 % for its axis alone (ellipse).",
-        x=stated_mm(halves[0], 4),
-        y=stated_mm(halves[1], 4),
+        "Repeatable: {lengths}, each 95 % for its axis alone (X and Y: ellipse).",
+        lengths=", ".join(f"{axis} +-{stated_mm(half, 4)} mm" for axis, half in halves.items()),
     )
     if radius_mm is not None:
         shape.append(circle(middle, round(radius_mm * panel.per_mm, 2), class_="rms"))
         said += " " + tr(
-            "Both axes together, 95 %: circle, radius {radius} mm.", radius=stated_mm(radius_mm, 4)
+            "{axes} together, 95 %: circle, radius {radius} mm.",
+            axes=together,
+            radius=stated_mm(radius_mm, 4),
         )
     if within_mm is not None:
         shape.append(circle(middle, round(within_mm * panel.per_mm, 2), class_="accurate"))
         said += " " + tr(
-            "Accurate, 95 %: dashed circle, radius {radius} mm.", radius=stated_mm(within_mm, 4)
+            "Accurate, 95 %, {axes} together: dashed circle, radius {radius} mm.",
+            axes=together,
+            radius=stated_mm(within_mm, 4),
         )
     dot = element("g", circle(middle, 2.4), class_="point")
     return panel.drawn(tr("Tip on the flange: repeatable and accurate"), said, *shape, dot)

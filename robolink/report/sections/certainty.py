@@ -1,7 +1,6 @@
 """What the result is repeatable to and accurate to, what that rests on, and the budget."""
 
 import math
-from typing import Final
 
 from robolink.calibration import (
     CalibrationResult,
@@ -13,18 +12,16 @@ from robolink.messages import tr
 from robolink.model import Pose
 from robolink.report._values import Report
 
-SIGN: Final = "\u00b1 "
-
 
 def statements(report: Report) -> tuple[str, ...]:
     """Return what the result is repeatable and accurate to, what brings most, and the seating."""
     fit, seating = report.fit, report.seating
     if fit is None:
         return ()
-    said = tuple(proved_statements(fit, report.verification, SIGN))
+    said = tuple(proved_statements(fit, report.verification))
     if seating is None or not said:
         return said
-    return (*said, seating_sentence(seating["within_mm"], seating["changes"], SIGN))
+    return (*said, seating_sentence(seating["within_mm"], seating["changes"]))
 
 
 def interval_sentences(fit: CalibrationResult) -> tuple[str, ...]:

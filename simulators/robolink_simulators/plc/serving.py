@@ -6,6 +6,7 @@ from urllib.parse import quote, urlencode
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.transport import parse_url
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.hosting.streams.line_host import LineHost
 from robolink_simulators.hosting.streams.serial_cable import PTY_LINE, no_pseudo_terminal
@@ -15,6 +16,7 @@ from robolink_simulators.plc.frames import LineFrames
 from robolink_simulators.plc.link import PlcLink
 
 _DEFAULT_UNIT: Final = 1
+_SIMULATED: Final = "&simulated=yes"
 _UNITS_ON_A_LINE: Final = range(1, 248)
 
 
@@ -72,7 +74,9 @@ class PlcHost(TcpHost):
     @property
     def url(self) -> str:
         """Where clients connect to, with the unit and the map."""
-        return super().url + self._options
+        url = super().url + self._options
+        # What leads out of this computer may lead to a machine, and says nothing of itself.
+        return url + _SIMULATED if parse_url(url).stays_here else url
 
     def close(self) -> None:
         """Stop serving and close every connection. Idempotent."""
@@ -93,9 +97,7 @@ class PlcLineHost(LineHost):
         options = dict(PTY_LINE)
         if simulator.unit != _DEFAULT_UNIT:
             options["unit"] = str(simulator.unit)
-        self.url = (
-            f"plc+modbus-rtu://{self.cable.near}?{urlencode(options)}&{_map_option(map_file)}"
-        )
+        self.url = f"plc+modbus-rtu://{self.cable.near}?{urlencode(options)}&{_map_option(map_file)}{_SIMULATED}"
         simulator.keep_time(clock)
 
 

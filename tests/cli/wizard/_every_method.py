@@ -166,13 +166,13 @@ class FlowHand:
         if state.at_place:
             self.at_place()
         elif isinstance(state.subject, CheckSubject):
-            self.say(["1", "3", "5"], ["1", "3", "y"])
+            self.say(["2", "5"] * 3, ["1", "2", "y"])
         elif isinstance(state.subject, WriteSubject):
             self.say(["1", "*"], ["1"])
         elif isinstance(state.subject, FitSubject):
-            self.say(["3" if "3" in offered(state) else "5"], ["n"])
+            self.say(["5"], ["n"])
         else:
-            self.say(["1"], ["y"])
+            self.say(["2", "5"], ["y"])
 
     def moment(self) -> str:
         state = self.state
@@ -202,11 +202,6 @@ class FlowHand:
                 self.type(line)
         else:
             self.press(*keys)
-
-
-def offered(state: WizardState) -> str:
-    """Return the keys of a screen."""
-    return "".join(key for key, _ in screen_of(state, time.monotonic()).actions)
 
 
 def look_at(state: WizardState) -> None:

@@ -28,9 +28,9 @@ class LineHand:
 
     def start(self):
         self.terminal.wait_for("then y to start; n = leave")
-        for key in ("1", "3"):
+        for key in ("1", "2"):
             self.type(key)
-            self.terminal.wait_for(r"First: \[3\]|are confirmed")
+            self.terminal.wait_for(r"First: 2\.|are confirmed")
         self.type("y")
 
     def left_mm(self):

@@ -62,11 +62,11 @@ class HandAtScreen(ABC):
         """Confirm what the list asks, and start."""
         self.see(r"Start moving \(2 open\)")
         self.rest(0.4)
-        self.press(["1"])
+        self.press(["2", "5"])
         self.see(r"Start moving \(1 open\)")
-        self.press(["3"])
+        self.press(["2", "5"])
         self.see(r"Start moving(?! \()")
-        self.press(["5"])
+        self.press(["2", "5"])
 
     def left_mm(self):
         assert self.eyes is not None

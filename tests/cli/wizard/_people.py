@@ -113,9 +113,9 @@ def contradicted(**more):
 CHECK = CheckSubject(
     (
         CheckPoint(Mark.OK, "Controller answers: T6-602S, serial T6S0012345"),
-        CheckPoint(Mark.TO_DO, "Motors are off", "7", "Switch them on"),
-        CheckPoint(Mark.YOU, "New needle mounted and tight, pin PIN-07 clean", "1", "Yes"),
-        CheckPoint(Mark.YOU, "Nobody in the cell, hoses free", "3", "Yes"),
+        CheckPoint(Mark.YOU, "New needle mounted and tight, pin PIN-07 clean", "mounted", "Yes"),
+        CheckPoint(Mark.YOU, "Nobody in the cell, hoses free", "clear", "Yes"),
+        CheckPoint(Mark.TO_DO, "Motors are off", "motors", "Switch them on"),
     ),
     "The robot will move by itself 6 times: power LOW, up to 20 mm/s, at most 150 mm from here.",
 )

@@ -112,7 +112,7 @@ def by_screen(words, simulator, pictures):
     touched = 0
     while True:
         found = hand.see(
-            r"Jog the tip onto the pin|To write, type|\[1\] Yes +\[3\] No|\[Enter\] Done|DONE"
+            r"Jog the tip onto the pin|To write, type|  Yes *\n  No|\[Enter\] Done|DONE"
             r"|Start moving \(2 open\)"
         )[0]
         if pictures:
@@ -137,7 +137,7 @@ def by_screen(words, simulator, pictures):
             hand.rest(1.0)
         else:
             hand.rest(0.4)
-            hand.press(["1"])
+            hand.press(["2", "5"])
             hand.rest(1.0)
     code = hand.end()
     if pictures:

@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from robolink_cli.wizard.check_list import CheckPoint, Mark
 from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.happenings import (
     HasEnded,
@@ -96,13 +97,13 @@ def test_turned_keys_still_name_what_they_do(quarters):
 
     hand = at_touch()
     for _ in range(quarters):
-        hand.key("*")
+        hand.key("tab")
     rows = "\n".join(touch_screen(hand.state, hand.now).lines)
     for key in "6842":
         axis = rows[rows.index(f"[{key}] ") + 4 :][:2]
         other = at_touch()
         for _ in range(quarters):
-            other.key("*")
+            other.key("tab")
         other.keys(key)
         assert other.sent == [f"{axis.lower()}0.1"], (key, rows)
 
@@ -112,8 +113,10 @@ def test_enter_takes_writes_and_starts_nothing():
     assert at_touch(arrival=None).line("").sent == []
     hand = Sitting().asked(write_subject(1), Question.YES_NO).keys("1")
     assert hand.key("enter").sent == []
-    hand = Sitting().asked(CHECK, Question.YES_NO).keys("1", "3")
-    assert hand.key("enter").sent == []
+    hand = Sitting().asked(CHECK, Question.YES_NO)
+    for key in ("2", "5", "2", "5", "2", "2"):  # each row, and the one that starts
+        assert hand.keys(key).key("enter").sent == []
+        assert "ENTER does nothing here" in hand.state.message
 
 
 def test_no_key_answers_before_its_question_could_be_seen():
@@ -152,25 +155,50 @@ def test_the_numbers_of_several_tools_are_typed_all():
 def test_a_start_waits_for_every_point_of_the_list():
     hand = Sitting().asked(CHECK, Question.YES_NO).keys("5")
     assert hand.sent == []
-    assert "First: [7] [1] [3]." in hand.state.message
-    assert hand.keys("1", "3", "5").sent == []
-    assert "First: [7]." in hand.state.message
-    assert hand.keys("7").sent == ["motors"]
-    done = CHECK.__class__(tuple(p for p in CHECK.points if p.key != "7"), CHECK.plan)
-    hand = Sitting().asked(done, Question.YES_NO).keys("1", "3", "5")
+    assert "Mark a row first." in hand.state.message
+    assert hand.keys("8", "5").sent == []
+    assert hand.state.message == "Not yet: 3 open."
+    assert hand.line("y").state.message == "Not yet. First: 1, 2, 3."
+    assert hand.keys("8", "8", "5", "8", "5").line("y").sent == []
+    assert hand.state.message == "Not yet. First: 3."
+    assert hand.keys("2", "2", "5").sent == ["motors"]
+    done = replace(CHECK, points=CHECK.points[:3])
+    hand = Sitting().asked(done, Question.YES_NO).keys("2", "5", "2", "5", "2", "5")
     assert hand.sent == ["y"]
     # Who comes back into the cell takes the row back.
-    hand = Sitting().asked(done, Question.YES_NO).keys("1", "3", "3", "5")
+    hand = Sitting().asked(done, Question.YES_NO).keys("2", "5", "2", "5", "5", "2", "5")
     assert hand.sent == []
-    assert "First: [3]." in hand.state.message
+    assert hand.state.message == "Not yet: 1 open."
+    assert Sitting().asked(done, Question.YES_NO).line("1").line("2").line("y").sent == ["y"]
+
+
+def test_a_list_that_changes_under_the_finger_has_no_mark_any_more():
+    ready = replace(CHECK, points=(*CHECK.points[:3], CheckPoint(Mark.OK, "Motors are on")))
+    hand = Sitting().asked(CHECK, Question.YES_NO).keys("2", "5", "2", "5", "2")
+    hand.happens(WasRegarded(ready))  # somebody else switched them on
+    assert hand.keys("5").sent == []
+    hand = Sitting().asked(ready, Question.YES_NO).keys("2", "5", "2", "5", "2")
+    hand.happens(WasRegarded(CHECK))  # they went off again
+    assert hand.keys("5").sent == []
+    assert hand.keys("2", "5").sent == ["motors"]
+
+
+@pytest.mark.parametrize("pressed", [1, 2, 3, 40])
+def test_a_main_key_that_is_held_down_never_starts(pressed):
+    hand = Sitting().asked(replace(CHECK, points=CHECK.points[:3]), Question.YES_NO)
+    assert hand.keys(*["5"] * pressed).sent == []
+    assert hand.keys("2", *["5"] * pressed).sent == []
+    assert len(hand.state.checked) <= 1
 
 
 def test_the_worst_touch_is_offered_first_only_where_it_stands_out():
     far, near = fit_subject(0.006, 0.08, 0.004, worst=1), fit_subject(0.02, 0.03, 0.02, worst=1)
-    assert Sitting().asked(far, Question.YES_NO).keys("5").sent == ["y"]
-    assert Sitting().asked(far, Question.YES_NO).keys("3").sent == ["n"]
-    assert Sitting().asked(near, Question.YES_NO).keys("5").sent == ["n"]
-    assert Sitting().asked(near, Question.YES_NO).keys("1").sent == ["y"]
+    for fit, first in ((far, "/"), (near, "5")):
+        hand = Sitting().asked(fit, Question.YES_NO)
+        assert screen_of(hand.state, hand.now).actions[0][0] == first
+        assert hand.keys("5").sent == ["n"]
+        assert Sitting().asked(fit, Question.YES_NO).keys("/").sent == ["y"]
+        assert Sitting().asked(fit, Question.YES_NO).keys("enter", "+", "1", "3").sent == []
 
 
 @pytest.mark.parametrize(
@@ -254,11 +282,8 @@ def test_from_the_new_values_one_key_goes_back_to_the_touches(again, adds, typed
 def test_one_more_touch_is_offered_beside_the_worst():
     first = replace(fit_subject(0.006, 0.08, 0.004, worst=1), more=True)
     later = replace(fit_subject(0.02, 0.03, 0.02, worst=1), more=True)
-    for fit, answers in (
-        (first, {"5": "y", "1": "more", "3": "n", "/": "y"}),
-        (later, {"5": "n", "1": "more", "/": "y"}),
-    ):
-        for key, sent in answers.items():
+    for fit in (first, later):
+        for key, sent in {"5": "n", "+": "more", "/": "y"}.items():
             assert Sitting().asked(fit, Question.YES_NO).keys(key).sent == [sent]
         assert Sitting().asked(fit, Question.YES_NO).line("再触碰").sent == ["more"]
         assert Sitting().asked(fit, Question.YES_NO).line("again").sent == ["y"]
@@ -284,10 +309,13 @@ def test_a_reading_that_is_old_takes_no_touch():
         (True, "5", WizardCommand.LEAVE),
         (True, "0", WizardCommand.LEAVE),
         (True, "enter", None),
-        (True, "1", WizardCommand.SHOW_REPORT),
-        (True, "3", WizardCommand.NEXT_TOOL),
-        (False, "1", None),
-        (False, "3", None),
+        (True, ".", WizardCommand.SHOW_REPORT),
+        (True, "delete", WizardCommand.SHOW_REPORT),
+        (True, "+", WizardCommand.NEXT_TOOL),
+        (True, "1", None),
+        (True, "3", None),
+        (False, ".", None),
+        (False, "+", None),
         (False, "5", WizardCommand.BEGIN_AGAIN),
         (False, "stop", WizardCommand.LEAVE),
         (False, "enter", None),
@@ -309,8 +337,8 @@ def test_the_last_screen_is_left_by_its_keys_alone_and_not_by_one_that_is_held(d
 def test_the_last_screen_takes_only_what_it_offers_typed_words_too():
     for offers in ((), (WizardCommand.SHOW_REPORT,), (WizardCommand.NEXT_TOOL,)):
         for key, word, chinese, wanted in (
-            ("1", "report", "报告", WizardCommand.SHOW_REPORT),
-            ("3", "Next", "下一个", WizardCommand.NEXT_TOOL),
+            (".", "report", "报告", WizardCommand.SHOW_REPORT),
+            ("+", "Next", "下一个", WizardCommand.NEXT_TOOL),
         ):
             for act in (
                 lambda hand, key=key: hand.keys(key),
@@ -368,7 +396,7 @@ def test_a_line_while_the_robot_moves_is_no_step():
     assert at_touch().line("x+0.1").line("x+0.1").sent == ["x+0.1"]
 
 
-NAMES = [*"0123456789+-*/nyqt. ", "main", "stop", "enter", "backspace"]
+NAMES = [*"0123456789+-*/nyqt. ", "main", "stop", "enter", "backspace", "tab", "delete"]
 WORDS = [
     "take",
     "done",
@@ -581,5 +609,5 @@ def test_after_a_list_a_yes_or_no_is_asked_for_itself():
     hand.asked(None, Question.YES_NO, "Keep the value?")
     assert hand.line("5").sent == ["5"]
     assert told_question(hand.state) == "Keep the value? [y or n]"
-    assert "[1] Yes" in screen_of(hand.state, hand.now).rows()[-1]
+    assert screen_of(hand.state, hand.now).lines[-2:] == ("  Yes", "  No")
     assert hand.line("n").sent == ["5", "n"]

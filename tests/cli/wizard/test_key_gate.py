@@ -69,6 +69,7 @@ def test_after_a_burst_a_key_counts_only_where_its_end_was_seen():
         (" ", "main"),
         ("c-m", "enter"),
         ("7", "7"),
+        ("c-i", "tab"),
     ],
 )
 def test_the_keypad_means_the_same_with_and_without_numlock(key, name):

@@ -133,9 +133,9 @@ def test_without_a_terminal_it_ends_at_once(url, words):
 @pytest.mark.soak
 def test_motors_that_are_off_are_switched_on_from_the_list(hand, simulator):
     simulator.machine.motors_on = False
-    hand.terminal.wait_for(r"TO DO: Motors are off  \[7\] Switch them on")
+    hand.terminal.wait_for(r"TO DO: Motors are off  \[3\] Switch them on")
     hand.terminal.wait_for("n = leave")
-    hand.type("7")
+    hand.type("3")
     hand.terminal.wait_for("OK: Motors are on")
     hand.terminal.wait_for("n = leave")
     assert simulator.machine.motors_on

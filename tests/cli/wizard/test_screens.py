@@ -206,17 +206,17 @@ def checking():
                 when="2026-11-20 13:58 (UTC+1)",
             ),
         ),
-        CheckPoint(Mark.TO_DO, tr("Motors are off"), "7", tr("Switch them on")),
         CheckPoint(
             Mark.YOU,
             tr("The new nozzle is mounted and tight; tip and pin are clean"),
-            "1",
+            "mounted",
             tr("Yes"),
         ),
-        CheckPoint(Mark.YOU, tr("Nobody in the cell, hoses free"), "3", tr("Yes")),
+        CheckPoint(Mark.YOU, tr("Nobody in the cell, hoses free"), "clear", tr("Yes")),
+        CheckPoint(Mark.TO_DO, tr("Motors are off"), "motors", tr("Switch them on")),
     )
     hand = Sitting(motors=False).asked(CheckSubject(points, plan), Question.YES_NO)
-    return hand.keys("1", "3")
+    return hand.keys("2", "5", "2", "5", "2")
 
 
 def remarked():
@@ -414,7 +414,7 @@ SCREENS = {
     "choose": choosing,
     "choose job": jobs,
     "check without backup": unsaved,
-    "check": lambda: Sitting(motors=False).asked(CHECK, Question.YES_NO).keys("1"),
+    "check": lambda: Sitting(motors=False).asked(CHECK, Question.YES_NO).keys("2", "5"),
     "moving": moving,
     "touch": touching,
     "first touch": lambda: Sitting().asked(touch_subject(number=1, arrival=None)),
@@ -570,12 +570,17 @@ def test_the_pictures_of_the_pages_are_those_of_the_screens(language_of_page):
         assert path.read_text(encoding="utf-8") == text, "python -m tests.cli.wizard.pictures"
 
 
-def test_keys_of_a_list_stand_at_the_right_edge_in_every_language(language):
-    hand = checking()
-    rows = screen_of(hand.state, hand.now).rows()
-    keyed = [row for row in rows[3:12] if "[7]" in row or "[3]" in row]
-    assert len(keyed) == 2
-    assert {wcswidth(row) for row in keyed} == {79}, language
+def test_the_last_row_says_what_the_main_key_does_on_the_marked_row(language):
+    hand, said = checking(), []
+    hand.asked(hand.state.subject, Question.YES_NO)
+    for key in ("2", "2", "2", "8", "8", "5"):
+        hand.keys(key)
+        screen = screen_of(hand.state, hand.now)
+        assert sum(row.startswith(">") for row in screen.rows()) == 1
+        said.append(dict(screen.actions)["5"])
+    switch, start = tr("Switch them on"), tr("Start moving ({n} open)", n=1)
+    # Both rows of the person were confirmed before, so the first arrow goes to what is open.
+    assert said == [switch, start, start, switch, tr("Take it back"), tr("Yes")]
 
 
 @pytest.mark.parametrize("width", range(34, 42))

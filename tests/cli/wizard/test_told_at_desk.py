@@ -227,10 +227,10 @@ def test_a_list_says_which_backup_there_is_on_this_computer(tmp_path, monkeypatc
 
 
 def test_a_backup_that_is_missing_keeps_nobody_from_starting():
-    points = (CheckPoint(Mark.LOOK, "No backup."), CheckPoint(Mark.YOU, "Clear.", "3", "Yes"))
+    points = (CheckPoint(Mark.LOOK, "No backup."), CheckPoint(Mark.YOU, "Clear.", "clear", "Yes"))
     hand = Sitting().asked(CheckSubject(points, ""), Question.YES_NO)
-    assert point_rows(points[0], frozenset())[0].split()[0] == "LOOK"
-    assert hand.keys("3", "5").sent == ["y"]
+    assert point_rows(points[0], frozenset(), marked=False)[0].split()[0] == "LOOK"
+    assert hand.keys("2", "5", "2", "5").sent == ["y"]
 
 
 def test_a_list_says_how_a_tool_was_left_and_nothing_of_one_that_somebody_changed():
@@ -426,7 +426,7 @@ def test_the_step_is_numbered_where_that_cuts_nothing_off():
 
 @pytest.mark.parametrize(("keys", "number"), [(("1", "*"), "7 of 7"), (("n",), "3 of 7")])
 def test_movements_after_a_write_was_agreed_to_are_those_of_the_turn_test(keys, number):
-    hand = Sitting().asked(CheckSubject((), ""), Question.YES_NO).keys("5")
+    hand = Sitting().asked(CheckSubject((), ""), Question.YES_NO).keys("2", "5")
     assert hand.sent == ["y"]
     hand.asked(write_subject(1), Question.YES_NO).keys(*keys)
     going = MoveSubject(Pose(300.0, 400.0, -60.0, 90.0, tool=0), Way.JOINT, 20.0, "Up.")

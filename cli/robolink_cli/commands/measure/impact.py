@@ -59,6 +59,7 @@ def impact(
     """
     from robolink.calibration import impact_on
     from robolink.errors import UndefinedToolError
+    from robolink.model import says_it_is_simulated
     from robolink_cli.views.documents import offset_payload
     from robolink_cli.views.tables import show_change
 
@@ -78,11 +79,12 @@ def impact(
                 controller=controller.identity,
             )
         after = replace(before, **changes)
+        simulated = says_it_is_simulated(controller)
         found = impact_on(request.read(controller), old=before, new=after)
         draft.offer(tool, before=before, after=after, given=tuple(changes), impact=found)
     shown = offset_payload(before), offset_payload(after)
     payload = {"tool": tool, "before": shown[0], "after": shown[1], **impact_payload(found)}
-    payload["report"] = draft.saved
+    payload |= {"simulated": simulated, "report": draft.saved}
 
     def show() -> None:
         show_change(tool, *shown, after_name=tr("new"))

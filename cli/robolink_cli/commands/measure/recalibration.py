@@ -274,7 +274,11 @@ class Recalibration:
 
 
 def _payload(report: ChangeReport) -> dict[str, object]:
-    return {"change": report.change, "tools": [report_payload(one) for one in report.tools]}
+    return {
+        "change": report.change,
+        "simulated": report.simulated,
+        "tools": [report_payload(one) for one in report.tools],
+    }
 
 
 def _which_is_mounted() -> str:

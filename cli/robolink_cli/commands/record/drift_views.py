@@ -33,7 +33,7 @@ def _show_cell(cell: CellDrift, called: str, *, all_plots: bool) -> None:
     first, last = cell.changes[0].at[:10], cell.changes[-1].at[:10]
     title = tr(
         "{controller}: measured changes: {count}, {first} to {last}",
-        controller=f"{called} ({cell.controller})" if called else cell.controller,
+        controller=_named(cell, called),
         count=len(cell.changes),
         first=first,
         last=last,
@@ -139,6 +139,7 @@ def drift_payload(cells: Sequence[CellDrift]) -> dict[str, object]:
         "controllers": [
             {
                 "controller": cell.controller,
+                "simulated": cell.simulated,
                 "change_count": len(cell.changes),
                 "charts": [_chart(chart) for chart in cell.charts],
                 "findings": [
@@ -185,3 +186,9 @@ def _chart(chart: Chart) -> dict[str, object]:
             for point in chart.points
         ],
     }
+
+
+def _named(cell: CellDrift, called: str) -> str:
+    """Return a cell by its name and its controller, and whether that is simulated."""
+    name = f"{called} ({cell.controller})" if called else cell.controller
+    return f"{name} ({tr('SIMULATED')})" if cell.simulated else name

@@ -90,6 +90,7 @@ def _tool_payload(report: Report) -> dict[str, object]:
     return {
         "tool": report.tool,
         "outcome": str(report.outcome),
+        "simulated": report.simulated,
         "method": report.method,
         "local_time": report.local_time or None,
         "machine": {name: value or None for name, value in asdict(report.facts).items()},

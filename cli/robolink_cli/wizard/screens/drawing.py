@@ -64,11 +64,16 @@ def _question_screen(state: WizardState, now_s: float) -> Screen:
     """Return the screen of a question that has none of its own."""
     assert state.question is not None  # noqa: S101 - looked at by whoever calls
     asked = ["", *broken(state.question.text), ""]
+    keys: tuple[tuple[str, str], ...]
     if state.question.kind is Question.TEXT:
         asked.append(f"> {state.typed}_")
-        keys: tuple[tuple[str, str], ...] = (("Enter", tr("Done")), ("Esc", tr("STOP")))
+        keys = (("Enter", tr("Done")), ("Esc", tr("STOP")))
     else:
-        keys = (("1", tr("Yes")), ("3", tr("No")), ("0", tr("STOP")))
+        asked += [
+            f"{'>' if index == state.marked else ' '} {answer}"
+            for index, answer in enumerate((tr("Yes"), tr("No")))
+        ]
+        keys = (("5", tr("Do it")), (tr("arrows"), tr("choose")), ("0", tr("STOP")))
     # What was told before often says why it is asked.
     before = [row for remark in state.remarks[-6:] for row in broken(remark)]
     room = max(0, BODY - len(asked) - 1)

@@ -142,9 +142,9 @@ def ended_screen(state: WizardState, ended: LastScreen) -> Screen:
 
 def _offered(state: WizardState) -> Iterator[tuple[str, str]]:
     if WizardCommand.SHOW_REPORT in state.offers:
-        yield "1", tr("Show the report")
+        yield ".", tr("Show the report")
     if WizardCommand.NEXT_TOOL in state.offers:
-        yield "3", tr("Next tool")
+        yield "+", tr("Next tool")
 
 
 def told_end(state: WizardState) -> str:

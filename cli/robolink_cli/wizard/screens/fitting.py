@@ -22,14 +22,11 @@ _MOST_ROWS: Final = 9
 
 def fit_screen(state: WizardState, fit: FitSubject) -> Screen:
     """Return the screen of a fit whose worst sample may be taken again."""
-    again = worst_first(fit)
     worst = fit.rows[fit.worst].number if fit.worst is not None else 0
-    retake, show = tr("Touch {k} again", k=worst), tr("Show the result")
-    more = (("1", tr("One more touch")),) if fit.more else ()
-    if again:
-        keys = (("5", retake), *more, ("3", show))
-    else:
-        keys = (("5", show), *more, ("/" if more else "1", retake))
+    retake, show = ("/", tr("Touch {k} again", k=worst)), ("5", tr("Show the result"))
+    more = (("+", tr("One more touch")),) if fit.more else ()
+    # What is to be done first stands first; what a key does is the same.
+    keys = (retake, *more, show) if worst_first(fit) else (show, *more, retake)
     return Screen(
         title_row(state, tr("How well it fits"), JobStep.FIT),
         ("", *fit_lines(fit)),

@@ -37,9 +37,10 @@ def told_before(state: WizardState, width: int = WIDTH) -> list[str]:
                 rows += [f"    {detail}" for detail in details]
             return [*subject.above, *rows]
         case CheckSubject() as subject:
+            numbers = {point.name: n for n, point in enumerate(subject.rows, start=1)}
             points = [
                 f"  {mark_of(point, state.checked)}: {point.text}"
-                + (f"  [{point.key}] {point.does}" if point.key else "")
+                + (f"  [{numbers[point.name]}] {point.does}" if point.name else "")
                 for point in subject.points
             ]
             return [*points, subject.plan, tr("Keep a hand near the emergency stop.")]

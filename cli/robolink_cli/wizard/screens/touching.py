@@ -189,7 +189,7 @@ def _keypad(state: WizardState) -> list[str]:
     return [
         padded(f"     [8] {up}         [9] {above}", 40) + f"{step}    [+] [-]",
         padded(f" [4] {left}   [6] {right}", 40) + sizes,
-        padded(f"     [2] {down}         [3] {below}", 40) + f"[1] U-   [7] U+   [*] {turns}",
+        padded(f"     [2] {down}         [3] {below}", 40) + f"[1] U-   [7] U+   [Tab] {turns}",
     ]
 
 

@@ -15,6 +15,7 @@ from robolink.errors import RemoteProtocolError
 from robolink.messages import tr
 from robolink.model import OutcomeLog, Pose, ToolOffset, of_no_tool
 from robolink.protocols.mailbox import (
+    Bits,
     Command,
     Response,
     Six,
@@ -63,6 +64,11 @@ class Mailbox(DriverLink):
     def waited_on(self) -> bool:
         """Whether a thread of this process waits on a movement or keeps a jog going."""
         return self.wire.waited_on
+
+    @property
+    def simulated(self) -> bool:
+        """Whether the last snapshot said that the axes are simulated."""
+        return bool(self.snapshots.latest.bits & Bits.SIMULATED)
 
     def show_life(self) -> None:
         """Beat for the ownership alone: nothing while a movement or jog is unfinished."""

@@ -160,7 +160,8 @@ def _calibrate(
         listener.read_points(controller)
 
         def document(report: ChangeReport) -> dict[str, object]:
-            return {**report_payload(report.tools[0]), **_extra(source, listener), "report": None}
+            tool, extra = report_payload(report.tools[0]), _extra(source, listener)
+            return {**tool, "simulated": report.simulated, **extra, "report": None}
 
         if frame.dry_run:
             payload = _dry_run(controller, frame, given, listener) | _extra(source, listener)

@@ -135,6 +135,7 @@ class LiveCalibration:
         impact = self._listener.impact
         return {
             **report_payload(report.tools[0]),
+            "simulated": report.simulated,
             "source": {"kind": "live"},
             "impact": impact_payload(impact) if impact else None,
             "report": None,

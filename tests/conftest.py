@@ -70,8 +70,14 @@ def _outlived(_number, _frame):
 
 
 @pytest.fixture
-def signals_of_a_terminal():
-    """Ctrl-C, a termination and a closed window do in this process what they usually do."""
+def signals_of_a_terminal(monkeypatch):
+    """Ctrl-C, a termination and a closed window do in this process what they usually do.
+
+    A session that an earlier test left open is not heard, and keeps nothing from being given back.
+    """
+    from robolink import interrupts
+
+    monkeypatch.setattr(interrupts, "_handler", interrupts._Handler())
     usual: dict[int, Any] = {
         signal.SIGINT: signal.default_int_handler,
         signal.SIGTERM: signal.SIG_DFL,

@@ -189,13 +189,13 @@ def kept(case, result, flange):
     found = result.offset
     aside = ASIDE | ({"u_deg": 4.0} if "u_deg" in result.measured else {})
     written = replace(found, **{name: getattr(found, name) + by for name, by in aside.items()})
-    controller = MemoryController()
     nobody: Any = None
-    context = MeasurementContext(controller, nobody, start=flange, settings=Limits().settings)
-    context.stands = flange
-    proof = case.source.proof(
-        context, 1, replace(result, offset=written), tip=found, tolerance_mm=0.1
-    )
+    with MemoryController() as controller:
+        context = MeasurementContext(controller, nobody, start=flange, settings=Limits().settings)
+        context.stands = flange
+        proof = case.source.proof(
+            context, 1, replace(result, offset=written), tip=found, tolerance_mm=0.1
+        )
     return proof, written
 
 

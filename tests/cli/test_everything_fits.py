@@ -87,9 +87,9 @@ def drift():
 
 
 def entries():
-    controller = MemoryController()
-    change_tools(controller, [Wanted(3, ToolOffset(-112.5, -103.25, 280, -90), None)])
-    return list(controller.outcomes.recorded(tool=3))
+    with MemoryController() as controller:
+        change_tools(controller, [Wanted(3, ToolOffset(-112.5, -103.25, 280, -90), None)])
+        return list(controller.outcomes.recorded(tool=3))
 
 
 def offset(*numbers):

@@ -75,17 +75,13 @@ class LazyGroup(click.Group):
             found = super().resolve_command(ctx, args)
         except click.exceptions.NoSuchCommand as error:
             # click looks among the commands that are loaded only.
-            names = [*self.list_commands(ctx), *(self._unlisted.keys() - self.renamed.keys())]
+            said, names = error.message, self.list_commands(ctx)
+            names += self._unlisted.keys() - self.renamed.keys()
             if grouped := self._groups_with(ctx, error.command_name):
-                names, error.message = [], joined(
-                    " ",
-                    (
-                        error.message,
-                        *(tr("There is 'robolink {command}'.", command=one) for one in grouped),
-                    ),
-                )
+                hints = (tr("There is 'robolink {command}'.", command=one) for one in grouped)
+                said, names = joined(" ", (said, *hints)), []
             raise click.exceptions.NoSuchCommand(
-                error.command_name, error.message, names, error.ctx
+                error.command_name, said, names, error.ctx
             ) from None
         if args[0] in self.renamed and not ctx.resilient_parsing and sys.stderr.isatty():
             typed = " ".join([*ctx.command_path.split()[1:], args[0]])

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from robolink.controllers.registry import capabilities_of_kind as capabilities_of_kind
     from robolink.controllers.registry import connect as connect
     from robolink.controllers.resolving import MarkerResolver as MarkerResolver
+    from robolink.controllers.robot_models import axes_of_model as axes_of_model
     from robolink.controllers.stopping import stop_now as stop_now
     from robolink.controllers.stopping import stop_requests as stop_requests
     from robolink.controllers.tool_table import ToolTableCore as ToolTableCore
@@ -40,6 +41,7 @@ else:
                 "CONTROLLERS_GROUP ConnectionTerms ControllerOpener capabilities_of_kind connect"
             ),
             "resolving": "MarkerResolver",
+            "robot_models": "axes_of_model",
             "stopping": "stop_now stop_requests",
             "tool_table": "ToolTableCore",
             "tool_writing": "ToolWrite",

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.methods import PointsParameters
+from robolink.methods.pivot.source import LEAST_AXES
 from robolink.model import Capabilities, Controller, LookingController, says_it_is_simulated
 from robolink.sensing import VISION_GUIDE
 
@@ -15,7 +16,12 @@ if TYPE_CHECKING:
 
 
 def beyond(
-    recipe: "Recipe", able: Capabilities, *, other_sensor: bool = False, writes: bool = True
+    recipe: "Recipe",
+    able: Capabilities,
+    *,
+    other_sensor: bool = False,
+    writes: bool = True,
+    axes: int | None = None,
 ) -> tuple[str, ...]:
     """Return what a recipe asks for and a controller cannot do, a sentence each.
 
@@ -24,6 +30,7 @@ def beyond(
         able: What the controller, or its kind, can be asked for.
         other_sensor: Whether another camera takes the place of the recipe's.
         writes: Whether the tools are written.
+        axes: How many axes the robot has; ``None`` where nobody knows yet.
 
     Example:
         >>> from pathlib import Path
@@ -43,6 +50,10 @@ def beyond(
     found = []
     if recipe.source.of_method.needs.motion and not able.motion:
         found.append(tr("The recipe moves the robot, which this controller cannot be told to."))
+    if recipe.source.of_method.needs.tilt and axes is not None and axes < LEAST_AXES:
+        found.append(
+            tr("The recipe tilts the tool, which a robot of {axes} axes cannot do.", axes=axes)
+        )
     if taught and not able.points:
         found.append(tr("The recipe reads taught points, and this controller has none."))
     if looks and not able.looks:

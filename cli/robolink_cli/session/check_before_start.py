@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from robolink.model import Controller, MotionTerms
+    from robolink.stations import StationKind
     from robolink_cli.prompts.present import AskingDesk
     from robolink_cli.wizard.check_list import CheckPoint
 
@@ -27,6 +28,7 @@ def agree_to_procedure(
     speed_mm_s: float,
     box_mm: float,
     yes: bool,
+    at: "StationKind | None",
     tools: "Sequence[int]" = (),
 ) -> None:
     """Have a person agree to a procedure in which the robot moves by itself.
@@ -38,6 +40,7 @@ def agree_to_procedure(
         speed_mm_s: How fast at most.
         box_mm: How far at most.
         yes: Whether the answer was given beforehand.
+        at: At what it measures, which has to be clean too; ``None`` where nobody knows.
         tools: Numbers of the tools that are measured: the list says how they were left.
 
     Raises:
@@ -49,7 +52,13 @@ def agree_to_procedure(
         agree_to_motion(question, yes=yes)
         return
     check_before_start(
-        controller, purpose, moves=moves, speed_mm_s=speed_mm_s, box_mm=box_mm, tools=tools
+        controller,
+        purpose,
+        moves=moves,
+        speed_mm_s=speed_mm_s,
+        box_mm=box_mm,
+        at=at,
+        tools=tools,
     )
 
 
@@ -60,6 +69,7 @@ def check_before_start(
     moves: int,
     speed_mm_s: float,
     box_mm: float,
+    at: "StationKind | None",
     tools: "Sequence[int]" = (),
 ) -> None:
     """Have the person at the desk go through the list; arguments as above.
@@ -84,7 +94,8 @@ def check_before_start(
             **foreseen,
         )
     tried, left = False, (saved_tools(controller), *_as_left(controller, tools))
-    while _answer_to_list(desk, controller, purpose, plan, left, tried=tried) != "y":
+    new = _new_nozzle(at)
+    while _answer_to_list(desk, controller, purpose, plan, left, new, tried=tried) != "y":
         controller.motors(True)
         tried = True
 
@@ -130,6 +141,7 @@ def _answer_to_list(
     purpose: str,
     plan: str,
     left: "tuple[CheckPoint, ...]",
+    new: str,
     *,
     tried: bool,
 ) -> str:
@@ -141,6 +153,7 @@ def _answer_to_list(
         purpose: What it moves for, in words.
         plan: What it will do, a sentence.
         left: Whether the tools are saved, and how they were left.
+        new: What the person confirms of the new nozzle.
         tried: Whether it was told before to switch them on: asking once more would not help.
 
     Raises:
@@ -154,19 +167,19 @@ def _answer_to_list(
 
     off = _motors_are_off(controller, purpose, tried=tried)
     name, terms = _name(controller), controller.groups[0].terms()
-    desk.regard(CheckSubject(_points(name, terms, left, off=off), plan))
+    desk.regard(CheckSubject(_points(name, terms, left, new, off=off), plan))
     desk.ask(tr("Start moving"), Question.YES_NO)
     while (answer := desk.poll(POLL_S)) is None:
         now = _motors_are_off(controller, purpose, tried=tried)
         if now is not off:
             # The list says what is so now; what the person has confirmed stays confirmed.
             off = now
-            desk.regard(CheckSubject(_points(name, terms, left, off=off), plan))
+            desk.regard(CheckSubject(_points(name, terms, left, new, off=off), plan))
     if answer == SWITCH_ON:
         return answer
     if answer == "y":
         controller.groups[0].require_able(purpose)
-        for point in _points(name, terms, left, off=off):
+        for point in _points(name, terms, left, new, off=off):
             if point.mark is Mark.YOU:
                 keep_answer(point.text, True, AnsweredBy.PERSON)
         keep_answer(joined(" ", (plan, tr("Start moving"))), True, AnsweredBy.PERSON)
@@ -260,7 +273,7 @@ def tools_as_left(controller: "Controller", tools: "Sequence[int]") -> tuple[str
 
 
 def _points(
-    name: str, terms: "MotionTerms", left: "tuple[CheckPoint, ...]", *, off: bool
+    name: str, terms: "MotionTerms", left: "tuple[CheckPoint, ...]", new: str, *, off: bool
 ) -> "tuple[CheckPoint, ...]":
     from robolink_cli.wizard.check_list import CheckPoint, Mark
 
@@ -270,7 +283,6 @@ def _points(
         *left,
         CheckPoint(Mark.OK, terms.watch),
     ]
-    new = tr("The new nozzle is mounted and tight; tip and pin are clean")
     clear = tr("Nobody in the cell, hoses free")
     points.append(CheckPoint(Mark.YOU, new, "mounted", tr("Yes")))
     points.append(CheckPoint(Mark.YOU, clear, "clear", tr("Yes")))
@@ -282,7 +294,28 @@ def _points(
     return tuple(points)
 
 
+def _new_nozzle(at: "StationKind | None") -> str:
+    """Return what the person confirms of the new nozzle, and of what it is measured at."""
+    from robolink.stations import StationKind
+
+    match at:
+        case StationKind.PIN:
+            return tr("The new nozzle is mounted and tight; tip and pin are clean")
+        case StationKind.BEAMS:
+            return tr("The new nozzle is mounted and tight; tip and beams are clean")
+        case StationKind.TOUCH:
+            return tr("The new nozzle is mounted and tight; tip and surface are clean")
+        case StationKind.CAMERA:
+            return tr("The new nozzle is mounted and tight; tip and camera are clean")
+        case _:
+            return tr("The new nozzle is mounted and tight; the tip is clean")
+
+
 def _name(controller: "Controller") -> str:
     facts = controller.facts()
-    said = (*facts.robot_models, facts.controller_serial, facts.firmware)
+    serial = facts.controller_serial and tr("serial {serials}", serials=facts.controller_serial)
+    firmware = facts.firmware or ""
+    if firmware[:1].isdigit():  # a PLC says "mailbox 1.0"
+        firmware = tr("firmware {version}", version=firmware)
+    said = (*facts.robot_models, serial, firmware)
     return ", ".join(one for one in said if one) or controller.identity

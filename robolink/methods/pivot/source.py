@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from robolink.methods.pivot.proof import TiltTest
     from robolink.methods.pivot.tilts import Tilt
 
-_LEAST_AXES: Final = 5
+LEAST_AXES: Final = 5
 """X, Y, Z and a turn take four; whatever tilts needs another one."""
 
 
@@ -173,7 +173,7 @@ def require_tilting(controller: Controller, method: str) -> None:
         CalibrationError: ``rank_deficient``.
     """
     axes = axes_of(controller)
-    if not 0 < axes < _LEAST_AXES:
+    if not 0 < axes < LEAST_AXES:
         return
     raise CalibrationError(
         "rank_deficient",

@@ -245,7 +245,9 @@ def whole_change(cell: Any, case: Any, desk: Desk) -> None:
         tool = ToolPlan(TOOL, case.source(cell), approach=case.approach)
         if controller.capabilities.motors:
             controller.motors(True)
-        check_before_start(controller, "to measure", moves=9, speed_mm_s=20.0, box_mm=100.0)
+        check_before_start(
+            controller, "to measure", moves=9, speed_mm_s=20.0, box_mm=100.0, at=None
+        )
         change = NozzleChange(controller, ChangePlan((tool,), QUICK), operator=desk)
         desk.regard(change.run())
 

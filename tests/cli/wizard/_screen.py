@@ -15,6 +15,8 @@ from robolink_simulators.assist.port import InProcessEyes
 
 from tests.cli.wizard._hand_at_screen import HandAtScreen
 
+_THE_END = re.compile(r"(DONE|STOPPED|NOT STARTED) *(SIMULATED *)?$")
+
 
 class ScreenHand(HandAtScreen):
     """The far end of a pseudo terminal, drawn by pyte; and a hand at its keys.
@@ -78,7 +80,10 @@ class ScreenHand(HandAtScreen):
         """Leave the last screen, where there is one, and return the exit code."""
         end_s, shown = time.monotonic() + self.longest_s, ""
         while self.read(0.2) and time.monotonic() < end_s:
-            if re.search(r"(DONE|STOPPED|NOT STARTED) *(SIMULATED *)?$", self.screen.display[0]) and not shown:
+            if (
+                re.search(r"(DONE|STOPPED|NOT STARTED) *(SIMULATED *)?$", self.screen.display[0])
+                and not shown
+            ):
                 self.rest(0.5)
                 shown = self.last = self.text
                 self.press(["0"])

@@ -37,6 +37,7 @@ from robolink.model import Path as Way
 from robolink.model import Pose, ToolOffset, describe_offset
 from robolink.recipe import load_recipe
 from robolink.runner import MoveSubject, Question
+from robolink.stations import StationKind
 from robolink.timing import local_label
 from robolink.transaction import Wanted, change_tools
 from tests.cli.wizard._people import HEADER, Sitting, touch_subject, write_subject
@@ -160,7 +161,7 @@ def test_a_list_does_not_go_on_saying_what_is_no_longer_so():
         sitting_at(Presser(simulator)),
         pytest.raises(NotReadyError, match="emergency stop is pressed"),
     ):
-        check_before_start(controller, "to look", moves=2, speed_mm_s=20.0, box_mm=60.0)
+        check_before_start(controller, "to look", moves=2, speed_mm_s=20.0, box_mm=60.0, at=None)
 
 
 class Leaver(Desk):
@@ -170,12 +171,12 @@ class Leaver(Desk):
         return "n"
 
 
-def listed(controller, *tools):
+def listed(controller, *tools, at=None):
     """Return the texts of the check list, and its plan."""
     desk = Leaver()
     with click.Context(click.Command("change")), sitting_at(desk), pytest.raises(DeclinedError):
         check_before_start(
-            controller, "to look", moves=2, speed_mm_s=20.0, box_mm=60.0, tools=tools
+            controller, "to look", moves=2, speed_mm_s=20.0, box_mm=60.0, at=at, tools=tools
         )
     (subject,) = (
         one.subject
@@ -190,7 +191,11 @@ def test_a_list_claims_of_a_plc_only_what_its_mailbox_tells():
         serve_tcp(EpsonSimulator(seed=7), clock=ScaledClock(10.0)) as host,
         robolink.connect(host.url) as controller,
     ):
-        said = listed(controller)
+        said = listed(controller, at=StationKind.BEAMS)
+        assert "tip and beams are clean" in said
+        assert "pin" not in said, "there is none"
+        assert "serial C-SIM" in said
+        assert "firmware 7." in said
         assert "guard closed" in said
         assert "power LOW" in said
     with (
@@ -359,16 +364,20 @@ def test_a_job_is_chosen_by_what_it_does_and_when_it_did_so_last(tmp_path, monke
     here.close()
 
 
-def rows_offered(url):
+def rows_offered(url, cell=None):
+    return choice_offered(url, cell).options
+
+
+def choice_offered(url, cell=None):
     desk = Leaver()
     with pytest.raises(DeclinedError):
-        choose_recipe(desk, None, url)
+        choose_recipe(desk, cell, url)
     (subject,) = (
         one.subject
         for one in desk.happened()
         if isinstance(one, WasRegarded) and isinstance(one.subject, ChoiceSubject)
     )
-    return subject.options
+    return subject
 
 
 def jobs_offered(url):
@@ -441,3 +450,38 @@ def test_a_recipe_without_a_turn_test_has_one_step_less(tmp_path):
         path = tmp_path / "a.toml"
         path.write_text(said, encoding="utf-8")
         assert steps_of(load_recipe(path)) == number
+
+
+@pytest.mark.parametrize("copies", [True, False], ids=["to copy", "to run"])
+@pytest.mark.parametrize(
+    ("url", "robot", "tilts"),
+    [
+        ("epson+tcp://x:5000", "T6-602S", "no"),
+        ("epson+tcp://x:5000", "C8-C901S", "yes"),
+        ("softmotion+modbus-tcp://x", "Kin_Scara3_Z", "no"),
+        ("softmotion+modbus-tcp://x", "Kin_5Axes", "yes"),
+        ("softmotion+modbus-tcp://x", "Kin_Gantry3+Kin_CAxis", "nobody knows"),
+        ("epson+tcp://x:5000", "", "nobody knows"),
+    ],
+)
+def test_what_the_robot_of_the_cell_cannot_tilt_for_is_not_offered_and_else_that_is_said(
+    tmp_path, monkeypatch, url, robot, tilts, copies
+):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
+    named = f'robot = "{robot}"\n' if robot else ""
+    (tmp_path / "robolink.toml").write_text(f'[cells.line3]\nurl = "{url}"\n{named}')
+    if not copies:
+        for name in ("five-axes-pivot", "scara-pin"):
+            shutil.copy(RECIPES / f"{name}.toml", tmp_path)
+    subject = choice_offered(url, find_cell("line3"))
+    rows = [
+        " ".join((row, *said)) for row, said in zip(subject.options, subject.details, strict=True)
+    ]
+    (pivot,) = [row for row in rows if "five-axes-pivot" in row] or [""]
+    assert any("scara-pin" in row for row in rows), "it turns about Z, which each of them can"
+    assert bool(pivot) is (tilts != "no")
+    assert ("Needs a robot that tilts" in pivot) is (tilts == "nobody knows")
+    assert sum("Needs a robot that tilts" in row for row in rows) == (
+        0 if tilts != "nobody knows" else 3 if copies else 1
+    )

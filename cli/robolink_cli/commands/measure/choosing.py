@@ -124,14 +124,18 @@ def choose_recipe(
     def ask() -> tuple[str, ChoiceSubject]:
         if head is not None:
             desk.regard(head())
-        found = _of_this_kind(_of_this_cell(_loaded(desk, paths), cell), url)
+        found = _of_this_kind(_of_this_cell(_loaded(desk, paths), cell), url, _axes(cell))
         ordered = sorted(
             zip(found, _pasts(found, url), strict=True),
             key=lambda one: one[1].elsewhere is not None,
         )
         loaded[:] = [recipe for recipe, _ in ordered]
         pasts = [past for _, past in ordered]
-        details = tuple(_told_of(*one) for one in zip(loaded, pasts, strict=True))
+        unknown = _axes(cell) is None
+        details = tuple(
+            (*_told_of(*one), *_needs_tilt(one[0], unknown=unknown))
+            for one in zip(loaded, pasts, strict=True)
+        )
         rows = _rows_of(loaded, pasts)
         return tr("Which job?"), ChoiceSubject(tr("Choose"), (), rows, details=details)
 
@@ -175,8 +179,9 @@ def _copied(
     from robolink.recipe import load_recipe
     from robolink_cli.commands.shipped.recipe_copies import copy_recipe, models, purpose_of
 
-    fitting = _of_this_kind([load_recipe(path) for path in models().values()], url)
-    # Only a connected controller tells its axes: what fits every robot comes first.
+    axes = _axes(cell)
+    fitting = _of_this_kind([load_recipe(path) for path in models().values()], url, axes)
+    # What fits every robot comes first.
     fitting.sort(key=lambda one: one.recipe.source.of_method.needs.tilt)
 
     def ask() -> tuple[str, ChoiceSubject]:
@@ -184,7 +189,10 @@ def _copied(
             desk.regard(head())
         said = tr("Its numbers are those of a simulated cell: you put in yours before it runs.")
         rows = tuple(one.path.stem for one in fitting)
-        details = tuple((spoken(purpose_of(one.path)), said) for one in fitting)
+        details = tuple(
+            (spoken(purpose_of(one.path)), *_needs_tilt(one, unknown=axes is None), said)
+            for one in fitting
+        )
         question = tr("There is no recipe here yet. Which one is copied to begin with?")
         return question, ChoiceSubject(
             tr("Choose"), (), rows, details=details, does=tr("Copy it"), enters=False
@@ -220,8 +228,31 @@ def _of_this_cell(loaded: "list[LoadedRecipe]", cell: "Cell | None") -> "list[Lo
     )
 
 
-def _of_this_kind(loaded: "list[LoadedRecipe]", url: str | None) -> "list[LoadedRecipe]":
-    """Return the recipes that this kind of controller can carry out, by what a run refuses too.
+def _axes(cell: "Cell | None") -> int | None:
+    """Return how many axes the robot of a cell has, where the cell file names a model."""
+    from robolink.controllers import axes_of_model
+
+    if cell is None:
+        return None
+    return axes_of_model(cell.url.partition("+")[0], cell.settings.robot)
+
+
+def _needs_tilt(loaded: "LoadedRecipe", *, unknown: bool) -> tuple[str, ...]:
+    """Return what a recipe needs of a robot of which nobody knows yet whether it has that."""
+    if not unknown or not loaded.recipe.source.of_method.needs.tilt:
+        return ()
+    return (
+        tr(
+            "Needs a robot that tilts its tool. The cell file does not name the robot, so "
+            "whether it does shows after connecting."
+        ),
+    )
+
+
+def _of_this_kind(
+    loaded: "list[LoadedRecipe]", url: str | None, axes: int | None
+) -> "list[LoadedRecipe]":
+    """Return the recipes that this robot can carry out as far as known, as a run refuses the rest.
 
     Raises:
         ConfigError: There is none.
@@ -232,7 +263,7 @@ def _of_this_kind(loaded: "list[LoadedRecipe]", url: str | None) -> "list[Loaded
     able = capabilities_of_kind((url or "").partition("+")[0])
     if able is None:
         return loaded
-    found = [(one, beyond(one.recipe, able)) for one in loaded]
+    found = [(one, beyond(one.recipe, able, axes=axes)) for one in loaded]
     fitting = [one for one, why in found if not why]
     if fitting:
         return fitting

@@ -168,6 +168,7 @@ class Recalibration:
             moves=sum(step.target is not None for step in steps),
             speed_mm_s=run.plan.limits.speed_mm_s,
             box_mm=run.plan.limits.box.x_max_mm,
+            at=self._loaded.recipe.source.of_method.needs.station,
             tools=[plan.tool for plan in run.plan.tools],
         )
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 from robolink.errors import ControllerError
 from robolink.messages import declared, spoken, tr
 from robolink.model import AnsweredBy, Controller, Finding, MarkerKind, Pose, begun_in_words
+from robolink.stations import StationKind
 from robolink.timing import local_label
 from robolink.transaction import Recovery, Settler, look, recover
 from robolink_cli.console.render import json_is_on, note, say
@@ -271,6 +272,7 @@ class TurnTests:
             speed_mm_s=settings.speed_mm_s,
             box_mm=box.x_max_mm - box.x_min_mm,
             yes=False,
+            at=StationKind.PIN if tests[0].test.by_touch else None,
         )
 
 

@@ -104,8 +104,8 @@ def ended_of(state: WizardState, error: BaseException | None, at_s: float) -> La
         return None
     headed = _headed(state, error)
     kept = (_head(state, headed), *_where(state), *_next(state, error))
-    lines = tuple(stopped_lines(state, error))
-    return LastScreen(False, lines, kept, at_s, headed, again=not _is_blocked(error))
+    said = tuple(stopped_lines(state, error))
+    return LastScreen(False, said, kept, at_s, headed, again=not _is_blocked(error))
 
 
 def stopped_lines(state: WizardState, error: RobolinkError) -> list[str]:

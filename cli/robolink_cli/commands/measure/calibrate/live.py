@@ -6,6 +6,7 @@ from functools import partial
 from robolink.backup import keep_first_backup
 from robolink.calibration import known_doubts
 from robolink.messages import tr
+from robolink.methods import find_method
 from robolink.model import Controller
 from robolink.nozzle_change import (
     ChangePlan,
@@ -209,6 +210,7 @@ def _measure(
             speed_mm_s=frame.limits.speed_mm_s,
             box_mm=frame.limits.box.x_max_mm,
             yes=frame.yes,
+            at=find_method(frame.method).needs.station,
             tools=(live.tool,),
         )
         payload = live.run()

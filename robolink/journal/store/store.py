@@ -7,31 +7,30 @@ the whole journal; ``verify`` reads the rest.
 """
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from typing import Final
-
-from sqlalchemy import Connection, Engine
-from sqlalchemy.exc import SQLAlchemyError
 
 from robolink import ambient
 from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.errors import JournalError
 from robolink.journal._places import JournalPlace
 from robolink.journal._records import Filter
-from robolink.journal.store import migrations
+from robolink.journal.store import migrations, statements
 from robolink.journal.store.chain import ChainCheck
+from robolink.journal.store.connection import Connection
 from robolink.journal.store.engines import Backend, backend_of
 from robolink.journal.store.entry_rows import EntryRows
 from robolink.journal.store.failures import damaged_error, journal_error
 from robolink.journal.store.lease_rows import LeaseRows
 from robolink.journal.store.marker_rows import MarkerRows
 from robolink.journal.store.name_rows import NameRows
-from robolink.journal.store.prepared import Prepared, StatementRunner
 from robolink.messages import tr
 
 _NEWEST: Final = 20
 """How many entries are looked at, of the journal and of the controller."""
+
+_OF_FILES: Final = (OSError, UnicodeDecodeError)
 
 
 class Tables:
@@ -39,30 +38,31 @@ class Tables:
 
     Attributes:
         connection: The connection.
-        runner: Runs prepared statements over it.
         entries: The append-only record.
         markers: What is not settled.
         leases: Who may change which controller.
         names: Who is meant by a name or an address.
         newer: Whether a newer robolink made the tables.
-        self_checks: Statements by which the database looks for damage.
+        behind: Whether what others are writing does not show; see
+            :attr:`Backend.last_resort`.
     """
 
-    def __init__(
-        self, connection: Connection, version: int, self_checks: tuple[Prepared, ...]
-    ) -> None:
+    def __init__(self, connection: Connection, version: int, *, behind: bool) -> None:
         self.connection = connection
-        self.runner = StatementRunner(connection)
-        self.entries = EntryRows(self.runner)
-        self.markers = MarkerRows(self.runner)
-        self.leases = LeaseRows(self.runner)
+        self.entries = EntryRows(connection)
+        self.markers = MarkerRows(connection)
+        self.leases = LeaseRows(connection)
         self.names = NameRows(
-            self.runner,
+            connection,
             known=version >= migrations.NAMED,
             robots_known=version >= migrations.OF_ROBOTS,
         )
         self.newer = version > len(migrations.MIGRATIONS)
-        self.self_checks = self_checks
+        self.behind = behind
+
+    def unfinished(self) -> bool:
+        """Whether anything is open, or anybody at work, on any controller."""
+        return bool(self.connection.rows(statements.UNFINISHED))
 
     def damage(self, names: tuple[str, ...]) -> Iterator[str]:
         """Yield what is wrong with what a change of a controller would rest on, in sentences.
@@ -70,8 +70,8 @@ class Tables:
         Args:
             names: Of the controller.
         """
-        for check in self.self_checks:
-            for (answer,) in self.runner.rows(check):
+        for check in self.connection.self_checks:
+            for (answer,) in self.connection.rows(check):
                 if answer != "ok":
                     yield tr("A table is damaged: {text}.", text=str(answer).strip().rstrip("."))
         newest, head = self.entries.settled(
@@ -102,6 +102,7 @@ class Store:
         self._backend: Backend | None = None
         self._tables: Tables | None = None
         self._file: tuple[int, int] | None = None
+        self._failures: tuple[type[Exception], ...] = _OF_FILES
 
     @property
     def durable(self) -> bool:
@@ -166,7 +167,7 @@ class Store:
         with self._lock:
             self._drop()
             if self._backend is not None:
-                self._backend.engine.dispose()
+                self._backend.dispose()
                 self._backend = None
 
     @contextmanager
@@ -175,31 +176,32 @@ class Store:
             checkpoint(Checkpoint.COMMIT, "before")
         with self._lock:
             try:
-                backend, tables = self._connected(to_write=writing)
-                runner = tables.runner
-                if writing and backend.begin_writing is not None:
-                    runner.run(backend.begin_writing)
+                tables = self._connected(to_write=writing)
+                connection = tables.connection
+                if writing and connection.begin_writing:
+                    connection.run(connection.begin_writing)
                 try:
                     yield tables
                 except BaseException:
-                    runner.roll_back()
+                    connection.roll_back()
                     raise
                 if writing:
-                    runner.commit()
+                    connection.commit()
                 else:
-                    runner.roll_back()
+                    connection.roll_back()
             except JournalError:
                 self._drop()
                 raise
-            except (SQLAlchemyError, OSError, UnicodeDecodeError) as error:
+            except self._failures as error:
                 self._drop()
                 raise journal_error(error, self._place.name, consequence) from error
         if writing:
             checkpoint(Checkpoint.COMMIT, "after")
 
-    def _connected(self, *, to_write: bool) -> tuple[Backend, Tables]:
+    def _connected(self, *, to_write: bool) -> Tables:
         if self._backend is None:
             self._backend = backend_of(self._place, read_only=self._read_only)
+            self._failures = (*_OF_FILES, *self._backend.failures)
         if self._tables is None:
             self._tables = self._connect(self._backend)
             self._file = self._file_now()
@@ -211,47 +213,47 @@ class Store:
                     "of what is unfinished."
                 ),
             )
-        return self._backend, self._tables
+        return self._tables
 
     def _connect(self, backend: Backend) -> Tables:
         try:
-            return self._tables_of(backend.engine, backend)
+            return self._tables_of(backend.connect)
         except Exception as error:
             if backend.last_resort is None or isinstance(error, JournalError):
                 raise
             first = journal_error(error, self._place.name, "")
         try:
-            return self._tables_of(backend.last_resort, backend)
+            return self._tables_of(backend.last_resort, behind=True)
         except Exception as error:
             raise first from error
 
-    def _tables_of(self, engine: Engine, backend: Backend) -> Tables:
-        connection = engine.connect()
+    def _tables_of(self, connect: Callable[[], Connection], *, behind: bool = False) -> Tables:
+        connection = connect()
         try:
-            version = self._bring_up_to_date(connection, backend)
+            version = self._bring_up_to_date(connection)
         except BaseException:
             connection.close()
             raise
-        return Tables(connection, version, backend.self_checks)
+        return Tables(connection, version, behind=behind)
 
-    def _bring_up_to_date(self, connection: Connection, backend: Backend) -> int:
+    def _bring_up_to_date(self, connection: Connection) -> int:
         """Return the version of the tables; older ones that are only read stay as they are."""
         own, name = len(migrations.MIGRATIONS), self._place.name
-        with connection.begin():
-            found = migrations.stored_version(connection, name)
+        found = migrations.stored_version(connection, name)
+        connection.roll_back()
         if found > own and not self._read_only:
             raise migrations.newer_error(name, found)
         if found >= own or (self._read_only and found):
             return found
         if self._read_only:
             raise migrations.empty_error(name)
-        with connection.begin():
-            connection.exec_driver_sql(backend.begin_migrating)
-            # Another process may have been faster while this one waited for the lock.
-            found = migrations.stored_version(connection, name)
-            if found > own:
-                raise migrations.newer_error(name, found)
-            migrations.migrate(connection, found)
+        connection.run(connection.begin_migrating)
+        # Another process may have been faster while this one waited for the lock.
+        found = migrations.stored_version(connection, name)
+        if found > own:
+            raise migrations.newer_error(name, found)
+        migrations.migrate(connection, found)
+        connection.commit()
         return max(own, found)
 
     def _file_now(self) -> tuple[int, int] | None:

@@ -1,6 +1,6 @@
 """The journal: what was done to each tool, by whom, and what is not settled yet.
 
-Append-only: an SQLite file by default, PostgreSQL by URL (docs/decisions/0011-the-journal.md,
+Append-only: an SQLite file by default, PostgreSQL by URL (docs/decisions/0011,
 docs/reference/rules.md 6).
 """
 

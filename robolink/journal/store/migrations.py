@@ -14,55 +14,23 @@ from robolink.ways import Way, way
 
 _FIRST_TABLES: Final = """
     CREATE TABLE IF NOT EXISTS entries (
-        number {number_type} NOT NULL,
-        at TEXT NOT NULL,
-        controller TEXT NOT NULL,
-        kind TEXT NOT NULL,
-        change TEXT NOT NULL,
-        operation TEXT NOT NULL,
-        tool INTEGER,
-        tolerance TEXT NOT NULL,
-        verdict TEXT NOT NULL,
-        details TEXT NOT NULL,
-        proved_tool INTEGER,
-        operator TEXT NOT NULL,
-        role TEXT NOT NULL,
-        os_user TEXT NOT NULL,
-        host TEXT NOT NULL,
-        nozzle TEXT NOT NULL,
-        lot TEXT NOT NULL,
-        recipe TEXT NOT NULL,
-        recipe_hash TEXT NOT NULL,
-        station TEXT NOT NULL,
-        version TEXT NOT NULL,
-        previous TEXT NOT NULL,
-        hash TEXT NOT NULL,
-        PRIMARY KEY (number)
+        number {number_type} NOT NULL, at TEXT NOT NULL, controller TEXT NOT NULL,
+        kind TEXT NOT NULL, change TEXT NOT NULL, operation TEXT NOT NULL,
+        tool INTEGER, tolerance TEXT NOT NULL, verdict TEXT NOT NULL, details TEXT NOT NULL,
+        proved_tool INTEGER, operator TEXT NOT NULL, role TEXT NOT NULL, os_user TEXT NOT NULL,
+        host TEXT NOT NULL, nozzle TEXT NOT NULL, lot TEXT NOT NULL, recipe TEXT NOT NULL,
+        recipe_hash TEXT NOT NULL, station TEXT NOT NULL, version TEXT NOT NULL,
+        previous TEXT NOT NULL, hash TEXT NOT NULL, PRIMARY KEY (number)
     );
-    CREATE TABLE IF NOT EXISTS head (
-        number {number_type} NOT NULL,
-        hash TEXT NOT NULL
-    );
+    CREATE TABLE IF NOT EXISTS head (number {number_type} NOT NULL, hash TEXT NOT NULL);
     CREATE TABLE IF NOT EXISTS leases (
-        controller TEXT NOT NULL,
-        epoch BIGINT NOT NULL,
-        beat BIGINT NOT NULL,
-        beat_ns BIGINT NOT NULL,
-        token TEXT NOT NULL,
-        holder TEXT NOT NULL,
-        boot TEXT NOT NULL,
-        taken_at TEXT NOT NULL,
-        purpose TEXT NOT NULL,
-        PRIMARY KEY (controller)
+        controller TEXT NOT NULL, epoch BIGINT NOT NULL, beat BIGINT NOT NULL,
+        beat_ns BIGINT NOT NULL, token TEXT NOT NULL, holder TEXT NOT NULL, boot TEXT NOT NULL,
+        taken_at TEXT NOT NULL, purpose TEXT NOT NULL, PRIMARY KEY (controller)
     );
     CREATE TABLE IF NOT EXISTS markers (
-        controller TEXT NOT NULL,
-        operation TEXT NOT NULL,
-        id BIGINT NOT NULL,
-        kind TEXT NOT NULL,
-        request TEXT NOT NULL,
-        begun_at TEXT NOT NULL,
-        details TEXT NOT NULL,
+        controller TEXT NOT NULL, operation TEXT NOT NULL, id BIGINT NOT NULL, kind TEXT NOT NULL,
+        request TEXT NOT NULL, begun_at TEXT NOT NULL, details TEXT NOT NULL,
         PRIMARY KEY (controller, operation)
     ){keyed_table};
     CREATE TABLE IF NOT EXISTS schema_version (version INTEGER NOT NULL);
@@ -77,23 +45,17 @@ _FIRST_TABLES: Final = """
 
 _NAMES: Final = """
     CREATE TABLE IF NOT EXISTS addresses (
-        address TEXT NOT NULL,
-        controller TEXT NOT NULL,
-        met_at TEXT NOT NULL,
+        address TEXT NOT NULL, controller TEXT NOT NULL, met_at TEXT NOT NULL,
         PRIMARY KEY (address)
     );
     CREATE TABLE IF NOT EXISTS former_names (
-        name TEXT NOT NULL,
-        controller TEXT NOT NULL,
-        PRIMARY KEY (name)
+        name TEXT NOT NULL, controller TEXT NOT NULL, PRIMARY KEY (name)
     )
 """
 
 _ROBOTS: Final = """
     CREATE TABLE IF NOT EXISTS robots (
-        name TEXT NOT NULL,
-        controller TEXT NOT NULL,
-        PRIMARY KEY (name)
+        name TEXT NOT NULL, controller TEXT NOT NULL, PRIMARY KEY (name)
     )
 """
 

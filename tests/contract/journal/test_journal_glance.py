@@ -10,7 +10,12 @@ from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 
 import robolink
-from robolink.journal import close_files, default_location, nothing_is_open, open_journal
+from robolink.journal import (
+    close_files,
+    default_location,
+    nothing_is_open,
+    open_journal,
+)
 from robolink.model import Marker, MarkerKind
 
 
@@ -73,9 +78,7 @@ def test_a_server_is_not_glanced_at(address, monkeypatch):
     assert not nothing_is_open(address)
 
 
-HEAVY = (
-    "numpy pydantic pymodbus rich sqlalchemy asyncio robolink.calibration robolink.nozzle_change"
-)
+HEAVY = "numpy pydantic pymodbus rich asyncio robolink.calibration robolink.nozzle_change"
 
 PROBE = """
 import sys

@@ -44,6 +44,7 @@ class LookingLog:
         record: Opens the log that is stood in for; raises what is wrong with the journal.
         read: Opens a log of it that only reads; raises when that is impossible too.
         in_order: Tells whether the journal can be read and has nothing to say about a look.
+        trouble: What opening the log raised, where that was tried before.
     """
 
     def __init__(
@@ -54,6 +55,7 @@ class LookingLog:
         record: Callable[[], OutcomeLog],
         read: Callable[[], OutcomeLog],
         in_order: Callable[[], bool],
+        trouble: JournalError | None = None,
     ) -> None:
         self.signature = signature
         self._address = address
@@ -65,10 +67,8 @@ class LookingLog:
         self._reader: OutcomeLog | None = None
         self._trouble: JournalError | None = None
         self._change = self._order = ""
-
-    def opened(self) -> OutcomeLog:
-        """Return the log that is stood in for; this one where that cannot be opened."""
-        return self._recorder() or self
+        if trouble is not None:
+            self._go_on_without(trouble)
 
     @property
     def change(self) -> str:
@@ -244,11 +244,14 @@ class LookingLog:
             try:
                 self._opened = self._record()
             except JournalError as error:
-                self._trouble = error
-                with suppress(JournalError):
-                    self._reader = self._read()
+                self._go_on_without(error)
                 raise
             finally:
                 if self._who is not None:
                     self.ask(self._who)
         return self._opened
+
+    def _go_on_without(self, trouble: JournalError) -> None:
+        self._trouble = trouble
+        with suppress(JournalError):
+            self._reader = self._read()

@@ -6,7 +6,7 @@ from contextlib import closing
 from typing import TYPE_CHECKING, Final, NamedTuple, TypeVar
 from weakref import WeakValueDictionary
 
-from robolink.errors import ConfigError
+from robolink.errors import ConfigError, JournalError
 from robolink.journal._looking import LookingLog
 from robolink.journal._places import JournalPlace, default_location, memory_place, place_of
 from robolink.model import OutcomeLog, Signature
@@ -102,14 +102,20 @@ def open_log(
         journal.require_usable()  # one that was opened before may have been broken since
         return journal.log(address, signature=signature)
 
-    looking = LookingLog(
+    trouble = None
+    if not glance:
+        try:
+            return record()
+        except JournalError as error:
+            trouble = error
+    return LookingLog(
         address,
         signature=signature,
         record=record,
         read=lambda: open_journal(read_only=True).log(address, signature=signature),
         in_order=lambda: nothing_is_open(address),
+        trouble=trouble,
     )
-    return looking if glance else looking.opened()
 
 
 def nothing_is_open(address: str) -> bool:

@@ -17,7 +17,7 @@ _SCHEMA_LOCK: Final = 0x726F626F  # any number that no other user of the databas
 _PLACE: Final = re.compile(r":(\w+)")
 
 
-class Connection:
+class DatabaseConnection:
     """One connection to SQLite.
 
     Whatever the database refuses, each call raises as the driver does.
@@ -98,8 +98,8 @@ class Connection:
         return statement
 
 
-class PostgresqlConnection(Connection):
-    """One connection to PostgreSQL, by psycopg; see :class:`Connection`."""
+class PostgresqlConnection(DatabaseConnection):
+    """One connection to PostgreSQL, by psycopg; see :class:`DatabaseConnection`."""
 
     begin_writing = ""
     begin_migrating = f"SELECT pg_advisory_xact_lock({_SCHEMA_LOCK})"

@@ -13,7 +13,7 @@ from robolink import ambient
 from robolink.errors import JournalError
 from robolink.files.durable import make_folder, sync_folder
 from robolink.journal._places import JournalPlace
-from robolink.journal.store.connection import Connection, PostgresqlConnection
+from robolink.journal.store.connection import DatabaseConnection, PostgresqlConnection
 from robolink.messages import tr
 from robolink.timing import Deadline, SystemClock
 
@@ -69,9 +69,9 @@ class Backend:
         dispose: Ends what outlives the connections: memory.
     """
 
-    connect: Callable[[], Connection]
+    connect: Callable[[], DatabaseConnection]
     failures: tuple[type[Exception], ...] = (sqlite3.Error,)
-    last_resort: Callable[[], Connection] | None = None
+    last_resort: Callable[[], DatabaseConnection] | None = None
     dispose: Callable[[], None] = lambda: None
 
 
@@ -86,27 +86,27 @@ def backend_of(place: JournalPlace, *, read_only: bool) -> Backend:
         return _postgresql(place, read_only=read_only)
     if place.path is None:
         memory = _connect("file::memory:")
-        return Backend(lambda: Connection(memory, lasting=True), dispose=memory.close)
+        return Backend(lambda: DatabaseConnection(memory, lasting=True), dispose=memory.close)
     path = place.path
     if read_only:
         _require_file(place)
         return Backend(
-            lambda: Connection(_connect(_uri(path, "mode=ro"))),
+            lambda: DatabaseConnection(_connect(_uri(path, "mode=ro"))),
             # A read-only folder has no room for the shared memory that SQLite reads through.
-            last_resort=lambda: Connection(_connect(_uri(path, "immutable=1"))),
+            last_resort=lambda: DatabaseConnection(_connect(_uri(path, "immutable=1"))),
         )
     _make_file(path)
     return Backend(lambda: _to_write(path))
 
 
-def _to_write(path: Path) -> Connection:
+def _to_write(path: Path) -> DatabaseConnection:
     connection = _connect(_uri(path, "mode=rw"))
     try:
         _prepare(connection)
     except BaseException:
         connection.close()
         raise
-    return Connection(connection)
+    return DatabaseConnection(connection)
 
 
 def _connect(uri: str) -> sqlite3.Connection:
@@ -183,7 +183,7 @@ def _postgresql(place: JournalPlace, *, read_only: bool) -> Backend:
         settings.append("SET default_transaction_read_only TO on")
     where: dict[str, Any] = {**parameters_of(place.url), **_NOTICED}
 
-    def connect() -> Connection:
+    def connect() -> DatabaseConnection:
         connection = PostgresqlConnection(psycopg.connect(**where))
         try:
             for setting in settings:

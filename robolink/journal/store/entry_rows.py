@@ -8,7 +8,7 @@ from typing import Any, Final, TypeAlias, TypeVar
 from robolink.journal._records import Filter
 from robolink.journal.store import statements
 from robolink.journal.store.chain import canonical, digest, storable
-from robolink.journal.store.connection import Connection
+from robolink.journal.store.connection import DatabaseConnection
 from robolink.journal.store.statements import COLUMNS, KIND, NAME
 from robolink.messages import plain
 from robolink.model import PROOFS, NewEntry, Signature
@@ -28,7 +28,7 @@ _PLACES: Final = dict.fromkeys(sorted(name for name in COLUMNS if name != "hash"
 class EntryRows:
     """The append-only record over one connection."""
 
-    def __init__(self, connection: Connection) -> None:
+    def __init__(self, connection: DatabaseConnection) -> None:
         self._connection = connection
         self._head: _Head | None = None  # a guess: others add entries too
 

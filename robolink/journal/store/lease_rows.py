@@ -5,13 +5,13 @@ from collections.abc import Mapping
 from robolink.journal._sightings import FREE, LeaseSighting
 from robolink.journal.store import statements
 from robolink.journal.store.chain import storable
-from robolink.journal.store.connection import Connection
+from robolink.journal.store.connection import DatabaseConnection
 
 
 class LeaseRows:
     """Who may change which controller, over one connection."""
 
-    def __init__(self, connection: Connection) -> None:
+    def __init__(self, connection: DatabaseConnection) -> None:
         self._connection = connection
 
     def sight(self, controller: str) -> LeaseSighting:

@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 from robolink.errors import JournalError
 from robolink.journal.store import statements
 from robolink.journal.store.chain import canonical, storable
-from robolink.journal.store.connection import Connection
+from robolink.journal.store.connection import DatabaseConnection
 from robolink.messages import plain, tr
 from robolink.model import Marker, MarkerKind
 from robolink.timing import local_label
@@ -38,7 +38,7 @@ one that leaves the name of their controller out."""
 class MarkerRows:
     """What is not settled, over one connection."""
 
-    def __init__(self, connection: Connection) -> None:
+    def __init__(self, connection: DatabaseConnection) -> None:
         self._connection = connection
 
     def put(self, controller: str, marker: Marker) -> bool:

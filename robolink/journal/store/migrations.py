@@ -8,7 +8,7 @@ from typing import Final
 
 from robolink.errors import JournalError
 from robolink.journal.store import statements
-from robolink.journal.store.connection import Connection
+from robolink.journal.store.connection import DatabaseConnection
 from robolink.messages import tr
 from robolink.ways import Way, way
 
@@ -60,7 +60,7 @@ _ROBOTS: Final = """
 """
 
 
-def _first_tables(connection: Connection) -> None:
+def _first_tables(connection: DatabaseConnection) -> None:
     _run_all(
         connection,
         _FIRST_TABLES.format(
@@ -69,7 +69,7 @@ def _first_tables(connection: Connection) -> None:
     )
 
 
-def _names(connection: Connection) -> None:
+def _names(connection: DatabaseConnection) -> None:
     """Let a controller be known by what it says of itself, not by how its URL is spelled.
 
     Entries are chained and stay as they are: whose they are stands in ``former_names``.
@@ -77,7 +77,7 @@ def _names(connection: Connection) -> None:
     _run_all(connection, _NAMES)
 
 
-def _robots(connection: Connection) -> None:
+def _robots(connection: DatabaseConnection) -> None:
     """Let each robot of a controller with several have its own record.
 
     Entries of before tell only the controller. They are chained and stay as they are: listed,
@@ -87,12 +87,12 @@ def _robots(connection: Connection) -> None:
     _run_all(connection, _ROBOTS)
 
 
-def _run_all(connection: Connection, script: str) -> None:
+def _run_all(connection: DatabaseConnection, script: str) -> None:
     for statement in script.split(";"):  # executescript of sqlite3 would commit first
         connection.run(statement.strip())
 
 
-MIGRATIONS: tuple[Callable[[Connection], None], ...] = (_first_tables, _names, _robots)
+MIGRATIONS: tuple[Callable[[DatabaseConnection], None], ...] = (_first_tables, _names, _robots)
 
 NAMED: Final = 2
 """From this version on a journal tells names from addresses."""
@@ -101,7 +101,7 @@ OF_ROBOTS: Final = 3
 """From this version on it tells the robots of one controller from each other."""
 
 
-def stored_version(connection: Connection, name: str) -> int:
+def stored_version(connection: DatabaseConnection, name: str) -> int:
     """Return the version of the tables, 0 for an empty database.
 
     Raises:
@@ -122,7 +122,7 @@ def stored_version(connection: Connection, name: str) -> int:
     return rows[0][0] if rows else 0
 
 
-def migrate(connection: Connection, found: int) -> None:
+def migrate(connection: DatabaseConnection, found: int) -> None:
     """Bring tables of version ``found`` to the present one, inside the caller's transaction."""
     for step in MIGRATIONS[found:]:
         step(connection)

@@ -7,7 +7,7 @@ so keep theirs.
 
 from robolink.journal.store import statements
 from robolink.journal.store.chain import storable
-from robolink.journal.store.connection import Connection
+from robolink.journal.store.connection import DatabaseConnection
 from robolink.journal.store.marker_rows import MarkerRows
 
 
@@ -21,7 +21,7 @@ class NameRows:
         robots_known: Whether it has that of the robots.
     """
 
-    def __init__(self, connection: Connection, *, known: bool, robots_known: bool) -> None:
+    def __init__(self, connection: DatabaseConnection, *, known: bool, robots_known: bool) -> None:
         self._connection = connection
         self._known = known
         self._robots_known = robots_known

@@ -18,7 +18,7 @@ from robolink.journal._places import JournalPlace
 from robolink.journal._records import Filter
 from robolink.journal.store import migrations, statements
 from robolink.journal.store.chain import ChainCheck
-from robolink.journal.store.connection import Connection
+from robolink.journal.store.connection import DatabaseConnection
 from robolink.journal.store.engines import Backend, backend_of
 from robolink.journal.store.entry_rows import EntryRows
 from robolink.journal.store.failures import damaged_error, journal_error
@@ -47,7 +47,7 @@ class Tables:
             :attr:`Backend.last_resort`.
     """
 
-    def __init__(self, connection: Connection, version: int, *, behind: bool) -> None:
+    def __init__(self, connection: DatabaseConnection, version: int, *, behind: bool) -> None:
         self.connection = connection
         self.entries = EntryRows(connection)
         self.markers = MarkerRows(connection)
@@ -227,7 +227,9 @@ class Store:
         except Exception as error:
             raise first from error
 
-    def _tables_of(self, connect: Callable[[], Connection], *, behind: bool = False) -> Tables:
+    def _tables_of(
+        self, connect: Callable[[], DatabaseConnection], *, behind: bool = False
+    ) -> Tables:
         connection = connect()
         try:
             version = self._bring_up_to_date(connection)
@@ -236,7 +238,7 @@ class Store:
             raise
         return Tables(connection, version, behind=behind)
 
-    def _bring_up_to_date(self, connection: Connection) -> int:
+    def _bring_up_to_date(self, connection: DatabaseConnection) -> int:
         """Return the version of the tables; older ones that are only read stay as they are."""
         own, name = len(migrations.MIGRATIONS), self._place.name
         found = migrations.stored_version(connection, name)

@@ -16,7 +16,7 @@ from functools import partial
 from itertools import count
 
 from robolink.journal import EntryKind, JournalOutcomeLog, NewEntry, close_files, open_journal
-from robolink.journal.store.connection import Connection
+from robolink.journal.store.connection import DatabaseConnection
 from tests.contract.journal._acts import marker
 
 # On Windows os.kill ends a process by TerminateProcess, whatever signal it is given.
@@ -42,7 +42,7 @@ def kill_at(number: int) -> None:
             os.kill(os.getpid(), KILL)
 
     for name in ("run", "run_many", "rows", "commit"):
-        setattr(Connection, name, _after(step, getattr(Connection, name)))
+        setattr(DatabaseConnection, name, _after(step, getattr(DatabaseConnection, name)))
 
 
 def _after(step: Callable[[], None], run: Callable[..., object]) -> Callable[..., object]:

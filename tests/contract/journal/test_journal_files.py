@@ -13,7 +13,7 @@ import pytest
 
 from robolink.errors import JournalError
 from robolink.journal import ChainVerification, EntryKind, NewEntry, memory_journal, open_journal
-from robolink.journal.store.connection import NOTHING, Connection
+from robolink.journal.store.connection import NOTHING, DatabaseConnection
 from robolink.journal.store.entry_rows import EntryRows
 from tests.contract.journal._acts import marker
 
@@ -288,7 +288,7 @@ def test_many_entries_do_not_slow_down_the_questions_of_every_day(path, open_ane
     for _ in range(4):
         log.append(*[NewEntry(EntryKind.VERIFY, tool=3, change="c")] * 500)
     asked = []
-    rows = Connection.rows
+    rows = DatabaseConnection.rows
 
     def noted(connection, statement, values=NOTHING):
         if "FROM entries" in statement:  # names and leases are few
@@ -305,7 +305,7 @@ def test_many_entries_do_not_slow_down_the_questions_of_every_day(path, open_ane
         lambda: journal.last_value("cell", 3),
     )
     with monkeypatch.context() as patch:
-        patch.setattr(Connection, "rows", noted)
+        patch.setattr(DatabaseConnection, "rows", noted)
         assert all(question() for question in questions)
     assert len(asked) == len(questions)
     plans = {}

@@ -9,7 +9,6 @@ from robolink.errors import JournalError
 from robolink.journal._outcome_log import JournalOutcomeLog
 from robolink.journal._processes import LeaseHolder
 from robolink.journal._records import ChainVerification, Filter
-from robolink.journal._traces import traces_of
 from robolink.journal.store.chain import ChainCheck
 from robolink.messages import tr
 from robolink.model import EntryKind, Marker, Recorded, Signature
@@ -196,9 +195,7 @@ class Journal:
             JournalError: It cannot be read.
         """
         with self._store.read() as tables:
-            identity = tables.names.meant(controller)
-            former, robots = tables.names.former(identity), tables.names.robots(identity)
-            return (identity, *former, *robots)
+            return tables.names.all_of(controller)
 
     def robots_of(self, controller: str) -> tuple[str, ...]:
         """Return the names of the robots of a controller that has several, else nothing.
@@ -232,39 +229,6 @@ class Journal:
         """
         with self._store.read() as tables:
             return tables.markers.of_all()
-
-    def is_in_order(self, address: str) -> bool:
-        """Tell whether it has nothing to say about a look at what is reached at an address.
-
-        Nothing is unfinished and nobody at work, on any controller; who is there was met before,
-        and nothing shows that what was done to it is on record elsewhere, or lost.
-
-        Raises:
-            JournalError: It cannot be read.
-        """
-        with self._store.read() as tables:
-            name = tables.names.at(address)
-            if not name or tables.behind or tables.unfinished():
-                return False
-            traces = traces_of((name,))
-            if traces is None:
-                return True
-            names = (name, *tables.names.former(name), *tables.names.robots(name))
-            return traces.journal in ("", self.location) and tables.entries.history(names)
-
-    def subjects(self, controller: str) -> tuple[tuple[int | None, str], ...]:
-        """Return each tool, or ``None``, with each station that entries are about.
-
-        Args:
-            controller: Its identity, an address at which it was met, or a name of before; empty
-                for all.
-
-        Raises:
-            JournalError: It cannot be read.
-        """
-        names = self.names_of(controller) if controller else ()
-        with self._store.read() as tables:
-            return tables.entries.subjects(names)
 
     def close(self) -> None:
         """Close the connection; the next use makes a new one. A journal in memory ends here."""

@@ -13,6 +13,7 @@ from robolink.model import OutcomeLog, Signature
 
 if TYPE_CHECKING:
     from robolink.journal._journal import Journal
+    from robolink.journal.store.store import Tables
 
 T = TypeVar("T")
 
@@ -129,7 +130,7 @@ def nothing_is_open(address: str) -> bool:
     Returns:
         False also where that cannot be told; a server is not asked.
     """
-    return _asked(lambda journal: journal.is_in_order(address), unknown=False)
+    return _asked(lambda tables, location: tables.in_order(address, location), unknown=False)
 
 
 class NamesOnRecord(NamedTuple):
@@ -154,14 +155,17 @@ def names_on_record(address: str) -> NamesOnRecord:
         Nothing where the journal is on a server, or its file is missing or cannot be read.
     """
     nobody: tuple[tuple[int | None, str], ...] = ()
-    rows = _asked(lambda journal: journal.subjects(address), unknown=nobody)
+    rows = _asked(
+        lambda tables, _: tables.entries.subjects(tables.names.all_of(address) if address else ()),
+        unknown=nobody,
+    )
     return NamesOnRecord(
         tuple(sorted({tool for tool, _ in rows if isinstance(tool, int)})),
         tuple(sorted({str(station) for _, station in rows if station})),
     )
 
 
-def _asked(question: "Callable[[Journal], T]", *, unknown: T) -> T:
+def _asked(question: "Callable[[Tables, str], T]", *, unknown: T) -> T:
     """Ask this user's journal where it is a file; one that is not well, or not there, says nothing.
 
     The file is opened for the question alone: the next one may be about another file.
@@ -170,8 +174,10 @@ def _asked(question: "Callable[[Journal], T]", *, unknown: T) -> T:
         place = place_of(default_location())
         if place.path is None or not place.path.exists():
             return unknown
-        with closing(_open(place, read_only=True)) as journal:
-            return question(journal)
+        from robolink.journal.store.store import Store
+
+        with closing(Store(place, read_only=True)) as store, store.read() as tables:
+            return question(tables, place.location)
     except (ConfigError, OSError, ValueError):
         return unknown
 

@@ -14,7 +14,7 @@ Values: TypeAlias = Mapping[str, object]
 NOTHING: Final[Values] = {}
 
 _SCHEMA_LOCK: Final = 0x726F626F  # any number that no other user of the database takes
-_PLACE: Final = re.compile(r":(\w+)")
+_PLACE: Final = r":(\w+)"
 
 
 class DatabaseConnection:
@@ -125,4 +125,4 @@ class PostgresqlConnection(DatabaseConnection):
 
 @lru_cache(maxsize=512)
 def _for_psycopg(statement: str) -> str:
-    return _PLACE.sub(r"%(\1)s", statement)
+    return re.sub(_PLACE, r"%(\1)s", statement)

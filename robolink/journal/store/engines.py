@@ -44,17 +44,14 @@ _NOTICED: Final = {
 """A server whose network is cut is missed after :data:`BUSY_S`, also in the middle of a transaction
 (docs/reference/faults.md F78); the system's own patience is two hours."""
 
-_SERVER: Final = re.compile(
-    r"""
+_SERVER: Final = r"""
     (?:(?P<user>[^:/]*)(?::(?P<password>[^@]*))?@)?
     (?:\[(?P<address>[^/?]+)\]|(?P<host>[^/:?]+))?
     (?::(?P<port>[^/?]*))?
     (?:/(?P<dbname>[^?]*))?
     (?:\?(?P<query>.*))?
-    """,
-    re.VERBOSE,
-)
-_HOST_AND_PORT: Final = re.compile(r"([A-Za-z0-9.-]*):([0-9]*)")
+    """
+_HOST_AND_PORT: Final = r"([A-Za-z0-9.-]*):([0-9]*)"
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,7 +201,7 @@ def parameters_of(url: str) -> dict[str, str]:
     (https://www.postgresql.org/docs/current/libpq-connect.html). Several hosts stand there, as
     ``host=a,b&port=1,2`` or ``host=a:1&host=b:2``.
     """
-    found = _SERVER.match(url.partition("://")[2])
+    found = re.match(_SERVER, url.partition("://")[2], re.VERBOSE)
     parts = (
         {} if found is None else {name: text for name, text in found.groupdict().items() if text}
     )
@@ -218,7 +215,7 @@ def parameters_of(url: str) -> dict[str, str]:
         given.setdefault(name, []).append(text)
     told |= {name: ",".join(texts) for name, texts in given.items()}
     hosts = given.get("host", [])
-    pairs = [_HOST_AND_PORT.fullmatch(text) for text in hosts]
+    pairs = [re.fullmatch(_HOST_AND_PORT, text) for text in hosts]
     if any(pairs) and "port" not in given:
         told["host"] = ",".join(
             text if pair is None else pair[1] for text, pair in zip(hosts, pairs, strict=True)

@@ -38,6 +38,14 @@ class NameRows:
         """Return the controller that an address or a name leads to now, else the name itself."""
         return self.at(name) or self.successor(name) or name
 
+    def all_of(self, name: str) -> tuple[str, ...]:
+        """Return every name under which the controller that is meant is on record, its own first.
+
+        Of one with several robots that is all of them.
+        """
+        identity = self.meant(name)
+        return (identity, *self.former(identity), *self.robots(identity))
+
     def successor(self, name: str) -> str:
         """Return whose entries those under ``name`` are, empty when nobody's but its own."""
         return self._one(statements.SUCCESSOR, name)

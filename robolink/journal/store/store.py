@@ -16,6 +16,7 @@ from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.errors import JournalError
 from robolink.journal._places import JournalPlace
 from robolink.journal._records import Filter
+from robolink.journal._traces import traces_of
 from robolink.journal.store import migrations, statements
 from robolink.journal.store.chain import ChainCheck
 from robolink.journal.store.connection import DatabaseConnection
@@ -60,9 +61,23 @@ class Tables:
         self.newer = version > len(migrations.MIGRATIONS)
         self.behind = behind
 
-    def unfinished(self) -> bool:
-        """Whether anything is open, or anybody at work, on any controller."""
-        return bool(self.connection.rows(statements.UNFINISHED))
+    def in_order(self, address: str, location: str) -> bool:
+        """Tell whether there is nothing to say about a look at what is reached at an address.
+
+        Nothing is unfinished and nobody at work, on any controller; who is there was met before,
+        and nothing shows that what was done to it is on record elsewhere, or lost.
+
+        Args:
+            address: How it is reached.
+            location: Of this journal.
+        """
+        name = self.names.at(address)
+        if not name or self.behind or self.connection.rows(statements.UNFINISHED):
+            return False
+        traces = traces_of((name,))
+        if traces is None:
+            return True
+        return traces.journal in ("", location) and self.entries.history(self.names.all_of(name))
 
     def damage(self, names: tuple[str, ...]) -> Iterator[str]:
         """Yield what is wrong with what a change of a controller would rest on, in sentences.

@@ -45,7 +45,6 @@ def test_it_is_read_as_it_stands(made_before, open_anew):
     assert reader.verify() == ChainVerification(3, ())
     assert reader.last_value(ADDRESS, 3).details == {"value": {"x_mm": 1.25}}
     assert [known.operation for known in reader.log(ADDRESS).open_markers()] == ["b2"]
-    assert not reader.is_in_order(ADDRESS)
 
 
 def test_it_goes_on_where_it_ended(made_before, open_anew):

@@ -176,7 +176,7 @@ def _asked(question: "Callable[[Tables, str], T]", *, unknown: T) -> T:
             return unknown
         from robolink.journal.store.store import Store
 
-        with closing(Store(place, read_only=True)) as store, store.read() as tables:
+        with closing(Store(place, read_only=True, glance=True)) as store, store.read() as tables:
             return question(tables, place.location)
     except (ConfigError, OSError, ValueError):
         return unknown

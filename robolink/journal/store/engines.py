@@ -20,6 +20,9 @@ from robolink.timing import Deadline, SystemClock
 BUSY_S: Final = 3.0
 """How long a write waits for another program that writes."""
 
+GLANCE_S: Final = 1.0
+"""How long a look waits for one; after that the journal, opened to write, says what is wrong."""
+
 _AGAIN_S: Final = 0.01
 """Pause before a new file is asked again for its write-ahead log."""
 
@@ -72,8 +75,13 @@ class Backend:
     dispose: Callable[[], None] = lambda: None
 
 
-def backend_of(place: JournalPlace, *, read_only: bool) -> Backend:
+def backend_of(place: JournalPlace, *, read_only: bool, glance: bool = False) -> Backend:
     """Return the database at ``place``; no file and no server is opened yet.
+
+    Args:
+        place: Where it is.
+        read_only: Whether nothing is written.
+        glance: Whether that is for one short question: see :class:`Store`.
 
     Raises:
         OSError: The file or its folder cannot be made.
@@ -87,6 +95,8 @@ def backend_of(place: JournalPlace, *, read_only: bool) -> Backend:
     path = place.path
     if read_only:
         _require_file(place)
+        if glance:
+            return Backend(lambda: DatabaseConnection(_connect(_uri(path, "mode=ro"), GLANCE_S)))
         return Backend(
             lambda: DatabaseConnection(_connect(_uri(path, "mode=ro"))),
             # A read-only folder has no room for the shared memory that SQLite reads through.
@@ -106,11 +116,11 @@ def _to_write(path: Path) -> DatabaseConnection:
     return DatabaseConnection(connection)
 
 
-def _connect(uri: str) -> sqlite3.Connection:
+def _connect(uri: str, wait_s: float | None = None) -> sqlite3.Connection:
     # Transactions are begun by us, so that a write takes its lock first; one lock of the store
     # keeps threads apart.
     return sqlite3.connect(
-        uri, uri=True, timeout=BUSY_S, isolation_level=None, check_same_thread=False
+        uri, uri=True, timeout=wait_s or BUSY_S, isolation_level=None, check_same_thread=False
     )
 
 

@@ -44,11 +44,9 @@ class Tables:
         leases: Who may change which controller.
         names: Who is meant by a name or an address.
         newer: Whether a newer robolink made the tables.
-        behind: Whether what others are writing does not show; see
-            :attr:`Backend.last_resort`.
     """
 
-    def __init__(self, connection: DatabaseConnection, version: int, *, behind: bool) -> None:
+    def __init__(self, connection: DatabaseConnection, version: int) -> None:
         self.connection = connection
         self.entries = EntryRows(connection)
         self.markers = MarkerRows(connection)
@@ -59,7 +57,6 @@ class Tables:
             robots_known=version >= migrations.OF_ROBOTS,
         )
         self.newer = version > len(migrations.MIGRATIONS)
-        self.behind = behind
 
     def in_order(self, address: str, location: str) -> bool:
         """Tell whether there is nothing to say about a look at what is reached at an address.
@@ -72,7 +69,7 @@ class Tables:
             location: Of this journal.
         """
         name = self.names.at(address)
-        if not name or self.behind or self.connection.rows(statements.UNFINISHED):
+        if not name or self.connection.rows(statements.UNFINISHED):
             return False
         traces = traces_of((name,))
         if traces is None:
@@ -108,11 +105,18 @@ class Store:
 
     After any error the connection is dropped and the next use makes a new one, so that a
     server that was restarted is found again.
+
+    Args:
+        place: Where it is.
+        read_only: Whether nothing is written.
+        glance: Whether a file that cannot be read soon, or only without what others are writing,
+            counts as one that cannot be read.
     """
 
-    def __init__(self, place: JournalPlace, *, read_only: bool) -> None:
+    def __init__(self, place: JournalPlace, *, read_only: bool, glance: bool = False) -> None:
         self._place = place
         self._read_only = read_only
+        self._glance = glance
         self._lock = ambient.reentrant_lock()
         self._backend: Backend | None = None
         self._tables: Tables | None = None
@@ -215,7 +219,7 @@ class Store:
 
     def _connected(self, *, to_write: bool) -> Tables:
         if self._backend is None:
-            self._backend = backend_of(self._place, read_only=self._read_only)
+            self._backend = backend_of(self._place, read_only=self._read_only, glance=self._glance)
             self._failures = (*_OF_FILES, *self._backend.failures)
         if self._tables is None:
             self._tables = self._connect(self._backend)
@@ -238,20 +242,18 @@ class Store:
                 raise
             first = journal_error(error, self._place.name, "")
         try:
-            return self._tables_of(backend.last_resort, behind=True)
+            return self._tables_of(backend.last_resort)
         except Exception as error:
             raise first from error
 
-    def _tables_of(
-        self, connect: Callable[[], DatabaseConnection], *, behind: bool = False
-    ) -> Tables:
+    def _tables_of(self, connect: Callable[[], DatabaseConnection]) -> Tables:
         connection = connect()
         try:
             version = self._bring_up_to_date(connection)
         except BaseException:
             connection.close()
             raise
-        return Tables(connection, version, behind=behind)
+        return Tables(connection, version)
 
     def _bring_up_to_date(self, connection: DatabaseConnection) -> int:
         """Return the version of the tables; older ones that are only read stay as they are."""

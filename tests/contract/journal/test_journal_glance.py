@@ -102,7 +102,8 @@ def test_what_others_are_writing_does_not_show_so_a_look_believes_nothing(
     address, tmp_path, monkeypatch
 ):
     """A journal that somebody keeps to himself can be read, but only without its log."""
-    monkeypatch.setattr("robolink.journal.store.engines.BUSY_S", 0.02)
+    for patience in ("BUSY_S", "GLANCE_S"):
+        monkeypatch.setattr(f"robolink.journal.store.engines.{patience}", 0.02)
     close_files()
     holder = sqlite3.connect(tmp_path / "journal.db", isolation_level=None)
     with closing(holder):

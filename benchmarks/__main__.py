@@ -33,7 +33,7 @@ JSON: Final = ROOT / "build" / "bench.json"
 SCHEMA: Final = "robolink/bench/1"
 TOO_NOISY: Final = 3
 
-_PACKAGES: Final = ("numpy", "scipy", "pymodbus", "canopen", "SQLAlchemy", "click", "lark")
+_PACKAGES: Final = ("numpy", "scipy", "pymodbus", "canopen", "click", "lark")
 
 
 def main() -> int:

@@ -12,7 +12,7 @@ from importlib import import_module
 from typing import Final, Protocol, cast
 
 from robolink.errors import ConfigError, RobolinkError
-from robolink.journal import GlancingLog, open_log, signature_here
+from robolink.journal import open_log, signature_here
 from robolink.messages import tr
 from robolink.model import Capabilities, ChangeLimits, Controller, OutcomeLog, Secret, Signature
 from robolink.plug_ins import PlugInError, find_plug_in
@@ -91,9 +91,7 @@ class ConnectionTerms:
         """
         if self.outcomes is not None:
             return self.outcomes
-        if self.glance and durable:
-            return GlancingLog(address, signature=self.signature)
-        return open_log(address, durable=durable, signature=self.signature)
+        return open_log(address, durable=durable, signature=self.signature, glance=self.glance)
 
 
 class ControllerOpener(Protocol):

@@ -175,7 +175,7 @@ def _tell_which(wire: "MailboxWire", met: "Callable[[str], None]") -> None:
 def _stop_other(link: LinkUrl, means: _Means) -> "ControllerStatus":
     """Stop a controller of a kind that another package brings, by what it offers for that."""
     from robolink.controllers.registry import ConnectionTerms, find_opener
-    from robolink.journal import GlancingLog, signature_here
+    from robolink.journal import open_log, signature_here
     from robolink.model import Secret
     from robolink.version import VERSION
 
@@ -187,7 +187,7 @@ def _stop_other(link: LinkUrl, means: _Means) -> "ControllerStatus":
         clock=means.clock,
         trace=means.trace,
         # It opens no journal before something has to be recorded.
-        outcomes=GlancingLog(link.address, signature=signature),
+        outcomes=open_log(link.address, durable=True, signature=signature, glance=True),
     )
     with find_opener(link)(link, terms) as controller:
         controller.stop()

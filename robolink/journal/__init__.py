@@ -1,8 +1,7 @@
 """The journal: what was done to each tool, by whom, and what is not settled yet.
 
-Append-only, on SQLAlchemy Core: an SQLite file by default, PostgreSQL by URL
-(docs/decisions/0011-journal-on-sqlalchemy.md, docs/reference/rules.md 6). Importing this package
-loads no database code; opening a journal does.
+Append-only: an SQLite file by default, PostgreSQL by URL (docs/decisions/0011,
+docs/reference/rules.md 6).
 """
 
 from typing import TYPE_CHECKING
@@ -14,15 +13,14 @@ from robolink.model import Recorded as Recorded
 from robolink.model import Signature as Signature
 
 if TYPE_CHECKING:
-    from robolink.journal._glancing import GlancingLog as GlancingLog
-    from robolink.journal._glancing import NamesOnRecord as NamesOnRecord
-    from robolink.journal._glancing import names_on_record as names_on_record
-    from robolink.journal._glancing import nothing_is_open as nothing_is_open
     from robolink.journal._journal import Journal as Journal
     from robolink.journal._looking import LookingLog as LookingLog
+    from robolink.journal._opening import NamesOnRecord as NamesOnRecord
     from robolink.journal._opening import close_files as close_files
     from robolink.journal._opening import forget_memory as forget_memory
     from robolink.journal._opening import memory_journal as memory_journal
+    from robolink.journal._opening import names_on_record as names_on_record
+    from robolink.journal._opening import nothing_is_open as nothing_is_open
     from robolink.journal._opening import open_journal as open_journal
     from robolink.journal._opening import open_log as open_log
     from robolink.journal._outcome_log import JournalOutcomeLog as JournalOutcomeLog
@@ -37,11 +35,11 @@ else:
     __getattr__ = lazy_exports(
         __name__,
         {
-            "_glancing": "GlancingLog NamesOnRecord names_on_record nothing_is_open",
             "_journal": "Journal",
             "_outcome_log": "JournalOutcomeLog",
             "_looking": "LookingLog",
-            "_opening": "close_files forget_memory memory_journal open_journal open_log",
+            "_opening": "NamesOnRecord close_files forget_memory memory_journal names_on_record "
+            "nothing_is_open open_journal open_log",
             "_places": "default_location may_exist",
             "_processes": "LeaseHolder signature_here this_process",
             "_records": "ChainVerification",

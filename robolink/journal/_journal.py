@@ -31,7 +31,7 @@ class Journal:
     one journal at once.
 
     Attributes:
-        location: Its SQLAlchemy URL, without the password.
+        location: Its URL, without the password.
         read_only: Whether nothing can be added.
     """
 
@@ -195,9 +195,7 @@ class Journal:
             JournalError: It cannot be read.
         """
         with self._store.read() as tables:
-            identity = tables.names.meant(controller)
-            former, robots = tables.names.former(identity), tables.names.robots(identity)
-            return (identity, *former, *robots)
+            return tables.names.all_of(controller)
 
     def robots_of(self, controller: str) -> tuple[str, ...]:
         """Return the names of the robots of a controller that has several, else nothing.

@@ -1,16 +1,21 @@
 """Opening a journal: one connection for each place and process."""
 
 import threading
-from typing import TYPE_CHECKING, Final
+from collections.abc import Callable
+from contextlib import closing
+from typing import TYPE_CHECKING, Final, NamedTuple, TypeVar
 from weakref import WeakValueDictionary
 
-from robolink.errors import JournalError
+from robolink.errors import ConfigError, JournalError
 from robolink.journal._looking import LookingLog
 from robolink.journal._places import JournalPlace, default_location, memory_place, place_of
 from robolink.model import OutcomeLog, Signature
 
 if TYPE_CHECKING:
     from robolink.journal._journal import Journal
+    from robolink.journal.store.store import Tables
+
+T = TypeVar("T")
 
 _lock: Final = threading.Lock()
 _opened: Final[dict[tuple[str, bool], "Journal"]] = {}
@@ -68,7 +73,9 @@ def forget_memory(identity: str) -> None:
         journal.close()
 
 
-def open_log(address: str, *, durable: bool, signature: Signature) -> OutcomeLog:
+def open_log(
+    address: str, *, durable: bool, signature: Signature, glance: bool = False
+) -> OutcomeLog:
     """Return the record of a controller, which may be one that cannot be kept.
 
     Looking at a controller and calming it needs no record: a journal that cannot be opened
@@ -78,6 +85,8 @@ def open_log(address: str, *, durable: bool, signature: Signature) -> OutcomeLog
         address: How the controller is reached.
         durable: Whether it outlives this process, so that its record must too.
         signature: Who works here.
+        glance: Whether this is for a look, so that a journal that outlives this process is not
+            opened before something is unfinished there or has to be recorded.
 
     Example:
         >>> from robolink.journal import open_log, signature_here
@@ -88,17 +97,89 @@ def open_log(address: str, *, durable: bool, signature: Signature) -> OutcomeLog
     """
     if not durable:
         return memory_journal(address).log(address, signature=signature)
-    try:
+
+    def record() -> OutcomeLog:
         journal = open_journal()
         journal.require_usable()  # one that was opened before may have been broken since
         return journal.log(address, signature=signature)
-    except JournalError as error:
-        return LookingLog(
-            error,
-            lambda: open_journal(read_only=True).log(address, signature=signature),
-            address=address,
-            signature=signature,
-        )
+
+    trouble = None
+    if not glance:
+        try:
+            return record()
+        except JournalError as error:
+            trouble = error
+    return LookingLog(
+        address,
+        signature=signature,
+        record=record,
+        read=lambda: open_journal(read_only=True).log(address, signature=signature),
+        in_order=lambda: nothing_is_open(address),
+        trouble=trouble,
+    )
+
+
+def nothing_is_open(address: str) -> bool:
+    """Tell whether the journal is a readable file that has nothing to say about a look.
+
+    Args:
+        address: How the controller is reached. One that was not met there before is asked who
+            it is, and what follows from that is said. So is one that was changed from here, where
+            this journal might not be its record.
+
+    Returns:
+        False also where that cannot be told; a server is not asked.
+    """
+    return _asked(lambda tables, location: tables.in_order(address, location), unknown=False)
+
+
+class NamesOnRecord(NamedTuple):
+    """What a journal has entries about.
+
+    Attributes:
+        tools: Numbers of tools, in their order.
+        stations: Ids of stations, in the order of the alphabet.
+    """
+
+    tools: tuple[int, ...] = ()
+    stations: tuple[str, ...] = ()
+
+
+def names_on_record(address: str) -> NamesOnRecord:
+    """Return the tools and stations on record, for TAB.
+
+    Args:
+        address: How the controller is reached; empty for all controllers.
+
+    Returns:
+        Nothing where the journal is on a server, or its file is missing or cannot be read.
+    """
+    nobody: tuple[tuple[int | None, str], ...] = ()
+    rows = _asked(
+        lambda tables, _: tables.entries.subjects(tables.names.all_of(address) if address else ()),
+        unknown=nobody,
+    )
+    return NamesOnRecord(
+        tuple(sorted({tool for tool, _ in rows if isinstance(tool, int)})),
+        tuple(sorted({str(station) for _, station in rows if station})),
+    )
+
+
+def _asked(question: "Callable[[Tables, str], T]", *, unknown: T) -> T:
+    """Ask this user's journal where it is a file; one that is not well, or not there, says nothing.
+
+    The file is opened for the question alone: the next one may be about another file.
+    """
+    try:
+        place = place_of(default_location())
+        if place.path is None or not place.path.exists():
+            return unknown
+        from robolink.journal.store.store import Store
+
+        with closing(Store(place, read_only=True, glance=True)) as store, store.read() as tables:
+            return question(tables, place.location)
+    except (ConfigError, OSError, ValueError):
+        return unknown
 
 
 def close_files() -> None:
@@ -113,7 +194,7 @@ def close_files() -> None:
 
 def _open(place: JournalPlace, *, read_only: bool) -> "Journal":
     from robolink.journal._journal import Journal
-    from robolink.journal.store.store import Store  # here, because it loads SQLAlchemy
+    from robolink.journal.store.store import Store
 
     store = Store(place, read_only=read_only)
     store.open()

@@ -39,7 +39,7 @@ class JournalPlace:
     """Where one journal is: a file, a server, or the memory of this process.
 
     Attributes:
-        location: The SQLAlchemy URL without its password.
+        location: The URL without its password.
         name: What a person is told: the file's path, or the URL.
         path: The file; ``None`` when it is none.
         url: The URL of a server, password and all; empty when it is none.
@@ -52,7 +52,7 @@ class JournalPlace:
 
 
 def default_location() -> str:
-    """Return the SQLAlchemy URL of this user's journal.
+    """Return the URL of this user's journal.
 
     ROBOLINK_JOURNAL names it, as a URL or as a path. Without that it is ``journal.db`` in
     ROBOLINK_STATE_DIR or, without that too, in the user's data folder for robolink.

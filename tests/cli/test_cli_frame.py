@@ -28,7 +28,7 @@ HEAVY = {
     "pymodbus",
     "can",
     "canopen",
-    "sqlalchemy",
+    "sqlite3",
     "pydantic",
     "rich",
     "lark",

@@ -193,7 +193,7 @@ def _loaded_by_tab(shell_environment, line, word):
     program = (
         "import atexit, sys\n"
         "heavy = {'pydantic', 'rich', 'serial', 'keyring', 'lark', 'robolink.controllers', "
-        "'sqlalchemy', 'numpy', 'pymodbus', 'can', 'canopen'}\n"
+        "'numpy', 'pymodbus', 'can', 'canopen'}\n"
         "atexit.register(lambda: print('loaded:', sorted(heavy & set(sys.modules))))\n"
         "from robolink_cli.main import main\n"
         "main()\n"

@@ -382,7 +382,7 @@ def test_the_environment_names_the_controller(monkeypatch):
 
 
 HEAVY = """
-can canopen click jinja2 keyring lark numpy pydantic pymodbus rich sqlalchemy sqlite3 logging
+can canopen click jinja2 keyring lark numpy pydantic pymodbus rich sqlite3 logging
 asyncio robolink.journal robolink.calibration robolink.controllers.epson.controller
 robolink.controllers.softmotion.controller
 """

@@ -46,7 +46,7 @@ def instead(tmp_path):
     return run
 
 
-@pytest.mark.parametrize("name", ["click", "pydantic", "sqlalchemy"])
+@pytest.mark.parametrize("name", ["click", "pydantic", "rich"])
 def test_doctor_names_what_is_there_and_what_is_needed(instead, name):
     done = instead(name, "1.0.3", BREAKS, "doctor")
     assert done.returncode == 1, done.stderr

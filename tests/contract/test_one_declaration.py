@@ -227,7 +227,7 @@ def test_help_asks_for_no_mathematics_and_no_recipes():
         "for words in [[], *commands]:\n"
         "    shown = CliRunner().invoke(calibrate, [*words, '--help'])\n"
         "    assert shown.exit_code == 0, shown.output\n"
-        "late = {'numpy', 'pydantic', 'sqlalchemy', 'pymodbus', 'can', 'rich'}\n"
+        "late = {'numpy', 'pydantic', 'sqlite3', 'pymodbus', 'can', 'rich'}\n"
         "assert not late & {*sys.modules}, late & {*sys.modules}"
     )
     subprocess.run([sys.executable, "-c", code], check=True, timeout=30)

@@ -1,13 +1,11 @@
 """The fixture ``epson_replay``, as the tests of somebody else use it."""
 
 import pytest
-import sqlalchemy.dialects.sqlite  # noqa: F401 - see below
 
 import robolink
 from robolink.timing import wall_label
 from robolink.transport import DialogueLog, format_dialogue
 
-# It forgets what is imported while it runs, and SQLAlchemy does not bear to be imported twice.
 pytest_plugins = ["pytester"]
 
 TESTS = """

@@ -339,7 +339,7 @@ import weakref
 import pytest
 
 def test_the_plugin_is_light():
-    heavy = {"numpy", "lark", "pymodbus", "can", "canopen", "sqlalchemy", "pydantic", "click"}
+    heavy = {"numpy", "lark", "pymodbus", "can", "canopen", "psycopg", "pydantic", "click"}
     assert not heavy & set(sys.modules)
     ours = [name for name in sys.modules if name.startswith("robolink")]
     assert ours == ["robolink_simulators", "robolink_simulators.pytest_plugin"]

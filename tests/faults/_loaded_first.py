@@ -22,8 +22,6 @@ import robolink_cli.session.selected_tool
 import robolink_cli.stopping.notes
 import robolink_simulators.assist.port
 import robolink_simulators.cell.clock
-import sqlalchemy.dialects.postgresql
-import sqlalchemy.dialects.sqlite
 
 import robolink.controllers
 import robolink.journal

@@ -88,11 +88,11 @@ def commits(refused: Callable[[int], bool]) -> Iterator[list[int]]:
             if not refused(number):
                 yield tables
                 return
-            tables.connection.exec_driver_sql("PRAGMA query_only=ON")
+            tables.connection.run("PRAGMA query_only=ON")
             try:
                 yield tables
             finally:
-                tables.connection.exec_driver_sql("PRAGMA query_only=OFF")
+                tables.connection.run("PRAGMA query_only=OFF")
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Store, "write", watched)

@@ -22,7 +22,7 @@ _HEAVY: Final = (
     "pytest",
     "numpy",
     "pydantic",
-    "sqlalchemy.dialects.sqlite",
+    "sqlite3",
     "click",
     "rich.console",
     "rich.table",

@@ -149,7 +149,7 @@ DEFECTS: Final = (
         {"robolink.journal.store.engines._prepare": stand_ins.not_synced},
     ),
     KnownDefect(
-        "an error of the journal's disk is one of SQLAlchemy's",
+        "an error of the journal's disk is one of the database's",
         {"robolink.journal.store.store.journal_error": stand_ins.as_it_was_raised},
         found_by="an unwritable journal",
     ),

@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robolink.journal import ChainVerification, EntryKind, NewEntry, Signature, memory_journal
-from robolink.journal.store.tables import ENTRIES
+from robolink.journal.store.statements import COLUMNS as STORED
 from robolink.model import new_operation
 
-COLUMNS = [column.name for column in ENTRIES.columns]
+COLUMNS = list(STORED)
 TEXTS = st.text(st.characters(), max_size=8)
 PLAIN = st.recursive(
     st.none()
@@ -50,7 +50,7 @@ def filled(count):
 
 def tamper(journal, statement):
     with journal._store.write() as tables:
-        tables.connection.exec_driver_sql(statement)
+        tables.connection.run(statement)
 
 
 @settings(max_examples=40, deadline=None)
@@ -129,8 +129,10 @@ def test_a_changed_note_of_the_end_is_found(statement, problem):
 def test_an_entry_that_was_hashed_anew_does_not_fit_the_next_one():
     journal = filled(3)
     with journal._store.read() as tables:
-        found = tables.connection.exec_driver_sql("SELECT * FROM entries WHERE number = 2")
-        row = dict(found.mappings().one())
+        (found,) = tables.connection.rows(
+            f"SELECT {', '.join(COLUMNS)} FROM entries WHERE number = 2"
+        )
+        row = dict(zip(COLUMNS, found, strict=True))
     del row["hash"]
     row["verdict"] = "forged"
     forged = sha256(json.dumps(row, sort_keys=True, separators=(",", ":")).encode()).hexdigest()

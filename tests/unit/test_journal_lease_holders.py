@@ -116,7 +116,7 @@ def test_a_lease_that_is_freed_while_it_is_watched_can_be_taken(leases):
 def test_a_lease_whose_holder_makes_no_sense_is_watched_like_a_stranger(leases):
     leases.log(ANNA).begin(marker("a"))
     with leases.journal._store.write() as tables:
-        tables.connection.exec_driver_sql("UPDATE leases SET holder = 'torn'")
+        tables.connection.run("UPDATE leases SET holder = 'torn'")
     began_ns = leases.clock.now_ns()
     leases.log(BERT).begin(marker("b"))
     assert leases.clock.now_ns() - began_ns == LEASE_S * 1e9

@@ -161,7 +161,7 @@ def test_nothing_of_a_clear_that_fails_is_done(journal, log):
 def test_a_marker_that_makes_no_sense_blocks_its_controller(journal, log, column, value):
     log.begin(marker("a"))
     with journal._store.write() as tables:
-        tables.connection.exec_driver_sql(f"UPDATE markers SET {column} = {value}")
+        tables.connection.run(f"UPDATE markers SET {column} = {value}")
     with pytest.raises(JournalError, match="cannot be read") as caught:
         log.open_markers()
     assert "by hand" in caught.value.remedy

@@ -9,6 +9,7 @@ import pytest
 from robolink.errors import JournalError
 from robolink.journal import default_location
 from robolink.journal._places import place_of
+from robolink.journal.store.engines import parameters_of
 
 
 @pytest.fixture(autouse=True)
@@ -86,7 +87,7 @@ def test_no_database_code_is_loaded_before_a_journal_is_opened():
     program = (
         "import sys, robolink.journal\n"
         "robolink.journal.default_location\n"
-        "print([name for name in sys.modules if name.startswith(('sqlalchemy', 'psycopg'))])"
+        "print([name for name in sys.modules if name.startswith(('sqlite3', 'psycopg'))])"
     )
     shown = subprocess.run(
         [sys.executable, "-c", program],
@@ -96,3 +97,25 @@ def test_no_database_code_is_loaded_before_a_journal_is_opened():
         cwd=Path(__file__).parents[2],
     )
     assert shown.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize(
+    ("url", "told"),
+    [
+        ("cells@db.plant/journal", {"user": "cells", "host": "db.plant", "dbname": "journal"}),
+        (
+            "u%40x:p%2F@[::1]:5433/j%20k",
+            {"user": "u@x", "password": "p/", "host": "::1", "port": "5433", "dbname": "j k"},
+        ),
+        ("u:ge/heim@db/j", {"user": "u", "password": "ge/heim", "host": "db", "dbname": "j"}),
+        ("/j?host=/run/postgresql", {"dbname": "j", "host": "/run/postgresql"}),
+        ("/j?host=a:1&host=b", {"dbname": "j", "host": "a,b", "port": "1,"}),
+        ("/j?host=a,b&port=1,2", {"dbname": "j", "host": "a,b", "port": "1,2"}),
+        (
+            "db/j?options=-c+search_path%3Dx&sslmode=require",
+            {"host": "db", "dbname": "j", "options": "-c search_path=x", "sslmode": "require"},
+        ),
+    ],
+)
+def test_a_server_is_told_what_its_url_says(url, told):
+    assert parameters_of(f"postgresql+psycopg://{url}") == told

@@ -7,7 +7,6 @@ FAILING: Final[Mapping[str, tuple[str, str]]] = {
     "annotated-types": ("0.5.0", "tests/unit/test_recipe_files.py"),
     "click": ("8.4.2", "tests/cli/test_completion.py"),
     "pydantic": ("2.8.2", "tests/unit/test_recipe_files.py"),
-    "sqlalchemy": ("2.0.41", "tests/contract/journal/test_journal_files.py"),
 }
 """The release beneath the lowest, and tests that do not pass with it."""
 

@@ -1,26 +1,27 @@
-"""The two databases: all that differs between them."""
+"""The two databases: how each is connected to, and what it is told first."""
 
 import os
+import re
 import sqlite3
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
-from urllib.parse import quote
-
-from sqlalchemy import Engine, create_engine, event, text
-from sqlalchemy.pool import NullPool, Pool, StaticPool
+from urllib.parse import parse_qsl, quote, unquote
 
 from robolink import ambient
 from robolink.errors import JournalError
 from robolink.files.durable import make_folder, sync_folder
 from robolink.journal._places import JournalPlace
-from robolink.journal.store.prepared import Prepared
+from robolink.journal.store.connection import DatabaseConnection, PostgresqlConnection
 from robolink.messages import tr
 from robolink.timing import Deadline, SystemClock
 
 BUSY_S: Final = 3.0
 """How long a write waits for another program that writes."""
+
+GLANCE_S: Final = 1.0
+"""How long a look waits for one; after that the journal, opened to write, says what is wrong."""
 
 _AGAIN_S: Final = 0.01
 """Pause before a new file is asked again for its write-ahead log."""
@@ -46,13 +47,14 @@ _NOTICED: Final = {
 """A server whose network is cut is missed after :data:`BUSY_S`, also in the middle of a transaction
 (docs/reference/faults.md F78); the system's own patience is two hours."""
 
-_SCHEMA_LOCK: Final = 0x726F626F  # any number that no other user of the database takes
-
-_BEGIN: Final = "BEGIN IMMEDIATE"
-_BEGIN_WRITING: Final = Prepared(text(_BEGIN))
-_SELF_CHECKS: Final = tuple(
-    Prepared(text(f"PRAGMA quick_check({name})")) for name in ("markers", "leases", "head")
-)
+_SERVER: Final = r"""
+    (?:(?P<user>[^:/]*)(?::(?P<password>[^@]*))?@)?
+    (?:\[(?P<address>[^/?]+)\]|(?P<host>[^/:?]+))?
+    (?::(?P<port>[^/?]*))?
+    (?:/(?P<dbname>[^?]*))?
+    (?:\?(?P<query>.*))?
+    """
+_HOST_AND_PORT: Final = r"([A-Za-z0-9.-]*):([0-9]*)"
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,23 +62,26 @@ class Backend:
     """One database.
 
     Attributes:
-        engine: Makes connections.
-        last_resort: Makes connections to a file that the first one cannot read.
-        begin_writing: Statement that takes the write lock at the start of a transaction.
-        begin_migrating: Statement that keeps others from changing the tables.
-        self_checks: Statements by which it looks for damage in small tables; each answers
-            "ok". PostgreSQL checks each page that it reads.
+        connect: Makes a connection.
+        failures: What it may raise about the database.
+        last_resort: Makes a connection to a file that the first one cannot read; what is being
+            written there does not show.
+        dispose: Ends what outlives the connections: memory.
     """
 
-    engine: Engine
-    last_resort: Engine | None = None
-    begin_writing: Prepared | None = None
-    begin_migrating: str = ""
-    self_checks: tuple[Prepared, ...] = ()
+    connect: Callable[[], DatabaseConnection]
+    failures: tuple[type[Exception], ...] = (sqlite3.Error,)
+    last_resort: Callable[[], DatabaseConnection] | None = None
+    dispose: Callable[[], None] = lambda: None
 
 
-def backend_of(place: JournalPlace, *, read_only: bool) -> Backend:
-    """Return the database at ``place``; nothing is opened yet.
+def backend_of(place: JournalPlace, *, read_only: bool, glance: bool = False) -> Backend:
+    """Return the database at ``place``; no file and no server is opened yet.
+
+    Args:
+        place: Where it is.
+        read_only: Whether nothing is written.
+        glance: Whether that is for one short question: see :class:`Store`.
 
     Raises:
         OSError: The file or its folder cannot be made.
@@ -85,55 +90,38 @@ def backend_of(place: JournalPlace, *, read_only: bool) -> Backend:
     if place.url:
         return _postgresql(place, read_only=read_only)
     if place.path is None:
-        return _sqlite(_engine(_memory, StaticPool))
+        memory = _connect("file::memory:")
+        return Backend(lambda: DatabaseConnection(memory, lasting=True), dispose=memory.close)
+    path = place.path
     if read_only:
         _require_file(place)
+        if glance:
+            return Backend(lambda: DatabaseConnection(_connect(_uri(path, "mode=ro"), GLANCE_S)))
         return Backend(
-            _file_engine(_uri(place.path, "mode=ro")),
+            lambda: DatabaseConnection(_connect(_uri(path, "mode=ro"))),
             # A read-only folder has no room for the shared memory that SQLite reads through.
-            last_resort=_file_engine(_uri(place.path, "immutable=1")),
+            last_resort=lambda: DatabaseConnection(_connect(_uri(path, "immutable=1"))),
         )
-    _make_file(place.path)
-    return _sqlite(_file_engine(_uri(place.path, "mode=rw"), _prepare))
+    _make_file(path)
+    return Backend(lambda: _to_write(path))
 
 
-def _sqlite(engine: Engine) -> Backend:
-    return Backend(
-        engine,
-        begin_writing=_BEGIN_WRITING,
-        begin_migrating=_BEGIN,
-        self_checks=_SELF_CHECKS,
-    )
+def _to_write(path: Path) -> DatabaseConnection:
+    connection = _connect(_uri(path, "mode=rw"))
+    try:
+        _prepare(connection)
+    except BaseException:
+        connection.close()
+        raise
+    return DatabaseConnection(connection)
 
 
-def _engine(connect: Callable[[], sqlite3.Connection], pool: type[Pool]) -> Engine:
-    return create_engine("sqlite://", creator=connect, poolclass=pool)
-
-
-def _file_engine(uri: str, prepare: Callable[[sqlite3.Connection], None] | None = None) -> Engine:
-    def connect() -> sqlite3.Connection:
-        connection = _connect(uri)
-        try:
-            if prepare is not None:
-                prepare(connection)
-        except BaseException:
-            connection.close()
-            raise
-        return connection
-
-    return _engine(connect, NullPool)
-
-
-def _connect(uri: str) -> sqlite3.Connection:
+def _connect(uri: str, wait_s: float | None = None) -> sqlite3.Connection:
     # Transactions are begun by us, so that a write takes its lock first; one lock of the store
     # keeps threads apart.
     return sqlite3.connect(
-        uri, uri=True, timeout=BUSY_S, isolation_level=None, check_same_thread=False
+        uri, uri=True, timeout=wait_s or BUSY_S, isolation_level=None, check_same_thread=False
     )
-
-
-def _memory() -> sqlite3.Connection:
-    return _connect("file::memory:")
 
 
 def _prepare(connection: sqlite3.Connection) -> None:
@@ -191,12 +179,7 @@ def _make_file(path: Path) -> None:
 
 def _postgresql(place: JournalPlace, *, read_only: bool) -> Backend:
     try:
-        engine = create_engine(
-            place.url,
-            poolclass=NullPool,
-            paramstyle="format",  # prepared statements are given their values by place
-            connect_args=dict(_NOTICED),
-        )
+        import psycopg
     except ImportError as error:
         raise JournalError(
             tr("The package psycopg, which connects to {name}, is missing.", name=place.name),
@@ -205,11 +188,47 @@ def _postgresql(place: JournalPlace, *, read_only: bool) -> Backend:
     settings = [f"SET lock_timeout = {round(BUSY_S * 1000)}", "SET synchronous_commit TO on"]
     if read_only:
         settings.append("SET default_transaction_read_only TO on")
+    where: dict[str, Any] = {**parameters_of(place.url), **_NOTICED}
 
-    def configure(connection: Any, _record: object) -> None:  # noqa: ANN401 - psycopg may be absent
-        for setting in settings:
-            connection.execute(setting)
-        connection.commit()
+    def connect() -> DatabaseConnection:
+        connection = PostgresqlConnection(psycopg.connect(**where))
+        try:
+            for setting in settings:
+                connection.run(setting)
+            connection.commit()
+        except BaseException:
+            connection.close()
+            raise
+        return connection
 
-    event.listen(engine, "connect", configure)
-    return Backend(engine, begin_migrating=f"SELECT pg_advisory_xact_lock({_SCHEMA_LOCK})")
+    return Backend(connect, failures=(psycopg.Error,))
+
+
+def parameters_of(url: str) -> dict[str, str]:
+    """Return what libpq is told of a server by the URL of a journal.
+
+    User, password and database may have %-escapes; of the query all parameters of libpq are known
+    (https://www.postgresql.org/docs/current/libpq-connect.html). Several hosts stand there, as
+    ``host=a,b&port=1,2`` or ``host=a:1&host=b:2``.
+    """
+    found = re.match(_SERVER, url.partition("://")[2], re.VERBOSE)
+    parts = (
+        {} if found is None else {name: text for name, text in found.groupdict().items() if text}
+    )
+    query = parts.pop("query", "")
+    host = parts.pop("address", "") or parts.pop("host", "")
+    told = {name: text if name == "port" else unquote(text) for name, text in parts.items()}
+    if host:
+        told["host"] = host
+    given: dict[str, list[str]] = {}
+    for name, text in parse_qsl(query):
+        given.setdefault(name, []).append(text)
+    told |= {name: ",".join(texts) for name, texts in given.items()}
+    hosts = given.get("host", [])
+    pairs = [re.fullmatch(_HOST_AND_PORT, text) for text in hosts]
+    if any(pairs) and "port" not in given:
+        told["host"] = ",".join(
+            text if pair is None else pair[1] for text, pair in zip(hosts, pairs, strict=True)
+        )
+        told["port"] = ",".join("" if pair is None else pair[2] for pair in pairs)
+    return told

@@ -5,14 +5,13 @@ from dataclasses import fields
 from functools import lru_cache
 from typing import Any, Final, TypeAlias, TypeVar
 
-from sqlalchemy import BindParameter, Integer, Text, bindparam, func, insert, select, update
-
 from robolink.journal._records import Filter
+from robolink.journal.store import statements
 from robolink.journal.store.chain import canonical, digest, storable
-from robolink.journal.store.prepared import Prepared, StatementRunner
-from robolink.journal.store.tables import ENTRIES, HEAD, IN_A_CHANGE
+from robolink.journal.store.connection import DatabaseConnection
+from robolink.journal.store.statements import COLUMNS, KIND, NAME
 from robolink.messages import plain
-from robolink.model import NO_HISTORY, PROOFS, NewEntry, Signature
+from robolink.model import PROOFS, NewEntry, Signature
 from robolink.timing import wall_time
 
 T = TypeVar("T")
@@ -22,31 +21,15 @@ _Head: TypeAlias = tuple[int, str]
 _LOOKS: Final = 100
 """After so many in which others wrote each time something else is wrong."""
 
-# The kinds whose value was read on the controller.
-_HEAD_OF: Final = select(HEAD.c.number, HEAD.c.hash)
-_SELECT_HEAD: Final = Prepared(_HEAD_OF)
-_LOCK_HEAD: Final = Prepared(_HEAD_OF.with_for_update())
-_MOVE_HEAD: Final = Prepared(
-    update(HEAD)
-    .where(HEAD.c.number == bindparam("of_number"), HEAD.c.hash == bindparam("of_hash"))
-    .values(number=bindparam("number"), hash=bindparam("hash"))
-)
-_INSERT: Final = Prepared(insert(ENTRIES))
 _SIGNATURE: Final = tuple(field.name for field in fields(Signature))
-_PLACES: Final = dict.fromkeys(sorted(column.name for column in ENTRIES.c if column.name != "hash"))
-_COLUMNS: Final = tuple(ENTRIES.c.keys())
-_COUNT: Final = Prepared(select(func.count()).select_from(ENTRIES))
-_LAST: Final = Prepared(select(func.max(ENTRIES.c.number)))
-
-_NAME, _KIND = "name_", "kind_"
-"""How the places of several names and kinds begin."""
+_PLACES: Final = dict.fromkeys(sorted(name for name in COLUMNS if name != "hash"))
 
 
 class EntryRows:
     """The append-only record over one connection."""
 
-    def __init__(self, runner: StatementRunner) -> None:
-        self._runner = runner
+    def __init__(self, connection: DatabaseConnection) -> None:
+        self._connection = connection
         self._head: _Head | None = None  # a guess: others add entries too
 
     def append(
@@ -73,7 +56,7 @@ class EntryRows:
             head = self._locked_head()
             rows = _chained(head, _common(controller, signature), change, entries)
             self._move_head(head, rows[-1])
-        self._runner.run_many(_INSERT, rows)
+        self._connection.run_many(statements.ADD_ENTRY, rows)
 
     def page(
         self, wanted: Filter, *, before: int | None, after: int | None, limit: int
@@ -84,14 +67,23 @@ class EntryRows:
             values["before"] = before
         if after is not None:
             values["after"] = after
-        outside = wanted.change == ""
-        listing = _listing(tuple(values), newest_first=wanted.newest_first, outside=outside)
-        return [dict(zip(_COLUMNS, row, strict=True)) for row in self._runner.rows(listing, values)]
+        listing = statements.entries_where(
+            tuple(values), newest_first=wanted.newest_first, outside=wanted.change == ""
+        )
+        rows = self._connection.rows(listing, values)
+        return [dict(zip(COLUMNS, row, strict=True)) for row in rows]
 
     def history(self, names: Sequence[str]) -> bool:
         """Whether anything was changed, or decided, on the controller with these names."""
-        values = {f"{_NAME}{place}": storable(name) for place, name in enumerate(names)}
-        return bool(values) and bool(self._runner.rows(_history(tuple(values)), values))
+        values = _named(names)
+        history = statements.history_of(tuple(values))
+        return bool(values) and bool(self._connection.rows(history, values))
+
+    def subjects(self, names: Sequence[str]) -> tuple[tuple[int | None, str], ...]:
+        """Return each tool, or ``None``, and station of entries under these names, or under any."""
+        values = _named(names)
+        rows = self._connection.rows(statements.subjects_of(tuple(values)), values)
+        return tuple([(tool, station) for tool, station in rows])
 
     def holds(self, number: int, its_hash: str) -> bool:
         """Whether an entry of this number and hash is there."""
@@ -100,16 +92,16 @@ class EntryRows:
 
     def count(self) -> int:
         """Return how many there are."""
-        return int(self._runner.rows(_COUNT)[0][0])
+        return int(self._connection.rows(statements.COUNT_ENTRIES)[0][0])
 
     def last_number(self) -> int:
         """Return the highest number, 0 when there is none."""
-        highest = self._runner.rows(_LAST)[0][0]
+        highest = self._connection.rows(statements.LAST_ENTRY)[0][0]
         return 0 if highest is None else int(highest)
 
     def head(self) -> tuple[int, str] | None:
         """Return number and hash of the entry that was stored last."""
-        row = next(iter(self._runner.rows(_SELECT_HEAD)), None)
+        row = next(iter(self._connection.rows(statements.HEAD)), None)
         return None if row is None else (row[0], row[1])
 
     def settled(self, read: Callable[[], T]) -> tuple[T, _Head | None]:
@@ -131,14 +123,14 @@ class EntryRows:
         return found, head
 
     def _locked_head(self) -> _Head:
-        ((number, last_hash),) = self._runner.rows(_LOCK_HEAD)
+        ((number, last_hash),) = self._connection.rows(statements.HEAD + self._connection.row_lock)
         return number, last_hash
 
     def _move_head(self, head: _Head, last: Mapping[str, Any]) -> bool:
         self._head = (last["number"], last["hash"])
         values = {"number": last["number"], "hash": last["hash"]}
         seen = {"of_number": head[0], "of_hash": head[1]}
-        return self._runner.run(_MOVE_HEAD, {**values, **seen}) == 1
+        return self._connection.run(statements.MOVE_HEAD, {**values, **seen}) == 1
 
 
 def _chained(
@@ -160,12 +152,10 @@ def _chained(
 
 
 def _values(wanted: Filter) -> dict[str, object]:
-    """Return what is looked for, by the names of the places in :func:`_listing`."""
-    values: dict[str, object] = {}
-    for place, name in enumerate(wanted.controllers):
-        values[f"{_NAME}{place}"] = storable(name)
+    """Return what is looked for, by the names of the places in the query."""
+    values: dict[str, object] = {**_named(wanted.controllers)}
     for place, kind in enumerate(wanted.kinds):
-        values[f"{_KIND}{place}"] = str(kind)
+        values[f"{KIND}{place}"] = str(kind)
     if wanted.change:
         values["change"] = storable(wanted.change)
     if wanted.tool is not None:
@@ -175,52 +165,8 @@ def _values(wanted: Filter) -> dict[str, object]:
     return values
 
 
-@lru_cache(maxsize=256)
-def _listing(places: tuple[str, ...], *, newest_first: bool, outside: bool) -> Prepared:
-    """Return the statement that has these places.
-
-    Args:
-        places: Names of its parameters.
-        newest_first: In which order.
-        outside: Whether only entries outside of changes are meant.
-    """
-    columns = ENTRIES.c
-    order = columns.number.desc() if newest_first else columns.number
-    listing = select(ENTRIES).order_by(order).limit(bindparam("limit", type_=Integer))
-    if names := _texts(places, _NAME):
-        # A change has few entries and an index of its own. SQLite prefers the index that gives
-        # the order, and would walk through all that the controller has on record.
-        inside = "change" in places
-        controller = func.coalesce(columns.controller, "") if inside else columns.controller
-        one = len(names) == 1
-        listing = listing.where(controller == names[0] if one else controller.in_(names))
-    for name in ("tool", "proved_tool"):
-        if name in places:
-            listing = listing.where(columns[name] == bindparam(name))
-    if "change" in places:
-        listing = listing.where(columns.change == bindparam("change"), IN_A_CHANGE)
-    elif outside:
-        listing = listing.where(columns.change == "")
-    if kinds := _texts(places, _KIND):
-        listing = listing.where(columns.kind.in_(kinds))
-    if "before" in places:
-        listing = listing.where(columns.number < bindparam("before"))
-    if "after" in places:
-        listing = listing.where(columns.number > bindparam("after"))
-    return Prepared(listing)
-
-
-@lru_cache(maxsize=64)
-def _history(places: tuple[str, ...]) -> Prepared:
-    """Return the statement that looks for a change under names in these places."""
-    columns = ENTRIES.c
-    ours = columns.controller.in_(_texts(places, _NAME))
-    changed = [columns.kind != str(kind) for kind in NO_HISTORY]
-    return Prepared(select(columns.number).where(ours, *changed).limit(1))
-
-
-def _texts(places: tuple[str, ...], beginning: str) -> list[BindParameter[str]]:
-    return [bindparam(name, type_=Text) for name in places if name.startswith(beginning)]
+def _named(names: Sequence[str]) -> dict[str, object]:
+    return {f"{NAME}{place}": storable(name) for place, name in enumerate(names)}
 
 
 @lru_cache(maxsize=64)

@@ -2,8 +2,6 @@
 
 from typing import Final
 
-from sqlalchemy.exc import DBAPIError
-
 from robolink.errors import JournalError
 from robolink.messages import joined, tr
 from robolink.ways import Way, way
@@ -41,12 +39,11 @@ def journal_error(error: Exception, name: str, consequence: str) -> JournalError
     """Return what a person is told about an error of the database.
 
     Args:
-        error: As the driver, SQLAlchemy or the system raised it.
+        error: As the driver or the system raised it.
         name: Which journal, as a person is told.
         consequence: What it means for the controller, one sentence.
     """
-    raw = (error.orig if isinstance(error, DBAPIError) else None) or error
-    cause, remedy = _sentences(_reason(raw), " ".join(str(raw).split()))
+    cause, remedy = _sentences(_reason(error), " ".join(str(error).split()))
     return JournalError(
         tr("The journal {name} cannot be used: {cause}.", name=name, cause=cause),
         remedy=joined(" ", filter(None, (remedy, consequence))),

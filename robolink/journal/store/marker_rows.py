@@ -10,12 +10,10 @@ from collections.abc import Mapping, Sequence
 from hashlib import sha256
 from typing import Final, NamedTuple
 
-from sqlalchemy import BindParameter, bindparam, delete, func, insert, select, update
-
 from robolink.errors import JournalError
+from robolink.journal.store import statements
 from robolink.journal.store.chain import canonical, storable
-from robolink.journal.store.prepared import UNLESS_THERE, Prepared, StatementRunner
-from robolink.journal.store.tables import MARKERS
+from robolink.journal.store.connection import DatabaseConnection
 from robolink.messages import plain, tr
 from robolink.model import Marker, MarkerKind
 from robolink.timing import local_label
@@ -36,35 +34,12 @@ _SUM: Final = "_sum"
 """Where the checksum stands. Markers of before have none, and nothing tells that one is bent; or
 one that leaves the name of their controller out."""
 
-_SAME: Final = (
-    MARKERS.c.controller == bindparam("of_controller"),
-    MARKERS.c.operation == bindparam("of_operation"),
-)
-_STATE: Final[dict[str, BindParameter[object]]] = {
-    name: bindparam(name) for name in ("kind", "request", "begun_at", "details")
-}
-_NAMES: Final[dict[str, BindParameter[object]]] = {
-    name: bindparam(f"of_{name}") for name in ("controller", "operation")
-}
-_UPDATE: Final = Prepared(update(MARKERS).where(*_SAME).values(**_STATE))
-_NEXT: Final = select(func.coalesce(func.max(MARKERS.c.id), 0) + 1).scalar_subquery()
-_INSERT: Final = Prepared(insert(MARKERS).values(id=_NEXT, **_NAMES, **_STATE), UNLESS_THERE)
-_RENAME: Final = Prepared(
-    update(MARKERS)
-    .where(*_SAME)
-    .values(controller=bindparam("to_controller"), details=_STATE["details"])
-)
-_DELETE: Final = Prepared(delete(MARKERS).where(*_SAME))
-_LISTING: Final = select(*(MARKERS.c[name] for name in _Stored._fields)).order_by(MARKERS.c.id)
-_SELECT: Final = Prepared(_LISTING.where(MARKERS.c.controller == bindparam("of_controller")))
-_SELECT_ALL: Final = Prepared(_LISTING)
-
 
 class MarkerRows:
     """What is not settled, over one connection."""
 
-    def __init__(self, runner: StatementRunner) -> None:
-        self._runner = runner
+    def __init__(self, connection: DatabaseConnection) -> None:
+        self._connection = connection
 
     def put(self, controller: str, marker: Marker) -> bool:
         """Store a marker in place of an earlier one of its operation.
@@ -89,14 +64,14 @@ class MarkerRows:
             details=canonical(details),
         )
         values["details"] = _with_sum(stored, details)
-        if self._runner.run(_INSERT, values):
+        if self._connection.run(statements.ADD_MARKER, values):
             return True
-        self._runner.run(_UPDATE, values)
+        self._connection.run(statements.CHANGE_MARKER, values)
         return False
 
     def remove(self, controller: str, operation: str) -> bool:
         """Forget a marker; return whether it was there."""
-        return self._runner.run(_DELETE, _same(controller, operation)) == 1
+        return self._connection.run(statements.REMOVE_MARKER, _same(controller, operation)) == 1
 
     def rename(self, controller: str, to: str) -> None:
         """Make the markers of a controller those of another name.
@@ -104,18 +79,22 @@ class MarkerRows:
         Raises:
             JournalError: One of them is damaged.
         """
-        for row in self._runner.rows(_SELECT, {"of_controller": storable(controller)}):
+        for row in self._connection.rows(
+            statements.MARKERS_OF, {"of_controller": storable(controller)}
+        ):
             old = _Stored(*row)
             details = _marker(old).details
             new = old._replace(controller=storable(to), details=canonical(details))
             values = {**_same(old.controller, old.operation), "details": _with_sum(new, details)}
-            self._runner.run(_RENAME, {**values, "to_controller": new.controller})
+            self._connection.run(
+                statements.RENAME_MARKER, {**values, "to_controller": new.controller}
+            )
 
     def of(self, *names: str) -> tuple[Marker, ...]:
         """Return the markers of a controller, under each of its names, oldest first."""
         found: list[Marker] = []
         for name in names:
-            rows = self._runner.rows(_SELECT, {"of_controller": storable(name)})
+            rows = self._connection.rows(statements.MARKERS_OF, {"of_controller": storable(name)})
             found += [_marker(_Stored(*row)) for row in rows]
         return tuple(found)
 
@@ -125,7 +104,7 @@ class MarkerRows:
         Raises:
             JournalError: One of them is damaged.
         """
-        found = [_Stored(*row) for row in self._runner.rows(_SELECT_ALL)]
+        found = [_Stored(*row) for row in self._connection.rows(statements.ALL_MARKERS)]
         return tuple([(row.controller, _marker(row)) for row in found])
 
 

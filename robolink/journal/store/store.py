@@ -7,31 +7,31 @@ the whole journal; ``verify`` reads the rest.
 """
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from typing import Final
-
-from sqlalchemy import Connection, Engine
-from sqlalchemy.exc import SQLAlchemyError
 
 from robolink import ambient
 from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.errors import JournalError
 from robolink.journal._places import JournalPlace
 from robolink.journal._records import Filter
-from robolink.journal.store import migrations
+from robolink.journal._traces import traces_of
+from robolink.journal.store import migrations, statements
 from robolink.journal.store.chain import ChainCheck
+from robolink.journal.store.connection import DatabaseConnection
 from robolink.journal.store.engines import Backend, backend_of
 from robolink.journal.store.entry_rows import EntryRows
 from robolink.journal.store.failures import damaged_error, journal_error
 from robolink.journal.store.lease_rows import LeaseRows
 from robolink.journal.store.marker_rows import MarkerRows
 from robolink.journal.store.name_rows import NameRows
-from robolink.journal.store.prepared import Prepared, StatementRunner
 from robolink.messages import tr
 
 _NEWEST: Final = 20
 """How many entries are looked at, of the journal and of the controller."""
+
+_OF_FILES: Final = (OSError, UnicodeDecodeError)
 
 
 class Tables:
@@ -39,30 +39,42 @@ class Tables:
 
     Attributes:
         connection: The connection.
-        runner: Runs prepared statements over it.
         entries: The append-only record.
         markers: What is not settled.
         leases: Who may change which controller.
         names: Who is meant by a name or an address.
         newer: Whether a newer robolink made the tables.
-        self_checks: Statements by which the database looks for damage.
     """
 
-    def __init__(
-        self, connection: Connection, version: int, self_checks: tuple[Prepared, ...]
-    ) -> None:
+    def __init__(self, connection: DatabaseConnection, version: int) -> None:
         self.connection = connection
-        self.runner = StatementRunner(connection)
-        self.entries = EntryRows(self.runner)
-        self.markers = MarkerRows(self.runner)
-        self.leases = LeaseRows(self.runner)
+        self.entries = EntryRows(connection)
+        self.markers = MarkerRows(connection)
+        self.leases = LeaseRows(connection)
         self.names = NameRows(
-            self.runner,
+            connection,
             known=version >= migrations.NAMED,
             robots_known=version >= migrations.OF_ROBOTS,
         )
         self.newer = version > len(migrations.MIGRATIONS)
-        self.self_checks = self_checks
+
+    def in_order(self, address: str, location: str) -> bool:
+        """Tell whether there is nothing to say about a look at what is reached at an address.
+
+        Nothing is unfinished and nobody at work, on any controller; who is there was met before,
+        and nothing shows that what was done to it is on record elsewhere, or lost.
+
+        Args:
+            address: How it is reached.
+            location: Of this journal.
+        """
+        name = self.names.at(address)
+        if not name or self.connection.rows(statements.UNFINISHED):
+            return False
+        traces = traces_of((name,))
+        if traces is None:
+            return True
+        return traces.journal in ("", location) and self.entries.history(self.names.all_of(name))
 
     def damage(self, names: tuple[str, ...]) -> Iterator[str]:
         """Yield what is wrong with what a change of a controller would rest on, in sentences.
@@ -70,8 +82,8 @@ class Tables:
         Args:
             names: Of the controller.
         """
-        for check in self.self_checks:
-            for (answer,) in self.runner.rows(check):
+        for check in self.connection.self_checks:
+            for (answer,) in self.connection.rows(check):
                 if answer != "ok":
                     yield tr("A table is damaged: {text}.", text=str(answer).strip().rstrip("."))
         newest, head = self.entries.settled(
@@ -93,15 +105,23 @@ class Store:
 
     After any error the connection is dropped and the next use makes a new one, so that a
     server that was restarted is found again.
+
+    Args:
+        place: Where it is.
+        read_only: Whether nothing is written.
+        glance: Whether a file that cannot be read soon, or only without what others are writing,
+            counts as one that cannot be read.
     """
 
-    def __init__(self, place: JournalPlace, *, read_only: bool) -> None:
+    def __init__(self, place: JournalPlace, *, read_only: bool, glance: bool = False) -> None:
         self._place = place
         self._read_only = read_only
+        self._glance = glance
         self._lock = ambient.reentrant_lock()
         self._backend: Backend | None = None
         self._tables: Tables | None = None
         self._file: tuple[int, int] | None = None
+        self._failures: tuple[type[Exception], ...] = _OF_FILES
 
     @property
     def durable(self) -> bool:
@@ -166,7 +186,7 @@ class Store:
         with self._lock:
             self._drop()
             if self._backend is not None:
-                self._backend.engine.dispose()
+                self._backend.dispose()
                 self._backend = None
 
     @contextmanager
@@ -175,31 +195,32 @@ class Store:
             checkpoint(Checkpoint.COMMIT, "before")
         with self._lock:
             try:
-                backend, tables = self._connected(to_write=writing)
-                runner = tables.runner
-                if writing and backend.begin_writing is not None:
-                    runner.run(backend.begin_writing)
+                tables = self._connected(to_write=writing)
+                connection = tables.connection
+                if writing and connection.begin_writing:
+                    connection.run(connection.begin_writing)
                 try:
                     yield tables
                 except BaseException:
-                    runner.roll_back()
+                    connection.roll_back()
                     raise
                 if writing:
-                    runner.commit()
+                    connection.commit()
                 else:
-                    runner.roll_back()
+                    connection.roll_back()
             except JournalError:
                 self._drop()
                 raise
-            except (SQLAlchemyError, OSError, UnicodeDecodeError) as error:
+            except self._failures as error:
                 self._drop()
                 raise journal_error(error, self._place.name, consequence) from error
         if writing:
             checkpoint(Checkpoint.COMMIT, "after")
 
-    def _connected(self, *, to_write: bool) -> tuple[Backend, Tables]:
+    def _connected(self, *, to_write: bool) -> Tables:
         if self._backend is None:
-            self._backend = backend_of(self._place, read_only=self._read_only)
+            self._backend = backend_of(self._place, read_only=self._read_only, glance=self._glance)
+            self._failures = (*_OF_FILES, *self._backend.failures)
         if self._tables is None:
             self._tables = self._connect(self._backend)
             self._file = self._file_now()
@@ -211,47 +232,47 @@ class Store:
                     "of what is unfinished."
                 ),
             )
-        return self._backend, self._tables
+        return self._tables
 
     def _connect(self, backend: Backend) -> Tables:
         try:
-            return self._tables_of(backend.engine, backend)
+            return self._tables_of(backend.connect)
         except Exception as error:
             if backend.last_resort is None or isinstance(error, JournalError):
                 raise
             first = journal_error(error, self._place.name, "")
         try:
-            return self._tables_of(backend.last_resort, backend)
+            return self._tables_of(backend.last_resort)
         except Exception as error:
             raise first from error
 
-    def _tables_of(self, engine: Engine, backend: Backend) -> Tables:
-        connection = engine.connect()
+    def _tables_of(self, connect: Callable[[], DatabaseConnection]) -> Tables:
+        connection = connect()
         try:
-            version = self._bring_up_to_date(connection, backend)
+            version = self._bring_up_to_date(connection)
         except BaseException:
             connection.close()
             raise
-        return Tables(connection, version, backend.self_checks)
+        return Tables(connection, version)
 
-    def _bring_up_to_date(self, connection: Connection, backend: Backend) -> int:
+    def _bring_up_to_date(self, connection: DatabaseConnection) -> int:
         """Return the version of the tables; older ones that are only read stay as they are."""
         own, name = len(migrations.MIGRATIONS), self._place.name
-        with connection.begin():
-            found = migrations.stored_version(connection, name)
+        found = migrations.stored_version(connection, name)
+        connection.roll_back()
         if found > own and not self._read_only:
             raise migrations.newer_error(name, found)
         if found >= own or (self._read_only and found):
             return found
         if self._read_only:
             raise migrations.empty_error(name)
-        with connection.begin():
-            connection.exec_driver_sql(backend.begin_migrating)
-            # Another process may have been faster while this one waited for the lock.
-            found = migrations.stored_version(connection, name)
-            if found > own:
-                raise migrations.newer_error(name, found)
-            migrations.migrate(connection, found)
+        connection.run(connection.begin_migrating)
+        # Another process may have been faster while this one waited for the lock.
+        found = migrations.stored_version(connection, name)
+        if found > own:
+            raise migrations.newer_error(name, found)
+        migrations.migrate(connection, found)
+        connection.commit()
         return max(own, found)
 
     def _file_now(self) -> tuple[int, int] | None:

@@ -12,4 +12,4 @@ def marker(operation: str = "a", kind: MarkerKind = MarkerKind.SET) -> Marker:
 def run(journal: Journal, statement: str) -> None:
     """Change the database behind the journal's back."""
     with journal._store.write() as tables:
-        tables.connection.exec_driver_sql(statement)
+        tables.connection.run(statement)

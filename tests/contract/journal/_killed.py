@@ -15,10 +15,8 @@ from collections.abc import Callable
 from functools import partial
 from itertools import count
 
-from sqlalchemy import Engine, event
-
 from robolink.journal import EntryKind, JournalOutcomeLog, NewEntry, close_files, open_journal
-from robolink.journal.store.prepared import StatementRunner
+from robolink.journal.store.connection import DatabaseConnection
 from tests.contract.journal._acts import marker
 
 # On Windows os.kill ends a process by TerminateProcess, whatever signal it is given.
@@ -43,11 +41,8 @@ def kill_at(number: int) -> None:
         if left == 0:
             os.kill(os.getpid(), KILL)
 
-    event.listen(Engine, "before_cursor_execute", step)
-    event.listen(Engine, "commit", step)
-    # Prepared statements go past SQLAlchemy, so it tells nobody of them.
-    for name in ("run", "run_text", "run_many", "rows", "commit"):
-        setattr(StatementRunner, name, _after(step, getattr(StatementRunner, name)))
+    for name in ("run", "run_many", "rows", "commit"):
+        setattr(DatabaseConnection, name, _after(step, getattr(DatabaseConnection, name)))
 
 
 def _after(step: Callable[[], None], run: Callable[..., object]) -> Callable[..., object]:

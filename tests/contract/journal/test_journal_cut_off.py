@@ -96,7 +96,7 @@ def test_f78_a_server_that_the_network_loses_is_missed_within_seconds(server, op
     """The kernel is told to; without that a transaction would wait for two hours."""
     journal = open_anew(server.empty_place())
     with journal._store.read() as tables:
-        raw = tables.connection.connection.driver_connection
+        raw = tables.connection.driver
         with socket.socket(fileno=raw.fileno()) as line:
             wanted = {
                 socket.TCP_USER_TIMEOUT: 3000,

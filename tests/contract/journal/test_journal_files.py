@@ -13,8 +13,8 @@ import pytest
 
 from robolink.errors import JournalError
 from robolink.journal import ChainVerification, EntryKind, NewEntry, memory_journal, open_journal
+from robolink.journal.store.connection import NOTHING, DatabaseConnection
 from robolink.journal.store.entry_rows import EntryRows
-from robolink.journal.store.prepared import NOTHING, StatementRunner
 from tests.contract.journal._acts import marker
 
 ROOT = Path(__file__).parents[3]
@@ -78,10 +78,7 @@ def test_a_folder_that_is_there_keeps_its_rights(tmp_path, open_anew):
 def test_commits_are_durable_and_writers_do_not_block_readers(path, open_anew):
     journal = open_anew(str(path))
     with journal._store.read() as tables:
-        pragmas = {
-            name: tables.connection.exec_driver_sql(f"PRAGMA {name}").scalar_one()
-            for name in PRAGMAS
-        }
+        pragmas = {name: tables.connection.rows(f"PRAGMA {name}")[0][0] for name in PRAGMAS}
     assert pragmas == PRAGMAS
 
 
@@ -165,8 +162,8 @@ def test_a_disk_that_is_full_leaves_the_journal_as_it_was(filled, open_anew):
     journal = open_anew(str(filled))
     log = journal.log("other")
     with journal._store.read() as tables:
-        pages = tables.connection.exec_driver_sql("PRAGMA page_count").scalar_one()
-        tables.connection.exec_driver_sql(f"PRAGMA max_page_count = {pages}")
+        pages = tables.connection.rows("PRAGMA page_count")[0][0]
+        tables.connection.rows(f"PRAGMA max_page_count = {pages}")
 
     def fill():
         for _ in range(100):
@@ -291,13 +288,12 @@ def test_many_entries_do_not_slow_down_the_questions_of_every_day(path, open_ane
     for _ in range(4):
         log.append(*[NewEntry(EntryKind.VERIFY, tool=3, change="c")] * 500)
     asked = []
-    rows = StatementRunner.rows
+    rows = DatabaseConnection.rows
 
-    def noted(runner, statement, values=NOTHING):
-        words = statement.words(runner._dialect)
-        if "FROM entries" in words.text:  # names and leases are few
-            asked.append((words.text, tuple(words.places(values))))
-        return rows(runner, statement, values)
+    def noted(connection, statement, values=NOTHING):
+        if "FROM entries" in statement:  # names and leases are few
+            asked.append((statement, values))
+        return rows(connection, statement, values)
 
     questions = (
         lambda: journal.entry(5),
@@ -309,14 +305,14 @@ def test_many_entries_do_not_slow_down_the_questions_of_every_day(path, open_ane
         lambda: journal.last_value("cell", 3),
     )
     with monkeypatch.context() as patch:
-        patch.setattr(StatementRunner, "rows", noted)
+        patch.setattr(DatabaseConnection, "rows", noted)
         assert all(question() for question in questions)
     assert len(asked) == len(questions)
     plans = {}
     with journal._store.read() as tables:
-        for statement, parameters in asked:
-            plan = tables.connection.exec_driver_sql(f"EXPLAIN QUERY PLAN {statement}", parameters)
-            plans[statement] = [row.detail for row in plan]
+        for statement, values in asked:
+            plan = tables.connection.rows(f"EXPLAIN QUERY PLAN {statement}", values)
+            plans[statement] = [row[-1] for row in plan]
     for statement, plan in plans.items():
         by_number = "WHERE" not in statement and plan == ["SCAN entries"]  # and a limit
         assert by_number or (len(plan) == 1 and plan[0].startswith("SEARCH entries USING")), plan

@@ -1,8 +1,10 @@
 """A look opens the journal when it has something to say, and only then."""
 
 import os
+import sqlite3
 import subprocess
 import sys
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -10,7 +12,15 @@ from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 
 import robolink
-from robolink.journal import close_files, default_location, nothing_is_open, open_journal
+from robolink.journal import (
+    EntryKind,
+    NewEntry,
+    close_files,
+    default_location,
+    nothing_is_open,
+    open_journal,
+)
+from robolink.journal._opening import _opened
 from robolink.model import Marker, MarkerKind
 
 
@@ -73,9 +83,39 @@ def test_a_server_is_not_glanced_at(address, monkeypatch):
     assert not nothing_is_open(address)
 
 
-HEAVY = (
-    "numpy pydantic pymodbus rich sqlalchemy asyncio robolink.calibration robolink.nozzle_change"
-)
+def test_a_look_at_a_journal_in_order_leaves_the_file_as_it_is(address, tmp_path):
+    close_files()
+    path = tmp_path / "journal.db"
+    before = path.read_bytes()
+    with robolink.connect(address, glance=True) as controller:
+        assert controller.outcomes.open_markers() == ()
+        assert controller.outcomes.at_work() == ""
+        assert controller.outcomes.trouble is None
+        assert _opened == {}
+        controller.outcomes.append(NewEntry(EntryKind.DECISION, verdict="kept"))
+    assert path.read_bytes() == before  # what was added is in its log
+    (entry,) = open_journal().entries(kinds=(EntryKind.DECISION,))
+    assert entry.verdict == "kept"
+
+
+def test_what_others_are_writing_does_not_show_so_a_look_believes_nothing(
+    address, tmp_path, monkeypatch
+):
+    """A journal that somebody keeps to himself can be read, but only without its log."""
+    for patience in ("BUSY_S", "GLANCE_S"):
+        monkeypatch.setattr(f"robolink.journal.store.engines.{patience}", 0.02)
+    close_files()
+    holder = sqlite3.connect(tmp_path / "journal.db", isolation_level=None)
+    with closing(holder):
+        holder.execute("PRAGMA locking_mode = EXCLUSIVE")
+        holder.execute("BEGIN EXCLUSIVE")
+        holder.execute("UPDATE head SET number = number")
+        assert open_journal(read_only=True).addresses_of("nobody") == ()
+        assert not nothing_is_open(address)
+    assert nothing_is_open(address)
+
+
+HEAVY = "numpy pydantic pymodbus rich asyncio robolink.calibration robolink.nozzle_change"
 
 PROBE = """
 import sys

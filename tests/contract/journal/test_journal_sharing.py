@@ -142,12 +142,12 @@ def _work(location, name):
 
 
 def _add_a_column(connection):
-    connection.exec_driver_sql("ALTER TABLE entries ADD COLUMN witness TEXT NOT NULL DEFAULT ''")
+    connection.run("ALTER TABLE entries ADD COLUMN witness TEXT NOT NULL DEFAULT ''")
 
 
 def _fail_half_way(connection):
     _add_a_column(connection)
-    connection.exec_driver_sql("ALTER TABLE no_such_table ADD COLUMN witness TEXT")
+    connection.run("ALTER TABLE no_such_table ADD COLUMN witness TEXT")
 
 
 def _newer(monkeypatch, *steps):
@@ -156,7 +156,7 @@ def _newer(monkeypatch, *steps):
 
 def _version(journal):
     with journal._store.read() as tables:
-        return tables.connection.exec_driver_sql("SELECT version FROM schema_version").scalar_one()
+        return tables.connection.rows("SELECT version FROM schema_version")[0][0]
 
 
 def test_an_older_journal_is_brought_up_to_date_with_all_that_is_in_it(
@@ -225,7 +225,7 @@ def test_a_write_that_another_program_holds_up_is_refused_in_time(location, open
     monkeypatch.setattr("robolink.journal.store.engines.BUSY_S", 0.2)
     journal, other = open_anew(location), open_anew(location)
     with other._store.write() as tables:
-        tables.connection.exec_driver_sql("UPDATE head SET hash = hash")
+        tables.connection.run("UPDATE head SET hash = hash")
         with pytest.raises(JournalError, match="another program keeps it locked") as caught:
             journal.log(CELLS[0]).begin(marker("a"))
     assert "The command was not sent." in caught.value.remedy

@@ -1,0 +1,77 @@
+"""A file that an earlier robolink made: nothing of it is lost, whatever form its tables have."""
+
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from robolink.journal import ChainVerification, EntryKind, NewEntry
+from robolink.journal.store.migrations import MIGRATIONS
+
+FORM_1 = Path(__file__).with_name("journal_form_1.sql")
+LATER = {
+    2: (
+        "CREATE TABLE addresses (\n\taddress TEXT NOT NULL, \n\tcontroller TEXT NOT NULL, "
+        "\n\tmet_at TEXT NOT NULL, \n\tPRIMARY KEY (address)\n)",
+        "CREATE TABLE former_names (\n\tname TEXT NOT NULL, \n\tcontroller TEXT NOT NULL, "
+        "\n\tPRIMARY KEY (name)\n)",
+    ),
+    3: (
+        "CREATE TABLE robots (\n\tname TEXT NOT NULL, \n\tcontroller TEXT NOT NULL, "
+        "\n\tPRIMARY KEY (name)\n)",
+    ),
+}
+"""What each later form adds."""
+ADDRESS = "epson+tcp://192.0.2.1:5000"
+
+
+@pytest.fixture(params=[1, 2, 3])
+def made_before(request, tmp_path):
+    """A journal of each form."""
+    path = tmp_path / "journal.db"
+    with closing(sqlite3.connect(path)) as file:
+        file.executescript(FORM_1.read_text(encoding="utf-8"))
+        for form in range(2, request.param + 1):
+            for statement in LATER[form]:
+                file.execute(statement)
+        file.execute("UPDATE schema_version SET version = ?", (request.param,))
+        file.commit()
+    return path
+
+
+def test_it_is_read_as_it_stands(made_before, open_anew):
+    reader = open_anew(str(made_before), read_only=True)
+    assert reader.verify() == ChainVerification(3, ())
+    assert reader.last_value(ADDRESS, 3).details == {"value": {"x_mm": 1.25}}
+    assert [known.operation for known in reader.log(ADDRESS).open_markers()] == ["b2"]
+
+
+def test_it_goes_on_where_it_ended(made_before, open_anew):
+    journal = open_anew(str(made_before))
+    log = journal.log(ADDRESS)
+    log.clear("b2", NewEntry(EntryKind.DONE, tool=4, details={"value": {"x_mm": 2.5}}))
+    assert journal.open_markers() == ()
+    assert journal.verify() == ChainVerification(4, ())
+    assert [entry.tool for entry in journal.entries(controller=ADDRESS)] == [4, 4, 3, 3]
+    assert journal.entry(2).verdict == "gleich ä 机"
+    assert shape(journal) == shape(open_anew(str(made_before.with_name("new.db"))))
+
+
+def shape(journal):
+    """Columns, keys and indexes of all tables, and the version; the wording may differ."""
+    with journal._store.read() as tables:
+        rows = tables.connection.rows
+        found = {
+            name: (
+                rows(f"PRAGMA table_xinfo({name})"),
+                sorted(
+                    (index[1:], rows(f"PRAGMA index_xinfo({index[1]})"))
+                    for index in rows(f"PRAGMA index_list({name})")
+                ),
+                rows(f"PRAGMA table_list({name})"),
+            )
+            for (name,) in rows(tables.connection.table_names)
+        }
+        assert rows("SELECT version FROM schema_version") == [(len(MIGRATIONS),)]
+    return found

@@ -40,7 +40,7 @@ def add_cell(path: Path, name: str, said: Mapping[str, str | float]) -> None:
 
 
 def content_with_cell(path: Path, name: str, said: Mapping[str, str | float]) -> bytes:
-    """Return what a cell file says with one more cell, so far as its keys are known by now.
+    r"""Return what a cell file says with one more cell, so far as its keys are known by now.
 
     Args:
         path: The file; it is read where there is one.
@@ -54,7 +54,7 @@ def content_with_cell(path: Path, name: str, said: Mapping[str, str | float]) ->
         >>> from pathlib import Path
         >>> from robolink.config import content_with_cell
         >>> content_with_cell(Path("new-cell-example.toml"), "line3", {})
-        b'[cells."line3"]\\n'
+        b'[cells."line3"]\n'
     """
     before = CELL_FILE.read(path) if path.exists() else b""
     cells = CELL_FILE.parse(path, before).get("cells")

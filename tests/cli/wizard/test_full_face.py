@@ -49,9 +49,9 @@ pytestmark = pytest.mark.simulator_only
 class Drawn:
     """A face in a thread of the test, keys by a pipe, drawn by pyte."""
 
-    def __init__(self, desk, work, source):
+    def __init__(self, desk, work, source, size=Size(rows=24, columns=80)):  # noqa: B008 - a value
         self.screen, self.paper = pyte.Screen(80, 24), StringIO()
-        self.source, self.done, self.size = source, None, Size(rows=24, columns=80)
+        self.source, self.done, self.size = source, None, size
         output = Vt100_Output(self.paper, lambda: self.size, term="xterm")
         face = FullFace(source, output)
         self.thread = threading.Thread(target=lambda: self.show(face, desk, work))
@@ -138,7 +138,8 @@ def test_keys_of_a_pipe_jog_take_and_write():
     assert answers == ["N-7", "z-0.1", "done", "y"]
 
 
-def test_the_screen_comes_back_when_a_small_window_grew(monkeypatch):
+@pytest.mark.parametrize("small_first", [False, True], ids=["became small", "begun small"])
+def test_the_screen_comes_when_a_small_window_grew(monkeypatch, small_first):
     """What is asked goes on in lines meanwhile, and no key counts that was on its way."""
     monkeypatch.setattr(lines, "_STEADY_S", 0.1)
     monkeypatch.setattr(lines, "open_lines", NoLines)
@@ -154,10 +155,12 @@ def test_the_screen_comes_back_when_a_small_window_grew(monkeypatch):
 
     with click.Context(click.Command("x")), create_pipe_input() as source:
         work = Work(do)
-        face = Drawn(desk, work, source)
+        begun = Size(rows=23, columns=79) if small_first else Size(rows=24, columns=80)
+        face = Drawn(desk, work, source, begun)
         try:
             work.start()
-            until(lambda: "Touch 2 of 4" in face.text)
+            if not small_first:
+                until(lambda: "Touch 2 of 4" in face.text)
             face.size = Size(rows=23, columns=79)
             until(lambda: any("Type steps" in text for text in shown))
             face.paper.truncate(0)

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from robolink_cli.console.tolerance import PLAIN
-from robolink_cli.wizard.screens.layout import HEIGHT, WIDTH
 
 if TYPE_CHECKING:
     from robolink_cli.wizard.work import Face
@@ -17,7 +16,10 @@ _POOR: Final = frozenset({"", "dumb", "unknown"})
 
 
 def face_here() -> "Face":
-    """Return the face for this process's terminal: the full screen where it can be drawn."""
+    """Return the face for this process's terminal: the full screen where it can be drawn.
+
+    In a small window that one begins with lines.
+    """
     if draws_whole_screens():
         from robolink_cli.wizard.faces.full import FullFace
 
@@ -28,7 +30,7 @@ def face_here() -> "Face":
 
 
 def draws_whole_screens() -> bool:
-    """Tell whether the terminal, and the person at it, take full screens."""
+    """Tell whether the terminal, and the person at it, take full screens, once there is room."""
     context = click.get_current_context(silent=True)
     plain = context is not None and bool(context.meta.get(PLAIN))
     if plain or os.environ.get("ROBOLINK_PLAIN") == "1":
@@ -43,6 +45,4 @@ def draws_whole_screens() -> bool:
         size = os.get_terminal_size(sys.stderr.fileno())
     except (OSError, ValueError, AttributeError):
         return False
-    # prompt_toolkit keeps off the last column of a Windows console, which would wrap there.
-    columns = size.columns - (1 if os.name == "nt" else 0)
-    return columns >= WIDTH and size.lines >= HEIGHT
+    return min(size.columns, size.lines) > 0  # where nobody knows the size, none is assumed

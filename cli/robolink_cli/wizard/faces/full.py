@@ -62,7 +62,9 @@ class FullFace:
         """Show it until the work has ended; return the last state."""
         self._desk, self._state, self._work = desk, state, work
         self._left = False
-        while self._draws():
+        begins_with_lines = not self._has_room()
+        while begins_with_lines or self._draws():
+            begins_with_lines = False
             lines = LineFace(self._has_room)
             self._state = lines.run(desk, self._state, work)
             if not lines.handed_back:

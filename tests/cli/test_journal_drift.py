@@ -86,7 +86,9 @@ def test_the_charts_hold_what_was_measured_and_kept(run):
     assert charts["pin", "PIN-07", "y"] == pytest.approx(pins)
 
 
-def test_one_change_draws_no_empty_table_and_is_headed_by_the_cell_that_was_named(run, tmp_path):
+def test_one_change_draws_no_empty_table_and_is_headed_by_the_cell_that_was_named(
+    run, tmp_path, capsys
+):
     (tmp_path / "robolink.toml").write_text(f'[cells.line3]\nurl = "{HERE}"\n')
     record(course(1, 1))
     code, out, _ = run("-c", "line3")
@@ -96,6 +98,8 @@ def test_one_change_draws_no_empty_table_and_is_headed_by_the_cell_that_was_name
     assert "from the second measured change of a tool on" in rest[0]
     assert "limits" not in out
     assert run("-c", HERE)[1].startswith(f"{HERE}: "), "a URL is no name"
+    before = main.run(["-c", "line3", "journal", "drift"])
+    assert (before, capsys.readouterr().out) == (code, out)
 
 
 def test_a_kept_z_is_not_charted_and_a_used_pin_is_not_found(run):

@@ -35,7 +35,7 @@ def test_the_newest_change_is_undone_and_the_end_says_how_that_is_taken_back(
     assert "before 12.500 -3.000 -20.000" in shown
     assert "restored 12.000 -3.500 -20.000" in shown
     assert "change -0.500 -0.500 0.000" in shown
-    again = out.rpartition("'robolink undo ")[2][:8]
+    again = out.rpartition(" undo ")[2][:8]
     assert run("undo", again, "--yes")[0] == 0
     assert tool_1(simulator) == NEW
 

@@ -8,7 +8,11 @@ import click
 
 from robolink.messages import declared, tr
 from robolink_cli.access.cell import complete_cell
-from robolink_cli.commands.record.journal_lookup import controller_meant, journal_to_read
+from robolink_cli.commands.record.journal_lookup import (
+    cell_meant,
+    controller_meant,
+    journal_to_read,
+)
 from robolink_cli.console.exit_codes import DIFFERENT
 from robolink_cli.console.render import emit_json, json_is_on, say
 from robolink_cli.options.shared import json_option
@@ -90,17 +94,10 @@ def drift(
     elif not cells:
         say(tr("No measured change is on record here."))
     else:
-        show_drift(cells, all_plots=plots, called=_called(controller))
+        show_drift(cells, all_plots=plots, called=cell_meant(controller))
         if page is not None:
             say(tr("Page: {path}", path=page))
     return DIFFERENT if any(cell.findings for cell in cells) else 0
-
-
-def _called(controller: str | None) -> str:
-    """Return the name of the cell that was named; empty for a URL, and for none."""
-    from robolink.config import cell_names
-
-    return controller if controller in cell_names() else ""
 
 
 def _cells(

@@ -46,7 +46,7 @@ def controller_meant(named: str | None) -> str | None:
     """
     from robolink.transport import parse_url
 
-    chosen = named or click.get_current_context().meta.get(GIVEN, {}).get("url")
+    chosen = _named(named)
     if chosen is None:
         return None
     if is_cell_name(chosen):
@@ -54,6 +54,16 @@ def controller_meant(named: str | None) -> str | None:
 
         chosen = find_cell(chosen).url
     return parse_url(chosen).address
+
+
+def cell_meant(named: str | None) -> str:
+    """Return the name of the cell that was named here or before the command; else nothing."""
+    chosen = _named(named)
+    return chosen if chosen is not None and is_cell_name(chosen) else ""
+
+
+def _named(named: str | None) -> str | None:
+    return named or click.get_current_context().meta.get(GIVEN, {}).get("url")
 
 
 def entries_named(journal: "Journal", name: str) -> "list[Recorded]":

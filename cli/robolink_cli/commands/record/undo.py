@@ -69,7 +69,8 @@ def undo(
         if requests:
             _agree(context, yes=yes)
         payload = undoing.run()
-    context.emit("undo", payload, undoing.show_end)
+    called = context.cell.name if context.cell else str(context.url)
+    context.emit("undo", payload, lambda: undoing.show_end(called))
 
 
 def _agree(context: CliContext, *, yes: bool) -> None:

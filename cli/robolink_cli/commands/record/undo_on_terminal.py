@@ -68,11 +68,21 @@ class Undoing:
             "restored": [receipt_payload(receipt) for receipt in self._done.receipts],
         }
 
-    def show_end(self) -> None:
-        """Say how it ended, and how it is undone."""
+    def show_end(self, cell: str) -> None:
+        """Say how it ended, and how it is undone.
+
+        Args:
+            cell: How a person names the controller.
+        """
         if not self._done.receipts:
             say(tr("The controller has the old values already. Nothing was written."))
             return
         numbers = ", ".join(str(receipt.tool) for receipt in self._done.receipts)
         say(tr("Old values written and read back: tool {numbers}.", numbers=numbers))
-        say(tr("'robolink undo {change}' takes this back.", change=self._done.change[:8]))
+        say(
+            tr(
+                'To take it back: robolink -c "{cell}" undo {id}',
+                cell=cell,
+                id=self._done.change[:8],
+            )
+        )

@@ -3,9 +3,11 @@
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import click
 import pytest
+from robolink_cli.commands.measure import recipe_events
 from robolink_cli.commands.measure.choosing import choose_recipe
 from robolink_cli.commands.measure.recalibrate import _chosen_anew, steps_of
 from robolink_cli.options.shared import GIVEN, TYPED
@@ -35,6 +37,7 @@ from robolink.errors import ConfigError, DeclinedError, NotReadyError
 from robolink.journal import EntryKind, NewEntry, Signature, memory_journal, open_log
 from robolink.model import Path as Way
 from robolink.model import Pose, ToolOffset, describe_offset
+from robolink.nozzle_change import Moment
 from robolink.recipe import load_recipe
 from robolink.runner import MoveSubject, Question
 from robolink.stations import StationKind
@@ -485,3 +488,25 @@ def test_what_the_robot_of_the_cell_cannot_tilt_for_is_not_offered_and_else_that
     assert sum("Needs a robot that tilts" in row for row in rows) == (
         0 if tilts != "nobody knows" else 3 if copies else 1
     )
+
+
+@pytest.mark.parametrize(
+    ("drawn", "tools", "said"),
+    [
+        (True, 1, []),
+        (True, 2, ["Tool 2 is measured now."]),
+        (False, 1, ["-- tool 2: measure", "-- propose and write"]),
+    ],
+)
+def test_a_screen_is_not_headed_twice_and_says_which_of_several_tools(
+    monkeypatch, drawn, tools, said
+):
+    told: list[str] = []
+    nothing = click.Context(click.Command("x"))
+    monkeypatch.setattr(recipe_events, "drawn_elsewhere", lambda: drawn)
+    monkeypatch.setattr(recipe_events, "note", told.append)
+    progress = recipe_events.Progress(recipe_events.EventStream(nothing, on=False), tools)
+    bench: Any = None
+    progress.moment(Moment.BEFORE_MEASURE, bench, 2)
+    progress.moment(Moment.BEFORE_WRITE, bench)
+    assert told == said

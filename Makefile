@@ -65,7 +65,7 @@ peers: $(VENV)/.installed-dev $(JUDGES) $(API_JUDGE) ## Let foreign programs jud
 		echo "Not all judges are here. On Debian and Ubuntu:" \
 			"apt-get install mbpoll libmodbus-dev pkg-config gcc tshark nodejs" >&2; \
 		exit 1; }
-	PYTHONPATH=$(JUDGES) $(BIN)/python -m pytest -o 'python_files=judge_*.py' tests/peers
+	PYTHONPATH=$(JUDGES) $(BIN)/python -m pytest --timeout 300 -o 'python_files=judge_*.py' tests/peers
 
 # It needs pyserial and nothing else. Without it its judge is left out, and says so.
 $(JUDGES): $(VENV)/.installed-dev

@@ -14,6 +14,7 @@ from robolink import ToolOffset
 from robolink.errors import NotComparedError, RejectedError
 from robolink.testing import confirm_whole_map
 from robolink.transaction import Wanted, change_tools
+from tests._patience import PATIENCE_S
 
 MAP = Path("examples/plc-maps/commit-bit.toml").absolute()
 OLD = {1: ToolOffset(12.0, -3.5, -20.0, 15.0), 2: ToolOffset(-12.0, -3.5, -21.0)}
@@ -32,7 +33,7 @@ class MappedPlc:
     def end(self) -> None:
         """End the process and collect what it took over, each time."""
         self.process.kill()
-        printed, _ = self.process.communicate(timeout=5)
+        printed, _ = self.process.communicate(timeout=PATIENCE_S)
         takeovers = [line for line in printed.splitlines() if line.startswith("in force ")]
         self.in_force = [[float(text) for text in line.split()[2:]] for line in takeovers]
 

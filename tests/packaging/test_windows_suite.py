@@ -11,8 +11,9 @@ def of_tests(module):
     """Yield the modules of the tests that a module imports, and those that these import."""
     tree = ast.parse(Path(module.__file__).read_text(encoding="utf-8"))
     for node in ast.walk(tree):
-        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("tests."):
-            found = import_module(node.module)
+        name = node.module if isinstance(node, ast.ImportFrom) else None
+        if name and name.startswith("tests."):
+            found = import_module(name)
             yield found
             yield from of_tests(found)
 

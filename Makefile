@@ -39,11 +39,13 @@ SEEDS :=
 COUNT := 1000
 SHARE := 1/1
 HOURS := 20
+# MARKS="soak and not fault" leaves out what `make faults` runs.
+MARKS := soak
 
 .PHONY: soak
 soak: $(VENV)/.installed-dev $(if $(SEEDS),,docs) ## Run what make test leaves out for its length; SEEDS=0-499 the adversary only.
 ifeq ($(SEEDS),)
-	$(BIN)/python -m pytest -n 2 -m soak
+	$(BIN)/python -m pytest -n 2 -m '$(MARKS)'
 	$(BIN)/python -m tests.certificate.table
 	$(BIN)/python -m tests.soak.mutant_table
 else
@@ -65,7 +67,7 @@ peers: $(VENV)/.installed-dev $(JUDGES) $(API_JUDGE) ## Let foreign programs jud
 		echo "Not all judges are here. On Debian and Ubuntu:" \
 			"apt-get install mbpoll libmodbus-dev pkg-config gcc tshark nodejs" >&2; \
 		exit 1; }
-	PYTHONPATH=$(JUDGES) $(BIN)/python -m pytest -o 'python_files=judge_*.py' tests/peers
+	PYTHONPATH=$(JUDGES) $(BIN)/python -m pytest --timeout 300 -o 'python_files=judge_*.py' tests/peers
 
 # It needs pyserial and nothing else. Without it its judge is left out, and says so.
 $(JUDGES): $(VENV)/.installed-dev

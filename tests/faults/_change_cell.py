@@ -25,6 +25,7 @@ import robolink
 from robolink.journal import Journal, open_journal
 from robolink.model import EntryKind, MarkerKind, ToolOffset
 from robolink.transaction import changed_since
+from tests._patience import PATIENCE_S
 from tests.faults._change_process import OLD, CommitStep, ProgramProcess, acknowledged
 from tests.faults._steps import MOMENTS, Moment
 
@@ -174,7 +175,7 @@ class ChangeCell(ABC):
 
         def hold(number: int, _text: str) -> None:
             if number == before + step.number and not reached.is_set():
-                started.get(timeout=30).kill()
+                started.get(timeout=PATIENCE_S).kill()
                 reached.set()
 
         with self.simulator.lock:
@@ -184,7 +185,7 @@ class ChangeCell(ABC):
                 self.simulator.on_reply = hold
         client = ProgramProcess(program, self.url, self.folder)
         started.put(client)
-        assert reached.wait(30), "the step was not reached"
+        assert reached.wait(PATIENCE_S), "the step was not reached"
         with self.simulator.lock:
             self.simulator.on_request = self.simulator.on_reply = None
         return client

@@ -21,6 +21,7 @@ import robolink
 from robolink.journal import open_journal
 from robolink.model import TIP, Controller, LookingController, ToolOffset
 from robolink.transaction import ToolChange, Wanted, carrying_out, change_tools, recover
+from tests._patience import PATIENCE_S
 from tests.faults import _client_process
 
 OLD: Final = {1: ToolOffset(12.0, -3.5, -20.0), 2: ToolOffset(-12.0, -3.5, -21.0)}
@@ -29,7 +30,6 @@ NEW: Final = {1: ToolOffset(12.25, -3.25, -20.0), 2: ToolOffset(-11.75, -3.5, -2
 ORDER: Final = "A-17/3"
 
 CommitMoment = Literal["before it is durable", "once it is durable"]
-_PATIENCE_S: Final = 30.0
 
 
 @dataclass(frozen=True)
@@ -101,11 +101,11 @@ class ProgramProcess:
         """Send SIGKILL and return when the process, and with it its socket, is gone."""
         assert self._process.pid is not None
         os.kill(self._process.pid, signal.SIGKILL)
-        assert wait([self._process.sentinel], _PATIENCE_S), "it outlived SIGKILL"
+        assert wait([self._process.sentinel], PATIENCE_S), "it outlived SIGKILL"
 
     def exit_code(self) -> int:
         """Wait for its end and return the exit code, negative for a signal."""
-        assert wait([self._process.sentinel], _PATIENCE_S), "it hangs"
+        assert wait([self._process.sentinel], PATIENCE_S), "it hangs"
         self._process.join()
         code = self._process.exitcode
         self._process.close()

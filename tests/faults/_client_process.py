@@ -12,6 +12,8 @@ from collections.abc import Mapping, Sequence
 from multiprocessing.connection import wait
 from pathlib import Path
 
+from tests._patience import PATIENCE_S
+
 _FORKS = multiprocessing.get_context("forkserver")
 _FORKS.set_forkserver_preload(
     [
@@ -21,8 +23,6 @@ _FORKS.set_forkserver_preload(
         "tests.faults._operator_process",
     ]
 )
-
-_PATIENCE_S = 30.0
 
 
 class ClientProcess:
@@ -52,11 +52,11 @@ class ClientProcess:
     def kill(self) -> None:
         """Send SIGKILL and return when the process, and with it its socket, is gone."""
         self.signal(signal.SIGKILL)
-        assert wait([self._process.sentinel], _PATIENCE_S), "it outlived SIGKILL"
+        assert wait([self._process.sentinel], PATIENCE_S), "it outlived SIGKILL"
 
     def exit_code(self) -> int:
         """Wait for its end and return the exit code, negative for a signal."""
-        assert wait([self._process.sentinel], _PATIENCE_S), f"it hangs; {self.err}"
+        assert wait([self._process.sentinel], PATIENCE_S), f"it hangs; {self.err}"
         self._process.join()
         code = self._process.exitcode
         self._process.close()

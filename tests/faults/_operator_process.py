@@ -6,7 +6,6 @@ import sys
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Final
 
 from robolink_simulators.cell.clock import ManualClock
 
@@ -16,10 +15,9 @@ from robolink.journal import open_journal
 from robolink.model import Signature, ToolOffset
 from robolink.timing import NS_PER_S
 from robolink.transaction import Wanted, change_tools
+from tests._patience import PATIENCE_S
 from tests.faults import _client_process
 from tests.faults._operator_steps import StepKind, Waiting, wait_at_each_step
-
-_PATIENCE_S: Final = 30.0
 
 
 @dataclass(frozen=True)
@@ -102,7 +100,7 @@ class OperatorProcess:
         self._line.close()
 
     def _listen(self) -> None:
-        assert self._line.poll(_PATIENCE_S), "he hangs"
+        assert self._line.poll(PATIENCE_S), "he hangs"
         self.state = self._line.recv()
 
     def _signal(self, number: signal.Signals) -> None:

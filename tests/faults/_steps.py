@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from queue import SimpleQueue
 from typing import Final, Literal
 
+from tests._patience import PATIENCE_S
 from tests.faults._client_process import ClientProcess
 from tests.faults._nozzle_cell import NozzleCell
 
@@ -71,7 +72,7 @@ def disturbed(cell: NozzleCell, step: Step, act: Callable[[ClientProcess], None]
 
     def hold(number: int, _text: str) -> None:
         if number == step.number and not reached.is_set():
-            act(started.get(timeout=30))
+            act(started.get(timeout=PATIENCE_S))
             reached.set()
 
     simulator = cell.simulator
@@ -82,7 +83,7 @@ def disturbed(cell: NozzleCell, step: Step, act: Callable[[ClientProcess], None]
             simulator.on_reply = hold
     client = cell.calibrate()
     started.put(client)
-    assert reached.wait(30), "the step was not reached"
+    assert reached.wait(PATIENCE_S), "the step was not reached"
     with simulator.lock:
         simulator.on_request = simulator.on_reply = None
     return client

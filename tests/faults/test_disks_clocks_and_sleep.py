@@ -30,12 +30,12 @@ from robolink.errors import LeaseHeldError, LeaseLostError, TransportTimeoutErro
 from robolink.journal import open_journal
 from robolink.journal.store import engines
 from robolink.model import Marker, MarkerKind
+from tests._patience import PATIENCE_S
 from tests.faults._client_process import ClientProcess
 from tests.faults._nozzle_cell import OLD_TIP, NozzleCell, served_cell
 from tests.faults._requests import changes
 
 ROOT = Path(__file__).parents[2]
-PATIENCE_S = 20.0
 
 
 @pytest.fixture
@@ -75,7 +75,7 @@ def test_f61_on_a_disk_that_is_full_nothing_is_written(cell, tmp_path):
         env={**os.environ, "ROBOLINK_JOURNAL": str(disk / "journal.db")},
         capture_output=True,
         text=True,
-        timeout=50,
+        timeout=PATIENCE_S,
         check=False,
     )
     if ended.returncode == 99 or "unshare:" in ended.stderr:
@@ -271,7 +271,7 @@ def said_after_sleep(location: Path, identity: str, asleep_s: int) -> str:
     asleep = ["unshare", "--time", "--boottime", str(asleep_s)]
     command = [sys.executable, "-c", SOMEBODY_ELSE, str(location), identity]
     ended = subprocess.run(
-        [*asleep, *command], capture_output=True, text=True, timeout=50, check=False
+        [*asleep, *command], capture_output=True, text=True, timeout=PATIENCE_S, check=False
     )
     if "unshare:" in ended.stderr:
         pytest.skip(f"no time namespace can be made here: {ended.stderr.strip()}")

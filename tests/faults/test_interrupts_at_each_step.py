@@ -22,11 +22,12 @@ from robolink.interrupts import InterruptGate
 from robolink.journal import JournalOutcomeLog, memory_journal
 from robolink.model import describe_offset
 from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
+from tests._patience import PATIENCE_S
 from tests.faults._client_process import ClientProcess
 from tests.faults._nozzle_cell import MOVE, OLD_TIP, NozzleCell, served_cell
 from tests.faults._steps import SHARES, Step, disturbed, steps_of
 
-pytestmark = pytest.mark.timeout(600)
+pytestmark = pytest.mark.timeout(3600)
 
 POSE = '$Execute,"Print RealPos"'
 
@@ -100,7 +101,7 @@ def test_a_second_signal_during_the_cleaning_up_breaks_nothing(tmp_path, monkeyp
                 return
             if not sent:
                 sent.append("SIGTERM")
-                clients.append(started.get(timeout=30))
+                clients.append(started.get(timeout=PATIENCE_S))
                 clients[0].signal(signal.SIGTERM)
             elif text == "$Abort":
                 sent.append("SIGINT")

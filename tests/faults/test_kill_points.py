@@ -14,7 +14,7 @@ from robolink.journal import EntryKind, open_journal
 from tests.faults._nozzle_cell import OLD_TIP, NozzleCell, served_cell
 from tests.faults._steps import SHARES, Step, disturbed, steps_of
 
-pytestmark = pytest.mark.timeout(600)
+pytestmark = pytest.mark.timeout(3600)
 
 
 @pytest.fixture(scope="module")

@@ -28,6 +28,7 @@ from robolink.journal import memory_journal
 from robolink.model import Controller, MotionProfile, Path, ToolOffset, Verdict, WorkBox
 from robolink.protocols.mailbox import to_frame
 from robolink.transaction import Wanted, change_tools, recover
+from tests._patience import PATIENCE_S
 from tests.contract._softmotion_cell import served
 
 THREADS = 100
@@ -45,7 +46,7 @@ def together(acts: Sequence[Callable[[], object]]) -> list[object]:
     gate = threading.Barrier(len(acts))
 
     def run(number: int) -> None:
-        gate.wait(30)
+        gate.wait(PATIENCE_S)
         try:
             ends[number] = acts[number]()
         except RobolinkError as error:
@@ -55,7 +56,7 @@ def together(acts: Sequence[Callable[[], object]]) -> list[object]:
     for thread in threads:
         thread.start()
     for thread in threads:
-        thread.join(50)
+        thread.join(PATIENCE_S)
     assert not any(thread.is_alive() for thread in threads)
     return ends
 
@@ -74,7 +75,7 @@ def admitted(controller: Controller, others: threading.Semaphore) -> str:
     try:
         with controller.preserved("a procedure"):
             for _ in range(AT_ONCE - 1):
-                assert others.acquire(timeout=20), "somebody else was let in, or hangs"
+                assert others.acquire(timeout=PATIENCE_S), "somebody else was let in, or hangs"
             return "admitted"
     except BusyError:
         others.release()

@@ -22,6 +22,7 @@ from robolink.journal import memory_journal, open_journal
 from robolink.model import ANY, EntryKind, Marker, MarkerKind, plain_offset
 from robolink.testing import MemoryController, MemoryMachine
 from robolink.transaction import Settler, ToolChange, Wanted, carrying_out, change_tools
+from tests._patience import PATIENCE_S
 from tests.faults._change_cell import ChangeCell, Step, change_cell
 from tests.faults._change_process import NEW, OLD, ORDER, PROGRAMS, CommitStep
 from tests.faults._client_process import ClientProcess
@@ -29,7 +30,7 @@ from tests.faults._nozzle_cell import OLD_TIP, NozzleCell, served_cell
 from tests.faults._softmotion_change_cell import plc_change_cell
 from tests.faults._steps import MOMENTS, Moment
 
-pytestmark = pytest.mark.timeout(600)
+pytestmark = pytest.mark.timeout(3600)
 
 CELLS: dict[str, Callable[[Path], AbstractContextManager[ChangeCell]]] = {
     "EPSON": change_cell,
@@ -143,11 +144,11 @@ def kill_change(cell: NozzleCell, at: Instant) -> None:
         if kind_of(text) == at.request:
             seen.append(number)
             if len(seen) == at.nth and at.moment == MOMENTS[0]:
-                started.get(timeout=30).kill()
+                started.get(timeout=PATIENCE_S).kill()
 
     def hold_answer(number: int, _text: str) -> None:
         if seen[at.nth - 1 : at.nth] == [number] and at.moment == MOMENTS[1]:
-            started.get(timeout=30).kill()
+            started.get(timeout=PATIENCE_S).kill()
 
     with cell.simulator.lock:
         cell.simulator.on_request, cell.simulator.on_reply = hold, hold_answer

@@ -18,7 +18,7 @@ from tests.faults._kill_points import (
 from tests.faults._softmotion_change_cell import plc_change_cell
 from tests.faults._steps import MOMENTS
 
-pytestmark = pytest.mark.timeout(600)
+pytestmark = pytest.mark.timeout(3600)
 
 
 def written_by(step: Step) -> bool:

@@ -11,9 +11,8 @@ from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 from robolink.stopping import far_end_of, holders_of
+from tests._patience import PATIENCE_S
 from tests.faults._client_process import ClientProcess
-
-PATIENCE_S = 20.0
 
 
 @pytest.fixture

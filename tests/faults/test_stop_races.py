@@ -14,6 +14,7 @@ from robolink_simulators.epson.device import EpsonSimulator
 
 from robolink.errors import StoppedError
 from robolink.model import MotionProfile, Path, WorkBox
+from tests._patience import PATIENCE_S
 from tests.contract import _softmotion_cell as plcs
 from tests.contract.conftest import served
 
@@ -63,7 +64,7 @@ def races(controller, moves_begun, trials, *, reset):
             motion.wait(timeout_s=20)
         except StoppedError:
             pass
-        stopper.join(20)
+        stopper.join(PATIENCE_S)
         assert stopper.acknowledged is not None, "no stop was acknowledged"
         left += stopper.acknowledged > before
         after += moves_begun() > stopper.acknowledged

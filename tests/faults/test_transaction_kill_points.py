@@ -23,7 +23,7 @@ from tests.faults._kill_points import (
 )
 from tests.faults._steps import MOMENTS
 
-pytestmark = pytest.mark.timeout(600)
+pytestmark = pytest.mark.timeout(3600)
 
 CHANGES = (
     "one tool",

@@ -36,6 +36,7 @@ from robolink.protocols.mailbox import (
     next_number,
 )
 from robolink.transport import open_mailbox_link, parse_url
+from tests._patience import PATIENCE_S
 
 OLD, MINE = ToolOffset(12.0, -3.5, -20.0), ToolOffset(12.1, -3.5, -20.0)
 
@@ -73,7 +74,7 @@ class Laptop:
             stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,
-            timeout=50,
+            timeout=PATIENCE_S,
             check=False,
         )
         return done.returncode, json.loads(done.stdout)

@@ -21,7 +21,7 @@ from robolink.model import TIP, LookingController
 from tests.faults._change_cell import EpsonChangeCell, Step, WireStep, change_cell
 from tests.faults._change_process import OLD
 
-pytestmark = pytest.mark.timeout(600)
+pytestmark = pytest.mark.timeout(3600)
 
 PROGRAM = Path(__file__).parents[2] / "companions" / "epson" / "robolink_vision.prg"
 VISION = """

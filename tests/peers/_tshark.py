@@ -7,6 +7,7 @@ from pathlib import Path
 import robolink
 from robolink import ToolOffset
 from robolink.protocols.mailbox import Command, Opcode
+from tests._patience import PATIENCE_S
 
 SLOT = 5
 NEW = ToolOffset(1.5, 2.0, -3.0, 10.0)
@@ -52,5 +53,5 @@ def complaints(capture: Path, *, options: Sequence[str] = ()) -> list[str]:
 
 def _tshark(capture: Path, *arguments: str) -> list[str]:
     command = ["tshark", "-n", "-r", str(capture), *_STRICT, *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=30)
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=PATIENCE_S)
     return done.stdout.splitlines()

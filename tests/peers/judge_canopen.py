@@ -3,6 +3,7 @@
 import os
 import socket
 import struct
+import threading
 
 import canopen
 import pytest
@@ -10,9 +11,11 @@ from robolink_simulators.hosting.fieldbus.canopen_node import CanPlace, serve_ca
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 from robolink.protocols.mailbox import PROBE, VERSION, Bits, decode_response, decode_slot
+from tests._patience import PATIENCE_S
 
 DATA_SHEET = "companions/codesys/robolink_mailbox.eds"
 NODE = 5
+OPERATIONAL = 5
 PRODUCER_HEARTBEAT, RESPONSE, MAILBOX, TOOL_SLOT = 0x1017, 0x2101, 0x2102, 0x2200
 
 
@@ -46,7 +49,21 @@ def node(simulator, place):
     with canopen.Network() as network:
         network.NOTIFIER_CYCLE = 0.02
         network.connect(**place.settings())
-        yield network.add_node(canopen.RemoteNode(NODE, DATA_SHEET))
+        node = network.add_node(canopen.RemoteNode(NODE, DATA_SHEET))
+        node.sdo.RESPONSE_TIMEOUT = PATIENCE_S  # else 0.3 s, which a busy computer takes
+        yield node
+
+
+def seen(register, wanted):
+    """Wait until something of which canopen tells all callbacks is as wanted."""
+    came = threading.Event()
+
+    def keep(told):
+        if wanted(told):
+            came.set()
+
+    register(keep)
+    return came.wait(PATIENCE_S)
 
 
 def response(node):
@@ -58,7 +75,7 @@ def response(node):
 def test_the_heartbeat_time_is_that_of_the_data_sheet_and_heartbeats_come(node):
     assert node.sdo[PRODUCER_HEARTBEAT].raw == 100
     node.nmt.state = "OPERATIONAL"
-    assert node.nmt.wait_for_heartbeat(timeout=2) == "OPERATIONAL"
+    assert seen(node.nmt.add_heartbeat_callback, lambda state: state == OPERATIONAL)
 
 
 def test_the_mailbox_describes_itself(node, simulator):
@@ -86,10 +103,13 @@ def test_the_first_pdo_is_mapped_as_the_data_sheet_says(node):
     node.tpdo.read()
     node.nmt.state = "OPERATIONAL"
     head = node.tpdo[1]
-    head.wait_for_reception(timeout=2)
-    before = head["head.heartbeat"].raw
-    head.wait_for_reception(timeout=2)
+    beats = []
+
+    def beats_move(head):
+        beats.append(head["head.heartbeat"].raw)
+        return beats[-1] != beats[0]
+
+    assert seen(head.add_callback, beats_move)
     now = response(node)
     assert head["head.group_state"].raw == now.group_state
     assert head["head.ack"].raw == now.ack_head
-    assert head["head.heartbeat"].raw != before

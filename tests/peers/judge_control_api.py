@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from tests._patience import PATIENCE_S
+
 CLIENT = Path(__file__).parent / "control_client.mjs"
 
 
@@ -19,7 +21,7 @@ def test_a_client_in_another_language_calibrates_and_stops():
         env={**os.environ, "PYTHONPATH": paths},
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=PATIENCE_S,
         check=False,
     )
     assert done.returncode == 0, done.stderr

@@ -12,6 +12,7 @@ from robolink.protocols.mailbox import (
     decode_slot,
 )
 from robolink.transport import parse_url
+from tests._patience import PATIENCE_S
 
 
 @pytest.fixture
@@ -25,7 +26,9 @@ def read_registers(programs, softmotion_sim):
 
     def run(*blocks: int) -> list[list[int]]:
         command = [str(programs / "read_registers"), *way, *map(str, blocks)]
-        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=10)
+        done = subprocess.run(
+            command, capture_output=True, text=True, check=False, timeout=PATIENCE_S
+        )
         if done.returncode:
             raise RuntimeError(done.stderr.strip())
         return [[int(word, 16) for word in line.split()] for line in done.stdout.splitlines()]

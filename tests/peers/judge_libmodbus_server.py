@@ -11,8 +11,10 @@ from robolink_simulators.hosting.streams.serial_cable import SerialCable
 
 import robolink
 from robolink import ToolOffset
-from robolink.errors import RejectedError
+from robolink.errors import NotComparedError, RejectedError
+from robolink.testing import confirm_whole_map
 from robolink.transaction import Wanted, change_tools
+from tests._patience import PATIENCE_S
 
 MAP = Path("examples/plc-maps/commit-bit.toml").absolute()
 OLD = {1: ToolOffset(12.0, -3.5, -20.0, 15.0), 2: ToolOffset(-12.0, -3.5, -21.0)}
@@ -31,7 +33,7 @@ class MappedPlc:
     def end(self) -> None:
         """End the process and collect what it took over, each time."""
         self.process.kill()
-        printed, _ = self.process.communicate(timeout=5)
+        printed, _ = self.process.communicate(timeout=PATIENCE_S)
         takeovers = [line for line in printed.splitlines() if line.startswith("in force ")]
         self.in_force = [[float(text) for text in line.split()[2:]] for line in takeovers]
 
@@ -75,6 +77,14 @@ def plc(request):
     return request.getfixturevalue(f"{request.param}_plc")
 
 
+@pytest.fixture
+def compared_plc(plc):
+    """The PLC, whose map somebody has compared with the machine's screen."""
+    with robolink.connect(plc.url) as controller:
+        confirm_whole_map(controller)
+    return plc
+
+
 def values(*tools: ToolOffset) -> list[float]:
     """Return what the PLC prints about tools."""
     return [value for t in tools for value in (t.x_mm, t.y_mm, t.z_mm, t.u_deg)]
@@ -88,31 +98,40 @@ def test_tools_and_signals_are_read(plc):
     assert (status.remote, status.ready, status.fault) == (True, True, False)
 
 
-def test_a_tool_is_written_taken_over_and_read_back(plc):
+def test_no_tool_is_written_by_a_map_that_nobody_has_compared(plc):
     with robolink.connect(plc.url) as controller:
+        with pytest.raises(NotComparedError):
+            controller.tools.write(1, NEW[1], expected=OLD[1])
+        assert controller.tools.read_all() == OLD
+    plc.end()
+    assert plc.in_force == []
+
+
+def test_a_tool_is_written_taken_over_and_read_back(compared_plc):
+    with robolink.connect(compared_plc.url) as controller:
         receipt = controller.tools.write(1, NEW[1], expected=OLD[1])
         assert (receipt.before, receipt.read_back) == (OLD[1], NEW[1])
-    with robolink.connect(plc.url) as controller:
+    with robolink.connect(compared_plc.url) as controller:
         assert controller.tools.read_all() == {1: NEW[1], 2: OLD[2]}
-    plc.end()
-    assert plc.in_force == [values(NEW[1], OLD[2])]
+    compared_plc.end()
+    assert compared_plc.in_force == [values(NEW[1], OLD[2])]
 
 
-def test_two_tools_change_together(plc):
-    with robolink.connect(plc.url) as controller:
+def test_two_tools_change_together(compared_plc):
+    with robolink.connect(compared_plc.url) as controller:
         change_tools(controller, [Wanted(tool, NEW[tool], OLD[tool]) for tool in OLD])
         assert controller.tools.read_all() == NEW
-    plc.end()
-    assert plc.in_force == [values(NEW[1], OLD[2]), values(NEW[1], NEW[2])]
+    compared_plc.end()
+    assert compared_plc.in_force == [values(NEW[1], OLD[2]), values(NEW[1], NEW[2])]
 
 
-def test_a_refused_value_is_named_and_all_tools_are_as_before(plc):
+def test_a_refused_value_is_named_and_all_tools_are_as_before(compared_plc):
     wanted = [Wanted(1, NEW[1], OLD[1]), Wanted(2, TOO_FAR, OLD[2])]
-    with robolink.connect(plc.url) as controller:
+    with robolink.connect(compared_plc.url) as controller:
         with pytest.raises(RejectedError, match="7, the offset is outside the limits"):
             change_tools(controller, wanted)
         assert controller.tools.read_all() == OLD
         assert controller.status().ready
-    plc.end()
-    assert plc.in_force[0] == values(NEW[1], OLD[2])
-    assert plc.in_force[-1] == values(OLD[1], OLD[2])
+    compared_plc.end()
+    assert compared_plc.in_force[0] == values(NEW[1], OLD[2])
+    assert compared_plc.in_force[-1] == values(OLD[1], OLD[2])

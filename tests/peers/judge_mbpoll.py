@@ -21,6 +21,7 @@ from robolink.protocols.mailbox import (
     encode_command,
 )
 from robolink.transport import parse_url
+from tests._patience import PATIENCE_S
 
 INPUT, INPUT_HEX, INPUT_REAL, INPUT_BITS, HOLDING = "3", "3:hex", "3:float", "1", "4"
 
@@ -40,7 +41,9 @@ def mbpoll(softmotion_sim):
         asked = () if values else ("-c", str(count))
         words = [str(value) for value in values]
         command = ["mbpoll", *way, "-0", "-1", "-t", kind, "-r", str(first), *asked, place, *words]
-        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=10)
+        done = subprocess.run(
+            command, capture_output=True, text=True, check=False, timeout=PATIENCE_S
+        )
         if done.returncode:
             raise RuntimeError(done.stderr.strip())
         return re.findall(r"^\[\d+\]:\s+(\S+)", done.stdout, re.MULTILINE)

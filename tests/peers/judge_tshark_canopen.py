@@ -9,6 +9,7 @@ from robolink_simulators.hosting.fieldbus.canopen_node import CanPlace, serve_ca
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 from robolink.protocols.mailbox import decode_command
+from tests._patience import PATIENCE_S
 from tests.peers._pcap import write_can
 from tests.peers._tshark import (
     SLOT,
@@ -45,7 +46,7 @@ def frames(tmp_path):
         listener = can.Notifier(bus, [keep], timeout=0.02)
         with serve_canopen(SoftMotionSimulator(), place) as host:
             write_a_tool(host.url)
-            assert operational.wait(2)
+            assert operational.wait(PATIENCE_S)
         listener.stop()
     return seen
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Final, Literal
 
 import pyte
+from robolink_cli.wizard.key_gate import ALONE_S
 from robolink_simulators.assist.port import InProcessEyes
 from robolink_simulators.epson.device import EpsonSimulator
 from wcwidth import wcwidth
@@ -61,6 +62,7 @@ class WindowsConsole(HandAtScreen):
     ) -> None:
         super().__init__(pyte.Screen(columns, rows), simulator and InProcessEyes(simulator))
         self._way = way
+        self._gap = folder / "gap.txt"
         with socket.create_server(("127.0.0.1", 0)) as server:
             server.settimeout(PATIENCE_S)
             port = str(server.getsockname()[1])
@@ -111,6 +113,16 @@ class WindowsConsole(HandAtScreen):
     def send(self, key: str) -> None:
         """Have a key pressed and released."""
         self._keys.sendall(f"{key}\n".encode())
+
+    def scanned(self, how: str) -> bool:
+        """Have keys pressed faster than a hand does; return whether they came so fast."""
+        self._gap.unlink(missing_ok=True)
+        self.send(how)
+        end_s = time.monotonic() + PATIENCE_S
+        while not self._gap.exists():
+            assert time.monotonic() < end_s, self.text
+            self.read()
+        return float(self._gap.read_text(encoding="utf-8")) < ALONE_S / 2
 
     def type(self, text: str, *, later_s: float = 1.0) -> None:
         """Write to the terminal, for wine's own console to make keys of; a person types later."""

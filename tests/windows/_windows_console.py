@@ -20,8 +20,10 @@ import struct
 import sys
 import threading
 import time
+from collections.abc import Iterable
 from ctypes import wintypes
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 kernel32: Any = ctypes.WinDLL("kernel32")  # type: ignore[attr-defined,unused-ignore]
@@ -113,6 +115,28 @@ def close_window() -> None:
     kernel32.TerminateProcess(wintypes.HANDLE(kernel32.GetCurrentProcess()), 0xC000013A)
 
 
+def longest_gap_s(keys: Iterable[str], pause_s: float) -> float:
+    """Press keys one after the other; return the longest time between two of them.
+
+    A busy computer stretches it, as it does not with the keys of a real scanner.
+    """
+    longest_s = 0.0
+    before_s: float | None = None
+    for one in keys:
+        press(one, released=True)
+        now_s = time.monotonic()
+        longest_s, before_s = max(longest_s, now_s - (before_s or now_s)), now_s
+        time.sleep(pause_s)
+    return longest_s
+
+
+def tell(gap_s: float) -> None:
+    """Leave a number for the far end, which reads the file once it is whole."""
+    part = Path("gap.part")
+    part.write_text(str(gap_s), encoding="utf-8")
+    part.replace("gap.txt")
+
+
 def hand(connection: socket.socket) -> None:
     """Press what the far end names."""
     for line in connection.makefile(encoding="utf-8"):
@@ -122,12 +146,9 @@ def hand(connection: socket.socket) -> None:
         elif name == "kill":
             kernel32.TerminateProcess(wintypes.HANDLE(kernel32.GetCurrentProcess()), 1)
         elif name.startswith("burst "):
-            for one in name.removeprefix("burst ").split("+"):
-                press(one, released=True)
+            tell(longest_gap_s(name.removeprefix("burst ").split("+"), 0.0))
         elif name.startswith("scan "):
-            for one in name.removeprefix("scan "):
-                press(one, released=True)
-                time.sleep(0.008)
+            tell(longest_gap_s(name.removeprefix("scan "), 0.008))
         elif name.startswith("held "):
             press(name.removeprefix("held "), released=False)
         else:

@@ -213,11 +213,17 @@ def _said(*command: str) -> str:
     return done.stdout
 
 
+TAKEN_ALONG: Final = ("pyproject.toml", "docs/documents.schema.json")
+"""What the tests read of the source beside themselves."""
+
+
 def suite_beside(python: WindowsPython) -> Path:
     """Return a folder with the tests and their settings, so that they import the wheel."""
     folder = python.folder / "suite"
     shutil.rmtree(folder, ignore_errors=True)
     leave = shutil.ignore_patterns("__pycache__", "soak", "peers")
     shutil.copytree(ROOT / "tests", folder / "tests", ignore=leave)
-    shutil.copy(ROOT / "pyproject.toml", folder)
+    for name in TAKEN_ALONG:
+        (folder / name).parent.mkdir(exist_ok=True)
+        shutil.copy(ROOT / name, folder / name)
     return folder

@@ -88,17 +88,24 @@ def test_keys_without_numlock_jog_a_held_one_ends_with_its_release_and_escape_st
 
 @BOTH
 def test_a_code_that_is_scanned_while_somebody_jogs_moves_nothing(opened, simulator, way):
-    console = jogging(opened, way)
+    console, arm = jogging(opened, way), simulator.machine.arm
+    judged = 0
     for how in ("scan 4468136931", "burst 4+6+9+enter", "scan 6842679", "burst 4+6+8+2") * 3:
-        console.send(how)
-        console.see("Too fast for a hand")
-        console.rest(1.0)
-        assert simulator.machine.arm.moves_started == 0, how
+        began = arm.moves_started
+        if console.scanned(how):
+            console.see("Too fast for a hand")
+            console.rest(1.0)
+            assert arm.moves_started == began, how
+            judged += 1
+        else:  # this computer was so busy that they came as slowly as a hand's
+            console.rest(5.0)
+    assert judged
+    began = arm.moves_started
     console.press(["6"])
     end_s = time.monotonic() + console.longest_s
-    while not simulator.machine.arm.moves_started and time.monotonic() < end_s:
+    while arm.moves_started == began and time.monotonic() < end_s:
         console.rest(0.2)
-    assert simulator.machine.arm.moves_started == 1
+    assert arm.moves_started == began + 1
 
 
 @BOTH

@@ -15,6 +15,9 @@ from tests.faults.catalogue._rows import rows
 from tests.faults.catalogue._shown_by import showings
 from tests.faults.catalogue._verdicts import Listener, judged
 
+_TEST_S = 600
+"""A minute, as in the suite, is too little where a computer does much else besides."""
+
 
 def main(wanted: list[str]) -> int:
     """Run and print; return what the process ends with."""
@@ -27,6 +30,7 @@ def main(wanted: list[str]) -> int:
     listener = Listener()
     # An expression that speaks of soak brings those that take long as well (tests/conftest.py).
     everything = ["-m", "fault and (soak or not soak)", "--quiet", "--no-header", "-r", "fE"]
+    everything += ["--timeout", str(_TEST_S)]
     ended = pytest.main([*everything, "-n", "2", *nodes], plugins=[listener]) if nodes else 0
     verdicts = [judged(row, showings(), listener.ends) for row in chosen]
     print("\n".join(["", *(verdict.line for verdict in verdicts), ""]))

@@ -2,6 +2,7 @@
 
 import logging
 import threading
+import time
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -13,7 +14,7 @@ from robolink.errors import ConfigError, ConnectError
 from robolink.messages import tr
 from robolink.timing import NS_PER_S
 from robolink_simulators.cell.clock import ScaledClock
-from robolink_simulators.hosting.fieldbus.canopen_face import LOOK_S, PERIOD_S, CanopenFace
+from robolink_simulators.hosting.fieldbus.canopen_face import LOOK_S, CanopenFace, EventTimer
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 for _name in ("can", "canopen"):  # they write to standard error when nobody listens
@@ -98,11 +99,9 @@ class CanopenHost(ClosedAtExit):
 
     def _live(self) -> None:
         """Send heads and heartbeats until the end."""
-        rounds = round(PERIOD_S / LOOK_S)
-        count = 0
+        timer = EventTimer(time.monotonic_ns())
         while not self._ending.wait(LOOK_S):
-            count += 1
-            self._face.look(due=count % rounds == 0)
+            self._face.look(due=timer.due(time.monotonic_ns()))
 
 
 def serve_canopen(

@@ -106,7 +106,8 @@ def test_a_command_that_cannot_be_typed_is_told(line, why):
 
 def test_the_sentences_of_troubleshooting_are_those_of_the_screen():
     """Each quoted sentence stands in the catalogue; ``...`` stands for what is filled in."""
-    page = (ROOT / "docs" / "troubleshooting.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "stopping.md").read_text(encoding="utf-8")
+    page = page.partition("\n## Troubleshooting: ")[2]
     quoted = re.findall(r'^\| "(.+?)" \|', page, re.M)
     with (ROOT / "robolink" / "locale" / "robolink.pot").open("rb") as file:
         sentences = [re.sub(r"\s+", " ", str(one.id)) for one in read_po(file) if one.id]

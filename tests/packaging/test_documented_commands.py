@@ -1,7 +1,7 @@
 """Every command of README and of the pages is one of today, and takes what is typed after it.
 
 Nothing is carried out here: names, options and numbers of arguments are those of the command.
-``tests/contract/test_pages_typed.py`` types whole pages.
+``tests/contract/test_pages_typed.py`` types whole parts of pages.
 """
 
 import re

@@ -115,7 +115,7 @@ $(PEER): $(VENV)/.installed-dev
 	$(BIN)/python -m pip install --quiet --no-deps --target $@ \
 		scikit-surgerycalibration==1.2.6 scikit-surgerycore==0.8.3 || true
 
-# Installed only here: nothing else needs Sphinx. docs/decisions/0021-pages-built-with-sphinx.md
+# Installed only here: nothing else needs Sphinx. docs/decisions/0005-libraries-chosen.md
 .PHONY: docs
 docs: $(VENV)/.installed-docs ## Build the pages and the API into build/docs/html, links checked.
 	$(BIN)/python docs/site/build.py

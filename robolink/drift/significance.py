@@ -3,7 +3,7 @@
 The limits of a control chart that rests on 20 values are themselves unsure: in half of all steady
 cells some coordinate leaves them within 30 changes. So a chart draws attention, and these tests,
 which know how little is known, decide what is said in words. Each look is one more chance of a
-false alarm; the levels are chosen for that, and what they come to was measured (docs/drift.md).
+false alarm; the levels are chosen for that, and what they come to was measured (docs/accuracy.md).
 """
 
 import math

@@ -1,7 +1,7 @@
 """A look at a whole cell that moves nothing: is it as the last change left it, is anything due.
 
 For a job that runs every night, and for whoever comes to a cell in the morning
-(docs/nightly-check.md).
+(docs/accuracy.md).
 """
 
 from typing import TYPE_CHECKING

@@ -3,7 +3,7 @@
 A queue that delivers at least once gives each job an id. That id stands in the journal beside the
 change, in the very transaction that keeps it, so that there is no instant at which a value stays
 and its order does not count as carried out. It is looked up under the lease, before anything is
-moved or sent (docs/line-computer.md).
+moved or sent (docs/commands.md).
 """
 
 import json

@@ -12,7 +12,7 @@ from robolink_cli.console import exit_codes
 from robolink import errors
 from robolink.standing import Standing, ToolStanding, note_standing
 
-_PAGE = Path(__file__).parents[2] / "docs" / "exit-codes.md"
+_PAGE = Path(__file__).parents[2] / "docs" / "commands.md"
 _NAMED = {
     value
     for name, value in vars(exit_codes).items()
@@ -21,7 +21,7 @@ _NAMED = {
 
 
 def test_the_page_has_the_table_of_the_code():
-    table = _PAGE.read_text().split("\n\n**6 outranks")[0]
+    table = _PAGE.read_text().split("\n\n**6 overrides")[0]
     rows = re.findall(r"^\| (\d+) \| (.+) \|$", table, re.MULTILINE)
     assert {int(code): meaning for code, meaning in rows} == exit_codes.MEANINGS
     assert [int(code) for code, _ in rows] == sorted(exit_codes.MEANINGS)

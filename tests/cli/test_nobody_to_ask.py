@@ -1,6 +1,6 @@
 """Off a terminal no command waits for an answer: it ends with 9 and says why, or does what is told.
 
-What that is stands in docs/exit-codes.md, "Without a terminal", for every command that may ask; a
+What that is stands in docs/commands.md, "Without a terminal", for every command that may ask; a
 command that is added and takes ``--yes`` fails here until it has a row.
 """
 
@@ -24,7 +24,7 @@ from tests.cli.test_refusals_of_every_command import leaves
 from tests.contract._method_cell import method_cell
 
 ROOT = Path(__file__).parents[2]
-PAGE = ROOT / "docs" / "exit-codes.md"
+PAGE = ROOT / "docs" / "commands.md"
 NOBODY = "nobody to ask"
 
 CAMERA = """
@@ -243,7 +243,7 @@ def test_every_command_that_asks_has_a_row_here_and_on_the_page():
     assert len({*with_9, *with_0}) == len(with_9) + len(with_0)
     assert {*asking()} <= {*with_9, *with_0}
     page = PAGE.read_text(encoding="utf-8")
-    told = page[page.index("## Without a terminal") :].split("\n## ")[0]
+    told = page[page.index("### Without a terminal") :].split("\n### ")[0]
     for code, names in ((9, with_9), (0, with_0)):
         (row,) = re.findall(rf"^\| {code} \| (.*) \|$", told, re.MULTILINE)
         for name in names:

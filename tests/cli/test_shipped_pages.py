@@ -36,12 +36,12 @@ def test_every_page_is_listed_with_its_title_once(run):
     assert all(pages.values())
 
 
-@pytest.mark.parametrize("name", ["drift", "drift.md", "docs/drift.md"])
+@pytest.mark.parametrize("name", ["accuracy", "accuracy.md", "docs/accuracy.md"])
 def test_a_page_is_shown_as_it_stands(run, name):
     code, out, _ = run("docs", name)
-    assert (code, out) == (0, (ROOT / "docs" / "drift.md").read_text(encoding="utf-8"))
+    assert (code, out) == (0, (ROOT / "docs" / "accuracy.md").read_text(encoding="utf-8"))
     assert json.loads(run("docs", name, "--json")[1])["text"] == out
-    assert Path(run("docs", name, "--path")[1].strip()) == ROOT / "docs" / "drift.md"
+    assert Path(run("docs", name, "--path")[1].strip()) == ROOT / "docs" / "accuracy.md"
 
 
 @pytest.mark.parametrize("name", ["technician.md", "technician.zh.md"])
@@ -70,7 +70,7 @@ def test_a_page_that_is_there_in_chinese_is_shown_so(run):
     code, out, _ = run("docs", "technician", "--lang", "zh")
     assert (code, out) == (0, (ROOT / "docs" / "technician.zh.md").read_text(encoding="utf-8"))
     assert run("docs", "technician")[1] != out
-    assert run("docs", "drift", "--lang", "zh")[1].startswith("# What a tool's changes")
+    assert run("docs", "accuracy", "--lang", "zh")[1].startswith("# Accuracy")
 
 
 def test_a_page_that_is_nearly_called_so_is_proposed(run):

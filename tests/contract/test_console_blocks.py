@@ -1,6 +1,6 @@
 """Every block of commands of README and of the pages is typed as it stands, or it is named why not.
 
-``test_pages_typed.py`` types whole pages, those of its list. Here are the others: the blocks of a
+``test_pages_typed.py`` types the parts of its list. Here is what remains: the other blocks of a
 page from top to bottom against one simulated cell, which stands in for every address, cell and
 served simulator. A command that asks is typed once as it stands, where nobody can answer: it ends
 with 9. Then it is typed with ``--yes``, which is the answer of the person at the cell.
@@ -27,7 +27,7 @@ from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.hosting.in_process.epson import register, unregister
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 
-from tests.contract.test_pages_typed import TYPED
+from tests.contract.test_pages_typed import without_typed_parts
 from tests.unit.test_epson_point_files import block as point
 from tests.unit.test_epson_point_files import pts
 
@@ -121,7 +121,7 @@ def text_of(page):
 
 
 def blocks(page):
-    return BLOCK.findall(text_of(page))
+    return BLOCK.findall(without_typed_parts(page))
 
 
 def commands(page):
@@ -135,7 +135,7 @@ def commands(page):
             yield place, line[1], int(end[1]) if end else 0
 
 
-HERE = [page for page in PAGES if blocks(page) and page.stem not in TYPED]
+HERE = [page for page in PAGES if blocks(page)]
 
 LONG = dict.fromkeys(("README.zh.md", "recipes.md", "stations.md"), pytest.mark.soak)
 """Whole changes of a needle, and a search of beams: others in the default suite have them too."""
@@ -227,7 +227,7 @@ def recorded(capsys):
 
 def before(place, cell):
     """Bring the cell to where a page says that it is by then."""
-    if place == "first-day.md 5, 1":
+    if place == "tutorial.md 5, 1":
         cell.panel.teach()
     if place == "stations.md 1, 3":
         gauge = cell.world.tips[15] = cell.world.tips[1]

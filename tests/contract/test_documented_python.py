@@ -318,37 +318,37 @@ def a_fault_plan(stack: ExitStack) -> dict[str, Any]:
 
 MAKERS = {
     "README.md 1": with_password,
-    "README.md 2": two_tools,
     "simulators/README.md 1": nothing,
-    "backup.md 1": nothing,
-    "beams-and-probe.md 1": above_two_beams,
-    "beams-and-probe.md 2": nothing,
+    "records.md 1": nothing,
+    "stations.md 1": above_two_beams,
+    "stations.md 2": nothing,
     "camera-and-board.md 1": lambda stack: {"SpotUnit": SpotUnit, "Spot": Spot, "TIP": TIP},
     "camera-and-board.md 2": nothing,
     "custom-kinematics.md 1": nothing,
-    "extending.md 1": an_acme_camera,
-    "extending.md 2": a_camera_for_a_recipe,
-    "extending.md 3": a_panel,
-    "extending.md 4": nothing,
-    "extending.md 5": an_acme_arm,
+    "extending.md 1": two_tools,
+    "extending.md 2": an_acme_camera,
+    "extending.md 3": a_camera_for_a_recipe,
+    "extending.md 4": a_panel,
+    "extending.md 5": nothing,
+    "extending.md 6": an_acme_arm,
     "fault-plans.md 1": a_fault_plan,
-    "io-and-variables.md 1": with_variables,
+    "monitor-only.md 1": with_variables,
     "journal.md 1": a_journal,
     "json.md 1": as_in_a_wheel,
-    "line-computer.md 1": undelivered,
+    "commands.md 1": undelivered,
     "plc-maps.md 1": a_map,
     "recipes.md 1": a_recipe,
     "simulated-softmotion.md 1": nothing,
     "simulated-softmotion.md 2": nothing,
     "solvers.md 1": four_poses,
     "solvers.md 2": nothing,
-    "softmotion-controller.md 1": one_plc,
-    "softmotion-controller.md 2": a_connected_plc,
+    "mailbox.md 1": one_plc,
+    "mailbox.md 2": a_connected_plc,
     "spel-programs.md 1": nothing,
     "spel-programs.md 2": nothing,
     "stopping.md 1": with_password,
     "stopping.md 2": with_password,
-    "structured-text.md 1": nothing,
+    "plc-program.md 1": nothing,
 }
 
 TESTS = {name for name, block in BLOCKS.items() if "\ndef test_" in f"\n{block}"}
@@ -358,14 +358,13 @@ def test_every_block_is_run_and_no_python_stands_outside_of_a_fence():
     assert MAKERS.keys() | TESTS == BLOCKS.keys()
     assert not MAKERS.keys() & TESTS
     assert {
-        "README.md 3",
-        "README.md 4",
-        "structured-text.md 2",
+        "plc-program.md 2",
         "testing.md 1",
         "testing.md 2",
         "testing.md 3",
         "testing.md 4",
-        "verify-controller.md 1",
+        "testing.md 5",
+        "controllers.md 1",
     } == TESTS
     for page in PAGES:
         rest = FENCED.sub("", page.read_text(encoding="utf-8"))
@@ -388,7 +387,7 @@ def test_the_test_of_an_integrator_s_program_passes_and_sees_a_changed_line(pyte
     folder = pytester.mkdir("our-plc")
     for name, text in program_texts().items():
         (folder / name).write_text(text)
-    pytester.makepyfile(BLOCKS["structured-text.md 2"])
+    pytester.makepyfile(BLOCKS["plc-program.md 2"])
     pytester.runpytest_inprocess("-p", "no:cacheprovider").assert_outcomes(passed=1)
     core = folder / "robolink_core.st"
     core.write_text(core.read_text().replace("kept.slots[o0].tool := pose;", "raw := 0;"))
@@ -397,11 +396,11 @@ def test_the_test_of_an_integrator_s_program_passes_and_sees_a_changed_line(pyte
     result.stdout.fnmatch_lines(["E *ReadBack*", "*robolink wire: softmotion*", "*WRITE_TOOL*"])
 
 
-def test_the_tests_of_readme_pass_in_somebody_else_s_run(pytester):
-    blocks = ("README.md 3", "README.md 4", *(f"testing.md {number}" for number in range(1, 5)))
+def test_the_tests_of_the_pages_pass_in_somebody_else_s_run(pytester):
+    blocks = [f"testing.md {number}" for number in range(1, 6)]
     pytester.makepyfile("".join(BLOCKS[name] for name in blocks))
     result = pytester.runpytest_subprocess("-p", "no:cacheprovider", "--strict-markers")
-    result.assert_outcomes(passed=10)
+    result.assert_outcomes(passed=7)
 
 
 def test_the_test_of_a_recording_passes_and_sees_a_difference(pytester):
@@ -425,5 +424,5 @@ def test_the_test_of_a_recording_passes_and_sees_a_difference(pytester):
         our_program = SimpleNamespace(run=run)
         """
     )
-    pytester.makepyfile(recorded + BLOCKS["verify-controller.md 1"])
+    pytester.makepyfile(recorded + BLOCKS["controllers.md 1"])
     pytester.runpytest_subprocess("-p", "no:cacheprovider").assert_outcomes(passed=1)

@@ -1,7 +1,7 @@
-"""Pages of commands, typed as they stand from top to bottom, against one simulated cell.
+"""Parts of pages, typed as they stand from top to bottom, against one simulated cell.
 
-Every ``$ robolink`` line of a page runs in this process; a line ``(exit code N)`` below it says how
-it ends. The cells of the page's own TOML are written to ``robolink.toml``, with the simulator in
+Every ``$ robolink`` line of a part runs in this process; a line ``(exit code N)`` below it says how
+it ends. The cells of its own TOML are written to ``robolink.toml``, with the simulator in
 place of every address.
 """
 
@@ -22,23 +22,25 @@ ROOT = Path(__file__).parents[2]
 TOML = re.compile(r"^```toml\n(.*?)^```", re.M | re.S)
 CONSOLE = re.compile(r"^```console\n(.*?)^```", re.M | re.S)
 CELL = '[cells.line3]\nurl = "epson+tcp://192.168.0.1:5000"\n'
-RECIPES = {"ci": "needle-beams"}
-"""The recipe that a page calls needle.toml without saying where it is from."""
+CI = "testing#In a CI machine without hardware"
+LINE_COMPUTER = "commands#A line computer runs the change"
+RECIPES = {CI: "needle-beams"}
+"""The recipe that a part calls needle.toml without saying where it is from."""
 
-NEW_NOZZLE = {"line-computer", "ci"}
-"""The pages that begin when another nozzle was mounted and the motors are on."""
+NEW_NOZZLE = {LINE_COMPUTER, CI}
+"""The parts that begin when another nozzle was mounted and the motors are on."""
 
 TYPED: dict[str, tuple[pytest.MarkDecorator, ...]] = {
-    "tutorial": (),
-    "after-a-crash": (),
-    "people": (),
-    "nightly-check": (),
-    "epson-controller": (),
-    "first-hardware": (pytest.mark.soak,),
-    "line-computer": (pytest.mark.soak,),
-    "ci": (),
+    "tutorial#Ten minutes with a simulated robot": (),
+    "stopping#After a crash, a cut link or an emergency stop": (),
+    "cell-files#People and roles": (),
+    "accuracy#A check every night": (),
+    "controllers#Connecting an EPSON controller": (),
+    "controllers#First time on hardware": (pytest.mark.soak,),
+    LINE_COMPUTER: (pytest.mark.soak,),
+    CI: (),
 }
-"""The pages that are typed here, with their marks."""
+"""The parts of pages that are typed here, each by its page and heading, with their marks."""
 
 
 @pytest.fixture
@@ -66,9 +68,27 @@ def typed(page):
     ]
 
 
+def part(name):
+    """Return what stands on a page below one of its headings, down to the next one."""
+    file, _, heading = name.partition("#")
+    page = (ROOT / "docs" / f"{file}.md").read_text(encoding="utf-8")
+    _, found, below = page.partition(f"\n## {heading}\n")
+    assert found, name
+    return re.split(r"^## ", below, maxsplit=1, flags=re.M)[0]
+
+
+def without_typed_parts(page):
+    """Return the text of a page but for the parts that are typed here."""
+    text = page.read_text(encoding="utf-8")
+    for name in TYPED:
+        if name.partition("#")[0] == page.stem:
+            text = text.replace(part(name), "")
+    return text
+
+
 @pytest.mark.parametrize("name", [pytest.param(name, marks=marks) for name, marks in TYPED.items()])
-def test_a_page_can_be_typed_from_top_to_bottom(cell, name, tmp_path, capsys):
-    page = (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8")
+def test_a_part_of_a_page_can_be_typed_from_top_to_bottom(cell, name, tmp_path, capsys):
+    page = part(name)
     cells = "".join(block for block in TOML.findall(page) if "[cells." in block) or CELL
     cells = re.sub(r'^url = ".*"', f'url = "{cell.url}"', cells, flags=re.M)
     if "confirmed_by" not in cells:

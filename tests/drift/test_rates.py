@@ -1,4 +1,4 @@
-"""How often a steady cell is suspected, and how soon a change is seen; for docs/drift.md."""
+"""How often a steady cell is suspected, and how soon a change is seen; for docs/accuracy.md."""
 
 from collections import Counter
 from statistics import median

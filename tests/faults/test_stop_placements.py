@@ -67,7 +67,7 @@ def check_nothing_went_on(cell: RecipeCell, ended: Ended, rest: AtRest) -> None:
     assert all(count == 1 for count in after.values()), after
     for tool in after:
         assert cell.tools()[tool] == cell.before[tool], "a write that is no roll-back"
-    # A value that could not be put back outranks the stop (docs/exit-codes.md).
+    # A value that could not be put back outranks the stop (docs/commands.md).
     unproved = {marker.kind for marker in cell.open_markers()} - {MarkerKind.SELECTION}
     assert ended.code == (6 if unproved else 10), (ended.code, ended.err)
     if not cell.changed():

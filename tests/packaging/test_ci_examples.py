@@ -1,4 +1,4 @@
-"""The container file and the pipeline of docs/ci.md: their shell parts, run in a plain shell.
+"""The container file and the pipeline of docs/testing.md: their shell parts, run in a plain shell.
 
 No container engine is needed, and none was asked: that the image is built is not shown here.
 """

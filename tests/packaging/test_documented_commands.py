@@ -1,7 +1,7 @@
 """Every command of README and of the pages is one of today, and takes what is typed after it.
 
 Nothing is carried out here: names, options and numbers of arguments are those of the command.
-``tests/contract/test_pages_typed.py`` types whole pages.
+``tests/contract/test_pages_typed.py`` types whole parts of pages.
 """
 
 import re
@@ -106,7 +106,8 @@ def test_a_command_that_cannot_be_typed_is_told(line, why):
 
 def test_the_sentences_of_troubleshooting_are_those_of_the_screen():
     """Each quoted sentence stands in the catalogue; ``...`` stands for what is filled in."""
-    page = (ROOT / "docs" / "troubleshooting.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "stopping.md").read_text(encoding="utf-8")
+    page = page.partition("\n## Troubleshooting: ")[2]
     quoted = re.findall(r'^\| "(.+?)" \|', page, re.M)
     with (ROOT / "robolink" / "locale" / "robolink.pot").open("rb") as file:
         sentences = [re.sub(r"\s+", " ", str(one.id)) for one in read_po(file) if one.id]

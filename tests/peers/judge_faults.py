@@ -1,7 +1,7 @@
 """What other makers' clients do, and ours, when an answer is late, old, in pieces, or lost.
 
 All of them talk through the same proxy to the same simulators. What is asserted is what ours
-do; what the others do is printed, so that docs/peers.md can be compared: ``pytest -s``.
+do; what the others do is printed, so that docs/contributing.md can be compared: ``pytest -s``.
 """
 
 import time

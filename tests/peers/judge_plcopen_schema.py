@@ -1,8 +1,8 @@
 """The schema of PLCopen, version 2.01, reads the exported XML.
 
-It states no licence, so it is not here: ``TC6_SCHEMA`` names a copy (docs/peers.md). CODESYS writes
-the name space of version 2.0 (docs/reference/structured_text.md 3), so that stands in the place of
-its own unless 0201 is exported.
+It states no licence, so it is not here: ``TC6_SCHEMA`` names a copy (docs/contributing.md).
+CODESYS writes the name space of version 2.0 (docs/reference/structured_text.md 3), so that stands
+in the place of its own unless 0201 is exported.
 """
 
 import os

@@ -1,4 +1,4 @@
-"""docs/spel-statements.md says what is so: each of its rows is sent, and the answer compared."""
+"""docs/spel-programs.md says what is so: each of its rows is sent, and the answer compared."""
 
 import re
 from pathlib import Path
@@ -21,19 +21,24 @@ from robolink_simulators.epson.spel.parse import (
 from robolink_simulators.epson.spel.programs.families.texts import FUNCTIONS_OF_ARRAYS
 from robolink_simulators.epson.spel.tasks.functions import TASK_FUNCTIONS
 
-PAGE = Path(__file__).parents[2] / "docs" / "spel-statements.md"
+PAGE = Path(__file__).parents[2] / "docs" / "spel-programs.md"
 _ROW = re.compile(r"^\| `(?P<statement>[^|]+)` \| (?P<who>[^|]+) \| (?P<answer>[^|]+) \|$")
 _LONGEST_S = 120
 
 
+def part():
+    page = PAGE.read_text(encoding="utf-8")
+    return page.partition("\n## Statements that the simulator answers\n")[2]
+
+
 def rows():
-    answered = PAGE.read_text(encoding="utf-8").partition("## Not carried out")[0]
+    answered = part().partition("### Not carried out")[0]
     found = map(_ROW.match, answered.splitlines())
     return [(row["statement"], row["answer"]) for row in found if row]
 
 
 def before():
-    (block,) = re.findall(r"```\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    (block,) = re.findall(r"```\n(.*?)```", part(), re.DOTALL)
     return block.strip().splitlines()
 
 

@@ -59,7 +59,7 @@ MEANINGS: Final[dict[int, str]] = {
     READER_LEFT: "the program that read the output has ended",
     TERMINATED: "terminated (SIGTERM)",
 }
-"""What each exit code says; docs/exit-codes.md has the same table."""
+"""What each exit code says; docs/commands.md has the same table."""
 
 # The first class that fits decides. A tool number that does not exist is a mistake in the
 # command (2). A tool that was changed meanwhile, is undefined, or did not keep what was

@@ -1,7 +1,7 @@
 """In which language this command speaks, and whether the console can show it.
 
 ``--lang``, ROBOLINK_LANG, ``language`` in the cell file or the user's, what the system is set to;
-what names no language that we have is English (docs/languages.md). Nothing of it is looked at
+what names no language that we have is English (docs/wizard.md). Nothing of it is looked at
 before the first sentence is made, so a stop has sent its frame by then.
 """
 

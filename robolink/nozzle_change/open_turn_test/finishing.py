@@ -2,7 +2,7 @@
 
 Its marker, and no other, lets the robot move, and stays until the verdict: a process that is killed
 in the test leaves what it found
-(docs/decisions/0060-a-change-is-taken-up-again-for-its-turn-test.md).
+(docs/decisions/0013-an-unverified-change-is-taken-back.md).
 """
 
 from collections.abc import Callable, Iterator, Mapping

@@ -1,7 +1,7 @@
 """What a change keeps of its turn tests in its durable marker, and how it is read back.
 
 Whoever finds the marker open later takes the change up again
-(docs/decisions/0060-a-change-is-taken-up-again-for-its-turn-test.md).
+(docs/decisions/0013-an-unverified-change-is-taken-back.md).
 """
 
 import math

@@ -15,7 +15,7 @@ class KeptProof(ABC):
     """The proof of one tool. What derives from it is a frozen dataclass of plain values.
 
     A change writes it down in its durable marker before it writes the offset
-    (docs/decisions/0060-a-change-is-taken-up-again-for-its-turn-test.md).
+    (docs/decisions/0013-an-unverified-change-is-taken-back.md).
 
     Attributes:
         method: Name of the calibration method that declares its type.

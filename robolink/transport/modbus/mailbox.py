@@ -60,7 +60,7 @@ def open_modbus_link(
         timeout_s: Longest wait for the connection, and for each answer.
         clock: Keeps the deadlines.
         registers_only: Whether it is opened for a stop or a look, which wait for no pymodbus;
-            over TCP nothing of a mailbox ever does (docs/decisions/0064).
+            over TCP nothing of a mailbox ever does (docs/decisions/0012).
 
     Raises:
         ConfigError: The URL or an option is wrong.

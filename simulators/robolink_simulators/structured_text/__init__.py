@@ -1,6 +1,6 @@
 """An interpreter for the subset of Structured Text that several compilers take alike.
 
-It executes what ``robolink expert plc export`` writes (docs/structured-text.md). It refuses, with
+It executes what ``robolink expert plc export`` writes (docs/plc-program.md). It refuses, with
 file, line and column, what is outside of the subset, and what compilers are known to do
 differently.
 """

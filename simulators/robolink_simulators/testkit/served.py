@@ -158,7 +158,7 @@ class EndedCommand:
     """How a command ended.
 
     Attributes:
-        exit_code: See docs/exit-codes.md.
+        exit_code: See docs/commands.md.
         out: What it printed: one document with --json.
         messages: What it told a person meanwhile.
     """

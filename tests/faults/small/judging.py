@@ -15,7 +15,7 @@ _PROOF_MM: Final = 0.2
 """By how much the proof about the new tip lets it drift; half of that turn shows the error."""
 
 _NAMED: Final = frozenset({0, 2, 3, 4, 5, 6, 7, 8, 9, 10})
-"""Exit codes of a command that knows what happened (docs/exit-codes.md); 70 is a defect of ours. A
+"""Exit codes of a command that knows what happened (docs/commands.md); 70 is a defect of ours. A
 bent pose may lead out of the box, which is 2."""
 
 _MOVE: Final = re.compile(r"\$Execute,\"(Move|Go) |write_command MOVE_")

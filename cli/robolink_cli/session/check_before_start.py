@@ -300,15 +300,16 @@ def _new_nozzle(at: "StationKind | None") -> str:
 
     match at:
         case StationKind.PIN:
-            return tr("The new nozzle is mounted and tight; tip and pin are clean")
+            clean = tr("tip and pin are clean")
         case StationKind.BEAMS:
-            return tr("The new nozzle is mounted and tight; tip and beams are clean")
+            clean = tr("tip and beams are clean")
         case StationKind.TOUCH:
-            return tr("The new nozzle is mounted and tight; tip and surface are clean")
+            clean = tr("tip and surface are clean")
         case StationKind.CAMERA:
-            return tr("The new nozzle is mounted and tight; tip and camera are clean")
+            clean = tr("tip and camera are clean")
         case _:
-            return tr("The new nozzle is mounted and tight; the tip is clean")
+            clean = tr("the tip is clean")
+    return tr("The new nozzle is mounted and tight; {clean}", clean=clean)
 
 
 def _name(controller: "Controller") -> str:

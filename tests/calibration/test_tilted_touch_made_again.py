@@ -5,6 +5,7 @@ import math
 import pytest
 
 from robolink.calibration import rotation_of
+from robolink.errors import CalibrationError
 from robolink.methods import informative_tilts, measure_pivot
 from robolink.methods.pivot.procedure import go_on_pivot
 from robolink.procedures import touches_of
@@ -23,10 +24,10 @@ class SlipsALittle(Person):
 
     def __init__(self, slip):
         super().__init__(sigma_mm=0.0)
-        self.slip = slip
+        self.slip, self.slip_mm = slip, 0.1
 
     def _error(self):
-        return [0.1 if len(self.touches) == self.slip else 0.0, 0.0, 0.0]
+        return [self.slip_mm if len(self.touches) == self.slip else 0.0, 0.0, 0.0]
 
 
 @pytest.mark.parametrize("again", [0, 3])
@@ -51,6 +52,25 @@ def test_a_tilted_touch_is_made_again_in_its_orientation_and_the_tool_ends_uprig
         rotation_of(person.touches[0]), abs=1e-9
     )
     assert tip_mm(person.steps[-1][2])[2] == pytest.approx(PIN[2] + PLAN.lift_mm, abs=0.1)
+
+
+def test_a_touch_made_again_that_is_refused_leaves_the_tool_upright():
+    person = SlipsALittle(-1)
+    first = person.run(measure_pivot(PLAN, tilts=TILTS, stored=STORED))
+    person.slip_mm, person.slip = 8.0, len(person.touches)
+    again = go_on_pivot(
+        PLAN,
+        here=person.steps[-1][2],
+        taken=touches_of(first),
+        again=2,
+        tilts=TILTS,
+        stored=STORED,
+    )
+    with pytest.raises(CalibrationError):
+        person.run(again)
+    assert rotation_of(person.steps[-1][2]) == pytest.approx(
+        rotation_of(person.touches[0]), abs=1e-9
+    )
 
 
 class GoesBack(Person):

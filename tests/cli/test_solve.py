@@ -116,6 +116,16 @@ def test_two_hands_warn_with_the_number(solved):
     assert answer["offset"] == pytest.approx([12.5, -3.25])
 
 
+def test_what_is_wrong_with_a_case_is_said_before_what_to_do(tmp_path, capsys):
+    path = tmp_path / "case.json"
+    path.write_text(json.dumps(case(poses=[ROUND[0], ROUND[0]])))
+    assert main.run(["solve", str(path), "--json"]) == 7
+    answer = json.loads(capsys.readouterr().out)
+    assert main.run(["solve", str(path)]) == 7
+    said = capsys.readouterr().out
+    assert said.index(answer["what"]) < said.index(answer["remedy"])
+
+
 def test_a_file_with_several_cases_is_as_bad_as_its_worst(solved):
     cases = [{"id": "good", **case()}, {"id": "bad", **case(poses=[ROUND[0], ROUND[0]])}]
     code, answer = solved({"schema": "robolink-calibration-vectors/1", "vectors": cases})

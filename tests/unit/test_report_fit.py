@@ -1,6 +1,7 @@
 """The picture of a measurement: residuals, the interval as an ellipse, the poses from above."""
 
 import math
+from dataclasses import replace
 from xml.etree.ElementTree import tostring
 
 import numpy as np
@@ -11,6 +12,7 @@ from robolink.model import ControllerFacts, Pose, ToolOffset
 from robolink.report import Outcome, Report, render
 from robolink.report.pictures.fit import fit_drawings, interval_ellipse
 from robolink.report.pictures.pose_plan import pose_drawings
+from robolink.report.pictures.run_order import order_drawings
 
 TIP = ToolOffset(12.0, -3.5, -20.0)
 ERRORS = ((0.012, -0.004), (-0.009, 0.011), (0.003, 0.007), (-0.006, -0.010), (0.004, 0.002))
@@ -70,6 +72,23 @@ def test_two_touches_have_no_ellipse_and_the_page_says_why():
     assert interval_ellipse(result) is None
     assert drawn(fit_drawings(result)) == ""
     assert "Repeatable: not known (two touches cannot check each other)." in render(report(result))
+
+
+def test_a_pose_without_a_residual_has_its_number_and_the_plan_names_its_cross():
+    result = solve_two_pose(*touches(0, 180))
+    page = render(report(result))
+    assert "along X" not in page
+    assert "second move" not in page
+    assert "the cross the reference point" in drawn(pose_drawings(result))
+    nowhere = replace(result, reference_point_mm=())
+    assert "cross" not in drawn(pose_drawings(nowhere))
+
+
+def test_three_residuals_have_an_order_and_two_have_none():
+    result = solve_n_angle(touches(0, 120, 240))
+    assert drawn(order_drawings(result, {}))
+    fewer = replace(result, residuals_mm=result.residuals_mm[:2])
+    assert not drawn(order_drawings(fewer, {}))
 
 
 def test_a_stated_sigma_gives_two_touches_an_ellipse():

@@ -18,6 +18,7 @@ from robolink.stations import (
     station_entry,
     touch_station,
 )
+from robolink.stations._apart import apart_mm
 
 CELL = """
 [cells.a]
@@ -85,6 +86,8 @@ def test_what_the_cell_file_declares_is_a_station(file):
         "PLATE": "touch",
     }
     assert not any(one.learnt for one in stations.values())
+    assert (stations["PLATE"].gauge, stations["PLATE"].gauge_due) == ("", "")
+    assert None not in stations["PLATE"].details.values()
     beams = beam_station(stations["BEAMS"])
     assert (beams.z_mm, beams.inputs, beams.beams[1].direction_deg) == (-100.0, (3, 4), 90.0)
     plate = touch_station(stations["PLATE"])
@@ -124,6 +127,18 @@ def test_a_cell_file_that_was_corrected_by_hand_is_not_passed_over_in_silence(fi
     assert find_stations(cell, record(near))["PLATE"].remark() == ""
     # A beam is a line: where along it somebody stated a point does not matter.
     assert find_stations(cell, entries)["BEAMS"].apart_mm == 0.5
+
+
+@pytest.mark.parametrize(("dx_mm", "dy_mm", "off_mm"), [(2.0, 2.0, 0.0), (2.0, -2.0, 8**0.5)])
+def test_only_what_lies_across_a_slanting_beam_counts(file, record, dx_mm, dy_mm, off_mm):
+    beam = {"x_mm": 340.0, "y_mm": 80.0, "direction_deg": 45.0}
+    moved = beam | {"x_mm": 340.0 + dx_mm, "y_mm": 80.0 + dy_mm}
+    stated, learnt = (
+        Found(id="BEAMS", kind=StationKind.BEAMS, x_mm=None, y_mm=None, z_mm=-100, details=details)
+        for details in ({"beams": [beam]}, {"beams": [moved]})
+    )
+    first, last = (find_station(None, record(one), "BEAMS") for one in (stated, learnt))
+    assert apart_mm(first, last) == pytest.approx(off_mm, abs=1e-9)
 
 
 def test_a_pin_may_be_known_from_the_journal_alone(record):

@@ -79,6 +79,14 @@ def test_z_that_was_kept_is_known_where_the_needle_or_the_heights_are_the_same(l
     assert log.half_of(ASIDE) == (None if half is None else pytest.approx(half, rel=1e-3))
 
 
+@pytest.mark.parametrize("aside_mm", [-0.3, 0.3])
+def test_a_z_that_was_kept_has_to_be_the_one_that_was_measured(log, aside_mm):
+    log.calibrated(OLD, MEASURED, measured=Z, z_from="measured", nozzle="N-1")
+    shifted = replace(ASIDE, z_mm=MEASURED.z_mm + aside_mm)
+    log.calibrated(shifted, shifted, measured=XY, z_from="kept", nozzle="N-1")
+    assert log.half_of(shifted) is None
+
+
 def test_x_and_y_that_were_typed_leave_z_as_known_as_it_was(log):
     log.calibrated(OLD, MEASURED, measured=Z, z_from="measured")
     log.typed(MEASURED, ASIDE)

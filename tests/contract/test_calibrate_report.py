@@ -109,6 +109,7 @@ def test_a_page_says_that_nothing_was_written_and_why(command, simulator, tmp_pa
     page = page_of(tmp_path / "page.html")
     assert found == code
     assert verdict in page
+    assert "SIMULATED: these results come from a simulator" in page
     assert "Report: page.html" in err
     assert simulator.machine.tools.get(1) == STORED
     if code:

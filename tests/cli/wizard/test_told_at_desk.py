@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 import pytest
+from robolink_cli import main
 from robolink_cli.commands.measure import recipe_events
 from robolink_cli.commands.measure.choosing import choose_recipe
 from robolink_cli.commands.measure.recalibrate import _chosen_anew, steps_of
@@ -27,6 +28,7 @@ from robolink_cli.wizard.state import Header, WizardState
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
+from robolink_simulators.hosting.in_process.epson import simulator_named, unregister
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
@@ -37,7 +39,7 @@ from robolink.errors import ConfigError, DeclinedError, NotReadyError
 from robolink.journal import EntryKind, NewEntry, Signature, memory_journal, open_log
 from robolink.model import Path as Way
 from robolink.model import Pose, ToolOffset, describe_offset
-from robolink.nozzle_change import Moment
+from robolink.nozzle_change import ChangeReport, Moment
 from robolink.recipe import load_recipe
 from robolink.runner import MoveSubject, Question
 from robolink.stations import StationKind
@@ -510,3 +512,30 @@ def test_a_screen_is_not_headed_twice_and_says_which_of_several_tools(
     progress.moment(Moment.BEFORE_MEASURE, bench, 2)
     progress.moment(Moment.BEFORE_WRITE, bench)
     assert told == said
+
+
+class Onlooker(Desk):
+    """Keeps what the desk is told to be about."""
+
+    def __init__(self):
+        super().__init__()
+        self.subjects = []
+
+    def regard(self, subject):
+        self.subjects.append(subject)
+
+
+def test_a_calibration_ends_with_its_result_at_the_desk(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
+    url = "epson+sim://desk-of-a-calibration"
+    assert main.run(["-c", url, "status"]) == 0
+    simulator_named("desk-of-a-calibration").machine.motors_on = True
+    desk = Onlooker()
+    words = ["two-pose", "--tool", "1", "--assist", url, "--sigma", "0.01", "--yes"]
+    try:
+        with sitting_at(desk):
+            assert main.run(["-c", url, "calibrate", *words, "--no-verify"]) == 0
+    finally:
+        unregister("desk-of-a-calibration")
+    assert isinstance(desk.subjects[-1], ChangeReport)

@@ -7,13 +7,16 @@ import subprocess
 import sys
 import tempfile
 import textwrap
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 
+from robolink import ambient
 from robolink.errors import JournalError
 from robolink.journal import ChainVerification, EntryKind, NewEntry, memory_journal, open_journal
 from robolink.journal.store.connection import NOTHING, DatabaseConnection
+from robolink.journal.store.engines import _begin_wal
 from robolink.journal.store.entry_rows import EntryRows
 from tests.contract.journal._acts import marker
 
@@ -340,3 +343,27 @@ def test_an_entry_that_another_process_adds_during_the_look_is_no_damage(
     log.begin(marker("b"))
     assert len(added) == 3
     assert open_anew(str(filled)).verify().problems == ()
+
+
+def test_a_file_that_another_keeps_to_itself_is_given_up_after_the_usual_wait(
+    tmp_path, monkeypatch
+):
+    waited, now = [], [0]
+    monkeypatch.setattr(ambient, "monotonic_ns", lambda: now[0])
+
+    def sleep(seconds):
+        waited.append(seconds)
+        assert len(waited) < 1000, "it waits for ever"
+        now[0] += round(seconds * 1e9)
+
+    monkeypatch.setattr(ambient, "sleep", sleep)
+    path = tmp_path / "busy.db"
+    with closing(sqlite3.connect(path, timeout=0)) as first:
+        first.execute("CREATE TABLE t (x)")
+        first.execute("BEGIN EXCLUSIVE")
+        with (
+            closing(sqlite3.connect(path, timeout=0)) as second,
+            pytest.raises(sqlite3.OperationalError, match="locked"),
+        ):
+            _begin_wal(second)
+    assert 2 < sum(waited) < 4

@@ -100,6 +100,16 @@ def test_a_run_of_this_computer_that_has_ended_is_named_and_waited_out(plc):
     assert plc.cell.owner == 0
 
 
+def test_who_insists_does_not_wait_for_a_run_that_has_ended(in_process):
+    plc = in_process
+    plc.killed(ENDED, lambda run: run.take())
+    began_s = plc.now_s
+    with plc.connect(HERE) as next_run:
+        next_run.take_over("Bea's PC is off")
+        assert plc.now_s - began_s < 2
+    assert plc.told == []
+
+
 def test_a_command_without_a_marker_leaves_its_name_too(in_process):
     plc = in_process
     plc.killed(ENDED, lambda run: run.take())

@@ -69,6 +69,7 @@ def templates() -> Environment:
         "tr": tr,
         "figure": figure,
         "half": half,
+        "plus_minus": plus_minus,
         "last_statements": last_statements,
         "rows_in_words": rows_in_words,
         "drawn": drawn,
@@ -92,6 +93,11 @@ def figure(value: float, digits: int = 3) -> Markup:
 def half(value: float, digits: int = 4) -> Markup:
     """Return half of an interval: never 0 to the eye, whole for a program that reads the page."""
     return Markup('<data value="{}">{}</data>').format(repr(float(value)), stated_mm(value, digits))
+
+
+def plus_minus(half95: float) -> Markup:
+    """Return half of an interval with its sign."""
+    return Markup(plain("+-")) + half(half95)
 
 
 def drawn(one: Drawing) -> Markup:

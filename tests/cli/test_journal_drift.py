@@ -171,8 +171,8 @@ def test_what_a_simulator_measured_is_told_from_what_says_nothing(run):
     record(course(1, 3))
     record(course(1, 3), "epson:C-SIM7782B265")
     _, out, _ = run()
-    assert f"{HERE}: 3 measured changes" in out
-    assert "epson:C-SIM7782B265 (SIMULATED): 3 measured changes" in out
+    assert f"{HERE}: measured changes: 3" in out
+    assert "epson:C-SIM7782B265 (SIMULATED): measured changes: 3" in out
     assert out.count("SIMULATED") == 1
     _, out, _ = run("--json")
     told = {one["controller"]: one["simulated"] for one in json.loads(out)["controllers"]}

@@ -81,7 +81,8 @@ def backend_of(place: JournalPlace, *, read_only: bool, glance: bool = False) ->
     Args:
         place: Where it is.
         read_only: Whether nothing is written.
-        glance: Whether that is for one short question: see :class:`~robolink.journal.store.store.Store`.
+        glance: Whether that is for one short question: see
+            :class:`~robolink.journal.store.store.Store`.
 
     Raises:
         OSError: The file or its folder cannot be made.

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from robolink.journal._records import ChainVerification as ChainVerification
     from robolink.journal._sightings import LEASE_S as LEASE_S
 else:
-    __getattr__ = lazy_exports(
+    __getattr__, __dir__, __all__ = lazy_exports(
         __name__,
         {
             "_glancing": "GlancingLog NamesOnRecord names_on_record nothing_is_open",

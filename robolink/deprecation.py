@@ -40,6 +40,12 @@ OLD_NAMES: Final[Mapping[str, Mapping[str, str]]] = {
         "open_softmotion": "robolink.controllers.open_softmotion",
         "read_device_id": "robolink.controllers.read_device_id",
     },
+    "robolink.journal": {
+        "EntryKind": "robolink.model.EntryKind",
+        "NewEntry": "robolink.model.NewEntry",
+        "Recorded": "robolink.model.Recorded",
+        "Signature": "robolink.model.Signature",
+    },
     "robolink.protocols.epson_binary": {
         "NEED_DATA": "robolink.protocols.NEED_DATA",
         "Role": "robolink.protocols.Role",

@@ -7,11 +7,7 @@ loads no database code; opening a journal does.
 
 from typing import TYPE_CHECKING
 
-from robolink.lazy_exports import lazy_exports
-from robolink.model import EntryKind as EntryKind
-from robolink.model import NewEntry as NewEntry
-from robolink.model import Recorded as Recorded
-from robolink.model import Signature as Signature
+from robolink.lazy_exports import lazy_exports, old_names
 
 if TYPE_CHECKING:
     from robolink.journal._glancing import GlancingLog as GlancingLog
@@ -47,4 +43,5 @@ else:
             "_records": "ChainVerification",
             "_sightings": "LEASE_S",
         },
+        old_names(__name__),
     )

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robolink.journal import ChainVerification, EntryKind, NewEntry, Signature, memory_journal
+from robolink.journal import ChainVerification, memory_journal
 from robolink.journal.store.tables import ENTRIES
-from robolink.model import new_operation
+from robolink.model import EntryKind, NewEntry, Signature, new_operation
 
 COLUMNS = [column.name for column in ENTRIES.columns]
 TEXTS = st.text(st.characters(), max_size=8)

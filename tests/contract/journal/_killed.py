@@ -17,8 +17,9 @@ from itertools import count
 
 from sqlalchemy import Engine, event
 
-from robolink.journal import EntryKind, JournalOutcomeLog, NewEntry, close_files, open_journal
+from robolink.journal import JournalOutcomeLog, close_files, open_journal
 from robolink.journal.store.prepared import StatementRunner
+from robolink.model import EntryKind, NewEntry
 from tests.contract.journal._acts import marker
 
 # On Windows os.kill ends a process by TerminateProcess, whatever signal it is given.

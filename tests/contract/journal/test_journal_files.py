@@ -12,9 +12,10 @@ from pathlib import Path
 import pytest
 
 from robolink.errors import JournalError
-from robolink.journal import ChainVerification, EntryKind, NewEntry, memory_journal, open_journal
+from robolink.journal import ChainVerification, memory_journal, open_journal
 from robolink.journal.store.entry_rows import EntryRows
 from robolink.journal.store.prepared import NOTHING, StatementRunner
+from robolink.model import EntryKind, NewEntry
 from tests.contract.journal._acts import marker
 
 ROOT = Path(__file__).parents[3]

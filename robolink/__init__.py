@@ -30,22 +30,7 @@ if TYPE_CHECKING:
     from robolink.runner import Operator as Operator
     from robolink.runner import Question as Question
 
-__all__ = [
-    "ANY",
-    "Controller",
-    "Operator",
-    "Pose",
-    "Question",
-    "RobolinkError",
-    "Secret",
-    "Spot",
-    "SpotUnit",
-    "TipSensor",
-    "ToolOffset",
-    "connect",
-]
-
-__getattr__ = lazy_exports(
+__getattr__, __dir__, __all__ = lazy_exports(
     __name__,
     {
         "controllers": "connect",
@@ -54,7 +39,3 @@ __getattr__ = lazy_exports(
         "runner": "Operator Question",
     },
 )
-
-
-def __dir__() -> list[str]:
-    return sorted([*globals(), *__all__])

@@ -10,6 +10,13 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from enum import StrEnum
 
+__all__ = [
+    "Checkpoint",
+    "Observer",
+    "checkpoint",
+    "observed",
+]
+
 
 class Checkpoint(StrEnum):
     """What kind of point a thread passes."""

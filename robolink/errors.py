@@ -49,6 +49,49 @@ boundary only, always ``from`` the original.
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
+__all__ = [
+    "AmbiguousPosesError",
+    "BusyError",
+    "CalibrationError",
+    "ConfigError",
+    "ConnectError",
+    "ControllerError",
+    "ControllerFaultError",
+    "DeclinedError",
+    "HeartbeatLostError",
+    "JournalError",
+    "LeaseHeldError",
+    "LeaseLostError",
+    "LimitError",
+    "LocalProtocolError",
+    "LoginRefusedError",
+    "LoginUnansweredError",
+    "MotionTimeoutError",
+    "NotAllowedError",
+    "NotComparedError",
+    "NotReadyError",
+    "NotReadyReason",
+    "OutcomeUnknownError",
+    "ProtocolError",
+    "ReadBackError",
+    "RejectedError",
+    "RemoteProtocolError",
+    "ReservedToolError",
+    "RobolinkError",
+    "SelectedToolError",
+    "StoppedError",
+    "ToolChangedError",
+    "ToolError",
+    "ToolIndexError",
+    "TransportBrokenError",
+    "TransportClosedError",
+    "TransportError",
+    "TransportTimeoutError",
+    "UnclearAnswerError",
+    "UndefinedToolError",
+    "VerifyError",
+]
+
 if TYPE_CHECKING:  # what no command needs before something stands on a controller
     from robolink.standing import Standing
 

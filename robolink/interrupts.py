@@ -26,6 +26,19 @@ from typing import Final
 
 from robolink import ambient
 
+__all__ = [
+    "EndedBy",
+    "InterruptGate",
+    "Interrupted",
+    "end",
+    "ended_by",
+    "heard_by_this_thread",
+    "heed",
+    "one_ending",
+    "output_closed",
+    "window_closed",
+]
+
 
 class EndedBy(StrEnum):
     """What ended a command before its time."""

@@ -13,6 +13,17 @@ What is made when a module is imported is made before a language is known: it is
 from collections.abc import Callable, Iterable, Mapping
 from typing import Final
 
+__all__ = [
+    "Translated",
+    "declared",
+    "in_english",
+    "install",
+    "joined",
+    "plain",
+    "spoken",
+    "tr",
+]
+
 _translate: Callable[[str], str] | None = None
 
 _WIDE_STOPS = ("\u3002", "\uff01", "\uff1f")

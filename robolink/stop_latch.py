@@ -19,6 +19,11 @@ from robolink import ambient
 from robolink.errors import ControllerError, StoppedError, UnclearAnswerError
 from robolink.messages import tr
 
+__all__ = [
+    "CommandClass",
+    "StopLatch",
+]
+
 
 class CommandClass(Enum):
     """What a request does to the machine."""

@@ -9,6 +9,18 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol, Self, runtime_checkable
 
 from robolink import ambient
 
+__all__ = [
+    "Clock",
+    "Deadline",
+    "FASTEST_ANSWER_S",
+    "NS_PER_S",
+    "SteppedClock",
+    "SystemClock",
+    "local_label",
+    "wall_label",
+    "wall_time",
+]
+
 if TYPE_CHECKING:
     from datetime import datetime
 

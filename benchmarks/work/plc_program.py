@@ -13,7 +13,7 @@ from robolink_simulators.softmotion.program.structured_plc import (
 from robolink_simulators.structured_text import SourceText
 
 from benchmarks.table import Amount, Figure
-from robolink.protocols.mailbox import program_texts
+from robolink.protocols.mailbox.exports import program_texts
 
 CYCLES = 250
 ROUNDS = 5

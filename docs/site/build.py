@@ -5,8 +5,6 @@ so that a relative link means the same on GitHub and here. Sphinx fails on a lin
 heading that is not there; what it wrote is then looked through once more, link by link.
 """
 
-import ast
-import importlib
 import inspect
 import json
 import re
@@ -19,23 +17,13 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT))
+
+from tools.api import public  # noqa: E402 - the tools lie beside the packages
+
 PAGES = ROOT / "build" / "docs" / "pages"
 HTML = ROOT / "build" / "docs" / "html"
 LINKED = ("docs", "simulators", "companions", "examples", "tests", "benchmarks")
-PACKAGES = {
-    "robolink": ROOT / "robolink",
-    "robolink_simulators": ROOT / "simulators/robolink_simulators",
-}
-MODULES = ("robolink.checkpoints", "robolink.errors", "robolink.timing")
-
-
-def exported(source: str) -> list[str]:
-    """Return the names that a package hands out: imported as themselves, or in ``__all__``."""
-    names = []
-    for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.ImportFrom):
-            names += [alias.name for alias in node.names if alias.asname == alias.name]
-    return names
 
 
 def described(path: str, value: object) -> list[str]:
@@ -50,28 +38,6 @@ def described(path: str, value: object) -> list[str]:
     else:
         kind = "autofunction" if inspect.isroutine(value) else "autodata"
     return [f".. {kind}:: {path}"]
-
-
-def packages() -> dict[str, dict[str, object]]:
-    """Return what each package hands out, by name; and the modules that are public as they are."""
-    found = {name: public(name) for name in MODULES}
-    for top, folder in PACKAGES.items():
-        for init in sorted(folder.rglob("__init__.py")):
-            package = ".".join((top, *init.parent.relative_to(folder).parts))
-            module = importlib.import_module(package)
-            if names := exported(init.read_text(encoding="utf-8")):
-                found[package] = {name: getattr(module, name) for name in names}
-    return dict(sorted(found.items()))
-
-
-def public(module: str) -> dict[str, object]:
-    """Return the classes and functions that a module defines."""
-    members = vars(importlib.import_module(module)).items()
-    return {
-        name: value
-        for name, value in members
-        if not name.startswith("_") and getattr(value, "__module__", "") == module
-    }
 
 
 def home(value: object, name: str, places: list[str]) -> str:
@@ -108,7 +74,7 @@ def write_api(api: Path) -> None:
     elsewhere: dict[str, str] = {}
     listed = ["API", "===", "", "What each package hands out.", "", ".. toctree::"]
     listed += ["   :maxdepth: 1", ""]
-    found = packages()
+    found = public()
     for package, things in found.items():
         names = {
             name: home(thing, name, [p for p, named in found.items() if named.get(name) is thing])

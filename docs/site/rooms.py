@@ -52,6 +52,7 @@ WORDS = {
     "messages": "the catalogue",
     "ways": "words of who shows",
     "lazy_exports": "names on first use",
+    "deprecation": "old names",
     "standing": "what is left",
     "version": "which robolink",
     "checkpoints": "where another thread may come in",

@@ -8,18 +8,37 @@ What is left out on purpose: the terminal and the sockets of a stop are read aga
 time, since nothing simulated stands behind them.
 """
 
-from robolink.ambient.present import Ambience as Ambience
-from robolink.ambient.present import boot_ns as boot_ns
-from robolink.ambient.present import lock as lock
-from robolink.ambient.present import monotonic_ns as monotonic_ns
-from robolink.ambient.present import random_bytes as random_bytes
-from robolink.ambient.present import random_number as random_number
-from robolink.ambient.present import reentrant_lock as reentrant_lock
-from robolink.ambient.present import regularly as regularly
-from robolink.ambient.present import replaced as replaced
-from robolink.ambient.present import sleep as sleep
-from robolink.ambient.present import steps_time as steps_time
-from robolink.ambient.present import waiting_room as waiting_room
-from robolink.ambient.present import wall_s as wall_s
-from robolink.ambient.waiting import WaitingLock as WaitingLock
-from robolink.ambient.waiting import WaitingRoom as WaitingRoom
+from robolink.ambient.present import (
+    Ambience,
+    boot_ns,
+    lock,
+    monotonic_ns,
+    random_bytes,
+    random_number,
+    reentrant_lock,
+    regularly,
+    replaced,
+    sleep,
+    steps_time,
+    waiting_room,
+    wall_s,
+)
+from robolink.ambient.waiting import WaitingLock, WaitingRoom
+
+__all__ = [
+    "Ambience",
+    "WaitingLock",
+    "WaitingRoom",
+    "boot_ns",
+    "lock",
+    "monotonic_ns",
+    "random_bytes",
+    "random_number",
+    "reentrant_lock",
+    "regularly",
+    "replaced",
+    "sleep",
+    "steps_time",
+    "waiting_room",
+    "wall_s",
+]

@@ -120,9 +120,7 @@ if TYPE_CHECKING:
     from robolink.calibration.crossed_beams import moved_beams as moved_beams
     from robolink.calibration.crossed_beams import solve_crossed_beams as solve_crossed_beams
     from robolink.calibration.crossed_beams import where_they_cross as where_they_cross
-    from robolink.calibration.evidence.approach_bias import (
-        with_approach_bias as with_approach_bias,
-    )
+    from robolink.calibration.evidence.approach_bias import with_approach_bias as with_approach_bias
     from robolink.calibration.evidence.units import RobotReach as RobotReach
     from robolink.calibration.evidence.units import require_near as require_near
     from robolink.calibration.evidence.units import require_stored_scale as require_stored_scale
@@ -237,9 +235,7 @@ if TYPE_CHECKING:
     from robolink.calibration.touch.length import LengthChange as LengthChange
     from robolink.calibration.touch.length import LengthDecision as LengthDecision
     from robolink.calibration.touch.length import length_change as length_change
-    from robolink.calibration.touch.length import (
-        length_not_observable as length_not_observable,
-    )
+    from robolink.calibration.touch.length import length_not_observable as length_not_observable
     from robolink.calibration.touch.plane_touch import PlaneTouchResult as PlaneTouchResult
     from robolink.calibration.touch.plane_touch import TouchedPlane as TouchedPlane
     from robolink.calibration.touch.plane_touch import plane_columns as plane_columns
@@ -275,94 +271,125 @@ if TYPE_CHECKING:
     from robolink.calibration.z_touch import ZTouchResult as ZTouchResult
     from robolink.calibration.z_touch import solve_z_touch as solve_z_touch
     from robolink.calibration.z_touch import touch_sigma_gain as touch_sigma_gain
-
-__getattr__ = lazy_exports(
-    __name__,
-    {
-        "beam_lines": "Beam Crossing find_beams",
-        "beam_shaft": "Lean ShaftSeen",
-        "camera.board": "LEAST_SPACING_MM solve_board",
-        "camera.board_drawing": "BoardDrawing",
-        "camera.board_fit": "solve_board_fit",
-        "camera.board_round": "solve_board_round",
-        "camera.camera_affine": "CameraCalibration PixelSighting solve_camera_affine",
-        "camera.camera_model": "CameraLimits CameraModel USUAL_CAMERA require_same_camera",
-        "camera.camera_round": "CameraRound as_round solve_camera_round",
-        "camera.known_movement": "CameraChangeRows MovementVerdict SeenMovement camera_changed "
-        "mm_camera_noise same_radius spot_changed tip_did_not_move",
-        "camera.runout": "RunoutReport runout_report",
-        "camera.runout_table": "RunoutRow RunoutTable RunoutTableResult solve_runout_table",
-        "camera.sighting": "Sighting",
-        "camera.up_camera": "solve_up_camera",
-        "core.accuracy": "ACCURACY_ROWS Accuracy AccuracyFacts AccuracyRow AssessedRow "
-        "ErrorSource RowFact",
-        "core.budget": "BudgetRow DIVISORS UncertaintyBudget",
-        "core.dispersion": "require_positive",
-        "core.evidence": "FitEvidence RunOrder",
-        "core.frames": "flange_of flange_pose flange_poses in_base seen_from tilted_flange_pose "
-        "tilted_from tip_pose toward_zero",
-        "core.pose_checks": "MIN_ROTATION_DEG angle_spread_deg planar_sigma_gain",
-        "core.pose_suggestion": "PoseLimits PosePlan precise_enough select_poses sigma_gain "
-        "suggest_poses",
-        "core.result": "CalibrationResult Drift DriftVerdict GUARD_FACTOR LEAST_HALF_WIDTH "
-        "PERSON_U_DRIFT_MM ResidualVectors VerifyResult judge_drift offset_sigma_mm worst_of",
-        "core.least_squares": "linear_fit",
-        "core.robust": "Floats Robust",
-        "core.rotations": "pose_arrays quaternion_rotations rotation_of rotations uvw_deg zyz_deg",
-        "core.turn_claim": "CONTRADICTS_ACCURACY CONTRADICTS_REPEATABILITY DriftLimits "
-        "REPEATED SMALL_ANGLE TurnClaim TurnJudgement",
-        "core.statistics": "NORMAL_95 chi_square_quantile f_quantile normal_quantile "
-        "shifted_half95 shifted_region95 student_t studentized_range_0999",
-        "crossed_beams": (
-            "BeamsResult crossing_sigma_gain moved_beams solve_crossed_beams where_they_cross"
-        ),
-        "flange_plane": "FlangePlane TipHeight carrying height_of solvable_planes",
-        "pin.axis_displacement": "GOOD_WAY_MM axis_displacement between_deg require_unturned",
-        "pin.joint": "JointResult JointTouch ToolDifference solve_joint",
-        "pin.n_angle": "solve_n_angle",
-        "pin.needle_chain": "NeedleChain NeedleLimits chain_of chain_sigma_mm",
-        "pin.stored_z": "StoredZ",
-        "pin.needle_change": "NeedleChangeResult solve_needle_change",
-        "pin.one_touch": "Pin pin_touched solve_one_touch",
-        "pin.pivot": "solve_pivot",
-        "pin.pivot_fit": "PivotDesign PivotFit fit_pivot fit_pivot_robust pivot_design",
-        "pin.six_point": "FAR_DEG SixPointResult ToolAxis solve_six_point solve_tool_axis",
-        "pin.two_pose": "solve_two_pose two_of",
-        "statement.accuracy": "assessed usual_look_sigma_mm",
-        "quality.control_chart": (
-            "LEAST_BASELINE USUAL_LAMBDA USUAL_WIDTH ControlChart control_chart"
-        ),
-        "quality.gauge_study": "GaugeStudy gauge_study",
-        "quality.doubts": "doubt_sentence known_doubts order_in_words",
-        "quality.impact": "Impact PointImpact impact_on",
-        "quality.moved_station": "StationShift TipShift judge_shifts",
-        "statement.sentences": "RowInWords accurate_sentence basis_words largest_row_sentence "
-        "measured_axes repeatable_sentence rows_in_words seating_sentence stated_mm "
-        "statement_line statement_sentences",
-        "quality.station_part": "SharedStation StationPart shared_station with_station",
-        "quality.tolerances": (
-            "BEYOND_TOLERANCE PLANAR_TOLERANCE TOUCH_TOLERANCE Tolerance beyond_tolerance"
-        ),
-        "quality.tool_fits": "ToolFit better_fit fits_alike tool_fits",
-        "evidence.approach_bias": "with_approach_bias",
-        "evidence.units": "RobotReach require_near require_stored_scale require_within_reach",
-        "statement.turn_test": "LEAST_TURN_DEG held_to_claim turn_claim",
-        "statement.turn_test_again": "MOST_REPEATS held_together looks_together",
-        "statement.turn_test_sentences": "proved_statements turn_test_headline turn_test_sentences",
-        "quality.update_guard": "Correction NEEDLE_LIMIT_MM require_shrinking update_guard "
-        "writes_refused_unattended",
-        "quality.verify_drift": "PLACING_TOLERANCE_MM verify_drift",
-        "touch.length": ("LengthChange LengthDecision length_change length_not_observable"),
-        "touch.plane_touch": "TouchedPlane PlaneTouchResult plane_columns solve_plane_touch",
-        "touch.sphere_touch": "SphereTouchResult solve_sphere_touch sphere_columns sphere_through",
-        "touch.standoff": "Standoff StandoffSeries",
-        "touch.surface_evidence": "SurfaceEvidence judge_surface_touches",
-        "touch.surface_fit": "tip_is_told",
-        "touch.surface_standoff": "SurfaceStandoffs",
-        "touch.touch_evidence": "TouchEvidence WitnessedTouch "
-        "height_limit_mm height_shows_from_mm judge_touches least_jog_mm stand_upright",
-        "touch.touch_limits": "FARTHEST_MM HIGHEST_MM MOST_RESIDUAL_MM "
-        "PERSON_SIGMA_Z_MM PROBE_SIGMA_Z_MM",
-        "z_touch": "USUAL_DECELERATION_MM_S2 Touch ZTouchResult solve_z_touch touch_sigma_gain",
-    },
-)
+else:
+    __getattr__, __dir__, __all__ = lazy_exports(
+        __name__,
+        {
+            "beam_lines": "Beam Crossing find_beams",
+            "beam_shaft": "Lean ShaftSeen",
+            "camera.board": "LEAST_SPACING_MM solve_board",
+            "camera.board_drawing": "BoardDrawing",
+            "camera.board_fit": "solve_board_fit",
+            "camera.board_round": "solve_board_round",
+            "camera.camera_affine": "CameraCalibration PixelSighting solve_camera_affine",
+            "camera.camera_model": "CameraLimits CameraModel USUAL_CAMERA require_same_camera",
+            "camera.camera_round": "CameraRound as_round solve_camera_round",
+            "camera.known_movement": (
+                "CameraChangeRows MovementVerdict SeenMovement "
+                "camera_changed mm_camera_noise same_radius spot_changed "
+                "tip_did_not_move"
+            ),
+            "camera.runout": "RunoutReport runout_report",
+            "camera.runout_table": "RunoutRow RunoutTable RunoutTableResult solve_runout_table",
+            "camera.sighting": "Sighting",
+            "camera.up_camera": "solve_up_camera",
+            "core.accuracy": (
+                "ACCURACY_ROWS Accuracy AccuracyFacts AccuracyRow AssessedRow ErrorSource RowFact"
+            ),
+            "core.budget": "BudgetRow DIVISORS UncertaintyBudget",
+            "core.dispersion": "require_positive",
+            "core.evidence": "FitEvidence RunOrder",
+            "core.frames": (
+                "flange_of flange_pose flange_poses in_base seen_from "
+                "tilted_flange_pose tilted_from tip_pose toward_zero"
+            ),
+            "core.least_squares": "linear_fit",
+            "core.pose_checks": "MIN_ROTATION_DEG angle_spread_deg planar_sigma_gain",
+            "core.pose_suggestion": (
+                "PoseLimits PosePlan precise_enough select_poses sigma_gain suggest_poses"
+            ),
+            "core.result": (
+                "CalibrationResult Drift DriftVerdict GUARD_FACTOR LEAST_HALF_WIDTH "
+                "PERSON_U_DRIFT_MM ResidualVectors VerifyResult judge_drift "
+                "offset_sigma_mm worst_of"
+            ),
+            "core.robust": "Floats Robust",
+            "core.rotations": (
+                "pose_arrays quaternion_rotations rotation_of rotations uvw_deg zyz_deg"
+            ),
+            "core.statistics": (
+                "NORMAL_95 chi_square_quantile f_quantile normal_quantile "
+                "shifted_half95 shifted_region95 student_t "
+                "studentized_range_0999"
+            ),
+            "core.turn_claim": (
+                "CONTRADICTS_ACCURACY CONTRADICTS_REPEATABILITY DriftLimits "
+                "REPEATED SMALL_ANGLE TurnClaim TurnJudgement"
+            ),
+            "crossed_beams": (
+                "BeamsResult crossing_sigma_gain moved_beams solve_crossed_beams where_they_cross"
+            ),
+            "evidence.approach_bias": "with_approach_bias",
+            "evidence.units": ("RobotReach require_near require_stored_scale require_within_reach"),
+            "flange_plane": "FlangePlane TipHeight carrying height_of solvable_planes",
+            "pin.axis_displacement": ("GOOD_WAY_MM axis_displacement between_deg require_unturned"),
+            "pin.joint": "JointResult JointTouch ToolDifference solve_joint",
+            "pin.n_angle": "solve_n_angle",
+            "pin.needle_chain": "NeedleChain NeedleLimits chain_of chain_sigma_mm",
+            "pin.needle_change": "NeedleChangeResult solve_needle_change",
+            "pin.one_touch": "Pin pin_touched solve_one_touch",
+            "pin.pivot": "solve_pivot",
+            "pin.pivot_fit": "PivotDesign PivotFit fit_pivot fit_pivot_robust pivot_design",
+            "pin.six_point": "FAR_DEG SixPointResult ToolAxis solve_six_point solve_tool_axis",
+            "pin.stored_z": "StoredZ",
+            "pin.two_pose": "solve_two_pose two_of",
+            "quality.control_chart": (
+                "ControlChart LEAST_BASELINE USUAL_LAMBDA USUAL_WIDTH control_chart"
+            ),
+            "quality.doubts": "doubt_sentence known_doubts order_in_words",
+            "quality.gauge_study": "GaugeStudy gauge_study",
+            "quality.impact": "Impact PointImpact impact_on",
+            "quality.moved_station": "StationShift TipShift judge_shifts",
+            "quality.station_part": "SharedStation StationPart shared_station with_station",
+            "quality.tolerances": (
+                "BEYOND_TOLERANCE PLANAR_TOLERANCE TOUCH_TOLERANCE Tolerance beyond_tolerance"
+            ),
+            "quality.tool_fits": "ToolFit better_fit fits_alike tool_fits",
+            "quality.update_guard": (
+                "Correction NEEDLE_LIMIT_MM require_shrinking update_guard "
+                "writes_refused_unattended"
+            ),
+            "quality.verify_drift": "PLACING_TOLERANCE_MM verify_drift",
+            "statement.accuracy": "assessed usual_look_sigma_mm",
+            "statement.sentences": (
+                "RowInWords accurate_sentence basis_words "
+                "largest_row_sentence measured_axes repeatable_sentence "
+                "rows_in_words seating_sentence stated_mm statement_line "
+                "statement_sentences"
+            ),
+            "statement.turn_test": "LEAST_TURN_DEG held_to_claim turn_claim",
+            "statement.turn_test_again": "MOST_REPEATS held_together looks_together",
+            "statement.turn_test_sentences": (
+                "proved_statements turn_test_headline turn_test_sentences"
+            ),
+            "touch.length": "LengthChange LengthDecision length_change length_not_observable",
+            "touch.plane_touch": "PlaneTouchResult TouchedPlane plane_columns solve_plane_touch",
+            "touch.sphere_touch": (
+                "SphereTouchResult solve_sphere_touch sphere_columns sphere_through"
+            ),
+            "touch.standoff": "Standoff StandoffSeries",
+            "touch.surface_evidence": "SurfaceEvidence judge_surface_touches",
+            "touch.surface_fit": "tip_is_told",
+            "touch.surface_standoff": "SurfaceStandoffs",
+            "touch.touch_evidence": (
+                "TouchEvidence WitnessedTouch height_limit_mm height_shows_from_mm judge_touches "
+                "least_jog_mm stand_upright"
+            ),
+            "touch.touch_limits": (
+                "FARTHEST_MM HIGHEST_MM MOST_RESIDUAL_MM PERSON_SIGMA_Z_MM PROBE_SIGMA_Z_MM"
+            ),
+            "z_touch": (
+                "Touch USUAL_DECELERATION_MM_S2 ZTouchResult solve_z_touch touch_sigma_gain"
+            ),
+        },
+    )

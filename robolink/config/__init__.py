@@ -7,8 +7,7 @@ checked by pydantic, which is imported when the first file is loaded and not bef
 
 from typing import TYPE_CHECKING
 
-from robolink.files.toml import Problem as Problem
-from robolink.lazy_exports import lazy_exports
+from robolink.lazy_exports import lazy_exports, old_names
 
 if TYPE_CHECKING:
     from robolink.config._adding import add_cell as add_cell
@@ -33,14 +32,17 @@ if TYPE_CHECKING:
     from robolink.config._reach import remember_reach as remember_reach
     from robolink.config._settings import CellSettings as CellSettings
 else:
-    __getattr__ = lazy_exports(
+    __getattr__, __dir__, __all__ = lazy_exports(
         __name__,
         {
             "_adding": "add_cell content_with_cell",
-            "_cells": "Cell CellGlimpse USUAL_CHANGE_MM cell_names check_file find_cell "
-            "glimpse_of_cell load_cells settings_of_file",
+            "_cells": (
+                "Cell CellGlimpse USUAL_CHANGE_MM cell_names check_file find_cell "
+                "glimpse_of_cell load_cells settings_of_file"
+            ),
             "_files": "ConfigFile Source config_files",
             "_reach": "Expected Reach glance_at_cell proof_of_files reach_cell remember_reach",
             "_settings": "CellSettings",
         },
+        old_names(__name__),
     )

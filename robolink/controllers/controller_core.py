@@ -77,6 +77,7 @@ class ControllerCore(ABC):
 
     tools: ToolTable
     groups: Sequence[MotionGroup] = ()
+    _closed = False
 
     def __init__(
         self,
@@ -94,6 +95,19 @@ class ControllerCore(ABC):
         self.ledger = link.markers.ledger
         self.capabilities = capabilities
         self.tools = tools
+
+    def __repr__(self) -> str:
+        """Say which controller, and its state as it was read last; nothing is asked for it."""
+        seen = self.ledger.seen
+        if self._closed:
+            state = "closed"
+        elif self.latch.closed:
+            state = "held by a stop"
+        elif seen is None:
+            state = "state not read"
+        else:
+            state = f"{seen[0].state.value} when read last"
+        return f"<{type(self).__name__} {self.identity}: {state}>"
 
     # What a kind says.
 
@@ -249,6 +263,7 @@ class ControllerCore(ABC):
             note_standing(error, self.ledger.standing())
             raise
         finally:
+            self._closed = True
             self._close_link()
             self.outcomes.close()
 

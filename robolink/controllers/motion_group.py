@@ -32,6 +32,10 @@ class MotionGroupCore(ABC):
     def __init__(self, link: DriverLink) -> None:
         self._driver = link
 
+    def __repr__(self) -> str:
+        """Say whose it is."""
+        return f"<{type(self).__name__} of {self._driver.identity}>"
+
     @property
     @abstractmethod
     def name(self) -> str:

@@ -58,6 +58,10 @@ class ToolTableCore(ABC):
     def __init__(self, link: DriverLink) -> None:
         self._driver = link
 
+    def __repr__(self) -> str:
+        """Say whose it is."""
+        return f"<{type(self).__name__} of {self._driver.identity}>"
+
     # What a kind says.
 
     @abstractmethod

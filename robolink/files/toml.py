@@ -15,6 +15,13 @@ from robolink.errors import ConfigError
 from robolink.files.named import read_named
 from robolink.messages import tr
 
+__all__ = [
+    "FileKind",
+    "MOST_BYTES",
+    "MOST_SHOWN",
+    "Problem",
+]
+
 MOST_BYTES: Final = 250_000
 """A recipe of a hundred tools takes 60 kB, as does a cell file of a hundred cells."""
 

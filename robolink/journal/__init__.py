@@ -6,11 +6,7 @@ docs/reference/rules.md 6).
 
 from typing import TYPE_CHECKING
 
-from robolink.lazy_exports import lazy_exports
-from robolink.model import EntryKind as EntryKind
-from robolink.model import NewEntry as NewEntry
-from robolink.model import Recorded as Recorded
-from robolink.model import Signature as Signature
+from robolink.lazy_exports import lazy_exports, old_names
 
 if TYPE_CHECKING:
     from robolink.journal._journal import Journal as Journal
@@ -32,7 +28,7 @@ if TYPE_CHECKING:
     from robolink.journal._records import ChainVerification as ChainVerification
     from robolink.journal._sightings import LEASE_S as LEASE_S
 else:
-    __getattr__ = lazy_exports(
+    __getattr__, __dir__, __all__ = lazy_exports(
         __name__,
         {
             "_journal": "Journal",
@@ -45,4 +41,5 @@ else:
             "_records": "ChainVerification",
             "_sightings": "LEASE_S",
         },
+        old_names(__name__),
     )

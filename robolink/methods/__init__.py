@@ -86,9 +86,7 @@ if TYPE_CHECKING:
     from robolink.methods.pivot.tilts import Tilt as Tilt
     from robolink.methods.pivot.tilts import informative_tilts as informative_tilts
     from robolink.methods.pivot.tilts import proving_tilts as proving_tilts
-    from robolink.methods.plane_touch.parameters import (
-        PlaneTouchParameters as PlaneTouchParameters,
-    )
+    from robolink.methods.plane_touch.parameters import PlaneTouchParameters as PlaneTouchParameters
     from robolink.methods.plane_touch.procedure import measure_plane_touch as measure_plane_touch
     from robolink.methods.plane_touch.source import PlaneTouches as PlaneTouches
     from robolink.methods.plane_touch.source import PlaneTouchSource as PlaneTouchSource
@@ -106,9 +104,7 @@ if TYPE_CHECKING:
     from robolink.methods.runout_table.parameters import (
         RunoutTableParameters as RunoutTableParameters,
     )
-    from robolink.methods.runout_table.procedure import (
-        measure_runout_table as measure_runout_table,
-    )
+    from robolink.methods.runout_table.procedure import measure_runout_table as measure_runout_table
     from robolink.methods.runout_table.source import RunoutTableSource as RunoutTableSource
     from robolink.methods.six_point.parameters import SixPointParameters as SixPointParameters
     from robolink.methods.six_point.procedure import AxisTeachPlan as AxisTeachPlan
@@ -118,9 +114,7 @@ if TYPE_CHECKING:
     from robolink.methods.sphere_touch.parameters import (
         SphereTouchParameters as SphereTouchParameters,
     )
-    from robolink.methods.sphere_touch.procedure import (
-        measure_sphere_touch as measure_sphere_touch,
-    )
+    from robolink.methods.sphere_touch.procedure import measure_sphere_touch as measure_sphere_touch
     from robolink.methods.sphere_touch.source import SphereTouches as SphereTouches
     from robolink.methods.sphere_touch.source import SphereTouchSource as SphereTouchSource
     from robolink.methods.sphere_touch.survey import SphereSurvey as SphereSurvey
@@ -133,68 +127,68 @@ if TYPE_CHECKING:
     from robolink.methods.z_touch.procedure import measure_z_touch as measure_z_touch
     from robolink.methods.z_touch.procedure import verify_by_touching as verify_by_touching
     from robolink.methods.z_touch.source import ZTouchSource as ZTouchSource
-
-__getattr__ = lazy_exports(
-    __name__,
-    {
-        "beams.parameters": "BeamLine BeamsParameters",
-        "beams.procedure": "measure_beams trace_beams verify_by_crossing",
-        "beams.source": "BeamsSource",
-        "board.parameters": "BoardParameters",
-        "board.procedure": "measure_board verify_board",
-        "board.source": "BoardSource",
-        "camera.parameters": "CameraParameters",
-        "camera.procedure": "measure_camera",
-        "camera.source": "CameraSource",
-        "camera_affine.parameters": "CameraAffineParameters LEAST_SPAN_MM",
-        "camera_affine.procedure": "measure_camera_affine",
-        "camera_affine.source": "CameraAffineSource",
-        "declaration.checking": "order_of_residuals parameter_problems source_of",
-        "declaration.method": (
-            "Angle AnyMethod Check DEGREES Former Help InputNumber Length LengthRule "
-            "MM MM_S Method MethodParameters NOTHING_STATED Needs NextStep Option "
-            "Pair PoseHelp StatedLimits Unit"
-        ),
-        "declaration.fields": "ParameterField fields_of",
-        "declaration.look_parameters": "LookParameters",
-        "n_angle.parameters": "NAngleParameters most_informative_order",
-        "n_angle.procedure": "measure_n_angle",
-        "n_angle.source": "ManyTouches NAngleSource",
-        "one_touch.last_touch": "KEPT LastTouch find_last_touch",
-        "one_touch.parameters": "OneTouchParameters",
-        "one_touch.procedure": "measure_one_touch",
-        "one_touch.solvers": "Absolute Difference difference_from_last",
-        "one_touch.source": "OneTouchSource",
-        "declaration.pin_parameters": "PinParameters UprightPinParameters",
-        "declaration.surface_parameters": "SurfaceParameters",
-        "pivot.parameters": "PivotParameters",
-        "pivot.procedure": "measure_pivot verify_by_tilting",
-        "pivot.source": "PivotSource PivotTouches require_tilting",
-        "pivot.tilts": "OverPin Tilt informative_tilts proving_tilts",
-        "plane_touch.parameters": "PlaneTouchParameters",
-        "plane_touch.procedure": "measure_plane_touch",
-        "plane_touch.source": "PlaneTouchSource PlaneTouches",
-        "plane_touch.survey": "PlaneSurvey",
-        "points.parameters": "PointsParameters",
-        "points.source": "PointsSource PosesFound taught_poses",
-        "registry": "METHODS_GROUP all_methods find_method method_names register",
-        "declaration.site": "Site ToolHistory",
-        "runout_table.parameters": "AllRoundPlan RunoutTableParameters",
-        "runout_table.procedure": "measure_runout_table",
-        "runout_table.source": "RunoutTableSource",
-        "six_point.parameters": "SixPointParameters",
-        "six_point.procedure": "AxisTeachPlan measure_six_point",
-        "six_point.source": "SixPointSource SixPoints",
-        "sphere_touch.parameters": "SphereTouchParameters",
-        "sphere_touch.procedure": "measure_sphere_touch",
-        "sphere_touch.source": "SphereTouchSource SphereTouches",
-        "sphere_touch.survey": "SphereSurvey",
-        "station_learning": "learn_station",
-        "two_pose.parameters": "TwoPoseParameters",
-        "two_pose.procedure": "measure_two_pose",
-        "two_pose.source": "TwoPoseSource TwoTouches",
-        "z_touch.parameters": "ZTouchParameters",
-        "z_touch.procedure": "measure_z_touch verify_by_touching",
-        "z_touch.source": "ZTouchSource",
-    },
-)
+else:
+    __getattr__, __dir__, __all__ = lazy_exports(
+        __name__,
+        {
+            "beams.parameters": "BeamLine BeamsParameters",
+            "beams.procedure": "measure_beams trace_beams verify_by_crossing",
+            "beams.source": "BeamsSource",
+            "board.parameters": "BoardParameters",
+            "board.procedure": "measure_board verify_board",
+            "board.source": "BoardSource",
+            "camera.parameters": "CameraParameters",
+            "camera.procedure": "measure_camera",
+            "camera.source": "CameraSource",
+            "camera_affine.parameters": "CameraAffineParameters LEAST_SPAN_MM",
+            "camera_affine.procedure": "measure_camera_affine",
+            "camera_affine.source": "CameraAffineSource",
+            "declaration.checking": "order_of_residuals parameter_problems source_of",
+            "declaration.fields": "ParameterField fields_of",
+            "declaration.look_parameters": "LookParameters",
+            "declaration.method": (
+                "Angle AnyMethod Check DEGREES Former Help InputNumber Length "
+                "LengthRule MM MM_S Method MethodParameters NOTHING_STATED "
+                "Needs NextStep Option Pair PoseHelp StatedLimits Unit"
+            ),
+            "declaration.pin_parameters": "PinParameters UprightPinParameters",
+            "declaration.site": "Site ToolHistory",
+            "declaration.surface_parameters": "SurfaceParameters",
+            "n_angle.parameters": "NAngleParameters most_informative_order",
+            "n_angle.procedure": "measure_n_angle",
+            "n_angle.source": "ManyTouches NAngleSource",
+            "one_touch.last_touch": "KEPT LastTouch find_last_touch",
+            "one_touch.parameters": "OneTouchParameters",
+            "one_touch.procedure": "measure_one_touch",
+            "one_touch.solvers": "Absolute Difference difference_from_last",
+            "one_touch.source": "OneTouchSource",
+            "pivot.parameters": "PivotParameters",
+            "pivot.procedure": "measure_pivot verify_by_tilting",
+            "pivot.source": "PivotSource PivotTouches require_tilting",
+            "pivot.tilts": "OverPin Tilt informative_tilts proving_tilts",
+            "plane_touch.parameters": "PlaneTouchParameters",
+            "plane_touch.procedure": "measure_plane_touch",
+            "plane_touch.source": "PlaneTouchSource PlaneTouches",
+            "plane_touch.survey": "PlaneSurvey",
+            "points.parameters": "PointsParameters",
+            "points.source": "PointsSource PosesFound taught_poses",
+            "registry": "METHODS_GROUP all_methods find_method method_names register",
+            "runout_table.parameters": "AllRoundPlan RunoutTableParameters",
+            "runout_table.procedure": "measure_runout_table",
+            "runout_table.source": "RunoutTableSource",
+            "six_point.parameters": "SixPointParameters",
+            "six_point.procedure": "AxisTeachPlan measure_six_point",
+            "six_point.source": "SixPointSource SixPoints",
+            "sphere_touch.parameters": "SphereTouchParameters",
+            "sphere_touch.procedure": "measure_sphere_touch",
+            "sphere_touch.source": "SphereTouchSource SphereTouches",
+            "sphere_touch.survey": "SphereSurvey",
+            "station_learning": "learn_station",
+            "two_pose.parameters": "TwoPoseParameters",
+            "two_pose.procedure": "measure_two_pose",
+            "two_pose.source": "TwoPoseSource TwoTouches",
+            "z_touch.parameters": "ZTouchParameters",
+            "z_touch.procedure": "measure_z_touch verify_by_touching",
+            "z_touch.source": "ZTouchSource",
+        },
+    )

@@ -116,49 +116,53 @@ if TYPE_CHECKING:
     from robolink.model.record.outcomes import new_operation as new_operation
     from robolink.model.record.standing_words import describe_standing as describe_standing
 else:
-    __getattr__ = lazy_exports(
+    __getattr__, __dir__, __all__ = lazy_exports(
         __name__,
         {
             "_change_limits": "ChangeGuard ChangeLimits",
             "_controller": "Act Capabilities Controller",
             "_controller_cameras": "ControllerSensor LookingController",
-            "_status": "ControllerState ControllerStatus",
-            "record.findings": "Finding Resolver Verdict",
-            "motion.custom_kinematics": (
-                "AxisKind AxisPositions FlangeFrame ISMKinematicsWithOrientationImage "
-                "ISMOrientationKinematicsWithOriImage2 ISMPositionKinematics2 MCKinRefSM3 "
-                "is_custom kinematics_class kinematics_object"
-            ),
-            "motion.geometry": "Elbow Hand Pose Posture Wrist angle_difference_deg describe_pose "
-            "rotate_xy",
             "_identity": "ControllerFacts Identity Who is_own_name",
-            "record.journal_entries": (
-                "AnsweredBy NO_HISTORY PROOFS EntryKind NewEntry Recorded Signature answer_entry "
-                "answered_by_in_words"
-            ),
-            "record.ledger": "Account Ledger",
-            "motion.movement": (
-                "Motion MotionGroup MotionOutcome MotionProfile MotionTerms Path WorkBox"
-            ),
             "_optional_parts": (
                 "AlarmList DigitalIo PointReader Value ValueReceipt ValueT VariableTable"
             ),
-            "record.marker_words": "begun_in_words",
-            "record.method_names": "finding_named_now method_name_now with_method_name_now",
-            "record.outcomes": "ClientRun Marker MarkerKind OutcomeLog new_operation",
             "_people": "PersonRole refuse_operator require_engineer",
             "_secret": "Secret",
             "_simulated": "are_simulated_facts is_simulated_name says_it_is_simulated",
-            "record.standing_words": "describe_standing",
+            "_status": "ControllerState ControllerStatus",
+            "_tools": (
+                "ANY Expect Expected Jump KinematicToolTable ToolOffset ToolReceipt "
+                "ToolTable describe_offset of_no_tool plain_offset put_right read_offset "
+                "tool_changed"
+            ),
+            "motion.custom_kinematics": (
+                "AxisKind AxisPositions FlangeFrame "
+                "ISMKinematicsWithOrientationImage "
+                "ISMOrientationKinematicsWithOriImage2 "
+                "ISMPositionKinematics2 MCKinRefSM3 is_custom "
+                "kinematics_class kinematics_object"
+            ),
+            "motion.geometry": (
+                "Elbow Hand Pose Posture Wrist angle_difference_deg describe_pose rotate_xy"
+            ),
+            "motion.movement": (
+                "Motion MotionGroup MotionOutcome MotionProfile MotionTerms Path WorkBox"
+            ),
             "motion.orientation_coupling": "CsTool OrientationImage combined_space",
             "motion.orientation_space": (
                 "Direction3 NotReachable OrientationDof OrientationSpace RotationMatrix"
             ),
             "motion.tip_sensor": "Spot SpotUnit TIP TipSensor",
-            "_tools": (
-                "ANY Expect Expected Jump KinematicToolTable ToolOffset ToolReceipt ToolTable "
-                "describe_offset of_no_tool plain_offset put_right read_offset tool_changed"
-            ),
             "motion.until_input": "InputEdge MotionUntilInput",
+            "record.findings": "Finding Resolver Verdict",
+            "record.journal_entries": (
+                "AnsweredBy EntryKind NO_HISTORY NewEntry PROOFS Recorded "
+                "Signature answer_entry answered_by_in_words"
+            ),
+            "record.ledger": "Account Ledger",
+            "record.marker_words": "begun_in_words",
+            "record.method_names": "finding_named_now method_name_now with_method_name_now",
+            "record.outcomes": "ClientRun Marker MarkerKind OutcomeLog new_operation",
+            "record.standing_words": "describe_standing",
         },
     )

@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     from robolink.pose_tables.values import PoseTable as PoseTable
     from robolink.pose_tables.values import ReadingChoices as ReadingChoices
     from robolink.pose_tables.values import TabledPose as TabledPose
-
-__getattr__ = lazy_exports(
-    __name__,
-    {
-        "conventions": "RULES RotationRule",
-        "formats.epson_points": "parse_pts read_pts",
-        "reading": "read_poses",
-        "values": "NOTHING_SAID HowRead LengthUnit PoseTable ReadingChoices TabledPose",
-    },
-)
+else:
+    __getattr__, __dir__, __all__ = lazy_exports(
+        __name__,
+        {
+            "conventions": "RULES RotationRule",
+            "formats.epson_points": "parse_pts read_pts",
+            "reading": "read_poses",
+            "values": "HowRead LengthUnit NOTHING_SAID PoseTable ReadingChoices TabledPose",
+        },
+    )

@@ -82,42 +82,45 @@ if TYPE_CHECKING:
     from robolink.procedures.surface_touches import SurfaceTouches as SurfaceTouches
     from robolink.procedures.turning import require_turn_inside as require_turn_inside
     from robolink.procedures.turning import turn_in_air as turn_in_air
-
-__getattr__ = lazy_exports(
-    __name__,
-    {
-        "turning": "require_turn_inside turn_in_air",
-        "approach": "NO_OFFSET approach_path offset_z seek_or_retract",
-        "camera.plan": "HALF_ROUND_DEG LEAST_BESIDE_MM LookPlan TWO_ANGLES_DEG",
-        "camera.drive": "CameraDrive Place",
-        "camera.samples": "CameraSamples",
-        "camera.source": (
-            "CalibratedCameraSource angles_between calibrated_camera camera_error_of pixel_camera "
-            "proof_angles radius_of"
-        ),
-        "camera.verify": "NO_ERROR nearest_first seen_drift verify_by_looking",
-        "input_source": "InputSource",
-        "lazy_source": "LazySource",
-        "pin.judging": "TOUCH_CODES heights_agree jog_mm require_one_height require_touches",
-        "pin.proof": "DriftProof MOST_MORE contact_pose drift_uncertainty_mm verify_by_turning",
-        "pin.source": (
-            "ManualPinSource PinSource TouchSource TouchesPin middles_of_gaps touches_of"
-        ),
-        "pin.touch_plan": "TouchPlan plain_pose",
-        "pin.touches": "PinTouches lift_off touch_again turned_touches",
-        "pin.turn_test": "TurnTest",
-        "pose_method": "PoseMethod",
-        "proving.kept_proof": "KeepsProof KeptProof PlacedProof ProvesAgain",
-        "sampling.sampler": "Sampler SequentialSampler",
-        "sampling.samples": "Samples",
-        "sampling.sequential": (
-            "SamplingPolicy TAKE_ALL agreement finalize_samples may_end_early "
-            "resume_samples sample_sequentially"
-        ),
-        "source": "FindsStation MeasurementContext MovingSource RequiresMotion RequiresSensor "
-        "StopsAbovePin "
-        "TipSource TouchesFurther",
-        "surface_proof": "SurfaceProof",
-        "surface_touches": "SurfaceTouches",
-    },
-)
+else:
+    __getattr__, __dir__, __all__ = lazy_exports(
+        __name__,
+        {
+            "approach": "NO_OFFSET approach_path offset_z seek_or_retract",
+            "camera.drive": "CameraDrive Place",
+            "camera.plan": "HALF_ROUND_DEG LEAST_BESIDE_MM LookPlan TWO_ANGLES_DEG",
+            "camera.samples": "CameraSamples",
+            "camera.source": (
+                "CalibratedCameraSource angles_between calibrated_camera "
+                "camera_error_of pixel_camera proof_angles radius_of"
+            ),
+            "camera.verify": "NO_ERROR nearest_first seen_drift verify_by_looking",
+            "input_source": "InputSource",
+            "lazy_source": "LazySource",
+            "pin.judging": "TOUCH_CODES heights_agree jog_mm require_one_height require_touches",
+            "pin.proof": (
+                "DriftProof MOST_MORE contact_pose drift_uncertainty_mm verify_by_turning"
+            ),
+            "pin.source": (
+                "ManualPinSource PinSource TouchSource TouchesPin middles_of_gaps touches_of"
+            ),
+            "pin.touch_plan": "TouchPlan plain_pose",
+            "pin.touches": "PinTouches lift_off touch_again turned_touches",
+            "pin.turn_test": "TurnTest",
+            "pose_method": "PoseMethod",
+            "proving.kept_proof": "KeepsProof KeptProof PlacedProof ProvesAgain",
+            "sampling.sampler": "Sampler SequentialSampler",
+            "sampling.samples": "Samples",
+            "sampling.sequential": (
+                "SamplingPolicy TAKE_ALL agreement finalize_samples "
+                "may_end_early resume_samples sample_sequentially"
+            ),
+            "source": (
+                "FindsStation MeasurementContext MovingSource RequiresMotion "
+                "RequiresSensor StopsAbovePin TipSource TouchesFurther"
+            ),
+            "surface_proof": "SurfaceProof",
+            "surface_touches": "SurfaceTouches",
+            "turning": "require_turn_inside turn_in_air",
+        },
+    )

@@ -6,14 +6,15 @@ tables is named, and not before. docs/recipes.md explains every key.
 
 from typing import TYPE_CHECKING
 
-from robolink.recipe._loading import LoadedRecipe as LoadedRecipe
-from robolink.recipe._loading import check_recipe as check_recipe
-from robolink.recipe._loading import load_recipe as load_recipe
+from robolink.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from robolink.recipe._able import beyond as beyond
     from robolink.recipe._answers import Answers as Answers
     from robolink.recipe._answers import require_answers as require_answers
+    from robolink.recipe._loading import LoadedRecipe as LoadedRecipe
+    from robolink.recipe._loading import check_recipe as check_recipe
+    from robolink.recipe._loading import load_recipe as load_recipe
     from robolink.recipe._past import RecipePast as RecipePast
     from robolink.recipe._past import changes_left_of as changes_left_of
     from robolink.recipe._past import pasts_of as pasts_of
@@ -34,38 +35,21 @@ if TYPE_CHECKING:
     from robolink.recipe.file.tables import StationTable as StationTable
     from robolink.recipe.file.tables import Tolerances as Tolerances
     from robolink.recipe.file.tables import Tool as Tool
-
-_LOADED_LATER = {
-    "beyond": "_able",
-    "Answers": "_answers",
-    "require_answers": "_answers",
-    "RecipePast": "_past",
-    "changes_left_of": "_past",
-    "pasts_of": "_past",
-    "RecipeRun": "_run",
-    "MethodTable": "file.method_tables",
-    "method_table": "file.method_tables",
-    "Basis": "file.recipe",
-    "HeightRule": "file.recipe",
-    "Recipe": "file.recipe",
-    "json_schema": "file.schema",
-    "Box": "file.tables",
-    "FlangePose": "file.tables",
-    "Output": "file.tables",
-    "Poses": "file.tables",
-    "Prompt": "file.tables",
-    "RefusalTable": "file.tables",
-    "Speeds": "file.tables",
-    "StationTable": "file.tables",
-    "Tolerances": "file.tables",
-    "Tool": "file.tables",
-}
-
-
-def __getattr__(name: str) -> object:
-    """Load what needs pydantic from its module (PEP 562)."""
-    if name not in _LOADED_LATER:
-        raise AttributeError(f"module 'robolink.recipe' has no attribute {name!r}")
-    from importlib import import_module
-
-    return getattr(import_module(f"robolink.recipe.{_LOADED_LATER[name]}"), name)
+else:
+    __getattr__, __dir__, __all__ = lazy_exports(
+        __name__,
+        {
+            "_able": "beyond",
+            "_answers": "Answers require_answers",
+            "_loading": "LoadedRecipe check_recipe load_recipe",
+            "_past": "RecipePast changes_left_of pasts_of",
+            "_run": "RecipeRun",
+            "file.method_tables": "MethodTable method_table",
+            "file.recipe": "Basis HeightRule Recipe",
+            "file.schema": "json_schema",
+            "file.tables": (
+                "Box FlangePose Output Poses Prompt RefusalTable Speeds StationTable "
+                "Tolerances Tool"
+            ),
+        },
+    )

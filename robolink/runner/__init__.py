@@ -68,23 +68,31 @@ if TYPE_CHECKING:
     from robolink.runner._yes_no import ask_yes_no as ask_yes_no
     from robolink.runner._yes_no import ask_yes_no_or as ask_yes_no_or
     from robolink.runner._yes_no import yes_or_no as yes_or_no
-
-__getattr__ = lazy_exports(
-    __name__,
-    {
-        "_arm_ahead": "ArmAhead",
-        "_capture": "FINEST_STEP NotYet SETTLING_S",
-        "_endings": "EndingWatch",
-        "_foreseeing": "ForeseenStep considered first_clear foreseen_steps nothing_in_the_way",
-        "_jog_steps": "jog_target parse_decimal parse_steps refuse_decimal_comma way_in_words",
-        "_operator": "Operator POLL_S Question awaited_line",
-        "_place_question": "AGAIN MOST_REFUSED TakenAgainError inputs_of",
-        "_runner": "Runner ask_for_pose",
-        "_settings": "RunSettings",
-        "_steps": "Ask Confirm Consider Look Move Notify Procedure Seek SeenAt Step TakenStep "
-        "StepDone TeachPrompt TouchedAt",
-        "_subjects": "AngleShown ChoiceRow FitRow FitSubject GuidedOperator JogRange JogSubject "
-        "MoveSubject OfferedChoice TouchSubject regard",
-        "_yes_no": "BACK MORE ask_yes_no ask_yes_no_or yes_or_no",
-    },
-)
+else:
+    __getattr__, __dir__, __all__ = lazy_exports(
+        __name__,
+        {
+            "_arm_ahead": "ArmAhead",
+            "_capture": "FINEST_STEP NotYet SETTLING_S",
+            "_endings": "EndingWatch",
+            "_foreseeing": (
+                "ForeseenStep considered first_clear foreseen_steps nothing_in_the_way"
+            ),
+            "_jog_steps": (
+                "jog_target parse_decimal parse_steps refuse_decimal_comma way_in_words"
+            ),
+            "_operator": "Operator POLL_S Question awaited_line",
+            "_place_question": "AGAIN MOST_REFUSED TakenAgainError inputs_of",
+            "_runner": "Runner ask_for_pose",
+            "_settings": "RunSettings",
+            "_steps": (
+                "Ask Confirm Consider Look Move Notify Procedure Seek SeenAt Step "
+                "StepDone TakenStep TeachPrompt TouchedAt"
+            ),
+            "_subjects": (
+                "AngleShown ChoiceRow FitRow FitSubject GuidedOperator JogRange "
+                "JogSubject MoveSubject OfferedChoice TouchSubject regard"
+            ),
+            "_yes_no": "BACK MORE ask_yes_no ask_yes_no_or yes_or_no",
+        },
+    )

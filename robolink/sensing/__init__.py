@@ -4,13 +4,19 @@ The cameras themselves are brought by other packages through the entry-point gro
 ``robolink.sensors``; the simulated ones come through the same door.
 """
 
-from robolink.sensing._asking import median_spot as median_spot
-from robolink.sensing._asking import scatter_of as scatter_of
-from robolink.sensing._asking import seen_in as seen_in
-from robolink.sensing._asking import seen_once as seen_once
-from robolink.sensing._registry import SENSORS_GROUP as SENSORS_GROUP
-from robolink.sensing._registry import SensorOpener as SensorOpener
-from robolink.sensing._registry import open_sensor as open_sensor
-from robolink.sensing._registry import sensor_name as sensor_name
-from robolink.sensing._vision_guide import VISION_GUIDE as VISION_GUIDE
-from robolink.sensing._vision_guide import VisionGuideCamera as VisionGuideCamera
+from robolink.sensing._asking import median_spot, scatter_of, seen_in, seen_once
+from robolink.sensing._registry import SENSORS_GROUP, SensorOpener, open_sensor, sensor_name
+from robolink.sensing._vision_guide import VISION_GUIDE, VisionGuideCamera
+
+__all__ = [
+    "SENSORS_GROUP",
+    "SensorOpener",
+    "VISION_GUIDE",
+    "VisionGuideCamera",
+    "median_spot",
+    "open_sensor",
+    "scatter_of",
+    "seen_in",
+    "seen_once",
+    "sensor_name",
+]

@@ -90,7 +90,7 @@ def free_machine(controller: Controller, *, patience_s: float = 12.0) -> None:
         ConfigError: It is no mailbox.
         LeaseHeldError: Another client owns it, and is at work.
     """
-    from robolink.controllers.softmotion import SoftMotionController
+    from robolink.controllers import SoftMotionController
 
     if not isinstance(controller, SoftMotionController):
         raise ConfigError(

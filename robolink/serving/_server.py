@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Final
 from robolink import ambient
 from robolink.errors import ConfigError, RobolinkError
 from robolink.messages import tr
-from robolink.protocols.spel_callback import NEED_DATA, CallbackCodec, encode_line
+from robolink.protocols import NEED_DATA
+from robolink.protocols.spel_callback import CallbackCodec, encode_line
 
 if TYPE_CHECKING:
     from robolink.serving._conversation import CallbackConversation

@@ -29,15 +29,15 @@ if TYPE_CHECKING:
     from robolink.stations._station import Gauge as Gauge
     from robolink.stations._station import Station as Station
     from robolink.stations._station import StationKind as StationKind
-
-__getattr__ = lazy_exports(
-    __name__,
-    {
-        "_base": "base_now learnt_elsewhere require_base_of",
-        "_finding": "find_station find_stations",
-        "_places": "beam_station camera_station pin_of sensor_of touch_station",
-        "_records": "Found station_entry station_of",
-        "_sensors": "BeamStation CameraStation TouchStation",
-        "_station": "AGREEING_MM Gauge Station StationKind",
-    },
-)
+else:
+    __getattr__, __dir__, __all__ = lazy_exports(
+        __name__,
+        {
+            "_base": "base_now learnt_elsewhere require_base_of",
+            "_finding": "find_station find_stations",
+            "_places": "beam_station camera_station pin_of sensor_of touch_station",
+            "_records": "Found station_entry station_of",
+            "_sensors": "BeamStation CameraStation TouchStation",
+            "_station": "AGREEING_MM Gauge Station StationKind",
+        },
+    )

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from robolink.stopping._notes import find_note as find_note
     from robolink.stopping._notes import leave_note as leave_note
 else:
-    __getattr__ = lazy_exports(
+    __getattr__, __dir__, __all__ = lazy_exports(
         __name__,
         {
             "_asking": "ControllerHolder HolderGoneError LastSeen holders_of",

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from robolink.controllers.plc_map import PlcMapController
+from robolink.controllers import PlcMapController
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Controller

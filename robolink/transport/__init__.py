@@ -29,21 +29,21 @@ if TYPE_CHECKING:
     from robolink.transport.stream.trace import TraceSink as TraceSink
     from robolink.transport.stream.trace import TracingTransport as TracingTransport
 else:
-    __getattr__ = lazy_exports(
+    __getattr__, __dir__, __all__ = lazy_exports(
         __name__,
         {
+            "_mailbox_link": "MailboxHead MailboxLink",
+            "_registry": (
+                "TRANSPORTS_GROUP TransportOpener open_mailbox_link open_modbus "
+                "open_quick_link open_transport"
+            ),
+            "_url": "LinkUrl parse_url",
+            "_url_options": "UrlOptions",
             "stream.contract": "Transport",
             "stream.dialogue": (
                 "Dialogue DialogueLog Passage format_dialogue opening_line "
                 "parse_dialogues passage_line"
             ),
-            "_mailbox_link": "MailboxHead MailboxLink",
-            "_registry": (
-                "TRANSPORTS_GROUP TransportOpener "
-                "open_mailbox_link open_modbus open_quick_link open_transport"
-            ),
-            "stream.trace": "SECRET_PLACEHOLDER Direction TraceSink TracingTransport",
-            "_url": "LinkUrl parse_url",
-            "_url_options": "UrlOptions",
+            "stream.trace": "Direction SECRET_PLACEHOLDER TraceSink TracingTransport",
         },
     )

@@ -22,7 +22,7 @@ from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
 from robolink.calibration import BoardDrawing, Pin, RowFact, VerifyResult, carrying
-from robolink.controllers.softmotion import SoftMotionController
+from robolink.controllers import SoftMotionController
 from robolink.errors import RobolinkError, VerifyError
 from robolink.methods import (
     Absolute,

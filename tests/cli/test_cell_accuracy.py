@@ -8,8 +8,8 @@ from robolink_cli import main
 from robolink_simulators.hosting.in_process import epson as in_process
 
 import robolink
-from robolink.journal import EntryKind, forget_memory, memory_journal, open_journal
-from robolink.model import NewEntry, Signature
+from robolink.journal import forget_memory, memory_journal, open_journal
+from robolink.model import EntryKind, NewEntry, Signature
 
 URL = "epson+sim://accuracy-cell"
 BIASED = "world.person_bias_mm=0.04&world.person_bias_frame=tool&world.person_bias_toward_deg=30"

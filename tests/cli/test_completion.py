@@ -9,7 +9,8 @@ import pytest
 from click.shell_completion import BashComplete
 from robolink_cli import main
 
-from robolink.journal import EntryKind, NewEntry, Signature, open_log
+from robolink.journal import open_log
+from robolink.model import EntryKind, NewEntry, Signature
 
 OTHER = "epson+tcp://192.0.2.2:5000"
 URL = "epson+tcp://192.0.2.1:5000"

@@ -13,10 +13,10 @@ import robolink
 from robolink.config import find_cell
 from robolink.errors import CalibrationError, NotAllowedError
 from robolink.methods import PointsSource
-from robolink.model import ChangeLimits, PersonRole, Pose, Signature, ToolOffset
+from robolink.model import ChangeLimits, Jump, PersonRole, Pose, Signature, ToolOffset
 from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
 from robolink.testing import MemoryController, MemoryMachine
-from robolink.transaction import Jump, Wanted, change_tools
+from robolink.transaction import Wanted, change_tools
 
 CELL = """
 [cells.a]

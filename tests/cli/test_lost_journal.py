@@ -10,7 +10,7 @@ from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
 import robolink.transaction
-from robolink.controllers.epson import EpsonController
+from robolink.controllers import EpsonController
 from robolink.errors import JournalError, OutcomeUnknownError
 from robolink.journal import open_journal
 from robolink.journal._opening import _closed, _opened, close_files

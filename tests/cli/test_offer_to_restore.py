@@ -9,7 +9,7 @@ from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.in_process.epson import register, unregister
 
 import robolink
-from robolink.controllers.epson import EpsonController
+from robolink.controllers import EpsonController
 from robolink.journal import memory_journal
 
 

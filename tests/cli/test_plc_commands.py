@@ -7,18 +7,13 @@ from pathlib import Path
 import pytest
 from robolink_cli import main
 from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.faults import PlcFault, PlcFaultAction
 from robolink_simulators.hosting.in_process import epson, softmotion
 from robolink_simulators.plc import PlcSimulator, serve_plc
-from robolink_simulators.softmotion.mailbox import (
-    MailboxOptions,
-    PlcFault,
-    PlcFaultAction,
-    PlcOptions,
-    SoftMotionSimulator,
-)
+from robolink_simulators.softmotion.mailbox import MailboxOptions, PlcOptions, SoftMotionSimulator
 
 import robolink
-from robolink.controllers.softmotion import SoftMotionController
+from robolink.controllers import SoftMotionController
 from robolink.errors import RobolinkError
 from robolink.journal import memory_journal, open_journal
 from robolink.model import ANY, EntryKind, ToolOffset

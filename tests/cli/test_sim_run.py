@@ -20,7 +20,7 @@ from robolink_simulators.control.client import ControlClient
 
 import robolink
 from robolink import ToolOffset
-from robolink.controllers.plc_map import PlcMapController
+from robolink.controllers import PlcMapController
 from robolink.errors import ConfigError
 from robolink.testing import confirm_whole_map
 from tests._documents import wrong_in

@@ -10,7 +10,8 @@ from robolink_simulators.testkit.recipes import written_recipe
 
 from robolink.accuracy import stated_rows
 from robolink.config import find_cell
-from robolink.journal import EntryKind, forget_memory, memory_journal
+from robolink.journal import forget_memory, memory_journal
+from robolink.model import EntryKind
 from robolink.stations import Station, StationKind
 
 URL = "epson+sim://stated-rows"

@@ -25,7 +25,7 @@ from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 import robolink
 from robolink import Secret
 from robolink.config import glance_at_cell
-from robolink.controllers.epson import EpsonController
+from robolink.controllers import EpsonController
 from robolink.errors import OutcomeUnknownError
 from robolink.journal import close_files, open_journal
 from robolink.model import MotionProfile, WorkBox

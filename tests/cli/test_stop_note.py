@@ -5,7 +5,7 @@ from robolink_cli import main
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.in_process.epson import register, unregister
 
-from robolink.controllers.epson import EpsonController
+from robolink.controllers import EpsonController
 from robolink.stopping import far_end_of, find_note, leave_note
 
 NAME = "stopped-meanwhile"

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from robolink.calibration import CameraModel
-from robolink.controllers.softmotion import SoftMotionController
+from robolink.controllers import SoftMotionController
 from robolink.model import ToolOffset
 from robolink.stations import CameraStation
 from tests.contract._sensor_cell import TOOL, SensorCell, plc_sensor_cell, sensor_cell

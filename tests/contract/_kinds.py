@@ -10,8 +10,7 @@ from robolink_simulators.hosting.in_process import softmotion as plc_in_process
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
-from robolink.controllers import ConnectionTerms
-from robolink.controllers.plc_map import PlcMapController
+from robolink.controllers import ConnectionTerms, PlcMapController
 from robolink.controllers.softmotion.motion.jog import Jog
 from robolink.journal import memory_journal, signature_here
 from robolink.model import (

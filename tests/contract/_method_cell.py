@@ -14,8 +14,8 @@ import pytest
 from robolink_cli import main
 from robolink_simulators.cell.clock import ManualClock
 
-from robolink.journal import EntryKind, memory_journal
-from robolink.model import Recorded, ToolOffset
+from robolink.journal import memory_journal
+from robolink.model import EntryKind, Recorded, ToolOffset
 from tests.contract._sensor_cell import SensorCell, plc_sensor_cell, sensor_cell
 
 KINDS = ("epson", "plc")

@@ -16,7 +16,7 @@ from robolink_simulators.hosting.in_process.softmotion import clock_of, register
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
-from robolink.controllers.softmotion import SoftMotionController
+from robolink.controllers import SoftMotionController
 from robolink.journal import Journal, memory_journal
 from robolink.model import MotionProfile, Path, Pose
 from robolink.timing import NS_PER_S, SystemClock

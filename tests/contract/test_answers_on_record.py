@@ -10,8 +10,7 @@ from robolink_cli.prompts.present import sitting_at
 from robolink_cli.views.journal import said_in
 from robolink_simulators.assist.port import open_eyes
 
-from robolink.journal import EntryKind
-from robolink.model import AnsweredBy
+from robolink.model import AnsweredBy, EntryKind
 from robolink.report import reports_of
 from tests.contract._method_cell import method_cell
 

@@ -7,7 +7,7 @@ from datetime import datetime
 import pytest
 from robolink_cli.commands.record.recorded_change import report_payload
 
-from robolink.journal import EntryKind
+from robolink.model import EntryKind
 from robolink.report import reports_of, save
 from tests.contract._method_cell import method_cell, on
 

@@ -10,7 +10,8 @@ from robolink_cli import main
 from robolink_simulators.hosting.in_process import epson as in_process
 from robolink_simulators.hosting.in_process import softmotion as plc_in_process
 
-from robolink.journal import EntryKind, memory_journal, open_journal
+from robolink.journal import memory_journal, open_journal
+from robolink.model import EntryKind
 from tests.contract._camera_cell import camera_model, camera_station, furnish
 from tests.contract._sensor_cell import SensorCell
 from tests.faults._nozzle_cell import OLD_TIP, served_cell

@@ -4,8 +4,7 @@ import signal
 
 import pytest
 
-from robolink.journal import EntryKind
-from robolink.model import ToolOffset
+from robolink.model import EntryKind, ToolOffset
 from tests.contract._method_cell import KINDS, method_cell
 
 pytestmark = pytest.mark.simulator_only

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from robolink.calibration import rotation_of, uvw_deg
-from robolink.journal import EntryKind
-from robolink.model import Pose, ToolOffset
+from robolink.model import EntryKind, Pose, ToolOffset
 from tests.contract._method_cell import KINDS, method_cell
 
 pytestmark = pytest.mark.simulator_only

@@ -117,7 +117,7 @@ def test_the_document_says_how_each_touch_was_made_as_the_journal_does(cell):
     done = cell.calibrate("two-pose")
     assert done.code == 0, done.err
     measured, proved = done.document, done.document["verification"]
-    (entry,) = cell.recorded(robolink.journal.EntryKind.CALIBRATION)
+    (entry,) = cell.recorded(robolink.model.EntryKind.CALIBRATION)
     assert measured["touches"] == json.loads(json.dumps(entry.details["touches"]))
     assert measured["standoff_seed"] == entry.details["standoff_seed"]
     first, second = measured["touches"]
@@ -125,6 +125,6 @@ def test_the_document_says_how_each_touch_was_made_as_the_journal_does(cell):
     assert second["arrival"]["u_deg"] == pytest.approx(measured["poses"][1]["u_deg"])
     assert second["jog_mm"] == pytest.approx(math.hypot(*second["standoff_mm"]), abs=0.8)
     assert second["answered_s"] > 0.3
-    (entry,) = cell.recorded(robolink.journal.EntryKind.VERIFY)
+    (entry,) = cell.recorded(robolink.model.EntryKind.VERIFY)
     assert proved["touches"] == json.loads(json.dumps(entry.details["touches"]))
     assert len(proved["touches"]) == len(proved["drifts"])

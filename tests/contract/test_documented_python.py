@@ -29,7 +29,7 @@ from robolink.controllers.registry import ConnectionTerms
 from robolink.journal import memory_journal
 from robolink.model import TIP, Hand, Pose, Secret, Signature, Spot, SpotUnit, WorkBox, rotate_xy
 from robolink.protocols.epson_text import VariableType
-from robolink.protocols.mailbox import program_texts
+from robolink.protocols.mailbox.exports import program_texts
 from robolink.runner import RunSettings, ask_yes_no
 from robolink.sensing import open_sensor, seen_once
 from robolink.testing import MemoryMachine

@@ -12,7 +12,7 @@ from robolink_simulators.hosting.streams.epson_serial import serve_serial
 from robolink_simulators.hosting.streams.serial_cable import SerialCable
 
 import robolink
-from robolink.controllers.epson import EpsonController
+from robolink.controllers import EpsonController
 from robolink.errors import (
     ConfigError,
     ConnectError,

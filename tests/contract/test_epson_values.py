@@ -3,7 +3,6 @@
 import pytest
 from robolink_simulators.epson.device import EpsonSimulator
 
-from robolink.controllers.epson import VariableType
 from robolink.errors import (
     ConfigError,
     ControllerFaultError,
@@ -14,6 +13,7 @@ from robolink.errors import (
     RemoteProtocolError,
 )
 from robolink.model import ControllerFacts
+from robolink.protocols.epson_text import VariableType
 
 
 @pytest.fixture

@@ -10,9 +10,8 @@ from robolink_simulators.assist.port import InProcessEyes
 
 import robolink
 from robolink.errors import CalibrationError
-from robolink.journal import EntryKind
 from robolink.methods import TwoPoseSource
-from robolink.model import NewEntry
+from robolink.model import EntryKind, NewEntry
 from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
 from robolink.procedures import TouchPlan
 from tests.contract._method_cell import method_cell

@@ -5,8 +5,7 @@ import json
 import pytest
 from robolink_cli.prompts import operator as _operator
 
-from robolink.journal import EntryKind
-from robolink.model import ToolOffset
+from robolink.model import EntryKind, ToolOffset
 from tests.contract._method_cell import method_cell
 
 pytestmark = pytest.mark.simulator_only

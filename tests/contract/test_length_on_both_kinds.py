@@ -11,7 +11,7 @@ import pytest
 from robolink_cli.prompts import operator as _operator
 
 from robolink.calibration import NORMAL_95
-from robolink.journal import EntryKind
+from robolink.model import EntryKind
 from tests.contract._method_cell import method_cell
 from tests.contract.test_touches_not_made import RECIPE
 

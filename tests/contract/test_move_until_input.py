@@ -12,7 +12,7 @@ from robolink_simulators.hosting.in_process.softmotion import register, unregist
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 import robolink
-from robolink.controllers.softmotion import SoftMotionController
+from robolink.controllers import SoftMotionController
 from robolink.errors import (
     ConfigError,
     ControllerFaultError,

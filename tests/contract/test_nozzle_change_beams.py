@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from robolink.calibration import Beam
-from robolink.controllers.softmotion import SoftMotionController
+from robolink.controllers import SoftMotionController
 from robolink.errors import CalibrationError, LimitError, VerifyError
 from robolink.methods import BeamsParameters, BeamsSource, trace_beams
 from robolink.model import WorkBox

@@ -8,9 +8,8 @@ from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.hosting.in_process.epson import register, unregister
 
-from robolink.journal import EntryKind
 from robolink.methods import PointsSource
-from robolink.model import Pose, ToolOffset, rotate_xy
+from robolink.model import EntryKind, Pose, ToolOffset, rotate_xy
 from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
 from robolink.testing import MemoryController, MemoryMachine
 

@@ -9,7 +9,8 @@ from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_rtu, serve_
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 from robolink_simulators.structured_text import StructuredTextError
 
-from robolink.protocols.mailbox import Opcode, program_texts
+from robolink.protocols.mailbox import Opcode
+from robolink.protocols.mailbox.exports import program_texts
 from robolink.transport import open_mailbox_link
 from tests.unit._mailbox_client import MailboxClient, linked
 from tests.unit.structured_text._behaviours import of_program

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from robolink_simulators.epson.memory.points import Point
 
-from robolink.journal import EntryKind, open_journal
-from robolink.model import Pose, ToolOffset, rotate_xy
+from robolink.journal import open_journal
+from robolink.model import EntryKind, Pose, ToolOffset, rotate_xy
 from tests.faults._nozzle_cell import OLD_TIP, served_cell
 from tests.faults._requests import changes
 

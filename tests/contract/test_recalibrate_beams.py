@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 from robolink_simulators.cell.tip_switches import LightBeam, TouchPlate
 
-from robolink.journal import EntryKind, open_journal
+from robolink.journal import open_journal
+from robolink.model import EntryKind
 from tests.faults._nozzle_cell import OLD_TIP, served_cell
 
 pytestmark = [pytest.mark.simulator_only, pytest.mark.timeout(120)]

@@ -11,7 +11,8 @@ from robolink_simulators.cell.tip_switches import TouchPlate
 from robolink_simulators.hosting.in_process import epson as in_process
 from robolink_simulators.hosting.in_process import softmotion as plc_in_process
 
-from robolink.journal import EntryKind, open_journal
+from robolink.journal import open_journal
+from robolink.model import EntryKind
 from tests.contract._camera_cell import recipe_here
 from tests.contract._sensor_cell import SensorCell
 from tests.faults._nozzle_cell import OLD_TIP, served_cell

@@ -13,7 +13,8 @@ import pytest
 from robolink_cli import main
 from robolink_simulators.cell.held_board import SimulatedBoard
 
-from robolink.journal import EntryKind, memory_journal
+from robolink.journal import memory_journal
+from robolink.model import EntryKind
 from tests.contract._camera_cell import KINDS, cell_of, furnish, recipe_here, stored_in
 
 pytestmark = pytest.mark.simulator_only

@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 from robolink_cli.prompts import operator as _operator
 
-from robolink.journal import EntryKind
-from robolink.model import ToolOffset
+from robolink.model import EntryKind, ToolOffset
 from robolink.report import reports_of
 from robolink.report.sections.certainty import interval_sentences
 from robolink.report.sections.offsets import offsets

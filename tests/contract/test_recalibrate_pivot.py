@@ -13,7 +13,8 @@ from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.hosting.in_process import softmotion
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
-from robolink.journal import EntryKind, memory_journal
+from robolink.journal import memory_journal
+from robolink.model import EntryKind
 
 pytestmark = pytest.mark.simulator_only
 

@@ -7,21 +7,16 @@ from contextlib import closing
 import canopen
 import pytest
 from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.faults import PlcFault, PlcFaultAction
 from robolink_simulators.hosting.fieldbus.canopen_node import CanopenHost, CanPlace, serve_canopen
 from robolink_simulators.hosting.fieldbus.modbus import (
     ModbusHost,
     serve_modbus_rtu,
     serve_modbus_tcp,
 )
-from robolink_simulators.softmotion.mailbox import (
-    MailboxOptions,
-    PlcFault,
-    PlcFaultAction,
-    PlcOptions,
-    SoftMotionSimulator,
-)
+from robolink_simulators.softmotion.mailbox import MailboxOptions, PlcOptions, SoftMotionSimulator
 
-from robolink.controllers.softmotion import read_device_id
+from robolink.controllers import read_device_id
 from robolink.errors import (
     ConfigError,
     ConnectError,

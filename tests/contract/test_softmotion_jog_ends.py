@@ -4,9 +4,9 @@ import math
 import threading
 
 import pytest
-from robolink_simulators.softmotion.mailbox import PlcFault, PlcFaultAction
+from robolink_simulators.faults import PlcFault, PlcFaultAction
 
-from robolink.controllers.softmotion import Jog
+from robolink.controllers import Jog
 from robolink.controllers.softmotion.link.wire import MailboxWire
 from robolink.errors import (
     ControllerFaultError,

@@ -7,7 +7,7 @@ import pytest
 from robolink_simulators.softmotion import GroupOptions
 from robolink_simulators.softmotion.mailbox import PlcOptions, SoftMotionSimulator
 
-from robolink.controllers.softmotion import Jog
+from robolink.controllers import Jog
 from robolink.controllers.softmotion.link.wire import MailboxWire
 from robolink.errors import (
     BusyError,

@@ -3,7 +3,7 @@
 import pytest
 from robolink_cli.prompts.operator import AssistedOperator
 from robolink_simulators.assist.port import InProcessEyes
-from robolink_simulators.softmotion.mailbox import PlcFault, PlcFaultAction
+from robolink_simulators.faults import PlcFault, PlcFaultAction
 
 from robolink.backup import (
     backup_from_text,

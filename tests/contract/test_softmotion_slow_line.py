@@ -12,7 +12,7 @@ from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_rtu
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
-from robolink.controllers.softmotion import Jog
+from robolink.controllers import Jog
 from robolink.errors import ConfigError
 from robolink.journal import memory_journal
 from robolink.model import MotionOutcome, MotionProfile, Path, ToolOffset, WorkBox

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from robolink.errors import NotReadyError, NotReadyReason
-from robolink.journal import EntryKind
+from robolink.model import EntryKind
 from robolink.stations import (
     Found,
     StationKind,

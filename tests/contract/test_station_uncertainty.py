@@ -4,8 +4,7 @@ import pytest
 
 from robolink.calibration import AccuracyFacts, Pin, RowFact, assessed, solve_one_touch
 from robolink.errors import CalibrationError
-from robolink.journal import EntryKind
-from robolink.model import NewEntry, Pose, ToolOffset, plain_offset
+from robolink.model import EntryKind, NewEntry, Pose, ToolOffset, plain_offset
 from robolink.nozzle_change import AcceptanceCriteria
 from robolink.nozzle_change._seating import Seating, seating_of, touch_sigma_z_mm
 from robolink.stations import (

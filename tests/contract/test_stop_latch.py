@@ -11,7 +11,7 @@ from robolink_simulators.epson.device import EpsonSimulator
 
 from robolink import ToolOffset
 from robolink.checkpoints import Checkpoint, observed
-from robolink.controllers.softmotion import Jog
+from robolink.controllers import Jog
 from robolink.errors import RejectedError, StoppedError
 from robolink.model import MotionProfile, Path, WorkBox
 from robolink.runner import Runner, RunSettings, ask_for_pose

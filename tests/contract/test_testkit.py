@@ -21,8 +21,9 @@ from robolink.errors import (
     RobolinkError,
     TransportBrokenError,
 )
-from robolink.journal import EntryKind, forget_memory, memory_journal
-from robolink.protocols.mailbox import program_texts
+from robolink.journal import forget_memory, memory_journal
+from robolink.model import EntryKind
+from robolink.protocols.mailbox.exports import program_texts
 from robolink.testing import confirm_whole_map
 from robolink.transaction import Wanted, change_tools
 from robolink.transport import parse_url

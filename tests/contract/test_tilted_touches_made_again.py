@@ -8,7 +8,6 @@ import pytest
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
-from robolink.journal import EntryKind
 from robolink.methods import (
     AxisTeachPlan,
     PivotSource,
@@ -19,7 +18,7 @@ from robolink.methods import (
     SphereTouchSource,
     informative_tilts,
 )
-from robolink.model import Pose
+from robolink.model import EntryKind, Pose
 from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
 from robolink.procedures import TouchPlan
 from tests.contract._softmotion_cell import served

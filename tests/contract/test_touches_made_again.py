@@ -14,13 +14,13 @@ from robolink_simulators.assist.port import InProcessEyes
 import robolink
 from robolink.calibration import NeedleLimits
 from robolink.errors import CalibrationError, DeclinedError
-from robolink.journal import EntryKind
 from robolink.methods import (
     NAngleSource,
     OneTouchSource,
     TwoPoseSource,
     difference_from_last,
 )
+from robolink.model import EntryKind
 from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
 from robolink.procedures import SamplingPolicy
 from robolink.runner import Question

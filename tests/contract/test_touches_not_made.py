@@ -13,8 +13,8 @@ from robolink_simulators.assist.port import InProcessEyes
 
 import robolink
 from robolink.errors import CalibrationError, VerifyError
-from robolink.journal import EntryKind
 from robolink.methods import NAngleSource, TwoPoseSource
+from robolink.model import EntryKind
 from robolink.nozzle_change import AcceptanceCriteria, ChangePlan, NozzleChange, ToolPlan
 from robolink.procedures import TouchPlan
 from robolink.runner import TouchedAt

@@ -6,8 +6,8 @@ import pytest
 
 import robolink
 from robolink.errors import CalibrationError, VerifyError
-from robolink.journal import EntryKind
 from robolink.methods import NAngleSource, TwoPoseSource
+from robolink.model import EntryKind
 from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
 from tests.contract._method_cell import method_cell
 from tests.contract.test_touches_made_again import Undecided

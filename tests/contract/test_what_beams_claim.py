@@ -7,7 +7,7 @@ from functools import partial
 import pytest
 from robolink_simulators.cell.world_parameters import WorldParameters
 
-from robolink.controllers.softmotion import SoftMotionController
+from robolink.controllers import SoftMotionController
 from robolink.errors import CalibrationError, VerifyError
 from robolink.methods import BeamsParameters, BeamsSource
 from robolink.model import EntryKind

@@ -15,9 +15,7 @@ from typing import Final
 import pytest
 
 from robolink.checkpoints import Checkpoint, observed
-from robolink.controllers.epson import EpsonController
-from robolink.controllers.plc_map import PlcMapController
-from robolink.controllers.softmotion import SoftMotionController
+from robolink.controllers import EpsonController, PlcMapController, SoftMotionController
 from robolink.errors import RobolinkError
 from robolink.model import Controller
 

@@ -11,9 +11,10 @@ from contextlib import contextmanager
 import pytest
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.faults import PlcFault, PlcFaultAction
 from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_rtu
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
-from robolink_simulators.softmotion.mailbox import PlcFault, PlcFaultAction, SoftMotionSimulator
+from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
 from robolink import ToolOffset

@@ -7,7 +7,8 @@ slot was changed, the PLC counts itself.
 from contextlib import closing
 
 import pytest
-from robolink_simulators.softmotion.mailbox import PlcFault, PlcFaultAction, SoftMotionSimulator
+from robolink_simulators.faults import PlcFault, PlcFaultAction
+from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 from robolink import ToolOffset
 from robolink.errors import OutcomeUnknownError, RemoteProtocolError, RobolinkError

@@ -7,7 +7,8 @@ from robolink_simulators.faults import sqlite_vfs
 from robolink_simulators.faults.disk import DiskFault, FaultyDisk, bend_page, cut_short
 
 from robolink.errors import JournalError
-from robolink.journal import EntryKind, NewEntry, Signature, close_files, open_journal
+from robolink.journal import close_files, open_journal
+from robolink.model import EntryKind, NewEntry, Signature
 
 
 @pytest.fixture

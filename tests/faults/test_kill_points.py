@@ -10,7 +10,8 @@ all.
 
 import pytest
 
-from robolink.journal import EntryKind, open_journal
+from robolink.journal import open_journal
+from robolink.model import EntryKind
 from tests.faults._nozzle_cell import OLD_TIP, NozzleCell, served_cell
 from tests.faults._steps import SHARES, Step, disturbed, steps_of
 

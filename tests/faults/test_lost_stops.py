@@ -11,8 +11,7 @@ from robolink_simulators.faults import Fault, FaultAction, PlcFault, PlcFaultAct
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 
 import robolink
-from robolink.controllers import stop_now
-from robolink.controllers.epson import EpsonController
+from robolink.controllers import EpsonController, stop_now
 from robolink.errors import RobolinkError
 from robolink.model import ControllerState, MotionProfile, Path, WorkBox
 from tests.contract._softmotion_cell import SLOW, above, served

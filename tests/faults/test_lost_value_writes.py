@@ -5,7 +5,7 @@ from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.faults import Fault, FaultAction
 
 import robolink
-from robolink.controllers.epson import EpsonController
+from robolink.controllers import EpsonController
 from robolink.errors import ConfigError, OutcomeUnknownError
 from robolink.model import Marker, MarkerKind, Verdict
 

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.faults import Fault, FaultAction
+from robolink_simulators.faults import Fault, FaultAction, PlcFault, PlcFaultAction
 from robolink_simulators.hosting.in_process.epson import register, unregister
-from robolink_simulators.softmotion.mailbox import PlcFault, PlcFaultAction, SoftMotionSimulator
+from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
 from robolink import ToolOffset

@@ -8,15 +8,10 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 import pytest
+from robolink_simulators.faults import PlcFault, PlcFaultAction
 from robolink_simulators.hosting.fieldbus.canopen_node import CanPlace, serve_canopen
 from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_rtu
-from robolink_simulators.softmotion.mailbox import (
-    MailboxOptions,
-    PlcFault,
-    PlcFaultAction,
-    PlcOptions,
-    SoftMotionSimulator,
-)
+from robolink_simulators.softmotion.mailbox import MailboxOptions, PlcOptions, SoftMotionSimulator
 
 import robolink
 from robolink.errors import (

@@ -17,7 +17,7 @@ from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 from robolink_simulators.plc import PlcSimulator, serve_plc
 
 import robolink
-from robolink.controllers.plc_map import PlcMapController
+from robolink.controllers import PlcMapController
 from robolink.errors import (
     BusyError,
     NotReadyError,

@@ -14,8 +14,9 @@ import pytest
 from robolink_cli.console.exit_codes import USAGE
 
 from robolink.errors import JournalError
-from robolink.journal import EntryKind, NewEntry, open_journal
+from robolink.journal import open_journal
 from robolink.journal.store import engines
+from robolink.model import EntryKind, NewEntry
 from tests.faults._nozzle_cell import OLD_TIP, NozzleCell, served_cell
 from tests.faults._requests import changes
 

@@ -23,7 +23,7 @@ from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
-from robolink.controllers.softmotion import SoftMotionController
+from robolink.controllers import SoftMotionController
 from robolink.errors import NotReadyError, RejectedError, ToolChangedError
 from robolink.journal import close_files
 from robolink.model import MotionProfile, ToolOffset, WorkBox

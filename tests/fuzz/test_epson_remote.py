@@ -10,18 +10,16 @@ from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.hosting.in_process.transport import InProcessTransport
 
-from robolink.controllers.epson import open_epson
+from robolink.controllers import open_epson
 from robolink.controllers.epson.link.line import text_line
 from robolink.errors import RemoteProtocolError, RobolinkError
 from robolink.journal import memory_journal
 from robolink.model import ANY, Signature, ToolOffset
-from robolink.protocols import spel
+from robolink.protocols import NEED_DATA, Role, spel
 from robolink.protocols.epson_text import (
-    NEED_DATA,
     EndOfStream,
     EpsonTextCodec,
     Reply,
-    Role,
     parse_preferences,
     parse_status,
 )

@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from robolink.errors import RemoteProtocolError
 from robolink.journal import memory_journal
 from robolink.model import ToolOffset
-from robolink.protocols.epson_binary import NEED_DATA, Dialect, EpsonBinaryCodec, Letters, Role
+from robolink.protocols import NEED_DATA, Role
+from robolink.protocols.epson_binary import Dialect, EpsonBinaryCodec, Letters
 from robolink.protocols.epson_binary._frames import framed
 from robolink.protocols.epson_text import BadRequest, Refusal, Reply, Request
 from robolink.protocols.spel_callback import (

@@ -1,9 +1,10 @@
-"""Which files a tool write passes through before its request is sent, and poses until solved.
+"""Which files a tool write, a recipe, a request in the simulator and poses pass through.
 
 ``python -m tests.packaging._way_to_the_wire`` prints them. Counted are files of the three packages
 in which a function is entered, once each, from the call of a function of a given name until the
-request is handed to the socket; with poses, from the call of the method's ``solve`` until it
-returns. Not counted: what runs because a module is being imported, and
+request is handed to the socket: that of the tool write, or the first movement of a recipe. In the
+simulator, from the bytes of a tool write until its tool is stored; with poses, from the call of the
+method's ``solve`` until it returns. Not counted: what runs because a module is being imported, and
 class bodies and comprehensions of their own, since nothing is entered there.
 """
 
@@ -48,8 +49,13 @@ class WayToTheWire:
         finally:
             sys.setprofile(None)
 
+    def of_the_library(self, name: str) -> set[str]:
+        """Return the files of the library that were entered, from a function on."""
+        return {file for file in self.entered[name] if file.startswith("robolink/")}
+
     def _look(self, frame: FrameType, event: str, called: object) -> None:
         if self.stack:
+            sys.setprofile(None)
             return
         if event == "c_call":
             if getattr(called, "__name__", "") == "send" and self._sends(frame):
@@ -108,6 +114,19 @@ class WayToTheSolver(WayToTheWire):
             self._deepest = calls
 
 
+@dataclass
+class WayIntoTheSimulator(WayToTheWire):
+    """What was entered from the bytes of a request until the simulator holds its tool."""
+
+    def _sends(self, frame: FrameType) -> bool:
+        return False
+
+    def _enter(self, frame: FrameType) -> None:
+        super()._enter(frame)
+        if frame.f_code.co_qualname == "ToolMemory.set":
+            self.stack = list(reversed(list(_calls(frame))))
+
+
 def _calls(frame: FrameType | None) -> "list[tuple[str, str]]":
     found = []
     while frame is not None:
@@ -139,6 +158,44 @@ def follow_a_tool_write(url: str) -> WayToTheWire:
     write(12.5)
     way = WayToTheWire(b"TLSet 1,", {"run": {}, "set_tool": {}, "change_tools": {}})
     way.follow(lambda: write(12.7))
+    return way
+
+
+def follow_a_recipe(url: str, recipe: Path, assist: str) -> WayToTheWire:
+    """Change a nozzle by a recipe, and follow it up to the first movement.
+
+    Args:
+        url: The controller, an EPSON one. Its robot moves, and it is written.
+        recipe: The recipe.
+        assist: Who stands at the cell.
+    """
+    from robolink_cli import main
+
+    words = ["-c", url, "recalibrate", str(recipe), "--assist", assist, "--yes"]
+    way = WayToTheWire(b'$Execute,"Move ', {"run": {}})
+    way.follow(lambda: main.run(words))
+    return way
+
+
+def follow_into_the_simulator() -> WayIntoTheSimulator:
+    """Hand two tool writes to a simulated EPSON controller, and follow the second.
+
+    With the first it has read a line of this shape: what it does once in a process.
+    """
+    from robolink_simulators.epson.device import EpsonSimulator
+
+    simulator = EpsonSimulator(seed=1)
+    link = simulator.connect(0)
+    link.receive(b"$Login\r\n", 0)
+
+    def write(x_mm: float, at_s: int) -> None:
+        line = f'$Execute,"TLSet 1, XY({x_mm}, 0, 0, 0)"\r\n'
+        link.receive(line.encode(), at_s * 1_000_000_000)
+        simulator.advance((at_s + 1) * 1_000_000_000)
+
+    write(12.5, 1)
+    way = WayIntoTheSimulator(b"", {"receive": {}})
+    way.follow(lambda: write(12.7, 3))
     return way
 
 

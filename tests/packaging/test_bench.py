@@ -16,7 +16,8 @@ from benchmarks.pictures import Growth, picture
 from benchmarks.quiet import SPREAD, Floors
 from benchmarks.table import Amount, Figure
 from benchmarks.work.asked_cells import WRITE_S, lived, lived_apart
-from robolink.journal import EntryKind, memory_journal
+from robolink.journal import memory_journal
+from robolink.model import EntryKind
 
 SLOW = Figure("a stop", Amount(30.0, "ms"), "a floor", Amount(10.0, "ms"), 3.0, 2.5)
 QUICK = Figure("a look", Amount(1.234, "us"), "a floor", Amount(1.0, "us"), 1.234, 1.3)

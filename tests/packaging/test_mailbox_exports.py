@@ -21,8 +21,8 @@ from robolink.protocols.mailbox import (
     SLOT,
     ExportProfile,
     Opcode,
-    structured_text_types,
 )
+from robolink.protocols.mailbox.exports import structured_text_types
 
 SHIPPED = Path(__file__).parents[2] / "companions" / "codesys"
 AGAIN = "run: robolink expert plc export companions/codesys --profile full --force"

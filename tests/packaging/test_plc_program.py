@@ -18,15 +18,13 @@ from robolink_simulators.structured_text.parse import RESERVED_WORDS, is_vendor_
 from robolink.protocols.mailbox import (
     COMMAND,
     DEVICE_WORDS,
-    PROGRAM_FILES,
     RESPONSE,
     SLOT,
     ErrorClass,
     ExportProfile,
     Kinematics,
-    PlcopenSchema,
-    program_texts,
 )
+from robolink.protocols.mailbox.exports import PROGRAM_FILES, PlcopenSchema, program_texts
 
 FULL, TOOLS = ExportProfile.FULL, ExportProfile.TOOLS
 COUPLED = "Kin_Gantry3+Kin_CAxis"

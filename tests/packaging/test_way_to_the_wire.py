@@ -7,7 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from tests.packaging._way_to_the_wire import follow_a_tool_write, follow_typed_poses
+from tests.packaging._way_to_the_wire import (
+    follow_a_tool_write,
+    follow_into_the_simulator,
+    follow_typed_poses,
+)
+from tools import house
 
 MOST_FILES = {"set_tool": 84, "change_tools": 42}
 MOST_CALLS = 14
@@ -23,7 +28,14 @@ def way(epson_tcp, monkeypatch, tmp_path):
     return follow_a_tool_write(epson_tcp.url)
 
 
-def test_a_tool_write_passes_through_no_more_files_than_are_known(way):
+@pytest.fixture(scope="module")
+def told():
+    return house.told(house.PAGE.read_text(encoding="utf-8"))[1]
+
+
+def test_a_tool_write_passes_through_no_more_files_than_are_known(way, told):
+    files = sorted(way.of_the_library("run"))
+    assert len(files) <= told["`tool set` to its bytes"], files
     opened = {file for file, _ in way.stack[-MOST_CALLS + 1 :]}
     for name, most in MOST_FILES.items():
         files = sorted(way.entered[name])
@@ -52,3 +64,17 @@ def test_typed_poses_pass_through_no_more_files_than_are_known(epson_tcp, monkey
     page = Path(__file__).parents[2] / "docs" / "architecture.md"
     told = page.read_text(encoding="utf-8")
     assert [file for file in sorted({*files, *opened}) if f"`{file}`" not in told] == []
+
+
+def test_a_request_passes_through_no_more_files_of_the_simulator_than_are_known(told):
+    entered = sorted(follow_into_the_simulator().entered["receive"])
+    assert "simulators/robolink_simulators/epson/memory/tools.py" in entered
+    assert len(entered) <= told["a request to the simulator's `TLSet`"], entered
+
+
+@pytest.mark.soak
+def test_a_recipe_passes_through_no_more_files_than_are_known(told, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path))
+    way = "a recipe to its first movement"
+    assert house.walks()[way] <= told[way]

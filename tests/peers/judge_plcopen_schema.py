@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 from robolink_cli.commands.companions.plc_export import plc_texts
 
-from robolink.protocols.mailbox import ExportProfile, PlcopenSchema
+from robolink.protocols.mailbox import ExportProfile
+from robolink.protocols.mailbox.exports import PlcopenSchema
 
 etree = pytest.importorskip("lxml.etree")
 

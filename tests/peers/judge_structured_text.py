@@ -4,7 +4,8 @@ from contextlib import ExitStack
 
 import pytest
 
-from robolink.protocols.mailbox import ExportProfile, program_texts
+from robolink.protocols.mailbox import ExportProfile
+from robolink.protocols.mailbox.exports import program_texts
 from tests.peers._compiled_plc import CompiledCore, compiled_plc
 from tests.peers._iec_compilers import COMPILERS, IecCompiler
 from tests.unit.structured_text import _behaviours as b

@@ -7,15 +7,8 @@ from typing import Final
 
 from robolink_simulators.cell.clock import ManualClock
 
-from robolink.journal import (
-    EntryKind,
-    Journal,
-    JournalOutcomeLog,
-    LeaseHolder,
-    memory_journal,
-    this_process,
-)
-from robolink.model import Marker, MarkerKind, Recorded, new_operation
+from robolink.journal import Journal, JournalOutcomeLog, LeaseHolder, memory_journal, this_process
+from robolink.model import EntryKind, Marker, MarkerKind, Recorded, new_operation
 
 IDENTITY: Final = "epson+tcp://192.168.0.1:5000"
 HERE: Final = this_process()

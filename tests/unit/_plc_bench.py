@@ -6,7 +6,7 @@ from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.plc import PlcSimulator
 from robolink_simulators.plc.memory import OutsideError
 
-from robolink.controllers.plc_map import PlcMapController
+from robolink.controllers import PlcMapController
 from robolink.errors import RejectedError, TransportTimeoutError
 from robolink.journal import memory_journal
 from robolink.register_maps import RegisterTable, load_map

@@ -7,8 +7,15 @@ import pytest
 import robolink_cli
 
 import robolink
-from robolink.journal import EntryKind, memory_journal
-from robolink.model import AnsweredBy, NewEntry, WorkBox, answer_entry, answered_by_in_words
+from robolink.journal import memory_journal
+from robolink.model import (
+    AnsweredBy,
+    EntryKind,
+    NewEntry,
+    WorkBox,
+    answer_entry,
+    answered_by_in_words,
+)
 from robolink.runner import Confirm, Runner, RunSettings
 from robolink.testing import MemoryController
 

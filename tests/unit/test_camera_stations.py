@@ -5,9 +5,9 @@ import pytest
 from robolink.calibration import CameraModel
 from robolink.config import check_file, find_cell
 from robolink.errors import ConfigError
-from robolink.journal import EntryKind, memory_journal
+from robolink.journal import memory_journal
 from robolink.methods import learn_station
-from robolink.model import Pose, ToolOffset
+from robolink.model import EntryKind, Pose, ToolOffset
 from robolink.stations import (
     Found,
     Station,

@@ -8,15 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robolink.errors import LocalProtocolError, RemoteProtocolError
+from robolink.protocols import NEED_DATA, Role
 from robolink.protocols.epson_binary import (
     LETTERS,
-    NEED_DATA,
     Dialect,
     EpsonBinaryCodec,
     Letters,
     NakCode,
     Numbers,
-    Role,
 )
 from robolink.protocols.epson_text import (
     BadRequest,

@@ -4,8 +4,9 @@ import pytest
 from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.epson.options import options_from_text
 
+from robolink.protocols import Role
 from robolink.protocols.epson_binary import EpsonBinaryCodec
-from robolink.protocols.epson_text import EpsonTextCodec, Refusal, Reply, Request, Role
+from robolink.protocols.epson_text import EpsonTextCodec, Refusal, Reply, Request
 
 NS = 1_000_000_000
 

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robolink.errors import RemoteProtocolError
+from robolink.protocols import NEED_DATA, Role
 from robolink.protocols.epson_text import (
     COMMANDS,
-    NEED_DATA,
     EndOfStream,
     EpsonTextCodec,
     Event,
@@ -20,7 +20,6 @@ from robolink.protocols.epson_text import (
     RemoteCommand,
     Reply,
     Request,
-    Role,
 )
 
 PRINTABLE = "".join(chr(code) for code in range(0x20, 0x7F))

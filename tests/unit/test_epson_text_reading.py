@@ -5,8 +5,8 @@ from collections.abc import Iterable
 import pytest
 
 from robolink.errors import RemoteProtocolError
+from robolink.protocols import NEED_DATA, Role
 from robolink.protocols.epson_text import (
-    NEED_DATA,
     BadRequest,
     EndOfStream,
     EpsonTextCodec,
@@ -14,7 +14,6 @@ from robolink.protocols.epson_text import (
     Refusal,
     Reply,
     Request,
-    Role,
 )
 from robolink.protocols.epson_text._messages import next_request
 

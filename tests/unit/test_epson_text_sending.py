@@ -3,8 +3,8 @@
 import pytest
 
 from robolink.errors import ConfigError, LocalProtocolError, RemoteProtocolError
+from robolink.protocols import NEED_DATA, Role
 from robolink.protocols.epson_text import (
-    NEED_DATA,
     BadRequest,
     EndOfStream,
     EpsonTextCodec,
@@ -12,7 +12,6 @@ from robolink.protocols.epson_text import (
     Refusal,
     Reply,
     Request,
-    Role,
 )
 
 

@@ -6,15 +6,14 @@ from typing import Any
 
 import pytest
 
+from robolink.protocols import NEED_DATA, Role
 from robolink.protocols.epson_text import (
-    NEED_DATA,
     BadRequest,
     EpsonTextCodec,
     Event,
     Refusal,
     Reply,
     Request,
-    Role,
     StatusFlags,
     parse_status,
 )

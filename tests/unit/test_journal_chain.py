@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robolink.journal import ChainVerification, EntryKind, NewEntry, Signature, memory_journal
+from robolink.journal import ChainVerification, memory_journal
 from robolink.journal.store.statements import COLUMNS as STORED
-from robolink.model import new_operation
+from robolink.model import EntryKind, NewEntry, Signature, new_operation
 
 COLUMNS = list(STORED)
 TEXTS = st.text(st.characters(), max_size=8)

@@ -6,8 +6,8 @@ from dataclasses import replace
 import pytest
 
 from robolink.errors import JournalError
-from robolink.journal import EntryKind, NewEntry, Signature, memory_journal
-from robolink.model import Marker, MarkerKind, new_operation
+from robolink.journal import memory_journal
+from robolink.model import EntryKind, Marker, MarkerKind, NewEntry, Signature, new_operation
 
 IDENTITY = "epson+tcp://192.168.0.1:5000"
 

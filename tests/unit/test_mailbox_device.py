@@ -10,7 +10,7 @@ from robolink_simulators.softmotion.mailbox import (
 )
 from robolink_simulators.softmotion.mailbox.option_text import options_from_text
 
-from robolink.controllers.softmotion import read_device_id
+from robolink.controllers import read_device_id
 from robolink.errors import ConfigError, RejectedError
 from robolink.protocols.mailbox import (
     DEVICE_START,

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 from robolink_simulators.plc import PlcSimulator
 
-from robolink.controllers.plc_map import PlcMapController
+from robolink.controllers import PlcMapController
 from robolink.errors import ConfigError, NotComparedError
 from robolink.journal import memory_journal
 from robolink.model import ANY, ToolOffset

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from robolink_simulators.plc import PlcSimulator
 
-from robolink.controllers.plc_map import PlcMapController
+from robolink.controllers import PlcMapController
 from robolink.errors import ConfigError, RejectedError, RemoteProtocolError
 from robolink.journal import memory_journal
 from robolink.model import Act, ToolOffset

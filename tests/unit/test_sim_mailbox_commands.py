@@ -1,13 +1,8 @@
 """Which commands the simulated mailbox program carries out, and which it refuses."""
 
 import pytest
-from robolink_simulators.softmotion.mailbox import (
-    MailboxOptions,
-    PlcFault,
-    PlcFaultAction,
-    PlcOptions,
-    SoftMotionSimulator,
-)
+from robolink_simulators.faults import PlcFault, PlcFaultAction
+from robolink_simulators.softmotion.mailbox import MailboxOptions, PlcOptions, SoftMotionSimulator
 
 from robolink.protocols.mailbox import (
     Bits,

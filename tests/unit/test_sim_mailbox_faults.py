@@ -1,12 +1,8 @@
 """What can be planned to go wrong with a simulated PLC, and who is told about its exchanges."""
 
 import pytest
-from robolink_simulators.softmotion.mailbox import (
-    MailboxOptions,
-    PlcFault,
-    PlcFaultAction,
-    PlcOptions,
-)
+from robolink_simulators.faults import PlcFault, PlcFaultAction
+from robolink_simulators.softmotion.mailbox import MailboxOptions, PlcOptions
 
 from robolink.errors import TransportBrokenError, TransportClosedError, TransportTimeoutError
 from robolink.protocols.mailbox import (

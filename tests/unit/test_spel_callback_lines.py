@@ -6,9 +6,9 @@ from hypothesis import strategies as st
 
 from robolink.errors import LocalProtocolError, RemoteProtocolError
 from robolink.model import ToolOffset
+from robolink.protocols import NEED_DATA
 from robolink.protocols.spel_callback import (
     LONGEST_LINE,
-    NEED_DATA,
     CallbackCodec,
     CallbackLine,
     CallbackWord,

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from robolink.errors import ConfigError, LocalProtocolError
 from robolink.model import Hand, Pose, ToolOffset
-from robolink.protocols import spel
-from robolink.protocols.epson_text import EpsonTextCodec, Request, Role
+from robolink.protocols import Role, spel
+from robolink.protocols.epson_text import EpsonTextCodec, Request
 
 TOOL = ToolOffset(12.0, -3.25, -0.0001, 45.0)
 POSE = Pose(350.0, -100.0, -20.0004, 90.0)

@@ -6,7 +6,8 @@ import pytest
 
 from robolink.config import check_file, find_cell
 from robolink.errors import ConfigError
-from robolink.journal import EntryKind, memory_journal
+from robolink.journal import memory_journal
+from robolink.model import EntryKind
 from robolink.stations import (
     Found,
     Gauge,

@@ -5,7 +5,7 @@ from itertools import count
 
 import pytest
 
-from robolink.controllers.epson import EpsonController
+from robolink.controllers import EpsonController
 from robolink.transaction import ToolChange, change_tools
 from tests.unit._transaction_cell import NEW, OLD, tool_cell, wanted
 

@@ -6,8 +6,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 
 if TYPE_CHECKING:
-    from robolink.controllers.epson import EpsonController
-    from robolink.controllers.softmotion import SoftMotionController
+    from robolink.controllers import EpsonController, SoftMotionController
     from robolink.model import Controller, DigitalIo, PointReader
     from robolink.protocols.epson_text import Preference
 
@@ -22,7 +21,7 @@ def require_epson(controller: "Controller", what: str) -> "EpsonController":
     Raises:
         ConfigError: It is of another kind.
     """
-    from robolink.controllers.epson import EpsonController
+    from robolink.controllers import EpsonController
 
     if isinstance(controller, EpsonController):
         return controller
@@ -35,7 +34,7 @@ def require_softmotion(controller: "Controller") -> "SoftMotionController":
     Raises:
         ConfigError: It is of another kind.
     """
-    from robolink.controllers.softmotion import SoftMotionController
+    from robolink.controllers import SoftMotionController
 
     if isinstance(controller, SoftMotionController):
         return controller
@@ -68,7 +67,7 @@ def io_of(controller: "Controller") -> "DigitalIo":
 
 def preferences_of(controller: "Controller") -> "frozenset[Preference] | None":
     """Return the preferences set in a controller, ``None`` for one that does not tell."""
-    from robolink.controllers.epson import EpsonController
+    from robolink.controllers import EpsonController
 
     return controller.preferences() if isinstance(controller, EpsonController) else None
 

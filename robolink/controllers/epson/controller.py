@@ -53,7 +53,7 @@ class EpsonController(ControllerCore):
             0 (never) forbids motion.
 
     Example:
-        >>> from robolink.controllers.epson import EpsonController
+        >>> from robolink.controllers import EpsonController
         >>> from robolink.controllers.epson.link.line import open_line
         >>> from robolink.controllers.epson.link.session import EpsonSession
         >>> from robolink.journal import memory_journal
@@ -305,7 +305,7 @@ def open_epson(
         LoginUnansweredError: Nobody answers; another client may be logged in.
 
     Example:
-        >>> from robolink.controllers.epson import open_epson
+        >>> from robolink.controllers import open_epson
         >>> from robolink.controllers.epson.link.line import open_line
         >>> from robolink.journal import memory_journal
         >>> line = open_line("epson+sim://login-example", timeout_s=1)

@@ -2,17 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from robolink.lazy_exports import lazy_exports
+from robolink.lazy_exports import old_names
 
-if TYPE_CHECKING:
-    from robolink.controllers.plc_map.controller import PlcMapController as PlcMapController
-    from robolink.controllers.plc_map.controller import open_plc_map as open_plc_map
-    from robolink.controllers.plc_map.flange import FlangeReader as FlangeReader
-
-__getattr__ = lazy_exports(
-    __name__,
-    {
-        "controller": "PlcMapController open_plc_map",
-        "flange": "FlangeReader",
-    },
-)
+if not TYPE_CHECKING:
+    __getattr__ = old_names(__name__)

@@ -50,7 +50,7 @@ class PlcMapController(ControllerCore):
 
     Example:
         >>> from pathlib import Path
-        >>> from robolink.controllers.plc_map import PlcMapController
+        >>> from robolink.controllers import PlcMapController
         >>> from robolink.journal import memory_journal
         >>> from robolink.register_maps import load_map
         >>> from robolink.transport import open_modbus
@@ -234,7 +234,7 @@ def open_plc_map(
 
     Example:
         >>> from pathlib import Path
-        >>> from robolink.controllers.plc_map import open_plc_map
+        >>> from robolink.controllers import open_plc_map
         >>> from robolink.journal import memory_journal
         >>> from robolink.register_maps import load_map
         >>> from robolink.transport import parse_url

@@ -341,7 +341,7 @@ def open_softmotion(
         RemoteProtocolError: It is no mailbox of this version, or its words stand elsewhere.
 
     Example:
-        >>> from robolink.controllers.softmotion import open_softmotion
+        >>> from robolink.controllers import open_softmotion
         >>> from robolink.journal import memory_journal
         >>> from robolink.transport import open_mailbox_link
         >>> link = open_mailbox_link("softmotion+sim://mailbox-example")

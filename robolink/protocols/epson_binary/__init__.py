@@ -7,25 +7,21 @@ letter in place of a name, binary numbers, and a check sum of one byte.
 
 from typing import TYPE_CHECKING
 
-from robolink.lazy_exports import lazy_exports
-from robolink.protocols._role import NEED_DATA as NEED_DATA
-from robolink.protocols._role import Role as Role
+from robolink.lazy_exports import old_names
+from robolink.protocols.epson_binary._codec import EpsonBinaryCodec
+from robolink.protocols.epson_binary._dialect import Dialect, Letters, NakCode, Numbers
+from robolink.protocols.epson_binary._letters import LETTERS, Letter, letter_of
 
-if TYPE_CHECKING:
-    from robolink.protocols.epson_binary._codec import EpsonBinaryCodec as EpsonBinaryCodec
-    from robolink.protocols.epson_binary._dialect import Dialect as Dialect
-    from robolink.protocols.epson_binary._dialect import Letters as Letters
-    from robolink.protocols.epson_binary._dialect import NakCode as NakCode
-    from robolink.protocols.epson_binary._dialect import Numbers as Numbers
-    from robolink.protocols.epson_binary._letters import LETTERS as LETTERS
-    from robolink.protocols.epson_binary._letters import Letter as Letter
-    from robolink.protocols.epson_binary._letters import letter_of as letter_of
-else:
-    __getattr__ = lazy_exports(
-        __name__,
-        {
-            "_codec": "EpsonBinaryCodec",
-            "_dialect": "Dialect Letters NakCode Numbers",
-            "_letters": "LETTERS Letter letter_of",
-        },
-    )
+__all__ = [
+    "Dialect",
+    "EpsonBinaryCodec",
+    "LETTERS",
+    "Letter",
+    "Letters",
+    "NakCode",
+    "Numbers",
+    "letter_of",
+]
+
+if not TYPE_CHECKING:
+    __getattr__ = old_names(__name__)

@@ -37,7 +37,8 @@ class EpsonBinaryCodec(EpsonCodec):
         max_frame: Most bytes of one received frame.
 
     Example:
-        >>> from robolink.protocols.epson_binary import EpsonBinaryCodec, Role
+        >>> from robolink.protocols import Role
+        >>> from robolink.protocols.epson_binary import EpsonBinaryCodec
         >>> EpsonBinaryCodec(Role.HOST).carries("GetStatus")
         True
     """

@@ -198,7 +198,8 @@ class EpsonTextCodec(EpsonCodec):
         ConfigError: An argument is none of these.
 
     Example:
-        >>> from robolink.protocols.epson_text import EpsonTextCodec, Role
+        >>> from robolink.protocols import Role
+        >>> from robolink.protocols.epson_text import EpsonTextCodec
         >>> device = EpsonTextCodec(Role.DEVICE, terminator=bytes([13]))
         >>> device.receive_data("$GetStatus".encode() + bytes([13, 10]))
         >>> device.next_event().name

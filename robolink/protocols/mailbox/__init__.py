@@ -6,7 +6,7 @@ responses and slots.
 
 from typing import TYPE_CHECKING
 
-from robolink.lazy_exports import lazy_exports
+from robolink.lazy_exports import lazy_exports, old_names
 
 if TYPE_CHECKING:
     from robolink.protocols.mailbox._codes import Bits as Bits
@@ -72,49 +72,30 @@ if TYPE_CHECKING:
     from robolink.protocols.mailbox.blocks.words import crc16 as crc16
     from robolink.protocols.mailbox.blocks.words import heartbeat_word as heartbeat_word
     from robolink.protocols.mailbox.blocks.words import next_number as next_number
-    from robolink.protocols.mailbox.exports.eds import (
-        electronic_data_sheet as electronic_data_sheet,
-    )
-    from robolink.protocols.mailbox.exports.error_table import error_table_csv as error_table_csv
-    from robolink.protocols.mailbox.exports.plc_program import PROGRAM_FILES as PROGRAM_FILES
-    from robolink.protocols.mailbox.exports.plc_program import program_texts as program_texts
-    from robolink.protocols.mailbox.exports.plcopen_xml import PlcopenSchema as PlcopenSchema
-    from robolink.protocols.mailbox.exports.plcopen_xml import plcopen_xml as plcopen_xml
-    from robolink.protocols.mailbox.exports.register_map import register_map_csv as register_map_csv
-    from robolink.protocols.mailbox.exports.register_map import (
-        register_map_markdown as register_map_markdown,
-    )
-    from robolink.protocols.mailbox.exports.structured_text import (
-        structured_text_types as structured_text_types,
-    )
 else:
-    __getattr__ = lazy_exports(
+    __getattr__, __dir__, __all__ = lazy_exports(
         __name__,
         {
-            "blocks.answer": "Answer",
-            "blocks.layout": "BlockError BlockFault Field Four Layout Six WordType Words",
             "_codes": (
                 "Bits BufferMode Capability CommandState CoordinateSystem ErrorClass "
-                "GroupState ExportProfile ReadMode error_meaning"
+                "ExportProfile GroupState ReadMode error_meaning"
             ),
-            "blocks.command": "Command decode_command encode_command",
-            "blocks.device": "decode_device_id encode_device_id",
-            "exports.eds": "electronic_data_sheet",
-            "exports.error_table": "error_table_csv",
-            "exports.plc_program": "PROGRAM_FILES program_texts",
-            "exports.plcopen_xml": "PlcopenSchema plcopen_xml",
             "_frames": "frames_match from_frame to_frame",
             "_kinematics": "Kinematics find_kinematics find_kinematics_word kinematics_word",
-            "blocks.register_layouts": (
-                "COMMAND COMMAND_WORDS DEVICE DEVICE_START DEVICE_WORDS PROBE RESPONSE "
-                "RESPONSE_WORDS SLOT SLOTS SLOT_WORDS VERSION slot_start"
-            ),
             "_opcodes": "OPCODES Opcode OpcodeFacts opcodes_of",
-            "exports.register_map": "register_map_csv register_map_markdown",
+            "blocks.answer": "Answer",
+            "blocks.command": "Command decode_command encode_command",
+            "blocks.device": "decode_device_id encode_device_id",
+            "blocks.layout": "BlockError BlockFault Field Four Layout Six WordType Words",
+            "blocks.register_layouts": (
+                "COMMAND COMMAND_WORDS DEVICE DEVICE_START DEVICE_WORDS "
+                "PROBE RESPONSE RESPONSE_WORDS SLOT SLOTS SLOT_WORDS "
+                "VERSION slot_start"
+            ),
             "blocks.response": "Finished Response decode_response encode_response",
             "blocks.slot": "Slot decode_slot encode_slot",
-            "exports.structured_text": "structured_text_types",
             "blocks.word_order": "FoundProbe WordOrder find_probe find_word_order",
             "blocks.words": "beats_for crc16 heartbeat_word next_number",
         },
+        old_names(__name__),
     )

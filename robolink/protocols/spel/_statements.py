@@ -2,7 +2,7 @@
 
 A :data:`Statement` is made by a function of this package, which writes strict ASCII numbers into a
 fixed form, so that no value can turn into another statement. The one door past them is
-:meth:`robolink.controllers.epson.EpsonController.execute_raw`.
+:meth:`robolink.controllers.EpsonController.execute_raw`.
 """
 
 from dataclasses import replace

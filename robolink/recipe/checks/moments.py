@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Final
 
-from robolink.config import Problem
+from robolink.files.toml import Problem
 from robolink.messages import tr
 from robolink.recipe.checks.draft import Draft
 from robolink.recipe.file.tables import Output, Prompt

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from itertools import combinations
 
-from robolink.config import Problem
+from robolink.files.toml import Problem
 from robolink.messages import tr
 from robolink.methods import PointsParameters
 from robolink.recipe.checks.draft import Draft

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import fields
 from typing import Final
 
-from robolink.config import Problem
+from robolink.files.toml import Problem
 from robolink.messages import spoken, tr
 from robolink.methods import (
     NOTHING_STATED,

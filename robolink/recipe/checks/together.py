@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 from typing import Final
 
-from robolink.config import Problem
+from robolink.files.toml import Problem
 from robolink.recipe.checks.draft import Draft
 from robolink.recipe.checks.moments import answers, moments
 from robolink.recipe.checks.places import (

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from robolink.config import Problem
+from robolink.files.toml import Problem
 from robolink.messages import tr
 from robolink.recipe.checks.draft import Draft
 

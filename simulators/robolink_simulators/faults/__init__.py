@@ -3,7 +3,7 @@
 The numbers (F25) are those of docs/reference/faults.md; docs/fault-plans.md is for users.
 """
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 from robolink.lazy_exports import lazy_exports
 
@@ -29,16 +29,17 @@ if TYPE_CHECKING:
     from robolink_simulators.faults.plan_file import read_fault_file as read_fault_file
     from robolink_simulators.faults.stream import Fault as Fault
     from robolink_simulators.faults.stream import FaultAction as FaultAction
-
-_HOMES: Final = {
-    "counted": "CountedFaults Planned",
-    "disk": "DiskFault FaultyDisk",
-    "drawn": "FaultRates drawn_faults drawn_plc_faults",
-    "fieldbus": "PlcFault PlcFaultAction",
-    "links": "FaultNotPossibleError LinkKind links_of require_possible",
-    "plan": "Departure FaultPlan",
-    "plan_file": "FaultFile fault_as_keys faults_of_table read_fault_file",
-    "stream": "Fault FaultAction",
-}
-
-__getattr__ = lazy_exports(__name__, _HOMES)
+else:
+    __getattr__, __dir__, __all__ = lazy_exports(
+        __name__,
+        {
+            "counted": "CountedFaults Planned",
+            "disk": "DiskFault FaultyDisk",
+            "drawn": "FaultRates drawn_faults drawn_plc_faults",
+            "fieldbus": "PlcFault PlcFaultAction",
+            "links": "FaultNotPossibleError LinkKind links_of require_possible",
+            "plan": "Departure FaultPlan",
+            "plan_file": "FaultFile fault_as_keys faults_of_table read_fault_file",
+            "stream": "Fault FaultAction",
+        },
+    )

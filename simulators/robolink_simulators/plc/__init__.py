@@ -4,7 +4,12 @@ How real PLC programs of this kind behave beyond their register list is theirs; 
 here are the plainest that each handshake allows (assumed).
 """
 
-from robolink_simulators.plc.device import PlcSimulator as PlcSimulator
-from robolink_simulators.plc.serving import PlcHost as PlcHost
-from robolink_simulators.plc.serving import serve_plc as serve_plc
-from robolink_simulators.plc.serving import serve_plc_line as serve_plc_line
+from robolink_simulators.plc.device import PlcSimulator
+from robolink_simulators.plc.serving import PlcHost, serve_plc, serve_plc_line
+
+__all__ = [
+    "PlcHost",
+    "PlcSimulator",
+    "serve_plc",
+    "serve_plc_line",
+]

@@ -5,7 +5,12 @@ file, line and column, what is outside of the subset, and what compilers are kno
 differently.
 """
 
-from robolink_simulators.structured_text.parse import StructuredTextError as StructuredTextError
-from robolink_simulators.structured_text.parse import TextDialect as TextDialect
-from robolink_simulators.structured_text.program import SourceText as SourceText
-from robolink_simulators.structured_text.program import StructuredProgram as StructuredProgram
+from robolink_simulators.structured_text.parse import StructuredTextError, TextDialect
+from robolink_simulators.structured_text.program import SourceText, StructuredProgram
+
+__all__ = [
+    "SourceText",
+    "StructuredProgram",
+    "StructuredTextError",
+    "TextDialect",
+]

@@ -36,9 +36,9 @@ import robolink
 from robolink.backup import keep_first_backup, load, save
 from robolink.config import find_cell
 from robolink.errors import ConfigError, DeclinedError, NotReadyError
-from robolink.journal import EntryKind, NewEntry, Signature, memory_journal, open_log
+from robolink.journal import memory_journal, open_log
+from robolink.model import EntryKind, NewEntry, Pose, Signature, ToolOffset, describe_offset
 from robolink.model import Path as Way
-from robolink.model import Pose, ToolOffset, describe_offset
 from robolink.nozzle_change import ChangeReport, Moment
 from robolink.recipe import load_recipe
 from robolink.runner import MoveSubject, Question

@@ -15,8 +15,9 @@ from collections.abc import Callable
 from functools import partial
 from itertools import count
 
-from robolink.journal import EntryKind, JournalOutcomeLog, NewEntry, close_files, open_journal
+from robolink.journal import JournalOutcomeLog, close_files, open_journal
 from robolink.journal.store.connection import DatabaseConnection
+from robolink.model import EntryKind, NewEntry
 from tests.contract.journal._acts import marker
 
 # On Windows os.kill ends a process by TerminateProcess, whatever signal it is given.

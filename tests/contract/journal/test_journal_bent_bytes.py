@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from robolink.errors import JournalError
-from robolink.journal import EntryKind, NewEntry
+from robolink.model import EntryKind, NewEntry
 from tests.contract.journal._acts import marker
 
 SAMPLE = {"few": 20, "many": 2000}

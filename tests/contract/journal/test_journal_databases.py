@@ -5,7 +5,8 @@ from typing import Any
 
 import pytest
 
-from robolink.journal import ChainVerification, EntryKind, NewEntry, Signature
+from robolink.journal import ChainVerification
+from robolink.model import EntryKind, NewEntry, Signature
 from tests.contract.journal._acts import run
 
 CELLS = ("cell-a", "cell-b")

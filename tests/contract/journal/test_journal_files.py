@@ -14,10 +14,11 @@ import pytest
 
 from robolink import ambient
 from robolink.errors import JournalError
-from robolink.journal import ChainVerification, EntryKind, NewEntry, memory_journal, open_journal
+from robolink.journal import ChainVerification, memory_journal, open_journal
 from robolink.journal.store.connection import NOTHING, DatabaseConnection
 from robolink.journal.store.engines import _begin_wal
 from robolink.journal.store.entry_rows import EntryRows
+from robolink.model import EntryKind, NewEntry
 from tests.contract.journal._acts import marker
 
 ROOT = Path(__file__).parents[3]

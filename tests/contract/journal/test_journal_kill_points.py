@@ -5,8 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-from robolink.journal import ChainVerification, NewEntry
-from robolink.model import EntryKind
+from robolink.journal import ChainVerification
+from robolink.model import EntryKind, NewEntry
 from tests.contract.journal._killed import STEPS
 
 ROOT = Path(__file__).parents[3]

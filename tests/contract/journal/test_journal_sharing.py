@@ -8,10 +8,10 @@ import pytest
 from robolink_simulators.cell.clock import ManualClock
 
 from robolink.errors import JournalError, LeaseHeldError, LeaseLostError
-from robolink.journal import ChainVerification, EntryKind, NewEntry, open_journal
+from robolink.journal import ChainVerification, open_journal
 from robolink.journal import this_process as here
 from robolink.journal.store.migrations import MIGRATIONS
-from robolink.model import MarkerKind
+from robolink.model import EntryKind, MarkerKind, NewEntry
 from tests.contract.journal._acts import marker, run
 
 CELLS = ("cell-a", "cell-b")

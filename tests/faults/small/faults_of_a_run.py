@@ -8,7 +8,8 @@ from functools import cache
 
 from robolink.controllers.softmotion.link.snapshots import read_block
 from robolink.errors import RobolinkError
-from robolink.protocols.epson_text import NEED_DATA, EpsonTextCodec, Reply, Role, parse_status
+from robolink.protocols import NEED_DATA, Role
+from robolink.protocols.epson_text import EpsonTextCodec, Reply, parse_status
 from robolink.protocols.mailbox import BlockError, decode_slot
 from robolink.protocols.spel import parse_point, parse_tool_listing
 from robolink.transport.modbus.frames import TcpFraming

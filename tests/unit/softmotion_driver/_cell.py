@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 
 from robolink_simulators.cell.clock import ManualClock
 
-from robolink.controllers.softmotion import SoftMotionController, open_softmotion
+from robolink.controllers import SoftMotionController, open_softmotion
 from robolink.errors import ConnectError, RobolinkError, TransportClosedError, TransportTimeoutError
 from robolink.journal import memory_journal
 from robolink.model import Signature, new_operation

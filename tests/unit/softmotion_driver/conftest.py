@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from robolink.controllers.softmotion import SoftMotionController
+from robolink.controllers import SoftMotionController
 from robolink.model import MotionGroup
 from tests.unit.softmotion_driver._cell import Cell
 from tests.unit.softmotion_driver._plc import Plc

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from robolink.controllers.softmotion import Jog
+from robolink.controllers import Jog
 from robolink.errors import (
     ControllerFaultError,
     LeaseLostError,

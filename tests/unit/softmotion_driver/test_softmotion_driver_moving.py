@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import pytest
 
-from robolink.controllers.softmotion import Jog
+from robolink.controllers import Jog
 from robolink.controllers.softmotion.link.turns import Turns
 from robolink.errors import (
     BusyError,

@@ -2,8 +2,7 @@
 
 import pytest
 
-from robolink.controllers import connect
-from robolink.controllers.softmotion import SoftMotionController
+from robolink.controllers import SoftMotionController, connect
 from robolink.controllers.softmotion import controller as softmotion
 from robolink.errors import (
     ConfigError,

@@ -30,8 +30,8 @@ from robolink.protocols.mailbox import (
     WordOrder,
     crc16,
     find_probe,
-    program_texts,
 )
+from robolink.protocols.mailbox.exports import program_texts
 from robolink.transport import open_mailbox_link
 from tests.unit._mailbox_client import LINE, NO_TOOL, MailboxClient, linked, shifted
 

@@ -12,7 +12,7 @@ from robolink_cli.console.render import note, say, table
 from robolink_cli.session.context import CliContext, controller_options
 
 if TYPE_CHECKING:
-    from robolink.controllers.plc_map import PlcMapController
+    from robolink.controllers import PlcMapController
 
 
 @click.command("check-map", short_help="Check the map of a PLC's registers.")
@@ -139,7 +139,7 @@ def _check_values(context: CliContext, shows: tuple[str, ...]) -> None:
 
 
 def _opened(context: CliContext) -> "PlcMapController":
-    from robolink.controllers.plc_map import open_plc_map
+    from robolink.controllers import open_plc_map
     from robolink.journal import memory_journal
     from robolink.transport import parse_url
 

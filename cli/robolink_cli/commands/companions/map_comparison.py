@@ -25,7 +25,7 @@ from robolink_cli.session.context import CliContext
 from robolink_cli.session.operator_identity import signature_of
 
 if TYPE_CHECKING:
-    from robolink.controllers.plc_map import PlcMapController
+    from robolink.controllers import PlcMapController
 
 
 class MapComparison:

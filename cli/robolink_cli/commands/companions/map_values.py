@@ -8,7 +8,7 @@ from robolink.register_maps import COMPONENTS, MapValue, Number, RegisterMap, va
 from robolink_cli.console.render import note, table
 
 if TYPE_CHECKING:
-    from robolink.controllers.plc_map import PlcMapController
+    from robolink.controllers import PlcMapController
 
 
 class MapValues:

@@ -83,7 +83,8 @@ def export(
     docs/plc-program.md says what to do with them. Their licence is 0BSD: they may be used in a
     machine without any duty.
     """
-    from robolink.protocols.mailbox import ExportProfile, PlcopenSchema
+    from robolink.protocols.mailbox import ExportProfile
+    from robolink.protocols.mailbox.exports import PlcopenSchema
     from robolink_cli.commands.companions.plc_export import export_texts, plc_texts
 
     schema = PlcopenSchema(plcopen)

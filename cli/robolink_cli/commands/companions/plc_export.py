@@ -6,12 +6,11 @@ from pathlib import Path
 from robolink.errors import ConfigError
 from robolink.files.named import holds, require_free, save_named
 from robolink.messages import tr
-from robolink.protocols.mailbox import (
-    ExportProfile,
+from robolink.protocols.mailbox import ExportProfile, find_kinematics_word
+from robolink.protocols.mailbox.exports import (
     PlcopenSchema,
     electronic_data_sheet,
     error_table_csv,
-    find_kinematics_word,
     plcopen_xml,
     program_texts,
     register_map_csv,

@@ -14,7 +14,7 @@ from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.opening import open_controller
 
 if TYPE_CHECKING:
-    from robolink.controllers.softmotion import SoftMotionController
+    from robolink.controllers import SoftMotionController
 
 
 @click.command("take-ownership")

@@ -13,7 +13,7 @@ from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.opening import open_controller
 
 if TYPE_CHECKING:
-    from robolink.controllers.epson import EpsonVariables
+    from robolink.controllers import EpsonVariables
     from robolink.model import Controller
 
 _TYPES = ("Boolean", "Byte", "Double", "Integer", "Long", "Real", "String")
@@ -87,7 +87,7 @@ def set_variable(
     context: CliContext, name: str, value: str, kind: str, *, dry_run: bool, yes: bool
 ) -> None:
     """Set a variable and read it back; the program that uses it may act on it."""
-    from robolink.controllers.epson import typed_value
+    from robolink.controllers import typed_value
 
     wanted = typed_value(value, kind)
     with open_controller(context) as controller:

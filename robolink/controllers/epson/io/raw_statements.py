@@ -21,7 +21,7 @@ class RawStatements:
         self._link = link
 
     def execute(self, text: str) -> str:
-        """See :meth:`robolink.controllers.epson.EpsonController.execute_raw`."""
+        """See :meth:`robolink.controllers.EpsonController.execute_raw`."""
         statement = _checked(text)
         with self._link.lock.held(statement):
             # Before an engineer's word for it goes on record.

@@ -70,7 +70,7 @@ class EpsonLooks:
             ) from error
 
     def look(self, mark: int, *, program: int) -> tuple[Spot, ...]:
-        """See :meth:`robolink.controllers.epson.EpsonController.look`."""
+        """See :meth:`robolink.controllers.EpsonController.look`."""
         self._variables.write(_MARK, mark, VariableType.LONG)
         request = Request("Start", (str(program),))
         shown = as_sent(request)

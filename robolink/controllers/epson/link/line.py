@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Final, Protocol
 
 from robolink.errors import RejectedError
 from robolink.messages import tr
-from robolink.protocols.epson_text import EpsonTextCodec, ErrorCode, Event, Role
+from robolink.protocols import Role
+from robolink.protocols.epson_text import EpsonTextCodec, ErrorCode, Event
 from robolink.timing import Clock
 from robolink.transport import LinkUrl, TraceSink, TracingTransport, Transport, open_transport
 

@@ -8,7 +8,8 @@ import re
 from collections.abc import Iterable
 from typing import Final
 
-from robolink.protocols.epson_text import EpsonTextCodec, Request, Role
+from robolink.protocols import Role
+from robolink.protocols.epson_text import EpsonTextCodec, Request
 from robolink.protocols.spel import Statement
 from robolink.stop_latch import CommandClass
 

@@ -12,14 +12,8 @@ from typing import Final, Literal
 
 from robolink.errors import RemoteProtocolError, TransportBrokenError
 from robolink.messages import tr
-from robolink.protocols.epson_binary import (
-    Dialect,
-    EpsonBinaryCodec,
-    Letters,
-    NakCode,
-    Numbers,
-    Role,
-)
+from robolink.protocols import Role
+from robolink.protocols.epson_binary import Dialect, EpsonBinaryCodec, Letters, NakCode, Numbers
 from robolink.protocols.epson_text import Opening
 from robolink.timing import Deadline
 from robolink.transport import LinkUrl, Transport, UrlOptions

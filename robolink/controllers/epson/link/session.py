@@ -34,14 +34,8 @@ from robolink.errors import (
 from robolink.interrupts import InterruptGate
 from robolink.messages import tr
 from robolink.model import Secret
-from robolink.protocols.epson_text import (
-    NEED_DATA,
-    EndOfStream,
-    Refusal,
-    Reply,
-    Request,
-    find_command,
-)
+from robolink.protocols import NEED_DATA
+from robolink.protocols.epson_text import EndOfStream, Refusal, Reply, Request, find_command
 from robolink.protocols.spel import Statement
 from robolink.stop_latch import StopLatch
 from robolink.timing import Deadline

@@ -26,8 +26,8 @@ from robolink.errors import (
     TransportTimeoutError,
 )
 from robolink.messages import tr
+from robolink.protocols import NEED_DATA
 from robolink.protocols.epson_text import (
-    NEED_DATA,
     EndOfStream,
     ErrorCode,
     Refusal,

@@ -26,7 +26,7 @@ class EpsonActs:
         self._group = group
 
     def reset(self) -> None:
-        """See :meth:`~robolink.controllers.epson.EpsonController.reset_fault`."""
+        """See :meth:`~robolink.controllers.EpsonController.reset_fault`."""
         with self._link.lock.held("Reset", calming=True), self._link.latch.restoring():
             self._require_resettable(self._window.status())
             self._session.exchange("Reset")
@@ -51,7 +51,7 @@ class EpsonActs:
                 self._group.settings.slow_down(MotionProfile())
 
     def motors(self, on: bool) -> None:
-        """See :meth:`~robolink.controllers.epson.EpsonController.motors`."""
+        """See :meth:`~robolink.controllers.EpsonController.motors`."""
         name = "SetMotorsOn" if on else "SetMotorsOff"
         with self._link.lock.held(name, calming=not on):
             self._window.require_ready(name)

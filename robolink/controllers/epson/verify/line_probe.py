@@ -14,8 +14,9 @@ from robolink.controllers.epson.link.line import SERIAL
 from robolink.controllers.epson.link.serial_opening import take_dialect
 from robolink.errors import ConfigError, RemoteProtocolError
 from robolink.messages import tr
-from robolink.protocols.epson_binary import Dialect, EpsonBinaryCodec, Role
-from robolink.protocols.epson_text import NEED_DATA, Opening, Refusal, Reply, Request
+from robolink.protocols import NEED_DATA, Role
+from robolink.protocols.epson_binary import Dialect, EpsonBinaryCodec
+from robolink.protocols.epson_text import Opening, Refusal, Reply, Request
 from robolink.timing import Clock, Deadline, SystemClock
 from robolink.transport import LinkUrl, Transport, open_transport, parse_url
 

@@ -43,7 +43,8 @@ def program_texts(
             it set last.
 
     Example:
-        >>> from robolink.protocols.mailbox import ExportProfile, program_texts
+        >>> from robolink.protocols.mailbox import ExportProfile
+        >>> from robolink.protocols.mailbox.exports import program_texts
         >>> texts = program_texts(ExportProfile.TOOLS, kinematics="Kin_Scara3_Z")
         >>> "robolink_core.st" in texts
         True

@@ -3,14 +3,9 @@
 from collections.abc import Sequence
 from typing import Protocol
 
+from robolink.protocols import NEED_DATA, Role
 from robolink.protocols.epson_binary import Dialect, EpsonBinaryCodec
-from robolink.protocols.epson_text import (
-    NEED_DATA,
-    BadRequest,
-    EpsonTextCodec,
-    Request,
-    Role,
-)
+from robolink.protocols.epson_text import BadRequest, EpsonTextCodec, Request
 from robolink_simulators.faults import Fault, FaultAction, FaultPlan
 
 

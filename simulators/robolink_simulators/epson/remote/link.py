@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from typing import Final, Protocol
 
 from robolink.errors import LocalProtocolError, RemoteProtocolError
+from robolink.protocols import NEED_DATA, Role
 from robolink.protocols.epson_binary import Dialect, EpsonBinaryCodec
 from robolink.protocols.epson_text import (
-    NEED_DATA,
     BadRequest,
     EpsonTextCodec,
     ErrorCode,
@@ -17,7 +17,6 @@ from robolink.protocols.epson_text import (
     Refusal,
     Reply,
     Request,
-    Role,
 )
 from robolink.timing import NS_PER_S
 from robolink_simulators.device.wire_time import WireTime

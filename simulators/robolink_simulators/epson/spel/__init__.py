@@ -5,6 +5,10 @@ statements (``statements``, ``execution``) do; the interpreter runs them one aft
 simulated time.
 """
 
-from robolink_simulators.epson.spel.interpreter import Interpreter as Interpreter
-from robolink_simulators.epson.spel.interpreter import SpelError as SpelError
-from robolink_simulators.epson.spel.interpreter import StatementExecution as StatementExecution
+from robolink_simulators.epson.spel.interpreter import Interpreter, SpelError, StatementExecution
+
+__all__ = [
+    "Interpreter",
+    "SpelError",
+    "StatementExecution",
+]

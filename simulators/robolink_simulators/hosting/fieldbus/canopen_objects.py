@@ -20,9 +20,9 @@ from robolink.protocols.mailbox import (
     SLOT_WORDS,
     VERSION,
     Words,
-    electronic_data_sheet,
     slot_start,
 )
+from robolink.protocols.mailbox.exports import electronic_data_sheet
 from robolink_simulators.faults import LinkKind
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 from robolink_simulators.softmotion.mailbox.words.exchange import ServedAccess

@@ -7,7 +7,8 @@ from typing import Final, cast
 from robolink.errors import LocalProtocolError, RemoteProtocolError, RobolinkError
 from robolink.journal import Journal, JournalOutcomeLog
 from robolink.model import MarkerKind, Signature, ToolOffset
-from robolink.protocols.spel_callback import NEED_DATA, CallbackCodec, CallbackWord, encode_line
+from robolink.protocols import NEED_DATA
+from robolink.protocols.spel_callback import CallbackCodec, CallbackWord, encode_line
 from robolink.serving import CallbackConversation, CallbackLimits
 from robolink.timing import NS_PER_S
 from robolink_simulators.cell.clock import ManualClock

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Final
 
-from robolink.controllers.epson import open_epson
+from robolink.controllers import open_epson
 from robolink.controllers.epson.link.line import EpsonLine, text_line
 from robolink.errors import TransportError
 from robolink.model import Controller, OutcomeLog, Secret, ToolOffset

@@ -2,7 +2,8 @@
 
 from robolink.controllers.epson.link.line import EpsonLine
 from robolink.controllers.epson.link.serial_opening import turn_on
-from robolink.protocols.epson_binary import EpsonBinaryCodec, Role
+from robolink.protocols import Role
+from robolink.protocols.epson_binary import EpsonBinaryCodec
 from robolink.protocols.epson_text import BadRequest, Request
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.epson.options import serial_dialect

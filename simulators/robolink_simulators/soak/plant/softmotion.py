@@ -4,7 +4,7 @@ import struct
 from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
-from robolink.controllers.softmotion import open_softmotion
+from robolink.controllers import open_softmotion
 from robolink.model import Controller, OutcomeLog, ToolOffset
 from robolink.protocols.mailbox import WordOrder, Words
 from robolink.transport import MailboxLink

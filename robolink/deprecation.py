@@ -1,0 +1,146 @@
+"""Public names that were given up for better ones: each works for one more version, and warns.
+
+:data:`OLD_NAMES` is the one list of names that moved; a package with a row in it asks here by
+:func:`~robolink.lazy_exports.old_names`. What is found is the thing itself, so ``isinstance``,
+``except`` and pickles do not care by which name it was imported. A function or method that was
+given up keeps its body and has :func:`deprecated` before it.
+"""
+
+import sys
+import warnings
+from collections.abc import Callable, Mapping
+from functools import wraps
+from importlib import import_module
+from typing import Final, ParamSpec, TypeVar
+
+GONE_IN: Final = "0.2.0"
+"""The version without the names that this one still knows; a test reminds whoever makes it."""
+
+OLD_NAMES: Final[Mapping[str, Mapping[str, str]]] = {
+    "robolink.config": {"Problem": "robolink.files.toml.Problem"},
+    "robolink.controllers.epson": {
+        "EpsonController": "robolink.controllers.EpsonController",
+        "EpsonVariables": "robolink.controllers.EpsonVariables",
+        "PublishedTools": "robolink.controllers.PublishedTools",
+        "ValueReceipt": "robolink.model.ValueReceipt",
+        "VariableType": "robolink.protocols.epson_text.VariableType",
+        "open_epson": "robolink.controllers.open_epson",
+        "typed_value": "robolink.controllers.typed_value",
+        "variable_type": "robolink.controllers.variable_type",
+    },
+    "robolink.controllers.plc_map": {
+        "FlangeReader": "robolink.controllers.FlangeReader",
+        "PlcMapController": "robolink.controllers.PlcMapController",
+        "open_plc_map": "robolink.controllers.open_plc_map",
+    },
+    "robolink.controllers.softmotion": {
+        "Jog": "robolink.controllers.Jog",
+        "MailboxFacts": "robolink.controllers.MailboxFacts",
+        "SoftMotionController": "robolink.controllers.SoftMotionController",
+        "open_softmotion": "robolink.controllers.open_softmotion",
+        "read_device_id": "robolink.controllers.read_device_id",
+    },
+    "robolink.journal": {
+        "EntryKind": "robolink.model.EntryKind",
+        "NewEntry": "robolink.model.NewEntry",
+        "Recorded": "robolink.model.Recorded",
+        "Signature": "robolink.model.Signature",
+    },
+    "robolink.protocols.epson_binary": {
+        "NEED_DATA": "robolink.protocols.NEED_DATA",
+        "Role": "robolink.protocols.Role",
+    },
+    "robolink.protocols.epson_text": {
+        "NEED_DATA": "robolink.protocols.NEED_DATA",
+        "Role": "robolink.protocols.Role",
+    },
+    "robolink.protocols.mailbox": {
+        "PROGRAM_FILES": "robolink.protocols.mailbox.exports.PROGRAM_FILES",
+        "PlcopenSchema": "robolink.protocols.mailbox.exports.PlcopenSchema",
+        "electronic_data_sheet": "robolink.protocols.mailbox.exports.electronic_data_sheet",
+        "error_table_csv": "robolink.protocols.mailbox.exports.error_table_csv",
+        "plcopen_xml": "robolink.protocols.mailbox.exports.plcopen_xml",
+        "program_texts": "robolink.protocols.mailbox.exports.program_texts",
+        "register_map_csv": "robolink.protocols.mailbox.exports.register_map_csv",
+        "register_map_markdown": "robolink.protocols.mailbox.exports.register_map_markdown",
+        "structured_text_types": "robolink.protocols.mailbox.exports.structured_text_types",
+    },
+    "robolink.protocols.spel_callback": {"NEED_DATA": "robolink.protocols.NEED_DATA"},
+    "robolink.register_maps": {"Problem": "robolink.files.toml.Problem"},
+    "robolink.transaction": {"Jump": "robolink.model.Jump"},
+    "robolink_simulators.softmotion.mailbox": {
+        "PlcFault": "robolink_simulators.faults.PlcFault",
+        "PlcFaultAction": "robolink_simulators.faults.PlcFaultAction",
+    },
+}
+"""By package: the old name, and what it is now."""
+
+_GATE: Final = "robolink.lazy_exports"
+"""Whose calls lie between this module and whoever asks."""
+
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
+
+
+def under_old_name(package: str, name: str) -> object:
+    """Return what a package used to hand out under a name, and warn whoever asked for it.
+
+    It is called by the ``__getattr__`` of that package.
+
+    Args:
+        package: Its name.
+        name: What it is asked for.
+
+    Raises:
+        AttributeError: It never handed that out, or does no more.
+    """
+    new = OLD_NAMES.get(package, {}).get(name)
+    if new is None:
+        raise AttributeError(f"module {package!r} has no attribute {name!r}")
+    home, _, now = new.rpartition(".")
+    # "from package import name" has the import system look first, then asks again by itself.
+    depth, asking = 1, sys._getframe(1)  # noqa: SLF001 - as ``warnings`` finds whose line it is
+    while asking.f_back is not None and asking.f_globals.get("__name__") == _GATE:
+        depth, asking = depth + 1, asking.f_back
+    if not asking.f_code.co_filename.startswith("<frozen importlib"):
+        _warn(f"{package}.{name}", new, depth + 2)
+    return getattr(import_module(home), now)
+
+
+def deprecated(instead: str) -> Callable[[Callable[_P, _R]], Callable[_P, _R]]:
+    """Mark a function or a method that was given up: it does what it did, and warns.
+
+    Args:
+        instead: What to use, as a reader would write it.
+
+    Example:
+        >>> from robolink.deprecation import deprecated
+        >>> @deprecated("angle_deg")
+        ... def angle() -> float:
+        ...     return 90.0
+        >>> import warnings
+        >>> with warnings.catch_warnings(record=True) as told:
+        ...     warnings.simplefilter("always")
+        ...     angle()
+        90.0
+        >>> str(told[0].message)
+        'angle is now angle_deg. The old name goes in robolink 0.2.0.'
+    """
+
+    def marked(old: Callable[_P, _R]) -> Callable[_P, _R]:
+        @wraps(old)
+        def warned(*args: _P.args, **kwargs: _P.kwargs) -> _R:
+            _warn(old.__qualname__, instead, 3)
+            return old(*args, **kwargs)
+
+        return warned
+
+    return marked
+
+
+def _warn(old: str, new: str, stacklevel: int) -> None:
+    warnings.warn(
+        f"{old} is now {new}. The old name goes in robolink {GONE_IN}.",
+        DeprecationWarning,
+        stacklevel=stacklevel,
+    )

@@ -1,0 +1,102 @@
+"""A public name that was given up works for one more version, and says what it is now."""
+
+import importlib
+import pickle
+import warnings
+
+import pytest
+
+from robolink.deprecation import GONE_IN, OLD_NAMES, deprecated
+from robolink.version import VERSION
+
+ROWS = [(package, name, new) for package, row in OLD_NAMES.items() for name, new in row.items()]
+IDS = [f"{package}.{name}" for package, name, _ in ROWS]
+
+
+def told(act):
+    """Return the warnings of an act, and what it gave."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        given = act()
+    return caught, given
+
+
+def imported(package, name):
+    names: dict[str, object] = {}
+    exec(compile(f"from {package} import {name} as it", __file__, "exec"), names)
+    return names["it"]
+
+
+def the_new(path):
+    home, _, name = path.rpartition(".")
+    return getattr(importlib.import_module(home), name)
+
+
+@pytest.mark.parametrize(("package", "name", "new"), ROWS, ids=IDS)
+def test_an_old_name_is_the_same_thing_and_warns_once_where_it_is_used(package, name, new):
+    for act in (
+        lambda: imported(package, name),
+        lambda: getattr(importlib.import_module(package), name),
+    ):
+        caught, given = told(act)
+        assert given is the_new(new)
+        (one,) = caught
+        assert one.category is DeprecationWarning
+        assert one.filename == __file__
+        assert f"{package}.{name} is now {new}." in str(one.message)
+
+
+def test_what_a_package_hands_out_does_not_name_the_old():
+    for package, row in OLD_NAMES.items():
+        module = importlib.import_module(package)
+        assert not {*row} & {*dir(module), *getattr(module, "__all__", ())}
+
+
+def test_what_never_was_is_no_old_name():
+    for package in OLD_NAMES:
+        with pytest.raises(AttributeError, match=f"module '{package}' has no attribute 'nothing'"):
+            importlib.import_module(package).nothing  # noqa: B018 - the look-up is the test
+
+
+def test_a_pickle_that_names_the_old_place_is_read():
+    caught, found = told(lambda: pickle.loads(b"crobolink.config\nProblem\n."))
+    assert found is the_new("robolink.files.toml.Problem")
+    assert len(caught) == 1
+
+
+def test_the_old_names_end_with_the_version_that_the_warning_says():
+    now, gone = (tuple(map(int, text.split("."))) for text in (VERSION, GONE_IN))
+    assert now < gone, "empty OLD_NAMES, and say in which version the next ones go"
+
+
+class Tolerance:
+    """A class with a method that was given up."""
+
+    limit_mm = 0.2
+
+    def exceeded(self, by_mm):
+        return by_mm > self.limit_mm
+
+    @deprecated("Tolerance.exceeded")
+    def doubts(self, by_mm):
+        """Return whether it is."""
+        return self.exceeded(by_mm)
+
+    @property
+    @deprecated("Tolerance.limit_mm")
+    def most_mm(self):
+        return self.limit_mm
+
+
+def test_an_old_method_does_what_it_did_and_warns_where_it_is_called():
+    tolerance = Tolerance()
+    for act, given, message in (
+        (lambda: tolerance.doubts(0.3), True, "Tolerance.doubts is now Tolerance.exceeded."),
+        (lambda: tolerance.most_mm, 0.2, "Tolerance.most_mm is now Tolerance.limit_mm."),
+    ):
+        caught, found = told(act)
+        assert found == given
+        (one,) = caught
+        assert (one.category, one.filename) == (DeprecationWarning, __file__)
+        assert str(one.message).startswith(message)
+    assert Tolerance.doubts.__doc__ == "Return whether it is."

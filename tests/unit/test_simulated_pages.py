@@ -9,7 +9,7 @@ from robolink_simulators.plc import PlcSimulator
 from robolink_simulators.plc.serving import serve_plc
 
 from robolink import ToolOffset, connect
-from robolink.controllers.plc_map import open_plc_map
+from robolink.controllers import open_plc_map
 from robolink.drift import CellDrift, MeasuredChange, measured_changes
 from robolink.errors import ConfigError
 from robolink.journal import memory_journal

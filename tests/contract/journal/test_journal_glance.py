@@ -12,16 +12,9 @@ from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 
 import robolink
-from robolink.journal import (
-    EntryKind,
-    NewEntry,
-    close_files,
-    default_location,
-    nothing_is_open,
-    open_journal,
-)
+from robolink.journal import close_files, default_location, nothing_is_open, open_journal
 from robolink.journal._opening import _opened
-from robolink.model import Marker, MarkerKind
+from robolink.model import EntryKind, Marker, MarkerKind, NewEntry
 
 
 @pytest.fixture

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from robolink.journal import ChainVerification, EntryKind, NewEntry
+from robolink.journal import ChainVerification
 from robolink.journal.store.migrations import MIGRATIONS
+from robolink.model import EntryKind, NewEntry
 
 FORM_1 = Path(__file__).with_name("journal_form_1.sql")
 LATER = {

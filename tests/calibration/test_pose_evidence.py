@@ -24,6 +24,7 @@ from robolink.calibration import (
     with_station,
     writes_refused_unattended,
 )
+from robolink.calibration.core.pose_checks import leans
 from robolink.errors import CalibrationError, ConfigError
 from robolink.model import Pose, ToolOffset
 from tests.calibration._scipy_quantiles import fisher
@@ -383,3 +384,8 @@ def test_a_touch_that_a_person_brought_from_somewhere_does_not_disturb_the_bias(
     # Seven touches exceed three standard uncertainties by chance in some per cent.
     strict = with_approach_bias(solve_n_angle(poses[1:]), sides[1:], false_alarm=1e-12)
     assert "approach_bias" not in strict.warnings
+
+
+@pytest.mark.parametrize(("v_deg", "w_deg"), [(0.0, 0.5), (0.5, 0.0), (0.0, -0.5)])
+def test_half_a_degree_about_either_axis_leans(v_deg, w_deg):
+    assert leans(Pose(0, 0, 0, 0, v_deg, w_deg))

@@ -23,10 +23,13 @@ def test_each_recipe_is_within_its_own_limit_by_what_it_states(statements):
 
 def test_what_a_recipe_states_it_needs(statements):
     states = {name for name, one in statements.items() if one.stated}
-    assert states == {"scara-pin", "pendant-points", "needle-one-touch", "needle-beams"}
-    for name in states:
+    missing = {"scara-pin", "pendant-points", "needle-one-touch", "needle-beams"}
+    assert states == missing | {"sphere"}
+    for name in missing:
         one = statements[name]
         assert one.in_two_months.accurate_to_mm > one.limit_mm, name
+    # Its scatter comes from few residuals: without the row one run in six misses the limit.
+    assert statements["sphere"].by_default.accurate_to_mm > 0.9 * statements["sphere"].limit_mm
 
 
 def test_beams_fail_from_the_second_month_and_a_touch_by_eye_from_the_first_day(statements):

@@ -77,6 +77,24 @@ def measured(tip, stored, start_u_deg=0.0):
     return drive(measure_two_pose(PLAN, stored=stored), person), person
 
 
+class Beside(PerfectPerson):
+    """Touches the second time below the tip of the pin, beside it."""
+
+    def answer(self, step):
+        answer = super().answer(step)
+        if isinstance(step, Ask) and sum(isinstance(one, Ask) for one in self.log) == 2:
+            self.pose = replace(self.pose, z_mm=self.pose.z_mm - 0.8)
+            return self.pose
+        return answer
+
+
+def test_two_touches_of_which_one_is_beside_the_pin_are_refused():
+    tip, stored = ToolOffset(12.3, -3.9, -20), ToolOffset(12, -3.5, -20)
+    with pytest.raises(CalibrationError) as refused:
+        drive(measure_two_pose(PLAN, stored=stored), Beside(tip, start=START))
+    assert refused.value.code == "touch_heights_differ"
+
+
 @pytest.mark.parametrize("start_u_deg", [0.0, 15.0, -120.0, 180.0])
 def test_the_true_tip_is_found_from_any_start_angle(start_u_deg):
     tip = ToolOffset(12.3, -3.9, -20)

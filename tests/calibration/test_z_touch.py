@@ -114,6 +114,13 @@ def test_three_speeds_take_the_braking_out():
     assert abs(solve_z_touch(only, SURFACE).offset.z_mm - LENGTH) > 0.1
 
 
+def test_a_braking_that_no_robot_has_is_refused():
+    possible = solve_z_touch(touches(THREE, overshoot=0.0045), SURFACE)
+    assert possible.overshoot_s2_per_mm == pytest.approx(0.0045, rel=1e-3)
+    with pytest.raises(CalibrationError, match=r"possible are 0 to 0\.005"):
+        solve_z_touch(touches(THREE, overshoot=0.0065), SURFACE)
+
+
 def test_an_overshoot_is_seen_with_a_latency_that_is_known_too():
     result = solve_z_touch(touches(THREE, overshoot=0.001), SURFACE, latency_s=LATENCY)
     assert result.overshoot_s2_per_mm == pytest.approx(0.001)

@@ -5,7 +5,11 @@ import re
 import click
 import pytest
 from robolink_cli import main
+from robolink_cli.commands.measure.calibrate.values import type_of
 from robolink_cli.console.numbers import decimal
+
+from robolink.methods.declaration.fields import fields_of
+from robolink.methods.declaration.look_parameters import LookParameters
 
 STRANGE = [
     "\uff11\uff12.\uff15",
@@ -82,3 +86,21 @@ def test_a_time_that_is_none_is_a_mistake_of_usage(run):
     code, _, err = run("status", "--timeout", "nan")
     assert code == 2
     assert "must be a finite number" in err
+
+
+@pytest.mark.parametrize(
+    ("typed", "read"),
+    [
+        ("0.02,0,0,-0.02", ((0.02, 0.0), (0.0, -0.02))),
+        ("0.02,0,0", None),
+        ("0.02,0,0,-0.02,1", None),
+    ],
+)
+def test_a_matrix_has_as_many_numbers_as_it_has_places(typed, read):
+    (field,) = (one for one in fields_of(LookParameters) if one.name == "mm_per_px")
+    kind = type_of(field)
+    if read is None:
+        with pytest.raises(click.BadParameter, match="4"):
+            kind.convert(typed, None, None)
+    else:
+        assert kind.convert(typed, None, None) == read

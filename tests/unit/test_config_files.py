@@ -4,7 +4,15 @@ import sys
 
 import pytest
 
-from robolink.config import Source, cell_names, check_file, config_files, find_cell, load_cells
+from robolink.config import (
+    Source,
+    cell_names,
+    check_file,
+    config_files,
+    find_cell,
+    load_cells,
+    reach_cell,
+)
 from robolink.errors import ConfigError
 
 URL = "epson+tcp://192.0.2.1:5000"
@@ -231,3 +239,9 @@ def test_names_for_tab_are_read_without_pydantic(places, monkeypatch):
     places["user"].write_text(f'[cells.a]\nurl = "{URL}"\n')
     monkeypatch.setitem(sys.modules, "pydantic", None)
     assert cell_names() == ["a"]
+
+
+def test_a_stop_waits_as_usual_where_a_cell_says_nothing_of_it(places, monkeypatch):
+    places["named"].write_text('[cells.a]\nurl = "epson+tcp://192.0.2.1:5000"\n')
+    monkeypatch.setenv("ROBOLINK_CONFIG", str(places["named"]))
+    assert (reach_cell("a").url, reach_cell("a").timeout_s) == ("epson+tcp://192.0.2.1:5000", 0.0)

@@ -116,6 +116,14 @@ def test_a_number_can_be_written_in_digits_and_the_check_sum_does_not_tell() -> 
     assert codec.send(Request("Start", ("0",))) == bytes.fromhex("02 47 30 30 03 44")
 
 
+@pytest.mark.parametrize("parameters", [("counts", "Long", "3"), (), ("counts(0)",)])
+def test_only_a_single_variable_is_asked_for(parameters: tuple[str, ...]) -> None:
+    with pytest.raises(LocalProtocolError, match="a single variable"):
+        EpsonBinaryCodec(Role.HOST, Dialect(letters=Letters.GUESSED)).send(
+            Request("GetVariable", parameters)
+        )
+
+
 @pytest.mark.parametrize("comma", ["", "2C "])
 def test_a_status_is_read_with_and_without_the_printed_comma(comma: str) -> None:
     data = "53 00 01 00 00 00 00 00 00 00 01 " + comma + "30 30 30 30 03"

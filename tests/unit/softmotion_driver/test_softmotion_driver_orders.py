@@ -5,6 +5,7 @@ from itertools import count
 
 import pytest
 
+from robolink.controllers.softmotion.link import answers
 from robolink.errors import (
     ConfigError,
     ControllerFaultError,
@@ -164,6 +165,14 @@ def test_every_refusal_names_its_meaning_and_a_remedy(plc, controller):
             controller.io.read_input(3)
         assert refusal.value.code == error
         assert refusal.value.remedy
+
+
+def test_a_number_of_the_plc_s_own_is_told_of_the_error_that_it_belongs_to_alone(plc, controller):
+    plc.now = replace(plc.now, error_class=ErrorClass.DISABLED, raw_error=4711)
+    own = answers._meaning(ErrorClass.DISABLED, plc.now)
+    other = answers._meaning(ErrorClass.MOVING, plc.now)
+    assert "ErrorID is 4711" in own
+    assert "ErrorID" not in other
 
 
 def test_a_command_that_a_stop_ends_is_not_taken_as_done(cell, plc, controller):

@@ -40,6 +40,10 @@ class Journal:
         self.read_only = read_only
         self._store = store
 
+    def __repr__(self) -> str:
+        """Say which journal, without its password."""
+        return f"<Journal {self.location}{', read only' if self.read_only else ''}>"
+
     @property
     def durable(self) -> bool:
         """Whether it outlives this process."""

@@ -75,6 +75,7 @@ class JournalOutcomeLog:
         self.durable = store.durable
         self._journal = journal
         self._store = store
+        self._called = controller
         self._lock = ambient.reentrant_lock()
         self._naming = Naming(store, controller)
         self._holder, self._clock = holder or this_process(), clock or BootClock()
@@ -87,6 +88,10 @@ class JournalOutcomeLog:
         self._sound = False
         self._whole = False
         self._traced = not store.durable  # what dies with this process needs no trace
+
+    def __repr__(self) -> str:
+        """Say of which controller, as it was called, and in which journal; nothing is asked."""
+        return f"<JournalOutcomeLog of {self._called} in {self._journal.location}>"
 
     @property
     def identity(self) -> str:

@@ -471,6 +471,18 @@ HISTORIES = (
             ),
         ),
     ),
+    History(
+        691532353,
+        CellKind.EPSON_SERIAL,
+        (
+            Hour(
+                0,
+                Deed.CHANGE_NOZZLE,
+                Habit(),
+                (Disturbance(Hindrance.PENDANT, "", "", 311, 0.0, None),),
+            ),
+        ),
+    ),
 )
 HALF_A_FILE = drawn_history(919893192, 20)
 """A PLC over Modbus TCP, and a journal whose rows came back empty."""

@@ -4,7 +4,7 @@ import math
 import weakref
 from typing import Final
 
-from robolink.model import Motion, Pose, WorkBox
+from robolink.model import Motion, Pose, ToolOffset, WorkBox
 from robolink_simulators.cell.frames import Frame, axis_and_angle, product, transposed
 from robolink_simulators.epson.arm.kinematics import frame_of
 from robolink_simulators.soak.computer import VirtualProcess
@@ -28,7 +28,7 @@ class PlaceRules:
         self._on = grounds
         self._before: dict[int, Frame | None] = {}
         # Not the movement itself: it holds the controller of a process that may be killed.
-        self._sent: dict[int, weakref.ref[Motion]] = {}
+        self._sent: dict[int, tuple[weakref.ref[Motion], ToolOffset | None]] = {}
 
     def begin(self) -> None:
         """Begin an hour."""
@@ -43,7 +43,7 @@ class PlaceRules:
         self, process: VirtualProcess, motion: Motion, target: Pose, box: WorkBox
     ) -> tuple[bool, str]:
         """Return whether a movement goes where it was sent, in its box; and what was seen."""
-        self._sent[process.number] = weakref.ref(motion)
+        self._sent[process.number] = weakref.ref(motion), self._value_of(target.tool)
         limits = (
             (box.x_min_mm, target.x_mm, box.x_max_mm),
             (box.y_min_mm, target.y_mm, box.y_max_mm),
@@ -58,11 +58,11 @@ class PlaceRules:
     def arrived(self, process: VirtualProcess, motion: Motion) -> tuple[bool, str]:
         """Return whether a movement that arrived is where it was sent; and what was seen."""
         tip, target = self._standing(), motion.target
-        sent = self._sent.get(process.number)
+        sent, value = self._sent.get(process.number, (None, None))
         if sent is None or sent() is not motion or tip is None:
             return True, ""  # one that ends at an input ends somewhere on its way
-        if target.tool != self._on.plant.state().selected:
-            return True, ""  # somebody has selected another one meanwhile
+        if target.tool != self._on.plant.state().selected or value != self._value_of(target.tool):
+            return True, ""  # somebody has selected another one meanwhile, or typed its value
         return _alike(tip, frame_of(target)), f"it arrived at {tip}, sent to {target}"
 
     def read(self, process: VirtualProcess, pose: Pose) -> tuple[bool, str]:
@@ -71,6 +71,9 @@ class PlaceRules:
         if before is None or now is None or math.dist(before.shift_mm, now.shift_mm) > _MOVED_MM:
             return True, ""  # it was somewhere on the way
         return _alike(now, frame_of(pose)), f"{pose} was read, the tip is at {now}"
+
+    def _value_of(self, tool: int | None) -> ToolOffset | None:
+        return None if tool is None else self._on.plant.state().tools.get(tool)
 
     def _standing(self) -> Frame | None:
         return None if self._on.plant.moving else self._on.plant.tip()

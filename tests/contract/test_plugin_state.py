@@ -13,7 +13,7 @@ import robolink
 from robolink import ToolOffset
 from robolink.errors import OutcomeUnknownError
 from robolink_simulators.faults import Fault, FaultAction
-from robolink_simulators.softmotion.mailbox.faults import PlcFault, PlcFaultAction
+from robolink_simulators.faults import PlcFault, PlcFaultAction
 
 folders = []
 

@@ -105,7 +105,7 @@ def make_softmotion(
     """
     from robolink_simulators.softmotion.mailbox.option_text import options_from_text
     from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
-    from robolink_simulators.softmotion.program.plc_maker import plc_maker
+    from robolink_simulators.softmotion.program.structured_plc import plc_maker
 
     simulator = SoftMotionSimulator(
         request.kinematics,

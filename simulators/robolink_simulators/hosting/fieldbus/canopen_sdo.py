@@ -9,7 +9,7 @@ from canopen.sdo.server import SdoServer
 
 from robolink_simulators.faults import PlcFault, PlcFaultAction
 from robolink_simulators.hosting.fieldbus.canopen_objects import RESPONSE_OBJECT
-from robolink_simulators.softmotion.mailbox.words.exchange import ServedAccess
+from robolink_simulators.softmotion.mailbox.exchange import ServedAccess
 
 _REQUEST: Final = 0x600
 _ANSWER: Final = 0x580

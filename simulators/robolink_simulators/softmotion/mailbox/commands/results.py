@@ -1,11 +1,17 @@
-"""What the mailbox program makes of the complaints of function blocks.
+"""What the mailbox program makes of a command: an answer, or a refusal by class.
+
+Complaints of function blocks become error classes.
 
 Source: docs/reference/softmotion.md 1.4.
 """
 
+import math
+from collections.abc import Callable, Container, Sequence
+from dataclasses import dataclass
 from typing import Final
 
-from robolink.protocols.mailbox import ErrorClass
+from robolink.protocols.mailbox import SLOTS, Answer, Command, ErrorClass
+from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.group.condition import SmcGroupState
 from robolink_simulators.softmotion.smc_errors import ErrorKind
 
@@ -57,3 +63,59 @@ class Rejected(Exception):
 def class_of(kind: ErrorKind, state: SmcGroupState) -> ErrorClass:
     """Return the class of a complaint that a block made in this state of the group."""
     return _STATES[state] if kind is ErrorKind.WRONG_STATE else _CLASSES[kind]
+
+
+def require_operand(value: int, allowed: Container[int]) -> int:
+    """Return an operand, which must be one of ``allowed``.
+
+    Raises:
+        Rejected: OPERAND.
+    """
+    if value not in allowed:
+        raise Rejected(ErrorClass.OPERAND)
+    return value
+
+
+def require_finite(values: Sequence[float]) -> None:
+    """Refuse numbers that are not finite.
+
+    Raises:
+        Rejected: OPERAND.
+    """
+    if not all(map(math.isfinite, values)):
+        raise Rejected(ErrorClass.OPERAND)
+
+
+def require_slot(number: int) -> int:
+    """Return the number of a slot, which there must be.
+
+    Raises:
+        Rejected: SLOT_OUT_OF_RANGE.
+    """
+    if number not in SLOTS:
+        raise Rejected(ErrorClass.SLOT_OUT_OF_RANGE)
+    return number
+
+
+@dataclass(frozen=True, slots=True)
+class CommandResult:
+    """What becomes of a command.
+
+    Attributes:
+        execution: The block that carries it out.
+        answer: What stands in the answer words; ``None`` for nothing.
+    """
+
+    execution: BlockExecution
+    answer: Answer | None = None
+
+
+def ok(answer: Answer | None = None) -> CommandResult:
+    """Return the result of a command that is carried out at once."""
+    execution = BlockExecution()
+    execution.finish()
+    return CommandResult(execution, answer)
+
+
+Handler = Callable[[Command], CommandResult]
+"""Carries out one opcode; what it refuses it raises as ``Rejected``."""

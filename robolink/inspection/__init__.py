@@ -4,9 +4,13 @@ For a job that runs every night, and for whoever comes to a cell in the morning
 (docs/accuracy.md).
 """
 
-from robolink.inspection._findings import Inspection, InspectionCode, InspectionFinding
-from robolink.inspection._looking import inspect
-from robolink.inspection._measuring import measured_findings
+from robolink.inspection._looking import (
+    Inspection,
+    InspectionCode,
+    InspectionFinding,
+    inspect,
+    measured_findings,
+)
 
 __all__ = [
     "Inspection",

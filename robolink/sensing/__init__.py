@@ -4,9 +4,18 @@ The cameras themselves are brought by other packages through the entry-point gro
 ``robolink.sensors``; the simulated ones come through the same door.
 """
 
-from robolink.sensing._asking import median_spot, scatter_of, seen_in, seen_once
-from robolink.sensing._registry import SENSORS_GROUP, SensorOpener, open_sensor, sensor_name
-from robolink.sensing._vision_guide import VISION_GUIDE, VisionGuideCamera
+from robolink.sensing._camera import (
+    SENSORS_GROUP,
+    VISION_GUIDE,
+    SensorOpener,
+    VisionGuideCamera,
+    median_spot,
+    open_sensor,
+    scatter_of,
+    seen_in,
+    seen_once,
+    sensor_name,
+)
 
 __all__ = [
     "SENSORS_GROUP",

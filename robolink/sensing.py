@@ -1,4 +1,8 @@
-"""Several pictures, and the one place that they agree on."""
+"""Cameras that see a tip: how one is opened by name, and how it is asked.
+
+The cameras themselves are brought by other packages through the entry-point group
+``robolink.sensors``; the simulated ones come through the same door.
+"""
 
 import math
 import re
@@ -13,6 +17,19 @@ from robolink.errors import CalibrationError, ConfigError, OutcomeUnknownError, 
 from robolink.messages import tr
 from robolink.model import TIP, Controller, LookingController, Spot, SpotUnit, TipSensor
 from robolink.plug_ins import PlugInError, find_plug_in
+
+__all__ = [
+    "SENSORS_GROUP",
+    "SensorOpener",
+    "VISION_GUIDE",
+    "VisionGuideCamera",
+    "median_spot",
+    "open_sensor",
+    "scatter_of",
+    "seen_in",
+    "seen_once",
+    "sensor_name",
+]
 
 _QUARTER_OF_DIFFERENCES: Final = 0.4506
 """Lower quartile of |a - b| for two normal numbers of standard deviation 1: 0.3186 sqrt(2)."""

@@ -1,7 +1,7 @@
-"""Looks at a cell and at its record, and compares them.
+"""A look at a whole cell that moves nothing: is it as the last change left it, is anything due.
 
-What it reads is legal at any time but the tool table of an EPSON controller, which wants the
-controller at rest or a project that publishes it (docs/monitor-only.md).
+For a job that runs every night, and for whoever comes to a cell in the morning
+(docs/accuracy.md).
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -26,6 +26,8 @@ from robolink.recipe import RecipeRun
 from robolink.stations import find_stations
 from robolink.timing import local_label
 from robolink.transaction import changed_since
+
+__all__ = ["Inspection", "InspectionCode", "InspectionFinding", "inspect", "measured_findings"]
 
 
 class InspectionCode(StrEnum):

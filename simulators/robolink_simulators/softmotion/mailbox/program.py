@@ -168,11 +168,11 @@ class MailboxProgram:
             result = self._carried_out(command, now_ns, owned=owned)
             job = Job(command, result.execution)
         except Rejected as rejected:
-            told = CommandResult(BlockExecution())
+            result = CommandResult(BlockExecution())
             job = Job(command, result.execution)
             job.reject(rejected.error_class, rejected.raw)
         named = self.ownership.answer() if command.opcode == Opcode.OWNERSHIP else Answer()
-        self._answer = told.answer or named
+        self._answer = result.answer or named
         self.inbox.accept(command, owned=owned)
         self.jobs.add(job)
 

@@ -2,7 +2,7 @@
 
 import pytest
 from robolink_simulators.faults import FaultAction, LinkKind, PlcFaultAction, links_of
-from robolink_simulators.faults.instants import INSTANTS, RARE
+from robolink_simulators.faults.drawn import INSTANTS, RARE
 
 from tests.soak.adversary import CellKind, drawn_history
 from tests.soak.adversary.deed_lengths import length_of

@@ -6,8 +6,7 @@ from dataclasses import replace
 from typing import Final
 
 from robolink_simulators.faults import FaultAction, LinkKind, PlcFaultAction, links_of
-from robolink_simulators.faults.drawn import ONLY_BY_NAME
-from robolink_simulators.faults.instants import drawn_instant, drawn_rarity
+from robolink_simulators.faults.drawn import ONLY_BY_NAME, drawn_instant, drawn_rarity
 
 from tests.soak.adversary.command_lines import drawn_line
 from tests.soak.adversary.deed_lengths import length_of

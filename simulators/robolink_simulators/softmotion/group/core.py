@@ -5,7 +5,7 @@ from functools import wraps
 from typing import Concatenate, ParamSpec, TypeVar
 
 from robolink_simulators.cell.frames import Frame
-from robolink_simulators.device.motion_log import MotionLog
+from robolink_simulators.device.wire_record import MotionLog
 from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.group.condition import GroupStatus, SmcGroupState
 from robolink_simulators.softmotion.group.state_machine import StateMachine

@@ -6,7 +6,7 @@ from contextlib import AbstractContextManager
 from robolink.messages import tr
 from robolink.protocols.mailbox import WordOrder
 from robolink.timing import NS_PER_S
-from robolink_simulators.device.planned_acts import Act, PlannedActs
+from robolink_simulators.device.hosted import Act, PlannedActs
 from robolink_simulators.faults import PlcFault, PlcFaultAction
 from robolink_simulators.faults.fieldbus import Order
 from robolink_simulators.not_now import NotNowError

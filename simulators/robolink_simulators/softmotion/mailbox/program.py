@@ -195,17 +195,17 @@ class MailboxProgram:
             moving = not self._group.motion.resting or any(
                 axis.moving_alone for axis in self._group.axes
             )
-            told = self._halted_for_release(command)
+            result = self._halted_for_release(command)
             self.ownership.carry_out(command, now_ns, moving=moving)
             if self.holder not in (0, before):
                 self.jobs.end_moving(ErrorClass.NOT_OWNER)
-            return told
-        told = self._handlers[command.opcode](command)
+            return result
+        result = self._handlers[command.opcode](command)
         if command.opcode == Opcode.JOG:
             self.jobs.note_buttons(owned=owned)
         if command.opcode in _CHANGING_TOOLS:
             self._memory.tool_changed = True
-        return told
+        return result
 
     def _note_beat(self, now_ns: int) -> None:
         heard = self._watch.note(self.inbox.heartbeat, self._memory.epoch, now_ns)

@@ -17,7 +17,7 @@ from robolink.protocols.mailbox import COMMAND, SLOTS, Opcode, Six, Words
 from robolink_simulators.cell.frames import zyx_angles
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.device.hosted import HostedDevice
-from robolink_simulators.device.motion_log import MotionLog
+from robolink_simulators.device.wire_record import MotionLog
 from robolink_simulators.faults import LinkKind, PlcFault, PlcFaultAction
 from robolink_simulators.softmotion.catalogue import MachineModel, machine_named
 from robolink_simulators.softmotion.kinematics.kinematics import CoordRef

@@ -13,9 +13,9 @@ from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.options import serial_dialect
 from robolink_simulators.epson.remote.wire_text import shown_request
 from robolink_simulators.faults import Fault, FaultAction
-from robolink_simulators.hosting.in_process.line_port import LinePort
-from robolink_simulators.hosting.seam import WireDevice
-from robolink_simulators.hosting.streams.epson_serial import SerialFace
+from robolink_simulators.hosting.addresses import WireDevice
+from robolink_simulators.hosting.in_process.transport import LinePort
+from robolink_simulators.hosting.streams.epson import SerialFace
 
 from robolink.controllers import open_epson
 from robolink.controllers.epson.link.line import EpsonLine, text_line

@@ -125,7 +125,7 @@ _SPLIT_S: Final = 0.01
 
 
 class MailboxFrames:
-    """Implements ``hosting.seam.WireDevice`` in front of a simulated PLC.
+    """Implements ``hosting.addresses.WireDevice`` in front of a simulated PLC.
 
     Args:
         simulator: The PLC.
@@ -166,7 +166,7 @@ class MailboxFrames:
 
 
 class MailboxFramesLink:
-    """One connection, or the line; implements ``hosting.seam.DeviceLink``.
+    """One connection, or the line; implements ``hosting.addresses.DeviceLink``.
 
     Args:
         device: Whose it is.

@@ -11,8 +11,8 @@ from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.faults import PlcFault, PlcFaultAction
 from robolink_simulators.faults.fieldbus import Order
 from robolink_simulators.hosting.in_process.canopen_bus import SteppedCan
-from robolink_simulators.hosting.in_process.line_port import LinePort
 from robolink_simulators.hosting.in_process.mailbox_link import InProcessMailboxLink
+from robolink_simulators.hosting.in_process.transport import LinePort
 from robolink_simulators.softmotion.mailbox.option_text import PlcOptions
 from robolink_simulators.softmotion.mailbox.options import MailboxOptions
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator

@@ -162,7 +162,7 @@ class _OpenJournal:
 
 
 class ProgramLine:
-    """A program's connection; see ``epson.spel.tasks.channels.ports.PortLink``.
+    """A program's connection; see ``epson.spel.tasks.ports.PortLink``.
 
     Args:
         service: Who answers.

@@ -11,7 +11,7 @@ from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.epson.arm.kinematics import frame_of
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.options import serial_dialect
-from robolink_simulators.epson.remote.wire_text import shown_request
+from robolink_simulators.epson.remote.link import shown_request
 from robolink_simulators.faults import Fault, FaultAction
 from robolink_simulators.hosting.addresses import WireDevice
 from robolink_simulators.hosting.in_process.transport import LinePort

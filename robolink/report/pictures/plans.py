@@ -1,16 +1,93 @@
-"""The taught points from above, with an arrow each for the tip's displacement."""
+"""Where the flange stood at each pose, from above, and how it was turned."""
 
 import math
+from collections.abc import Iterator, Sequence
 from typing import Final
 from xml.etree.ElementTree import Element
 
-from robolink.calibration import Impact, PointImpact
+from robolink.calibration import CalibrationResult, Impact, PointImpact, VerifyResult
 from robolink.messages import tr
+from robolink.model import Pose, ToolOffset
 from robolink.report._markup import element
-from robolink.report.pictures.labels import Paper
-from robolink.report.pictures.panel import Drawing
-from robolink.report.pictures.plane import WIDTH, Plane, enlargement, plane_around, step_down
-from robolink.report.pictures.shapes import Place, arrow, circle, line, words
+from robolink.report._values import Report
+from robolink.report.pictures.drawing import (
+    SIDE,
+    WIDTH,
+    Drawing,
+    Paper,
+    Place,
+    Plane,
+    PlotPanel,
+    arrow,
+    circle,
+    dot_names,
+    enlargement,
+    line,
+    plane_around,
+    step_down,
+    words,
+)
+
+_TURN: Final = 26.0
+"""Length of the arrow that shows U, on paper."""
+
+_CROSS: Final = 6.0
+_LOWEST_MM: Final = 2.0
+
+
+def pose_drawings(result: CalibrationResult | None) -> Iterator[Drawing]:
+    """Yield the drawing of a measurement whose poses are known."""
+    if result is None or len(result.inputs) < 2:
+        return
+    poses, point = result.inputs, result.reference_point_mm[:2]
+    places = [(pose.x_mm, pose.y_mm) for pose in poses]
+    if len(point) == 2:
+        places.append((point[0], point[1]))
+    lowest, highest = (tuple(map(chosen, zip(*places, strict=True))) for chosen in (min, max))
+    middle = ((lowest[0] + highest[0]) / 2, (lowest[1] + highest[1]) / 2)
+    reach_mm = max(highest[0] - lowest[0], highest[1] - lowest[1], _LOWEST_MM) / 2
+    panel = PlotPanel(reach_mm * 1.4, middle)
+    said = tr("Poses of the flange from above; an arrow shows the direction of U.")
+    if len(point) == 2:
+        said = tr(
+            "Poses of the flange from above; an arrow shows the direction of U, the cross the "
+            "reference point."
+        )
+    yield panel.drawn(
+        tr("The poses of the flange from above"),
+        said,
+        *_reference(panel, point),
+        *_stands(panel, poses, result.rejected),
+    )
+
+
+def _stands(panel: PlotPanel, poses: Sequence[Pose], rejected: Sequence[int]) -> Iterator[Element]:
+    paper = Paper(SIDE, SIDE)
+    lines = [_turned(panel, pose) for pose in poses]
+    for start, end in lines:
+        paper.take_line(start, end)
+    for number, (start, end) in enumerate(lines):
+        kind = "largest" if number in rejected else "point"
+        yield element("g", *arrow(start, end), circle(start, 3.0), class_=kind)
+        text = str(number + 1)
+        corner = paper.place(start, 6.4 * len(text), 10.5, gap=5.0)
+        if corner is not None:
+            yield words(text, corner[0], corner[1] + 9.0, class_="name")
+
+
+def _turned(panel: PlotPanel, pose: Pose) -> tuple[Place, Place]:
+    x, y = panel.at(pose.x_mm, pose.y_mm)
+    angle = math.radians(pose.u_deg)
+    # Paper counts downwards, so a positive turn has a negative step.
+    return (x, y), (x + _TURN * math.cos(angle), y - _TURN * math.sin(angle))
+
+
+def _reference(panel: PlotPanel, point: Sequence[float]) -> Iterator[Element]:
+    if len(point) == 2:
+        x, y = panel.at(point[0], point[1])
+        yield line((x - _CROSS, y), (x + _CROSS, y), class_="bar")
+        yield line((x, y - _CROSS), (x, y + _CROSS), class_="bar")
+
 
 _LEFT, _TOP, _BELOW = 46.0, 10.0, 66.0
 _STILL_MM: Final = 5e-7
@@ -154,3 +231,52 @@ def _scales(plane: Plane, factor: float | None, longest_mm: float) -> Element:
         parts.append(element("g", *shaft, class_="point"))
         parts.append(words(said, start + length + 8, y + 4, class_="scale"))
     return element("g", *parts, transform=f"translate({_LEFT:g} {_TOP:g})")
+
+
+_LOWEST_SCALE_MM: Final = 0.05
+"""A panel shows at least so much to each side: less is noise."""
+
+
+def tip_drawings(report: Report) -> Iterator[Drawing]:
+    """Yield the drawings of a change on record that measured or turned something."""
+    if report.record is None or not report.compared:
+        return
+    if report.before is not None and report.after is not None:
+        yield _change(report.before, report.after)
+    if report.verification is not None and report.verification.drifts:
+        yield _drift(report.verification)
+
+
+def _change(before: ToolOffset, after: ToolOffset) -> Drawing:
+    """Draw the movement of the tip in the flange's XY plane, from above, both axes alike."""
+    dx_mm, dy_mm = after.x_mm - before.x_mm, after.y_mm - before.y_mm
+    panel = PlotPanel(max(math.hypot(dx_mm, dy_mm), _LOWEST_SCALE_MM) * 1.35)
+    start, end = panel.at(0, 0), panel.at(dx_mm, dy_mm)
+    said = tr(
+        "Tip on the flange, from before (grey) to after: X {dx:+.3f} mm, Y {dy:+.3f} mm.",
+        dx=dx_mm + 0.0,
+        dy=dy_mm + 0.0,
+    )
+    return panel.drawn(
+        tr("The tip before and after"),
+        said,
+        element("g", circle(start, 4.0), class_="old"),
+        element("g", *arrow(start, end), class_="point"),
+    )
+
+
+def _drift(result: VerifyResult) -> Drawing:
+    """Draw where the tip stood at each angle, and the circle that is allowed."""
+    largest_mm = max(result.max_drift_mm, result.tolerance_mm, _LOWEST_SCALE_MM)
+    panel = PlotPanel(largest_mm * 1.2)
+    middle = panel.at(0, 0)
+    places = [panel.at(drift.dx_mm, drift.dy_mm) for drift in result.drifts]
+    dots = [circle(place, 3.2) for place in places]
+    names = dot_names(places, [f"U {drift.u_deg:g}" for drift in result.drifts])
+    allowed = circle(middle, round(result.tolerance_mm * panel.per_mm, 2), class_="allowed")
+    return panel.drawn(
+        tr("Drift of the turned tip"),
+        tr("Drift of the tip when the tool turned; the dashed circle is allowed."),
+        allowed,
+        element("g", *dots, *names, class_="point" if result.passed else "largest"),
+    )

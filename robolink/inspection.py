@@ -1,28 +1,112 @@
-"""Looks at a cell and at its record, and compares them.
+"""A look at a whole cell that moves nothing: is it as the last change left it, is anything due.
 
-What it reads is legal at any time but the tool table of an EPSON controller, which wants the
-controller at rest or a project that publishes it (docs/monitor-only.md).
+For a job that runs every night, and for whoever comes to a cell in the morning
+(docs/accuracy.md).
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from enum import StrEnum
 
 from robolink.backup import ToolState
 from robolink.config import Cell
 from robolink.drift import KINDS, drift_of
-from robolink.errors import NotReadyError
-from robolink.inspection._findings import Inspection, InspectionCode, InspectionFinding
+from robolink.errors import CalibrationError, NotReadyError
 from robolink.messages import tr
 from robolink.methods import all_methods
 from robolink.model import (
     Controller,
     ControllerStatus,
     EntryKind,
+    NewEntry,
     ToolOffset,
     begun_in_words,
 )
+from robolink.recipe import RecipeRun
 from robolink.stations import find_stations
 from robolink.timing import local_label
 from robolink.transaction import changed_since
+
+__all__ = ["Inspection", "InspectionCode", "InspectionFinding", "inspect", "measured_findings"]
+
+
+class InspectionCode(StrEnum):
+    """What was found; what the charts show has the codes of :class:`robolink.drift.DriftCode`."""
+
+    CONTROLLER_IN_ERROR = "controller_in_error"
+    UNSETTLED = "unsettled"
+    TOOLS_NOT_READ = "tools_not_read"
+    TOOL_CHANGED = "tool_changed"
+    STATION_DUE = "station_due"
+    TIP_MOVED = "tip_moved"
+    TIP_NOT_MEASURED = "tip_not_measured"
+
+
+@dataclass(frozen=True, slots=True)
+class InspectionFinding:
+    """One thing that somebody should see to.
+
+    Attributes:
+        code: What it is.
+        subject: Number of a tool, name of a station, or of what was begun; empty for the cell.
+        sentence: The same for a person.
+        remedy: What to do; empty where the sentence says it.
+    """
+
+    code: str
+    subject: str
+    sentence: str
+    remedy: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Inspection:
+    """What a look at a cell found.
+
+    Attributes:
+        controller: Its identity.
+        tools: The tools that were read, ``None`` for an undefined one; empty where none could be.
+        selected: The selected tool, ``None`` where that cannot be told.
+        stations: Names of the stations that are known.
+        changes: How many measured changes are on record.
+        findings: What somebody should see to; empty when all is well.
+    """
+
+    controller: str
+    tools: Mapping[int, ToolOffset | None]
+    selected: int | None
+    stations: tuple[str, ...]
+    changes: int
+    findings: tuple[InspectionFinding, ...]
+
+    def with_findings(self, more: Iterable[InspectionFinding]) -> "Inspection":
+        """Return the same with what else was found."""
+        return replace(self, findings=(*self.findings, *more))
+
+    @property
+    def entry(self) -> NewEntry:
+        """The same for the record."""
+        found = [{"code": one.code, "subject": one.subject} for one in self.findings]
+        values = {
+            str(number): None if value is None else list(value.components())
+            for number, value in self.tools.items()
+        }
+        verdict = (
+            tr("Needs attention: {codes}.", codes=", ".join(one.code for one in self.findings))
+            if self.findings
+            else tr("In order.")
+        )
+        return NewEntry(
+            EntryKind.CHECK,
+            verdict=verdict,
+            details={
+                "findings": found,
+                "tools": values,
+                "selected_tool": self.selected,
+                "stations": list(self.stations),
+                "changes": self.changes,
+            },
+        )
 
 
 def inspect(
@@ -136,4 +220,45 @@ def _put_back(tool: int) -> str:
         "If nobody meant it, write the recorded value back with 'robolink tool set {tool}'; "
         "otherwise measure the tool again.",
         tool=tool,
+    )
+
+
+def measured_findings(run: RecipeRun) -> tuple[InspectionFinding, ...]:
+    """Return which tips are not where their stored values put them.
+
+    A tip counts as moved from the limit on that the turn test of the recipe has.
+
+    Args:
+        run: A run that only measures, after its preflight and after a person's yes.
+
+    Raises:
+        RobolinkError: The robot could not finish; nothing was written.
+    """
+    try:
+        report = run.run()
+    except CalibrationError as error:
+        return (
+            InspectionFinding(
+                InspectionCode.TIP_NOT_MEASURED,
+                "",
+                tr("The measurement was refused: {what}", what=error.what),
+                error.remedy,
+            ),
+        )
+    limits = {plan.tool: plan.criteria.drift_tolerance_mm for plan in run.plan.tools}
+    return tuple(
+        InspectionFinding(
+            InspectionCode.TIP_MOVED,
+            str(one.proposal.tool),
+            tr(
+                "Tool {tool}: the tip is {found:.3f} mm from where its value puts it, limit "
+                "{limit:.3f} mm.",
+                tool=one.proposal.tool,
+                found=one.proposal.change_mm,
+                limit=limits[one.proposal.tool],
+            ),
+            tr("Is the needle straight and tight? Then measure it again: robolink change"),
+        )
+        for one in report.tools
+        if (one.proposal.change_mm or 0.0) > limits[one.proposal.tool]
     )

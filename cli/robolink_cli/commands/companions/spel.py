@@ -53,7 +53,7 @@ def check(files: tuple[Path, ...], points: tuple[Path, ...], encoding: str | Non
     Nothing runs and no controller is asked.
     """
     from robolink_simulators.epson.spel.programs.loading import check_project
-    from robolink_simulators.epson.spel.source.faults import ProgramRefused
+    from robolink_simulators.epson.spel.source_text import ProgramRefused
 
     checked = check_project(files, points, encoding=encoding)
     if json_is_on():
@@ -189,7 +189,7 @@ def _run(
     printed: list[str],
 ) -> bool:
     """Run a program to its end; tell whether that came in time."""
-    from robolink_simulators.epson.spel.tasks.driving import run_to_end
+    from robolink_simulators.epson.spel.tasks.runner import run_to_end
 
     from robolink_cli.commands.simulate.kinds.epson import start_function
 

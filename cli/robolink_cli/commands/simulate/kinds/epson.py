@@ -10,12 +10,11 @@ from typing import Any, Final
 import click
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson import EpsonOptions, EpsonSimulator
+from robolink_simulators.epson.condition import SpelRefusal
 from robolink_simulators.epson.options import options_from_text, read_profile
-from robolink_simulators.epson.refusals import SpelRefusal
-from robolink_simulators.epson.spel.tasks.channels.serial_link import COM_NUMBERS
-from robolink_simulators.epson.spel.tasks.driving import run_to_end
-from robolink_simulators.epson.spel.tasks.runner import ProgramRunner
-from robolink_simulators.epson.vision.vision_file import install_vision
+from robolink_simulators.epson.spel.tasks.ports import COM_NUMBERS
+from robolink_simulators.epson.spel.tasks.runner import ProgramRunner, run_to_end
+from robolink_simulators.epson.vision_file import install_vision
 from robolink_simulators.faults import LinkKind
 from robolink_simulators.hosting.streams.epson import serve_serial, serve_tcp
 

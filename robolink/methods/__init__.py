@@ -62,11 +62,11 @@ if TYPE_CHECKING:
     from robolink.methods.declaration.surface_parameters import (
         SurfaceParameters as SurfaceParameters,
     )
-    from robolink.methods.n_angle.parameters import NAngleParameters as NAngleParameters
-    from robolink.methods.n_angle.parameters import most_informative_order as most_informative_order
-    from robolink.methods.n_angle.procedure import measure_n_angle as measure_n_angle
-    from robolink.methods.n_angle.source import ManyTouches as ManyTouches
-    from robolink.methods.n_angle.source import NAngleSource as NAngleSource
+    from robolink.methods.n_angle import ManyTouches as ManyTouches
+    from robolink.methods.n_angle import NAngleParameters as NAngleParameters
+    from robolink.methods.n_angle import NAngleSource as NAngleSource
+    from robolink.methods.n_angle import measure_n_angle as measure_n_angle
+    from robolink.methods.n_angle import most_informative_order as most_informative_order
     from robolink.methods.one_touch.last_touch import KEPT as KEPT
     from robolink.methods.one_touch.last_touch import LastTouch as LastTouch
     from robolink.methods.one_touch.last_touch import find_last_touch as find_last_touch
@@ -119,10 +119,10 @@ if TYPE_CHECKING:
     from robolink.methods.sphere_touch.source import SphereTouchSource as SphereTouchSource
     from robolink.methods.sphere_touch.survey import SphereSurvey as SphereSurvey
     from robolink.methods.station_learning import learn_station as learn_station
-    from robolink.methods.two_pose.parameters import TwoPoseParameters as TwoPoseParameters
-    from robolink.methods.two_pose.procedure import measure_two_pose as measure_two_pose
-    from robolink.methods.two_pose.source import TwoPoseSource as TwoPoseSource
-    from robolink.methods.two_pose.source import TwoTouches as TwoTouches
+    from robolink.methods.two_pose import TwoPoseParameters as TwoPoseParameters
+    from robolink.methods.two_pose import TwoPoseSource as TwoPoseSource
+    from robolink.methods.two_pose import TwoTouches as TwoTouches
+    from robolink.methods.two_pose import measure_two_pose as measure_two_pose
     from robolink.methods.z_touch.parameters import ZTouchParameters as ZTouchParameters
     from robolink.methods.z_touch.procedure import measure_z_touch as measure_z_touch
     from robolink.methods.z_touch.procedure import verify_by_touching as verify_by_touching
@@ -147,16 +147,16 @@ else:
             "declaration.fields": "ParameterField fields_of",
             "declaration.look_parameters": "LookParameters",
             "declaration.method": (
-                "Angle AnyMethod Check DEGREES Former Help InputNumber Length "
-                "LengthRule MM MM_S Method MethodParameters NOTHING_STATED "
-                "Needs NextStep Option Pair PoseHelp StatedLimits Unit"
+                "Angle AnyMethod Check DEGREES Former Help InputNumber Length LengthRule MM "
+                "MM_S Method MethodParameters NOTHING_STATED Needs NextStep Option Pair "
+                "PoseHelp StatedLimits Unit"
             ),
             "declaration.pin_parameters": "PinParameters UprightPinParameters",
             "declaration.site": "Site ToolHistory",
             "declaration.surface_parameters": "SurfaceParameters",
-            "n_angle.parameters": "NAngleParameters most_informative_order",
-            "n_angle.procedure": "measure_n_angle",
-            "n_angle.source": "ManyTouches NAngleSource",
+            "n_angle": (
+                "ManyTouches NAngleParameters NAngleSource measure_n_angle most_informative_order"
+            ),
             "one_touch.last_touch": "KEPT LastTouch find_last_touch",
             "one_touch.parameters": "OneTouchParameters",
             "one_touch.procedure": "measure_one_touch",
@@ -184,9 +184,7 @@ else:
             "sphere_touch.source": "SphereTouchSource SphereTouches",
             "sphere_touch.survey": "SphereSurvey",
             "station_learning": "learn_station",
-            "two_pose.parameters": "TwoPoseParameters",
-            "two_pose.procedure": "measure_two_pose",
-            "two_pose.source": "TwoPoseSource TwoTouches",
+            "two_pose": "TwoPoseParameters TwoPoseSource TwoTouches measure_two_pose",
             "z_touch.parameters": "ZTouchParameters",
             "z_touch.procedure": "measure_z_touch verify_by_touching",
             "z_touch.source": "ZTouchSource",

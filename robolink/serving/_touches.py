@@ -127,6 +127,6 @@ def touches_by(method: str, limits: CallbackLimits) -> ProgramTouches:
         from robolink.methods.pivot.source import PivotTouches
 
         return ProgramTouches(PivotTouches(sigma_mm=limits.sigma_mm), limits)
-    from robolink.methods.n_angle.source import ManyTouches
+    from robolink.methods.n_angle import ManyTouches
 
     return ProgramTouches(ManyTouches(sigma_mm=limits.sigma_mm), limits)

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 
 def _solver(parameters: PointsParameters, site: Site) -> "PoseMethod":
-    from robolink.methods.n_angle.source import ManyTouches
-    from robolink.methods.two_pose.source import TwoTouches
+    from robolink.methods.n_angle import ManyTouches
+    from robolink.methods.two_pose import TwoTouches
 
     many = parameters.method == "n-angle"
     return ManyTouches(site.sigma_mm) if many else TwoTouches(site.sigma_mm)

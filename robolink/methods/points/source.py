@@ -23,7 +23,7 @@ from robolink.calibration import (
 from robolink.errors import CalibrationError, RobolinkError, UndefinedToolError
 from robolink.messages import joined, tr
 from robolink.methods.points.axes_held import were_held
-from robolink.methods.two_pose.source import TwoTouches
+from robolink.methods.two_pose import TwoTouches
 from robolink.model import Controller, PointReader, Pose, ToolOffset
 from robolink.procedures import MeasurementContext, PoseMethod, require_one_height
 from robolink.ways import Way, way

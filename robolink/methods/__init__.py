@@ -11,21 +11,17 @@ if TYPE_CHECKING:
     from robolink.methods.beams.procedure import trace_beams as trace_beams
     from robolink.methods.beams.procedure import verify_by_crossing as verify_by_crossing
     from robolink.methods.beams.source import BeamsSource as BeamsSource
-    from robolink.methods.board.parameters import BoardParameters as BoardParameters
-    from robolink.methods.board.procedure import measure_board as measure_board
-    from robolink.methods.board.procedure import verify_board as verify_board
-    from robolink.methods.board.source import BoardSource as BoardSource
-    from robolink.methods.camera.parameters import CameraParameters as CameraParameters
-    from robolink.methods.camera.procedure import measure_camera as measure_camera
-    from robolink.methods.camera.source import CameraSource as CameraSource
-    from robolink.methods.camera_affine.parameters import LEAST_SPAN_MM as LEAST_SPAN_MM
-    from robolink.methods.camera_affine.parameters import (
-        CameraAffineParameters as CameraAffineParameters,
-    )
-    from robolink.methods.camera_affine.procedure import (
-        measure_camera_affine as measure_camera_affine,
-    )
-    from robolink.methods.camera_affine.source import CameraAffineSource as CameraAffineSource
+    from robolink.methods.board import BoardParameters as BoardParameters
+    from robolink.methods.board import BoardSource as BoardSource
+    from robolink.methods.board import measure_board as measure_board
+    from robolink.methods.board import verify_board as verify_board
+    from robolink.methods.camera import CameraParameters as CameraParameters
+    from robolink.methods.camera import CameraSource as CameraSource
+    from robolink.methods.camera import measure_camera as measure_camera
+    from robolink.methods.camera_affine import LEAST_SPAN_MM as LEAST_SPAN_MM
+    from robolink.methods.camera_affine import CameraAffineParameters as CameraAffineParameters
+    from robolink.methods.camera_affine import CameraAffineSource as CameraAffineSource
+    from robolink.methods.camera_affine import measure_camera_affine as measure_camera_affine
     from robolink.methods.declaration.checking import order_of_residuals as order_of_residuals
     from robolink.methods.declaration.checking import parameter_problems as parameter_problems
     from robolink.methods.declaration.checking import source_of as source_of
@@ -134,15 +130,11 @@ else:
             "beams.parameters": "BeamLine BeamsParameters",
             "beams.procedure": "measure_beams trace_beams verify_by_crossing",
             "beams.source": "BeamsSource",
-            "board.parameters": "BoardParameters",
-            "board.procedure": "measure_board verify_board",
-            "board.source": "BoardSource",
-            "camera.parameters": "CameraParameters",
-            "camera.procedure": "measure_camera",
-            "camera.source": "CameraSource",
-            "camera_affine.parameters": "CameraAffineParameters LEAST_SPAN_MM",
-            "camera_affine.procedure": "measure_camera_affine",
-            "camera_affine.source": "CameraAffineSource",
+            "board": "BoardParameters BoardSource measure_board verify_board",
+            "camera": "CameraParameters CameraSource measure_camera",
+            "camera_affine": (
+                "CameraAffineParameters CameraAffineSource LEAST_SPAN_MM measure_camera_affine"
+            ),
             "declaration.checking": "order_of_residuals parameter_problems source_of",
             "declaration.fields": "ParameterField fields_of",
             "declaration.look_parameters": "LookParameters",

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from robolink.calibration import RunoutTableResult, Sighting, solve_runout_table
-from robolink.methods.camera.procedure import look_round
+from robolink.methods.camera import look_round
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import LookPlan
 from robolink.runner import Procedure

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from robolink.calibration import RunoutTable, VerifyResult
-from robolink.methods.camera.proof import LookTest
+from robolink.methods.camera import LookTest
 from robolink.procedures import MeasurementContext
 
 

@@ -5,14 +5,14 @@ from typing import TYPE_CHECKING
 
 from robolink.calibration import CalibrationResult
 from robolink.messages import tr
-from robolink.methods.camera.source import CameraSource
+from robolink.methods.camera import CameraSource
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import MeasurementContext
 from robolink.runner import Procedure
 from robolink.sensing import sensor_name
 
 if TYPE_CHECKING:
-    from robolink.methods.camera.proof import LookTest
+    from robolink.methods.camera import LookTest
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,12 +5,12 @@ from typing import TYPE_CHECKING
 from robolink.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from robolink.methods.beams.parameters import BeamLine as BeamLine
-    from robolink.methods.beams.parameters import BeamsParameters as BeamsParameters
+    from robolink.methods.beams import BeamLine as BeamLine
+    from robolink.methods.beams import BeamsParameters as BeamsParameters
+    from robolink.methods.beams import BeamsSource as BeamsSource
     from robolink.methods.beams.procedure import measure_beams as measure_beams
     from robolink.methods.beams.procedure import trace_beams as trace_beams
     from robolink.methods.beams.procedure import verify_by_crossing as verify_by_crossing
-    from robolink.methods.beams.source import BeamsSource as BeamsSource
     from robolink.methods.board import BoardParameters as BoardParameters
     from robolink.methods.board import BoardSource as BoardSource
     from robolink.methods.board import measure_board as measure_board
@@ -58,26 +58,34 @@ if TYPE_CHECKING:
     from robolink.methods.declaration.surface_parameters import (
         SurfaceParameters as SurfaceParameters,
     )
+    from robolink.methods.given_poses import PointsSource as PointsSource
+    from robolink.methods.given_poses import PosesFound as PosesFound
+    from robolink.methods.given_poses import taught_poses as taught_poses
     from robolink.methods.n_angle import ManyTouches as ManyTouches
     from robolink.methods.n_angle import NAngleParameters as NAngleParameters
     from robolink.methods.n_angle import NAngleSource as NAngleSource
     from robolink.methods.n_angle import measure_n_angle as measure_n_angle
     from robolink.methods.n_angle import most_informative_order as most_informative_order
-    from robolink.methods.one_touch.last_touch import KEPT as KEPT
-    from robolink.methods.one_touch.last_touch import LastTouch as LastTouch
-    from robolink.methods.one_touch.last_touch import find_last_touch as find_last_touch
-    from robolink.methods.one_touch.parameters import OneTouchParameters as OneTouchParameters
-    from robolink.methods.one_touch.procedure import measure_one_touch as measure_one_touch
+    from robolink.methods.one_touch import OneTouchParameters as OneTouchParameters
+    from robolink.methods.one_touch import OneTouchSource as OneTouchSource
+    from robolink.methods.one_touch import measure_one_touch as measure_one_touch
+    from robolink.methods.one_touch.solvers import KEPT as KEPT
     from robolink.methods.one_touch.solvers import Absolute as Absolute
     from robolink.methods.one_touch.solvers import Difference as Difference
+    from robolink.methods.one_touch.solvers import LastTouch as LastTouch
     from robolink.methods.one_touch.solvers import difference_from_last as difference_from_last
-    from robolink.methods.one_touch.source import OneTouchSource as OneTouchSource
-    from robolink.methods.pivot.parameters import PivotParameters as PivotParameters
+    from robolink.methods.one_touch.solvers import find_last_touch as find_last_touch
+    from robolink.methods.pivot import PivotParameters as PivotParameters
+    from robolink.methods.pivot import PivotSource as PivotSource
+    from robolink.methods.pivot import PivotTouches as PivotTouches
+    from robolink.methods.pivot import require_tilting as require_tilting
     from robolink.methods.pivot.procedure import measure_pivot as measure_pivot
     from robolink.methods.pivot.procedure import verify_by_tilting as verify_by_tilting
-    from robolink.methods.pivot.source import PivotSource as PivotSource
-    from robolink.methods.pivot.source import PivotTouches as PivotTouches
-    from robolink.methods.pivot.source import require_tilting as require_tilting
+    from robolink.methods.pivot.six_point import SixPointParameters as SixPointParameters
+    from robolink.methods.pivot.six_point import SixPoints as SixPoints
+    from robolink.methods.pivot.six_point import SixPointSource as SixPointSource
+    from robolink.methods.pivot.six_point_procedure import AxisTeachPlan as AxisTeachPlan
+    from robolink.methods.pivot.six_point_procedure import measure_six_point as measure_six_point
     from robolink.methods.pivot.tilts import OverPin as OverPin
     from robolink.methods.pivot.tilts import Tilt as Tilt
     from robolink.methods.pivot.tilts import informative_tilts as informative_tilts
@@ -87,26 +95,16 @@ if TYPE_CHECKING:
     from robolink.methods.plane_touch.source import PlaneTouches as PlaneTouches
     from robolink.methods.plane_touch.source import PlaneTouchSource as PlaneTouchSource
     from robolink.methods.plane_touch.survey import PlaneSurvey as PlaneSurvey
-    from robolink.methods.points.parameters import PointsParameters as PointsParameters
-    from robolink.methods.points.source import PointsSource as PointsSource
-    from robolink.methods.points.source import PosesFound as PosesFound
-    from robolink.methods.points.source import taught_poses as taught_poses
+    from robolink.methods.points import PointsParameters as PointsParameters
     from robolink.methods.registry import METHODS_GROUP as METHODS_GROUP
     from robolink.methods.registry import all_methods as all_methods
     from robolink.methods.registry import find_method as find_method
     from robolink.methods.registry import method_names as method_names
     from robolink.methods.registry import register as register
-    from robolink.methods.runout_table.parameters import AllRoundPlan as AllRoundPlan
-    from robolink.methods.runout_table.parameters import (
-        RunoutTableParameters as RunoutTableParameters,
-    )
-    from robolink.methods.runout_table.procedure import measure_runout_table as measure_runout_table
-    from robolink.methods.runout_table.source import RunoutTableSource as RunoutTableSource
-    from robolink.methods.six_point.parameters import SixPointParameters as SixPointParameters
-    from robolink.methods.six_point.procedure import AxisTeachPlan as AxisTeachPlan
-    from robolink.methods.six_point.procedure import measure_six_point as measure_six_point
-    from robolink.methods.six_point.source import SixPoints as SixPoints
-    from robolink.methods.six_point.source import SixPointSource as SixPointSource
+    from robolink.methods.runout_table import AllRoundPlan as AllRoundPlan
+    from robolink.methods.runout_table import RunoutTableParameters as RunoutTableParameters
+    from robolink.methods.runout_table import RunoutTableSource as RunoutTableSource
+    from robolink.methods.runout_table_procedure import measure_runout_table as measure_runout_table
     from robolink.methods.sphere_touch.parameters import (
         SphereTouchParameters as SphereTouchParameters,
     )
@@ -119,17 +117,16 @@ if TYPE_CHECKING:
     from robolink.methods.two_pose import TwoPoseSource as TwoPoseSource
     from robolink.methods.two_pose import TwoTouches as TwoTouches
     from robolink.methods.two_pose import measure_two_pose as measure_two_pose
-    from robolink.methods.z_touch.parameters import ZTouchParameters as ZTouchParameters
+    from robolink.methods.z_touch import ZTouchParameters as ZTouchParameters
+    from robolink.methods.z_touch import ZTouchSource as ZTouchSource
     from robolink.methods.z_touch.procedure import measure_z_touch as measure_z_touch
     from robolink.methods.z_touch.procedure import verify_by_touching as verify_by_touching
-    from robolink.methods.z_touch.source import ZTouchSource as ZTouchSource
 else:
     __getattr__, __dir__, __all__ = lazy_exports(
         __name__,
         {
-            "beams.parameters": "BeamLine BeamsParameters",
+            "beams": "BeamLine BeamsParameters BeamsSource",
             "beams.procedure": "measure_beams trace_beams verify_by_crossing",
-            "beams.source": "BeamsSource",
             "board": "BoardParameters BoardSource measure_board verify_board",
             "camera": "CameraParameters CameraSource measure_camera",
             "camera_affine": (
@@ -146,39 +143,34 @@ else:
             "declaration.pin_parameters": "PinParameters UprightPinParameters",
             "declaration.site": "Site ToolHistory",
             "declaration.surface_parameters": "SurfaceParameters",
+            "given_poses": "PointsSource PosesFound taught_poses",
             "n_angle": (
                 "ManyTouches NAngleParameters NAngleSource measure_n_angle most_informative_order"
             ),
-            "one_touch.last_touch": "KEPT LastTouch find_last_touch",
-            "one_touch.parameters": "OneTouchParameters",
-            "one_touch.procedure": "measure_one_touch",
-            "one_touch.solvers": "Absolute Difference difference_from_last",
-            "one_touch.source": "OneTouchSource",
-            "pivot.parameters": "PivotParameters",
+            "one_touch": "OneTouchParameters OneTouchSource measure_one_touch",
+            "one_touch.solvers": (
+                "Absolute Difference KEPT LastTouch difference_from_last find_last_touch"
+            ),
+            "pivot": "PivotParameters PivotSource PivotTouches require_tilting",
             "pivot.procedure": "measure_pivot verify_by_tilting",
-            "pivot.source": "PivotSource PivotTouches require_tilting",
+            "pivot.six_point": "SixPointParameters SixPointSource SixPoints",
+            "pivot.six_point_procedure": "AxisTeachPlan measure_six_point",
             "pivot.tilts": "OverPin Tilt informative_tilts proving_tilts",
             "plane_touch.parameters": "PlaneTouchParameters",
             "plane_touch.procedure": "measure_plane_touch",
             "plane_touch.source": "PlaneTouchSource PlaneTouches",
             "plane_touch.survey": "PlaneSurvey",
-            "points.parameters": "PointsParameters",
-            "points.source": "PointsSource PosesFound taught_poses",
+            "points": "PointsParameters",
             "registry": "METHODS_GROUP all_methods find_method method_names register",
-            "runout_table.parameters": "AllRoundPlan RunoutTableParameters",
-            "runout_table.procedure": "measure_runout_table",
-            "runout_table.source": "RunoutTableSource",
-            "six_point.parameters": "SixPointParameters",
-            "six_point.procedure": "AxisTeachPlan measure_six_point",
-            "six_point.source": "SixPointSource SixPoints",
+            "runout_table": "AllRoundPlan RunoutTableParameters RunoutTableSource",
+            "runout_table_procedure": "measure_runout_table",
             "sphere_touch.parameters": "SphereTouchParameters",
             "sphere_touch.procedure": "measure_sphere_touch",
             "sphere_touch.source": "SphereTouchSource SphereTouches",
             "sphere_touch.survey": "SphereSurvey",
             "station_learning": "learn_station",
             "two_pose": "TwoPoseParameters TwoPoseSource TwoTouches measure_two_pose",
-            "z_touch.parameters": "ZTouchParameters",
+            "z_touch": "ZTouchParameters ZTouchSource",
             "z_touch.procedure": "measure_z_touch verify_by_touching",
-            "z_touch.source": "ZTouchSource",
         },
     )

@@ -30,7 +30,7 @@ _OWN: Final = {
     "board": "robolink.methods.board",
     "runout-table": "robolink.methods.runout_table",
     "pivot": "robolink.methods.pivot",
-    "six-point": "robolink.methods.six_point",
+    "six-point": "robolink.methods.pivot.six_point",
     "plane-touch": "robolink.methods.plane_touch",
     "sphere-touch": "robolink.methods.sphere_touch",
     "points": "robolink.methods.points",

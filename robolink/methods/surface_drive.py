@@ -8,8 +8,7 @@ import numpy as np
 
 from robolink.calibration import VerifyResult, rotation_of
 from robolink.messages import tr
-from robolink.methods.pivot.swing import tilt_in_air
-from robolink.methods.pivot.tilts import UPRIGHT, OverPin, Tilt
+from robolink.methods.pivot.tilts import UPRIGHT, OverPin, Tilt, tilt_in_air
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import MOST_MORE, SurfaceProof, SurfaceTouches, TouchPlan
 from robolink.runner import Notify, Procedure, TakenAgainError, TouchedAt

@@ -14,8 +14,7 @@ import numpy as np
 
 from robolink.calibration import Floats, linear_fit
 from robolink.messages import tr
-from robolink.methods.pivot.naming import TiltedNames
-from robolink.methods.pivot.tilts import UPRIGHT, OverPin, Tilt, apart_deg
+from robolink.methods.pivot.tilts import UPRIGHT, OverPin, Tilt, TiltedNames, apart_deg
 from robolink.methods.surface_drive import SurfaceDrive, SurfaceSpot, Vector, places_of
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import SurfaceTouches, approach_path, resume_samples

@@ -8,7 +8,7 @@ import pytest
 from robolink.calibration import rotation_of
 from robolink.errors import CalibrationError
 from robolink.methods import AxisTeachPlan, informative_tilts, measure_six_point
-from robolink.methods.six_point.procedure import go_on_six_point
+from robolink.methods.pivot.six_point_procedure import go_on_six_point
 from robolink.model import Path, Pose, ToolOffset
 from robolink.runner import TeachPrompt, TouchedAt
 from tests.calibration._tilting_person import (

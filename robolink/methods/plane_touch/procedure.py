@@ -15,8 +15,7 @@ from robolink.calibration import (
     plane_columns,
     solve_plane_touch,
 )
-from robolink.methods.pivot.reach import free_tilts
-from robolink.methods.pivot.tilts import UPRIGHT, OverPin
+from robolink.methods.pivot.tilts import UPRIGHT, OverPin, free_tilts
 from robolink.methods.plane_touch.design import (
     candidates,
     informative_spots,

@@ -7,8 +7,7 @@ import numpy as np
 
 from robolink.calibration import TouchedPlane, VerifyResult, rotation_of, tilted_from
 from robolink.messages import tr
-from robolink.methods.pivot.reach import free_tilts
-from robolink.methods.pivot.tilts import OverPin
+from robolink.methods.pivot.tilts import OverPin, free_tilts
 from robolink.methods.plane_touch.design import candidates
 from robolink.methods.surface_drive import (
     SurfaceSpot,

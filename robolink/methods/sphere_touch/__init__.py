@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def _source(parameters: SphereTouchParameters, site: Site) -> "TipSource":
-    from robolink.methods.pivot.source import axes_of, require_tilting
+    from robolink.methods.pivot import axes_of, require_tilting
     from robolink.methods.sphere_touch.source import SphereTouchSource
 
     require_tilting(site.controller, METHOD.name)

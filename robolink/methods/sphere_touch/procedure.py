@@ -11,8 +11,7 @@ import numpy as np
 
 from robolink.calibration import Floats, SphereTouchResult, solve_sphere_touch, sphere_columns
 from robolink.messages import tr
-from robolink.methods.pivot.reach import free_tilts
-from robolink.methods.pivot.tilts import UPRIGHT, OverPin
+from robolink.methods.pivot.tilts import UPRIGHT, OverPin, free_tilts
 from robolink.methods.plane_touch.design import candidates
 from robolink.methods.sphere_touch.design import (
     informative_spots,

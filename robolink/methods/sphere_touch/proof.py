@@ -6,8 +6,7 @@ from typing import ClassVar
 
 from robolink.calibration import VerifyResult, tilted_from
 from robolink.messages import tr
-from robolink.methods.pivot.reach import free_tilts
-from robolink.methods.pivot.tilts import OverPin
+from robolink.methods.pivot.tilts import OverPin, free_tilts
 from robolink.methods.plane_touch.design import candidates
 from robolink.methods.plane_touch.proof import TURNED_DEG
 from robolink.methods.sphere_touch.design import reachable

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from robolink.calibration import CalibrationResult
 from robolink.messages import tr
-from robolink.methods.pivot.source import require_known_tip
+from robolink.methods.pivot import require_known_tip
 from robolink.methods.sphere_touch.survey import SphereSurvey
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import (

@@ -3,6 +3,10 @@
 With the guard open in Teach, where a person touches a tip to a pin, a PC commands nothing
 (docs/reference/rules.md 9). So the poses are taught on the pendant and read afterwards. Nothing
 moves here and no tool is selected; therefore nothing is proved by turning about the new tip either.
+
+A robot whose axes are let go (SFREE) is pushed by hand; where it then stands, its joints yield and
+the weight of the arm takes up their play. EPSON's instructions for this measurement forbid it, and
+no pose shows it afterwards (docs/reference/epson.md 3.2). So a person is asked, once a command.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,11 +26,54 @@ from robolink.calibration import (
 )
 from robolink.errors import CalibrationError, RobolinkError, UndefinedToolError
 from robolink.messages import joined, tr
-from robolink.methods.points.axes_held import were_held
 from robolink.methods.two_pose import TwoTouches
-from robolink.model import Controller, PointReader, Pose, ToolOffset
+from robolink.model import AnsweredBy, Controller, PointReader, Pose, ToolOffset
 from robolink.procedures import MeasurementContext, PoseMethod, require_one_height
 from robolink.ways import Way, way
+
+
+def were_held(context: MeasurementContext, *, stated: bool) -> bool:
+    """Return whether somebody says that all axes were held; the answer goes on record.
+
+    Args:
+        context: What asks.
+        stated: Whether it was said beforehand, by an option or in the recipe.
+
+    Returns:
+        ``False`` where nobody said it and nobody is to be asked.
+
+    Raises:
+        CalibrationError: ``axes_free``: they were let go.
+
+    Example:
+        >>> from robolink.methods.given_poses import were_held
+        >>> from robolink.nozzle_change import Limits
+        >>> from robolink.procedures import MeasurementContext
+        >>> from robolink.testing import MemoryController
+        >>> with MemoryController() as controller:
+        ...     settings = Limits().settings
+        ...     context = MeasurementContext(controller, None, start=None, settings=settings)
+        ...     were_held(context, stated=True)
+        True
+    """
+    by_recipe = bool(context.controller.outcomes.signature.recipe)
+    by = AnsweredBy.RECIPE if by_recipe else AnsweredBy.OPTION
+    said = context.ask_once(held_question(), given=by if stated else None)
+    if said is False:
+        raise CalibrationError(
+            "axes_free",
+            tr("These poses were taught with axes let go, so they are not where the tip touched."),
+            remedy=tr(
+                "Nothing was written. Switch the motors on (no SFREE), bring the tip onto the pin "
+                "by jogging, and teach them again."
+            ),
+        )
+    return said is True
+
+
+def held_question() -> str:
+    """Return the question."""
+    return tr("Were all axes held by their motors (not SFREE) when these poses were taught?")
 
 
 def taught_poses(points: PointReader, numbers: Sequence[int]) -> tuple[Pose, ...]:

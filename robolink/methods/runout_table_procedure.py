@@ -1,11 +1,19 @@
-"""A tip seen all round by an up-looking camera: its offset, and a table of what that leaves."""
+"""How a tip is seen all round for runout-table, and the proof of what was found."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
-from robolink.calibration import RunoutTableResult, Sighting, solve_runout_table
-from robolink.methods.camera import look_round
+from robolink.calibration import (
+    RunoutTable,
+    RunoutTableResult,
+    Sighting,
+    VerifyResult,
+    solve_runout_table,
+)
+from robolink.methods.camera import LookTest, look_round
 from robolink.model import Pose, ToolOffset
-from robolink.procedures import LookPlan
+from robolink.procedures import LookPlan, MeasurementContext
 from robolink.runner import Procedure
 from robolink.stations import CameraStation
 
@@ -50,3 +58,27 @@ def measure_runout_table(
         return solve_runout_table(sightings, stored=stored, sigma_mm=sigma_mm, camera=station.model)
 
     return (yield from look_round(station, plan, solve, here=here, stored=stored, retake=retake))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WobbleTest(LookTest):
+    """A proof by a camera of a tip that wobbles.
+
+    Attributes:
+        table: How far the tip is beside its place, by U of the flange.
+    """
+
+    method: ClassVar[str] = "runout-table"
+
+    table: RunoutTable
+
+    def prove(self, context: MeasurementContext) -> VerifyResult:
+        """Make it; see :meth:`~robolink.procedures.KeptProof.prove`."""
+        # "slots" makes the class anew, so the short form of super() would not find it.
+        seen = LookTest.prove(self, context)
+        drifts = []
+        for drift in seen.drifts:
+            # The table counts U of the flange, the proof that of the new tool.
+            dx_mm, dy_mm = self.table.at(drift.u_deg - self.written.u_deg)
+            drifts.append(replace(drift, dx_mm=drift.dx_mm - dx_mm, dy_mm=drift.dy_mm - dy_mm))
+        return replace(seen, drifts=tuple(drifts))

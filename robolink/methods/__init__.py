@@ -55,9 +55,6 @@ if TYPE_CHECKING:
     )
     from robolink.methods.declaration.site import Site as Site
     from robolink.methods.declaration.site import ToolHistory as ToolHistory
-    from robolink.methods.declaration.surface_parameters import (
-        SurfaceParameters as SurfaceParameters,
-    )
     from robolink.methods.given_poses import PointsSource as PointsSource
     from robolink.methods.given_poses import PosesFound as PosesFound
     from robolink.methods.given_poses import taught_poses as taught_poses
@@ -90,11 +87,6 @@ if TYPE_CHECKING:
     from robolink.methods.pivot.tilts import Tilt as Tilt
     from robolink.methods.pivot.tilts import informative_tilts as informative_tilts
     from robolink.methods.pivot.tilts import proving_tilts as proving_tilts
-    from robolink.methods.plane_touch.parameters import PlaneTouchParameters as PlaneTouchParameters
-    from robolink.methods.plane_touch.procedure import measure_plane_touch as measure_plane_touch
-    from robolink.methods.plane_touch.source import PlaneTouches as PlaneTouches
-    from robolink.methods.plane_touch.source import PlaneTouchSource as PlaneTouchSource
-    from robolink.methods.plane_touch.survey import PlaneSurvey as PlaneSurvey
     from robolink.methods.points import PointsParameters as PointsParameters
     from robolink.methods.registry import METHODS_GROUP as METHODS_GROUP
     from robolink.methods.registry import all_methods as all_methods
@@ -105,14 +97,18 @@ if TYPE_CHECKING:
     from robolink.methods.runout_table import RunoutTableParameters as RunoutTableParameters
     from robolink.methods.runout_table import RunoutTableSource as RunoutTableSource
     from robolink.methods.runout_table_procedure import measure_runout_table as measure_runout_table
-    from robolink.methods.sphere_touch.parameters import (
-        SphereTouchParameters as SphereTouchParameters,
-    )
-    from robolink.methods.sphere_touch.procedure import measure_sphere_touch as measure_sphere_touch
-    from robolink.methods.sphere_touch.source import SphereTouches as SphereTouches
-    from robolink.methods.sphere_touch.source import SphereTouchSource as SphereTouchSource
-    from robolink.methods.sphere_touch.survey import SphereSurvey as SphereSurvey
     from robolink.methods.station_learning import learn_station as learn_station
+    from robolink.methods.surface_touch import SurfaceParameters as SurfaceParameters
+    from robolink.methods.surface_touch.plane import PlaneTouches as PlaneTouches
+    from robolink.methods.surface_touch.plane import PlaneTouchParameters as PlaneTouchParameters
+    from robolink.methods.surface_touch.plane import PlaneTouchSource as PlaneTouchSource
+    from robolink.methods.surface_touch.plane import measure_plane_touch as measure_plane_touch
+    from robolink.methods.surface_touch.sphere import SphereTouches as SphereTouches
+    from robolink.methods.surface_touch.sphere import SphereTouchParameters as SphereTouchParameters
+    from robolink.methods.surface_touch.sphere import SphereTouchSource as SphereTouchSource
+    from robolink.methods.surface_touch.sphere import measure_sphere_touch as measure_sphere_touch
+    from robolink.methods.surface_touch.survey import PlaneSurvey as PlaneSurvey
+    from robolink.methods.surface_touch.survey import SphereSurvey as SphereSurvey
     from robolink.methods.two_pose import TwoPoseParameters as TwoPoseParameters
     from robolink.methods.two_pose import TwoPoseSource as TwoPoseSource
     from robolink.methods.two_pose import TwoTouches as TwoTouches
@@ -142,7 +138,6 @@ else:
             ),
             "declaration.pin_parameters": "PinParameters UprightPinParameters",
             "declaration.site": "Site ToolHistory",
-            "declaration.surface_parameters": "SurfaceParameters",
             "given_poses": "PointsSource PosesFound taught_poses",
             "n_angle": (
                 "ManyTouches NAngleParameters NAngleSource measure_n_angle most_informative_order"
@@ -156,19 +151,19 @@ else:
             "pivot.six_point": "SixPointParameters SixPointSource SixPoints",
             "pivot.six_point_procedure": "AxisTeachPlan measure_six_point",
             "pivot.tilts": "OverPin Tilt informative_tilts proving_tilts",
-            "plane_touch.parameters": "PlaneTouchParameters",
-            "plane_touch.procedure": "measure_plane_touch",
-            "plane_touch.source": "PlaneTouchSource PlaneTouches",
-            "plane_touch.survey": "PlaneSurvey",
             "points": "PointsParameters",
             "registry": "METHODS_GROUP all_methods find_method method_names register",
             "runout_table": "AllRoundPlan RunoutTableParameters RunoutTableSource",
             "runout_table_procedure": "measure_runout_table",
-            "sphere_touch.parameters": "SphereTouchParameters",
-            "sphere_touch.procedure": "measure_sphere_touch",
-            "sphere_touch.source": "SphereTouchSource SphereTouches",
-            "sphere_touch.survey": "SphereSurvey",
             "station_learning": "learn_station",
+            "surface_touch": "SurfaceParameters",
+            "surface_touch.plane": (
+                "PlaneTouchParameters PlaneTouchSource PlaneTouches measure_plane_touch"
+            ),
+            "surface_touch.sphere": (
+                "SphereTouchParameters SphereTouchSource SphereTouches measure_sphere_touch"
+            ),
+            "surface_touch.survey": "PlaneSurvey SphereSurvey",
             "two_pose": "TwoPoseParameters TwoPoseSource TwoTouches measure_two_pose",
             "z_touch": "ZTouchParameters ZTouchSource",
             "z_touch.procedure": "measure_z_touch verify_by_touching",

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
-from typing import TYPE_CHECKING, Annotated, ClassVar, Final
+from typing import TYPE_CHECKING, Annotated, ClassVar, Final, Self
 
 from annotated_types import Ge, Le, MaxLen, MinLen
 
@@ -163,100 +163,6 @@ FALSE_ALARM: Final = 0.001
 """How often a bias along the approach is told where there is none."""
 
 
-def measure_n_angle(
-    plan: TouchPlan,
-    *,
-    turns_deg: Sequence[float],
-    stored: ToolOffset | None,
-    sigma_mm: float | None = None,
-    sampling: SamplingPolicy = TAKE_ALL,
-) -> Procedure[CalibrationResult]:
-    """Measure a tip on a pin at several angles. Runs in Tool 0; see :func:`sample_sequentially`.
-
-    Args:
-        plan: Lift and clearance.
-        turns_deg: Angles of the further touches, counted from the first one.
-        stored: The offset stored now; the approaches use it.
-        sigma_mm: Standard deviation of one coordinate of one touch, where it is known.
-        sampling: When it ends, and whether a pose may be taken again.
-
-    Raises:
-        CalibrationError: ``not_touched``, ``typed_ahead``, ``touch_heights_differ``,
-            ``touch_not_proven``, ``large_residual``, and as :func:`solve_n_angle`.
-        LimitError: The arm cannot turn so over this pin, nor to the other side, nor half as far.
-
-    Example:
-        >>> from robolink.methods import measure_n_angle
-        >>> from robolink.model import Pose, ToolOffset
-        >>> from robolink.procedures import TouchPlan
-        >>> from robolink.testing import PaperCell
-        >>> cell = PaperCell(Pose(300, 100, 20, 0), ToolOffset(12.3, -3.9, -20), (310, 95, -40))
-        >>> stored = ToolOffset(12, -4, -20)
-        >>> found = cell.run(measure_n_angle(TouchPlan(), turns_deg=(120, 240), stored=stored))
-        >>> round(found.offset.x_mm, 3), round(found.offset.y_mm, 3), found.dof
-        (12.3, -3.9, 2)
-    """
-    count = 1 + len(turns_deg)
-    touches = PinTouches(plan, comes_down=stored is not None, total=count, retakes=True)
-    first = yield from touches.first()
-    # Refused before anything turns, not when all touches are made.
-    solvable_planes([first], height_of(stored))
-    # Within half a turn of zero: adding up from touch to touch leaves the joint's range.
-    choice = [
-        [angle_difference_deg(first.u_deg + turn_deg * share, 0.0) for turn_deg in turns_deg]
-        for share in _SHARES
-    ]
-    nominal = replace(plan, nominal=True)
-    angles = yield from first_clear(
-        choice,
-        lambda angles_deg: turned_touches(
-            nominal, first, angles_deg, stored or ToolOffset(), comes_down=stored is not None
-        ),
-        offset_z(plain_pose(first), plan.lift_mm),
-    )
-    turning = _NAngleSampler(touches, stored, sigma_mm, first)
-    result = yield from sample_sequentially(turning, first, [first.u_deg, *angles], sampling)
-    touches.require_made()
-    return result
-
-
-def go_on_n_angle(
-    plan: TouchPlan,
-    *,
-    here: Pose,
-    taken: Sequence[TouchedAt],
-    again: int | None,
-    stored: ToolOffset | None,
-    sigma_mm: float | None = None,
-) -> Procedure[CalibrationResult]:
-    """Touch the pin once more after :func:`measure_n_angle`. Runs in Tool 0, ends lifted.
-
-    Args:
-        plan: Lift and clearance.
-        here: Where the flange is.
-        taken: The touches of the measurement.
-        again: Index of the one that is made again; ``None`` for one more, in the largest gap of U.
-        stored: The offset stored now.
-        sigma_mm: Standard deviation of one coordinate of one touch, where it is known.
-
-    Raises:
-        CalibrationError: As :func:`measure_n_angle`.
-        LimitError: There is no room for one more.
-    """
-    touches = PinTouches(plan, comes_down=stored is not None, total=len(taken), retakes=True)
-    places = [touch.u_deg for touch in taken]
-    touches.adopt(dict(zip(places, taken, strict=True)))
-    yield from approach_path(
-        offset_z(plain_pose(taken[-1]), plan.lift_mm),
-        here=here,
-        purpose=tr("Moving above the pin."),
-    )
-    turning = _NAngleSampler(touches, stored, sigma_mm, taken[-1])
-    result = yield from resume_samples(turning, places, taken, again)
-    touches.require_made()
-    return result
-
-
 @dataclass(slots=True)
 class _NAngleSampler:
     """Touches at angles of U; implements ``SequentialSampler``. Each ends lifted off the pin.
@@ -360,31 +266,103 @@ class NAngleSource(ManualPinSource):
             count=len(self.turns_deg) + 1,
         )
 
-    def _steps(self, stored: ToolOffset | None, *, live: bool) -> Procedure[CalibrationResult]:
-        return measure_n_angle(
-            self._touching(live=live),
-            turns_deg=self.turns_deg,
-            stored=stored,
-            sigma_mm=self.sigma_mm,
-            sampling=self.sampling if live else TAKE_ALL,
+    def foreseen(self) -> Self:
+        """Return the source whose steps are only shown."""
+        return replace(ManualPinSource.foreseen(self), sampling=TAKE_ALL)
+
+    def steps(self, stored: ToolOffset | None) -> Procedure[CalibrationResult]:
+        """Return the steps of the measurement; see :func:`measure_n_angle`."""
+        count = 1 + len(self.turns_deg)
+        touches = PinTouches(self.touch, comes_down=stored is not None, total=count, retakes=True)
+        first = yield from touches.first()
+        # Refused before anything turns, not when all touches are made.
+        solvable_planes([first], height_of(stored))
+        # Within half a turn of zero: adding up from touch to touch leaves the joint's range.
+        choice = [
+            [
+                angle_difference_deg(first.u_deg + turn_deg * share, 0.0)
+                for turn_deg in self.turns_deg
+            ]
+            for share in _SHARES
+        ]
+        nominal = replace(self.touch, nominal=True)
+        angles = yield from first_clear(
+            choice,
+            lambda angles_deg: turned_touches(
+                nominal, first, angles_deg, stored or ToolOffset(), comes_down=stored is not None
+            ),
+            offset_z(plain_pose(first), self.touch.lift_mm),
         )
+        turning = _NAngleSampler(touches, stored, self.sigma_mm, first)
+        result = yield from sample_sequentially(
+            turning, first, [first.u_deg, *angles], self.sampling
+        )
+        touches.require_made()
+        return result
 
     @property
     def adds_touch(self) -> bool:
         """There is always a gap between two angles."""
         return True
 
-    def _further_steps(
+    def further_steps(
         self, here: Pose, taken: Sequence[TouchedAt], again: int | None, stored: ToolOffset | None
     ) -> Procedure[CalibrationResult]:
-        return go_on_n_angle(
-            self.touch,
-            here=here,
-            taken=taken,
-            again=again,
-            stored=stored,
-            sigma_mm=self.sigma_mm,
+        """Return the steps that make one touch again, or one more in the largest gap of U.
+
+        Raises:
+            LimitError: There is no room for one more.
+        """
+        touches = PinTouches(
+            self.touch, comes_down=stored is not None, total=len(taken), retakes=True
         )
+        places = [touch.u_deg for touch in taken]
+        touches.adopt(dict(zip(places, taken, strict=True)))
+        yield from approach_path(
+            offset_z(plain_pose(taken[-1]), self.touch.lift_mm),
+            here=here,
+            purpose=tr("Moving above the pin."),
+        )
+        turning = _NAngleSampler(touches, stored, self.sigma_mm, taken[-1])
+        result = yield from resume_samples(turning, places, taken, again)
+        touches.require_made()
+        return result
+
+
+def measure_n_angle(
+    plan: TouchPlan,
+    *,
+    turns_deg: Sequence[float],
+    stored: ToolOffset | None,
+    sigma_mm: float | None = None,
+    sampling: SamplingPolicy = TAKE_ALL,
+) -> Procedure[CalibrationResult]:
+    """Measure a tip on a pin at several angles. Runs in Tool 0; see :func:`sample_sequentially`.
+
+    Args:
+        plan: Lift and clearance.
+        turns_deg: Angles of the further touches, counted from the first one.
+        stored: The offset stored now; the approaches use it.
+        sigma_mm: Standard deviation of one coordinate of one touch, where it is known.
+        sampling: When it ends, and whether a pose may be taken again.
+
+    Raises:
+        CalibrationError: ``not_touched``, ``typed_ahead``, ``touch_heights_differ``,
+            ``touch_not_proven``, ``large_residual``, and as :func:`solve_n_angle`.
+        LimitError: The arm cannot turn so over this pin, nor to the other side, nor half as far.
+
+    Example:
+        >>> from robolink.methods import measure_n_angle
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.procedures import TouchPlan
+        >>> from robolink.testing import PaperCell
+        >>> cell = PaperCell(Pose(300, 100, 20, 0), ToolOffset(12.3, -3.9, -20), (310, 95, -40))
+        >>> stored = ToolOffset(12, -4, -20)
+        >>> found = cell.run(measure_n_angle(TouchPlan(), turns_deg=(120, 240), stored=stored))
+        >>> round(found.offset.x_mm, 3), round(found.offset.y_mm, 3), found.dof
+        (12.3, -3.9, 2)
+    """
+    return NAngleSource(tuple(turns_deg), plan, sigma_mm, sampling).steps(stored)
 
 
 @dataclass(frozen=True, slots=True)

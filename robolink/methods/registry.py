@@ -31,8 +31,8 @@ _OWN: Final = {
     "runout-table": "robolink.methods.runout_table",
     "pivot": "robolink.methods.pivot",
     "six-point": "robolink.methods.pivot.six_point",
-    "plane-touch": "robolink.methods.plane_touch",
-    "sphere-touch": "robolink.methods.sphere_touch",
+    "plane-touch": "robolink.methods.surface_touch.plane",
+    "sphere-touch": "robolink.methods.surface_touch.sphere",
     "points": "robolink.methods.points",
 }
 """Name and folder, in the order of the help page."""

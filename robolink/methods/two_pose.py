@@ -72,6 +72,81 @@ class TwoPoseParameters(UprightPinParameters):
         return planar_sigma_gain([Pose(0.0, 0.0, 0.0, turn) for turn in (0.0, self.turn_deg)])
 
 
+def _second(
+    touches: PinTouches, first: TouchedAt, u_deg: float, guess: ToolOffset
+) -> Procedure[tuple[TouchedAt, TouchedAt]]:
+    """Return both touches, the first one as it was made last."""
+    first_deg = first.u_deg
+    while True:
+        try:
+            return first, (yield from touch_again(touches, first, u_deg, guess))
+        except TakenAgainError as again:
+            yield Notify(again.what)
+            first = yield from touch_again(touches, first, first_deg, guess)
+
+
+@dataclass(frozen=True, slots=True)
+class TwoPoseSource(ManualPinSource):
+    """Measures by touching one pin at two angles of U.
+
+    Attributes:
+        touch: Lift, clearance and angle.
+        sigma_mm: Standard deviation of one coordinate of one placement, where it is known.
+    """
+
+    touch: TouchPlan = field(default_factory=TouchPlan)
+    sigma_mm: float | None = None
+
+    @property
+    def sentence(self) -> str:
+        """What it does, for a report."""
+        return tr("measured on the robot: one pin touched at two angles of U")
+
+    def steps(self, stored: ToolOffset | None) -> Procedure[CalibrationResult]:
+        """Return the steps of the measurement; see :func:`measure_two_pose`."""
+        touches = PinTouches(self.touch, comes_down=stored is not None, total=2, retakes=True)
+        first = yield from touches.first()
+        # Refused before anything turns, not when both touches are made.
+        solvable_planes([first], height_of(stored))
+        # Toward zero, by the angle as it is counted and not modulo 360: U starts inside the
+        # joint's range, and so it stays there.
+        turn_deg = -self.touch.turn_deg if first.u_deg > 0 else self.touch.turn_deg
+        nominal, guess = replace(self.touch, nominal=True), stored or ToolOffset()
+        u_deg = yield from first_clear(
+            [first.u_deg + turn_deg, first.u_deg - turn_deg],
+            lambda angle_deg: turned_touches(
+                nominal, first, [angle_deg], guess, comes_down=stored is not None
+            ),
+            offset_z(plain_pose(first), self.touch.lift_mm),
+        )
+        first, second = yield from _second(touches, first, u_deg, guess)
+        touches.require_made()
+        return solve_two_pose(first, second, stored=stored, sigma_mm=self.sigma_mm)
+
+    @property
+    def adds_touch(self) -> bool:
+        """Two touches are the method; three are another one."""
+        return False
+
+    def further_steps(
+        self, here: Pose, taken: Sequence[TouchedAt], again: int | None, stored: ToolOffset | None
+    ) -> Procedure[CalibrationResult]:
+        """Return the steps that make one touch again."""
+        again = 1 if again is None else again
+        touches = PinTouches(self.touch, comes_down=stored is not None, total=2)
+        touches.adopt({touch.u_deg: touch for touch in taken})
+        other = taken[1 - again]
+        yield from approach_path(
+            offset_z(plain_pose(other), self.touch.lift_mm),
+            here=here,
+            purpose=tr("Moving above the pin."),
+        )
+        anew = yield from touch_again(touches, other, taken[again].u_deg, stored or ToolOffset())
+        touches.require_made()
+        first, second = (anew, other) if again == 0 else (other, anew)
+        return solve_two_pose(first, second, stored=stored, sigma_mm=self.sigma_mm)
+
+
 def measure_two_pose(
     plan: TouchPlan, *, stored: ToolOffset | None, sigma_mm: float | None = None
 ) -> Procedure[CalibrationResult]:
@@ -101,109 +176,7 @@ def measure_two_pose(
         >>> round(found.offset.x_mm, 3), round(found.offset.y_mm, 3)
         (12.3, -3.9)
     """
-    touches = PinTouches(plan, comes_down=stored is not None, total=2, retakes=True)
-    first = yield from touches.first()
-    # Refused before anything turns, not when both touches are made.
-    solvable_planes([first], height_of(stored))
-    # Toward zero, by the angle as it is counted and not modulo 360: U starts inside the
-    # joint's range, and so it stays there.
-    turn_deg = -plan.turn_deg if first.u_deg > 0 else plan.turn_deg
-    nominal, guess = replace(plan, nominal=True), stored or ToolOffset()
-    u_deg = yield from first_clear(
-        [first.u_deg + turn_deg, first.u_deg - turn_deg],
-        lambda angle_deg: turned_touches(
-            nominal, first, [angle_deg], guess, comes_down=stored is not None
-        ),
-        offset_z(plain_pose(first), plan.lift_mm),
-    )
-    first, second = yield from _second(touches, first, u_deg, guess)
-    touches.require_made()
-    return solve_two_pose(first, second, stored=stored, sigma_mm=sigma_mm)
-
-
-def _second(
-    touches: PinTouches, first: TouchedAt, u_deg: float, guess: ToolOffset
-) -> Procedure[tuple[TouchedAt, TouchedAt]]:
-    """Return both touches, the first one as it was made last."""
-    first_deg = first.u_deg
-    while True:
-        try:
-            return first, (yield from touch_again(touches, first, u_deg, guess))
-        except TakenAgainError as again:
-            yield Notify(again.what)
-            first = yield from touch_again(touches, first, first_deg, guess)
-
-
-def go_on_two_pose(
-    plan: TouchPlan,
-    *,
-    here: Pose,
-    taken: Sequence[TouchedAt],
-    again: int,
-    stored: ToolOffset | None,
-    sigma_mm: float | None = None,
-) -> Procedure[CalibrationResult]:
-    """Make one touch of :func:`measure_two_pose` again. Runs in Tool 0, ends lifted.
-
-    Args:
-        plan: Lift and clearance.
-        here: Where the flange is.
-        taken: Both touches.
-        again: Index of the one that is made again.
-        stored: The offset stored now.
-        sigma_mm: Standard deviation of one coordinate of one touch, where it is known.
-
-    Raises:
-        CalibrationError: As :func:`measure_two_pose`.
-    """
-    touches = PinTouches(plan, comes_down=stored is not None, total=2)
-    touches.adopt({touch.u_deg: touch for touch in taken})
-    other = taken[1 - again]
-    yield from approach_path(
-        offset_z(plain_pose(other), plan.lift_mm), here=here, purpose=tr("Moving above the pin.")
-    )
-    anew = yield from touch_again(touches, other, taken[again].u_deg, stored or ToolOffset())
-    touches.require_made()
-    first, second = (anew, other) if again == 0 else (other, anew)
-    return solve_two_pose(first, second, stored=stored, sigma_mm=sigma_mm)
-
-
-@dataclass(frozen=True, slots=True)
-class TwoPoseSource(ManualPinSource):
-    """Measures by touching one pin at two angles of U.
-
-    Attributes:
-        touch: Lift, clearance and angle.
-        sigma_mm: Standard deviation of one coordinate of one placement, where it is known.
-    """
-
-    touch: TouchPlan = field(default_factory=TouchPlan)
-    sigma_mm: float | None = None
-
-    @property
-    def sentence(self) -> str:
-        """What it does, for a report."""
-        return tr("measured on the robot: one pin touched at two angles of U")
-
-    def _steps(self, stored: ToolOffset | None, *, live: bool) -> Procedure[CalibrationResult]:
-        return measure_two_pose(self._touching(live=live), stored=stored, sigma_mm=self.sigma_mm)
-
-    @property
-    def adds_touch(self) -> bool:
-        """Two touches are the method; three are another one."""
-        return False
-
-    def _further_steps(
-        self, here: Pose, taken: Sequence[TouchedAt], again: int | None, stored: ToolOffset | None
-    ) -> Procedure[CalibrationResult]:
-        return go_on_two_pose(
-            self.touch,
-            here=here,
-            taken=taken,
-            again=1 if again is None else again,
-            stored=stored,
-            sigma_mm=self.sigma_mm,
-        )
+    return TwoPoseSource(plan, sigma_mm).steps(stored)
 
 
 @dataclass(frozen=True, slots=True)

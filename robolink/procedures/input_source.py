@@ -2,7 +2,7 @@
 
 from abc import abstractmethod
 from dataclasses import replace
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Self, TypeVar, cast
 
 from robolink.calibration import CalibrationResult
 from robolink.model import Pose, ToolOffset
@@ -34,17 +34,25 @@ class InputSource(ProvesAgain, Generic[PlanT]):
         stored: ToolOffset | None,
     ) -> CalibrationResult:
         """Drive and solve; see :class:`~robolink.procedures.MovingSource`."""
-        return context.measure(lambda here: self._steps(stored, here, self.plan))
+        return context.measure(lambda here: self.steps(stored, here))
 
     def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
         """Return the steps of a measurement; see :class:`~robolink.procedures.MovingSource`.
 
         All of them: when it ends early depends on what nobody has measured yet.
         """
-        return self._steps(stored, here, replace(self.plan, until_mm=None, retake=False))
+        return self.foreseen().steps(stored, here)
+
+    def foreseen(self) -> Self:
+        """Return the source whose steps are only shown."""
+        plan = replace(self.plan, until_mm=None, retake=False)
+        return cast(Self, replace(cast(Any, self), plan=plan))
 
     @abstractmethod
-    def _steps(
-        self, stored: ToolOffset | None, here: Pose, plan: PlanT
-    ) -> Procedure[CalibrationResult]:
-        """Return the steps, as ``plan`` says."""
+    def steps(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
+        """Return the steps of the measurement. They run in Tool 0.
+
+        Args:
+            stored: The offset stored now.
+            here: Where the flange is.
+        """

@@ -324,14 +324,13 @@ class BeamsSource(InputSource[BeamsParameters]):
 
         require_run_up(group, self.plan, change_mm)
 
-    def _steps(
-        self, stored: ToolOffset | None, here: Pose, plan: BeamsParameters
-    ) -> Procedure[CalibrationResult]:
+    def steps(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
+        """Return the steps of the measurement."""
         from robolink.methods.beams.procedure import measure_beams  # numpy, a look does without
 
         return measure_beams(
             self.station,
-            plan,
+            self.plan,
             here=here,
             stored=stored,
             sigma_mm=self.sigma_mm,

@@ -187,11 +187,11 @@ class OneTouchSource(ProvesAgain):
         stored: ToolOffset | None,
     ) -> CalibrationResult:
         """Touch and solve; see :class:`~robolink.procedures.MovingSource`."""
-        return context.measure(lambda here: self._steps(stored, here, self.touch))
+        return context.measure(lambda here: self.steps(stored, here))
 
     def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
         """Return the steps of a measurement; see :class:`~robolink.procedures.MovingSource`."""
-        return self._steps(stored, here, replace(self.touch, nominal=True))
+        return self.with_touch(replace(self.touch, nominal=True)).steps(stored, here)
 
     @property
     def adds_touch(self) -> bool:
@@ -206,7 +206,7 @@ class OneTouchSource(ProvesAgain):
         again: int | None,  # noqa: ARG002
     ) -> CalibrationResult:
         """Touch again; see :class:`~robolink.procedures.TouchesFurther`."""
-        return context.measure(lambda here: self._steps(stored, here, self.touch))
+        return context.measure(lambda here: self.steps(stored, here))
 
     def with_touch(self, plan: TouchPlan) -> Self:
         """Return the same source with another plan of its touch."""
@@ -217,12 +217,11 @@ class OneTouchSource(ProvesAgain):
         """Least height above the pin at which the robot stops."""
         return self.touch.clearance_mm
 
-    def _steps(
-        self, stored: ToolOffset | None, here: Pose, plan: TouchPlan
-    ) -> Procedure[CalibrationResult]:
+    def steps(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
+        """Return the steps of the measurement."""
         u_deg = self.solver.u_deg
         return measure_one_touch(
-            plan,
+            self.touch,
             here=here,
             pin_mm=self.solver.place_mm,
             u_deg=here.u_deg if u_deg is None else u_deg,

@@ -1,8 +1,8 @@
 """pivot: one pin touched in tilted orientations, on five axes and six."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, ClassVar, Final
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Annotated, ClassVar, Final, Self
 
 from annotated_types import Ge, Le
 
@@ -142,14 +142,19 @@ class PivotSource(PinSource):
             upright=upright_of(result, result.offset, tool),
         )
 
+    def foreseen(self) -> Self:
+        """Return the source whose steps are only shown."""
+        return replace(PinSource.foreseen(self), sampling=TAKE_ALL)
+
     @property
     def adds_touch(self) -> bool:
         """Which further tilt tells most depends on those of the plan."""
         return False
 
-    def _further_steps(
+    def further_steps(
         self, here: Pose, taken: Sequence[TouchedAt], again: int | None, stored: ToolOffset | None
     ) -> Procedure[CalibrationResult]:
+        """Return the steps that make one touch again."""
         from robolink.methods.pivot.procedure import go_on_pivot  # numpy
 
         return go_on_pivot(
@@ -166,7 +171,7 @@ class PivotSource(PinSource):
     def _tilt_deg(self) -> float:
         return max(abs(tilt.lean_deg) for tilt in self.tilts)
 
-    def _steps(self, stored: ToolOffset | None, *, live: bool) -> Procedure[CalibrationResult]:
+    def steps(self, stored: ToolOffset | None) -> Procedure[CalibrationResult]:
         """Return the steps.
 
         Raises:
@@ -177,11 +182,11 @@ class PivotSource(PinSource):
         )
 
         return measure_pivot(
-            self._touching(live=live),
+            self.touch,
             tilts=self.tilts,
             stored=require_known_tip(stored),
             sigma_mm=self.sigma_mm,
-            sampling=self.sampling if live else TAKE_ALL,
+            sampling=self.sampling,
         )
 
 

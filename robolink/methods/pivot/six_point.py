@@ -13,7 +13,6 @@ from robolink.methods.declaration.method import MM, Help, Method, Needs, Option,
 from robolink.methods.declaration.site import Site
 from robolink.methods.pivot import PivotParameters, PivotSource, require_known_tip
 from robolink.model import Pose, ToolOffset
-from robolink.procedures import TAKE_ALL
 from robolink.runner import Procedure, TouchedAt
 from robolink.stations import StationKind
 
@@ -71,9 +70,10 @@ class SixPointSource(PivotSource):
         )
         return f"{self._touched}; {shown}"
 
-    def _further_steps(
+    def further_steps(
         self, here: Pose, taken: Sequence[TouchedAt], again: int | None, stored: ToolOffset | None
     ) -> Procedure[CalibrationResult]:
+        """Return the steps that make one touch again."""
         from robolink.methods.pivot.six_point_procedure import (
             go_on_six_point,  # numpy, as in the pivot
         )
@@ -89,18 +89,19 @@ class SixPointSource(PivotSource):
             sigma_mm=self.sigma_mm,
         )
 
-    def _steps(self, stored: ToolOffset | None, *, live: bool) -> Procedure[CalibrationResult]:
+    def steps(self, stored: ToolOffset | None) -> Procedure[CalibrationResult]:
+        """Return the steps of the measurement."""
         from robolink.methods.pivot.six_point_procedure import (
             measure_six_point,  # numpy, as in the pivot
         )
 
         return measure_six_point(
-            self._touching(live=live),
+            self.touch,
             self.ways,
             tilts=self.tilts,
             stored=require_known_tip(stored),
             sigma_mm=self.sigma_mm,
-            sampling=self.sampling if live else TAKE_ALL,
+            sampling=self.sampling,
         )
 
 

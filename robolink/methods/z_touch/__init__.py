@@ -211,14 +211,13 @@ class ZTouchSource(InputSource[ZTouchParameters]):
         )
         return InputSource.measure(told, context, tool, stored)
 
-    def _steps(
-        self, stored: ToolOffset | None, here: Pose, plan: ZTouchParameters
-    ) -> Procedure[CalibrationResult]:
+    def steps(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
+        """Return the steps of the measurement."""
         from robolink.methods.z_touch.procedure import measure_z_touch  # numpy, late
 
         return measure_z_touch(
             self.station,
-            plan,
+            self.plan,
             here=here,
             stored=stored,
             sigma_mm=self.sigma_mm,

@@ -58,7 +58,7 @@ class TouchSource(ProvesAgain):
     ) -> CalibrationResult:
         """Touch and solve; see :class:`~robolink.procedures.MovingSource`."""
         context.controller.tools.select(0)
-        return context.run(self._steps(stored, live=True))
+        return context.run(self.steps(stored))
 
     def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:  # noqa: ARG002 - the person brings the tip to the pin
         """Return the steps of a measurement; see :class:`~robolink.procedures.MovingSource`.
@@ -66,7 +66,11 @@ class TouchSource(ProvesAgain):
         All of them: when it ends early depends on touches that nobody has made yet. Where the tip
         stops is foreseen at its highest; sideways it is drawn in the run.
         """
-        return self._steps(stored, live=False)
+        return self.foreseen().steps(stored)
+
+    def foreseen(self) -> Self:
+        """Return the source whose steps are only shown: all of them, each stop at its highest."""
+        return self.with_touch(replace(self.touch, nominal=True))
 
     @property
     @abstractmethod
@@ -82,25 +86,39 @@ class TouchSource(ProvesAgain):
     ) -> CalibrationResult:
         """Go on; see :class:`~robolink.procedures.TouchesFurther`."""
         taken = touches_of(result)
-        return context.measure(lambda here: self._further_steps(here, taken, again, stored))
+        return context.measure(lambda here: self.further_steps(here, taken, again, stored))
 
     @abstractmethod
-    def _further_steps(
+    def further_steps(
         self, here: Pose, taken: Sequence[TouchedAt], again: int | None, stored: ToolOffset | None
     ) -> Procedure[CalibrationResult]:
-        """Return the steps that make one touch again, or one more where ``again`` is ``None``."""
+        """Return the steps that make one touch again. They run in Tool 0 and end lifted.
 
-    def _touching(self, *, live: bool) -> TouchPlan:
-        """Return the plan of the touches, nominal where they are only shown."""
-        return self.touch if live else replace(self.touch, nominal=True)
+        Args:
+            here: Where the flange is.
+            taken: The touches of the measurement.
+            again: Index of the one that is made again; ``None`` for one more, and for the last one
+                where no more can be made than planned.
+            stored: The offset stored now.
+
+        Example:
+            >>> from robolink.methods import TwoPoseSource
+            >>> from robolink.model import Pose, ToolOffset
+            >>> from robolink.testing import PaperCell
+            >>> source, stored = TwoPoseSource(), ToolOffset(12, -4, -20)
+            >>> cell = PaperCell(Pose(300, 100, 20, 0), ToolOffset(12.3, -3.9, -20), (310, 95, -40))
+            >>> taken = cell.run(source.steps(stored)).inputs
+            >>> again = cell.run(source.further_steps(cell.here, taken, 1, stored))
+            >>> round(again.offset.x_mm, 3), round(again.offset.y_mm, 3)
+            (12.3, -3.9)
+        """
 
     @abstractmethod
-    def _steps(self, stored: ToolOffset | None, *, live: bool) -> Procedure[CalibrationResult]:
-        """Return the steps.
+    def steps(self, stored: ToolOffset | None) -> Procedure[CalibrationResult]:
+        """Return the steps of the measurement. They run in Tool 0 and end lifted.
 
         Args:
             stored: The offset stored now.
-            live: Whether they are taken, so that they may end early; else they are only shown.
         """
 
 

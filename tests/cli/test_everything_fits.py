@@ -29,10 +29,8 @@ from robolink.drift import CellDrift, MeasuredChange, charts_of
 from robolink.locale.languages import translator
 from robolink.nozzle_change import Proposal, Seating
 from robolink.report.pictures.control_chart import chart_drawing
-from robolink.report.pictures.fit import fit_drawings
-from robolink.report.pictures.point_map import draw
-from robolink.report.pictures.pose_plan import pose_drawings
-from robolink.report.pictures.run_order import order_drawings
+from robolink.report.pictures.plans import draw, pose_drawings
+from robolink.report.pictures.residuals import fit_drawings, order_drawings
 from robolink.testing import MemoryController
 from robolink.transaction import Wanted, change_tools
 from tests.cli.wizard.test_screens import SCREENS

@@ -15,8 +15,8 @@ from robolink_cli.commands.computer import scanning
 from robolink_cli.commands.computer.scanning import AddressProbe, State, parse_range
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson import EpsonOptions, EpsonSimulator
-from robolink_simulators.hosting.streams.epson_serial import serve_serial
-from robolink_simulators.hosting.streams.serial_cable import SerialCable
+from robolink_simulators.hosting.streams.epson import serve_serial
+from robolink_simulators.hosting.streams.serial_host import SerialCable
 
 from robolink.errors import ConfigError
 

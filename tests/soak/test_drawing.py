@@ -2,7 +2,7 @@
 
 import pytest
 from robolink_simulators.faults import FaultAction, LinkKind, PlcFaultAction, links_of
-from robolink_simulators.faults.instants import INSTANTS, RARE
+from robolink_simulators.faults.drawn import INSTANTS, RARE
 from robolink_simulators.soak import CellKind, drawn_history
 from robolink_simulators.soak.drawing.faults import LINE_KINDS, MAILBOX_KINDS
 from robolink_simulators.soak.drawing.hours import deeds_of

@@ -14,8 +14,8 @@ from robolink.model import Secret
 from robolink.protocols.epson_binary import Dialect
 from robolink.protocols.epson_text import StatusFlags
 from robolink_simulators.cell.world_parameters import WorldParameters
-from robolink_simulators.device.late_random import late_random
-from robolink_simulators.device.motion_log import MotionLog
+from robolink_simulators.device.wire_record import MotionLog
+from robolink_simulators.device.wire_time import late_random
 from robolink_simulators.epson.arm.robots import find_robot
 from robolink_simulators.epson.card import ControllerCard
 from robolink_simulators.epson.companion import Companion
@@ -41,8 +41,7 @@ from robolink_simulators.epson.time_stepping import TimeStepping
 from robolink_simulators.epson.world import World
 from robolink_simulators.faults import Fault, FaultPlan
 from robolink_simulators.faults.links import EPSON_LINKS
-from robolink_simulators.serial_numbers import drawn_serial
-from robolink_simulators.state_files import StateNotKeptError
+from robolink_simulators.state_files import StateNotKeptError, drawn_serial
 
 
 class EpsonSimulator(TimeStepping):

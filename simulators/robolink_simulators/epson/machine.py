@@ -6,7 +6,7 @@ from functools import partial
 from typing import Any, Generic, TypeVar, overload
 
 from robolink.model import Pose, ToolOffset
-from robolink_simulators.device.motion_log import MotionLog
+from robolink_simulators.device.wire_record import MotionLog
 from robolink_simulators.epson.arm.arm import Arm
 from robolink_simulators.epson.arm.joints import Joints
 from robolink_simulators.epson.arm.motion_parameters import MotionParameters

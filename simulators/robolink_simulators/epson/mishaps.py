@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 
 from robolink.timing import NS_PER_S
-from robolink_simulators.device.planned_acts import Act, PlannedActs
+from robolink_simulators.device.hosted import Act, PlannedActs
 from robolink_simulators.epson.panel import EpsonPanel
 from robolink_simulators.faults import Fault, FaultAction
 

@@ -27,7 +27,7 @@ from robolink_cli.wizard.state import Header, WizardState
 from robolink_cli.wizard.work import Work
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_tcp
 
 from robolink.errors import DeclinedError
 from robolink.model import Pose

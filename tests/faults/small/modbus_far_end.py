@@ -8,7 +8,7 @@ from robolink_simulators.cell.clock import ManualClock, ScaledClock
 from robolink_simulators.hosting.fieldbus.plc_registers import PlcRegisters
 from robolink_simulators.hosting.in_process.transport import InProcessTransport
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
-from robolink_simulators.softmotion.mailbox.words.places import Bank
+from robolink_simulators.softmotion.mailbox.image import Bank
 
 from robolink.timing import Clock
 from robolink.transport import LinkUrl

@@ -6,7 +6,7 @@ from dataclasses import astuple, replace
 from pathlib import Path
 
 import pytest
-from robolink_simulators.cell.held_board import SimulatedBoard
+from robolink_simulators.cell.camera import SimulatedBoard
 from robolink_simulators.epson.vision.calibration import VisionCalibration
 from robolink_simulators.epson.vision.project import VisionObject, VisionProject, VisionSequence
 from robolink_simulators.epson.vision.system import VisionSystem

@@ -9,7 +9,7 @@ from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.in_process.softmotion import simulator_named
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_tcp
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 import robolink

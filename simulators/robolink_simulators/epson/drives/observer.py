@@ -14,7 +14,7 @@ from typing import Final
 
 from robolink.timing import NS_PER_S
 from robolink_simulators.cell.frames import Vector
-from robolink_simulators.cell.pressing import NO_FORCE
+from robolink_simulators.cell.surfaces import NO_FORCE
 from robolink_simulators.epson.arm.arm import Arm, Travelled
 from robolink_simulators.epson.arm.joints import Joints
 from robolink_simulators.epson.drives.torque import CarriedLoad, JointMotion, speeds, torques

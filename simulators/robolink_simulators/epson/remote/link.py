@@ -66,7 +66,7 @@ class ServedRequest(Protocol):
 
 
 class EpsonServerLink:
-    """Implements :class:`~robolink_simulators.hosting.seam.DeviceLink`.
+    """Implements :class:`~robolink_simulators.hosting.addresses.DeviceLink`.
 
     A client that has not logged in within the login time-out is cut off, and so is one that
     stays after its logout (assumed).

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
-from robolink_simulators.faults.instants import drawn_instant, drawn_rarity
+from robolink_simulators.faults.drawn import drawn_instant, drawn_rarity
 from robolink_simulators.soak.drawing.commands import drawn_line
 from robolink_simulators.soak.drawing.faults import (
     LINE_KINDS,

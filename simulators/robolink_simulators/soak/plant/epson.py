@@ -17,7 +17,7 @@ from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.epson.arm.kinematics import frame_of
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.faults import Fault, FaultAction
-from robolink_simulators.hosting.seam import WireDevice
+from robolink_simulators.hosting.addresses import WireDevice
 from robolink_simulators.soak.computer import VirtualProcess
 from robolink_simulators.soak.history import Disturbance, Hindrance
 from robolink_simulators.soak.plant.counted_acts import CountedActs

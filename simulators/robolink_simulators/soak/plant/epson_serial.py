@@ -8,8 +8,8 @@ from robolink.protocols.epson_text import BadRequest, Request
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.epson.options import serial_dialect
 from robolink_simulators.epson.remote.wire_text import shown_request
-from robolink_simulators.hosting.in_process.line_port import LinePort
-from robolink_simulators.hosting.streams.epson_serial import SerialFace
+from robolink_simulators.hosting.in_process.transport import LinePort
+from robolink_simulators.hosting.streams.epson import SerialFace
 from robolink_simulators.soak.computer import VirtualProcess
 from robolink_simulators.soak.history import Disturbance, Hindrance
 from robolink_simulators.soak.plant.epson import EpsonPlant, TappedTransport

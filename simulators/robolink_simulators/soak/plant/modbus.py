@@ -12,7 +12,7 @@ from robolink.transport.modbus.messages import Area
 from robolink.transport.modbus.rtu import RtuExchange, RtuLine
 from robolink.transport.modbus.tcp import TcpExchange
 from robolink_simulators.cell.clock import ManualClock
-from robolink_simulators.hosting.in_process.line_port import LinePort
+from robolink_simulators.hosting.in_process.transport import LinePort
 from robolink_simulators.soak.computer import VirtualProcess
 from robolink_simulators.soak.history import Disturbance, Hindrance
 from robolink_simulators.soak.plant.lines.bent_line import BentLine, BentTransport

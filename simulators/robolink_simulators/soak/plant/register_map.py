@@ -17,7 +17,7 @@ from robolink.transport.modbus.rtu import RtuExchange
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.faults import Fault, FaultAction
-from robolink_simulators.hosting.in_process.line_port import LinePort
+from robolink_simulators.hosting.in_process.transport import LinePort
 from robolink_simulators.plc.device import PlcSimulator
 from robolink_simulators.plc.frames import decode
 from robolink_simulators.plc.serving import PlcOnLine

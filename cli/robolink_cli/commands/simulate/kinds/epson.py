@@ -17,8 +17,7 @@ from robolink_simulators.epson.spel.tasks.driving import run_to_end
 from robolink_simulators.epson.spel.tasks.runner import ProgramRunner
 from robolink_simulators.epson.vision.vision_file import install_vision
 from robolink_simulators.faults import LinkKind
-from robolink_simulators.hosting.streams.epson_serial import serve_serial
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_serial, serve_tcp
 
 from robolink.errors import ConfigError
 from robolink.messages import tr

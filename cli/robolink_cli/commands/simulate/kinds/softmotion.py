@@ -12,7 +12,7 @@ from robolink_simulators.faults import LinkKind
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 from robolink_simulators.softmotion.mailbox.option_text import options_from_text
 from robolink_simulators.softmotion.mailbox.parameters import parameters_from_text
-from robolink_simulators.softmotion.program.plc_maker import plc_maker
+from robolink_simulators.softmotion.program.structured_plc import plc_maker
 
 from robolink.errors import ConfigError
 from robolink.messages import tr

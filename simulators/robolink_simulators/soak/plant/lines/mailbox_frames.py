@@ -16,9 +16,9 @@ from robolink_simulators.plc.frames import (
     PlcRequest,
     TcpFrames,
 )
+from robolink_simulators.softmotion.mailbox.exchange import ServedAccess
+from robolink_simulators.softmotion.mailbox.image import Bank
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
-from robolink_simulators.softmotion.mailbox.words.exchange import ServedAccess
-from robolink_simulators.softmotion.mailbox.words.places import Bank
 
 _BANKS: Final = {RegisterTable.HOLDING: Bank.HOLDING, RegisterTable.INPUT: Bank.INPUT}
 _CHARACTER_BITS: Final = 11

@@ -1,4 +1,4 @@
-"""The calibration methods, one folder each: how it measures, solves and proves."""
+"""The calibration methods: how each measures, solves and proves."""
 
 from typing import TYPE_CHECKING
 

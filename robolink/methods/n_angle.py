@@ -191,7 +191,7 @@ class _NAngleSampler:
         )
         return self.last
 
-    def another(self, taken: Sequence[Pose]) -> Procedure[float | None]:
+    def next_place(self, taken: Sequence[Pose]) -> Procedure[float | None]:
         """Return a U in a gap, the largest that the arm can turn into."""
         nominal, guess = replace(self.touches.plan, nominal=True), self.stored or ToolOffset()
         comes_down = self.stored is not None

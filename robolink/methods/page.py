@@ -20,7 +20,7 @@ This page is made from the code: `python -m robolink.methods.page > docs/methods
 [Recipes](recipes.md) says what else is in a recipe.
 
 A method has one name. It is used in the command `robolink calibrate NAME`, as the `kind` in the
-`[source]` table of a recipe, and for the method's folder in `robolink/methods`. Its parameters are
+`[source]` table of a recipe, and for the method's module in `robolink/methods`. Its parameters are
 options of the command and keys of `[source]`, with the same limits. Limits are inclusive; a value
 outside them is refused before anything moves. Lengths are in mm, angles in degrees. Every command
 also has `--station`, `--sigma` and the other options of its help page.

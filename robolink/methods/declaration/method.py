@@ -1,8 +1,9 @@
 """What a calibration method declares: its parameters once, for commands, recipes, schema and docs.
 
-A method is one folder. Its parameters are one frozen dataclass; the annotation of each field says
-its limits (``annotated_types``), its unit and the sentence that help, schema and docs show. The
-command ``calibrate NAME``, the recipe's ``[source]`` and the page of all methods are made from it.
+A method is one module, or a folder of two or three. Its parameters are one frozen dataclass; the
+annotation of each field says its limits (``annotated_types``), its unit and the sentence that help,
+schema and docs show. The command ``calibrate NAME``, the recipe's ``[source]`` and the page of all
+methods are made from it.
 """
 
 from collections.abc import Callable, Collection, Iterator

@@ -127,7 +127,7 @@ class PivotSource(PinSource):
     ) -> "TiltTest":
         """Return the tilt test; see :class:`~robolink.procedures.KeepsProof`."""
         from robolink.methods.pivot.procedure import TiltTest  # numpy
-        from robolink.procedures.pin.tilting_proof import upright_of
+        from robolink.procedures.tilting_proof import upright_of
 
         x_mm, y_mm, z_mm = result.reference_point_mm
         return TiltTest(
@@ -155,9 +155,9 @@ class PivotSource(PinSource):
         self, here: Pose, taken: Sequence[TouchedAt], again: int | None, stored: ToolOffset | None
     ) -> Procedure[CalibrationResult]:
         """Return the steps that make one touch again."""
-        from robolink.methods.pivot.procedure import go_on_pivot  # numpy
+        from robolink.methods.pivot.procedure import retake_pivot  # numpy
 
-        return go_on_pivot(
+        return retake_pivot(
             self.touch,
             here=here,
             taken=taken,

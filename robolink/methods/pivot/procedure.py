@@ -40,7 +40,7 @@ from robolink.procedures import (
     resume_samples,
     sample_sequentially,
 )
-from robolink.procedures.pin.tilting_proof import TiltingProof, Vector
+from robolink.procedures.tilting_proof import TiltingProof, Vector
 from robolink.runner import Notify, Procedure, TouchedAt
 
 
@@ -107,7 +107,7 @@ def pivot_then_lift(
     return result, swing.over.pose(UPRIGHT, plan.lift_mm)
 
 
-def go_on_pivot(
+def retake_pivot(
     plan: TouchPlan,
     *,
     here: Pose,

@@ -75,10 +75,10 @@ class SixPointSource(PivotSource):
     ) -> Procedure[CalibrationResult]:
         """Return the steps that make one touch again."""
         from robolink.methods.pivot.six_point_procedure import (
-            go_on_six_point,  # numpy, as in the pivot
+            retake_six_point,  # numpy, as in the pivot
         )
 
-        return go_on_six_point(
+        return retake_six_point(
             self.touch,
             self.ways,
             here=here,

@@ -22,7 +22,7 @@ from robolink.calibration import (
 )
 from robolink.errors import CalibrationError
 from robolink.messages import joined, tr
-from robolink.methods.pivot.procedure import go_on_pivot, pivot_then_lift
+from robolink.methods.pivot.procedure import pivot_then_lift, retake_pivot
 from robolink.methods.pivot.tilts import Tilt
 from robolink.model import Path, Pose, ToolOffset
 from robolink.procedures import TAKE_ALL, SamplingPolicy, TouchPlan, approach_path, offset_z
@@ -123,7 +123,7 @@ def measure_six_point(
     return result
 
 
-def go_on_six_point(
+def retake_six_point(
     plan: TouchPlan,
     ways: AxisTeachPlan,
     *,
@@ -152,7 +152,7 @@ def go_on_six_point(
         CalibrationError: As :func:`measure_six_point`.
     """
     *touches, start, along_x, second = taken
-    fit = yield from go_on_pivot(
+    fit = yield from retake_pivot(
         plan,
         here=here,
         taken=touches,

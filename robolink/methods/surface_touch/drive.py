@@ -31,7 +31,7 @@ from robolink.procedures import (
     resume_samples,
     sample_sequentially,
 )
-from robolink.procedures.sampling.sampler import ResultT
+from robolink.procedures.samples import ResultT
 from robolink.runner import Notify, Procedure, TakenAgainError, TouchedAt
 
 PROVING_TOUCHES: Final = 4

@@ -112,7 +112,7 @@ class PlaneTouchSource(SurfaceTouchSource[PlaneSurvey]):
         """
         from robolink.calibration import PlaneTouchResult
         from robolink.methods.surface_touch.plane_procedure import PlaneTest  # numpy
-        from robolink.procedures.pin.tilting_proof import upright_of
+        from robolink.procedures.tilting_proof import upright_of
 
         if not isinstance(result, PlaneTouchResult):
             raise TypeError("the plane that was touched is a part of the result")

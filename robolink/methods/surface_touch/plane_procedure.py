@@ -47,7 +47,7 @@ from robolink.methods.surface_touch.drive import (
 )
 from robolink.methods.surface_touch.survey import PlaneSurvey, Vector
 from robolink.model import Pose, ToolOffset
-from robolink.procedures.pin.tilting_proof import TiltingProof
+from robolink.procedures.tilting_proof import TiltingProof
 from robolink.runner import Procedure
 
 _LEAST_ALTITUDE = 0.3

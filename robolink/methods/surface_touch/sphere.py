@@ -122,7 +122,7 @@ class SphereTouchSource(SurfaceTouchSource[SphereSurvey]):
             SphereTest,
             TouchedSphere,
         )
-        from robolink.procedures.pin.tilting_proof import upright_of
+        from robolink.procedures.tilting_proof import upright_of
 
         if not isinstance(result, SphereTouchResult):
             raise TypeError("the sphere that was touched is a part of the result")

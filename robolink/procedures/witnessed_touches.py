@@ -6,15 +6,15 @@ input switched (docs/reference/evidence.md 1). Another try is asked for, then it
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Hashable, Mapping
-from dataclasses import replace
-from typing import Final
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Final
 
+from robolink import ambient
+from robolink.calibration import PERSON_SIGMA_Z_MM, PROBE_SIGMA_Z_MM
 from robolink.errors import CalibrationError
 from robolink.messages import tr
-from robolink.model import Pose
-from robolink.procedures.pin.judging import was_jogged
-from robolink.procedures.pin.touch_plan import TouchPlan
+from robolink.model import InputEdge, Pose
 from robolink.runner import (
     AngleShown,
     Ask,
@@ -25,6 +25,164 @@ from robolink.runner import (
     TouchedAt,
     TouchSubject,
 )
+
+if TYPE_CHECKING:
+    from robolink.calibration import WitnessedTouch
+
+
+_SEED_BITS: Final = 48
+
+
+@dataclass(frozen=True, slots=True)
+class TouchPlan:
+    """How a tip is taken off the pin and brought back.
+
+    Attributes:
+        lift_mm: How far the tip is lifted before anything turns.
+        clearance_mm: Least height above the expected contact to which it comes down again; up to
+            ``HIGHEST_MM`` more is drawn.
+        turn_deg: By how much U differs between the two poses.
+        contact: The input that shows contact, ``None`` where a person's eye does.
+        sigma_z_mm: Standard deviation of a touch in height, ``None`` for what is usual.
+        seed: From which the standoffs are drawn, ``None`` for a new one in each run.
+        nominal: Whether it is only looked at: the highest standoffs, nothing drawn or judged.
+    """
+
+    lift_mm: float = 10.0
+    clearance_mm: float = 2.0
+    turn_deg: float = 180.0
+    contact: InputEdge | None = None
+    sigma_z_mm: float | None = None
+    seed: int | None = None
+    nominal: bool = False
+
+    @property
+    def sigma_in_height_mm(self) -> float:
+        """Standard deviation of a touch in height, stated or usual."""
+        usual_mm = PERSON_SIGMA_Z_MM if self.contact is None else PROBE_SIGMA_Z_MM
+        return self.sigma_z_mm or usual_mm
+
+
+def fresh_seed() -> int:
+    """Return the seed of a run: nobody can know the standoffs of a run before it."""
+    return ambient.random_number(_SEED_BITS)
+
+
+def plain_pose(pose: Pose) -> Pose:
+    """Return a pose without how it was taken."""
+    kept = Pose(*pose.coordinates(), hand=pose.hand, local=pose.local, tool=pose.tool)
+    return replace(kept, posture=pose.posture)
+
+
+TOUCH_CODES: Final = (
+    "not_touched",
+    "typed_ahead",
+    "touch_heights_differ",
+    "touch_not_proven",
+    "coarse_step",
+    "still_moving",
+    "old_reading",
+    "turned_too_little",
+    "not_upright",
+    "mixed_tool",
+    "tip_did_not_move",
+    "camera_changed",
+    "spot_changed",
+)
+"""Why touches do not count, in a measurement and in a proof; and why looks of a camera do not."""
+
+
+def was_jogged(touch: TouchedAt) -> bool:
+    """Tell whether a person jogged from where the robot had stopped."""
+    return witnessed_by(touch).made(_PRINTED_MM)
+
+
+def jog_mm(touch: TouchedAt) -> float | None:
+    """Return how far that was; ``None`` without an arrival."""
+    if touch.arrival is None:
+        return None
+    return math.dist(touch.coordinates()[:3], touch.arrival.coordinates()[:3])
+
+
+def require_touches(touches: Sequence[TouchedAt], *, sigma_z_mm: float) -> None:
+    """Refuse touches of one pin that were not made (docs/reference/evidence.md 1).
+
+    Args:
+        touches: All that count.
+        sigma_z_mm: Standard deviation of a touch in height.
+
+    Raises:
+        CalibrationError: ``not_touched``, ``touch_heights_differ``, ``touch_not_proven``,
+            ``large_residual``.
+    """
+    from robolink.calibration import judge_touches  # numpy, which a look does without
+
+    evidence = judge_touches([witnessed_by(touch) for touch in touches], sigma_z_mm=sigma_z_mm)
+    if code := evidence.most_telling:
+        raise _refusal(code, evidence.z_range_mm, evidence.max_residual_mm)
+
+
+def heights_agree(heights_mm: Sequence[float], sigma_z_mm: float) -> bool:
+    """Tell whether heights of a tip on one pin differ by no more than touches scatter."""
+    from robolink.calibration import height_limit_mm  # numpy, which a look does without
+
+    limit_mm = height_limit_mm(len(heights_mm), sigma_z_mm)
+    return max(heights_mm) - min(heights_mm) <= limit_mm
+
+
+def require_one_height(heights_mm: Sequence[float], *, sigma_z_mm: float) -> None:
+    """Refuse heights of an upright flange that were not all taken on one pin.
+
+    Raises:
+        CalibrationError: ``touch_heights_differ``.
+    """
+    if len(heights_mm) > 1 and not heights_agree(heights_mm, sigma_z_mm):
+        range_mm = max(heights_mm) - min(heights_mm)
+        raise _refusal("touch_heights_differ", range_mm, None)
+
+
+_PRINTED_MM: Final = 0.001
+"""No controller prints positions coarser; a finer one changes nothing."""
+
+
+def witnessed_by(touch: TouchedAt) -> "WitnessedTouch":
+    """Return what the mathematics knows of a touch."""
+    from robolink.calibration import Standoff, WitnessedTouch  # numpy
+
+    return WitnessedTouch(
+        touch,
+        touch.arrival,
+        Standoff(*touch.standoff_mm),
+        touch.seconds,
+        contact=touch.contact is True,
+    )
+
+
+def _refusal(code: str, range_mm: float | None, residual_mm: float | None) -> CalibrationError:
+    whats = {
+        "touch_heights_differ": tr(
+            "Heights differ by {spread:.2f} mm on one pin: at least one touch was in the air.",
+            spread=range_mm or 0.0,
+        ),
+        "touch_not_proven": tr(
+            "At least one touch was not made: the tip stayed where the robot had stopped "
+            "beside the pin."
+        ),
+        "large_residual": tr(
+            "One touch is {residual:.3f} mm off the others: the tip was not on the pin, or "
+            "the pin moved.",
+            residual=residual_mm or 0.0,
+        ),
+    }
+    return CalibrationError(
+        code,
+        whats.get(code, tr("A touch was not made.")),
+        remedy=tr(
+            "Nothing was written. Check that the pin is tight and measure again, each time "
+            "until the tip is on it."
+        ),
+    )
+
 
 MOST_ASKED: Final = 3
 """How often a person is asked for a touch before the refusal ends the measurement."""

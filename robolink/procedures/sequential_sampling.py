@@ -5,31 +5,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from robolink.calibration import (
-    LEAST_HALF_WIDTH,
-    MOST_RESIDUAL_MM,
-    CalibrationResult,
-    stated_mm,
-)
+from robolink.calibration import LEAST_HALF_WIDTH, MOST_RESIDUAL_MM, CalibrationResult, stated_mm
 from robolink.errors import CalibrationError
 from robolink.messages import joined, tr
-from robolink.procedures.sampling.sampler import (
+from robolink.procedures.samples import (
     AddsSamples,
     PlaceT,
     ResultT,
     Sampler,
+    Samples,
     SequentialSampler,
     TakenT,
 )
-from robolink.procedures.sampling.samples import Samples
-from robolink.runner import (
-    MORE,
-    Confirm,
-    FitRow,
-    FitSubject,
-    Notify,
-    Procedure,
-)
+from robolink.runner import MORE, Confirm, FitRow, FitSubject, Notify, Procedure
 
 MOST_REPEATED: Final = 3
 """How often one is offered to be taken again; after that the measurement stands as it is."""

@@ -13,13 +13,19 @@ from robolink.calibration import FARTHEST_MM, HIGHEST_MM, FlangePlane
 from robolink.messages import tr
 from robolink.model import Path, Pose, ToolOffset, angle_difference_deg
 from robolink.procedures.approach import offset_z
-from robolink.procedures.pin.judging import heights_agree, require_touches
-from robolink.procedures.pin.touch_plan import TouchPlan, fresh_seed, plain_pose
-from robolink.procedures.pin.witnessed import WitnessedTouches, you_touch
+from robolink.procedures.witnessed_touches import (
+    TouchPlan,
+    WitnessedTouches,
+    fresh_seed,
+    heights_agree,
+    plain_pose,
+    require_touches,
+    you_touch,
+)
 from robolink.runner import Move, NotYet, Procedure, TouchedAt
 
 if TYPE_CHECKING:
-    from robolink.calibration import StandoffSeries  # numpy, which a look does without
+    from robolink.calibration import StandoffSeries
 
 
 LEAST_TURN_DEG: Final = 10.0

@@ -22,42 +22,32 @@ if TYPE_CHECKING:
     from robolink.methods.camera_affine import CameraAffineParameters as CameraAffineParameters
     from robolink.methods.camera_affine import CameraAffineSource as CameraAffineSource
     from robolink.methods.camera_affine import measure_camera_affine as measure_camera_affine
-    from robolink.methods.declaration.checking import order_of_residuals as order_of_residuals
-    from robolink.methods.declaration.checking import parameter_problems as parameter_problems
-    from robolink.methods.declaration.checking import source_of as source_of
-    from robolink.methods.declaration.fields import ParameterField as ParameterField
-    from robolink.methods.declaration.fields import fields_of as fields_of
-    from robolink.methods.declaration.look_parameters import LookParameters as LookParameters
-    from robolink.methods.declaration.method import DEGREES as DEGREES
-    from robolink.methods.declaration.method import MM as MM
-    from robolink.methods.declaration.method import MM_S as MM_S
-    from robolink.methods.declaration.method import NOTHING_STATED as NOTHING_STATED
-    from robolink.methods.declaration.method import Angle as Angle
-    from robolink.methods.declaration.method import AnyMethod as AnyMethod
-    from robolink.methods.declaration.method import Check as Check
-    from robolink.methods.declaration.method import Former as Former
-    from robolink.methods.declaration.method import Help as Help
-    from robolink.methods.declaration.method import InputNumber as InputNumber
-    from robolink.methods.declaration.method import Length as Length
-    from robolink.methods.declaration.method import LengthRule as LengthRule
-    from robolink.methods.declaration.method import Method as Method
-    from robolink.methods.declaration.method import MethodParameters as MethodParameters
-    from robolink.methods.declaration.method import Needs as Needs
-    from robolink.methods.declaration.method import NextStep as NextStep
-    from robolink.methods.declaration.method import Option as Option
-    from robolink.methods.declaration.method import Pair as Pair
-    from robolink.methods.declaration.method import PoseHelp as PoseHelp
-    from robolink.methods.declaration.method import StatedLimits as StatedLimits
-    from robolink.methods.declaration.method import Unit as Unit
-    from robolink.methods.declaration.pin_parameters import PinParameters as PinParameters
-    from robolink.methods.declaration.pin_parameters import (
-        UprightPinParameters as UprightPinParameters,
-    )
-    from robolink.methods.declaration.site import Site as Site
-    from robolink.methods.declaration.site import ToolHistory as ToolHistory
     from robolink.methods.given_poses import PointsSource as PointsSource
     from robolink.methods.given_poses import PosesFound as PosesFound
     from robolink.methods.given_poses import taught_poses as taught_poses
+    from robolink.methods.method import DEGREES as DEGREES
+    from robolink.methods.method import MM as MM
+    from robolink.methods.method import MM_S as MM_S
+    from robolink.methods.method import NOTHING_STATED as NOTHING_STATED
+    from robolink.methods.method import Angle as Angle
+    from robolink.methods.method import AnyMethod as AnyMethod
+    from robolink.methods.method import Check as Check
+    from robolink.methods.method import Former as Former
+    from robolink.methods.method import Help as Help
+    from robolink.methods.method import InputNumber as InputNumber
+    from robolink.methods.method import Length as Length
+    from robolink.methods.method import LengthRule as LengthRule
+    from robolink.methods.method import Method as Method
+    from robolink.methods.method import MethodParameters as MethodParameters
+    from robolink.methods.method import Needs as Needs
+    from robolink.methods.method import NextStep as NextStep
+    from robolink.methods.method import Option as Option
+    from robolink.methods.method import Pair as Pair
+    from robolink.methods.method import PoseHelp as PoseHelp
+    from robolink.methods.method import Site as Site
+    from robolink.methods.method import StatedLimits as StatedLimits
+    from robolink.methods.method import ToolHistory as ToolHistory
+    from robolink.methods.method import Unit as Unit
     from robolink.methods.n_angle import ManyTouches as ManyTouches
     from robolink.methods.n_angle import NAngleParameters as NAngleParameters
     from robolink.methods.n_angle import NAngleSource as NAngleSource
@@ -72,6 +62,11 @@ if TYPE_CHECKING:
     from robolink.methods.one_touch.solvers import LastTouch as LastTouch
     from robolink.methods.one_touch.solvers import difference_from_last as difference_from_last
     from robolink.methods.one_touch.solvers import find_last_touch as find_last_touch
+    from robolink.methods.parameter_checks import ParameterField as ParameterField
+    from robolink.methods.parameter_checks import fields_of as fields_of
+    from robolink.methods.parameter_checks import order_of_residuals as order_of_residuals
+    from robolink.methods.parameter_checks import parameter_problems as parameter_problems
+    from robolink.methods.parameter_checks import source_of as source_of
     from robolink.methods.pivot import PivotParameters as PivotParameters
     from robolink.methods.pivot import PivotSource as PivotSource
     from robolink.methods.pivot import PivotTouches as PivotTouches
@@ -97,6 +92,9 @@ if TYPE_CHECKING:
     from robolink.methods.runout_table import RunoutTableParameters as RunoutTableParameters
     from robolink.methods.runout_table import RunoutTableSource as RunoutTableSource
     from robolink.methods.runout_table_procedure import measure_runout_table as measure_runout_table
+    from robolink.methods.shared_parameters import LookParameters as LookParameters
+    from robolink.methods.shared_parameters import PinParameters as PinParameters
+    from robolink.methods.shared_parameters import UprightPinParameters as UprightPinParameters
     from robolink.methods.station_learning import learn_station as learn_station
     from robolink.methods.surface_touch import SurfaceParameters as SurfaceParameters
     from robolink.methods.surface_touch.plane import PlaneTouches as PlaneTouches
@@ -128,23 +126,21 @@ else:
             "camera_affine": (
                 "CameraAffineParameters CameraAffineSource LEAST_SPAN_MM measure_camera_affine"
             ),
-            "declaration.checking": "order_of_residuals parameter_problems source_of",
-            "declaration.fields": "ParameterField fields_of",
-            "declaration.look_parameters": "LookParameters",
-            "declaration.method": (
+            "given_poses": "PointsSource PosesFound taught_poses",
+            "method": (
                 "Angle AnyMethod Check DEGREES Former Help InputNumber Length LengthRule MM "
                 "MM_S Method MethodParameters NOTHING_STATED Needs NextStep Option Pair "
-                "PoseHelp StatedLimits Unit"
+                "PoseHelp Site StatedLimits ToolHistory Unit"
             ),
-            "declaration.pin_parameters": "PinParameters UprightPinParameters",
-            "declaration.site": "Site ToolHistory",
-            "given_poses": "PointsSource PosesFound taught_poses",
             "n_angle": (
                 "ManyTouches NAngleParameters NAngleSource measure_n_angle most_informative_order"
             ),
             "one_touch": "OneTouchParameters OneTouchSource measure_one_touch",
             "one_touch.solvers": (
                 "Absolute Difference KEPT LastTouch difference_from_last find_last_touch"
+            ),
+            "parameter_checks": (
+                "ParameterField fields_of order_of_residuals parameter_problems source_of"
             ),
             "pivot": "PivotParameters PivotSource PivotTouches require_tilting",
             "pivot.procedure": "measure_pivot verify_by_tilting",
@@ -155,6 +151,7 @@ else:
             "registry": "METHODS_GROUP all_methods find_method method_names register",
             "runout_table": "AllRoundPlan RunoutTableParameters RunoutTableSource",
             "runout_table_procedure": "measure_runout_table",
+            "shared_parameters": "LookParameters PinParameters UprightPinParameters",
             "station_learning": "learn_station",
             "surface_touch": "SurfaceParameters",
             "surface_touch.plane": (

@@ -22,14 +22,7 @@ from robolink.calibration import (
 from robolink.files.toml import Problem
 from robolink.messages import declared, tr
 from robolink.methods.camera import LookTest
-from robolink.methods.declaration.look_parameters import (
-    PLACE,
-    UNMEASURED_Z,
-    LookParameters,
-    Turns,
-    camera_at,
-)
-from robolink.methods.declaration.method import (
+from robolink.methods.method import (
     MM,
     Check,
     Help,
@@ -38,8 +31,15 @@ from robolink.methods.declaration.method import (
     NextStep,
     Option,
     Pair,
+    Site,
 )
-from robolink.methods.declaration.site import Site
+from robolink.methods.shared_parameters import (
+    PLACE,
+    UNMEASURED_Z,
+    LookParameters,
+    Turns,
+    camera_at,
+)
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import (
     NO_ERROR,

@@ -14,14 +14,13 @@ from robolink.calibration import (
     solve_up_camera,
 )
 from robolink.messages import declared, tr
-from robolink.methods.declaration.look_parameters import (
+from robolink.methods.method import Method, Needs, Site
+from robolink.methods.shared_parameters import (
     PLACE,
     UNMEASURED_Z,
     LookParameters,
     camera_at,
 )
-from robolink.methods.declaration.method import Method, Needs
-from robolink.methods.declaration.site import Site
 from robolink.model import Pose, TipSensor, ToolOffset
 from robolink.procedures import (
     NO_OFFSET,

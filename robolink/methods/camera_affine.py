@@ -19,13 +19,7 @@ from robolink.calibration import (
 )
 from robolink.errors import CalibrationError
 from robolink.messages import declared, tr
-from robolink.methods.declaration.look_parameters import (
-    PLACE,
-    UNMEASURED_Z,
-    LookParameters,
-    camera_at,
-)
-from robolink.methods.declaration.method import (
+from robolink.methods.method import (
     DEGREES,
     MM,
     Former,
@@ -35,8 +29,14 @@ from robolink.methods.declaration.method import (
     Option,
     Pair,
     Rows,
+    Site,
 )
-from robolink.methods.declaration.site import Site
+from robolink.methods.shared_parameters import (
+    PLACE,
+    UNMEASURED_Z,
+    LookParameters,
+    camera_at,
+)
 from robolink.model import Pose, TipSensor, ToolOffset
 from robolink.procedures import (
     NO_OFFSET,

@@ -17,7 +17,7 @@ from robolink.calibration import (
 from robolink.errors import LimitError
 from robolink.files.toml import Problem
 from robolink.messages import declared, tr
-from robolink.methods.declaration.method import (
+from robolink.methods.method import (
     DEGREES,
     Angle,
     Check,
@@ -28,9 +28,9 @@ from robolink.methods.declaration.method import (
     Needs,
     Option,
     PoseHelp,
+    Site,
 )
-from robolink.methods.declaration.pin_parameters import Retake, UprightPinParameters
-from robolink.methods.declaration.site import Site
+from robolink.methods.shared_parameters import Retake, UprightPinParameters
 from robolink.model import Pose, ToolOffset, angle_difference_deg
 from robolink.procedures import (
     TAKE_ALL,

@@ -8,8 +8,8 @@ from typing import Final, Literal, get_args, get_origin
 
 from annotated_types import Ge, Gt, Le, Len, MaxLen, MinLen
 
-from robolink.methods.declaration.fields import ParameterField, bare, fields_of
-from robolink.methods.declaration.method import AnyMethod
+from robolink.methods.method import AnyMethod
+from robolink.methods.parameter_checks import ParameterField, bare, fields_of
 from robolink.methods.registry import all_methods
 
 _OPENING: Final = """\

@@ -12,7 +12,7 @@ from annotated_types import Ge, Le
 from robolink.errors import ConfigError
 from robolink.files.toml import Problem
 from robolink.messages import declared, tr
-from robolink.methods.declaration.method import (
+from robolink.methods.method import (
     Check,
     Help,
     Method,
@@ -20,9 +20,9 @@ from robolink.methods.declaration.method import (
     Needs,
     Option,
     PoseHelp,
+    Site,
 )
-from robolink.methods.declaration.pin_parameters import two_poses_agree
-from robolink.methods.declaration.site import Site
+from robolink.methods.shared_parameters import two_poses_agree
 from robolink.model import Pose
 from robolink.stations import StationKind
 

@@ -14,7 +14,7 @@ from typing import Final, cast
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.methods.declaration.method import AnyMethod
+from robolink.methods.method import AnyMethod
 from robolink.plug_ins import PlugInError, find_plug_in
 
 METHODS_GROUP: Final = "robolink.methods"

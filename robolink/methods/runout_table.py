@@ -10,14 +10,13 @@ from robolink.calibration import CalibrationResult
 from robolink.files.toml import Problem
 from robolink.messages import declared, tr
 from robolink.methods.camera import CameraSource
-from robolink.methods.declaration.look_parameters import (
+from robolink.methods.method import DEGREES, Angle, Check, Help, Method, Needs, Option, Site
+from robolink.methods.shared_parameters import (
     PLACE,
     UNMEASURED_Z,
     LookParameters,
     camera_at,
 )
-from robolink.methods.declaration.method import DEGREES, Angle, Check, Help, Method, Needs, Option
-from robolink.methods.declaration.site import Site
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import LookPlan, MeasurementContext
 from robolink.runner import Procedure

@@ -16,7 +16,7 @@ from robolink.calibration import (
     two_of,
 )
 from robolink.messages import declared, tr
-from robolink.methods.declaration.method import (
+from robolink.methods.method import (
     DEGREES,
     Former,
     Help,
@@ -24,9 +24,9 @@ from robolink.methods.declaration.method import (
     Needs,
     Option,
     PoseHelp,
+    Site,
 )
-from robolink.methods.declaration.pin_parameters import UprightPinParameters, two_poses_agree
-from robolink.methods.declaration.site import Site
+from robolink.methods.shared_parameters import UprightPinParameters, two_poses_agree
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import (
     ManualPinSource,

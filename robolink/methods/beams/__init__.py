@@ -10,7 +10,7 @@ from annotated_types import Ge, Le, Len
 from robolink.calibration import MIN_ROTATION_DEG, CalibrationResult, tip_pose
 from robolink.files.toml import Problem
 from robolink.messages import declared, tr
-from robolink.methods.declaration.method import (
+from robolink.methods.method import (
     DEGREES,
     MM,
     MM_S,
@@ -23,8 +23,8 @@ from robolink.methods.declaration.method import (
     MethodParameters,
     Needs,
     Option,
+    Site,
 )
-from robolink.methods.declaration.site import Site
 from robolink.methods.z_touch import retake_of_nothing
 from robolink.model import MotionGroup, Pose, ToolOffset, angle_difference_deg
 from robolink.procedures import InputSource, MeasurementContext, SamplingPolicy, may_end_early

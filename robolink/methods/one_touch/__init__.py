@@ -9,10 +9,19 @@ from annotated_types import Ge, Le
 from robolink.calibration import CalibrationResult, carrying, tip_pose
 from robolink.errors import ConfigError
 from robolink.messages import declared, tr
-from robolink.methods.declaration.method import MM, Former, Help, Method, Needs, Option, PoseHelp
-from robolink.methods.declaration.pin_parameters import PinParameters
-from robolink.methods.declaration.site import Site, ToolHistory
+from robolink.methods.method import (
+    MM,
+    Former,
+    Help,
+    Method,
+    Needs,
+    Option,
+    PoseHelp,
+    Site,
+    ToolHistory,
+)
 from robolink.methods.one_touch.solvers import Absolute, Difference
+from robolink.methods.shared_parameters import PinParameters
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import (
     MeasurementContext,

@@ -9,7 +9,7 @@ from annotated_types import Ge, Le
 from robolink.calibration import CalibrationResult
 from robolink.errors import CalibrationError, ConfigError
 from robolink.messages import declared, tr
-from robolink.methods.declaration.method import (
+from robolink.methods.method import (
     DEGREES,
     MM,
     Help,
@@ -18,9 +18,9 @@ from robolink.methods.declaration.method import (
     Needs,
     Option,
     PoseHelp,
+    Site,
 )
-from robolink.methods.declaration.pin_parameters import PinParameters, Retake
-from robolink.methods.declaration.site import Site
+from robolink.methods.shared_parameters import PinParameters, Retake
 from robolink.model import Controller, Pose, ToolOffset
 from robolink.procedures import (
     TAKE_ALL,

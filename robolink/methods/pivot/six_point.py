@@ -9,8 +9,7 @@ from annotated_types import Ge, Le
 from robolink.calibration import CalibrationResult
 from robolink.errors import CalibrationError
 from robolink.messages import declared, tr
-from robolink.methods.declaration.method import MM, Help, Method, Needs, Option, PoseHelp
-from robolink.methods.declaration.site import Site
+from robolink.methods.method import MM, Help, Method, Needs, Option, PoseHelp, Site
 from robolink.methods.pivot import PivotParameters, PivotSource, require_known_tip
 from robolink.model import Pose, ToolOffset
 from robolink.runner import Procedure, TouchedAt

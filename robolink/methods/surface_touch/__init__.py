@@ -9,9 +9,9 @@ from annotated_types import Ge, Le
 
 from robolink.calibration import CalibrationResult
 from robolink.messages import declared
-from robolink.methods.declaration.method import DEGREES, MM, Help, InputNumber, Option
-from robolink.methods.declaration.pin_parameters import PinParameters, Retake
+from robolink.methods.method import DEGREES, MM, Help, InputNumber, Option
 from robolink.methods.pivot import require_known_tip
+from robolink.methods.shared_parameters import PinParameters, Retake
 from robolink.methods.surface_touch.survey import SurveyT
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import TAKE_ALL, SamplingPolicy, TouchPlan, TouchSource

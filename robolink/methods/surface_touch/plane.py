@@ -9,8 +9,7 @@ from annotated_types import Ge, Le
 from robolink.calibration import HIGHEST_MM, CalibrationResult
 from robolink.files.toml import Problem
 from robolink.messages import declared, tr
-from robolink.methods.declaration.method import MM, Check, Help, Method, Needs, Option, PoseHelp
-from robolink.methods.declaration.site import Site
+from robolink.methods.method import MM, Check, Help, Method, Needs, Option, PoseHelp, Site
 from robolink.methods.surface_touch import SurfaceParameters, SurfaceTouchSource
 from robolink.methods.surface_touch.survey import PlaneSurvey
 from robolink.model import Pose, ToolOffset

@@ -9,7 +9,7 @@ from annotated_types import Ge, Le, MinLen
 from robolink.calibration import MIN_ROTATION_DEG, CalibrationResult, tip_pose
 from robolink.files.toml import Problem
 from robolink.messages import declared, tr
-from robolink.methods.declaration.method import (
+from robolink.methods.method import (
     DEGREES,
     MM,
     MM_S,
@@ -22,9 +22,9 @@ from robolink.methods.declaration.method import (
     MethodParameters,
     Needs,
     Option,
+    Site,
 )
-from robolink.methods.declaration.pin_parameters import clearance_below_lift
-from robolink.methods.declaration.site import Site
+from robolink.methods.shared_parameters import clearance_below_lift
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import InputSource, MeasurementContext, SamplingPolicy, may_end_early
 from robolink.runner import Procedure

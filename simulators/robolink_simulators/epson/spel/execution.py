@@ -51,8 +51,8 @@ from robolink_simulators.epson.spel.tree import (
 )
 
 
-def effect(evaluator: Evaluator, statement: Statement) -> StatementOutcome:
-    """Carry a statement out at once.
+def effect(evaluator: Evaluator, statement: Statement) -> str:
+    """Carry out a statement that takes no time and is no keyword's; return what it prints.
 
     Raises:
         Refusal: It cannot be carried out.
@@ -62,9 +62,7 @@ def effect(evaluator: Evaluator, statement: Statement) -> StatementOutcome:
             session = evaluator.session
             values = [evaluator.shown(item) for item in items]
             text = joined(values, session.options, session.machine.model)
-            return StatementOutcome(text + (CRLF if newline else ""))
-        case KeywordStatement():
-            return run_command(evaluator, statement)
+            return text + (CRLF if newline else "")
         case MotionStatement("curve"):
             store_curve(evaluator, statement)
         case PrintTo():
@@ -81,7 +79,7 @@ def effect(evaluator: Evaluator, statement: Statement) -> StatementOutcome:
             _assign(evaluator, name, evaluator.value(expression))
         case _:
             raise AssertionError(statement)
-    return StatementOutcome()
+    return ""
 
 
 def _store(evaluator: Evaluator, statement: AssignPoint | AssignCoordinate) -> None:
@@ -224,7 +222,7 @@ class StatementExecution:
             options = replace(motion.options, words=motion.options.words - {"sync"})
             self._pending.append(replace(motion, options=options))
             self._busy_until_ns = now_ns
-            self._attempt(now_ns)
+            self._take_up(now_ns)
 
     def suspend(self, now_ns: int) -> None:
         """Stop the motion where it is; nothing is done until :meth:`go_on`."""
@@ -267,37 +265,44 @@ class StatementExecution:
         while not self._done and now_ns >= (change_ns := self._change_ns):
             arm.advance(change_ns)
             self._evaluator.session.machine.timed_bits.advance(change_ns)
-            self._attempt(change_ns)
+            self._take_up(change_ns)
             self._seen_ns = change_ns
         arm.advance(now_ns)
         self._seen_ns = max(self._seen_ns, now_ns)
 
     def _take_up(self, change_ns: int) -> None:
         """Do what is due: an end of waiting, an edge, or the next statement."""
-        if self._waiting is not None:
-            if self._waiting.is_over(change_ns):
-                self._waiting, self._busy_until_ns = None, change_ns
-            return
-        if self._meanwhile is not None and self._meanwhile.due_ns(self._seen_ns) <= change_ns:
-            self._go_on_meanwhile(change_ns)
-            return
+        try:
+            if self._waiting is not None:
+                if self._waiting.is_over(change_ns):
+                    self._waiting, self._busy_until_ns = None, change_ns
+            elif self._meanwhile is not None and self._meanwhile.due_ns(self._seen_ns) <= change_ns:
+                self._go_on_meanwhile(change_ns)
+            elif not self._met_an_edge(change_ns):
+                self._evaluator.session.machine.robot.guard.require_no_error()
+                self._done = not self._pending
+                if self._pending:
+                    self._aim = None
+                    self._run(self._pending.pop())
+        except SpelRefusal as refusal:
+            self.refuse(refusal)
+        except RecursionError:
+            self.refuse(SpelRefusal(RefusalKind.SYNTAX, "Expression too deeply nested"))
+
+    def _met_an_edge(self, change_ns: int) -> bool:
+        """Return whether an edge is met, or the next statement waits for what is inside ``!...!``.
+
+        Source: docs/reference/spel.md 7.1.
+        """
         watch, self._watch = self._watch, None
         if watch is not None and watch.edge_after(self._seen_ns) == change_ns:
             rest_ns = watch.meet(change_ns)
             self._busy_until_ns = self._busy_until_ns if rest_ns is None else rest_ns
-        elif self._meanwhile is not None:
-            # The next statement waits for what stands inside !...! (docs/reference/spel.md 7.1).
+            return True
+        if self._meanwhile is not None:
             self._busy_until_ns = self._meanwhile.due_ns(self._seen_ns)
-        else:
-            self._evaluator.session.machine.robot.guard.require_no_error()
-            self._begin_next()
-
-    def _begin_next(self) -> None:
-        if self._pending:
-            self._aim = None
-            self._run(self._pending.pop())
-        else:
-            self._done = True
+            return True
+        return False
 
     def due_ns(self, seen_ns: int) -> int:
         """Return when it has to be looked at again."""
@@ -321,7 +326,7 @@ class StatementExecution:
     def step(self, now_ns: int) -> None:
         """Carry out what is due, without moving the arm through time."""
         while not self._done and now_ns >= (change_ns := self._change_ns):
-            self._attempt(change_ns)
+            self._take_up(change_ns)
             self._seen_ns = change_ns
 
     def next_change(self) -> int | None:
@@ -369,16 +374,28 @@ class StatementExecution:
         session.memory.last_error = getattr(session.options.numbers, refusal.kind)
         self._fail(SpelError(session.memory.last_error, refusal.text))
 
-    def _attempt(self, change_ns: int) -> None:
-        try:
-            self._take_up(change_ns)
-        except SpelRefusal as refusal:
-            self.refuse(refusal)
-        except RecursionError:
-            self.refuse(SpelRefusal(RefusalKind.SYNTAX, "Expression too deeply nested"))
-
     def _run(self, statement: Statement) -> None:
-        outcome = self._outcome(statement)
+        """Begin a statement; what takes no time is done when this returns."""
+        match statement:
+            case KeywordStatement("wait"):
+                outcome = self._wait(statement)
+            case KeywordStatement("recover"):
+                outcome = StatementOutcome(duration_ns=recover(self._evaluator, statement))
+            case KeywordStatement():
+                outcome = run_command(self._evaluator, statement)
+            case If():
+                outcome = self._branch(statement)
+            case MotionStatement(verb) if verb != "curve":
+                reserves = "sync" in statement.options.words
+                outcome = self._reserve(statement) if reserves else self._begin(statement)
+            case Distance(percent):
+                outcome = self._wait_for_distance(percent)
+            case _:
+                outcome = StatementOutcome(effect(self._evaluator, statement))
+        self._note(outcome)
+
+    def _note(self, outcome: StatementOutcome) -> None:
+        """Take up what a statement has begun, and how long it lasts."""
         start_ns, machine = self._busy_until_ns, self._evaluator.session.machine
         self.output += outcome.output
         if outcome.timed is not None:
@@ -445,19 +462,3 @@ class StatementExecution:
         holds = truth(self._evaluator.value(statement.condition))
         self._pending += reversed(statement.then if holds else statement.otherwise)
         return StatementOutcome()
-
-    def _outcome(self, statement: Statement) -> StatementOutcome:
-        match statement:
-            case KeywordStatement("wait"):
-                return self._wait(statement)
-            case KeywordStatement("recover"):
-                return StatementOutcome(duration_ns=recover(self._evaluator, statement))
-            case If():
-                return self._branch(statement)
-            case MotionStatement(verb) if verb != "curve":
-                reserves = "sync" in statement.options.words
-                return self._reserve(statement) if reserves else self._begin(statement)
-            case Distance(percent):
-                return self._wait_for_distance(percent)
-            case _:
-                return effect(self._evaluator, statement)

@@ -27,17 +27,17 @@ from robolink_simulators.epson.remote.command_window import SpelWindow
 from robolink_simulators.epson.remote.commands import Alarms, CommandDesk
 from robolink_simulators.epson.remote.link import ClientSlot, EpsonServerLink, OpenLinks
 from robolink_simulators.epson.spel import Interpreter
-from robolink_simulators.epson.spel.programs.loading import load_project
+from robolink_simulators.epson.spel.programs.program_load import load_project
 from robolink_simulators.epson.spel.tasks.ports import Ports
 from robolink_simulators.epson.spel.tasks.runner import ProgramRunner
-from robolink_simulators.epson.time_stepping import Companion, TimeStepping
+from robolink_simulators.epson.stepped_controller import Companion, SteppedController
 from robolink_simulators.epson.world import World
 from robolink_simulators.faults import Fault, FaultPlan
 from robolink_simulators.faults.links import EPSON_LINKS
 from robolink_simulators.state_files import StateNotKeptError, drawn_serial
 
 
-class EpsonSimulator(TimeStepping):
+class EpsonSimulator(SteppedController):
     r"""Implements ``hosting.addresses.WireDevice``.
 
     Args:

@@ -15,8 +15,8 @@ from robolink.timing import NS_PER_S
 from robolink_simulators.epson.arm.trajectory import Leg
 from robolink_simulators.epson.condition import RefusalKind, RequestRefused, SpelRefusal
 from robolink_simulators.epson.machine import Machine
-from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
-from robolink_simulators.epson.spel.expressions.printing import (
+from robolink_simulators.epson.spel.expressions.evaluator import Evaluator
+from robolink_simulators.epson.spel.expressions.print_format import (
     CRLF,
     LONGEST_PRINT_TO,
     joined,
@@ -145,8 +145,8 @@ class StatementExecution:
         >>> import random
         >>> from robolink_simulators.epson import EpsonOptions, EpsonSimulator
         >>> from robolink_simulators.epson.spel import Interpreter, StatementExecution
-        >>> from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
-        >>> from robolink_simulators.epson.spel.parse import parse
+        >>> from robolink_simulators.epson.spel.expressions.evaluator import Evaluator
+        >>> from robolink_simulators.epson.spel.parser import parse
         >>> machine = EpsonSimulator().machine
         >>> session = Interpreter(machine, EpsonOptions(), random.Random(1)).session
         >>> line = StatementExecution(Evaluator(session), parse("Wait 2; On 5"), now_ns=0)
@@ -225,7 +225,7 @@ class StatementExecution:
             self._take_up(now_ns)
 
     def suspend(self, now_ns: int) -> None:
-        """Stop the motion where it is; nothing is done until :meth:`go_on`."""
+        """Stop the motion where it is; nothing is done until :meth:`resume`."""
         if self._reserved is not None:
             self._held = True
         elif self.travels:
@@ -233,7 +233,7 @@ class StatementExecution:
         elif now_ns >= self._busy_until_ns:  # else the safeguard has stopped it just now
             self._aim = None
 
-    def go_on(self, now_ns: int) -> None:
+    def resume(self, now_ns: int) -> None:
         """Go on after :meth:`suspend`; a timed wait begins anew (docs/reference/spel.md 4.6).
 
         What is left of a motion is travelled point to point, of a straight one in a straight
@@ -242,11 +242,11 @@ class StatementExecution:
         machine = self._evaluator.session.machine
         self._seen_ns = now_ns
         try:
-            self._resume(machine, now_ns)
+            self._restart(machine, now_ns)
         except SpelRefusal as refusal:
             self.refuse(refusal)
 
-    def _resume(self, machine: Machine, now_ns: int) -> None:
+    def _restart(self, machine: Machine, now_ns: int) -> None:
         if self._reserved is not None:
             self._held = False
             if self._released:
@@ -276,8 +276,11 @@ class StatementExecution:
             if self._waiting is not None:
                 if self._waiting.is_over(change_ns):
                     self._waiting, self._busy_until_ns = None, change_ns
-            elif self._meanwhile is not None and self._meanwhile.due_ns(self._seen_ns) <= change_ns:
-                self._go_on_meanwhile(change_ns)
+            elif (
+                self._meanwhile is not None
+                and self._meanwhile.next_poll_ns(self._seen_ns) <= change_ns
+            ):
+                self._advance_meanwhile(change_ns)
             elif not self._met_an_edge(change_ns):
                 self._evaluator.session.machine.robot.guard.require_no_error()
                 self._done = not self._pending
@@ -300,16 +303,16 @@ class StatementExecution:
             self._busy_until_ns = self._busy_until_ns if rest_ns is None else rest_ns
             return True
         if self._meanwhile is not None:
-            self._busy_until_ns = self._meanwhile.due_ns(self._seen_ns)
+            self._busy_until_ns = self._meanwhile.next_poll_ns(self._seen_ns)
             return True
         return False
 
-    def due_ns(self, seen_ns: int) -> int:
+    def next_poll_ns(self, seen_ns: int) -> int:
         """Return when it has to be looked at again."""
         self.saw(seen_ns)
         return seen_ns + 1 if self._done else self._change_ns
 
-    def _go_on_meanwhile(self, now_ns: int) -> None:
+    def _advance_meanwhile(self, now_ns: int) -> None:
         """Carry out what is due of that which stands inside ``!...!``."""
         meanwhile = self._meanwhile
         if meanwhile is None:
@@ -341,13 +344,13 @@ class StatementExecution:
         if self._reserved is not None:
             return NEVER_NS
         if self._waiting is not None:
-            return self._waiting.next_look(self._seen_ns)
+            return self._waiting.next_poll_ns(self._seen_ns)
         change_ns = self._busy_until_ns
         if self._watch is not None:
             edge_ns = self._watch.edge_after(self._seen_ns)
             change_ns = change_ns if edge_ns is None else min(edge_ns, change_ns)
         if self._meanwhile is not None:
-            change_ns = min(change_ns, self._meanwhile.due_ns(self._seen_ns))
+            change_ns = min(change_ns, self._meanwhile.next_poll_ns(self._seen_ns))
         return change_ns
 
     def abort(self, now_ns: int) -> None:

@@ -76,7 +76,7 @@ class Companion:
         self._variables.set("robolink_end", str(self._count))
 
 
-class TimeStepping(RequestService, ABC):
+class SteppedController(RequestService, ABC):
     """Steps from one change to the next; between them nothing is done.
 
     Attributes:

@@ -10,8 +10,8 @@ from robolink_simulators.epson.vision_project import VisionObject, VisionProject
 from robolink_simulators.epson.vision_system import VisionSystem
 
 from robolink.calibration import Beam
+from robolink.methods.beams import BeamsParameters
 from robolink.methods.beams.drive import BeamDrive
-from robolink.methods.beams.parameters import BeamsParameters
 from robolink.model import TIP, Pose, ToolOffset
 from robolink.stations import BeamStation, Found, StationKind, station_entry
 from tests.faults._callback_cell import IDENTITY, NOMINAL, CallbackCell, main_of

@@ -213,7 +213,7 @@ DEFECTS: Final = (
     KnownDefect(
         "who only presses ENTER gets a proof",
         {
-            "robolink.procedures.pin.touch_plan.TouchPlan.__init__": stand_ins.nominal,
+            "robolink.procedures.witnessed_touches.TouchPlan.__init__": stand_ins.nominal,
             "robolink.nozzle_change._turn_verdict.require_proved": stand_ins.nothing,
         },
         found_by="careless people",

@@ -10,7 +10,7 @@ from typing import Any, Final
 from unittest import mock
 
 from robolink_cli import main
-from robolink_cli.commands.controller.contract_trials import TrialConnections
+from robolink_cli.commands.controller.contract_report import TrialConnections
 from robolink_cli.console.exit_codes import UNKNOWN
 from robolink_cli.console.ways import SHELL_WAYS
 from robolink_simulators.hosting.in_process import epson, softmotion

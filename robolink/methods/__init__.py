@@ -70,14 +70,14 @@ if TYPE_CHECKING:
     from robolink.methods.pivot import PivotParameters as PivotParameters
     from robolink.methods.pivot import PivotSource as PivotSource
     from robolink.methods.pivot import PivotTouches as PivotTouches
+    from robolink.methods.pivot import measure_pivot as measure_pivot
     from robolink.methods.pivot import require_tilting as require_tilting
-    from robolink.methods.pivot.procedure import measure_pivot as measure_pivot
     from robolink.methods.pivot.procedure import verify_by_tilting as verify_by_tilting
+    from robolink.methods.pivot.six_point import AxisTeachPlan as AxisTeachPlan
     from robolink.methods.pivot.six_point import SixPointParameters as SixPointParameters
     from robolink.methods.pivot.six_point import SixPoints as SixPoints
     from robolink.methods.pivot.six_point import SixPointSource as SixPointSource
-    from robolink.methods.pivot.six_point_procedure import AxisTeachPlan as AxisTeachPlan
-    from robolink.methods.pivot.six_point_procedure import measure_six_point as measure_six_point
+    from robolink.methods.pivot.six_point import measure_six_point as measure_six_point
     from robolink.methods.pivot.tilts import OverPin as OverPin
     from robolink.methods.pivot.tilts import Tilt as Tilt
     from robolink.methods.pivot.tilts import informative_tilts as informative_tilts
@@ -142,10 +142,11 @@ else:
             "parameter_checks": (
                 "ParameterField fields_of order_of_residuals parameter_problems source_of"
             ),
-            "pivot": "PivotParameters PivotSource PivotTouches require_tilting",
-            "pivot.procedure": "measure_pivot verify_by_tilting",
-            "pivot.six_point": "SixPointParameters SixPointSource SixPoints",
-            "pivot.six_point_procedure": "AxisTeachPlan measure_six_point",
+            "pivot": "PivotParameters PivotSource PivotTouches measure_pivot require_tilting",
+            "pivot.procedure": "verify_by_tilting",
+            "pivot.six_point": (
+                "AxisTeachPlan SixPointParameters SixPointSource SixPoints measure_six_point"
+            ),
             "pivot.tilts": "OverPin Tilt informative_tilts proving_tilts",
             "points": "PointsParameters",
             "registry": "METHODS_GROUP all_methods find_method method_names register",

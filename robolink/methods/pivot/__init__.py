@@ -157,15 +157,8 @@ class PivotSource(PinSource):
         """Return the steps that make one touch again."""
         from robolink.methods.pivot.procedure import retake_pivot  # numpy
 
-        return retake_pivot(
-            self.touch,
-            here=here,
-            taken=taken,
-            again=len(taken) - 1 if again is None else again,
-            tilts=self.tilts,
-            stored=require_known_tip(stored),
-            sigma_mm=self.sigma_mm,
-        )
+        known = require_known_tip(stored)
+        return retake_pivot(self, known, here=here, taken=taken, again=again)
 
     @property
     def _tilt_deg(self) -> float:
@@ -177,17 +170,52 @@ class PivotSource(PinSource):
         Raises:
             ConfigError: Nobody knows about where the tip is, so it cannot be kept off the pin.
         """
-        from robolink.methods.pivot.procedure import (
-            measure_pivot,  # numpy, which a look does without
-        )
+        return self._measured(require_known_tip(stored))
 
-        return measure_pivot(
-            self.touch,
-            tilts=self.tilts,
-            stored=require_known_tip(stored),
-            sigma_mm=self.sigma_mm,
-            sampling=self.sampling,
-        )
+    def _measured(self, known: ToolOffset) -> Procedure[CalibrationResult]:
+        from robolink.methods.pivot.procedure import pivot_then_lift  # numpy
+
+        result, _ = yield from pivot_then_lift(self, known)
+        return result
+
+
+def measure_pivot(
+    plan: TouchPlan,
+    *,
+    tilts: "Sequence[Tilt]",
+    stored: ToolOffset,
+    sigma_mm: float | None = None,
+    sampling: SamplingPolicy = TAKE_ALL,
+) -> Procedure[CalibrationResult]:
+    """Measure a tip on a pin in tilted orientations. Runs in Tool 0.
+
+    It ends lifted, and in the orientation in which it began.
+
+    Args:
+        plan: Lift and clearance.
+        tilts: Orientations of the further touches, counted from the first one; where the arm
+            cannot take them up over this pin, others are chosen.
+        stored: The offset stored now; the approaches use it. Where it is wrong by e, the tip comes
+            down nearer to the pin by up to 2 e sin(tilt / 2).
+        sigma_mm: Standard deviation of one coordinate of one touch, where it is known.
+        sampling: When it ends, and whether a pose may be taken again.
+
+    Raises:
+        CalibrationError: ``not_tilted``; ``not_touched``, ``typed_ahead``, ``touch_not_proven``,
+            ``large_residual``; and as :func:`solve_pivot`.
+
+    Example:
+        >>> from robolink.methods import informative_tilts, measure_pivot
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.procedures import TouchPlan
+        >>> from robolink.testing import PaperCell
+        >>> cell = PaperCell(Pose(300, 100, 20, 0), ToolOffset(12.3, -3.9, -20.6), (310, 95, -40))
+        >>> tilts, stored = informative_tilts(6, tilt_deg=30), ToolOffset(12, -4, -20)
+        >>> found = cell.run(measure_pivot(TouchPlan(), tilts=tilts, stored=stored))
+        >>> [round(length, 3) for length in found.offset.components()[:3]]
+        [12.3, -3.9, -20.6]
+    """
+    return PivotSource(tuple(tilts), plan, sigma_mm, sampling).steps(stored)
 
 
 def require_known_tip(stored: ToolOffset | None) -> ToolOffset:

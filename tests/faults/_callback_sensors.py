@@ -4,10 +4,10 @@ import math
 from dataclasses import replace
 
 from robolink_simulators.cell.tip_switches import LightBeam
+from robolink_simulators.epson.camera_calibrations import VisionCalibration
 from robolink_simulators.epson.memory.points import Point
-from robolink_simulators.epson.vision.calibration import VisionCalibration
-from robolink_simulators.epson.vision.project import VisionObject, VisionProject, VisionSequence
-from robolink_simulators.epson.vision.system import VisionSystem
+from robolink_simulators.epson.vision_project import VisionObject, VisionProject, VisionSequence
+from robolink_simulators.epson.vision_system import VisionSystem
 
 from robolink.calibration import Beam
 from robolink.methods.beams import BeamsParameters

@@ -11,12 +11,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from robolink_simulators.soak import CellKind
-
 from robolink.controllers.epson.tools.table import EpsonToolTable
 from robolink.model import MarkerKind
 from robolink.standing import UNTOUCHED
 from tests.soak import stand_ins
+from tests.soak.adversary import CellKind
 
 
 @dataclass(frozen=True, slots=True)

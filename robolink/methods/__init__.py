@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from robolink.methods.beams import BeamLine as BeamLine
     from robolink.methods.beams import BeamsParameters as BeamsParameters
     from robolink.methods.beams import BeamsSource as BeamsSource
-    from robolink.methods.beams.procedure import measure_beams as measure_beams
+    from robolink.methods.beams import measure_beams as measure_beams
     from robolink.methods.beams.procedure import trace_beams as trace_beams
     from robolink.methods.beams.procedure import verify_by_crossing as verify_by_crossing
     from robolink.methods.board import BoardParameters as BoardParameters
@@ -113,14 +113,14 @@ if TYPE_CHECKING:
     from robolink.methods.two_pose import measure_two_pose as measure_two_pose
     from robolink.methods.z_touch import ZTouchParameters as ZTouchParameters
     from robolink.methods.z_touch import ZTouchSource as ZTouchSource
-    from robolink.methods.z_touch.procedure import measure_z_touch as measure_z_touch
+    from robolink.methods.z_touch import measure_z_touch as measure_z_touch
     from robolink.methods.z_touch.procedure import verify_by_touching as verify_by_touching
 else:
     __getattr__, __dir__, __all__ = lazy_exports(
         __name__,
         {
-            "beams": "BeamLine BeamsParameters BeamsSource",
-            "beams.procedure": "measure_beams trace_beams verify_by_crossing",
+            "beams": "BeamLine BeamsParameters BeamsSource measure_beams",
+            "beams.procedure": "trace_beams verify_by_crossing",
             "board": "BoardParameters BoardSource measure_board verify_board",
             "camera": "CameraParameters CameraSource measure_camera",
             "camera_affine": (
@@ -163,7 +163,7 @@ else:
             ),
             "surface_touch.survey": "PlaneSurvey SphereSurvey",
             "two_pose": "TwoPoseParameters TwoPoseSource TwoTouches measure_two_pose",
-            "z_touch": "ZTouchParameters ZTouchSource",
-            "z_touch.procedure": "measure_z_touch verify_by_touching",
+            "z_touch": "ZTouchParameters ZTouchSource measure_z_touch",
+            "z_touch.procedure": "verify_by_touching",
         },
     )

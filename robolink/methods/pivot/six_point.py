@@ -93,7 +93,11 @@ class SixPointSource(PivotSource):
         )
         return f"{self._touched}; {shown}"
 
-    def _measured(self, known: ToolOffset) -> Procedure[CalibrationResult]:
+    def steps(self, stored: ToolOffset | None) -> "Procedure[SixPointResult]":
+        """Return the steps of the measurement; see :func:`measure_six_point`."""
+        return self._measured(require_known_tip(stored))
+
+    def _measured(self, known: ToolOffset) -> "Procedure[SixPointResult]":
         from robolink.calibration import solve_six_point  # numpy
         from robolink.methods.pivot.procedure import pivot_then_lift
 
@@ -163,7 +167,7 @@ def measure_six_point(
     stored: ToolOffset,
     sigma_mm: float | None = None,
     sampling: SamplingPolicy = TAKE_ALL,
-) -> Procedure[CalibrationResult]:
+) -> "Procedure[SixPointResult]":
     """Measure a whole tool frame. Runs in Tool 0.
 
     The touches go as in :func:`measure_pivot`. Then the person shows the axes. A way that cannot

@@ -260,7 +260,7 @@ class SurfaceSampler(TiltedNames, ABC, Generic[SurveyT, ResultT]):
 
     def __init__(
         self,
-        source: SurfaceTouchSource[SurveyT],
+        source: SurfaceTouchSource[SurveyT, ResultT],
         stored: ToolOffset,
         touches: SurfaceTouches,
         first: TouchedAt,
@@ -381,14 +381,16 @@ class SurfaceKind(Generic[SurveyT, ResultT]):
     """
 
     sampler: Callable[
-        [SurfaceTouchSource[SurveyT], ToolOffset, SurfaceTouches, TouchedAt],
+        [SurfaceTouchSource[SurveyT, ResultT], ToolOffset, SurfaceTouches, TouchedAt],
         SurfaceSampler[SurveyT, ResultT],
     ]
     asked: Callable[[], str]
 
 
 def measure_surface(
-    source: SurfaceTouchSource[SurveyT], kind: SurfaceKind[SurveyT, ResultT], stored: ToolOffset
+    source: SurfaceTouchSource[SurveyT, ResultT],
+    kind: SurfaceKind[SurveyT, ResultT],
+    stored: ToolOffset,
 ) -> Procedure[ResultT]:
     """Measure a tip on a surface. Runs in Tool 0.
 
@@ -407,7 +409,7 @@ def measure_surface(
 
 
 def retake_on_surface(
-    source: SurfaceTouchSource[SurveyT],
+    source: SurfaceTouchSource[SurveyT, ResultT],
     kind: SurfaceKind[SurveyT, ResultT],
     stored: ToolOffset,
     *,

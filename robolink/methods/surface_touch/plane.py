@@ -77,7 +77,7 @@ class PlaneTouchParameters(SurfaceParameters):
 
 
 @dataclass(frozen=True, slots=True)
-class PlaneTouchSource(SurfaceTouchSource[PlaneSurvey]):
+class PlaneTouchSource(SurfaceTouchSource[PlaneSurvey, "PlaneTouchResult"]):
     """Measures by touching one plane with the tool upright and tilted."""
 
     @property
@@ -142,7 +142,7 @@ def measure_plane_touch(
     axes: int = 0,
     sigma_mm: float | None = None,
     sampling: SamplingPolicy = TAKE_ALL,
-) -> Procedure[CalibrationResult]:
+) -> "Procedure[PlaneTouchResult]":
     """Measure a tip on a plane. Runs in Tool 0.
 
     It ends lifted, over the place that was touched last, in the orientation in which it began.

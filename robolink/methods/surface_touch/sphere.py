@@ -84,7 +84,7 @@ class SphereTouchParameters(SurfaceParameters):
 
 
 @dataclass(frozen=True, slots=True)
-class SphereTouchSource(SurfaceTouchSource[SphereSurvey]):
+class SphereTouchSource(SurfaceTouchSource[SphereSurvey, "SphereTouchResult"]):
     """Measures by touching one sphere from several sides, the tool upright and tilted."""
 
     @property
@@ -153,7 +153,7 @@ def measure_sphere_touch(
     axes: int = 0,
     sigma_mm: float | None = None,
     sampling: SamplingPolicy = TAKE_ALL,
-) -> Procedure[CalibrationResult]:
+) -> "Procedure[SphereTouchResult]":
     """Measure a tip on a sphere. Runs in Tool 0.
 
     It ends lifted, over the place that was touched last, in the orientation in which it began.

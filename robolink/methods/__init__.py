@@ -95,7 +95,7 @@ if TYPE_CHECKING:
     from robolink.methods.shared_parameters import LookParameters as LookParameters
     from robolink.methods.shared_parameters import PinParameters as PinParameters
     from robolink.methods.shared_parameters import UprightPinParameters as UprightPinParameters
-    from robolink.methods.station_learning import learn_station as learn_station
+    from robolink.methods.station_reference import learn_station as learn_station
     from robolink.methods.surface_touch import SurfaceParameters as SurfaceParameters
     from robolink.methods.surface_touch.plane import PlaneTouches as PlaneTouches
     from robolink.methods.surface_touch.plane import PlaneTouchParameters as PlaneTouchParameters
@@ -153,7 +153,7 @@ else:
             "runout_table": "AllRoundPlan RunoutTableParameters RunoutTableSource",
             "runout_table_procedure": "measure_runout_table",
             "shared_parameters": "LookParameters PinParameters UprightPinParameters",
-            "station_learning": "learn_station",
+            "station_reference": "learn_station",
             "surface_touch": "SurfaceParameters",
             "surface_touch.plane": (
                 "PlaneTouchParameters PlaneTouchSource PlaneTouches measure_plane_touch"

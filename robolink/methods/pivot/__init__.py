@@ -36,7 +36,7 @@ from robolink.stations import StationKind
 if TYPE_CHECKING:
     from robolink.methods.pivot.procedure import TiltTest
     from robolink.methods.pivot.tilts import Tilt
-    from robolink.procedures import KeptProof, PoseMethod, TipSource
+    from robolink.procedures import KeptProof, TipSource
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,7 +127,7 @@ class PivotSource(PinSource):
     ) -> "TiltTest":
         """Return the tilt test; see :class:`~robolink.procedures.KeepsProof`."""
         from robolink.methods.pivot.procedure import TiltTest  # numpy
-        from robolink.procedures.tilting_proof import upright_of
+        from robolink.procedures.tilt_proof import upright_of
 
         x_mm, y_mm, z_mm = result.reference_point_mm
         return TiltTest(
@@ -301,10 +301,6 @@ def _source(parameters: PivotParameters, site: Site) -> "TipSource":
     )
 
 
-def _from_poses(_parameters: PivotParameters, site: Site) -> "PoseMethod":
-    return PivotTouches(site.sigma_mm)
-
-
 def _proof() -> "type[KeptProof]":
     from robolink.methods.pivot.procedure import TiltTest
 
@@ -328,7 +324,7 @@ METHOD = Method(
     measures=("x_mm", "y_mm", "z_mm"),
     needs=Needs(station=StationKind.PIN, named=False, finds_pin=True, tilt=True),
     source=_source,
-    from_poses=_from_poses,
+    from_poses=lambda _parameters, site: PivotTouches(site.sigma_mm),
     pose_help=PoseHelp(
         points=declared("Three points or more taught on the pendant, the tool tilted and turned."),
         typed=declared("A pose X,Y,Z,U,V,W in mm and degrees; give it three times or more."),

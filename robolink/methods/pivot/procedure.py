@@ -39,7 +39,7 @@ from robolink.procedures import (
     resume_samples,
     sample_sequentially,
 )
-from robolink.procedures.tilting_proof import TiltingProof, Vector
+from robolink.procedures.tilt_proof import TiltingProof, Vector
 from robolink.runner import Notify, Procedure, TouchedAt
 
 

@@ -18,6 +18,7 @@ from robolink.methods.pivot.tilts import (
     TiltedNames,
     apart_deg,
     tilt_in_air,
+    tip_place,
 )
 from robolink.methods.surface_touch import SurfaceTouchSource
 from robolink.methods.surface_touch.survey import SurveyT, Vector
@@ -169,13 +170,7 @@ def in_turn(spots: Iterable[SurfaceSpot]) -> list[SurfaceSpot]:
 
 def places_of(touches: Sequence[Pose], tip: ToolOffset) -> list[Vector]:
     """Return where a tip was at touches, base."""
-    places = []
-    for touch in touches:
-        x, y, z = (
-            np.array(touch.coordinates()[:3]) + rotation_of(touch) @ tip.components()[:3]
-        ).tolist()
-        places.append((x, y, z))
-    return places
+    return [tip_place(touch, tip) for touch in touches]
 
 
 def proving_spots(over: OverPin, possible: Sequence[SurfaceSpot]) -> tuple[SurfaceSpot, ...]:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from robolink.calibration import PlaneTouchResult
     from robolink.methods.surface_touch.drive import SurfaceKind
     from robolink.methods.surface_touch.plane_procedure import PlaneTest
-    from robolink.procedures import KeptProof, PoseMethod, TipSource
+    from robolink.procedures import KeptProof, TipSource
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,7 +111,7 @@ class PlaneTouchSource(SurfaceTouchSource[PlaneSurvey, "PlaneTouchResult"]):
         """
         from robolink.calibration import PlaneTouchResult
         from robolink.methods.surface_touch.plane_procedure import PlaneTest  # numpy
-        from robolink.procedures.tilting_proof import upright_of
+        from robolink.procedures.tilt_proof import upright_of
 
         if not isinstance(result, PlaneTouchResult):
             raise TypeError("the plane that was touched is a part of the result")
@@ -211,10 +211,6 @@ def _source(parameters: PlaneTouchParameters, site: Site) -> "TipSource":
     )
 
 
-def _from_poses(_parameters: PlaneTouchParameters, site: Site) -> "PoseMethod":
-    return PlaneTouches(site.sigma_mm)
-
-
 def _proof() -> "type[KeptProof]":
     from robolink.methods.surface_touch.plane_procedure import PlaneTest
 
@@ -238,7 +234,7 @@ METHOD = Method(
     measures=("x_mm", "y_mm", "z_mm"),
     needs=Needs(station=StationKind.TOUCH, named=False, tilt=True),
     source=_source,
-    from_poses=_from_poses,
+    from_poses=lambda _parameters, site: PlaneTouches(site.sigma_mm),
     pose_help=PoseHelp(
         points=declared("Seven points or more taught on the pendant, the tool upright and tilted."),
         typed=declared("A pose X,Y,Z,U,V,W in mm and degrees; give it seven times or more."),

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from robolink.calibration import SphereTouchResult
     from robolink.methods.surface_touch.drive import SurfaceKind
     from robolink.methods.surface_touch.sphere_procedure import SphereTest
-    from robolink.procedures import KeptProof, PoseMethod, TipSource
+    from robolink.procedures import KeptProof, TipSource
 
 
 _USUAL_MM = 10.0
@@ -121,7 +121,7 @@ class SphereTouchSource(SurfaceTouchSource[SphereSurvey, "SphereTouchResult"]):
             SphereTest,
             TouchedSphere,
         )
-        from robolink.procedures.tilting_proof import upright_of
+        from robolink.procedures.tilt_proof import upright_of
 
         if not isinstance(result, SphereTouchResult):
             raise TypeError("the sphere that was touched is a part of the result")
@@ -225,10 +225,6 @@ def _source(parameters: SphereTouchParameters, site: Site) -> "TipSource":
     )
 
 
-def _from_poses(_parameters: SphereTouchParameters, site: Site) -> "PoseMethod":
-    return SphereTouches(site.sigma_mm)
-
-
 def _proof() -> "type[KeptProof]":
     from robolink.methods.surface_touch.sphere_procedure import SphereTest
 
@@ -252,7 +248,7 @@ METHOD = Method(
     measures=("x_mm", "y_mm", "z_mm"),
     needs=Needs(station=StationKind.TOUCH, named=False, tilt=True),
     source=_source,
-    from_poses=_from_poses,
+    from_poses=lambda _parameters, site: SphereTouches(site.sigma_mm),
     pose_help=PoseHelp(
         points=declared(
             "Eight points or more taught on the pendant from several sides, the tool tilted."

@@ -236,17 +236,23 @@ def require_known_tip(stored: ToolOffset | None) -> ToolOffset:
 
 
 @dataclass(frozen=True, slots=True)
-class PivotTouches:
-    """Touches of one pin with six axes, the tool tilted and turned.
+class TiltedTouches:
+    """Touches that exist already, the tool turned and tilted.
 
     Attributes:
-        sigma_mm: Standard deviation of one coordinate of one touch, where it is known.
+        sigma_mm: Standard deviation of one touch, where it is known: of one coordinate at a pin,
+            along the normal on a surface.
     """
 
     upright: ClassVar[bool] = False
     needs: ClassVar[tuple[str, ...]] = ("z_mm", "v_deg", "w_deg")
 
     sigma_mm: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class PivotTouches(TiltedTouches):
+    """Touches of one pin with six axes, the tool tilted and turned."""
 
     def solve(self, flange: Sequence[Pose], stored: ToolOffset | None) -> CalibrationResult:
         """Solve three poses and more; see :class:`~robolink.procedures.PoseMethod`."""

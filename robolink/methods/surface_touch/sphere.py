@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated
 
 from annotated_types import Ge, Le
 
@@ -10,6 +10,7 @@ from robolink.calibration import HIGHEST_MM, CalibrationResult
 from robolink.files.toml import Problem
 from robolink.messages import declared, tr
 from robolink.methods.method import MM, Check, Help, Method, Needs, Option, PoseHelp, Site
+from robolink.methods.pivot import TiltedTouches
 from robolink.methods.surface_touch import SurfaceParameters, SurfaceTouchSource
 from robolink.methods.surface_touch.survey import SphereSurvey
 from robolink.model import Pose, ToolOffset
@@ -193,17 +194,8 @@ def measure_sphere_touch(
 
 
 @dataclass(frozen=True, slots=True)
-class SphereTouches:
-    """Touches of one sphere from several sides, the tool upright, turned and tilted.
-
-    Attributes:
-        sigma_mm: Standard deviation of one touch along the normal, where it is known.
-    """
-
-    upright: ClassVar[bool] = False
-    needs: ClassVar[tuple[str, ...]] = ("z_mm", "v_deg", "w_deg")
-
-    sigma_mm: float | None = None
+class SphereTouches(TiltedTouches):
+    """Touches of one sphere from several sides, the tool upright, turned and tilted."""
 
     def solve(self, flange: Sequence[Pose], stored: ToolOffset | None) -> CalibrationResult:
         """Solve eight poses and more; see :class:`~robolink.procedures.PoseMethod`."""

@@ -1,13 +1,14 @@
-"""Procedures followed on paper: each step and where it leads, while nothing moves."""
+"""A procedure walked through on paper: its movements, and what stands in the way of the arm."""
 
 from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import repeat
+from itertools import repeat, starmap
 from typing import TypeVar
 
+from robolink.calibration import tip_pose
 from robolink.errors import CalibrationError, LimitError
 from robolink.messages import tr
-from robolink.model import Path, Pose, Spot, SpotUnit
+from robolink.model import Controller, MotionGroup, Path, Pose, Spot, SpotUnit, ToolOffset
 from robolink.runner._steps import (
     Ask,
     Confirm,
@@ -164,3 +165,42 @@ def first_clear(
             "places."
         ),
     )
+
+
+@dataclass(frozen=True, slots=True)
+class ArmAhead:
+    """What an arm says about movements of its flange that nobody has made yet.
+
+    Attributes:
+        group: The arm.
+        tool: The tool in force now, for which its controller answers.
+        selected: Its offset.
+    """
+
+    group: MotionGroup
+    tool: int
+    selected: ToolOffset | None
+
+    @classmethod
+    def of(cls, controller: Controller) -> "ArmAhead":
+        """Return the arm of a controller, with the tool that is in force."""
+        group = controller.groups[0]
+        tool = group.pose().tool or 0
+        return cls(group, tool, controller.tools.read(tool) if tool else None)
+
+    def considered(self, step: Consider, *, known: bool) -> tuple[str, ...]:
+        """Answer what a procedure wants to know; nothing where its places are not known."""
+        # Where a person will have brought the tip is not known, so neither what is in the way.
+        if not known:
+            return nothing_in_the_way(step, known=known)
+        return tuple(starmap(self.obstacle, considered(step)))
+
+    def obstacle(self, move: Move, start: Pose | None) -> str:
+        """Return why the arm cannot make a movement of the flange, empty where it can."""
+        begin = None if start is None else self._tip(start)
+        return self.group.obstacle(self._tip(move.target), move.path, start=begin)
+
+    def _tip(self, flange: Pose) -> Pose:
+        if self.selected is None:
+            return flange
+        return tip_pose(flange, self.selected, tool=self.tool)

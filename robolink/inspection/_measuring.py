@@ -1,9 +1,9 @@
 """Measures by a sensor where tips are, and compares that with the stored values."""
 
+from robolink.calibration_run import RecipeRun
 from robolink.errors import CalibrationError
 from robolink.inspection._findings import InspectionCode, InspectionFinding
 from robolink.messages import tr
-from robolink.recipe import RecipeRun
 
 
 def measured_findings(run: RecipeRun) -> tuple[InspectionFinding, ...]:

@@ -1,16 +1,17 @@
-"""What a person is asked, and what was answered beforehand."""
+"""What was answered beforehand of what a recipe asks."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
-from robolink.errors import ConfigError, DeclinedError
+from robolink.errors import DeclinedError
 from robolink.messages import tr
 from robolink.model import AnsweredBy
-from robolink.procedures import MeasurementContext
-from robolink.recipe.file.recipe import Recipe
-from robolink.recipe.file.tables import Prompt
-from robolink.runner import MOST_REFUSED, parse_decimal
 from robolink.ways import Way, way
+
+if TYPE_CHECKING:
+    from robolink.recipe._recipe import Recipe
+    from robolink.recipe._tables import Prompt
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +35,7 @@ class Answers:
     z_mm: Mapping[int, float] = field(default_factory=dict)
     early: Mapping[tuple[int, int | None], str] = field(default_factory=dict)
 
-    def prepared(self, number: int, prompt: Prompt, tool: int | None = None) -> str | None:
+    def prepared(self, number: int, prompt: "Prompt", tool: int | None = None) -> str | None:
         """Return the answer that was given beforehand, ``None`` when there is none.
 
         Args:
@@ -60,7 +61,7 @@ class Answers:
             return self.lot or None
         return self.texts.get(number)
 
-    def given_by(self, number: int, prompt: Prompt, tool: int | None = None) -> AnsweredBy:
+    def given_by(self, number: int, prompt: "Prompt", tool: int | None = None) -> AnsweredBy:
         """Return how a prompt was answered beforehand.
 
         Args:
@@ -77,7 +78,7 @@ class Answers:
             return AnsweredBy.PERSON
         return AnsweredBy.YES if prompt.answer == "yes" else AnsweredBy.OPTION
 
-    def ids_wanted(self, recipe: Recipe) -> Iterator[tuple[int, Prompt, int | None]]:
+    def ids_wanted(self, recipe: "Recipe") -> Iterator[tuple[int, "Prompt", int | None]]:
         """Yield the prompts for ids that nobody has answered, with the tool each is asked for."""
         for number, prompt in enumerate(recipe.prompts, start=1):
             if prompt.answer not in ("nozzle", "lot"):
@@ -89,7 +90,7 @@ class Answers:
                 if self.prepared(number, prompt, tool) is None:
                     yield number, prompt, tool
 
-    def missing(self, recipe: Recipe) -> Iterator[str]:
+    def missing(self, recipe: "Recipe") -> Iterator[str]:
         """Yield what nobody answered beforehand, as what would."""
         for number, prompt in enumerate(recipe.prompts, start=1):
             if self.prepared(number, prompt) is None:
@@ -102,7 +103,7 @@ class Answers:
                     yield way(Way.HEIGHT, tool=tool.number)
 
 
-def require_answers(answers: Answers, recipe: Recipe) -> None:
+def require_answers(answers: Answers, recipe: "Recipe") -> None:
     """Refuse, before anything is sent, to run where a question would find nobody.
 
     Raises:
@@ -116,95 +117,7 @@ def require_answers(answers: Answers, recipe: Recipe) -> None:
         )
 
 
-def ask_prompt(context: MeasurementContext, prompt: Prompt, tool: int | None = None) -> str:
-    """Put a question of the recipe to the person and return the answer, which is on record then.
-
-    Args:
-        context: What asks.
-        prompt: The question.
-        tool: The tool that it is asked for, ``None`` for the whole change.
-
-    Raises:
-        DeclinedError: A yes was needed.
-
-    Example:
-        >>> from robolink.nozzle_change import Limits
-        >>> from robolink.procedures import MeasurementContext
-        >>> from robolink.recipe import Prompt
-        >>> from robolink.recipe._answers import ask_prompt
-        >>> from robolink.testing import MemoryController
-        >>> class Person:  # implements robolink.Operator
-        ...     def ask(self, question, kind): ...
-        ...     def poll(self, wait_s):
-        ...         return "N-0815"
-        >>> with MemoryController() as controller:
-        ...     settings = Limits().settings
-        ...     context = MeasurementContext(controller, Person(), start=None, settings=settings)
-        ...     ask_prompt(context, Prompt(at="start", text="Which nozzle?", answer="nozzle"))
-        'N-0815'
-    """
-    runner = context.runner(tool=tool)
-    if prompt.answer != "yes":
-        return runner.ask_text(prompt.text)
-    if not runner.confirm(prompt.text):
-        raise DeclinedError(
-            tr("{question!r} was answered with no.", question=prompt.text),
-            remedy=tr("Nothing was written. Start again when the answer is yes."),
-        )
-    return "yes"
-
-
-def ask_height(context: MeasurementContext, tool: int, name: str) -> float:
-    """Ask for Z of a new tip, mm from the flange.
-
-    Raises:
-        DeclinedError: No number was typed, however often it was asked.
-    """
-    runner = context.runner(tool=tool)
-    for _ in range(MOST_REFUSED):
-        text = runner.ask_text(height_question(tool, name))
-        try:
-            return parse_decimal(text)
-        except ConfigError as error:
-            context.operator.tell(str(error))
-    raise DeclinedError(
-        tr(
-            "No number was typed for Z of tool {tool}, although it was asked several times.",
-            tool=tool,
-        ),
-        remedy=tr("Nothing was written. Start again with the length of the new tip at hand."),
-    )
-
-
-def height_question(tool: int, name: str) -> str:
-    """Return the question for Z of a new tip."""
-    return tr("Z of the new tip of tool {tool} {name} in mm from the flange?", tool=tool, name=name)
-
-
-def length_question(tool: int, name: str) -> str:
-    """Return the question whether Z may stay as it is."""
-    return tr(
-        "Z of tool {tool} {name} is not measured and stays. Is the new tip exactly as long "
-        "as the old one?",
-        tool=tool,
-        name=name,
-    )
-
-
-def confirm_height(context: MeasurementContext, tool: int, name: str) -> None:
-    """Ask whether the new tip is as long as the old one.
-
-    Raises:
-        DeclinedError: It is not.
-    """
-    if not context.runner(tool=tool).confirm(length_question(tool, name)):
-        raise DeclinedError(
-            tr("The new tip of tool {tool} is not as long as the old one.", tool=tool),
-            remedy=tr('Nothing was written. Use a recipe with z = "typed" or "measured".'),
-        )
-
-
-def _option(number: int, prompt: Prompt) -> str:
+def _option(number: int, prompt: "Prompt") -> str:
     if prompt.answer == "yes":
         return way(Way.YES)
     if prompt.answer == "nozzle":

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from robolink.calibration import Beam, BoardDrawing, Pin, rotation_of, tip_pose, uvw_deg
+from robolink.calibration_run import Limits
 from robolink.methods import (
     Absolute,
     AllRoundPlan,
@@ -37,7 +38,6 @@ from robolink.methods import (
 from robolink.methods.plane_touch.proof import PlaneTest
 from robolink.methods.sphere_touch.proof import SphereTest
 from robolink.model import Path, Pose, SpotUnit, ToolOffset
-from robolink.nozzle_change import Limits
 from robolink.procedures import MeasurementContext, TouchPlan
 from robolink.procedures.pin.tilting_proof import TiltingProof
 from robolink.runner import Ask, Move, TouchedAt

@@ -12,10 +12,10 @@ from robolink_simulators.assist.acts import perform
 from robolink_simulators.assist.port import InProcessEyes
 
 import robolink
+from robolink.calibration_run import AcceptanceCriteria, ChangePlan, NozzleChange, ToolPlan
 from robolink.errors import CalibrationError, VerifyError
 from robolink.methods import NAngleSource, TwoPoseSource
 from robolink.model import EntryKind
-from robolink.nozzle_change import AcceptanceCriteria, ChangePlan, NozzleChange, ToolPlan
 from robolink.procedures import TouchPlan
 from robolink.runner import TouchedAt
 from tests.contract._method_cell import method_cell, on

@@ -215,7 +215,7 @@ DEFECTS: Final = (
         "who only presses ENTER gets a proof",
         {
             "robolink.procedures.pin.touch_plan.TouchPlan.__init__": stand_ins.nominal,
-            "robolink.nozzle_change._turn_verdict.require_proved": stand_ins.nothing,
+            "robolink.calibration_run._turn_test.require_proved": stand_ins.nothing,
         },
         found_by="careless people",
     ),

@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final
 
+from robolink.calibration_run import ChangeReport, WriteSubject
 from robolink.model import Pose
-from robolink.nozzle_change import ChangeReport, WriteSubject
 from robolink.runner import FINEST_STEP, FitSubject, JogRange, Question, TouchSubject
 from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.happenings import Reading, WasAsked, WizardCommand

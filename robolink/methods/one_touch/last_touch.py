@@ -71,7 +71,7 @@ def find_last_touch(controller: Controller, tool: int, station: str) -> LastTouc
     Example:
         >>> from robolink.methods import PointsSource, find_last_touch
         >>> from robolink.model import Pose, ToolOffset
-        >>> from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
+        >>> from robolink.calibration_run import ChangePlan, NozzleChange, ToolPlan
         >>> from robolink.testing import MemoryController, MemoryMachine
         >>> class Nobody:  # implements robolink.Operator
         ...     def tell(self, text): ...

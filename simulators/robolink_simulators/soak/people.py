@@ -8,6 +8,7 @@ from typing import Final
 
 from robolink_cli.prompts.operator import AssistedOperator
 
+from robolink.calibration_run import ChangePlan, ChangeReport, NozzleChange, ToolPlan
 from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.errors import NotReadyError, RobolinkError
 from robolink.model import (
@@ -20,7 +21,6 @@ from robolink.model import (
     WorkBox,
     read_offset,
 )
-from robolink.nozzle_change import ChangePlan, ChangeReport, NozzleChange, ToolPlan
 from robolink.runner import Question
 from robolink.timing import Clock
 from robolink.transaction import Wanted, change_tools, plan_undo, recover, undo

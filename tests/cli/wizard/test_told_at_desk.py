@@ -34,12 +34,12 @@ from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 import robolink
 from robolink.backup import keep_first_backup, load, save
+from robolink.calibration_run import ChangeReport, Moment
 from robolink.config import find_cell
 from robolink.errors import ConfigError, DeclinedError, NotReadyError
 from robolink.journal import memory_journal, open_log
 from robolink.model import EntryKind, NewEntry, Pose, Signature, ToolOffset, describe_offset
 from robolink.model import Path as Way
-from robolink.nozzle_change import ChangeReport, Moment
 from robolink.recipe import load_recipe
 from robolink.runner import MoveSubject, Question
 from robolink.stations import StationKind

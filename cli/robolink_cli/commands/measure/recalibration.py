@@ -3,11 +3,11 @@
 from collections.abc import Callable, Mapping
 
 from robolink.backup import keep_first_backup
+from robolink.calibration_run import ChangeReport, RecipeRun, preview
 from robolink.errors import DeclinedError
 from robolink.messages import tr
 from robolink.model import AnsweredBy, Controller
-from robolink.nozzle_change import ChangeReport, preview
-from robolink.recipe import Answers, LoadedRecipe, RecipeRun, require_answers
+from robolink.recipe import Answers, LoadedRecipe, require_answers
 from robolink.transaction import Order
 from robolink_cli.access.capabilities import io_of
 from robolink_cli.commands.measure.recipe_events import EventStream, Progress

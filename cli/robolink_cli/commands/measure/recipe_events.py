@@ -7,10 +7,10 @@ from contextlib import contextmanager
 import click
 
 from robolink.calibration import VerifyResult
+from robolink.calibration_run import Listener, Moment, Proposal
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import ToolReceipt
-from robolink.nozzle_change import Listener, Moment, Proposal
 from robolink.procedures import MeasurementContext
 from robolink.runner import Ask, Confirm, Notify, StepDone, TakenStep
 from robolink_cli.console.exit_codes import error_body, exit_code

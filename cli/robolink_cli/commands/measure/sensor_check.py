@@ -3,12 +3,13 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from robolink.calibration_run import RecipeRun
 from robolink.config import Cell
 from robolink.errors import ConfigError, DeclinedError
 from robolink.inspection import InspectionFinding, measured_findings
 from robolink.messages import tr
 from robolink.model import Controller
-from robolink.recipe import LoadedRecipe, RecipeRun, load_recipe
+from robolink.recipe import LoadedRecipe, load_recipe
 from robolink_cli.prompts.operator import terminal
 from robolink_cli.prompts.questions import on_terminal
 from robolink_cli.session.motion_consent import agree_to_motion, motion_question

@@ -4,10 +4,10 @@ import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
+from robolink.calibration_run import ToolReport
 from robolink.errors import CalibrationError, VerifyError
 from robolink.messages import tr
 from robolink.model import ToolOffset
-from robolink.nozzle_change import ToolReport
 from robolink_cli.console.render import say
 from robolink_cli.views.calibration import report_payload, show_report
 from robolink_cli.views.documents import offset_payload

@@ -13,11 +13,7 @@ from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 import robolink
-from robolink.errors import CalibrationError, VerifyError
-from robolink.journal import memory_journal
-from robolink.messages import tr
-from robolink.model import Controller
-from robolink.nozzle_change import (
+from robolink.calibration_run import (
     ChangePlan,
     Listener,
     NozzleChange,
@@ -25,6 +21,10 @@ from robolink.nozzle_change import (
     ToolPlan,
     ToolReport,
 )
+from robolink.errors import CalibrationError, VerifyError
+from robolink.journal import memory_journal
+from robolink.messages import tr
+from robolink.model import Controller
 from robolink_cli.commands.simulate.demonstrated import (
     TOOL,
     AcceptedChange,

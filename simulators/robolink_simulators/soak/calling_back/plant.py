@@ -3,9 +3,9 @@
 import random
 from typing import Final, cast
 
+from robolink.calibration_run import ChangeReport
 from robolink.errors import JournalError, NotReadyError, NotReadyReason, RobolinkError
 from robolink.model import Controller, OutcomeLog, ToolOffset
-from robolink.nozzle_change import ChangeReport
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.cell.workplace import exchanged
 from robolink_simulators.cell.world_parameters import WorldParameters

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final, Protocol
 
+from robolink.calibration_run import ChangeReport
 from robolink.model import Controller, OutcomeLog, ToolOffset
-from robolink.nozzle_change import ChangeReport
 from robolink_simulators.assist.port import InProcessEyes
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.cell.frames import Frame

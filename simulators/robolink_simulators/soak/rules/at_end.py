@@ -5,6 +5,7 @@ from typing import Final
 
 from robolink_cli.console.exit_codes import BUG, UNKNOWN, exit_code
 
+from robolink.calibration_run import ChangeReport
 from robolink.errors import (
     ConfigError,
     LeaseLostError,
@@ -13,7 +14,6 @@ from robolink.errors import (
     TransportError,
 )
 from robolink.model import ToolOffset
-from robolink.nozzle_change import ChangeReport
 from robolink.standing import Effect, standing_after
 from robolink_simulators.soak.books import BookedMarker
 from robolink_simulators.soak.computer import VirtualProcess

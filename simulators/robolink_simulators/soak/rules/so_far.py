@@ -4,8 +4,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Final
 
+from robolink.calibration_run import ChangeReport
 from robolink.model import ToolOffset
-from robolink.nozzle_change import ChangeReport
 from robolink_simulators.soak.books import BookedMarker, Books
 from robolink_simulators.soak.history import Hour
 from robolink_simulators.soak.people import Wish

@@ -75,7 +75,7 @@ class RecipeRun:
         >>> import robolink
         >>> from robolink.calibration_run import RecipeRun
         >>> from robolink.recipe import load_recipe
-        >>> from robolink_simulators.testkit.recipes import written_recipe
+        >>> from robolink_simulators.testkit.operator import written_recipe
         >>> with robolink.connect("epson+sim://recipe-example") as controller:
         ...     loaded = load_recipe(written_recipe(Path.cwd()))
         ...     run = RecipeRun(controller, loaded, operator=None)

@@ -11,8 +11,8 @@ from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, create_
 from pydantic_core import CoreSchema
 
 from robolink.methods import AnyMethod, Help, MethodParameters, Unit, all_methods, fields_of
-from robolink.methods.declaration.fields import ParameterField as Parameter
-from robolink.methods.declaration.fields import bare
+from robolink.methods.parameter_checks import ParameterField as Parameter
+from robolink.methods.parameter_checks import bare
 from robolink.model import Pose, WorkBox
 
 Line = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")]

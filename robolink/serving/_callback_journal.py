@@ -26,6 +26,7 @@ from robolink.timing import wall_label
 if TYPE_CHECKING:
     from robolink.journal import JournalOutcomeLog
 
+
 CALLED_BACK: Final = "called_back"
 _PROVED: Final = "proved"
 _UNSET: Final = frozenset({"-", "0"})

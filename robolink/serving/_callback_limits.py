@@ -12,6 +12,7 @@ from robolink.model import Pose, ToolOffset
 if TYPE_CHECKING:
     from robolink.calibration import AccuracyFacts, CalibrationResult
 
+
 MOST_POSES: Final = 64
 
 _SAME_MM: Final = 0.002

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, ClassVar, Final
 from robolink.errors import CalibrationError, RemoteProtocolError
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset, angle_difference_deg
-from robolink.serving._judging import CallbackLimits, require_poses_sent, require_room
+from robolink.serving._callback_limits import CallbackLimits, require_poses_sent, require_room
 
 if TYPE_CHECKING:
     from robolink.calibration import CalibrationResult, Crossing, VerifyResult
     from robolink.methods.beams.crossings import CrossingSolver
     from robolink.stations import BeamStation
+
 
 LEAST_CROSSINGS: Final = 8
 """Each beam both ways, twice: once would leave no residual that could contradict."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar, Final
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
-from robolink.serving._judging import (
+from robolink.serving._callback_limits import (
     CallbackLimits,
     require_own,
     require_poses_sent,
@@ -18,6 +18,7 @@ from robolink.serving._judging import (
 if TYPE_CHECKING:
     from robolink.calibration import CalibrationResult, VerifyResult
     from robolink.procedures import PoseMethod
+
 
 LEAST_TOUCHES: Final = 4
 """With three touches of a circle little contradicts a wrong one, and nobody looks on."""

@@ -132,11 +132,28 @@ class NozzleChange:
                 put back.
             RobolinkError: Anything else that ended it, with the state it left.
         """
+        require_clearance(self._plan)
+        require_inputs(self._controller, self._plan)
+        with self._begun():
+            self._require_possible(write=write)
+            context = self._context(write=write)
+            measuring = Measuring(context, self._listener)
+            self._simulated = measuring.simulated
+            measuring.go_to(self._plan.safe, tr("Moving to the safe pose."))
+            self._listener.moment(Moment.START, context)
+            measured = [(one, measuring.propose(one)) for one in self._plan.tools]
+            proposals = self._agreed(context, measuring, measured, write=write)
+            reports = self._write(context, proposals) if write else _unwritten(proposals)
+            measuring.go_to(self._plan.safe, tr("Moving to the safe pose."))
+            self._listener.moment(Moment.END, context)
+            return self._report(reports)
+
+    @contextmanager
+    def _begun(self) -> Iterator[None]:
+        """Watch over the change; put tool, power mode and speed back whatever ends it."""
         numbers = ", ".join(str(plan.tool) for plan in self._plan.tools)
         reason = tr("calibrate tool {tool}", tool=numbers)
         controller = self._controller
-        require_clearance(self._plan)
-        require_inputs(controller, self._plan)
         controller.outcomes.change = new_operation()
         self._began_ns = controller.clock.now_ns()
         self._plan = replace(
@@ -147,7 +164,7 @@ class NozzleChange:
                 controller.latch.watching(reason),
                 controller.preserved(reason) if self._plan.moves else nullcontext(),
             ):
-                return self._carry_out(write=write)
+                yield
         except (KeyboardInterrupt, StoppedError):
             if self._written is not None and self._written.kept:
                 self._tell(tr("Tool {tool} keeps the new value.", tool=numbers))
@@ -156,40 +173,28 @@ class NozzleChange:
             self._accepted.close()
             controller.outcomes.change = ""
 
-    def _carry_out(self, *, write: bool) -> ChangeReport:
+    def _require_possible(self, *, write: bool) -> None:
+        """Say what the write would be refused for before a person has measured anything."""
         if write:
-            # What the write would be refused for is said before a person has measured anything.
             for one in self._plan.tools:
                 self._controller.tools.require_writable(one.tool)
             require_measurable(self._controller, self._plan)
         require_contacts(self._controller, self._plan)
         require_motion(self._controller, self._plan)
-        plan, listener, context = self._plan, self._listener, self._context(write=write)
-        measuring = Measuring(context, listener)
-        self._simulated = measuring.simulated
-        measuring.go_to(plan.safe, tr("Moving to the safe pose."))
-        listener.moment(Moment.START, context)
-        proposals = self._agreed(context, measuring, write=write)
-        if write:
-            reports = self._write(context, proposals)
-        else:
-            reports = tuple(
-                ToolReport(proposal, None, None, one.criteria.verdicts(proposal))
-                for one, proposal in proposals
-            )
-        measuring.go_to(plan.safe, tr("Moving to the safe pose."))
-        listener.moment(Moment.END, context)
-        return self._report(reports)
 
     def _report(self, tools: tuple[ToolReport, ...]) -> ChangeReport:
         outcomes = self._controller.outcomes
         return ChangeReport(outcomes.change, tools, outcomes.signature.role, self._simulated)
 
     def _agreed(
-        self, context: MeasurementContext, measuring: Measuring, *, write: bool
+        self,
+        context: MeasurementContext,
+        measuring: Measuring,
+        measured: Proposals,
+        *,
+        write: bool,
     ) -> Proposals:
-        """Measure, and return what is to be written; a person may go back to the touches."""
-        measured: Proposals = [(one, measuring.propose(one)) for one in self._plan.tools]
+        """Return what is to be written of what was measured; a person may go back to touches."""
         for left in reversed(range(MOST_FURTHER + 1)):
             proposals = self._checked(context, measured, write=write)
             self._listener.proposed([proposal for _, proposal in proposals])
@@ -431,3 +436,10 @@ class NozzleChange:
     def _tell(self, sentence: str) -> None:
         self._operator.tell(sentence)
         self._listener.told(sentence)
+
+
+def _unwritten(proposals: Proposals) -> tuple[ToolReport, ...]:
+    return tuple(
+        ToolReport(proposal, None, None, plan.criteria.verdicts(proposal))
+        for plan, proposal in proposals
+    )

@@ -1,7 +1,7 @@
 """One run of a recipe: preflight, then the nozzle change with all that the recipe adds."""
 
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -209,18 +209,8 @@ class RecipeRun:
         """
         if not self._looked_ahead:
             self.preflight()
-        outcomes, loaded = self._controller.outcomes, self._loaded
-        before = outcomes.signature
-        outcomes.signature = replace(
-            before,
-            recipe=loaded.name,
-            recipe_hash=loaded.sha256,
-            station=loaded.recipe.station.id,
-            nozzle=self._answers.nozzle,
-            lot=self._answers.lot,
-        )
         listener = RecipeListener(
-            loaded.recipe,
+            self._loaded.recipe,
             self._controller,
             self._answers,
             references={} if self.takes_reference else self._references,
@@ -238,8 +228,32 @@ class RecipeRun:
             order=self._order,
             describe=self._describe,
         )
-        try:
+        with self._signed(), self._outputs_told(listener):
             return change.run(write=not (self.takes_reference or self._measure_only))
+
+    @contextmanager
+    def _signed(self) -> Iterator[None]:
+        """Have every entry name the recipe, the station, the nozzle and its lot."""
+        outcomes, loaded = self._controller.outcomes, self._loaded
+        before = outcomes.signature
+        outcomes.signature = replace(
+            before,
+            recipe=loaded.name,
+            recipe_hash=loaded.sha256,
+            station=loaded.recipe.station.id,
+            nozzle=self._answers.nozzle,
+            lot=self._answers.lot,
+        )
+        try:
+            yield
+        finally:
+            outcomes.signature = before
+
+    @contextmanager
+    def _outputs_told(self, listener: RecipeListener) -> Iterator[None]:
+        """Say how the outputs were left, whatever ends the run early."""
+        try:
+            yield
         except RobolinkError as error:
             sentences = (error.remedy, self._outputs_left(listener))
             error.remedy = joined(" ", filter(None, sentences))
@@ -248,8 +262,6 @@ class RecipeRun:
             if said := self._outputs_left(listener):
                 self._operator.tell(said)
             raise
-        finally:
-            outcomes.signature = before
 
     def _outputs_left(self, listener: RecipeListener) -> str:
         """Say how the outputs were left.

@@ -1,6 +1,8 @@
 """One run of a recipe from the command line."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 
 from robolink.backup import keep_first_backup
 from robolink.calibration_run import ChangeReport, RecipeRun, preview
@@ -23,116 +25,130 @@ from robolink_cli.session.ordering import ordered, show_done, with_order
 from robolink_cli.views.fit import report_payload, show_report
 from robolink_cli.views.planned_steps import steps_payload
 
-_Show = Callable[[dict[str, object]], None]
-"""Shows a document to a person."""
 
+@dataclass(frozen=True, slots=True)
+class RunOptions:
+    """What was typed for one run of a recipe.
 
-class Recalibration:
-    """Runs one recipe on the controller of a command.
-
-    Args:
-        context: What the command was told.
-        loaded: The recipe.
+    Attributes:
         answers: What was answered beforehand.
-        events: Where events go.
         assist_url: A simulator's stand-in for the person.
         take_reference: Whether only a reference is taken.
         accepted_change_mm: A larger jump that an engineer accepts this time.
         sensor: The camera, in place of the recipe's.
         order: Id of the line computer's order; ``None`` without one.
+        dry_run: Whether the run is only shown.
     """
 
-    def __init__(
-        self,
-        context: CliContext,
-        loaded: LoadedRecipe,
-        answers: Answers,
-        *,
-        events: EventStream,
-        assist_url: str | None,
-        take_reference: bool,
-        accepted_change_mm: float | None,
-        sensor: str | None,
-        order: str | None = None,
-    ) -> None:
-        self._context = context
-        self._loaded = loaded
-        self._answers = answers
-        self._events = events
-        self._assist_url = assist_url
-        self._take_reference = take_reference
-        self._accepted_change_mm = accepted_change_mm
-        self._sensor = sensor
-        self._order = order
+    answers: Answers
+    assist_url: str | None = None
+    take_reference: bool = False
+    accepted_change_mm: float | None = None
+    sensor: str | None = None
+    order: str | None = None
+    dry_run: bool = False
 
-    def run(self, *, dry_run: bool) -> None:
+    @property
+    def alone(self) -> bool:
+        """Whether nobody, and no simulator either, could answer a question."""
+        return self.assist_url is None and not on_terminal()
+
+
+@dataclass(frozen=True, slots=True)
+class Recalibration:
+    """Runs one recipe on the controller of a command.
+
+    Attributes:
+        context: What the command was told.
+        loaded: The recipe.
+        options: What was typed for this run.
+        events: Where events go.
+    """
+
+    context: CliContext
+    loaded: LoadedRecipe
+    options: RunOptions
+    events: EventStream
+
+    def run(self) -> None:
         """Carry the recipe out, or only show it.
 
         Raises:
             RobolinkError: It ended early; the old values are in force, or it says which are not.
         """
-        if not dry_run and self._assist_url is None and not on_terminal():
-            require_answers(self._answers, self._loaded.recipe)
-        progress = Progress(self._events, len(self._loaded.recipe.tools))
-        answers, loaded = self._answers, self._loaded
+        dry_run = self.options.dry_run
+        if not dry_run and self.options.alone:
+            require_answers(self.options.answers, self.loaded.recipe)
+        with self._opened() as (controller, order):
+            if order is not None and order.done is not None:
+                document = dict(order.done.result)
+                show_done(order)
+            else:
+                with self._prepared(controller, order) as run:
+                    if dry_run:
+                        document = self._plan(controller, run)
+                    else:
+                        self._consent(controller, run)
+                        document = self._told(controller, run, run.run())
+        payload = with_order(document, order)
+        self.events.emit("result", **payload)
+        if not self.events.on:
+            self.context.emit(
+                "recalibration", payload, lambda: _show_plan(payload) if dry_run else None
+            )
+
+    @contextmanager
+    def _opened(self) -> Iterator[tuple[Controller, Order | None]]:
+        """Give the controller, and the order that the run carries out."""
+        answers, loaded = self.options.answers, self.loaded
         with (
             open_controller(
-                self._context,
-                changes=not dry_run,
+                self.context,
+                changes=not self.options.dry_run,
                 usual_change_mm=loaded.recipe.tolerances.jump_mm,
             ) as controller,
             ordered(
                 controller,
-                self._order,
+                self.options.order,
                 "change",
                 recipe=loaded.sha256,
                 nozzle=answers.nozzle,
                 lot=answers.lot,
             ) as order,
         ):
-            if order is not None and order.done is not None:
-                done: tuple[Mapping[str, object], _Show] = (order.done.result, _nothing)
-                show_done(order)
-            else:
-                done = self._run(controller, order, progress, dry_run=dry_run)
-        payload, show = with_order(done[0], order), done[1]
-        self._events.emit("result", **payload)
-        if not self._events.on:
-            self._context.emit("recalibration", payload, lambda: show(payload))
+            yield controller, order
 
-    def _run(
-        self, controller: Controller, order: Order | None, progress: Progress, *, dry_run: bool
-    ) -> tuple[Mapping[str, object], _Show]:
-        """Return the document of the run, and how a person is shown it."""
-        with operator_at(self._assist_url, lambda: progress.tool, controller.clock) as operator:
+    @contextmanager
+    def _prepared(self, controller: Controller, order: Order | None) -> Iterator[RecipeRun]:
+        """Give the run, with whoever answers it, once nothing speaks against it."""
+        options = self.options
+        progress = Progress(self.events, len(self.loaded.recipe.tools))
+        with operator_at(options.assist_url, lambda: progress.tool, controller.clock) as operator:
             run = RecipeRun(
                 controller,
-                self._loaded,
+                self.loaded,
                 operator=operator,
-                answers=self._answers,
+                answers=options.answers,
                 audience=progress,
-                take_reference=self._take_reference,
-                accepted_change_mm=self._accepted_change_mm,
-                ask_before_write=not self._answers.yes,
-                sensor=self._sensor,
-                cell=self._context.cell,
+                take_reference=options.take_reference,
+                accepted_change_mm=options.accepted_change_mm,
+                ask_before_write=not options.answers.yes,
+                sensor=options.sensor,
+                cell=self.context.cell,
                 order=order,
                 describe=lambda report: self._document(controller, report),
             )
             run.preflight()
             self._start(controller, run)
-            if dry_run:
-                return self._dry_run(controller, run), _shown_plan
-            self._consent(controller, run)
-            return self._carry_out(controller, run), _nothing
+            yield run
 
     def _start(self, controller: Controller, run: RecipeRun) -> None:
         for change in run.changed:
             note(change.sentence)
-        self._events.emit(
+        self.events.emit(
             "start",
-            recipe=self._loaded.name,
-            recipe_hash=self._loaded.sha256,
+            recipe=self.loaded.name,
+            recipe_hash=self.loaded.sha256,
             controller=controller.identity,
             tools=[plan.tool for plan in run.plan.tools],
             takes_reference=run.takes_reference,
@@ -149,7 +165,7 @@ class Recalibration:
         moves = run.plan.moves
         question = None if not moves or self._at_desk else self._question(controller, run)
         if run.takes_reference:
-            if self._take_reference:
+            if self.options.take_reference:
                 keep_answer(_which_is_mounted(), True, AnsweredBy.OPTION)
             else:
                 self._explain_reference()
@@ -158,7 +174,7 @@ class Recalibration:
             self._require_writer(run)
             return
         if question is not None:
-            agree_to_motion(question, yes=self._answers.yes)
+            agree_to_motion(question, yes=self.options.answers.yes)
             return
         name_the_needle(controller, run.ask_ids)
         steps = preview(controller, run.plan)
@@ -168,7 +184,7 @@ class Recalibration:
             moves=sum(step.target is not None for step in steps),
             speed_mm_s=run.plan.limits.speed_mm_s,
             box_mm=run.plan.limits.box.x_max_mm,
-            at=self._loaded.recipe.source.of_method.needs.station,
+            at=self.loaded.recipe.source.of_method.needs.station,
             tools=[plan.tool for plan in run.plan.tools],
         )
 
@@ -183,12 +199,12 @@ class Recalibration:
 
     @property
     def _at_desk(self) -> bool:
-        return present_desk() is not None and not self._answers.yes
+        return present_desk() is not None and not self.options.answers.yes
 
     def _purpose(self, run: RecipeRun) -> str:
         return tr(
             "as {recipe!r} says for tool {tools}",
-            recipe=self._loaded.name,
+            recipe=self.loaded.name,
             tools=", ".join(str(plan.tool) for plan in run.plan.tools),
         )
 
@@ -215,21 +231,21 @@ class Recalibration:
 
     def _require_writer(self, run: RecipeRun) -> None:
         """Refuse to write values that nobody watched being measured without a yes."""
-        nobody = not self._answers.yes and self._assist_url is None and not on_terminal()
+        nobody = not self.options.answers.yes and self.options.alone
         if nobody and not run.takes_reference:
             raise DeclinedError(
                 tr("Tools would be written, but there is nobody to ask."),
                 remedy=tr("Nothing was written. Add --yes, or run it on a terminal."),
             )
 
-    def _dry_run(self, controller: Controller, run: RecipeRun) -> dict[str, object]:
-        recipe = self._loaded.recipe
+    def _plan(self, controller: Controller, run: RecipeRun) -> dict[str, object]:
+        recipe = self.loaded.recipe
         return {
             "dry_run": True,
-            "recipe": self._loaded.name,
+            "recipe": self.loaded.name,
             "tools": [plan.tool for plan in run.plan.tools],
             "takes_reference": run.takes_reference,
-            "old_names": list(self._loaded.notes),
+            "old_names": list(self.loaded.notes),
             "steps": steps_payload(controller, preview(controller, run.plan)),
             "prompts": [{"at": prompt.at, "text": prompt.text} for prompt in recipe.prompts],
             "outputs": [
@@ -243,8 +259,10 @@ class Recalibration:
             ],
         }
 
-    def _carry_out(self, controller: Controller, run: RecipeRun) -> dict[str, object]:
-        report = run.run()
+    def _told(
+        self, controller: Controller, run: RecipeRun, report: ChangeReport
+    ) -> dict[str, object]:
+        """Show a person what was done; return the document of it."""
         # Now, because Ctrl-C may come before the logout is answered.
         desk = present_desk()
         if desk is not None:
@@ -265,32 +283,22 @@ class Recalibration:
         self, controller: Controller, report: ChangeReport, *, reference_taken: bool = False
     ) -> dict[str, object]:
         return {
-            "recipe": self._loaded.name,
-            "recipe_hash": self._loaded.sha256,
+            "recipe": self.loaded.name,
+            "recipe_hash": self.loaded.sha256,
             "controller": controller.identity,
-            **_payload(report),
-            "old_names": list(self._loaded.notes),
+            "change": report.change,
+            "simulated": report.simulated,
+            "tools": [report_payload(one) for one in report.tools],
+            "old_names": list(self.loaded.notes),
             "reference_taken": reference_taken,
         }
-
-
-def _payload(report: ChangeReport) -> dict[str, object]:
-    return {
-        "change": report.change,
-        "simulated": report.simulated,
-        "tools": [report_payload(one) for one in report.tools],
-    }
 
 
 def _which_is_mounted() -> str:
     return tr("Is the nozzle mounted that the points were taught with?")
 
 
-def _nothing(_payload: dict[str, object]) -> None:
-    """Everything was said as it happened."""
-
-
-def _shown_plan(payload: dict[str, object]) -> None:
+def _show_plan(payload: dict[str, object]) -> None:
     from robolink_cli.views.fit import show_steps
 
     say(tr("Dry run; nothing is sent. The recipe {recipe!r}:", recipe=payload["recipe"]))

@@ -209,7 +209,16 @@ class RecipeRun:
         """
         if not self._looked_ahead:
             self.preflight()
-        listener = RecipeListener(
+        with self._signed():
+            listener = self._listener()
+            with self._outputs_told(listener):
+                return self._change(listener).run(
+                    write=not (self.takes_reference or self._measure_only)
+                )
+
+    def _listener(self) -> RecipeListener:
+        """Return what carries out the recipe's own part; it signs as the run does now."""
+        return RecipeListener(
             self._loaded.recipe,
             self._controller,
             self._answers,
@@ -219,7 +228,9 @@ class RecipeRun:
             stated_pin=self.plan.tools[0].stated_pin,
             audience=self._audience,
         )
-        change = NozzleChange(
+
+    def _change(self, listener: RecipeListener) -> NozzleChange:
+        return NozzleChange(
             self._controller,
             self.plan,
             operator=self._operator,
@@ -228,8 +239,6 @@ class RecipeRun:
             order=self._order,
             describe=self._describe,
         )
-        with self._signed(), self._outputs_told(listener):
-            return change.run(write=not (self.takes_reference or self._measure_only))
 
     @contextmanager
     def _signed(self) -> Iterator[None]:

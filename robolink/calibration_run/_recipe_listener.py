@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from robolink.calibration import VerifyResult
 from robolink.calibration_run._length import known_height
 from robolink.calibration_run._proposal import Listener, Moment, Proposal
-from robolink.calibration_run._recipe_proposal import Reference, proposed
+from robolink.calibration_run._recipe_plan import Reference, proposed
 from robolink.errors import CalibrationError, ConfigError, DeclinedError
 from robolink.messages import tr
 from robolink.model import AnsweredBy, Controller, Signature, ToolReceipt, answer_entry

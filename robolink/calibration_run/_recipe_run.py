@@ -11,8 +11,7 @@ from robolink.calibration_run._plan import ChangePlan, require_ready
 from robolink.calibration_run._preview import preview, require_inside
 from robolink.calibration_run._proposal import ChangeReport, Listener
 from robolink.calibration_run._recipe_listener import RecipeListener
-from robolink.calibration_run._recipe_plan import located, plan_of
-from robolink.calibration_run._recipe_proposal import Reference, find_reference
+from robolink.calibration_run._recipe_plan import Reference, find_reference, located, plan_of
 from robolink.config import Cell
 from robolink.errors import ConfigError, NotAllowedError, RobolinkError
 from robolink.messages import joined, tr

@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING
 from robolink.lazy_exports import lazy_exports, old_names
 
 if TYPE_CHECKING:
-    from robolink.recipe._answers import Answers as Answers
-    from robolink.recipe._answers import require_answers as require_answers
     from robolink.recipe._loading import LoadedRecipe as LoadedRecipe
     from robolink.recipe._loading import check_recipe as check_recipe
     from robolink.recipe._loading import load_recipe as load_recipe
@@ -22,7 +20,9 @@ if TYPE_CHECKING:
     from robolink.recipe._recipe import HeightRule as HeightRule
     from robolink.recipe._recipe import Recipe as Recipe
     from robolink.recipe._recipe import json_schema as json_schema
+    from robolink.recipe._requirements import Answers as Answers
     from robolink.recipe._requirements import beyond as beyond
+    from robolink.recipe._requirements import require_answers as require_answers
     from robolink.recipe._tables import Box as Box
     from robolink.recipe._tables import FlangePose as FlangePose
     from robolink.recipe._tables import MethodTable as MethodTable
@@ -39,11 +39,10 @@ else:
     __getattr__, __dir__, __all__ = lazy_exports(
         __name__,
         {
-            "_answers": "Answers require_answers",
             "_loading": "LoadedRecipe check_recipe load_recipe",
             "_past": "RecipePast changes_left_of pasts_of",
             "_recipe": "Basis HeightRule Recipe json_schema",
-            "_requirements": "beyond",
+            "_requirements": "Answers beyond require_answers",
             "_tables": (
                 "Box FlangePose MethodTable Output Poses Prompt RefusalTable Speeds "
                 "StationTable Tolerances Tool method_table"

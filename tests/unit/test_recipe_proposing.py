@@ -8,7 +8,7 @@ import pytest
 
 from robolink.calibration import CalibrationResult
 from robolink.calibration_run import Proposal
-from robolink.calibration_run._recipe_proposal import Reference, proposed
+from robolink.calibration_run._recipe_plan import Reference, proposed
 from robolink.calibration_run._records import touch_details
 from robolink.model import Pose, ToolOffset
 from robolink.recipe import load_recipe

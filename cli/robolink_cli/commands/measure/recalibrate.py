@@ -86,8 +86,7 @@ def recalibrate(
     Without RECIPE, on a terminal, cell and recipe are chosen from lists.
     """
     from robolink_cli.commands.measure.choosing import nobody_to_ask
-    from robolink_cli.commands.measure.recalibration import Recalibration, RunOptions
-    from robolink_cli.commands.measure.recipe_events import EventStream
+    from robolink_cli.commands.measure.recalibration import EventStream, Recalibration, RunOptions
     from robolink_cli.console.output import may_be_guided
     from robolink_cli.console.render import note
     from robolink_cli.options.recipe_answers import answers_from

@@ -1,19 +1,26 @@
-"""One run of a recipe from the command line."""
+"""One run of a recipe from the command line: events for a script, headings for a person."""
 
-from collections.abc import Iterator
+import json
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+import click
+
 from robolink.backup import keep_first_backup
-from robolink.calibration_run import ChangeReport, RecipeRun, preview
-from robolink.errors import DeclinedError
+from robolink.calibration import VerifyResult
+from robolink.calibration_run import ChangeReport, Listener, Moment, Proposal, RecipeRun, preview
+from robolink.errors import CalibrationError, DeclinedError
 from robolink.messages import tr
-from robolink.model import AnsweredBy, Controller
+from robolink.model import AnsweredBy, Controller, ToolReceipt
+from robolink.procedures import MeasurementContext
 from robolink.recipe import Answers, LoadedRecipe, require_answers
+from robolink.runner import Ask, Confirm, Notify, StepDone, TakenStep
 from robolink.transaction import Order
 from robolink_cli.access.capabilities import io_of
-from robolink_cli.commands.measure.recipe_events import EventStream, Progress
-from robolink_cli.console.render import note, say
+from robolink_cli.console.exit_codes import error_body, exit_code
+from robolink_cli.console.output import drawn_elsewhere, hand_over
+from robolink_cli.console.render import note, say, switch_json_on
 from robolink_cli.prompts.operator import operator_at
 from robolink_cli.prompts.present import present_desk
 from robolink_cli.prompts.questions import asked, keep_answer, on_terminal
@@ -22,8 +29,134 @@ from robolink_cli.session.context import CliContext
 from robolink_cli.session.motion_consent import agree_to_motion, motion_question
 from robolink_cli.session.opening import open_controller
 from robolink_cli.session.ordering import ordered, show_done, with_order
+from robolink_cli.views.documents import (
+    pose_payload,
+    proposal_payload,
+    receipt_payload,
+    verification_payload,
+)
 from robolink_cli.views.fit import report_payload, show_report
 from robolink_cli.views.planned_steps import steps_payload
+
+
+class EventStream:
+    """Writes one JSON line for each event, where that is wanted.
+
+    Args:
+        context: Click's, so that text for people goes to stderr.
+        on: Whether it is wanted.
+    """
+
+    def __init__(self, context: click.Context, *, on: bool) -> None:
+        self.on = on
+        if on:
+            switch_json_on(context)
+
+    def emit(self, event: str, **payload: object) -> None:
+        """Write one event."""
+        if self.on:
+            line = {"schema": "robolink/recalibration-event/1", "event": event, **payload}
+            hand_over(json.dumps(line, allow_nan=False))
+
+    @contextmanager
+    def closing(self) -> Iterator[None]:
+        """End the stream with ``error`` when the block does; ``result`` is the block's own."""
+        try:
+            yield
+        except (Exception, KeyboardInterrupt) as error:
+            self.emit("error", error=error_body(error), exit_code=exit_code(error))
+            raise
+
+
+class Progress(Listener):
+    """Tells a person and a script what happens.
+
+    Attributes:
+        tool: Number of the tool at work.
+
+    Args:
+        events: The stream of a script.
+        tools: How many tools the recipe has.
+    """
+
+    def __init__(self, events: EventStream, tools: int) -> None:
+        self._events, self._tools = events, tools
+        self.tool = 0
+
+    def moment(self, moment: Moment, bench: MeasurementContext, tool: int | None = None) -> None:  # noqa: ARG002 - a phase is a phase
+        """Say which phase begins."""
+        if tool is not None:
+            self.tool = tool
+        if not drawn_elsewhere():
+            heading = _heading(moment, self.tool)
+        elif self._tools > 1 and moment is Moment.BEFORE_MEASURE:
+            heading = tr("Tool {tool} is measured now.", tool=self.tool)
+        else:
+            heading = ""  # the screen has one of its own
+        if heading:
+            note(heading)
+        self._events.emit("phase", phase=moment, tool=tool)
+
+    def step(self, tool: int, done: StepDone) -> None:
+        """Tell of one step."""
+        self.tool = tool
+        kind, text = _in_words(done.step)
+        pose = pose_payload(done.pose) if done.pose else None
+        self._events.emit("step", tool=tool, kind=kind, text=text, pose=pose)
+
+    def refused(self, tool: int, error: CalibrationError, *, again: bool) -> None:
+        """Tell of a measurement that is not believed."""
+        if again:
+            note(tr("Tool {tool}: {error} It is measured again.", tool=tool, error=error))
+        self._events.emit(
+            "refused", tool=tool, code=error.code, what=error.what, remedy=error.remedy, again=again
+        )
+
+    def proposed(self, proposals: Sequence[Proposal]) -> None:
+        """Show what was measured, next to what is stored."""
+        from robolink_cli.views.fit import show_proposal
+
+        for proposal in proposals:
+            show_proposal(proposal)
+            self._events.emit("proposal", **proposal_payload(proposal))
+
+    def wrote(self, receipt: ToolReceipt) -> None:
+        """Tell of a write."""
+        from robolink_cli.views.fit import tell_written
+
+        tell_written(receipt)
+        self.tool = receipt.tool
+        self._events.emit("write", **receipt_payload(receipt))
+
+    def verified(self, tool: int, result: VerifyResult) -> None:
+        """Tell of a verification."""
+        self._events.emit("verification", tool=tool, **(verification_payload(result) or {}))
+
+    def told(self, sentence: str) -> None:
+        """Pass on what a person was told."""
+        self._events.emit("note", text=sentence)
+
+
+def _in_words(step: TakenStep) -> tuple[str, str]:
+    """Return what kind of step it is, and what it says."""
+    match step:
+        case Ask():
+            return "touch", step.instruction
+        case Notify():
+            return "remark", step.text
+        case Confirm():
+            return "offer", step.question
+        case _:
+            return "move", step.purpose
+
+
+def _heading(moment: Moment, tool: int) -> str:
+    """Return the line over what comes next, empty for none."""
+    if moment is Moment.BEFORE_MEASURE:
+        return tr("-- tool {tool}: measure", tool=tool)
+    if moment is Moment.BEFORE_WRITE:
+        return tr("-- propose and write")
+    return tr("-- done") if moment is Moment.END else ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -136,7 +136,7 @@ def carrying_out(controller: Controller, order: str, job: Mapping[str, object]) 
 
     Where :attr:`Order.done` says that it was carried out before, nothing is to be done; else the
     order goes with the change: :class:`ToolChange`, :func:`change_tools` and
-    :class:`robolink.nozzle_change.NozzleChange` take it.
+    :class:`robolink.calibration_run.NozzleChange` take it.
 
     Args:
         controller: The controller, connected.

@@ -1,4 +1,4 @@
-"""A run of the tests: in the background what it starts hears signals all the same; it can be shared."""
+"""A run of the tests: what it starts hears signals, and processes share it."""
 
 import os
 import signal
@@ -36,7 +36,7 @@ def test_what_is_started_hears_signals_that_this_process_was_started_without():
 
 
 SHARED = {
-    "test_a.py": "import os\ndef test_well(tmp_path): pass\ndef test_wrong(): assert not os.getpid()",
+    "test_a.py": "def test_well(tmp_path): pass\ndef test_wrong(): assert not 1",
     "test_b.py": "import os\ndef test_ends_its_process(): os._exit(0)",
 }
 

@@ -4,7 +4,7 @@ Every sentence shown to a person is written as ``tr("...")`` where it is used an
 collected into ``robolink/locale/robolink.pot`` by ``make messages``; a test fails when
 that catalogue is stale. A language is installed once per process with
 :func:`install`; without one the English source sentence is shown. Which languages there
-are says :mod:`robolink.locale.languages`.
+are says ``robolink/locale/languages.py``.
 
 What is made when a module is imported is made before a language is known: it is
 ``declared("...")``, and goes through :func:`spoken` when it is shown.

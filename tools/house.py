@@ -134,8 +134,8 @@ def walks() -> dict[str, int]:
     from robolink_simulators.cell.clock import ScaledClock
     from robolink_simulators.epson.device import EpsonSimulator
     from robolink_simulators.epson.options import EpsonOptions
-    from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
-    from robolink_simulators.testkit.recipes import written_recipe
+    from robolink_simulators.hosting.streams.epson import serve_tcp
+    from robolink_simulators.testkit.operator import written_recipe
 
     from tests.packaging._way_to_the_wire import (
         follow_a_recipe,

@@ -5,9 +5,11 @@ is run whatever became of the others. What a machine lacks is *not run* and coun
 failure, and no pass either. The table is kept in ``build/nightly/table.md`` with commit and date,
 and what a part printed beside it. Ends with 1 when a part failed.
 
-NIGHT says how many hours there are; parts that are named are run alone.
+NIGHT says how many hours there are; parts that are named are run alone. The table has the last
+outcome of each part on the commit, so a night can be made in pieces.
 """
 
+import json
 import os
 import re
 import signal
@@ -16,7 +18,7 @@ import sys
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
@@ -166,8 +168,30 @@ def _commit() -> str:
         )
         return done.stdout.strip()
 
-    changed = " with changes" if asked("status", "--porcelain", "--untracked-files=no") else ""
+    # The list of seeds that were run is a record: a night itself adds to it.
+    seen = ("--untracked-files=no", "--", ".", ":!tests/soak/seeds_run.txt")
+    changed = " with changes" if asked("status", "--porcelain", *seen) else ""
     return f"commit {asked('rev-parse', '--short=12', 'HEAD') or 'unknown'}{changed}"
+
+
+def with_those_of_before(outcomes: Iterable[Outcome], commit: str, kept: Path) -> Sequence[Outcome]:
+    """Return the last outcome of every part on a commit, in the order of a night, and keep them.
+
+    Args:
+        outcomes: Of the parts that ended just now.
+        commit: What they ran on. Outcomes of another one are forgotten.
+        kept: The file in which they stand.
+    """
+    before = json.loads(kept.read_text(encoding="utf-8")) if kept.exists() else {}
+    last = {
+        one["name"]: Outcome(**one | {"lacks": tuple(one["lacks"])})
+        for one in before.get(commit, ())
+    }
+    last |= {one.name: one for one in outcomes}
+    known = [last[part.name] for part in PARTS if part.name in last]
+    text = json.dumps({commit: [asdict(one) for one in known]}, indent=1)
+    kept.write_text(f"{text}\n", encoding="utf-8")
+    return known
 
 
 def _say(line: str) -> None:
@@ -191,7 +215,8 @@ def chosen(names: Iterable[str]) -> list[Part]:
 def main(names: Sequence[str], night_h: float) -> int:
     """Run the parts, print the table and keep it; return the exit code."""
     FOLDER.mkdir(parents=True, exist_ok=True)
-    heading = f"{_commit()}, {datetime.now(UTC):%Y-%m-%d %H:%M} UTC, {night_h:g} h"
+    commit = _commit()
+    heading = f"{commit}, {datetime.now(UTC):%Y-%m-%d %H:%M} UTC, {night_h:g} h"
     outcomes: list[Outcome] = []
     try:
         for part in chosen(names):
@@ -199,7 +224,8 @@ def main(names: Sequence[str], night_h: float) -> int:
             outcomes.append(carry_out(part, night_h))
             _say(f"{part.name}: {outcomes[-1].how} {outcomes[-1].said}".rstrip())
     finally:  # Ctrl-C in the morning: what has ended is told
-        text = "\n".join(table(outcomes, heading)) + "\n"
+        known = with_those_of_before(outcomes, commit, FOLDER / "outcomes.json")
+        text = "\n".join(table(known, heading)) + "\n"
         (FOLDER / "table.md").write_text(text, encoding="utf-8")
         _say(text)
     return 1 if any(one.how == "FAILED" for one in outcomes) else 0

@@ -10,7 +10,7 @@ from time import perf_counter
 
 from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.hosting.garbage import RareFullCollections
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_tcp
 
 
 def main(count: int) -> None:

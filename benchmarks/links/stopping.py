@@ -23,7 +23,7 @@ from urllib.parse import urlsplit
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.fieldbus.canopen_node import CanPlace, serve_canopen
 from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_tcp
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 from benchmarks.table import Amount, Figure

@@ -4,23 +4,37 @@ Each row of a budget (``robolink.calibration.ACCURACY_ROWS``) is stated by the r
 cell file, learnt from the journal, or a default. docs/accuracy.md explains all three.
 """
 
-from robolink.accuracy._age import months_at
-from robolink.accuracy._bounds import (
+from robolink.accuracy._known import (
+    CellRecord,
+    KnownRow,
+    Recall,
+    facts_at,
+    rows_at,
+    rows_of_station,
+    stated_rows,
+)
+from robolink.accuracy._measured import (
     LEAST_RECORDS,
     ArtefactTest,
+    LooksAlike,
+    MeasuredRow,
     RowBound,
     artefact_test,
+    measured_entry,
+    measured_row,
     paired_half_width,
+    pooled_look,
     scatter_of_repeats,
     upper_half_width,
 )
-from robolink.accuracy._known import CellRecord, KnownRow, Recall, facts_at, rows_at
-from robolink.accuracy._looks import LooksAlike, pooled_look
-from robolink.accuracy._measured import MeasuredRow, measured_entry, measured_row
-from robolink.accuracy._overview import RowsAt, mm_per_px, rows_of_cell
-from robolink.accuracy._remedies import learning_commands, measuring_step
-from robolink.accuracy._repeats import learnt_rows
-from robolink.accuracy._stated import rows_of_station, stated_rows
+from robolink.accuracy._overview import (
+    RowsAt,
+    learning_commands,
+    measuring_step,
+    mm_per_px,
+    rows_of_cell,
+)
+from robolink.accuracy._repeats import learnt_rows, months_at
 from robolink.accuracy._studies import (
     MeasuredTip,
     artefact_row,

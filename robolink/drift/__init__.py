@@ -3,11 +3,10 @@
 Reads the record alone; nothing is asked of a controller.
 """
 
-from robolink.drift.cell import CellDrift, drift_of
+from robolink.drift.cell import CellDrift, drift_of, last_statements
 from robolink.drift.charts import Chart, ChartPoint, charts_of
 from robolink.drift.findings import DriftCode, DriftFinding, findings_in
 from robolink.drift.history import KINDS, MeasuredChange, measured_changes
-from robolink.drift.statements import last_statements
 
 __all__ = [
     "CellDrift",

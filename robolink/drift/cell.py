@@ -1,12 +1,13 @@
 """The course of one controller's tools, from its entries to findings."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from robolink.calibration import LEAST_BASELINE
+from robolink.calibration import LEAST_BASELINE, stated_mm
 from robolink.drift.charts import Chart, charts_of
 from robolink.drift.findings import DriftFinding, findings_in
 from robolink.drift.history import MeasuredChange, measured_changes
+from robolink.messages import tr
 from robolink.model import Recorded, is_simulated_name
 
 
@@ -69,3 +70,35 @@ def drift_of(
     )
     charts = charts_of(changes, baseline=baseline)
     return CellDrift(controller, changes, charts, findings_in(charts, changes))
+
+
+def last_statements(changes: Sequence[MeasuredChange]) -> Iterator[str]:
+    """Yield a sentence for each tool whose last change has a statement on record.
+
+    Args:
+        changes: The changes of one controller, oldest first.
+
+    Example:
+        >>> from robolink.drift import MeasuredChange, last_statements
+        >>> at, tip_mm = "2026-11-22T08:00:00Z", {"x": 12.3, "y": -3.9}
+        >>> change = MeasuredChange(7, at, "c-1", 1, "", "", tip_mm, None, 0.05, 0.024, 0.064)
+        >>> list(last_statements([change]))
+        ['Tool 1, last change: repeatable to +-0.024 mm, accurate to +-0.064 mm (95 %).']
+    """
+    for tool, last in sorted({change.tool: change for change in changes}.items()):
+        if last.accurate_to_mm is None:
+            continue
+        accurate = stated_mm(last.accurate_to_mm)
+        if last.repeatable_to_mm is None:
+            yield tr(
+                "Tool {tool}, last change: repeatable: not known, accurate to +-{u} mm (95 %).",
+                tool=tool,
+                u=accurate,
+            )
+        else:
+            yield tr(
+                "Tool {tool}, last change: repeatable to +-{r} mm, accurate to +-{u} mm (95 %).",
+                tool=tool,
+                r=stated_mm(last.repeatable_to_mm),
+                u=accurate,
+            )

@@ -11,8 +11,7 @@ from statistics import fmean
 from typing import Final, Literal, TypeAlias
 
 from robolink.calibration import LEAST_BASELINE, ControlChart, control_chart
-from robolink.drift.history import MeasuredChange
-from robolink.drift.significance import likeliest_split
+from robolink.drift.history import MeasuredChange, likeliest_split
 from robolink.errors import ConfigError
 from robolink.messages import tr
 

@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING
 from robolink.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from robolink.pose_tables.conventions import RULES as RULES
-    from robolink.pose_tables.conventions import RotationRule as RotationRule
     from robolink.pose_tables.formats.epson_points import parse_pts as parse_pts
     from robolink.pose_tables.formats.epson_points import read_pts as read_pts
+    from robolink.pose_tables.orientation import RULES as RULES
+    from robolink.pose_tables.orientation import RotationRule as RotationRule
     from robolink.pose_tables.reading import read_poses as read_poses
     from robolink.pose_tables.values import NOTHING_SAID as NOTHING_SAID
     from robolink.pose_tables.values import HowRead as HowRead
@@ -20,8 +20,8 @@ else:
     __getattr__, __dir__, __all__ = lazy_exports(
         __name__,
         {
-            "conventions": "RULES RotationRule",
             "formats.epson_points": "parse_pts read_pts",
+            "orientation": "RULES RotationRule",
             "reading": "read_poses",
             "values": "HowRead LengthUnit NOTHING_SAID PoseTable ReadingChoices TabledPose",
         },

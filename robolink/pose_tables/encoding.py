@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Final
 
 from robolink.messages import tr
-from robolink.pose_tables.refusals import UnusableText
+from robolink.pose_tables.values import UnusableText
 
 _MARKS: Final = (
     (codecs.BOM_UTF8, "utf-8-sig"),

@@ -6,9 +6,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final
 
 from robolink.messages import joined, tr
-from robolink.pose_tables.conventions import rules_for
-from robolink.pose_tables.refusals import OpenQuestion
-from robolink.pose_tables.values import ColumnHead, LengthUnit
+from robolink.pose_tables.orientation import rules_for
+from robolink.pose_tables.values import ColumnHead, LengthUnit, OpenQuestion
 from robolink.ways import Way, way
 
 _UNIT_IN_COMMENT: Final = re.compile(

@@ -14,7 +14,6 @@ from typing import Final
 from robolink.files.named import read_named
 from robolink.messages import tr
 from robolink.model import Hand, Pose
-from robolink.pose_tables.conventions import EPSON, rule_named
 from robolink.pose_tables.encoding import decoded, lines_of
 from robolink.pose_tables.formats.documents import read_document, read_json
 from robolink.pose_tables.formats.epson_points import read_points_table
@@ -23,10 +22,10 @@ from robolink.pose_tables.formats.labelled import of_joints_only, read_labelled
 from robolink.pose_tables.formats.matrices import read_matrices
 from robolink.pose_tables.formats.printed_arrays import read_arrays
 from robolink.pose_tables.formats.spel_points import read_spel
-from robolink.pose_tables.lengths import settled_length
+from robolink.pose_tables.numbers import settled_length
+from robolink.pose_tables.orientation import EPSON, rule_named
 from robolink.pose_tables.programs.readers import READERS
 from robolink.pose_tables.questions import FAR_MM
-from robolink.pose_tables.refusals import UnclearText, UnusableText, refused, unclear
 from robolink.pose_tables.tabular.in_columns import read_in_columns
 from robolink.pose_tables.tabular.table import read_table
 from robolink.pose_tables.values import (
@@ -36,6 +35,10 @@ from robolink.pose_tables.values import (
     RawTable,
     ReadingChoices,
     TabledPose,
+    UnclearText,
+    UnusableText,
+    refused,
+    unclear,
 )
 
 MOST_BYTES: Final = 32_000_000

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.methods import PointsParameters
-from robolink.methods.pivot.source import LEAST_AXES
+from robolink.methods.pivot import LEAST_AXES
 from robolink.model import Capabilities, Controller, LookingController, says_it_is_simulated
 from robolink.sensing import VISION_GUIDE
 
@@ -36,7 +36,7 @@ def beyond(
         >>> from pathlib import Path
         >>> from robolink.controllers import capabilities_of_kind
         >>> from robolink.recipe import beyond, load_recipe
-        >>> from robolink_simulators.testkit.recipes import written_recipe
+        >>> from robolink_simulators.testkit.operator import written_recipe
         >>> recipe = load_recipe(written_recipe(Path.cwd())).recipe
         >>> beyond(recipe, capabilities_of_kind("plc"))
         ('The recipe moves the robot, which this controller cannot be told to.',)

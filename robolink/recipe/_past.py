@@ -114,7 +114,7 @@ def changes_left_of(loaded: LoadedRecipe, journal: "Journal", address: str) -> d
         >>> from pathlib import Path
         >>> from robolink.journal import memory_journal
         >>> from robolink.recipe import changes_left_of, load_recipe
-        >>> from robolink_simulators.testkit.recipes import written_recipe
+        >>> from robolink_simulators.testkit.operator import written_recipe
         >>> loaded = load_recipe(written_recipe(Path.cwd()))
         >>> changes_left_of(loaded, memory_journal("left-example"), "epson+tcp://192.168.0.1:5000")
         {}

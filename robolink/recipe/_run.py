@@ -71,7 +71,7 @@ class RecipeRun:
         >>> from pathlib import Path
         >>> import robolink
         >>> from robolink.recipe import RecipeRun, load_recipe
-        >>> from robolink_simulators.testkit.recipes import written_recipe
+        >>> from robolink_simulators.testkit.operator import written_recipe
         >>> with robolink.connect("epson+sim://recipe-example") as controller:
         ...     loaded = load_recipe(written_recipe(Path.cwd()))
         ...     run = RecipeRun(controller, loaded, operator=None)

@@ -126,7 +126,7 @@ def compare(register_map: RegisterMap, found: Found, value: MapValue, shown: str
     Example:
         >>> from pathlib import Path
         >>> from robolink.register_maps import MapValue, compare, load_map
-        >>> from robolink_simulators.testkit.recipes import written_map
+        >>> from robolink_simulators.testkit.operator import written_map
         >>> register_map = load_map(written_map(Path.cwd()))
         >>> found = {MapValue(1, "x"): 12.5, MapValue(1, "y"): -3.25}
         >>> str(compare(register_map, found, MapValue(1, "x"), "12.50"))
@@ -173,7 +173,7 @@ def compare_test(
     Example:
         >>> from pathlib import Path
         >>> from robolink.register_maps import MapValue, compare_test, load_map
-        >>> from robolink_simulators.testkit.recipes import written_map
+        >>> from robolink_simulators.testkit.operator import written_map
         >>> register_map = load_map(written_map(Path.cwd()))
         >>> y, z = MapValue(1, "y"), MapValue(1, "z")
         >>> str(compare_test(register_map, {y: 0, z: 0}, {y: 7.3, z: 0}, y, "7.3"))
@@ -208,7 +208,7 @@ def to_compare(
     Example:
         >>> from pathlib import Path
         >>> from robolink.register_maps import load_map, to_compare
-        >>> from robolink_simulators.testkit.recipes import written_map
+        >>> from robolink_simulators.testkit.operator import written_map
         >>> wanted = to_compare(load_map(written_map(Path.cwd())), {}, {})
         >>> [str(one.value) for one in wanted]  # and what is to be entered there for it
         ['1.x', '1.y', '1.z', '1.u', '2.x']

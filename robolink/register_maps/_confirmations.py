@@ -98,7 +98,7 @@ def confirm(
         >>> from robolink.register_maps import (
         ...     MapValue, compare, confirm, confirmation_of, load_map
         ... )
-        >>> from robolink_simulators.testkit.recipes import written_map
+        >>> from robolink_simulators.testkit.operator import written_map
         >>> from pathlib import Path
         >>> register_map, x = load_map(written_map(Path.cwd())), MapValue(1, "x")
         >>> made = compare(register_map, {x: 12.5}, x, "12.50")

@@ -1,10 +1,8 @@
 """The report of a tool change: one HTML page that needs nothing beside itself."""
 
 from robolink.report._drift_page import render_drift, save_drift
-from robolink.report._file import save
-from robolink.report._page import render
-from robolink.report._recorded import reports_of
-from robolink.report._recorded_fit import recorded_fit
+from robolink.report._page import render, save
+from robolink.report._recorded import recorded_fit, reports_of
 from robolink.report._values import (
     Attempt,
     GaugeOnRecord,

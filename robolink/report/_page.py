@@ -1,8 +1,9 @@
 """The whole page. It runs no script and loads nothing: it can be kept, mailed and printed."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cache
 from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -10,17 +11,14 @@ from markupsafe import Markup
 
 from robolink.calibration import rows_in_words, stated_mm
 from robolink.drift import last_statements
+from robolink.files.named import save_named
 from robolink.messages import tr
 from robolink.report._markup import drawing, plain, rounded
 from robolink.report._values import Report
-from robolink.report.pictures.fit import fit_drawings
-from robolink.report.pictures.panel import Drawing
-from robolink.report.pictures.point_map import draw
-from robolink.report.pictures.pose_plan import pose_drawings
-from robolink.report.pictures.run_order import order_drawings
-from robolink.report.pictures.tip import tip_drawings
-from robolink.report.sections import certainty, decisions, points, summary
-from robolink.report.sections.offsets import offsets
+from robolink.report.pictures.drawing import Drawing
+from robolink.report.pictures.plans import draw, pose_drawings, tip_drawings
+from robolink.report.pictures.residuals import fit_drawings, order_drawings
+from robolink.report.sections import evidence, offsets, summary
 from robolink.report.sections.poses import pose_tables
 
 POLICY = "default-src 'none'; style-src 'unsafe-inline'"
@@ -75,12 +73,11 @@ def templates() -> Environment:
         "drawn": drawn,
         "drawings": drawings,
         "order": lambda report: list(order_drawings(report.fit, report.evidence)),
-        "offsets": offsets,
+        "offsets": offsets.offsets,
         "poses": pose_tables,
         "map_of": draw,
-        "certainty": certainty,
-        "decisions": decisions,
-        "points": points,
+        "evidence": evidence,
+        "points": offsets,
     }
     return environment
 
@@ -123,3 +120,36 @@ def _shown(value: Any) -> Any:  # noqa: ANN401 - whatever a template shows
     if isinstance(value, str) and not isinstance(value, Markup):
         return plain(value)
     return value
+
+
+def save(
+    report: Report, path: Path, *, others: Sequence[Report] = (), replace: bool = False
+) -> None:
+    """Write the page of a change; it is whole and on the disk when this returns.
+
+    Args:
+        report: What became of a tool.
+        path: Where.
+        others: The same of the other tools of that change.
+        replace: Whether a file that is there may go.
+
+    Raises:
+        ConfigError: A file is there already and ``replace`` is not set, or it cannot be
+            written. What was there is unchanged.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from robolink import ToolOffset
+        >>> from robolink.report import reports_of, save
+        >>> from robolink.testing import MemoryController
+        >>> from robolink.transaction import Wanted, change_tools
+        >>> controller = MemoryController()
+        >>> receipts = change_tools(controller, [Wanted(3, ToolOffset(1, 2, -30), None)])
+        >>> entries = tuple(reversed(list(controller.outcomes.recorded(tool=3))))
+        >>> about = {"made_at": "2026-11-23T08:00:00Z", "robolink_version": "0.1.0"}
+        >>> (report,) = reports_of(entries, check="The journal is whole.", **about)
+        >>> save(report, Path("report.html"))
+        >>> Path("report.html").exists()
+        True
+    """
+    save_named(path, render(report, *others).encode("utf-8"), replace=replace)

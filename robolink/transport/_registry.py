@@ -154,7 +154,7 @@ def open_modbus(
         >>> from robolink.register_maps import load_map
         >>> from robolink.transport import open_modbus
         >>> from robolink_simulators.plc import PlcSimulator, serve_plc
-        >>> from robolink_simulators.testkit.recipes import written_map
+        >>> from robolink_simulators.testkit.operator import written_map
         >>> path = written_map(Path.cwd())
         >>> with serve_plc(PlcSimulator(load_map(path), seed=1), path) as host:
         ...     client = open_modbus(host.url.partition("&map")[0], timeout_s=1)

@@ -19,7 +19,7 @@ import pytest
 if TYPE_CHECKING:
     from robolink.journal import Journal
     from robolink_simulators.cell.clock import ManualClock
-    from robolink_simulators.testkit.asked import CellRequest
+    from robolink_simulators.testkit.making import CellRequest
     from robolink_simulators.testkit.served import OwnFolder, SimulatedCell
 
 _STATE: Final = ("ROBOLINK_STATE_DIR", "ROBOLINK_JOURNAL")
@@ -76,7 +76,7 @@ def pytest_runtest_makereport(
     report: pytest.TestReport = yield
     cells: list[SimulatedCell] | None = item.stash.get(_CELLS, None)
     if report.failed and cells:
-        from robolink_simulators.testkit.report import sections_of
+        from robolink_simulators.testkit.served import sections_of
 
         sections = sections_of(cells)
         report.sections += sections
@@ -298,7 +298,7 @@ def _seed(text: str) -> int:
 def _asked(
     request: pytest.FixtureRequest, kind: str, given: dict[str, Any], medium: str
 ) -> "CellRequest":
-    from robolink_simulators.testkit.asked import (
+    from robolink_simulators.testkit.making import (
         HEEDED,
         CellRequest,
         require_heeded,

@@ -1,12 +1,33 @@
 """What a simulated controller keeps over a restart, as one small file."""
 
 import json
+import random
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Final
 
+from robolink import ambient
 from robolink.files.durable import sync_folder, write_whole
 from robolink.messages import tr
 from robolink_simulators.not_now import NotNowError
+
+_HIGHEST: Final = 0xFFFF_FFFF
+
+
+def drawn_number(origin: str = "") -> int:
+    """Return a number from 1 to 2^32 - 1.
+
+    Args:
+        origin: The same text draws the same number; empty draws another one each time.
+    """
+    if origin:
+        return random.Random(f"serial {origin}").randint(1, _HIGHEST)
+    return ambient.random_number(32)
+
+
+def drawn_serial(origin: str = "") -> str:
+    """Return a serial number as :func:`drawn_number` draws it, marked as a simulator's."""
+    return f"SIM{drawn_number(origin):08X}"
 
 
 class StateNotKeptError(NotNowError):

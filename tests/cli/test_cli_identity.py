@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 from robolink_cli import main
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_tcp
 
 from robolink.backup import first_backup_path
 from robolink.journal import open_journal

@@ -10,7 +10,7 @@ from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.epson.condition import Task
 from robolink_simulators.hosting.in_process.epson import clock_of
-from robolink_simulators.hosting.streams.epson_serial import serve_serial
+from robolink_simulators.hosting.streams.epson import serve_serial
 
 from robolink.model import ToolOffset
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from robolink_cli import main
 from robolink_cli.commands.record.journal_export import csv_lines
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_tcp
 
 from robolink.errors import ConfigError, RobolinkError
 from robolink.files.durable import file_name, write_whole

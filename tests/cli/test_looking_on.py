@@ -5,7 +5,7 @@ import json
 import pytest
 from robolink_cli import main
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_tcp
 
 import robolink
 from robolink.stopping import StopListener

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from robolink_cli import entry, main
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_tcp
 
 from robolink.files.named import MOST_BYTES, append_to_named, holds, read_named
 

@@ -16,7 +16,7 @@ import click
 import pytest
 from robolink_cli import main
 from robolink_simulators.plc import PlcSimulator, serve_plc
-from robolink_simulators.testkit.recipes import written_recipe
+from robolink_simulators.testkit.operator import written_recipe
 
 from robolink.register_maps import load_map
 from robolink.timing import NS_PER_S

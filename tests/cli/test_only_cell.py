@@ -6,7 +6,7 @@ import pytest
 from robolink_cli import main
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.in_process.epson import register, unregister
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_tcp
 
 from tests.cli.test_names_of_before import run_on_terminal
 from tests.contract._terminal import Terminal

@@ -14,10 +14,10 @@ import click
 import pytest
 from robolink_cli import main
 from robolink_cli.console import language
-from robolink_cli.console.columns import columns
+from robolink_cli.console.tables import columns
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.in_process.epson import register, unregister
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_tcp
 
 MARKS = "\u3010\u3011"
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from robolink_cli import main
 from robolink_simulators.hosting.in_process import epson as in_process
-from robolink_simulators.testkit.recipes import written_recipe
+from robolink_simulators.testkit.operator import written_recipe
 
 from robolink.accuracy import stated_rows
 from robolink.config import find_cell

@@ -25,7 +25,7 @@ from robolink_simulators.cell.tip_switches import LightBeam
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.hosting.in_process.epson import register, unregister
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_tcp
 
 from tests.contract.test_pages_typed import without_typed_parts
 from tests.unit.test_epson_point_files import block as point

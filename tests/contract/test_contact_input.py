@@ -5,8 +5,7 @@ from dataclasses import replace
 
 import pytest
 from robolink_cli.prompts.operator import AssistedOperator
-from robolink_simulators.assist.acts import perform
-from robolink_simulators.assist.port import InProcessEyes
+from robolink_simulators.assist.port import InProcessEyes, perform
 from robolink_simulators.hosting.in_process import epson, softmotion
 
 import robolink

@@ -9,8 +9,8 @@ from urllib.parse import urlencode, urlsplit
 import pytest
 from robolink_simulators.cell.clock import ManualClock, SteeredClock
 from robolink_simulators.control.acts.registry import ACTS
-from robolink_simulators.control.answer_schemas import AnswerSchemas
 from robolink_simulators.control.cell import AnySimulator, ControlledCell
+from robolink_simulators.control.openapi import AnswerSchemas
 from robolink_simulators.control.server import ControlServer
 from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.faults import FaultAction, PlcFaultAction

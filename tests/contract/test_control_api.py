@@ -24,7 +24,7 @@ from robolink_simulators.control.server import ControlServer
 from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.faults import counted
 from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_tcp
 from robolink_simulators.plc import PlcSimulator
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 

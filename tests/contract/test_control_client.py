@@ -13,7 +13,7 @@ from robolink_simulators.control.cell import ControlledCell
 from robolink_simulators.control.client import ControlClient
 from robolink_simulators.control.server import ControlServer
 from robolink_simulators.epson import EpsonSimulator
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_tcp
 
 from robolink.errors import (
     ConnectError,

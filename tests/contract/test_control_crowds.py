@@ -17,7 +17,7 @@ from robolink_simulators.control.client import ControlClient
 from robolink_simulators.control.server import ControlServer
 from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_tcp
 from robolink_simulators.plc import PlcSimulator, serve_plc
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 

@@ -8,8 +8,8 @@ from contextlib import contextmanager, suppress
 import pytest
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson import EpsonOptions, EpsonSimulator
-from robolink_simulators.hosting.streams.epson_serial import serve_serial
-from robolink_simulators.hosting.streams.serial_cable import SerialCable
+from robolink_simulators.hosting.streams.epson import serve_serial
+from robolink_simulators.hosting.streams.serial_host import SerialCable
 
 import robolink
 from robolink.controllers import EpsonController

@@ -9,7 +9,7 @@ from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.faults import Fault, FaultAction, PlcFault, PlcFaultAction
 from robolink_simulators.hosting.fieldbus.canopen_node import CanPlace, serve_canopen
 from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_rtu, serve_modbus_tcp
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_tcp
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 from robolink.errors import (

@@ -10,8 +10,8 @@ import pytest
 from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.epson.remote.link import EpsonServerLink
 from robolink_simulators.hosting.streams import serving_loop
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
-from robolink_simulators.hosting.streams.readiness import MOST_AT_ONCE, SelectedReadiness
+from robolink_simulators.hosting.streams.epson import serve_tcp
+from robolink_simulators.hosting.streams.serving_loop import MOST_AT_ONCE, SelectedReadiness
 from robolink_simulators.hosting.streams.tcp_host import TcpHost
 
 from robolink.transport import parse_url

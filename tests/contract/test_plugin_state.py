@@ -13,7 +13,7 @@ import robolink
 from robolink import ToolOffset
 from robolink.errors import OutcomeUnknownError
 from robolink_simulators.faults import Fault, FaultAction
-from robolink_simulators.softmotion.mailbox.faults import PlcFault, PlcFaultAction
+from robolink_simulators.faults import PlcFault, PlcFaultAction
 
 folders = []
 
@@ -80,7 +80,7 @@ def test_a_write_that_is_cut_leaves_nothing_in_the_tester_s_own_folder(
 def test_without_the_fixtures_it_would_be_there(own_folder):
     """What the test above looks for is where it looks."""
     from robolink_simulators.epson.device import EpsonSimulator
-    from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+    from robolink_simulators.hosting.streams.epson import serve_tcp
 
     with serve_tcp(EpsonSimulator()) as host, robolink.connect(host.url) as controller:
         controller.tools.write(2, ToolOffset(1, 2, 3), expected=None)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from robolink_cli import main
-from robolink_simulators.cell.held_board import SimulatedBoard
+from robolink_simulators.cell.camera import SimulatedBoard
 
 from robolink.journal import memory_journal
 from robolink.model import EntryKind

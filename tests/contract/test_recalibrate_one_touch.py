@@ -9,7 +9,7 @@ from robolink_cli.prompts import operator as _operator
 
 from robolink.model import EntryKind, ToolOffset
 from robolink.report import reports_of
-from robolink.report.sections.certainty import interval_sentences
+from robolink.report.sections.evidence import interval_sentences
 from robolink.report.sections.offsets import offsets
 from tests.contract._method_cell import KINDS, method_cell
 

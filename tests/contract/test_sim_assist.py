@@ -12,7 +12,7 @@ from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.cell.world_parameters import parameter_names
 from robolink_simulators.control.acts.registry import ACTS
 from robolink_simulators.epson import EpsonSimulator
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_tcp
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 from robolink.errors import ConfigError, ConnectError, TransportBrokenError

@@ -13,8 +13,7 @@ from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson import EpsonOptions, EpsonSimulator
 from robolink_simulators.epson.spel import parse
 from robolink_simulators.faults import Fault, FaultAction
-from robolink_simulators.hosting.streams.epson_serial import serve_serial
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_serial, serve_tcp
 
 from robolink.errors import ConfigError, ConnectError
 from robolink.model import Secret

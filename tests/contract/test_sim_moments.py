@@ -12,7 +12,7 @@ from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.faults import Fault, FaultAction, PlcFault, PlcFaultAction
 from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_tcp
 from robolink_simulators.plc import PlcSimulator, serve_plc
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 

@@ -1,7 +1,7 @@
 """The tool slots of a PLC keep their promises on every link."""
 
 import pytest
-from robolink_simulators.softmotion.kinematics.coordinates import CoordRef
+from robolink_simulators.softmotion.kinematics.kinematics import CoordRef
 from robolink_simulators.softmotion.mailbox import (
     MailboxOptions,
     PlcOptions,

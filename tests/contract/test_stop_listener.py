@@ -8,7 +8,7 @@ import threading
 
 import pytest
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_tcp
 
 import robolink
 from robolink.errors import OutcomeUnknownError, RejectedError, StoppedError

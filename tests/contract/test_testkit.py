@@ -9,8 +9,7 @@ from xml.etree import ElementTree
 import pytest
 from robolink_simulators import pytest_plugin
 from robolink_simulators.device.wire_record import MOST_LINES, WireRecord
-from robolink_simulators.testkit.asked import CellRequest
-from robolink_simulators.testkit.making import make_epson, make_softmotion
+from robolink_simulators.testkit.making import CellRequest, make_epson, make_softmotion
 from robolink_simulators.testkit.served import OwnFolder
 
 import robolink

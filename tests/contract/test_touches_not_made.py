@@ -8,8 +8,7 @@ import math
 
 import pytest
 from robolink_cli.prompts.operator import AssistedOperator
-from robolink_simulators.assist.acts import perform
-from robolink_simulators.assist.port import InProcessEyes
+from robolink_simulators.assist.port import InProcessEyes, perform
 
 import robolink
 from robolink.errors import CalibrationError, VerifyError

@@ -7,7 +7,7 @@ import pytest
 from robolink_cli import main
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_tcp
 
 from tests.contract._terminal import Terminal
 

@@ -13,8 +13,7 @@ from robolink_simulators.epson.options import (
 from robolink_simulators.epson.spel.expressions.machine_functions import MACHINE_FUNCTIONS
 from robolink_simulators.faults import Fault, FaultAction
 from robolink_simulators.hosting.in_process.epson import register, unregister
-from robolink_simulators.hosting.streams.epson_serial import serve_serial
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_serial, serve_tcp
 
 from robolink.controllers.epson.verify import redacted, verify_epson
 from robolink.errors import LoginRefusedError

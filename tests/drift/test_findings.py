@@ -7,8 +7,8 @@ import pytest
 
 from robolink.calibration import student_t
 from robolink.drift import DriftCode, charts_of, drift_of, findings_in, measured_changes
-from robolink.drift.mounted import mounted_trend
-from robolink.drift.significance import LEVEL, slope_of
+from robolink.drift.findings import mounted_trend
+from robolink.drift.history import LEVEL, slope_of
 from robolink.errors import ConfigError
 from robolink.model import EntryKind, Recorded, Signature, ToolOffset, plain_offset
 from tests.drift._courses import course, found

@@ -14,8 +14,8 @@ from robolink_simulators.faults import (
 )
 from robolink_simulators.hosting.in_process import epson, softmotion
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
+from robolink_simulators.softmotion.mailbox.exchange import WireFaults
 from robolink_simulators.softmotion.mailbox.plc import Plc
-from robolink_simulators.softmotion.mailbox.words.exchange import WireFaults
 
 import robolink
 from robolink.journal import memory_journal

@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import pytest
-from robolink_simulators.faults import Fault, FaultAction
-from robolink_simulators.softmotion.mailbox.faults import PlcFault, PlcFaultAction
+from robolink_simulators.faults import Fault, FaultAction, PlcFault, PlcFaultAction
 
 from robolink.journal.store.store import Store, Tables
 from robolink.model import EntryKind, MarkerKind

@@ -6,7 +6,7 @@ from itertools import count
 import pytest
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.hosting.in_process.epson import register, unregister
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_tcp
 
 _names = count()
 

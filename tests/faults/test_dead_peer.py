@@ -12,7 +12,7 @@ import pytest
 from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.hosting.fieldbus.canopen_node import CanPlace, serve_canopen
 from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_rtu
-from robolink_simulators.hosting.streams.epson_serial import serve_serial
+from robolink_simulators.hosting.streams.epson import serve_serial
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink

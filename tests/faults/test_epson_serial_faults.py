@@ -15,7 +15,7 @@ from contextlib import contextmanager, suppress
 import pytest
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson import EpsonSimulator
-from robolink_simulators.hosting.streams.epson_serial import serve_serial
+from robolink_simulators.hosting.streams.epson import serve_serial
 
 import robolink
 from robolink.errors import ConnectError, RobolinkError

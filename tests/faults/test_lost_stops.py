@@ -8,7 +8,7 @@ import pytest
 from robolink_cli import entry
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.faults import Fault, FaultAction, PlcFault, PlcFaultAction
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_tcp
 
 import robolink
 from robolink.controllers import EpsonController, stop_now

@@ -12,7 +12,7 @@ from functools import partial
 import pytest
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_tcp
 
 import robolink
 from robolink.errors import (

@@ -18,7 +18,7 @@ from robolink_simulators.control.cell import ControlledCell
 from robolink_simulators.control.server import ControlServer
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_tcp
 from robolink_simulators.plc import PlcSimulator, serve_plc
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 

@@ -6,7 +6,7 @@ computed bit by bit, both ways, and what the other end would have sampled is wha
 
 import pytest
 from robolink_simulators.epson import EpsonSimulator
-from robolink_simulators.hosting.streams.epson_serial import SerialFace
+from robolink_simulators.hosting.streams.epson import SerialFace
 
 from robolink.errors import ConnectError, RemoteProtocolError
 from tests.faults._uart import UartSettings, heard

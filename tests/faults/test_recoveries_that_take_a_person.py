@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import pytest
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.faults import Fault, FaultAction, PlcFault, PlcFaultAction
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_tcp
 
 import robolink
 from robolink.errors import OutcomeUnknownError

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_tcp
 from robolink_simulators.plc import PlcSimulator, serve_plc
 
 import robolink

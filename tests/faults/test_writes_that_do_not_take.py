@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.faults import Fault, FaultAction
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
-from robolink_simulators.softmotion.kinematics.coordinates import CoordRef
+from robolink_simulators.hosting.streams.epson import serve_tcp
+from robolink_simulators.softmotion.kinematics.kinematics import CoordRef
 
 import robolink
 from robolink.errors import NotReadyError, NotReadyReason, ReadBackError

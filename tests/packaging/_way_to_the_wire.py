@@ -223,7 +223,7 @@ def main() -> None:
 
     from robolink_simulators.cell.clock import ScaledClock
     from robolink_simulators.epson.device import EpsonSimulator
-    from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+    from robolink_simulators.hosting.streams.epson import serve_tcp
 
     with tempfile.TemporaryDirectory() as folder:
         os.environ["ROBOLINK_STATE_DIR"] = folder

@@ -14,6 +14,8 @@ from typing import Any, NamedTuple
 
 import pytest
 
+from tools.api import public
+
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("robolink", "cli/robolink_cli", "simulators/robolink_simulators")
 ROLE = re.compile(r":(?:py:)?(mod|class|func|meth|attr|data|exc|const|obj):`([^`]*)`")
@@ -49,13 +51,19 @@ def texts(node: ast.AST, owners: tuple[str, ...] = ()) -> Iterator[tuple[tuple[s
             yield from texts(child, inside)
 
 
+def targets(text: str) -> Iterator[str]:
+    """Yield what the roles of a docstring name."""
+    for _, written in ROLE.findall(text):
+        named = re.fullmatch(r"[^<]*<([^>]*)>", written)
+        target = (named[1] if named else written).strip().lstrip("~!.")
+        yield " ".join(target.split()).removesuffix("()")
+
+
 def roles(module: str, tree: ast.Module) -> Iterator[Role]:
     """Yield the roles in the docstrings of a module."""
     for owners, text in texts(tree):
-        for _, written in ROLE.findall(text):
-            named = re.fullmatch(r"[^<]*<([^>]*)>", written)
-            target = (named[1] if named else written).strip().lstrip("~!.")
-            yield Role(module, owners, " ".join(target.split()).removesuffix("()"))
+        for target in targets(text):
+            yield Role(module, owners, target)
 
 
 def imported(tree: ast.Module) -> dict[str, tuple[str, str]]:
@@ -133,15 +141,32 @@ def test_what_a_docstring_names_is_there(package):
     assert [role for role in found if not leads_somewhere(role, trees())] == []
 
 
+def without_a_page(text: str, pages: dict[str, dict[str, object]]) -> list[str]:
+    """Return what the roles of a text name by its whole path and no page of the API describes."""
+    described = {*pages, *(f"{package}.{name}" for package in pages for name in pages[package])}
+    whole = [target for target in targets(text) if target.startswith("robolink")]
+    return [one for one in whole if not {one, one.rpartition(".")[0]} & described]
+
+
+def test_what_a_page_of_the_api_names_has_a_page():
+    pages = public()
+    texts = [import_module(package).__doc__ or "" for package in pages]
+    texts += [
+        getattr(thing, "__doc__", "") or "" for named in pages.values() for thing in named.values()
+    ]
+    assert [one for text in texts for one in without_a_page(text, pages)] == []
+    assert without_a_page("Says :mod:`robolink.locale.languages`.", pages)
+
+
 @pytest.mark.parametrize(
     ("module", "owners", "target", "there"),
     [
         ("robolink.model.motion.movement", ("WorkBox",), "about", True),
         ("robolink.model.motion.movement", ("WorkBox",), "above", False),
-        ("robolink.methods.points.source", (), "TwoTouches", True),
-        ("robolink.methods.points.source", (), "robolink.procedures.TipSource", True),
-        ("robolink.methods.points.source", (), "robolink.procedures.TipSink", False),
-        ("robolink.methods.points.source", (), "solve_two_poses", False),
+        ("robolink.methods.given_poses", (), "TwoTouches", True),
+        ("robolink.methods.given_poses", (), "robolink.procedures.TipSource", True),
+        ("robolink.methods.given_poses", (), "robolink.procedures.TipSink", False),
+        ("robolink.methods.given_poses", (), "solve_two_poses", False),
     ],
 )
 def test_a_wrong_name_is_found(module, owners, target, there):

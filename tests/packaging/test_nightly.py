@@ -85,6 +85,16 @@ def test_the_table_counts_what_was_not_run_apart():
     assert "* not run: peers: no mbpoll" in text
 
 
+def test_a_night_can_be_made_in_pieces(tmp_path):
+    kept = tmp_path / "outcomes.json"
+    faults, docs = (nightly.Outcome(name, "FAILED", 2, lacks=("x",)) for name in ("faults", "docs"))
+    assert nightly.with_those_of_before([faults], "commit a", kept) == [faults]
+    assert nightly.with_those_of_before([docs], "commit a", kept) == [docs, faults]
+    mended = nightly.Outcome("docs", "passed", 1)
+    assert nightly.with_those_of_before([mended], "commit a", kept) == [mended, faults]
+    assert nightly.with_those_of_before([mended], "commit b", kept) == [mended]
+
+
 def test_the_shares_are_one_night_and_each_target_exists():
     assert sum(part.share for part in nightly.PARTS) == pytest.approx(1)
     targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))

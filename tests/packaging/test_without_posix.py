@@ -94,7 +94,7 @@ def test_the_platform_really_lacks_them():
     done = run(
         "import select, socket\n"
         "import robolink.controllers, robolink_cli.main\n"
-        "import robolink_simulators.hosting.streams.epson_tcp\n"
+        "import robolink_simulators.hosting.streams.epson\n"
         "assert not hasattr(select, 'poll') and not hasattr(socket, 'MSG_DONTWAIT')\n"
         "import termios\n"
     )

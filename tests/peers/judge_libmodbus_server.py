@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
-from robolink_simulators.hosting.streams.serial_cable import SerialCable
+from robolink_simulators.hosting.streams.serial_host import SerialCable
 
 import robolink
 from robolink import ToolOffset

@@ -16,7 +16,7 @@ from robolink_simulators.faults import (
 )
 from robolink_simulators.faults.drawn import ONLY_BY_NAME
 from robolink_simulators.faults.stream import EXCEPTION_CODES
-from robolink_simulators.softmotion.mailbox.words.exchange import WireFaults
+from robolink_simulators.softmotion.mailbox.exchange import WireFaults
 
 from robolink.errors import ConfigError
 

@@ -15,7 +15,7 @@ from robolink.journal.store.chain import canonical, storable
 from robolink.journal.store.failures import damaged_error, journal_error
 from robolink.locale import languages
 from robolink.messages import joined, plain, spoken, tr
-from robolink.pose_tables.refusals import OpenQuestion, unclear
+from robolink.pose_tables.values import OpenQuestion, unclear
 
 
 @pytest.fixture

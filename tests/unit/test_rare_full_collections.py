@@ -8,7 +8,7 @@ import sys
 import pytest
 from robolink_cli import main
 from robolink_simulators.epson import EpsonSimulator
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_tcp
 
 import robolink
 

@@ -10,9 +10,8 @@ import pytest
 from robolink.calibration import Robust, Touch, solve_n_angle, solve_two_pose, solve_z_touch
 from robolink.model import ControllerFacts, Pose, ToolOffset
 from robolink.report import Outcome, Report, render
-from robolink.report.pictures.fit import fit_drawings, interval_ellipse
-from robolink.report.pictures.pose_plan import pose_drawings
-from robolink.report.pictures.run_order import order_drawings
+from robolink.report.pictures.plans import pose_drawings
+from robolink.report.pictures.residuals import fit_drawings, interval_ellipse, order_drawings
 
 TIP = ToolOffset(12.0, -3.5, -20.0)
 ERRORS = ((0.012, -0.004), (-0.009, 0.011), (0.003, 0.007), (-0.006, -0.010), (0.004, 0.002))

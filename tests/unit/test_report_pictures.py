@@ -2,8 +2,7 @@
 
 import pytest
 
-from robolink.report.pictures.panel import dot_names
-from robolink.report.pictures.plane import step_down, step_up
+from robolink.report.pictures.drawing import dot_names, step_down, step_up
 
 
 @pytest.mark.parametrize(

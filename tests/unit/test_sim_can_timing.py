@@ -3,7 +3,7 @@
 from itertools import pairwise
 
 import pytest
-from robolink_simulators.hosting.fieldbus.canopen_face import LOOK_S, PERIOD_S, EventTimer
+from robolink_simulators.hosting.fieldbus.canopen_node import LOOK_S, PERIOD_S, EventTimer
 
 from robolink.timing import NS_PER_S
 

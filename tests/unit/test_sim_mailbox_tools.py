@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from robolink_simulators.softmotion.kinematics.coordinates import CoordRef
+from robolink_simulators.softmotion.kinematics.kinematics import CoordRef
 from robolink_simulators.softmotion.mailbox import (
     MailboxOptions,
     PlcOptions,

@@ -7,11 +7,11 @@ from statistics import fmean
 
 import pytest
 import robolink_cli.prompts.operator as _operator
-from robolink_simulators.assist.acts import perform
 from robolink_simulators.assist.port import (
     LEAST_THINKING_S,
     AssistClient,
     InProcessEyes,
+    perform,
     serve_assist,
 )
 from robolink_simulators.cell.clock import ScaledClock

@@ -17,8 +17,8 @@ from robolink_simulators.cell.frames import (
     zyz_angles,
 )
 from robolink_simulators.softmotion import BlockRefused, CoordRef, CoordSystem, ErrorKind
-from robolink_simulators.softmotion.kinematics.coordinates import CoordinateTransforms
-from robolink_simulators.softmotion.kinematics.orientation import about_z, yaw_deg
+from robolink_simulators.softmotion.kinematics.kinematics import CoordinateTransforms
+from robolink_simulators.softmotion.kinematics.positions import about_z, yaw_deg
 
 angles = st.floats(-360, 360)
 lengths = st.floats(-1000, 1000)

@@ -19,13 +19,26 @@ from robolink_simulators.cell.frames import (
 )
 from robolink_simulators.softmotion import BlockRefused, CoordRef, ErrorKind, machine_named
 from robolink_simulators.softmotion.catalogue import NAMES, complete_kinematics, parameter_names
-from robolink_simulators.softmotion.kinematics.articulated import PosRRR, articulated_6dof
-from robolink_simulators.softmotion.kinematics.coupled import Coupled, scara3_z
+from robolink_simulators.softmotion.kinematics.articulated import (
+    Palletizer4Axis,
+    PosRRR,
+    articulated_6dof,
+)
 from robolink_simulators.softmotion.kinematics.kinematics import ANY_CONFIGURATION, Configuration
-from robolink_simulators.softmotion.kinematics.orientation import about_z, yaw_deg
-from robolink_simulators.softmotion.kinematics.palletizer import Palletizer4Axis
-from robolink_simulators.softmotion.kinematics.positions import Gantry, Polar, Scara2Z
-from robolink_simulators.softmotion.kinematics.wrists import CAxis, Wrist2, Wrist3
+from robolink_simulators.softmotion.kinematics.positions import (
+    Gantry,
+    Polar,
+    Scara2Z,
+    about_z,
+    yaw_deg,
+)
+from robolink_simulators.softmotion.kinematics.wrists import (
+    CAxis,
+    Coupled,
+    Wrist2,
+    Wrist3,
+    scara3_z,
+)
 from robolink_simulators.softmotion.motion.paths import axes_for_tcp
 from robolink_simulators.softmotion.rows import five_axes
 

@@ -6,7 +6,7 @@ from urllib.parse import urlsplit
 
 import pytest
 from robolink_simulators.epson import EpsonOptions, EpsonSimulator
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_tcp
 
 NS_PER_S = 1_000_000_000
 

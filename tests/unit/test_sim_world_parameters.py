@@ -8,7 +8,7 @@ from statistics import fmean, pstdev
 
 import pytest
 from robolink_cli.commands.simulate.serving import world_from
-from robolink_simulators.assist.acts import perform
+from robolink_simulators.assist.port import perform
 from robolink_simulators.cell.camera import CameraOptics, CameraTruth
 from robolink_simulators.cell.tip_switches import LightBeam, TouchPlate
 from robolink_simulators.cell.world_parameters import (

@@ -6,7 +6,7 @@ import socket
 from collections import deque
 
 import pytest
-from robolink_simulators.hosting.streams.readiness import (
+from robolink_simulators.hosting.streams.serving_loop import (
     QueuedReadiness,
     SelectedReadiness,
     make_readiness,

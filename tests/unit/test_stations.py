@@ -19,7 +19,7 @@ from robolink.stations import (
     station_entry,
     touch_station,
 )
-from robolink.stations._apart import apart_mm
+from robolink.stations._station import apart_mm
 
 CELL = """
 [cells.a]

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_tcp
 
 from tests.windows._consoles import Way, WindowsConsole
 from tests.windows._windows_python import ROOT, WindowsPython

@@ -55,7 +55,7 @@ class PlcMapController(ControllerCore):
         >>> from robolink.register_maps import load_map
         >>> from robolink.transport import open_modbus
         >>> from robolink_simulators.plc import PlcSimulator, serve_plc
-        >>> from robolink_simulators.testkit.recipes import written_map
+        >>> from robolink_simulators.testkit.operator import written_map
         >>> path = written_map(Path.cwd())
         >>> register_map, log = load_map(path), memory_journal("map-example").log("map-example")
         >>> with serve_plc(PlcSimulator(register_map, seed=1), path) as host:
@@ -239,7 +239,7 @@ def open_plc_map(
         >>> from robolink.register_maps import load_map
         >>> from robolink.transport import parse_url
         >>> from robolink_simulators.plc import PlcSimulator, serve_plc
-        >>> from robolink_simulators.testkit.recipes import written_map
+        >>> from robolink_simulators.testkit.operator import written_map
         >>> path = written_map(Path.cwd())
         >>> def record(identity):
         ...     return memory_journal(identity).log(identity)

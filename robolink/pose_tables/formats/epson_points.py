@@ -29,10 +29,9 @@ from robolink.errors import ConfigError
 from robolink.files.named import read_named
 from robolink.messages import tr
 from robolink.model import Elbow, Hand, Pose, Posture, Wrist
-from robolink.pose_tables.conventions import EPSON
 from robolink.pose_tables.encoding import decoded, line_counter
-from robolink.pose_tables.refusals import UnusableText, refused
-from robolink.pose_tables.values import LengthUnit, RawPose, RawTable
+from robolink.pose_tables.orientation import EPSON
+from robolink.pose_tables.values import LengthUnit, RawPose, RawTable, UnusableText, refused
 
 _FIELDS: Final = ("nNumber", "nUndefined", "rX", "rY", "rZ", "rU", "rV", "rW", "nLocal", "nHand")
 _FLAGS: Final = ("nElbow", "nWrist", "nJ1Flag", "nJ2Flag", "nJ4Flag", "nJ6Flag")

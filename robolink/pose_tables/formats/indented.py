@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from robolink.messages import tr
-from robolink.pose_tables.refusals import UnusableText
+from robolink.pose_tables.values import UnusableText
 
 _KEY: Final = re.compile(
     r"(\"[^\"]*\"|'[^']*'|[^\s\"'\[\]{},#&*!|>%@-][^:\[\]{}]*?)\s*:(?:\s+(.*))?"

@@ -12,10 +12,9 @@ from typing import Final
 from robolink.messages import tr
 from robolink.pose_tables.formats.documents import read_document
 from robolink.pose_tables.numbers import NUMBER, plain, why_no_number
-from robolink.pose_tables.refusals import UnusableText, at_line
 from robolink.pose_tables.tabular.header import ANGLES, LENGTHS, MEANINGS
 from robolink.pose_tables.tabular.separators import table_lines
-from robolink.pose_tables.values import RawTable, ReadingChoices
+from robolink.pose_tables.values import RawTable, ReadingChoices, UnusableText, at_line
 
 _PAIR: Final = re.compile(
     r"(?<![\w.])([A-Za-z][A-Za-z_]{0,11})(\s*[:=]\s*|\s+)"

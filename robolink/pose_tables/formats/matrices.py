@@ -13,9 +13,8 @@ from robolink.messages import tr
 from robolink.pose_tables.numbers import NUMBER, seems_number
 from robolink.pose_tables.orientation import checked, is_rotation, uvw_deg
 from robolink.pose_tables.questions import unit_in
-from robolink.pose_tables.refusals import UnusableText
 from robolink.pose_tables.tabular.separators import table_lines
-from robolink.pose_tables.values import RawPose, RawTable
+from robolink.pose_tables.values import RawPose, RawTable, UnusableText
 
 _BRACKETS: Final = re.compile(r"[\[\](){};,|]")
 _NUMBER: Final = re.compile(NUMBER)

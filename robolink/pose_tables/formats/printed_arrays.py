@@ -13,8 +13,14 @@ from robolink.pose_tables.encoding import line_counter
 from robolink.pose_tables.formats.documents import read_rows
 from robolink.pose_tables.formats.matrices import is_matrix, pose_of_rows
 from robolink.pose_tables.numbers import NUMBER, number_of, plain, why_no_number
-from robolink.pose_tables.refusals import NotFiniteText, UnusableText, at_line
-from robolink.pose_tables.values import RawPose, RawTable, ReadingChoices
+from robolink.pose_tables.values import (
+    NotFiniteText,
+    RawPose,
+    RawTable,
+    ReadingChoices,
+    UnusableText,
+    at_line,
+)
 
 _OURS: Final = re.compile(
     r"\s*(?:[A-Za-z_]\w*\s*[=:]\s*)?(?:(?:(?:np|numpy)\.)?array\s*\(\s*)?\[+\s*[+\-.\d\[]"

@@ -11,11 +11,10 @@ from typing import Final
 
 from robolink.messages import tr
 from robolink.model import Hand
-from robolink.pose_tables.conventions import EPSON
 from robolink.pose_tables.numbers import number_of, plain, why_no_number
+from robolink.pose_tables.orientation import EPSON
 from robolink.pose_tables.programs.program_text import left_out
-from robolink.pose_tables.refusals import UnusableText
-from robolink.pose_tables.values import LengthUnit, RawPose, RawTable
+from robolink.pose_tables.values import LengthUnit, RawPose, RawTable, UnusableText
 
 _POINT: Final = re.compile(
     r"\s*(?:P\s*\(?\s*(?P<number>\d+)\s*\)?\s*(?:\(\s*(?P<tag>[A-Za-z_]\w*)\s*\))?"

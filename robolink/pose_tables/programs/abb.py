@@ -23,8 +23,7 @@ from robolink.pose_tables.programs.program_text import (
     turned,
     without,
 )
-from robolink.pose_tables.refusals import UnusableText
-from robolink.pose_tables.values import RawPose, RawTable
+from robolink.pose_tables.values import RawPose, RawTable, UnusableText
 
 Value: TypeAlias = "str | list[Value]"
 

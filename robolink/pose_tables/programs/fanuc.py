@@ -8,17 +8,16 @@ import re
 from typing import Final
 
 from robolink.messages import tr
-from robolink.pose_tables.conventions import RULES
 from robolink.pose_tables.encoding import line_counter
 from robolink.pose_tables.numbers import plain
+from robolink.pose_tables.orientation import RULES
 from robolink.pose_tables.programs.program_text import (
     program,
     radians,
     required_number,
     turned,
 )
-from robolink.pose_tables.refusals import UnusableText
-from robolink.pose_tables.values import RawPose, RawTable
+from robolink.pose_tables.values import RawPose, RawTable, UnusableText
 
 _RULE: Final = RULES["fanuc"]
 _COMPONENTS: Final = ("X", "Y", "Z", "R", "P", "W")

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from typing import Final
 
 from robolink.messages import tr
-from robolink.pose_tables.conventions import RULES
 from robolink.pose_tables.encoding import line_counter
 from robolink.pose_tables.numbers import number_of, plain
+from robolink.pose_tables.orientation import RULES
 from robolink.pose_tables.programs.program_text import (
     Group,
     blanked,
@@ -25,8 +25,7 @@ from robolink.pose_tables.programs.program_text import (
     turned,
     without,
 )
-from robolink.pose_tables.refusals import UnusableText
-from robolink.pose_tables.values import RawPose, RawTable
+from robolink.pose_tables.values import RawPose, RawTable, UnusableText
 
 _RULE: Final = RULES["kuka"]
 _COMPONENTS: Final = ("X", "Y", "Z", "A", "B", "C")

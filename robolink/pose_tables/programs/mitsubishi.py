@@ -9,8 +9,8 @@ import re
 from typing import Final
 
 from robolink.messages import tr
-from robolink.pose_tables.conventions import RULES
 from robolink.pose_tables.numbers import plain
+from robolink.pose_tables.orientation import RULES
 from robolink.pose_tables.programs.program_text import (
     left_out,
     program,
@@ -18,8 +18,7 @@ from robolink.pose_tables.programs.program_text import (
     required_number,
     turned,
 )
-from robolink.pose_tables.refusals import UnusableText
-from robolink.pose_tables.values import RawPose, RawTable
+from robolink.pose_tables.values import RawPose, RawTable, UnusableText
 
 _RULE: Final = RULES["mitsubishi"]
 _COMPONENTS: Final = ("X", "Y", "Z", "A", "B", "C", "L1", "L2")

@@ -14,8 +14,7 @@ from typing import Final
 from robolink.messages import tr
 from robolink.pose_tables import orientation
 from robolink.pose_tables.numbers import number_of, why_no_number
-from robolink.pose_tables.refusals import UnusableText
-from robolink.pose_tables.values import LengthUnit, RawPose, RawTable
+from robolink.pose_tables.values import LengthUnit, RawPose, RawTable, UnusableText
 
 _TURNED_MOST_DEG: Final = 720.0
 """Makers print angles within a turn, and people type two at most."""

@@ -11,12 +11,11 @@ from collections.abc import Iterator
 from typing import Final
 
 from robolink.messages import tr
-from robolink.pose_tables.conventions import RULES
 from robolink.pose_tables.encoding import line_counter
 from robolink.pose_tables.numbers import NUMBER, number_of, plain, seems_number, why_no_number
+from robolink.pose_tables.orientation import RULES
 from robolink.pose_tables.programs.program_text import blanked, left_out, program, turned
-from robolink.pose_tables.refusals import UnusableText
-from robolink.pose_tables.values import LengthUnit, RawPose, RawTable
+from robolink.pose_tables.values import LengthUnit, RawPose, RawTable, UnusableText
 
 _RULE: Final = RULES["rotvec"]
 _OURS: Final = re.compile(

@@ -5,8 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Final
 
 from robolink.messages import tr
-from robolink.pose_tables.refusals import UnusableText
-from robolink.pose_tables.values import AngleUnit, ColumnHead, LengthUnit
+from robolink.pose_tables.values import AngleUnit, ColumnHead, LengthUnit, UnusableText
 
 SKIPPED: Final = "-"
 

@@ -17,7 +17,6 @@ from dataclasses import dataclass
 from typing import Final
 
 from robolink.messages import tr
-from robolink.pose_tables.refusals import NotFiniteText, UnusableText, at_line
 from robolink.pose_tables.tabular.columns import PoseColumns
 from robolink.pose_tables.tabular.header import (
     SKIPPED,
@@ -34,7 +33,14 @@ from robolink.pose_tables.tabular.separators import (
     rows_in_comments,
     table_lines,
 )
-from robolink.pose_tables.values import ColumnHead, RawTable, ReadingChoices
+from robolink.pose_tables.values import (
+    ColumnHead,
+    NotFiniteText,
+    RawTable,
+    ReadingChoices,
+    UnusableText,
+    at_line,
+)
 
 _SEPARATORS: Final = ("\t", ";", "|", ",", " ")
 _SIGN: Final = re.compile(r"^(\s*[^\s:=;,|\t\"]+(?:\s*[(\[][^)\]]*[)\]])?)\s*[:=]\s*")

@@ -14,7 +14,7 @@ from typing import Final
 
 from robolink.messages import tr
 from robolink.pose_tables.numbers import NUMBER, number_of, plain
-from robolink.pose_tables.refusals import UnusableText
+from robolink.pose_tables.values import UnusableText
 
 Line = tuple[int, str]
 """Number of the line, and its text."""

@@ -7,11 +7,9 @@ from collections.abc import Sequence
 from typing import Final
 
 from robolink.messages import tr
-from robolink.pose_tables.lengths import metres_question
-from robolink.pose_tables.numbers import seems_number
+from robolink.pose_tables.numbers import metres_question, seems_number
 from robolink.pose_tables.orientation import is_rotation
 from robolink.pose_tables.questions import unit_in, which_columns, which_length
-from robolink.pose_tables.refusals import UnclearText, UnusableText, at_line
 from robolink.pose_tables.tabular.columns import PoseColumns
 from robolink.pose_tables.tabular.header import (
     ANGLES,
@@ -36,7 +34,15 @@ from robolink.pose_tables.tabular.separators import (
     table_lines,
     without_trailing,
 )
-from robolink.pose_tables.values import ColumnHead, LengthUnit, RawTable, ReadingChoices
+from robolink.pose_tables.values import (
+    ColumnHead,
+    LengthUnit,
+    RawTable,
+    ReadingChoices,
+    UnclearText,
+    UnusableText,
+    at_line,
+)
 
 Row = tuple[int, list[str]]
 

@@ -7,9 +7,7 @@ from xml.etree.ElementTree import Element
 from robolink.drift import Chart
 from robolink.messages import tr
 from robolink.report._markup import element
-from robolink.report.pictures.panel import Drawing
-from robolink.report.pictures.plane import WIDTH, step_up
-from robolink.report.pictures.shapes import Place, circle, line, words
+from robolink.report.pictures.drawing import WIDTH, Drawing, Place, circle, line, step_up, words
 
 MOST_POINTS: Final = 120
 """More values than these cannot be told apart on paper; the newest are drawn."""

@@ -8,7 +8,7 @@ from typing import Final
 from robolink.messages import tr
 from robolink.model import ControllerFacts
 from robolink.report._values import Outcome, Record, Report
-from robolink.report.sections.decisions import turn_test_doubted
+from robolink.report.sections.evidence import turn_test_doubted
 
 _TONES: Final = {
     Outcome.SKIPPED: "still",

@@ -14,14 +14,13 @@ import json
 import socket
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any, Final
 from urllib.parse import urlsplit
 
 from robolink.closing import ClosedAtExit
 from robolink.errors import ConfigError, RobolinkError
 from robolink.messages import tr
-from robolink_simulators.assist.acts import perform
-from robolink_simulators.assist.entrance import SCHEME, assist_address
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.cell.habits import PersonManner
 from robolink_simulators.cell.person import PersonLook
@@ -32,14 +31,87 @@ from robolink_simulators.client_errors import (
     is_silent,
     nobody_listens,
 )
+from robolink_simulators.control.acts.declared import Answer, Given
 from robolink_simulators.control.acts.registry import MACHINE_REFUSALS, defect, machine_refusal
-from robolink_simulators.control.cell import ControlledCell
-from robolink_simulators.control.tokens import drawn_token, is_token
+from robolink_simulators.control.acts.registry import perform as perform_act
+from robolink_simulators.control.cell import AnySimulator, ControlledCell, drawn_token, is_token
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.in_process import epson as in_process
 from robolink_simulators.hosting.in_process import softmotion as plc_in_process
 from robolink_simulators.hosting.streams.tcp_host import TcpHost
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
+
+
+def perform(simulator: AnySimulator | ControlledCell, request: Given) -> Answer:
+    """Do what ``request["do"]`` names and return what it gives.
+
+    Raises:
+        ConfigError: There is no such act, or a value is missing, wrong or unknown.
+        SpelRefusal, BlockRefused: The simulated robot cannot do it.
+    """
+    cell = simulator if isinstance(simulator, ControlledCell) else ControlledCell(simulator)
+    given = {name: value for name, value in request.items() if name != "do"}
+    return perform_act(cell, request.get("do"), given)
+
+
+SCHEME: Final = "assist+tcp"
+
+_TOKEN_CHARACTERS: Final = frozenset(
+    "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class AssistAddress:
+    """An assist URL, taken apart.
+
+    Attributes:
+        host: Host name or address.
+        port: TCP port.
+        token: What is shown at the entrance; empty when the URL has none. Never printed.
+    """
+
+    host: str
+    port: int
+    token: str
+
+    @property
+    def shown(self) -> str:
+        """The URL without its token, for sentences and records."""
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"{SCHEME}://{host}:{self.port}"
+
+    def __repr__(self) -> str:
+        return f"AssistAddress({self.shown!r})"
+
+
+def assist_address(url: str) -> AssistAddress:
+    """Take an assist URL apart.
+
+    Args:
+        url: ``assist+tcp://TOKEN@127.0.0.1:PORT``.
+
+    Raises:
+        ConfigError: It is not an assist URL. It is not repeated, since it may hold a token.
+    """
+    try:
+        parts = urlsplit(url)
+        host, port, token = parts.hostname, parts.port, parts.username or ""
+    except ValueError:
+        host = None
+    if (
+        not host
+        or not port
+        or parts.scheme != SCHEME
+        or parts.password is not None
+        or not set(token) <= _TOKEN_CHARACTERS
+    ):
+        raise ConfigError(
+            tr("This is not an assist URL."),
+            remedy=tr("Take the one that 'robolink sim' prints."),
+        )
+    return AssistAddress(host, port, token)
+
 
 LEAST_THINKING_S: Final = 0.35
 """However fast simulated time passes, a person who thinks at all really answers no sooner: a driver
@@ -105,7 +177,7 @@ def serve_assist(
 
 
 class _AssistDevice:
-    """Implements :class:`~robolink_simulators.hosting.seam.WireDevice`."""
+    """Implements :class:`~robolink_simulators.hosting.addresses.WireDevice`."""
 
     def __init__(self, simulator: Assisted, clock: ScaledClock, token: str) -> None:
         self.cell = ControlledCell(simulator, clock)
@@ -131,7 +203,7 @@ class _AssistDevice:
 
 
 class _AssistLink:
-    """Implements :class:`~robolink_simulators.hosting.seam.DeviceLink`."""
+    """Implements :class:`~robolink_simulators.hosting.addresses.DeviceLink`."""
 
     def __init__(self, device: _AssistDevice) -> None:
         self._device = device

@@ -13,7 +13,7 @@ from robolink_simulators.cell.frames import add, subtract
 from robolink_simulators.cell.habits import PersonManner, TouchCourse
 from robolink_simulators.cell.places import Axis, XyzMm
 from robolink_simulators.cell.workplace import MOUNTED_TOOL, Workplace
-from robolink_simulators.device.late_random import late_random
+from robolink_simulators.device.wire_time import late_random
 
 LAMP_MM: Final = 0.025
 """So much below the first contact, and not above it, a person stops who watches the lamp of a

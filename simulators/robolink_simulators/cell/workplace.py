@@ -12,13 +12,17 @@ from typing import Any, ClassVar, Final, Protocol
 
 from robolink.messages import tr
 from robolink.model import TIP, Pose, ToolOffset
-from robolink_simulators.cell.camera import CameraTruth
+from robolink_simulators.cell.camera import CameraTruth, SimulatedBoard
 from robolink_simulators.cell.frames import add
-from robolink_simulators.cell.held_board import SimulatedBoard
 from robolink_simulators.cell.places import Axis, Direction, Pixel, axis_of
 from robolink_simulators.cell.places import XyzMm as XyzMm
-from robolink_simulators.cell.pressing import resistance_n
-from robolink_simulators.cell.surfaces import FlatPlate, RoundBall, Surface, SurfaceContact
+from robolink_simulators.cell.surfaces import (
+    FlatPlate,
+    RoundBall,
+    Surface,
+    SurfaceContact,
+    resistance_n,
+)
 from robolink_simulators.cell.tip_switches import (
     STANDING,
     UPRIGHT,
@@ -29,7 +33,7 @@ from robolink_simulators.cell.tip_switches import (
     TipSwitch,
 )
 from robolink_simulators.cell.world_parameters import WorldParameters
-from robolink_simulators.device.late_random import late_random
+from robolink_simulators.device.wire_time import late_random
 from robolink_simulators.not_now import NotNowError
 
 _STRAIGHT: Final = Shaft()
@@ -206,7 +210,7 @@ class Workplace(ABC):
         return SurfaceContact(touched)
 
     def resistance_n(self, tip_mm: XyzMm) -> XyzMm:
-        """Return the force, N, of what is touched on a tip at a place; see :mod:`pressing`."""
+        """Return the force, N, of what is touched on a tip at a place; see :mod:`.surfaces`."""
         return resistance_n(tip_mm, self.pin_mm, self.parameters.pin_radius_mm, self.surface)
 
     def lean_of(self, tool: int) -> Lean:

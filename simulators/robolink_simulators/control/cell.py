@@ -1,5 +1,7 @@
 """One simulated controller with all that acts upon it past the wire."""
 
+import hmac
+import secrets
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
@@ -10,6 +12,21 @@ from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.faults import LinkKind
 from robolink_simulators.plc import PlcSimulator
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
+
+_TOKEN_BYTES: Final = 16
+
+
+def drawn_token() -> str:
+    """Return a token that nobody guesses: 128 bits, in characters that a URL carries."""
+    return secrets.token_urlsafe(_TOKEN_BYTES)
+
+
+def is_token(shown: object, token: str) -> bool:
+    """Whether ``shown`` is the token; takes as long for a near miss as for a far one."""
+    return isinstance(shown, str) and hmac.compare_digest(
+        shown.encode("utf-8", "surrogatepass"), token.encode()
+    )
+
 
 AnySimulator = EpsonSimulator | SoftMotionSimulator | PlcSimulator
 """A simulated controller of any kind."""

@@ -30,7 +30,7 @@ from robolink_simulators.control.acts.registry import (
     methods_of,
     perform,
 )
-from robolink_simulators.control.cell import ControlledCell
+from robolink_simulators.control.cell import ControlledCell, drawn_token, is_token
 from robolink_simulators.control.http_port import (
     SCHEMA,
     ApiReply,
@@ -38,7 +38,6 @@ from robolink_simulators.control.http_port import (
     error_document,
     no_request,
 )
-from robolink_simulators.control.tokens import drawn_token, is_token
 from robolink_simulators.hosting.addresses import cannot_listen
 from robolink_simulators.not_now import NotNowError
 

@@ -10,8 +10,7 @@ from typing import Any, ClassVar, Final
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink_simulators.device.motion_log import MotionLog, StartedMotion
-from robolink_simulators.device.wire_record import WireRecord
+from robolink_simulators.device.wire_record import MotionLog, StartedMotion, WireRecord
 from robolink_simulators.device.wire_time import WireClock, WireTime
 from robolink_simulators.not_now import NotNowError
 from robolink_simulators.state_files import StateNotKeptError
@@ -248,3 +247,34 @@ class HostedDevice(ABC):
                 tr("A simulator that executes a program cannot be rebuilt."),
                 remedy=tr("Restart it instead."),
             )
+
+
+Act = Callable[[], None]
+
+
+class PlannedActs:
+    """Acts, each at its own instant."""
+
+    def __init__(self) -> None:
+        self._planned: list[tuple[int, Act]] = []
+
+    def plan_at(self, at_ns: int, act: Act) -> None:
+        """Have something done at an instant."""
+        self._planned.append((at_ns, act))
+
+    def next_change(self) -> int | None:
+        """Return when the next one is due."""
+        return min(at_ns for at_ns, _ in self._planned) if self._planned else None
+
+    def carry_out(self, now_ns: int) -> None:
+        """Do what is due by now."""
+        if not self._planned:
+            return
+        due = [act for at_ns, act in self._planned if at_ns <= now_ns]
+        self._planned = [plan for plan in self._planned if plan[0] > now_ns]
+        for act in due:
+            act()
+
+    def forget(self) -> None:
+        """Plan nothing any more."""
+        self._planned.clear()

@@ -7,7 +7,9 @@ simulated seconds that pass no faster than real ones. Where simulated time runs 
 time or behind it, and in the process, where a client itself lets it pass, the two are the same.
 """
 
-from typing import Protocol
+import random
+from collections.abc import Callable
+from typing import Any, Protocol, cast
 
 
 class WireClock(Protocol):
@@ -45,3 +47,35 @@ class WireTime:
         Of a time to come it is an estimate, right as long as the pace stays: ask again.
         """
         return wire_ns if self.clock is None else self.clock.simulated_at(wire_ns)
+
+
+class _LateRandom:
+    """Stands for a generator that is made when it is first asked for something."""
+
+    __slots__ = ("_first", "_generator", "_seed")
+
+    def __init__(self, seed: str, first: Callable[[random.Random], object] | None) -> None:
+        self._seed = seed
+        self._first = first
+        self._generator: random.Random | None = None
+
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - whatever a generator has
+        if name.startswith("__"):
+            raise AttributeError(name)
+        if self._generator is None:
+            self._generator = random.Random(self._seed)
+            if self._first is not None:
+                self._first(self._generator)
+        return getattr(self._generator, name)
+
+
+def late_random(
+    seed: str, *, first: Callable[[random.Random], object] | None = None
+) -> random.Random:
+    """Return what draws as ``random.Random(seed)`` does; thousands of cells draw nothing.
+
+    Args:
+        seed: Its seed.
+        first: Draws what was drawn from it already.
+    """
+    return cast("random.Random", _LateRandom(seed, first))

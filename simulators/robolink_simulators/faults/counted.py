@@ -4,7 +4,7 @@ from collections.abc import Callable, Collection, Iterable
 from heapq import heappop, heappush
 from typing import Final, Generic, Protocol, TypeVar, cast
 
-from robolink_simulators.device.late_random import late_random
+from robolink_simulators.device.wire_time import late_random
 from robolink_simulators.faults.links import AnyAction, LinkKind, links_of, require_possible
 
 

@@ -22,7 +22,7 @@ _SHOWN: Final = 200
 
 
 class ReplayDevice:
-    """Implements :class:`~robolink_simulators.hosting.seam.WireDevice`.
+    """Implements :class:`~robolink_simulators.hosting.addresses.WireDevice`.
 
     Args:
         dialogues: One for each connection that a client will make, in order.
@@ -78,7 +78,7 @@ class ReplayDevice:
 
 
 class ReplayLink:
-    """Implements :class:`~robolink_simulators.hosting.seam.DeviceLink`; ``None`` is cut at once."""
+    """A :class:`~robolink_simulators.hosting.addresses.DeviceLink`; ``None`` is cut at once."""
 
     def __init__(self, device: ReplayDevice, dialogue: Dialogue | None) -> None:
         self._device = device

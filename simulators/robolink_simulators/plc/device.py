@@ -1,15 +1,19 @@
 """The simulated PLC: a program behind a Modbus server."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import fields
 from math import isfinite
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 from robolink.model import ToolOffset
 from robolink.register_maps import RegisterMap, RegisterTable
+from robolink.timing import NS_PER_S
 from robolink_simulators.device.hosted import HostedDevice
-from robolink_simulators.device.motion_log import MotionLog
+from robolink_simulators.device.wire_record import MotionLog
+from robolink_simulators.device.wire_time import WireTime
 from robolink_simulators.faults import Departure, FaultAction, FaultPlan
+from robolink_simulators.faults.departing import DepartingReplies
 from robolink_simulators.faults.links import PLC_LINKS
 from robolink_simulators.plc.frames import (
     ILLEGAL_ADDRESS,
@@ -20,10 +24,164 @@ from robolink_simulators.plc.frames import (
     PlcRequest,
     TcpFrames,
 )
-from robolink_simulators.plc.link import PlcLink
-from robolink_simulators.plc.memory import OutsideError
-from robolink_simulators.plc.panel import MappedPlcPanel
-from robolink_simulators.plc.program import PlcProgram
+from robolink_simulators.plc.program import OutsideError, PlcProgram
+
+
+class ActedOn(Protocol):
+    """The PLC, as its panel sees it."""
+
+    program: PlcProgram
+
+    def acting(self) -> AbstractContextManager[int]:
+        """Surround an act that comes past the wire."""
+
+    def cut_links(self) -> None:
+        """End every connection."""
+
+
+class MappedPlcPanel:
+    """The machine's permit, and its cable. Any thread may act.
+
+    Args:
+        plc: The controller.
+    """
+
+    def __init__(self, plc: ActedOn) -> None:
+        self._plc = plc
+
+    def give_permit(self) -> None:
+        """Let the machine allow that offsets are changed."""
+        with self._plc.acting():
+            self._plc.program.permit(True)
+
+    def withdraw_permit(self) -> None:
+        """Let the machine allow it no longer."""
+        with self._plc.acting():
+            self._plc.program.permit(False)
+
+    def cut_link(self) -> None:
+        """Pull the cable of every client."""
+        with self._plc.acting():
+            self._plc.cut_links()
+
+
+_SILENCE_NS: Final = 50_000_000
+"""Silence on a line that ends a frame: 3.5 characters (Modbus over serial line 1.02, 2.5.1.1).
+
+A simulated line carries a frame at once, at no baud rate; so it is longer here than at the slowest
+of them, and no busy computer cuts a frame in two.
+"""
+
+
+class ServedFrame(Protocol):
+    """The PLC, as its connections see it."""
+
+    wire_time: WireTime
+
+    @property
+    def now_ns(self) -> int:
+        """The simulated time."""
+
+    def advance(self, now_ns: int) -> None:
+        """Let simulated time reach ``now_ns``."""
+
+    def serve(
+        self, request: PlcRequest, frames: Frames, link: "PlcLink", *, counted: bool = False
+    ) -> list[Departure]:
+        """Carry a request out and return what leaves for it, when.
+
+        One that was ``counted`` meets no fault again.
+        """
+
+
+class PlcLink:
+    """Implements :class:`~robolink_simulators.hosting.addresses.DeviceLink`.
+
+    Args:
+        plc: Who serves.
+        frames: How requests and answers are wrapped.
+    """
+
+    def __init__(self, plc: ServedFrame, frames: Frames) -> None:
+        self._plc = plc
+        self._frames = frames
+        self._outbox = DepartingReplies()
+        self._late: list[PlcRequest] = []
+        self._heard_ns = plc.wire_time.at(plc.now_ns)
+        self._over = False
+
+    @property
+    def closed(self) -> bool:
+        """Whether the PLC has ended this connection, after what is outgoing."""
+        return self._outbox.ended(self._plc.now_ns)
+
+    @property
+    def reset(self) -> bool:
+        """Whether it has ended it with a reset."""
+        return self._outbox.reset(self._plc.now_ns)
+
+    @property
+    def drained(self) -> bool:
+        """Whether nothing will happen on this connection any more."""
+        return self._over and not self._late and self._outbox.empty(self._plc.now_ns)
+
+    def receive(self, data: bytes, now_ns: int) -> None:
+        """Take bytes from the client; ``b""`` means that the client is gone."""
+        self._plc.advance(now_ns)
+        if self._outbox.half_open:
+            return
+        if not data:
+            self._over = True
+        before_ns, self._heard_ns = self._heard_ns, self._plc.wire_time.at(self._plc.now_ns)
+        if self._frames.shared and self._heard_ns - before_ns > _SILENCE_NS:
+            self._frames.forget()
+        self._frames.feed(data)
+        try:
+            self._answer_all()
+        except ValueError:
+            self._outbox.post(None, self._plc.now_ns)
+            self._over = True
+
+    def outgoing(self) -> bytes:
+        """Take what is ready for the client, ``b""`` for nothing."""
+        return self._outbox.take(self._plc.now_ns)
+
+    def next_change(self) -> int | None:
+        """Return when something leaves, or the link carries again."""
+        return self._outbox.next_change(self._plc.now_ns)
+
+    def cut(self) -> None:
+        """End this connection, after what leaves now."""
+        self._outbox.post(None, self._plc.now_ns)
+        self._over = True
+
+    def stall(self, request: PlcRequest, seconds: float) -> None:
+        """Carry nothing for a while; then a request arrives, and what was sent behind it."""
+        self._outbox.stalled_until_ns = self._plc.now_ns + max(1, round(seconds * NS_PER_S))
+        self._late.append(request)
+
+    def catch_up(self) -> None:
+        """Have served what was on its way while the link carried nothing."""
+        if self._late and not self._stalled:
+            late, self._late = self._late, []
+            for request in late:
+                self._depart(self._plc.serve(request, self._frames, self, counted=True))
+            self._answer_all()
+
+    @property
+    def _stalled(self) -> bool:
+        return self._plc.now_ns < self._outbox.stalled_until_ns
+
+    def _answer_all(self) -> None:
+        while not (self._over or self._stalled or self._outbox.half_open):
+            if (request := self._frames.take()) is None:
+                return
+            self._depart(self._plc.serve(request, self._frames, self))
+
+    def _depart(self, departures: Sequence[Departure]) -> None:
+        if not self._outbox.depart(departures, self._plc.now_ns):
+            self._over = True
+
 
 MOST_WRITES: Final = 2000
 MOST_REGISTERS_READ: Final = 125
@@ -55,7 +213,7 @@ class PlcSimulator(HostedDevice):
         >>> from pathlib import Path
         >>> from robolink.register_maps import load_map
         >>> from robolink_simulators.plc import PlcSimulator
-        >>> from robolink_simulators.testkit.recipes import written_map
+        >>> from robolink_simulators.testkit.operator import written_map
         >>> plc = PlcSimulator(load_map(written_map(Path.cwd())), unit=3)
         >>> link = plc.connect(now_ns=0)
         >>> link.receive(bytes.fromhex("0001 0000 0006 04 03 0064 0002"), now_ns=0)
@@ -161,7 +319,7 @@ class PlcSimulator(HostedDevice):
             >>> from robolink.register_maps import RegisterTable, load_map
             >>> from robolink_simulators.plc import PlcSimulator
             >>> from robolink_simulators.plc.frames import PlcRequest, TcpFrames
-            >>> from robolink_simulators.testkit.recipes import written_map
+            >>> from robolink_simulators.testkit.operator import written_map
             >>> plc, frames = PlcSimulator(load_map(written_map(Path.cwd()))), TcpFrames()
             >>> link = plc.connect(now_ns=0, frames=frames)
             >>> asked = PlcRequest(1, 1, 6, RegisterTable.HOLDING, 100, 1, values=(7,))

@@ -8,12 +8,10 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.transport import parse_url
 from robolink_simulators.cell.clock import ScaledClock
-from robolink_simulators.hosting.streams.line_host import LineHost
-from robolink_simulators.hosting.streams.serial_cable import PTY_LINE, no_pseudo_terminal
+from robolink_simulators.hosting.streams.serial_host import PTY_LINE, LineHost, no_pseudo_terminal
 from robolink_simulators.hosting.streams.tcp_host import TcpHost
-from robolink_simulators.plc.device import PlcSimulator
+from robolink_simulators.plc.device import PlcLink, PlcSimulator
 from robolink_simulators.plc.frames import LineFrames
-from robolink_simulators.plc.link import PlcLink
 
 _DEFAULT_UNIT: Final = 1
 _SIMULATED: Final = "&simulated=yes"
@@ -40,7 +38,7 @@ class PlcHost(TcpHost):
         >>> from robolink.register_maps import load_map
         >>> from robolink_simulators.cell.clock import ScaledClock
         >>> from robolink_simulators.plc import PlcHost, PlcSimulator
-        >>> from robolink_simulators.testkit.recipes import written_map
+        >>> from robolink_simulators.testkit.operator import written_map
         >>> path = written_map(Path.cwd())
         >>> plc, here = PlcSimulator(load_map(path), unit=3), ("127.0.0.1", 0)
         >>> with PlcHost(plc, path, here, ScaledClock(), allow_remote=False) as host:
@@ -102,7 +100,7 @@ class PlcLineHost(LineHost):
 
 
 class PlcOnLine:
-    """The PLC as a line sees it: a :class:`~robolink_simulators.hosting.seam.WireDevice`."""
+    """The PLC as a line sees it: a :class:`~robolink_simulators.hosting.addresses.WireDevice`."""
 
     def __init__(self, simulator: PlcSimulator) -> None:
         self._simulator = simulator
@@ -142,7 +140,7 @@ def serve_plc(
         >>> import robolink
         >>> from robolink.register_maps import load_map
         >>> from robolink_simulators.plc import PlcSimulator, serve_plc
-        >>> from robolink_simulators.testkit.recipes import written_map
+        >>> from robolink_simulators.testkit.operator import written_map
         >>> path = written_map(Path.cwd())
         >>> with serve_plc(PlcSimulator(load_map(path), seed=7), path) as host:
         ...     with robolink.connect(host.url) as controller:
@@ -172,7 +170,7 @@ def serve_plc_line(
         >>> import robolink
         >>> from robolink.register_maps import load_map
         >>> from robolink_simulators.plc import PlcSimulator, serve_plc_line
-        >>> from robolink_simulators.testkit.recipes import written_map
+        >>> from robolink_simulators.testkit.operator import written_map
         >>> path = written_map(Path.cwd())
         >>> with serve_plc_line(PlcSimulator(load_map(path)), path) as host:
         ...     with robolink.connect(host.url) as controller:

@@ -8,12 +8,11 @@ from robolink_simulators.softmotion.catalogue import MachineModel, machine_named
 from robolink_simulators.softmotion.function_blocks import BlockExecution, BlockOutputs, BlockState
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
 from robolink_simulators.softmotion.group.condition import GroupStatus, ReadToolMode, SmcGroupState
-from robolink_simulators.softmotion.kinematics.coordinates import CoordRef, CoordSystem
+from robolink_simulators.softmotion.kinematics.kinematics import CoordRef, CoordSystem
 from robolink_simulators.softmotion.motion.axes import AxisLimits, AxisState
 from robolink_simulators.softmotion.motion.jog import JogCommand
 from robolink_simulators.softmotion.motion.movement import EdgeWatch, SmcBufferMode, ToolInForce
-from robolink_simulators.softmotion.motion.paths import Dynamics
-from robolink_simulators.softmotion.motion.planner import Target
+from robolink_simulators.softmotion.motion.paths import Dynamics, Target
 from robolink_simulators.softmotion.options import GroupOptions, SmcNumbers
 from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind, SmcError
 from robolink_simulators.softmotion.world import SoftMotionWorld

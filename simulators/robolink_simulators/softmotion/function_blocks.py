@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from enum import Enum
 
-from robolink_simulators.softmotion.kinematics.coordinates import CoordRef
+from robolink_simulators.softmotion.kinematics.kinematics import CoordRef
 from robolink_simulators.softmotion.smc_errors import SmcError
 
 

@@ -11,13 +11,22 @@ from functools import partial
 from typing import Final
 
 from robolink.model import AxisKind
-from robolink_simulators.softmotion.kinematics.articulated import PosRRR, articulated_6dof
-from robolink_simulators.softmotion.kinematics.coupled import Coupled, scara3_z
+from robolink_simulators.softmotion.kinematics.articulated import (
+    Palletizer4Axis,
+    PosRRR,
+    articulated_6dof,
+)
 from robolink_simulators.softmotion.kinematics.kinematics import KinematicsModel, OrientationModel
-from robolink_simulators.softmotion.kinematics.palletizer import Palletizer4Axis
 from robolink_simulators.softmotion.kinematics.parallel import RodMachine
 from robolink_simulators.softmotion.kinematics.positions import Gantry, Polar, Scara2Z
-from robolink_simulators.softmotion.kinematics.wrists import CAxis, FixedTool, Wrist2, Wrist3
+from robolink_simulators.softmotion.kinematics.wrists import (
+    CAxis,
+    Coupled,
+    FixedTool,
+    Wrist2,
+    Wrist3,
+    scara3_z,
+)
 from robolink_simulators.softmotion.motion.axes import ASSUMED_LIMITS, AxisLimits
 
 _LINEAR: Final = ASSUMED_LIMITS[AxisKind.LINEAR]

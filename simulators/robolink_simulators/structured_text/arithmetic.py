@@ -9,21 +9,19 @@ from robolink_simulators.structured_text.data_types import (
     BOOL,
     LREAL,
     TIME,
+    UNTYPED_INTEGER,
     Family,
     Frame,
     Getter,
-)
-from robolink_simulators.structured_text.parse import (
-    TextPlace,
-    refused,
-)
-from robolink_simulators.structured_text.typed import (
-    UNTYPED_INTEGER,
     Typed,
     constant,
     paired,
     settled,
     type_name,
+)
+from robolink_simulators.structured_text.parse import (
+    TextPlace,
+    refused,
 )
 
 Join = Callable[[Getter, Getter], Getter]

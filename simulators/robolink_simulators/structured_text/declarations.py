@@ -16,6 +16,7 @@ from robolink_simulators.structured_text.data_types import (
     TextVariable,
 )
 from robolink_simulators.structured_text.expressions import ExpressionTranslator, initial_value
+from robolink_simulators.structured_text.functions import DIFFERING
 from robolink_simulators.structured_text.parse import (
     Node,
     TextDialect,
@@ -24,7 +25,6 @@ from robolink_simulators.structured_text.parse import (
     require_name,
 )
 from robolink_simulators.structured_text.references import Runtime, TextScope
-from robolink_simulators.structured_text.standard_blocks import DIFFERING
 from robolink_simulators.structured_text.statements import bound_value
 
 Listed = dict[str, tuple[Frame, TextVariable]]

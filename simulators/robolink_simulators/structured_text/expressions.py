@@ -12,12 +12,16 @@ from robolink_simulators.structured_text.data_types import (
     ELEMENTARY,
     LREAL,
     TIME,
+    UNTYPED_INTEGER,
     ArrayType,
     DataType,
     Family,
     ScalarType,
     StructType,
+    Typed,
     Value,
+    constant,
+    fitted,
 )
 from robolink_simulators.structured_text.functions import function
 from robolink_simulators.structured_text.parse import (
@@ -27,7 +31,6 @@ from robolink_simulators.structured_text.parse import (
     refused,
 )
 from robolink_simulators.structured_text.references import TextScope, VariableReference, find
-from robolink_simulators.structured_text.typed import UNTYPED_INTEGER, Typed, constant, fitted
 
 _UNITS_US: Final = {"d": 86_400_000_000, "h": 3_600_000_000, "m": 60_000_000, "s": 1_000_000}
 _UNITS_US["ms"] = 1000

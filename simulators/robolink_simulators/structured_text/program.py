@@ -22,6 +22,7 @@ from robolink_simulators.structured_text.data_types import (
     copier,
 )
 from robolink_simulators.structured_text.declarations import Declarations, retained_scalars
+from robolink_simulators.structured_text.functions import standard_blocks
 from robolink_simulators.structured_text.parse import (
     Node,
     TextDialect,
@@ -30,7 +31,6 @@ from robolink_simulators.structured_text.parse import (
     refused,
 )
 from robolink_simulators.structured_text.references import Runtime
-from robolink_simulators.structured_text.standard_blocks import standard_blocks
 from robolink_simulators.structured_text.statements import (
     TURNS_A_CYCLE,
     StatementTranslator,

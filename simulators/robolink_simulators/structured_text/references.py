@@ -15,9 +15,13 @@ from robolink_simulators.structured_text.data_types import (
     Frame,
     Getter,
     ScalarType,
+    Storer,
     StructType,
     TextVariable,
+    Typed,
     Value,
+    as_number,
+    type_name,
 )
 from robolink_simulators.structured_text.parse import (
     Node,
@@ -25,7 +29,6 @@ from robolink_simulators.structured_text.parse import (
     TextPlace,
     refused,
 )
-from robolink_simulators.structured_text.typed import Storer, Typed, as_number, type_name
 
 SPENT: Final = object()
 """Stands in the variable of a FOR loop that has run to its end: compilers leave other values."""

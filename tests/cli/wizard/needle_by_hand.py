@@ -19,7 +19,7 @@ from robolink_simulators.assist.port import InProcessEyes, serve_assist
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.options import EpsonOptions
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_tcp
 
 from robolink.timing import SystemClock
 from tests.cli.wizard._screen import ScreenHand

@@ -4,10 +4,10 @@ import re
 import tomllib
 
 import pytest
-from robolink_cli.console.columns import columns, within
+from robolink_cli.console.tables import columns, within
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_tcp
 
 from tests.cli.wizard._screen import ScreenHand
 

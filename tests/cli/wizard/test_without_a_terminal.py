@@ -7,7 +7,7 @@ import time
 
 import pytest
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_tcp
 
 pytestmark = pytest.mark.simulator_only
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import pytest
 from robolink_simulators.cell.clock import ManualClock, ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_tcp
 
 import robolink
 from robolink.errors import JournalError, RobolinkError

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.streams.epson_tcp import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_tcp
 
 import robolink
 from robolink.journal import close_files, default_location, nothing_is_open, open_journal

@@ -65,8 +65,8 @@ class WiredPlcCell(PlcRecipeCell):
 
 
 def _shown(request: bytes) -> str:
+    from robolink_simulators.softmotion.mailbox.exchange import shown_read, shown_write
     from robolink_simulators.softmotion.mailbox.simulator import _opcode_name
-    from robolink_simulators.softmotion.mailbox.words.exchange import shown_read, shown_write
 
     function = request[7]
     address, count = int.from_bytes(request[8:10]), int.from_bytes(request[10:12])

@@ -8,7 +8,7 @@ from robolink_simulators.cell.clock import ManualClock, ScaledClock
 from robolink_simulators.hosting.fieldbus.plc_registers import PlcRegisters
 from robolink_simulators.hosting.in_process.transport import InProcessTransport
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
-from robolink_simulators.softmotion.mailbox.words.places import Bank
+from robolink_simulators.softmotion.mailbox.image import Bank
 
 from robolink.timing import Clock
 from robolink.transport import LinkUrl
@@ -28,7 +28,7 @@ _UNIT: Final = 255
 
 
 class ModbusFarEnd:
-    """Implements ``hosting.seam.WireDevice`` for functions 3, 4 and 16."""
+    """Implements ``hosting.addresses.WireDevice`` for functions 3, 4 and 16."""
 
     def __init__(self, simulator: SoftMotionSimulator, clock: ManualClock) -> None:
         self._simulator = simulator

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final, Protocol
 
-from robolink_simulators.hosting.seam import DeviceLink, WireDevice
+from robolink_simulators.hosting.addresses import DeviceLink, WireDevice
 
 from robolink.timing import NS_PER_S
 

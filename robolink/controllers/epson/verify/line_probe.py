@@ -69,7 +69,7 @@ def probe_line(url: str, *, timeout_s: float = 1.0, clock: Clock | None = None) 
     Example:
         >>> from robolink.controllers.epson.verify import probe_line
         >>> from robolink_simulators.epson import EpsonSimulator
-        >>> from robolink_simulators.hosting.streams.epson_serial import serve_serial
+        >>> from robolink_simulators.hosting.streams.epson import serve_serial
         >>> with serve_serial(EpsonSimulator(seed=1)) as host:  # a pseudo terminal
         ...     probe_line(host.url, timeout_s=1).found.value
         'controller'

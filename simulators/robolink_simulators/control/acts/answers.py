@@ -8,8 +8,7 @@ from robolink.model import ToolOffset
 from robolink_simulators.cell.places import XyzMm
 from robolink_simulators.cell.surfaces import FlatPlate, RoundBall
 from robolink_simulators.cell.world_parameters import WorldParameters
-from robolink_simulators.device.motion_log import StartedMotion
-from robolink_simulators.device.wire_record import WireLine
+from robolink_simulators.device.wire_record import StartedMotion, WireLine
 from robolink_simulators.faults.fieldbus import Order
 
 Described = Any

@@ -1,19 +1,124 @@
 """Every act by name, for each kind of simulated controller."""
 
 from collections.abc import Mapping
-from typing import Final
+from typing import Final, get_args
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink_simulators.control.acts.declared import Answer, ControlAct, Given
-from robolink_simulators.control.acts.epson import EPSON_ACTS
-from robolink_simulators.control.acts.keeping import KEEPING_ACTS
-from robolink_simulators.control.acts.plc import MAPPED_ACTS, PLC_ACTS
-from robolink_simulators.control.acts.wire import WIRE_ACTS
+from robolink_simulators.control.acts.answers import FlangeTold
+from robolink_simulators.control.acts.declared import (
+    NUMBER,
+    ON,
+    Answer,
+    ControlAct,
+    Given,
+    Taken,
+    panel_act,
+    shown_flange,
+)
+from robolink_simulators.control.acts.wire import KEEPING_ACTS, WIRE_ACTS
 from robolink_simulators.control.acts.world import WORLD_ACTS
 from robolink_simulators.control.cell import ControlledCell
-from robolink_simulators.epson.refusals import SpelRefusal
+from robolink_simulators.epson.condition import SpelRefusal
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.epson.panel import EpsonPanel
+from robolink_simulators.faults.fieldbus import Order
+from robolink_simulators.faults.links import LinkKind
+from robolink_simulators.not_now import NotNowError
+from robolink_simulators.plc import PlcSimulator
+from robolink_simulators.plc.device import MappedPlcPanel
+from robolink_simulators.softmotion.mailbox.panel import PlcPanel
+from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 from robolink_simulators.softmotion.smc_errors import BlockRefused
+
+
+def _teach_point(cell: ControlledCell, given: Given) -> Answer:
+    """Turn the tool to an angle, jog its tip onto the pin, and teach the flange pose there."""
+    flange = _epson(cell).world.operator.teach_point(given["number"], given["u_deg"])
+    return {"flange": shown_flange(flange)}
+
+
+def _push(cell: ControlledCell, given: Given) -> Answer:
+    """Send every client a line that nobody asked for."""
+    _epson(cell).push(given["text"].encode("ascii") + b"\r\n")
+    return {}
+
+
+def _epson(cell: ControlledCell) -> EpsonSimulator:
+    if not isinstance(cell.simulator, EpsonSimulator):
+        raise TypeError(cell.simulator.kind)
+    return cell.simulator
+
+
+EPSON_ACTS: Final = (
+    ControlAct(
+        "teach_point",
+        _teach_point,
+        (NUMBER, Taken("u_deg", least=-360, most=360)),
+        gives=FlangeTold,
+    ),
+    ControlAct("push", _push, (Taken("text", "text", ascii=True),)),
+    panel_act(EpsonPanel, "set_input", NUMBER, ON, method="switch_input"),
+    panel_act(EpsonPanel, "teach"),
+    panel_act(EpsonPanel, "auto"),
+    panel_act(EpsonPanel, "press_estop"),
+    panel_act(EpsonPanel, "release_estop"),
+    panel_act(EpsonPanel, "open_guard"),
+    panel_act(EpsonPanel, "close_guard"),
+    panel_act(EpsonPanel, "raise_error", NUMBER),
+    panel_act(EpsonPanel, "raise_warning", NUMBER),
+    panel_act(EpsonPanel, "raise_alarm", NUMBER),
+    panel_act(EpsonPanel, "raise_serious_error"),
+    panel_act(EpsonPanel, "set_monitoring_only", Taken("on", "flag")),
+    panel_act(EpsonPanel, "start_production"),
+    panel_act(EpsonPanel, "stop_production"),
+    panel_act(EpsonPanel, "lose_login"),
+    panel_act(EpsonPanel, "cut_link"),
+)
+"""Acts at an EPSON controller."""
+
+
+_NO_CONNECTION: Final = frozenset({LinkKind.MODBUS_RTU, LinkKind.CAN, LinkKind.PLC_RTU})
+
+
+def _cut_link(cell: ControlledCell, _given: Given) -> Answer:
+    """Pull the cable of the client that is logged in."""
+    if _NO_CONNECTION.issuperset(cell.links):
+        raise NotNowError(
+            tr("A serial line or a CAN bus has no connection that could be cut."),
+            remedy=tr("Plan a fault of the wire there, for example drop_reply."),
+        )
+    if isinstance(cell.simulator, (SoftMotionSimulator, PlcSimulator)):
+        cell.simulator.panel.cut_link()
+    return {}
+
+
+PLC_ACTS: Final[tuple[ControlAct, ...]] = (
+    panel_act(PlcPanel, "set_input", NUMBER, ON, method="switch_input"),
+    panel_act(PlcPanel, "press_estop"),
+    panel_act(PlcPanel, "release_estop"),
+    panel_act(PlcPanel, "give_permit"),
+    panel_act(PlcPanel, "withdraw_permit"),
+    panel_act(PlcPanel, "take_change_back"),
+    panel_act(PlcPanel, "fail_axis", NUMBER),
+    panel_act(PlcPanel, "move_axis", NUMBER, Taken("target")),
+    panel_act(PlcPanel, "zero_inputs"),
+    panel_act(PlcPanel, "freeze"),
+    panel_act(PlcPanel, "thaw"),
+    panel_act(PlcPanel, "freeze_heartbeat"),
+    panel_act(PlcPanel, "take_ownership"),
+    ControlAct("cut_link", _cut_link),
+    panel_act(PlcPanel, "lay_words", Taken("order", "text", choices=get_args(Order))),
+    panel_act(PlcPanel, "shift_map", Taken("words", "whole", most=64)),
+)
+"""Acts at a PLC with a mailbox."""
+
+MAPPED_ACTS: Final[tuple[ControlAct, ...]] = (
+    panel_act(MappedPlcPanel, "give_permit"),
+    panel_act(MappedPlcPanel, "withdraw_permit"),
+    ControlAct("cut_link", _cut_link),
+)
+"""Acts at a PLC with a register map."""
 
 
 class UnknownActError(ConfigError):

@@ -24,8 +24,8 @@ from robolink.protocols.mailbox import (
 )
 from robolink.protocols.mailbox.exports import electronic_data_sheet
 from robolink_simulators.faults import LinkKind
+from robolink_simulators.softmotion.mailbox.exchange import ServedAccess
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
-from robolink_simulators.softmotion.mailbox.words.exchange import ServedAccess
 
 COMMAND_OBJECT: Final = 0x2100
 RESPONSE_OBJECT: Final = 0x2101

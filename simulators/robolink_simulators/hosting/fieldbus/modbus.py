@@ -9,7 +9,7 @@ from robolink_simulators.faults import LinkKind
 from robolink_simulators.hosting.addresses import cannot_listen, require_loopback
 from robolink_simulators.hosting.fieldbus.modbus_server import ModbusServerThread, SerialLine
 from robolink_simulators.hosting.fieldbus.plc_registers import PlcRegisters
-from robolink_simulators.hosting.streams.serial_cable import (
+from robolink_simulators.hosting.streams.serial_host import (
     PTY_LINE,
     SerialCable,
     no_pseudo_terminal,

@@ -25,9 +25,9 @@ from robolink.timing import NS_PER_S
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.faults import PlcFault, PlcFaultAction
 from robolink_simulators.hosting.fieldbus.plc_registers import PlcRegisters
-from robolink_simulators.hosting.streams.connection import NO_TIME
-from robolink_simulators.softmotion.mailbox.words.exchange import ServedAccess
-from robolink_simulators.softmotion.mailbox.words.places import REGISTERS, Bank
+from robolink_simulators.hosting.streams.tcp_host import NO_TIME
+from robolink_simulators.softmotion.mailbox.exchange import ServedAccess
+from robolink_simulators.softmotion.mailbox.image import REGISTERS, Bank
 
 # It writes to standard error when nobody listens; clients are told by their answers.
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())

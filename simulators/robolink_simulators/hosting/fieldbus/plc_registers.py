@@ -7,14 +7,14 @@ from typing import Final
 
 from robolink.timing import Clock
 from robolink_simulators.faults import LinkKind
-from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
-from robolink_simulators.softmotion.mailbox.words.exchange import ServedAccess
-from robolink_simulators.softmotion.mailbox.words.places import (
+from robolink_simulators.softmotion.mailbox.exchange import ServedAccess
+from robolink_simulators.softmotion.mailbox.image import (
     REGISTERS,
     Bank,
     MailboxPlace,
     places_of,
 )
+from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 _WORD_BITS: Final = 16
 

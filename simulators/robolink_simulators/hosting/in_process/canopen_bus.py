@@ -8,7 +8,7 @@ import canopen
 
 from robolink.timing import NS_PER_S
 from robolink_simulators.cell.clock import ManualClock
-from robolink_simulators.hosting.fieldbus.canopen_face import LOOK_S, PERIOD_S, CanopenFace
+from robolink_simulators.hosting.fieldbus.canopen_node import LOOK_S, PERIOD_S, CanopenFace
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 _FRAME_NS: Final = 250_000

@@ -16,7 +16,7 @@ from robolink_simulators.faults import LinkKind, read_fault_file
 from robolink_simulators.hosting.in_process.named import NamedSimulators, seed_from_text
 from robolink_simulators.hosting.in_process.transport import InProcessTransport
 from robolink_simulators.option_values import require_known
-from robolink_simulators.serial_numbers import drawn_serial
+from robolink_simulators.state_files import drawn_serial
 
 _OWN_OPTIONS: Final = ("robot", "seed", "state", "split", "faults")
 

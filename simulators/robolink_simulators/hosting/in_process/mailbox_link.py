@@ -22,8 +22,8 @@ from robolink.protocols.mailbox import (
 from robolink.transport import MailboxHead
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.faults import PlcFaultAction
+from robolink_simulators.softmotion.mailbox.exchange import ServedAccess
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
-from robolink_simulators.softmotion.mailbox.words.exchange import ServedAccess
 
 _HEAD_WORDS: Final = 10
 _HEARTBEAT: Final = COMMAND["client_heartbeat"].word

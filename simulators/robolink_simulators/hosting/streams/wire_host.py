@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from robolink.closing import ClosedAtExit
 from robolink_simulators.cell.clock import ScaledClock
-from robolink_simulators.hosting.seam import WireDevice
+from robolink_simulators.hosting.addresses import WireDevice
 from robolink_simulators.hosting.streams.serving_loop import (
     Served,
     ServingLoop,

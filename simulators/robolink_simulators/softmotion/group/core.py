@@ -5,12 +5,15 @@ from functools import wraps
 from typing import Concatenate, ParamSpec, TypeVar
 
 from robolink_simulators.cell.frames import Frame
-from robolink_simulators.device.motion_log import MotionLog
+from robolink_simulators.device.wire_record import MotionLog
 from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.group.condition import GroupStatus, SmcGroupState
 from robolink_simulators.softmotion.group.state_machine import StateMachine
-from robolink_simulators.softmotion.kinematics.coordinates import CoordinateTransforms
-from robolink_simulators.softmotion.kinematics.kinematics import AxisValues, KinematicsModel
+from robolink_simulators.softmotion.kinematics.kinematics import (
+    AxisValues,
+    CoordinateTransforms,
+    KinematicsModel,
+)
 from robolink_simulators.softmotion.motion.axes import ASSUMED_LIMITS, Axis, AxisLimits
 from robolink_simulators.softmotion.motion.motion import GroupMotion
 from robolink_simulators.softmotion.motion.movement import ToolInForce

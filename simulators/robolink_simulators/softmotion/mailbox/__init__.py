@@ -3,10 +3,10 @@
 from typing import TYPE_CHECKING
 
 from robolink.lazy_exports import old_names
+from robolink_simulators.softmotion.mailbox.exchange import ServedAccess
 from robolink_simulators.softmotion.mailbox.option_text import PlcOptions
 from robolink_simulators.softmotion.mailbox.options import MailboxOptions
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
-from robolink_simulators.softmotion.mailbox.words.exchange import ServedAccess
 
 __all__ = [
     "MailboxOptions",

@@ -7,8 +7,8 @@ from typing import Final
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_simulators.option_values import require_known, values_from_text
+from robolink_simulators.softmotion.mailbox.image import require_places
 from robolink_simulators.softmotion.mailbox.options import MailboxOptions
-from robolink_simulators.softmotion.mailbox.words.places import require_places
 from robolink_simulators.softmotion.options import GroupOptions, SmcNumbers
 
 _NUMBERS: Final = "numbers."

@@ -17,14 +17,14 @@ from robolink_simulators.device.wire_time import WireTime
 from robolink_simulators.softmotion.catalogue import MachineModel
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
 from robolink_simulators.softmotion.group.condition import SmcGroupState
-from robolink_simulators.softmotion.kinematics.coordinates import CoordRef
+from robolink_simulators.softmotion.kinematics.kinematics import CoordRef
 from robolink_simulators.softmotion.mailbox.commands.tools import ToolDesk
+from robolink_simulators.softmotion.mailbox.exchange import Inbox
+from robolink_simulators.softmotion.mailbox.image import UserUnits
 from robolink_simulators.softmotion.mailbox.option_text import PlcOptions
 from robolink_simulators.softmotion.mailbox.outbox import HEAD, Outbox
 from robolink_simulators.softmotion.mailbox.program import MailboxProgram
 from robolink_simulators.softmotion.mailbox.retained import RetainedMemory
-from robolink_simulators.softmotion.mailbox.words.inbox import Inbox
-from robolink_simulators.softmotion.mailbox.words.units import UserUnits
 
 _PRESET_SLOT: Final = 1
 

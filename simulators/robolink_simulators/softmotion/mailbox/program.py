@@ -23,18 +23,21 @@ from robolink.protocols.mailbox import (
 from robolink_simulators.device.wire_time import WireTime
 from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
-from robolink_simulators.softmotion.mailbox.commands.complaints import Rejected
-from robolink_simulators.softmotion.mailbox.commands.jobs import Job, Jobs
+from robolink_simulators.softmotion.mailbox.commands.jobs import Job, Jobs, SignalDesk
 from robolink_simulators.softmotion.mailbox.commands.motion import MotionDesk
-from robolink_simulators.softmotion.mailbox.commands.signals import SignalDesk
-from robolink_simulators.softmotion.mailbox.commands.told import Handler, Told, done
+from robolink_simulators.softmotion.mailbox.commands.results import (
+    CommandResult,
+    Handler,
+    Rejected,
+    ok,
+)
 from robolink_simulators.softmotion.mailbox.commands.tools import ToolDesk
+from robolink_simulators.softmotion.mailbox.exchange import Inbox
+from robolink_simulators.softmotion.mailbox.image import UserUnits
 from robolink_simulators.softmotion.mailbox.options import MailboxOptions
 from robolink_simulators.softmotion.mailbox.ownership import MailboxOwnership
 from robolink_simulators.softmotion.mailbox.retained import RetainedMemory
-from robolink_simulators.softmotion.mailbox.words.client_watch import ClientWatch
-from robolink_simulators.softmotion.mailbox.words.inbox import Inbox
-from robolink_simulators.softmotion.mailbox.words.units import UserUnits
+from robolink_simulators.softmotion.mailbox.watchdogs import ClientWatch
 
 _ANYTIME: Final = frozenset({Opcode.STOP, Opcode.HALT})
 _CHANGING_TOOLS: Final = frozenset(
@@ -162,14 +165,14 @@ class MailboxProgram:
                 self.inbox.hold_back(command, owned=owned)
                 self.jobs.note(Finished(command.sequence, CommandState.ERROR, ErrorClass.BUSY))
                 return
-            told = self._carried_out(command, now_ns, owned=owned)
-            job = Job(command, told.execution)
+            result = self._carried_out(command, now_ns, owned=owned)
+            job = Job(command, result.execution)
         except Rejected as rejected:
-            told = Told(BlockExecution())
-            job = Job(command, told.execution)
+            result = CommandResult(BlockExecution())
+            job = Job(command, result.execution)
             job.reject(rejected.error_class, rejected.raw)
         named = self.ownership.answer() if command.opcode == Opcode.OWNERSHIP else Answer()
-        self._answer = told.answer or named
+        self._answer = result.answer or named
         self.inbox.accept(command, owned=owned)
         self.jobs.add(job)
 
@@ -186,33 +189,33 @@ class MailboxProgram:
         if not self.permitted and command.needs_permit:
             raise Rejected(ErrorClass.NOT_PERMITTED)
 
-    def _carried_out(self, command: Command, now_ns: int, *, owned: bool) -> Told:
+    def _carried_out(self, command: Command, now_ns: int, *, owned: bool) -> CommandResult:
         if command.opcode == Opcode.OWNERSHIP:
             before = self.holder
             moving = not self._group.motion.resting or any(
                 axis.moving_alone for axis in self._group.axes
             )
-            told = self._halted_for_release(command)
+            result = self._halted_for_release(command)
             self.ownership.carry_out(command, now_ns, moving=moving)
             if self.holder not in (0, before):
                 self.jobs.end_moving(ErrorClass.NOT_OWNER)
-            return told
-        told = self._handlers[command.opcode](command)
+            return result
+        result = self._handlers[command.opcode](command)
         if command.opcode == Opcode.JOG:
             self.jobs.note_buttons(owned=owned)
         if command.opcode in _CHANGING_TOOLS:
             self._memory.tool_changed = True
-        return told
+        return result
 
     def _note_beat(self, now_ns: int) -> None:
         heard = self._watch.note(self.inbox.heartbeat, self._memory.epoch, now_ns)
         if heard and self.ownership.holder:
             self.ownership.heard(now_ns)
 
-    def _halted_for_release(self, command: Command) -> Told:
+    def _halted_for_release(self, command: Command) -> CommandResult:
         """Halt what is unfinished before its owner leaves; done when the group is at rest."""
         leaves = command.operands[:2] in ((0, 0), (0, 1)) and self.ownership.owns(command)
-        return Told(self._group.halt()) if leaves and self.jobs.moving else done()
+        return CommandResult(self._group.halt()) if leaves and self.jobs.moving else ok()
 
     def _supervise(self, now_ns: int) -> None:
         """Halt what moves when nobody stands behind it any more; the tool stays."""

@@ -17,22 +17,21 @@ from robolink.protocols.mailbox import COMMAND, SLOTS, Opcode, Six, Words
 from robolink_simulators.cell.frames import zyx_angles
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.device.hosted import HostedDevice
-from robolink_simulators.device.motion_log import MotionLog
+from robolink_simulators.device.wire_record import MotionLog
 from robolink_simulators.faults import LinkKind, PlcFault, PlcFaultAction
 from robolink_simulators.softmotion.catalogue import MachineModel, machine_named
-from robolink_simulators.softmotion.kinematics.coordinates import CoordRef
-from robolink_simulators.softmotion.mailbox.mishaps import PlcMishaps
-from robolink_simulators.softmotion.mailbox.option_text import PlcOptions
-from robolink_simulators.softmotion.mailbox.panel import PlcPanel
-from robolink_simulators.softmotion.mailbox.plc import Plc
-from robolink_simulators.softmotion.mailbox.retained import RetainedFile
-from robolink_simulators.softmotion.mailbox.words.exchange import (
+from robolink_simulators.softmotion.kinematics.kinematics import CoordRef
+from robolink_simulators.softmotion.mailbox.exchange import (
     ServedAccess,
     WireFaults,
     shown_read,
     shown_write,
 )
-from robolink_simulators.softmotion.mailbox.words.fieldbus_watchdog import FieldbusWatchdog
+from robolink_simulators.softmotion.mailbox.option_text import PlcOptions
+from robolink_simulators.softmotion.mailbox.panel import PlcMishaps, PlcPanel
+from robolink_simulators.softmotion.mailbox.plc import Plc
+from robolink_simulators.softmotion.mailbox.retained import RetainedFile
+from robolink_simulators.softmotion.mailbox.watchdogs import FieldbusWatchdog
 from robolink_simulators.softmotion.world import SoftMotionWorld
 from robolink_simulators.state_files import StateNotKeptError
 

@@ -17,9 +17,10 @@ from robolink_simulators.cell.frames import (
     turned,
 )
 from robolink_simulators.softmotion.function_blocks import BlockExecution
-from robolink_simulators.softmotion.kinematics.coordinates import CoordinateTransforms, CoordSystem
 from robolink_simulators.softmotion.kinematics.kinematics import (
     AxisValues,
+    CoordinateTransforms,
+    CoordSystem,
     KinematicsModel,
 )
 from robolink_simulators.softmotion.motion.axes import Axis

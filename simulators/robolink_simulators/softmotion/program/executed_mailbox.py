@@ -8,19 +8,18 @@ from robolink import ambient
 from robolink.protocols.mailbox import Capability, Command, Opcode, WordOrder, Words, encode_command
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
 from robolink_simulators.softmotion.group.condition import SmcGroupState
+from robolink_simulators.softmotion.mailbox.exchange import Inbox
+from robolink_simulators.softmotion.mailbox.image import UserUnits
 from robolink_simulators.softmotion.mailbox.option_text import PlcOptions
-from robolink_simulators.softmotion.mailbox.words.inbox import Inbox
-from robolink_simulators.softmotion.mailbox.words.units import UserUnits
-from robolink_simulators.softmotion.program.error_numbers import ErrorNumbers
+from robolink_simulators.softmotion.program.foreign_blocks import MotionBlocks, reading_blocks
 from robolink_simulators.softmotion.program.foreign_types import (
     AXIS_GROUP,
     READ_MODE,
     SYMBOLS,
+    ErrorNumbers,
     foreign_types,
     kinematics_types,
 )
-from robolink_simulators.softmotion.program.motion_blocks import MotionBlocks
-from robolink_simulators.softmotion.program.reading_blocks import reading_blocks
 from robolink_simulators.softmotion.signals import SIGNALS
 from robolink_simulators.structured_text import SourceText, StructuredProgram
 from robolink_simulators.structured_text.data_types import DataType

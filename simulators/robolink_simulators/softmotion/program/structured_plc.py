@@ -10,29 +10,146 @@ takes to keep up with the time.
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Any, Final
 
 from robolink.errors import ConfigError
 from robolink.files.named import read_named
 from robolink.messages import tr
 from robolink.protocols.mailbox import (
     RESPONSE_WORDS,
+    SLOTS,
     Command,
     Opcode,
+    Six,
+    Slot,
     WordOrder,
     Words,
     encode_command,
+    encode_slot,
     next_number,
 )
 from robolink_simulators.not_now import NotNowError
 from robolink_simulators.softmotion.catalogue import MachineModel
 from robolink_simulators.softmotion.group.condition import SmcGroupState
-from robolink_simulators.softmotion.kinematics.coordinates import CoordRef
+from robolink_simulators.softmotion.kinematics.kinematics import CoordRef
 from robolink_simulators.softmotion.mailbox.option_text import PlcOptions
 from robolink_simulators.softmotion.mailbox.plc import Plc
+from robolink_simulators.softmotion.mailbox.retained import RetainedMemory
 from robolink_simulators.softmotion.program.executed_mailbox import ExecutedMailbox
-from robolink_simulators.softmotion.program.program_memory import ProgramMemory
-from robolink_simulators.structured_text import SourceText, TextDialect
+from robolink_simulators.structured_text import SourceText, StructuredProgram, TextDialect
+
+if TYPE_CHECKING:
+    from robolink_simulators.softmotion.mailbox.simulator import PlcMaker
+
+
+_MEMORY: Final = "RL_Kept.memory"
+_TOOL_CHANGED: Final = "RL_Kept.xToolChanged"
+_NAME_WORDS: Final = 8
+
+
+class ProgramMemory(RetainedMemory):
+    """Boot counter, epoch, number and slots where the program has them.
+
+    Args:
+        program: Holds ``RL_Kept.memory`` of the type RL_KeptMemory.
+        device_id: The PLC's number; 0 lets the program draw one.
+    """
+
+    def __init__(self, program: StructuredProgram, device_id: int = 0) -> None:
+        self._program = program
+        super().__init__(device_id or 1)
+        self.device_id = device_id
+
+    @property
+    def boot_id(self) -> int:
+        """Counts PLC starts."""
+        return int(self._program.value(f"{_MEMORY}.bootId"))
+
+    @boot_id.setter
+    def boot_id(self, number: int) -> None:
+        self._program.put(f"{_MEMORY}.bootId", number)
+
+    @property
+    def epoch(self) -> int:
+        """Counts owners."""
+        return int(self._program.value(f"{_MEMORY}.epoch"))
+
+    @epoch.setter
+    def epoch(self, number: int) -> None:
+        self._program.put(f"{_MEMORY}.epoch", number)
+
+    @property
+    def device_id(self) -> int:
+        """The PLC's own number; 0 until a program draws it with its first command."""
+        return int(self._program.value(f"{_MEMORY}.deviceId"))
+
+    @device_id.setter
+    def device_id(self, number: int) -> None:
+        self._program.put(f"{_MEMORY}.deviceId", number)
+
+    @property
+    def tool_changed(self) -> bool:
+        """Whether a client has changed a tool (``xToolChanged``)."""
+        return bool(self._program.value(_TOOL_CHANGED))
+
+    @tool_changed.setter
+    def tool_changed(self, changed: bool) -> None:
+        self._program.put(_TOOL_CHANGED, changed)
+
+    def slot(self, number: int) -> Slot:
+        """Return what a slot holds."""
+        counter, filled, tool, words = self._held(number)
+        letters = b"".join(word.to_bytes(2, "little") for word in words)
+        name = letters.partition(b"\0")[0].decode("latin-1")
+        x, y, z, a, b, c = tool
+        return Slot(counter, defined=filled, tool=(x, y, z, a, b, c), name=name)
+
+    def defined(self) -> dict[int, Slot]:
+        """Return the slots that hold a tool."""
+        found = {number: self.slot(number) for number in SLOTS}
+        return {number: slot for number, slot in found.items() if slot.defined}
+
+    def define(self, number: int, tool: Six, name: str) -> None:
+        """Put a tool into a slot."""
+        counter = self.slot(number).counter % 0xFFFF + 1
+        self._put(number, Slot(counter, defined=True, tool=tool, name=name))
+
+    def clear(self, number: int) -> None:
+        """Empty a slot; an empty one is not changed, nor counted."""
+        slot = self.slot(number)
+        if slot.defined:
+            self._put(number, Slot(slot.counter % 0xFFFF + 1))
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Take over what ``to_state`` gave.
+
+        Raises:
+            KeyError, TypeError, ValueError: It is no such state.
+        """
+        plain = RetainedMemory(1)
+        plain.restore(state)
+        for number in SLOTS:
+            self._put(number, plain.slot(number))
+        self.boot_id, self.epoch = plain.boot_id, plain.epoch
+        self.device_id, self.tool_changed = plain.device_id, plain.tool_changed
+
+    def to_state(self) -> dict[str, object]:
+        """Return all of it, ready for JSON."""
+        self._slots = {number: self.slot(number) for number in SLOTS}
+        return super().to_state()
+
+    def _held(self, number: int) -> list[Any]:
+        slots: list[list[Any]] = self._program.value(f"{_MEMORY}.slots")
+        return slots[number - SLOTS.start]
+
+    def _put(self, number: int, slot: Slot) -> None:
+        encode_slot(slot)
+        held = self._held(number)
+        letters = slot.name.encode("ascii").ljust(2 * _NAME_WORDS, b"\0")
+        held[0], held[1] = slot.counter, slot.defined
+        held[2][:] = list(slot.tool)
+        held[3][:] = [int.from_bytes(letters[at : at + 2], "little") for at in range(0, 16, 2)]
+
 
 PROGRAM_SOURCES: Final = (
     ("robolink_core.st", TextDialect.COMMON),
@@ -189,3 +306,22 @@ def _not_in_a_program() -> NotNowError:
         tr("A program that is executed from its text cannot be changed like that."),
         remedy=tr("Change its text, or simulate without one."),
     )
+
+
+def plc_maker(folder: Path | None) -> "PlcMaker":
+    """Return what makes the controller of a ``SoftMotionSimulator``.
+
+    The interpreter is loaded only where a program is to be executed.
+
+    Args:
+        folder: Holds a program as ``expert plc export`` writes it, changed or not; ``None`` for
+            the modelled program.
+
+    Raises:
+        ConfigError: A file of the program is missing, or cannot be read.
+    """
+    if folder is None:
+        return Plc
+    from robolink_simulators.softmotion.program.structured_plc import program_plc, sources_in
+
+    return program_plc(sources_in(folder))

@@ -1,13 +1,22 @@
 """The commands that the mailbox program has accepted, until their end and beyond."""
 
 from collections import deque
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Final
 
-from robolink.protocols.mailbox import Command, CommandState, ErrorClass, Finished, Opcode
+from robolink.protocols.mailbox import Answer, Command, CommandState, ErrorClass, Finished, Opcode
 from robolink_simulators.softmotion.function_blocks import BlockExecution, BlockState
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
 from robolink_simulators.softmotion.group.condition import SmcGroupState
-from robolink_simulators.softmotion.mailbox.commands.complaints import class_of
+from robolink_simulators.softmotion.mailbox.commands.results import (
+    CommandResult,
+    Handler,
+    class_of,
+    ok,
+    require_operand,
+)
+from robolink_simulators.softmotion.signals import SIGNALS
 from robolink_simulators.softmotion.smc_errors import SmcError
 
 MOVEMENTS: Final = frozenset({Opcode.MOVE_DIRECT, Opcode.MOVE_LINEAR, Opcode.MOVE_UNTIL_INPUT})
@@ -181,3 +190,30 @@ class Jobs:
     def note(self, end: Finished) -> None:
         """Add an end to the last ones."""
         self._ends.appendleft(end)
+
+
+class SignalDesk:
+    """Reads inputs and switches outputs.
+
+    Args:
+        group: Beside which they are.
+
+    Attributes:
+        opcodes: What it can do.
+    """
+
+    def __init__(self, group: AxisGroup) -> None:
+        self._group = group
+        self.opcodes: Mapping[int, Handler] = MappingProxyType(
+            {Opcode.READ_INPUT: self._read, Opcode.WRITE_OUTPUT: self._write}
+        )
+
+    def _read(self, command: Command) -> CommandResult:
+        number = require_operand(command.operands[0], range(SIGNALS))
+        return ok(Answer.of_input(int(self._group.inputs.read(number, self._group.values))))
+
+    def _write(self, command: Command) -> CommandResult:
+        number = require_operand(command.operands[0], range(SIGNALS))
+        on = require_operand(command.operands[1], range(2))
+        self._group.outputs.switch(number, on == 1)
+        return ok()

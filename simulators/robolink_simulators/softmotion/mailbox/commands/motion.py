@@ -9,16 +9,20 @@ from robolink.protocols.mailbox import Answer, Command, ErrorClass, Opcode
 from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
 from robolink_simulators.softmotion.group.condition import SmcGroupState
-from robolink_simulators.softmotion.kinematics.coordinates import CoordSystem
-from robolink_simulators.softmotion.mailbox.commands.complaints import Rejected
+from robolink_simulators.softmotion.kinematics.kinematics import CoordSystem
 from robolink_simulators.softmotion.mailbox.commands.jobs import Job, Jobs
-from robolink_simulators.softmotion.mailbox.commands.operands import require_finite, require_operand
-from robolink_simulators.softmotion.mailbox.commands.told import Handler, Told, done
-from robolink_simulators.softmotion.mailbox.words.units import UserUnits
+from robolink_simulators.softmotion.mailbox.commands.results import (
+    CommandResult,
+    Handler,
+    Rejected,
+    ok,
+    require_finite,
+    require_operand,
+)
+from robolink_simulators.softmotion.mailbox.image import UserUnits
 from robolink_simulators.softmotion.motion.jog import COORDINATES, JogCommand
 from robolink_simulators.softmotion.motion.movement import EdgeWatch, SmcBufferMode
-from robolink_simulators.softmotion.motion.paths import Dynamics
-from robolink_simulators.softmotion.motion.planner import Target
+from robolink_simulators.softmotion.motion.paths import Dynamics, Target
 from robolink_simulators.softmotion.signals import SIGNALS
 
 MOST_MOVEMENTS: Final = 4
@@ -44,12 +48,12 @@ class MotionDesk:
         self._releases: list[BlockExecution] = []
         self.opcodes: Mapping[int, Handler] = MappingProxyType(
             {
-                Opcode.ENABLE: lambda _: Told(group.enable()),
-                Opcode.DISABLE: lambda _: Told(group.disable()),
-                Opcode.RESET: lambda _: Told(group.reset()),
-                Opcode.CONTINUE: lambda _: Told(group.resume()),
-                Opcode.INTERRUPT: lambda _: Told(group.interrupt()),
-                Opcode.HALT: lambda _: Told(group.halt()),
+                Opcode.ENABLE: lambda _: CommandResult(group.enable()),
+                Opcode.DISABLE: lambda _: CommandResult(group.disable()),
+                Opcode.RESET: lambda _: CommandResult(group.reset()),
+                Opcode.CONTINUE: lambda _: CommandResult(group.resume()),
+                Opcode.INTERRUPT: lambda _: CommandResult(group.interrupt()),
+                Opcode.HALT: lambda _: CommandResult(group.halt()),
                 Opcode.STOP: self._stop,
                 Opcode.JOG: self._jog,
                 Opcode.MOVE_DIRECT: self._move_direct,
@@ -70,17 +74,17 @@ class MotionDesk:
                 release.finish()
             self._releases.clear()
 
-    def _stop(self, command: Command) -> Told:
+    def _stop(self, command: Command) -> CommandResult:
         if require_operand(command.operands[0], range(2)) == 0:
-            return Told(self._group.stop())
+            return CommandResult(self._group.stop())
         if self._group.state is not SmcGroupState.STOPPING:
-            return done()  # nothing is held (assumed)
+            return ok()  # nothing is held (assumed)
         self._group.release_stop()
         release = BlockExecution()
         self._releases.append(release)
-        return Told(release)
+        return CommandResult(release)
 
-    def _jog(self, command: Command) -> Told:
+    def _jog(self, command: Command) -> CommandResult:
         forward, backward, system, _ = command.operands
         for mask in (forward, backward):
             require_operand(mask, _MASKS)
@@ -89,32 +93,34 @@ class MotionDesk:
         if not any(pressed.directions):
             return self._end_jog()
         dynamics = self._units.dynamics(command.dynamics, factors=pressed.by_factor)
-        return Told(self._group.jog(replace(pressed, dynamics=dynamics)))
+        return CommandResult(self._group.jog(replace(pressed, dynamics=dynamics)))
 
-    def _end_jog(self) -> Told:
+    def _end_jog(self) -> CommandResult:
         jog = self._group.motion.jog
         if jog is not None:
             jog.release()
-        return done()
+        return ok()
 
-    def _move_direct(self, command: Command) -> Told:
+    def _move_direct(self, command: Command) -> CommandResult:
         target, mode = self._target(command)
         factors = self._units.dynamics(command.dynamics, factors=True)
-        return Told(self._group.move_direct_absolute(target, factors, mode=mode))
+        return CommandResult(self._group.move_direct_absolute(target, factors, mode=mode))
 
-    def _move_linear(self, command: Command) -> Told:
+    def _move_linear(self, command: Command) -> CommandResult:
         return self._on_a_line(command, None)
 
-    def _move_until_input(self, command: Command) -> Told:
+    def _move_until_input(self, command: Command) -> CommandResult:
         signal, run_on, *_ = command.operands
         number = require_operand(abs(signal), range(SIGNALS))
         stops = require_operand(run_on, range(2)) == 0
         return self._on_a_line(command, EdgeWatch(number, falling=signal < 0, stops=stops))
 
-    def _on_a_line(self, command: Command, watch: EdgeWatch | None) -> Told:
+    def _on_a_line(self, command: Command, watch: EdgeWatch | None) -> CommandResult:
         target, mode = self._target(command)
         dynamics = self._units.dynamics(command.dynamics)
-        return Told(self._group.move_linear_absolute(target, dynamics, mode=mode, watch=watch))
+        return CommandResult(
+            self._group.move_linear_absolute(target, dynamics, mode=mode, watch=watch)
+        )
 
     def _target(self, command: Command) -> tuple[Target, SmcBufferMode]:
         _, _, system, mode = command.operands

@@ -22,17 +22,19 @@ from robolink_simulators.softmotion.catalogue import (
 )
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
 from robolink_simulators.softmotion.group.condition import ReadToolMode
-from robolink_simulators.softmotion.kinematics.coordinates import CoordRef
-from robolink_simulators.softmotion.kinematics.kinematics import KinematicsModel
-from robolink_simulators.softmotion.mailbox.commands.complaints import Rejected, class_of
-from robolink_simulators.softmotion.mailbox.commands.operands import (
+from robolink_simulators.softmotion.kinematics.kinematics import CoordRef, KinematicsModel
+from robolink_simulators.softmotion.mailbox.commands.results import (
+    CommandResult,
+    Handler,
+    Rejected,
+    class_of,
+    ok,
     require_finite,
     require_operand,
     require_slot,
 )
-from robolink_simulators.softmotion.mailbox.commands.told import Handler, Told, done
+from robolink_simulators.softmotion.mailbox.image import UserUnits
 from robolink_simulators.softmotion.mailbox.retained import RetainedMemory
-from robolink_simulators.softmotion.mailbox.words.units import UserUnits
 from robolink_simulators.softmotion.motion.movement import ToolInForce
 from robolink_simulators.softmotion.smc_errors import BlockRefused
 
@@ -113,7 +115,7 @@ class ToolDesk:
         """Return the tool in force for movements to come."""
         return self._answer(self._group.tool)
 
-    def _write(self, command: Command) -> Told:
+    def _write(self, command: Command) -> CommandResult:
         number = require_slot(command.operands[0])
         require_finite(command.pose)
         x, y, z, a, b, c = (part + 0.0 for part in command.pose)  # a minus zero is a zero
@@ -122,25 +124,25 @@ class ToolDesk:
         named = command.name.isascii() and command.name.isprintable()
         if not named or max(map(abs, lengths_mm)) > _LONGEST_MM:
             raise Rejected(ErrorClass.OPERAND)
-        told = done()
+        result = ok()
         if number == self.selected:
-            told = self._apply(number, pose, command.name)
-        if told.execution.outputs.done:
+            result = self._apply(number, pose, command.name)
+        if result.execution.outputs.done:
             self._memory.define(number, pose, command.name)
-        return told
+        return result
 
-    def _select(self, command: Command) -> Told:
+    def _select(self, command: Command) -> CommandResult:
         number = command.operands[0]
         if number == 0:
-            told = self._apply(0, _NO_TOOL, "")
+            result = self._apply(0, _NO_TOOL, "")
         else:
             slot = self._memory.slot(require_slot(number))
             if not slot.defined:
                 raise Rejected(ErrorClass.SLOT_EMPTY)
-            told = self._apply(number, slot.tool, slot.name)
-        return Told(told.execution, self.set_tool())
+            result = self._apply(number, slot.tool, slot.name)
+        return CommandResult(result.execution, self.set_tool())
 
-    def _read(self, command: Command) -> Told:
+    def _read(self, command: Command) -> CommandResult:
         mode = ReadToolMode(require_operand(command.operands[0], range(len(ReadToolMode))))
         # What was interrupted is the active movement of the mailbox.
         waits = mode is ReadToolMode.ACTIVE_MOVEMENT and self._group.motion.interrupted
@@ -150,21 +152,21 @@ class ToolDesk:
             error_class = class_of(refused.kind, self._group.state)
             number = self._group.options.numbers.error(refused.kind).number
             raise Rejected(error_class, number) from None
-        return done(self._answer(tool))
+        return ok(self._answer(tool))
 
-    def _clear(self, command: Command) -> Told:
+    def _clear(self, command: Command) -> CommandResult:
         number = require_slot(command.operands[0])
         if number == self.selected:
             raise Rejected(ErrorClass.WRONG_STATE)
         self._memory.clear(number)
-        return done()
+        return ok()
 
-    def _set_kinematics(self, command: Command) -> Told:
+    def _set_kinematics(self, command: Command) -> CommandResult:
         position, orientation, *_ = command.operands
         execution = self._group.set_kin_transform(self._kinematics(position, orientation))
         if execution.outputs.done:
             self.forget()
-        return Told(execution)
+        return CommandResult(execution)
 
     def _kinematics(self, position: int, orientation: int) -> KinematicsModel:
         """Return the kinematics of two codes; one of the machine builder's own is its own."""
@@ -182,12 +184,12 @@ class ToolDesk:
         except ConfigError:  # its own figures with the machine's parameters make none
             raise Rejected(ErrorClass.NO_KINEMATICS) from None
 
-    def _apply(self, number: int, tool: Six, name: str) -> Told:
+    def _apply(self, number: int, tool: Six, name: str) -> CommandResult:
         execution = self._group.set_tool(self._units.tool(tool), name)
         if execution.outputs.done:
             self.selected = number
             self._applied = self._group.tool
-        return Told(execution)
+        return CommandResult(execution)
 
     def _answer(self, tool: ToolInForce) -> Answer:
         return Answer.of_pose(self._units.given(CoordRef.of(tool.frame)))

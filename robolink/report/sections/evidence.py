@@ -1,0 +1,193 @@
+"""What the result is repeatable to and accurate to, what that rests on, and the budget."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from robolink.calibration import (
+    GUARD_FACTOR,
+    CalibrationResult,
+    DriftVerdict,
+    VerifyResult,
+    doubt_sentence,
+    proved_statements,
+    seating_sentence,
+    turn_test_sentences,
+)
+from robolink.messages import joined, tr
+from robolink.model import Pose
+from robolink.report._values import Outcome, Report
+
+
+def statements(report: Report) -> tuple[str, ...]:
+    """Return what the result is repeatable and accurate to, what brings most, and the seating."""
+    fit, seating = report.fit, report.seating
+    if fit is None:
+        return ()
+    said = tuple(proved_statements(fit, report.verification))
+    if seating is None or not said:
+        return said
+    return (*said, seating_sentence(seating["within_mm"], seating["changes"]))
+
+
+def interval_sentences(fit: CalibrationResult) -> tuple[str, ...]:
+    """Return what the statement of repeatability rests on; notes alone where there is none."""
+    notes = tuple(map(doubt_sentence, fit.notes))
+    if not fit.half_width95:
+        return notes
+    if "z_mm" in fit.changed:
+        return (change_of_z(), *_intervals(fit), *notes)
+    return (*_intervals(fit), *notes)
+
+
+def change_of_z() -> str:
+    """Return what a change of Z does not say."""
+    return tr(
+        "Z is a change: only by how much the new tip is longer or shorter was measured. The stored "
+        "Z was never measured, so nothing is stated of how long the tip is."
+    )
+
+
+def _intervals(fit: CalibrationResult) -> tuple[str, ...]:
+    said = [_what_it_rests_on(fit)]
+    if sum(name.endswith("_mm") for name in fit.measured) > 1:
+        said.append(
+            tr(
+                "Each interval of the table holds for its axis alone, the statements for all axes "
+                "together."
+            )
+        )
+    return tuple(said)
+
+
+def _what_it_rests_on(fit: CalibrationResult) -> str:
+    if fit.interval_from == "resolution" and fit.sigma_mm is not None:
+        return tr(
+            "Repeatability rests on the step of the positions, {step:g} mm.",
+            step=fit.sigma_mm * math.sqrt(12),
+        )
+    from_residuals = fit.interval_from == "residuals"
+    if fit.sigma_stated and fit.sigma_mm is not None and not from_residuals:
+        return tr(
+            "Repeatability rests on a stated standard deviation of {sigma:g} mm of one placement.",
+            sigma=fit.sigma_mm,
+        )
+    if fit.dof is None:
+        return tr("Repeatability comes from how well the poses agree.")
+    return tr(
+        "Repeatability comes from how well the poses agree (Student's t, degrees of freedom: "
+        "{dof}).",
+        dof=fit.dof,
+    )
+
+
+def resolution_sentence(poses: tuple[Pose, ...]) -> str:
+    """Return the finest step in which the poses are written, empty without poses."""
+    digits = max((_digits(value) for pose in poses for value in pose.coordinates()[:3]), default=-1)
+    return "" if digits < 0 else tr("Positions as they were read: {step:g} mm.", step=10**-digits)
+
+
+def _digits(value: float) -> int:
+    """Return after how many decimals a number ends, 9 at most."""
+    for digits in range(9):
+        if math.isclose(round(value, digits), value, abs_tol=1e-10):
+            return digits
+    return 9
+
+
+@dataclass(frozen=True, slots=True)
+class Proof:
+    """The proof by turning about the new tip.
+
+    Attributes:
+        result: What came of it.
+        undecided: Whether it neither passed nor failed.
+        rule: By which rule it was decided, one sentence.
+        guarded: Whether a guard band was taken off the tolerance.
+        heights: Whether the drift has a height.
+        said: What it says about both statements of the measurement, in sentences.
+    """
+
+    result: VerifyResult
+    undecided: bool
+    rule: str
+    guarded: bool
+    heights: bool
+    said: tuple[str, ...] = ()
+
+
+def proof(report: Report) -> Proof | None:
+    """Return the proof, ``None`` where nothing was turned."""
+    result = report.verification
+    if result is None:
+        return None
+    guarded = any(drift.u_mm for drift in result.drifts)
+    return Proof(
+        result,
+        undecided=result.verdict is DriftVerdict.UNDECIDED,
+        rule=joined(" ", filter(None, (_rule(guarded=guarded), _held_to_statements(result)))),
+        guarded=guarded,
+        heights=any(drift.dz_mm for drift in result.drifts),
+        said=tuple(turn_test_sentences(result.judgement, report.fit)),
+    )
+
+
+def _held_to_statements(result: VerifyResult) -> str:
+    if result.judgement is None:
+        return ""
+    return tr(
+        "Each drift is also compared with what scatter alone and all rows together explain: "
+        "beyond the first it leaves a doubt, beyond the second it contradicts the measurement."
+    )
+
+
+def _rule(*, guarded: bool) -> str:
+    if guarded:
+        return tr(
+            "Decision rule (after ISO 14253-1): a drift passes when drift + {factor:g} u is within "
+            "the tolerance, and fails when drift - {factor:g} u is beyond it. What lies between is "
+            "undecided and does not pass; u is the standard uncertainty of the drift.",
+            factor=GUARD_FACTOR,
+        )
+    return tr(
+        "Decision rule: a drift passes when it is within the tolerance; nothing is taken off for "
+        "its uncertainty."
+    )
+
+
+def was_not_proved(report: Report) -> bool:
+    """Tell whether a value stands in the controller that nothing proved."""
+    return report.verification is None and report.outcome in (Outcome.WRITTEN, Outcome.SKIPPED)
+
+
+def turn_test_doubted(report: Report) -> bool:
+    """Tell whether a value was kept although its turn test does not fit what was measured."""
+    judgement = None if report.verification is None else report.verification.judgement
+    return report.outcome is Outcome.VERIFIED and judgement is not None and not judgement.good
+
+
+def limits_rule(report: Report) -> str:
+    """Return by which rule the limits were judged, empty where nothing was."""
+    if not report.judgements:
+        return ""
+    return tr(
+        "Decision rule of the limits: what is found is compared directly with what is "
+        "allowed; the measurement is refused when one of them is exceeded."
+    )
+
+
+def conformity(report: Report) -> Iterator[str]:
+    """Yield what may be stated of the tool now, in sentences."""
+    result = report.verification
+    if turn_test_doubted(report):
+        yield tr("Conformity is not stated: the turn test leaves a doubt.")
+    elif report.outcome is Outcome.VERIFIED and result is not None:
+        yield tr(
+            "The tool conforms: when it turned, its tip stayed within {limit:g} mm by the decision "
+            "rule below.",
+            limit=result.tolerance_mm,
+        )
+    elif report.outcome in (Outcome.WRITTEN, Outcome.SKIPPED):
+        yield tr("Conformity is not stated: the tip was not proved by turning about it.")
+    elif report.outcome is not Outcome.PROPOSED:
+        yield tr("Conformity is not stated: this change was not kept.")

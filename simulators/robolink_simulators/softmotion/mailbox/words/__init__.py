@@ -1,1 +1,0 @@
-"""The words of the mailbox on a field bus: blocks in and out, places, units, faults, watchdog."""

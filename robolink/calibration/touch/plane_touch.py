@@ -12,12 +12,11 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from robolink.calibration.core.least_squares import LinearFit, linear_fit
+from robolink.calibration.core.least_squares import Floats, LinearFit, linear_fit
 from robolink.calibration.core.result import CalibrationResult
-from robolink.calibration.core.robust import Floats
 from robolink.calibration.core.rotations import pose_arrays
+from robolink.calibration.quality.doubts import Tolerance
 from robolink.calibration.quality.fit_quality import judged
-from robolink.calibration.quality.tolerances import Tolerance
 from robolink.calibration.touch.surface_fit import (
     SURFACE_TOLERANCE,
     distinct_touches,

@@ -178,7 +178,7 @@ def solve_camera_affine(
     result = with_height_error(result, (by_height[0], by_height[1]), height)
     rms_px = _rms_px(camera, residuals) if result.dof else None
     limits.require_fit(rms_px, max(result.half_width95, default=None))
-    doubts = (*result.warnings, *limits.doubts(camera, rms_px))
+    doubts = (*result.warnings, *limits.exceeded(camera, rms_px))
     known = _with_spread(camera, fit, offset_sigma_mm(result), pixels.mean(axis=0).tolist())
     return replace(result, rms_px=rms_px, warnings=doubts, camera=known)
 

@@ -15,6 +15,7 @@ from robolink.calibration.flange_plane import (
     require_flange_in_base,
     solvable_planes,
 )
+from robolink.deprecation import deprecated
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import Pose, angle_difference_deg
@@ -120,8 +121,8 @@ class CameraLimits:
     most_mm_per_px: float = 0.2
     interval_mm: float = 0.05
 
-    def doubts(self, camera: CameraModel, rms_px: float | None) -> tuple[str, ...]:
-        """Return the names of what is doubtful about a camera."""
+    def exceeded(self, camera: CameraModel, rms_px: float | None) -> tuple[str, ...]:
+        """Return the codes of the limits for a warning that a camera exceeds."""
         sx, sy = camera.scale_mm_per_px
         found = []
         if abs(sx / sy - 1) > self.unequal_scale:
@@ -131,6 +132,11 @@ class CameraLimits:
         if rms_px is not None and rms_px > self.rms_px:
             found.append("large_pixel_residual")
         return tuple(found)
+
+    @deprecated("CameraLimits.exceeded")
+    def doubts(self, camera: CameraModel, rms_px: float | None) -> tuple[str, ...]:
+        """Return what :meth:`exceeded` returns."""
+        return self.exceeded(camera, rms_px)
 
     def require_camera(self, camera: CameraModel) -> None:
         """Refuse what no camera that looks at tips is like.

@@ -1,6 +1,4 @@
-"""A budget of uncertainty, and what a result is accurate to with it.
-
-What a result is accurate to: its scatter, and what its scatter cannot show.
+"""What a result is accurate to: its scatter, and what its scatter cannot show.
 
 A fit that agrees with itself to a hundredth says nothing about a station that was moved, a camera
 that was turned, or a person who always sees contact on the same side. Each of these is a row of

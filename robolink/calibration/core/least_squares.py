@@ -1,14 +1,10 @@
-"""Linear least squares, and which poses belong together before them.
+"""Linear least squares with what is needed to trust the answer, and which poses belong together.
 
-Linear least squares with what is needed to trust the answer, and how errors reach a result.
-
-Which poses belong together: the largest set that agrees on one tip.
-
-Whole poses are rejected, never single coordinates. Every smallest sample that has a solution is
-tried where there are not too many of them, else random draws; the best of them are refined until
-their set stays, and the largest set is kept. So the answer is a property of the data, not of the
-seed of the draws, and where draws under several seeds disagree that is told
-(docs/reference/evidence.md 10).
+Of poses the largest set is taken that agrees on one tip. Whole poses are rejected, never single
+coordinates. Every smallest sample that has a solution is tried where there are not too many of
+them, else random draws; the best of them are refined until their set stays, and the largest set is
+kept. So the answer is a property of the data, not of the seed of the draws, and where draws under
+several seeds disagree that is told (docs/reference/evidence.md 10).
 """
 
 import math

@@ -1,7 +1,4 @@
-"""What a calibration proposes, and how much of it was measured.
-
-What a fit tells about itself beyond its answer: figures behind notes and doubts.
-"""
+"""What a calibration proposes, how much of it was measured, and what its fit tells of itself."""
 
 import math
 from collections.abc import Iterable, Iterator, Sequence

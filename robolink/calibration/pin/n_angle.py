@@ -38,7 +38,7 @@ from robolink.calibration.core.pose_checks import (
     keep_unmeasured,
     require_poses,
     some_on_their_head,
-    tilted,
+    tilted_pose,
 )
 from robolink.calibration.core.result import CalibrationResult, ResidualVectors
 from robolink.calibration.core.rotations import checked_table
@@ -303,7 +303,7 @@ def _planar(table: Floats, poses: Sequence[Pose]) -> tuple[Complexes, Complexes,
     leaning = np.degrees(np.arccos(np.minimum(np.abs(upward), 1.0))) >= UPRIGHT_WITHIN_DEG
     if leaning.any():
         first = int(np.argmax(leaning))
-        raise tilted(first + 1, poses[first])
+        raise tilted_pose(first + 1, poses[first])
     down = upward < 0
     if down.any() and not down.all():
         raise some_on_their_head()

@@ -3,8 +3,6 @@
 After the pivot the tool is moved, without turning, along its own X and then along its own Z
 (or anywhere in its XZ plane). The ways of the flange, seen from the flange, are the axes
 (docs/reference/calibration.md 2.4).
-
-A way of the flange along an axis of the tool: what it shows, and when it shows nothing.
 """
 
 import math

@@ -1,12 +1,8 @@
-"""What a measurement is doubted for: the figures, and the sentences.
+"""What a measurement is doubted for: the limits, and the named doubts and notes as sentences.
 
-The named doubts and notes of a measurement, as sentences.
-
-A code is for programs; what a person reads, on a screen or in a report, is the same sentence.
-
-Residuals above which a result is given with a warning (docs/reference/calibration.md 3).
-
-The figures by which touches are told (docs/reference/evidence.md 1).
+Residuals above the limits give a result a warning (docs/reference/calibration.md 3); others tell
+how a touch was made (docs/reference/evidence.md 1). A code is for programs; what a person reads, on
+a screen or in a report, is the same sentence.
 """
 
 import math
@@ -15,6 +11,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from robolink.calibration.core.result import RunOrder
+from robolink.deprecation import deprecated
 from robolink.messages import tr
 from robolink.ways import Way, way
 
@@ -44,14 +41,19 @@ class Tolerance:
     rms_mm: float
     max_residual_mm: float
 
-    def doubts(self, rms_mm: float | None, max_residual_mm: float | None) -> tuple[str, ...]:
-        """Return the names of the limits that are exceeded."""
+    def exceeded(self, rms_mm: float | None, max_residual_mm: float | None) -> tuple[str, ...]:
+        """Return the codes of the limits that are exceeded."""
         found = []
         if rms_mm is not None and rms_mm > self.rms_mm:
             found.append("large_rms")
         if max_residual_mm is not None and max_residual_mm > self.max_residual_mm:
             found.append("large_residual")
         return tuple(found)
+
+    @deprecated("Tolerance.exceeded")
+    def doubts(self, rms_mm: float | None, max_residual_mm: float | None) -> tuple[str, ...]:
+        """Return what :meth:`exceeded` returns."""
+        return self.exceeded(rms_mm, max_residual_mm)
 
 
 PLANAR_TOLERANCE = Tolerance(rms_mm=0.05, max_residual_mm=0.15)

@@ -59,7 +59,7 @@ def judged(
         max_residual_mm=worst,
         dof=dof,
         evidence=agreement,
-        warnings=(*result.warnings, *doubts, *tolerance.doubts(rms, worst)),
+        warnings=(*result.warnings, *doubts, *tolerance.exceeded(rms, worst)),
     )
 
 

@@ -1,8 +1,6 @@
-"""What is asked of numbers that someone brings along: their unit, their number, their tool.
+"""Poses that someone brings along: their unit, are there enough, are they flat, which tool fits.
 
-Lengths that look like metres or inches (docs/reference/evidence.md 15).
-
-Poses that someone brings along: are there enough, are they flat, and which tool fits them.
+Lengths may look like metres or inches (docs/reference/evidence.md 15).
 
 A stored point carries no tool number (docs/reference/epson.md 3.2), so a person says with which
 tool it was taught. The geometry can contradict. Let the poses be taken for tip poses of tool j; the

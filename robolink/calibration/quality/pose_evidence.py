@@ -1,7 +1,5 @@
 """What poses on one point show about themselves, beyond the offset that they give.
 
-Whether something moved while the touches were made.
-
 A touch that a bumped pin, a slipping nozzle or a warming arm displaced lies off by the same vector
 as all touches after it, or by one that grows. The fit gets that vector as further unknowns; by how
 much the squares shrink is tested with F (docs/reference/evidence.md 8). With c columns and the
@@ -12,19 +10,15 @@ residuals r of a fit with nu degrees of freedom
 where d is the part of the new columns that the offset and the point cannot take over. The largest
 F of all splits is compared with the 1 % limit divided among them.
 
-What poses on one point show about themselves: copies, order, and how much hangs on one.
+Copies, order, and how much hangs on one pose are checked alike in planar fits and in space; in the
+plane the rotations are 2 x 2 (docs/reference/evidence.md 5, 8). When an outlier search is believed
+stands in docs/reference/evidence.md 10.
 
-Planar fits and fits in space are checked alike; in the plane the rotations are 2 x 2
-(docs/reference/evidence.md 5, 8).
-
-When an outlier search is believed (docs/reference/evidence.md 10).
-
-Whether touches are off toward the side from which the tip came (docs/reference/evidence.md 8).
-
-Who looks along one direction takes the tip for touching too early, always by about the same b. The
-robot stops beside the pin before each touch, in a direction that the procedure drew; the fit gets
-one number more, b along that direction. A bias fixed in the tool has the same columns as the
-offset and one fixed in the base those of the point: neither is ever found so.
+Touches may be off toward the side from which the tip came (docs/reference/evidence.md 8). Who looks
+along one direction takes the tip for touching too early, always by about the same b. The robot
+stops beside the pin before each touch, in a direction that the procedure drew; the fit gets one
+number more, b along that direction. A bias fixed in the tool has the same columns as the offset and
+one fixed in the base those of the point: neither is ever found so.
 """
 
 import math

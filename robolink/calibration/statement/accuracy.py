@@ -22,7 +22,7 @@ from robolink.calibration.core.accuracy import (
     ErrorSource,
     UncertaintyBudget,
 )
-from robolink.calibration.core.pose_checks import leans
+from robolink.calibration.core.pose_checks import tilted
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.statistics import (
     NORMAL_95,
@@ -318,7 +318,7 @@ def _scattering(
     """
     variance = (sigma_mm * result.sigma_gain) ** 2
     variances = [variance] * lengths
-    upright = not any(map(leans, result.inputs))
+    upright = not any(map(tilted, result.inputs))
     if height_mm is not None and upright and result.measured[-1] == "z_mm":
         variances[-1] = (height_mm * result.sigma_gain) ** 2
     halves = (*(NORMAL_95 * math.sqrt(one) for one in variances), *result.half_width95[lengths:])

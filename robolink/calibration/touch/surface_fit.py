@@ -28,6 +28,7 @@ from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.statistics import student_t
 from robolink.calibration.flange_plane import require_flange_in_base
 from robolink.calibration.quality.doubts import LEVELS_MM, MOST_LEFT, MOST_RESIDUAL_MM, Tolerance
+from robolink.calibration.quality.fit_quality import judged
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
@@ -42,6 +43,8 @@ that is nearly zero does not show in the condition, for which all are brought to
 SURFACE_TOLERANCE = Tolerance(rms_mm=0.3, max_residual_mm=1.0)
 
 KEPT = ("u_deg", "v_deg", "w_deg")
+
+ResultT = TypeVar("ResultT", bound=CalibrationResult)
 
 _STEPS = 60
 
@@ -133,33 +136,45 @@ def never_settled() -> CalibrationError:
 
 
 def tip_result(
+    kind: Callable[..., ResultT],
     method: str,
     poses: Sequence[Pose],
     *,
     stored: ToolOffset | None,
     tip_mm: Floats,
     fit: LinearFit,
-    misses: Floats,
-    place_mm: tuple[float, ...],
+    across: Floats,
+    unknowns: int,
+    sigma_mm: float | None,
+    tolerance: Tolerance,
     warnings: tuple[str, ...],
-) -> CalibrationResult:
-    """Return X, Y and Z of a tip; its residuals are to be judged.
+    place_mm: tuple[float, ...] = (),
+    **surface: object,
+) -> ResultT:
+    """Return X, Y and Z of a tip, judged by how far the touches lie from the surface.
 
     Args:
+        kind: The result of the method.
         method: The method's name.
         poses: The touches.
         stored: What U, V and W are kept from.
         tip_mm: The tip in the flange's axes.
         fit: The last fit; its first three unknowns are the tip.
-        misses: Residual vectors, base axes.
-        place_mm: The point that was found, empty for none.
+        across: Unit normal of the surface, one for all touches or one for each, base axes.
+        unknowns: How many numbers the fit had to find.
+        sigma_mm: Standard deviation of one touch along the normal, where it is known.
+        tolerance: Residuals above which the result carries a warning.
         warnings: Doubts so far.
+        place_mm: The point that was found, empty for none.
+        surface: What the result holds of the surface beside.
 
     Raises:
         CalibrationError: ``implausible_offset``.
+        ConfigError: ``sigma_mm`` is not positive.
     """
     x_mm, y_mm, z_mm = tip_mm.tolist()
-    return CalibrationResult(
+    misses = -fit.residuals[:, None] * across
+    result = kind(
         method=method,
         offset=keep_unmeasured(stored, x_mm=x_mm, y_mm=y_mm, z_mm=z_mm),
         measured=("x_mm", "y_mm", "z_mm"),
@@ -173,6 +188,15 @@ def tip_result(
         rank=fit.rank,
         unobservable=KEPT,
         sources=(ErrorSource.of_lengths("touch_mm", 3),),
+        **surface,
+    )
+    return judged(
+        result,
+        fit.residuals[:, None],
+        fit.unit_covariance[:3, :3],
+        unknowns=unknowns,
+        sigma_mm=sigma_mm,
+        tolerance=tolerance,
     )
 
 

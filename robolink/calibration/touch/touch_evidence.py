@@ -1,11 +1,8 @@
 """Whether touches of one pin were made: jogs, answers in time, heights, and standoffs undone.
 
-Source: docs/reference/evidence.md 1.
-
-Where the robot stops before each touch: beside and above the pin, by a distance that is drawn.
-
-A person who brings the tip onto the pin undoes that distance; who only presses ENTER does not, and
-no other needle looks the same (docs/reference/evidence.md 1).
+The robot stops before each touch beside and above the pin, by a distance that is drawn. A person
+who brings the tip onto the pin undoes that distance; who only presses ENTER does not, and no other
+needle looks the same (docs/reference/evidence.md 1).
 """
 
 import math

@@ -161,8 +161,8 @@ def test_what_a_page_of_the_api_names_has_a_page():
 @pytest.mark.parametrize(
     ("module", "owners", "target", "there"),
     [
-        ("robolink.model.motion.movement", ("WorkBox",), "about", True),
-        ("robolink.model.motion.movement", ("WorkBox",), "above", False),
+        ("robolink.model._movement", ("WorkBox",), "about", True),
+        ("robolink.model._movement", ("WorkBox",), "above", False),
         ("robolink.methods.points.source", (), "TwoTouches", True),
         ("robolink.methods.points.source", (), "robolink.procedures.TipSource", True),
         ("robolink.methods.points.source", (), "robolink.procedures.TipSink", False),

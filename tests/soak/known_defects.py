@@ -41,7 +41,7 @@ class KnownDefect:
 _NOTERS: Final = (
     "robolink.controllers.controller_core",
     "robolink.controllers.markers",
-    "robolink.model.record.ledger",
+    "robolink.model._ledger",
     "robolink.transaction._change",
 )
 _WIRE: Final = "robolink.controllers.softmotion.link.wire.MailboxWire.ended"

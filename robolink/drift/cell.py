@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from robolink.calibration import LEAST_BASELINE, stated_mm
+from robolink.deprecation import without_sign
 from robolink.drift.charts import Chart, charts_of
 from robolink.drift.findings import DriftFinding, findings_in
 from robolink.drift.history import MeasuredChange, measured_changes
@@ -72,6 +73,7 @@ def drift_of(
     return CellDrift(controller, changes, charts, findings_in(charts, changes))
 
 
+@without_sign
 def last_statements(changes: Sequence[MeasuredChange]) -> Iterator[str]:
     """Yield a sentence for each tool whose last change has a statement on record.
 

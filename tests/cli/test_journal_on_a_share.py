@@ -6,7 +6,7 @@ from robolink_cli.commands.computer.doctor_finding import Level
 
 from robolink.errors import JournalError
 from robolink.journal import _places, open_journal
-from robolink.journal._opening import close_files
+from robolink.journal._connections import close_files
 
 
 @pytest.fixture

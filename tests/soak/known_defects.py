@@ -146,7 +146,7 @@ DEFECTS: Final = (
     ),
     KnownDefect(
         "what the journal commits is not synced",
-        {"robolink.journal.store.engines._prepare": stand_ins.not_synced},
+        {"robolink.journal.store.connection._prepare": stand_ins.not_synced},
     ),
     KnownDefect(
         "an error of the journal's disk is one of the database's",

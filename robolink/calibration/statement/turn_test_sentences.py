@@ -16,6 +16,7 @@ from robolink.calibration.statement.sentences import (
     stated_mm,
     statement_sentences,
 )
+from robolink.deprecation import without_sign
 from robolink.messages import tr
 
 
@@ -149,6 +150,7 @@ def _explained(judgement: TurnJudgement) -> Iterator[str]:
         )
 
 
+@without_sign
 def proved_statements(measured: CalibrationResult, result: VerifyResult | None) -> Iterator[str]:
     """Yield what a tip is repeatable and accurate to after its turn test, a sentence each.
 

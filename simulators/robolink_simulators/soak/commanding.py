@@ -15,7 +15,7 @@ from robolink_cli.console.exit_codes import UNKNOWN
 from robolink_cli.console.ways import SHELL_WAYS
 
 from robolink.errors import OutcomeUnknownError
-from robolink.journal._opening import close_files
+from robolink.journal._connections import close_files
 from robolink.model import Controller
 from robolink.ways import speaking
 from robolink_simulators.hosting.in_process import epson, softmotion

@@ -8,10 +8,10 @@ given up keeps its body and has :func:`deprecated` before it.
 
 import sys
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import wraps
 from importlib import import_module
-from typing import Final, ParamSpec, TypeVar
+from typing import Final, ParamSpec, TypeVar, cast
 
 GONE_IN: Final = "0.2.0"
 """The version without the names that this one still knows; a test reminds whoever makes it."""
@@ -42,6 +42,7 @@ OLD_NAMES: Final[Mapping[str, Mapping[str, str]]] = {
     },
     "robolink.journal": {
         "EntryKind": "robolink.model.EntryKind",
+        "LookingLog": "robolink.journal.ReadOnlyLog",
         "NewEntry": "robolink.model.NewEntry",
         "Recorded": "robolink.model.Recorded",
         "Signature": "robolink.model.Signature",
@@ -180,6 +181,29 @@ def deprecated(instead: str) -> Callable[[Callable[_P, _R]], Callable[_P, _R]]:
         return warned
 
     return marked
+
+
+def without_sign(sentence: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Mark a function of sentences that took what stands before a half width: it still does.
+
+    ``sign``, by name or as the last argument, replaces ``+-`` in what is returned, and warns.
+    """
+    takes = sentence.__code__.co_argcount
+
+    @wraps(sentence)
+    def warned(*args: object, **kwargs: object) -> object:
+        said = cast("Callable[..., str | Iterator[str]]", sentence)
+        sign = kwargs.pop("sign", args[takes] if len(args) == takes + 1 else None)
+        if not isinstance(sign, str):
+            return said(*args, **kwargs)
+        name = sentence.__name__
+        _warn(f"sign of {name}", "'+-' alone, which whoever shows a sentence may replace", 3)
+        found = said(*args[:takes], **kwargs)
+        if isinstance(found, str):
+            return found.replace("+-", sign)
+        return (one.replace("+-", sign) for one in found)
+
+    return cast("Callable[_P, _R]", warned)
 
 
 def old_hook(kind: type, old: str, new: str, adapted: Callable[..., object]) -> None:

@@ -9,6 +9,7 @@ from statistics import fmean
 from typing import Final
 
 from robolink.calibration import LEAST_BASELINE, stated_mm, student_t
+from robolink.deprecation import without_sign
 from robolink.drift.charts import Chart, charts_of
 from robolink.drift.history import (
     LEVEL,
@@ -424,6 +425,7 @@ def drift_of(
     return CellDrift(controller, changes, charts, findings_in(charts, changes))
 
 
+@without_sign
 def last_statements(changes: Sequence[MeasuredChange]) -> Iterator[str]:
     """Yield a sentence for each tool whose last change has a statement on record.
 

@@ -9,7 +9,7 @@ from typing import Final, Literal, Protocol, runtime_checkable
 
 from robolink.errors import ConfigError, ToolChangedError, UnclearAnswerError
 from robolink.messages import tr
-from robolink.model.motion.geometry import angle_difference_deg, described
+from robolink.model._geometry import angle_difference_deg, described
 
 _LEAST: Final = 1e-100
 _MOST: Final = 1e9

@@ -40,7 +40,7 @@ class KnownDefect:
 _NOTERS: Final = (
     "robolink.controllers.controller_core",
     "robolink.controllers.markers",
-    "robolink.model.record.ledger",
+    "robolink.model._ledger",
     "robolink.transaction._change",
 )
 _WIRE: Final = "robolink.controllers.softmotion.link.wire.MailboxWire.ended"
@@ -145,7 +145,7 @@ DEFECTS: Final = (
     ),
     KnownDefect(
         "what the journal commits is not synced",
-        {"robolink.journal.store.engines._prepare": stand_ins.not_synced},
+        {"robolink.journal.store.connection._prepare": stand_ins.not_synced},
     ),
     KnownDefect(
         "an error of the journal's disk is one of the database's",

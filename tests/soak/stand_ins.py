@@ -22,7 +22,7 @@ from robolink.controllers.softmotion.link.commands import CommandSender
 from robolink.controllers.tool_table import ToolTableCore
 from robolink.errors import RobolinkError, TransportTimeoutError
 from robolink.journal._lease import Grip, Lease
-from robolink.journal.store import engines
+from robolink.journal.store import connection
 from robolink.model import (
     EntryKind,
     Finding,
@@ -200,7 +200,7 @@ def unread(tools: Any, marker: Marker) -> Finding:
     return Finding(marker, Verdict.NOT_APPLIED, "it did not take", entries=(entry,))
 
 
-_prepare = engines._prepare
+_prepare = connection._prepare
 
 
 def not_synced(connection: sqlite3.Connection) -> None:

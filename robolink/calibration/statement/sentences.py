@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Final
 from robolink.calibration.core.accuracy import ACCURACY_ROWS, Accuracy, AssessedRow
 from robolink.calibration.core.result import CalibrationResult, DriftVerdict, VerifyResult
 from robolink.calibration.core.turn_claim import TurnJudgement
+from robolink.deprecation import without_sign
 from robolink.messages import joined, spoken, tr
 
 if TYPE_CHECKING:
@@ -52,6 +53,7 @@ def measured_axes(result: "CalibrationResult") -> str:
     return ", ".join(name[0].upper() for name in result.measured if name.endswith("_mm"))
 
 
+@without_sign
 def repeatable_sentence(result: "CalibrationResult") -> str:
     """Return what a result is repeatable to, or why that is not known; empty without a length.
 
@@ -83,6 +85,7 @@ def repeatable_sentence(result: "CalibrationResult") -> str:
     return tr("Repeatable: not known (nothing is left over that could check it).")
 
 
+@without_sign
 def accurate_sentence(result: "CalibrationResult") -> str:
     """Return what a result is accurate to; empty without a length.
 
@@ -110,6 +113,7 @@ def accurate_sentence(result: "CalibrationResult") -> str:
     )
 
 
+@without_sign
 def largest_row_sentence(accuracy: Accuracy) -> str:
     """Return which row brings most, how large it is, and what tells that.
 
@@ -132,6 +136,7 @@ def largest_row_sentence(accuracy: Accuracy) -> str:
     return tr("Largest row: {row}, +-{half} ({basis}).", half=half_width_of(row), **facts)
 
 
+@without_sign
 def statement_sentences(result: "CalibrationResult") -> Iterator[str]:
     """Yield both statements and the largest row, a sentence each; nothing without a length.
 
@@ -239,6 +244,7 @@ def basis_words(basis: str) -> str:
     }.get(basis, basis)
 
 
+@without_sign
 def seating_sentence(within_mm: float | None, changes: int | None) -> str:
     """Return how far off the tip may be after the next mounting; no part of the accuracy.
 
@@ -392,6 +398,7 @@ def _explained(judgement: TurnJudgement) -> Iterator[str]:
         )
 
 
+@without_sign
 def proved_statements(measured: CalibrationResult, result: VerifyResult | None) -> Iterator[str]:
     """Yield what a tip is repeatable and accurate to after its turn test, a sentence each.
 

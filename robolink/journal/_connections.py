@@ -6,9 +6,10 @@ from contextlib import closing
 from typing import TYPE_CHECKING, Final, NamedTuple, TypeVar
 from weakref import WeakValueDictionary
 
+from robolink.deprecation import deprecated
 from robolink.errors import ConfigError, JournalError
-from robolink.journal._looking import LookingLog
 from robolink.journal._places import JournalPlace, default_location, memory_place, place_of
+from robolink.journal._read_only_log import ReadOnlyLog
 from robolink.model import OutcomeLog, Signature
 
 if TYPE_CHECKING:
@@ -109,7 +110,7 @@ def open_log(
             return record()
         except JournalError as error:
             trouble = error
-    return LookingLog(
+    return ReadOnlyLog(
         address,
         signature=signature,
         record=record,
@@ -117,6 +118,12 @@ def open_log(
         in_order=lambda: nothing_is_open(address),
         trouble=trouble,
     )
+
+
+@deprecated("open_log(address, durable=True, signature=signature, glance=True)")
+def GlancingLog(address: str, *, signature: Signature) -> OutcomeLog:  # noqa: N802 - a class once
+    """Return the record of a controller for a look; see :func:`open_log`."""
+    return open_log(address, durable=True, signature=signature, glance=True)
 
 
 def nothing_is_open(address: str) -> bool:

@@ -9,7 +9,7 @@ option or ``--yes``, is kept with the question that it answered.
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Final
+from typing import Any, Final
 
 from robolink.messages import tr
 
@@ -215,3 +215,35 @@ def answered_by_in_words(by: str) -> str:
         AnsweredBy.PROGRAM: tr("not asked: answered by the program"),
     }
     return next((said for one, said in words.items() if one == by), by)
+
+
+_FORMER: Final = {
+    "two_pose": "two-pose",
+    "n_angle": "n-angle",
+    "one_touch": "one-touch",
+    "z_touch": "z-touch",
+    "six_point": "six-point",
+    "crossed_beams": "beams",
+    "up_camera": "camera",
+    "camera_affine": "camera-affine",
+    "board_fit": "board",
+}
+"""What was written, and the name of the method now."""
+
+
+def method_name_now(written: str) -> str:
+    """Return a method's name of now; one that never changed comes back as it is."""
+    return _FORMER.get(written, written)
+
+
+def with_method_name_now(details: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the details of an entry, with the method called what it is called now."""
+    written = details.get("method")
+    now = {"method": method_name_now(written)} if isinstance(written, str) else {}
+    return {**details, **now}
+
+
+def finding_named_now(how: str) -> str:
+    """Return how a station was found, "METHOD with tool N", with the method's name of now."""
+    method, blank, rest = how.partition(" ")
+    return f"{method_name_now(method)}{blank}{rest}"

@@ -10,8 +10,7 @@ from contextlib import AbstractContextManager, suppress
 from typing import TypeVar
 
 from robolink.errors import JournalError
-from robolink.journal._processes import this_process
-from robolink.journal._runs import forget_client, note_client, run_of
+from robolink.journal._lease_view import forget_client, note_client, run_of, this_process
 from robolink.model import (
     ClientRun,
     EntryKind,
@@ -26,7 +25,7 @@ from robolink.model import (
 T = TypeVar("T")
 
 
-class LookingLog:
+class ReadOnlyLog:
     """Stands in for a log until something is unfinished or has to be recorded.
 
     It goes on standing in where the journal is full, damaged, newer, locked or out of reach. What

@@ -3,7 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Final, Protocol
+from typing import Final, Protocol, runtime_checkable
+
+from robolink.model._controller import Controller
 
 TIP: Final = 0
 """The mark that stands for the tip; fiducials of a held board count from 1."""
@@ -73,3 +75,39 @@ class TipSensor(Protocol):
 
     def close(self) -> None:
         """Let go of the camera."""
+
+
+@runtime_checkable
+class ControllerSensor(Protocol):
+    """A :class:`TipSensor` that is asked through the controller of the cell."""
+
+    def beside(self, controller: Controller) -> TipSensor:
+        """Return it as a connected controller shows it; reads only.
+
+        Raises:
+            ConfigError: This controller has no such camera.
+        """
+
+
+@runtime_checkable
+class LookingController(Protocol):
+    """A controller with a vision system of its own."""
+
+    @property
+    def identity(self) -> str:
+        """Which controller this is."""
+
+    def require_looks(self) -> None:
+        """Find out whether looks can be taken; reads only.
+
+        Raises:
+            ConfigError: What takes them is not there.
+        """
+
+    def look(self, mark: int, *, program: int) -> Sequence[Spot]:
+        """Take a look with a program of the controller.
+
+        Args:
+            mark: The tip (0), or the number of a fiducial.
+            program: Which program.
+        """

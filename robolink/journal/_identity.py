@@ -10,7 +10,7 @@ from robolink.model import EntryKind, Identity, NewEntry, Signature, Who
 from robolink.timing import wall_label
 
 if TYPE_CHECKING:
-    from robolink.journal.store.name_rows import NameRows
+    from robolink.journal.store.state_rows import NameRows
     from robolink.journal.store.store import Store
 
 _LOOPBACK_PORT: Final = re.compile(r"[/@](?:127\.[\d.]+|localhost|\[::1\]):(\d+)")

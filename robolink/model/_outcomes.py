@@ -1,4 +1,4 @@
-"""Durable markers of what was begun and not proved finished."""
+"""Durable markers of what was begun and not proved finished, and what was found out about them."""
 
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import AbstractContextManager
@@ -8,8 +8,9 @@ from typing import Protocol
 
 from robolink import ambient
 from robolink.errors import ConfigError
+from robolink.messages import tr
 from robolink.model._identity import Who
-from robolink.model.record.journal_entries import EntryKind, NewEntry, Recorded, Signature
+from robolink.model._journal_entries import EntryKind, NewEntry, Recorded, Signature
 
 
 class MarkerKind(StrEnum):
@@ -212,3 +213,87 @@ class OutcomeLog(Protocol):
 
     def close(self) -> None:
         """Give the lease up; open markers stay, and block until they are settled."""
+
+
+class Verdict(StrEnum):
+    """What reading the controller says about an open marker."""
+
+    DONE = "done"
+    NOT_APPLIED = "not applied"
+    NOT_FINISHED = "not finished"
+    CONFLICT = "conflict"
+    LOOK = "look"
+    NOT_RESTORED = "not restored"
+
+    @property
+    def needs_a_person(self) -> bool:
+        """Whether reading the controller cannot settle it."""
+        return self in (Verdict.CONFLICT, Verdict.LOOK)
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """An open marker and what is true now.
+
+    Attributes:
+        marker: What was begun.
+        verdict: What became of it.
+        sentence: The same for a person.
+        action: What settling it will do beyond forgetting it, empty for nothing.
+        entries: What settling it puts on record.
+    """
+
+    marker: Marker
+    verdict: Verdict
+    sentence: str
+    action: str = ""
+    entries: tuple[NewEntry, ...] = ()
+
+
+class Resolver(Protocol):
+    """Examines and settles what was begun on a controller and not proved finished."""
+
+    def fence(self) -> None:
+        """Make sure that nothing sent earlier, and not answered, takes effect from here on.
+
+        What is read before may be overtaken by a request that arrives late; so whoever settles
+        something calls this first. It changes nothing that a person would notice, and does
+        nothing where a link cannot deliver late, or was fenced off in this session already.
+
+        Raises:
+            LeaseHeldError: Another client has the controller.
+            RobolinkError: It cannot be done now; nothing may be settled.
+        """
+
+    def examine(self, marker: Marker) -> Finding:
+        """Read what is needed to judge ``marker``; changes nothing.
+
+        Raises:
+            ConfigError: The marker was written by something else.
+        """
+
+    def settle(self, finding: Finding) -> None:
+        """Do what ``finding.action`` says and forget the marker."""
+
+
+def begun_in_words(marker: Marker) -> str:
+    """Return what a marker was stored for, without the statement that was sent.
+
+    Args:
+        marker: Of a movement with its ``target`` (mm, degrees), of a tool that was written or
+            selected, or of anything else, which says itself what it is.
+    """
+    details = marker.details
+    target = details.get("target")
+    if marker.kind is MarkerKind.MOVE:
+        if not isinstance(target, list) or len(target) < 4:
+            return tr("a movement")
+        x, y, z, u = (float(value) for value in target[:4])
+        return tr("a movement to X {x:.3f} Y {y:.3f} Z {z:.3f} U {u:.3f}", x=x, y=y, z=z, u=u)
+    if marker.kind is MarkerKind.SET and isinstance(details.get("select"), int):
+        return tr("selecting tool {tool}", tool=details["select"])
+    if marker.kind is MarkerKind.SET and isinstance(details.get("tool"), int):
+        if details.get("requested") is None:
+            return tr("clearing tool {tool}", tool=details["tool"])
+        return tr("writing tool {tool}", tool=details["tool"])
+    return marker.request

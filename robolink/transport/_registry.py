@@ -15,7 +15,7 @@ from robolink.plug_ins import PlugInError, find_plug_in
 from robolink.timing import Clock
 from robolink.transport._mailbox_link import MailboxLink
 from robolink.transport._url import LinkUrl, parse_url
-from robolink.transport.stream.contract import Transport
+from robolink.transport.byte_stream import Transport
 
 if TYPE_CHECKING:
     from robolink.transport.modbus.client import ModbusClient
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 TRANSPORTS_GROUP = "robolink.transports"
 
 _MEDIA = {
-    "tcp": ("robolink.transport.stream.tcp", "open_tcp"),
-    "serial": ("robolink.transport.stream.serial_port", "open_serial_line"),
+    "tcp": ("robolink.transport.tcp", "open_tcp"),
+    "serial": ("robolink.transport.serial_port", "open_serial_line"),
 }
 _MAILBOX_MEDIA = {
     "modbus-tcp": ("robolink.transport.modbus.mailbox", "open_modbus_link"),

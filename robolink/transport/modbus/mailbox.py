@@ -20,8 +20,7 @@ from robolink.transport._mailbox_link import (
     require_slot,
     require_words,
 )
-from robolink.transport._url import LinkUrl
-from robolink.transport._url_options import UrlOptions
+from robolink.transport._url import LinkUrl, UrlOptions
 from robolink.transport.modbus.client import ModbusClient
 from robolink.transport.modbus.messages import Area
 from robolink.transport.modbus.opening import TCP_MEDIUM, Probe, open_client

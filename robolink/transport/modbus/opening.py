@@ -6,18 +6,16 @@ from typing import TYPE_CHECKING, Final
 from robolink.errors import ConfigError, ConnectError, TransportTimeoutError
 from robolink.messages import tr
 from robolink.timing import Clock, Deadline, SystemClock
-from robolink.transport._url import LinkUrl
-from robolink.transport._url_options import UrlOptions
+from robolink.transport._url import LinkUrl, UrlOptions
 from robolink.transport.modbus.client import ModbusClient
 from robolink.transport.modbus.framing import Framing
 from robolink.transport.modbus.messages import MOST_REGISTERS_READ, Area
 from robolink.transport.modbus.register_frames import RegisterRtuFraming, RegisterTcpFraming
 from robolink.transport.modbus.tcp import TcpExchange
-from robolink.transport.stream.dial import dial
-from robolink.transport.stream.tcp import TcpTransport
+from robolink.transport.tcp import TcpTransport, dial
 
 if TYPE_CHECKING:
-    from robolink.transport.stream.serial_port import SerialSettings
+    from robolink.transport.serial_port import SerialSettings
 
 MOST_REGISTERS: Final = "most_registers"
 """Option of a URL: how many registers the server gives in one read."""
@@ -142,7 +140,7 @@ def _open_rtu(
 ) -> ModbusClient:
     # Here, because over TCP nothing of a serial line is needed.
     from robolink.transport.modbus.rtu import RtuExchange, RtuLine
-    from robolink.transport.stream.serial_port import open_serial, take_settings
+    from robolink.transport.serial_port import open_serial, take_settings
 
     unit = options.take_int("unit", _DEFAULT_UNITS[RTU_MEDIUM], 1, 247)
     settings = take_settings(options, baud=19_200, parity="even", stop_bits_without_parity="2")

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
 
-from robolink.controllers.softmotion.link.snapshots import read_block
+from robolink.controllers.softmotion.snapshots import read_block
 from robolink.errors import RobolinkError
 from robolink.protocols import NEED_DATA, Role
 from robolink.protocols.epson_text import EpsonTextCodec, Reply, parse_status

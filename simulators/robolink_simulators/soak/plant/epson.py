@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Final
 
 from robolink.controllers import open_epson
-from robolink.controllers.epson.link.line import EpsonLine, text_line
+from robolink.controllers.epson.line import EpsonLine, text_line
 from robolink.errors import TransportError
 from robolink.model import Controller, OutcomeLog, Secret, ToolOffset
 from robolink.timing import Deadline

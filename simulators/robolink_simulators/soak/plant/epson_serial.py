@@ -1,7 +1,7 @@
 """An EPSON controller with Remote RS232 in a virtual cell, and the line that leads to it."""
 
-from robolink.controllers.epson.link.line import EpsonLine
-from robolink.controllers.epson.link.serial_opening import turn_on
+from robolink.controllers.epson.line import EpsonLine
+from robolink.controllers.epson.serial_opening import turn_on
 from robolink.protocols import Role
 from robolink.protocols.epson_binary import EpsonBinaryCodec
 from robolink.protocols.epson_text import BadRequest, Request
